@@ -1,0 +1,28 @@
+//! Pure camera geometry in `f64`: lens models, mounts, virtual views, view plans and box
+//! footprints. Knows no image, does no I/O.
+//!
+//! * Camera frame: OpenCV (x right, y down, z along the optical axis).
+//! * Lens functions speak of pixel centres: the centre of the top-left pixel is (0, 0).
+//! * Boxes are corner-origin: pixel `i` covers `[i, i + 1)`. [`pixels`] crosses the half pixel.
+//! * Angles are radians; `theta` is the angle from the optical axis.
+
+pub mod floor;
+pub mod footprint;
+pub mod lens;
+pub mod mount;
+pub mod oriented_box;
+pub mod pixels;
+pub mod view_plan;
+pub mod virtual_view;
+
+pub use footprint::{BackProjection, Footprint};
+pub use lens::{Lens, LensError};
+pub use mount::Mount;
+pub use oriented_box::OrientedBox;
+pub use view_plan::{FieldOfViewReading, ViewPlan};
+pub use virtual_view::VirtualView;
+
+/// A position in an image, in pixels.
+pub type Pixel = nalgebra::Point2<f64>;
+/// A direction in the camera frame; of unit length unless said otherwise.
+pub type Ray = nalgebra::Vector3<f64>;

@@ -1,0 +1,55 @@
+//! Bearings and floor positions of pixels.
+
+use super::{
+    Lens, Mount, Pixel,
+    pixels::{PixelConvention, cross_half_pixel},
+};
+
+/// Rays flatter than this above the floor (cosine of the angle from straight down) hit it too far
+/// away for the height to mean anything: 88°, about 29 heights away.
+const MIN_DOWNWARD_COSINE: f64 = 0.035;
+
+/// The direction of a pixel as seen from the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bearing {
+    /// 0 toward image right, growing clockwise on the screen, radians in [0, 2π).
+    pub azimuth: f64,
+    /// Angle from the optical axis, radians.
+    pub off_axis: f64,
+}
+
+/// A place on the floor; origin below the camera, x toward image right and y toward image down of
+/// a camera that looks straight down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FloorPosition {
+    /// Metres toward image right.
+    pub x_m: f64,
+    /// Metres toward image down.
+    pub y_m: f64,
+}
+
+/// The bearing of `point` (corner-origin frame pixels); `None` outside the lens image.
+#[must_use]
+pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
+    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCentre))?;
+    Some(Bearing {
+        azimuth: ray.y.atan2(ray.x).rem_euclid(std::f64::consts::TAU),
+        off_axis: ray.x.hypot(ray.y).atan2(ray.z),
+    })
+}
+
+/// Where the ray through `point` (corner-origin frame pixels) meets the floor; `None` when the
+/// height is unknown, the point lies outside the lens image, or the ray does not fall.
+#[must_use]
+pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorPosition> {
+    let height_m = mount.height_m()?;
+    let ray = lens.unproject(&cross_half_pixel(point, PixelConvention::PixelCentre))?;
+    let levelled = mount.camera_from_floor().inverse_transform_vector(&ray);
+    (levelled.z >= MIN_DOWNWARD_COSINE).then(|| FloorPosition {
+        x_m: height_m * levelled.x / levelled.z,
+        y_m: height_m * levelled.y / levelled.z,
+    })
+}
+
+#[cfg(test)]
+mod tests;

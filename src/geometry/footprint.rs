@@ -1,0 +1,145 @@
+//! Footprints: what a box found in a view covers in the fisheye frame.
+
+use nalgebra::Vector2;
+
+use super::{
+    Lens, Mount, Pixel, VirtualView,
+    pixels::{PixelConvention, cross_half_pixel},
+};
+
+/// Points on an inscribed ellipse: more change the hull by less than 0.2 % of its size.
+const ELLIPSE_POINTS: u32 = 32;
+/// The tilted ellipse is not determined near 45°: squared direction components at least this far
+/// apart keep the solution stable.
+const MIN_TILT_DETERMINANT: f64 = 0.18;
+/// A tilted ellipse thinner than this (ratio of squared axes) is not a person.
+const MIN_SQUARED_AXIS_RATIO: f64 = 0.04;
+/// A box of which less than this share of the outline lies in the lens image is not mapped.
+const MIN_INSIDE_SHARE: f64 = 0.5;
+
+/// How a box is taken back to the frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BackProjection {
+    /// The axis-parallel hull of the four mapped corners: the paper's way, oversized at oblique
+    /// azimuths (Seidel et al., section III-C).
+    CornerHull,
+    /// The hull of the inscribed ellipse whose major axis lies along the projected vertical at
+    /// the box centre: persons are upright ellipsoids far more than they are boxes.
+    TiltedEllipse,
+}
+
+/// An outline in the frame, corner-origin pixels, never empty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Footprint {
+    outline: Vec<Pixel>,
+}
+
+impl Footprint {
+    /// Maps the box `[x_min, y_min, x_max, y_max]` (corner-origin view pixels) to the frame.
+    /// Outline points beyond the lens image are pulled to its rim. `None` when most of the
+    /// outline lies beyond it.
+    #[must_use]
+    pub fn of_view_box(
+        view_box: [f64; 4],
+        back_projection: BackProjection,
+        view: &VirtualView,
+        lens: &Lens,
+        mount: &Mount,
+    ) -> Option<Self> {
+        let outline_in_view = match back_projection {
+            BackProjection::CornerHull => corners(view_box).to_vec(),
+            BackProjection::TiltedEllipse => tilted_ellipse(view_box, view, mount),
+        };
+        let mut inside = 0_usize;
+        let mut outline = Vec::with_capacity(outline_in_view.len());
+        for point in &outline_in_view {
+            let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
+            let ray = view.ray_in_camera(&pixel);
+            inside += usize::from(lens.project(&ray).is_some());
+            if let Some(in_frame) = lens.project_to_rim(&ray) {
+                outline.push(cross_half_pixel(in_frame, PixelConvention::CornerOrigin));
+            }
+        }
+        #[expect(clippy::cast_precision_loss, reason = "at most 32 points")]
+        let inside_share = inside as f64 / outline_in_view.len() as f64;
+        (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self { outline })
+    }
+
+    /// The outline's points, corner-origin frame pixels.
+    #[must_use]
+    pub fn outline(&self) -> &[Pixel] {
+        &self.outline
+    }
+
+    /// The axis-parallel hull `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
+    #[must_use]
+    pub fn bounds(&self) -> [f64; 4] {
+        let first = self.outline[0];
+        self.outline
+            .iter()
+            .fold([first.x, first.y, first.x, first.y], |hull, point| {
+                [
+                    hull[0].min(point.x),
+                    hull[1].min(point.y),
+                    hull[2].max(point.x),
+                    hull[3].max(point.y),
+                ]
+            })
+    }
+}
+
+fn corners([x_min, y_min, x_max, y_max]: [f64; 4]) -> [Pixel; 4] {
+    [
+        Pixel::new(x_min, y_min),
+        Pixel::new(x_max, y_min),
+        Pixel::new(x_max, y_max),
+        Pixel::new(x_min, y_max),
+    ]
+}
+
+fn tilted_ellipse(
+    [x_min, y_min, x_max, y_max]: [f64; 4],
+    view: &VirtualView,
+    mount: &Mount,
+) -> Vec<Pixel> {
+    let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
+    let half_width = (x_max - x_min) / 2.0;
+    let half_height = (y_max - y_min) / 2.0;
+    let center_pixel = cross_half_pixel(center, PixelConvention::PixelCentre);
+    let (axis, along, across) = view
+        .vertical_at(&center_pixel, mount)
+        .and_then(|vertical| ellipse_axes(vertical, half_width, half_height))
+        .unwrap_or((Vector2::y(), half_height, half_width));
+    let normal = Vector2::new(axis.y, -axis.x);
+    (0..ELLIPSE_POINTS)
+        .map(|index| {
+            let angle = std::f64::consts::TAU * f64::from(index) / f64::from(ELLIPSE_POINTS);
+            center + axis * (along * angle.cos()) + normal * (across * angle.sin())
+        })
+        .collect()
+}
+
+/// The semi-axes (along and across `vertical`) of the ellipse inscribed in a box.
+///
+/// An ellipse with semi-axes `p` along `(sx, sy)` and `q` across has the half extents
+/// `w² = p² sx² + q² sy²` and `h² = p² sy² + q² sx²`; this is their inverse.
+fn ellipse_axes(
+    vertical: Vector2<f64>,
+    half_width: f64,
+    half_height: f64,
+) -> Option<(Vector2<f64>, f64, f64)> {
+    let (sx2, sy2) = (vertical.x * vertical.x, vertical.y * vertical.y);
+    // sy⁴ − sx⁴ with sx² + sy² = 1.
+    let determinant = sy2 - sx2;
+    if determinant.abs() < MIN_TILT_DETERMINANT {
+        return None;
+    }
+    let (w2, h2) = (half_width * half_width, half_height * half_height);
+    let along2 = (h2 * sy2 - w2 * sx2) / determinant;
+    let across2 = (w2 * sy2 - h2 * sx2) / determinant;
+    let plausible = along2 > 0.0 && across2 > MIN_SQUARED_AXIS_RATIO * along2;
+    plausible.then(|| (vertical, along2.sqrt(), across2.sqrt()))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,110 @@
+//! Boxes whose height axis follows the projected vertical: how people stand in a fisheye frame.
+
+use nalgebra::Vector2;
+
+use super::{
+    Lens, Mount, Pixel,
+    pixels::{PixelConvention, cross_half_pixel},
+};
+
+/// Step along the vertical, in units of the ray, for the direction of up in the frame.
+const VERTICAL_STEP: f64 = 1e-4;
+
+/// A rectangle in the frame, turned so that its height axis is the projected vertical.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrientedBox {
+    /// Centre, corner-origin frame pixels.
+    pub center: Pixel,
+    /// Extent across the height axis, pixels.
+    pub width: f64,
+    /// Extent along the height axis, pixels.
+    pub height: f64,
+    /// Clockwise rotation of the height axis from image up, radians, in (−π/2, π/2].
+    pub angle: f64,
+    /// Unit vector of the height axis, from the feet to the head.
+    pub up: Vector2<f64>,
+}
+
+impl OrientedBox {
+    /// The middle of the lower short side: where the feet are. Corner-origin frame pixels.
+    #[must_use]
+    pub fn foot(&self) -> Pixel {
+        self.center - self.up * (self.height / 2.0)
+    }
+
+    /// The box with its height axis along `up` that averages the extents of several outlines.
+    /// Weights must be positive; `None` without outlines.
+    #[must_use]
+    pub fn averaging<'a>(
+        up: Vector2<f64>,
+        weighted_outlines: impl IntoIterator<Item = (f64, &'a [Pixel])>,
+    ) -> Option<Self> {
+        let right = Vector2::new(-up.y, up.x);
+        let mut total = 0.0;
+        let mut extents = [0.0; 4];
+        for (weight, outline) in weighted_outlines {
+            let (low, high) = extent(outline, &up)?;
+            let (left_end, right_end) = extent(outline, &right)?;
+            total += weight;
+            for (sum, value) in extents.iter_mut().zip([low, high, left_end, right_end]) {
+                *sum += weight * value;
+            }
+        }
+        if total <= 0.0 {
+            return None;
+        }
+        let [low, high, left_end, right_end] = extents.map(|sum| sum / total);
+        let center = up * f64::midpoint(low, high) + right * f64::midpoint(left_end, right_end);
+        Some(Self {
+            center: Pixel::from(center),
+            width: right_end - left_end,
+            height: high - low,
+            angle: axis_angle(up),
+            up,
+        })
+    }
+}
+
+/// The direction (unit length, frame pixels) in which a vertical pole seen at `point`
+/// (corner-origin) rises; image up where the camera looks along the vertical.
+#[must_use]
+pub fn vertical_in_frame(point: Pixel, lens: &Lens, mount: &Mount) -> Vector2<f64> {
+    let image_up = Vector2::new(0.0, -1.0);
+    let pixel = cross_half_pixel(point, PixelConvention::PixelCentre);
+    let Some(ray) = lens.unproject(&pixel) else {
+        return image_up;
+    };
+    let step = mount.world_up() * VERTICAL_STEP;
+    let (Some(below), Some(above)) = (
+        lens.project_to_rim(&(ray - step)),
+        lens.project_to_rim(&(ray + step)),
+    ) else {
+        return image_up;
+    };
+    (above - below)
+        .try_normalize(f64::EPSILON)
+        .unwrap_or(image_up)
+}
+
+fn extent(outline: &[Pixel], axis: &Vector2<f64>) -> Option<(f64, f64)> {
+    outline
+        .iter()
+        .map(|point| point.coords.dot(axis))
+        .map(|along| (along, along))
+        .reduce(|(low, high), (along, _)| (low.min(along), high.max(along)))
+}
+
+/// The clockwise angle of an axis from image up, radians, in (−π/2, π/2]: an axis has no sign.
+fn axis_angle(up: Vector2<f64>) -> f64 {
+    let angle = up.x.atan2(-up.y);
+    if angle > std::f64::consts::FRAC_PI_2 {
+        angle - std::f64::consts::PI
+    } else if angle <= -std::f64::consts::FRAC_PI_2 {
+        angle + std::f64::consts::PI
+    } else {
+        angle
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,163 @@
+//! View plans: which directions a camera is looked at from within.
+
+use std::f64::consts::TAU;
+
+use super::{Mount, VirtualView, virtual_view::ViewDirection};
+
+/// How the paper's field of view is read (Seidel et al., section III; their formula for the field
+/// of view contradicts its own symbols, so three readings exist).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldOfViewReading {
+    /// 53.13° horizontally and vertically (focal length = view width). The only reading in which
+    /// the outermost ring is the last one without black borders, as the paper says of it.
+    #[default]
+    Horizontal,
+    /// 53.13° along the diagonal (38.94° horizontally).
+    Diagonal,
+    /// The formula taken literally: focal length = half the view width, 90° horizontally.
+    Literal,
+}
+
+impl FieldOfViewReading {
+    /// The full horizontal opening angle, radians.
+    #[must_use]
+    pub fn radians(self) -> f64 {
+        let focal_per_width = match self {
+            Self::Horizontal => 1.0,
+            Self::Diagonal => std::f64::consts::SQRT_2,
+            Self::Literal => 0.5,
+        };
+        2.0 * f64::atan(0.5 / focal_per_width)
+    }
+}
+
+/// A ring of views at one elevation, spread evenly over the full turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ring {
+    /// Angle from the plan's axis, radians.
+    pub elevation: f64,
+    /// How many views.
+    pub count: u32,
+    /// Full horizontal opening angle of each, radians.
+    pub field_of_view: f64,
+}
+
+/// The directions a camera is looked at from within.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewPlan {
+    directions: Vec<ViewDirection>,
+}
+
+impl ViewPlan {
+    /// The 128 views of the paper: elevations 0, 0.3, 0.6, 0.9 rad, each at the 32 azimuths
+    /// −3.14, −2.94 … 3.06 rad (Seidel et al., section IV).
+    #[must_use]
+    pub fn paper(reading: FieldOfViewReading) -> Self {
+        let elevations = [0.0, 0.3, 0.6, 0.9];
+        let directions = elevations.iter().flat_map(|&elevation| {
+            (0..32).map(move |step| ViewDirection {
+                elevation,
+                azimuth: 0.2 * f64::from(step) - 3.14,
+                field_of_view: reading.radians(),
+            })
+        });
+        Self {
+            directions: directions.collect(),
+        }
+    }
+
+    /// Evenly filled rings.
+    #[must_use]
+    pub fn rings(rings: &[Ring]) -> Self {
+        let directions = rings.iter().flat_map(|ring| {
+            (0..ring.count).map(|index| ViewDirection {
+                elevation: ring.elevation,
+                azimuth: TAU * f64::from(index) / f64::from(ring.count),
+                field_of_view: ring.field_of_view,
+            })
+        });
+        Self {
+            directions: directions.collect(),
+        }
+    }
+
+    /// One nadir view and a ring of twelve, all of 90°: nearly the recall of the paper's plan at
+    /// a tenth of its cost.
+    #[must_use]
+    pub fn thirteen_wide() -> Self {
+        let field_of_view = 90_f64.to_radians();
+        Self::rings(&[
+            Ring {
+                elevation: 0.0,
+                count: 1,
+                field_of_view,
+            },
+            Ring {
+                elevation: 0.8,
+                count: 12,
+                field_of_view,
+            },
+        ])
+    }
+
+    /// 24 views of 70°: sharper than the wide plan, still upright out to the rim.
+    #[must_use]
+    pub fn twenty_four() -> Self {
+        let field_of_view = 70_f64.to_radians();
+        Self::rings(&[
+            Ring {
+                elevation: 0.05,
+                count: 2,
+                field_of_view,
+            },
+            Ring {
+                elevation: 0.55,
+                count: 10,
+                field_of_view,
+            },
+            Ring {
+                elevation: 0.95,
+                count: 12,
+                field_of_view,
+            },
+        ])
+    }
+
+    /// 52 views of the paper's opening angle: every standing person within 6 m wholly in a view.
+    #[must_use]
+    pub fn fifty_two() -> Self {
+        let field_of_view = FieldOfViewReading::Horizontal.radians();
+        let ring = |elevation, count| Ring {
+            elevation,
+            count,
+            field_of_view,
+        };
+        Self::rings(&[
+            ring(0.1, 1),
+            ring(0.35, 9),
+            ring(0.6, 10),
+            ring(0.75, 10),
+            ring(0.9, 12),
+            ring(1.05, 10),
+        ])
+    }
+
+    /// The directions, in plan order.
+    #[must_use]
+    pub fn directions(&self) -> &[ViewDirection] {
+        &self.directions
+    }
+
+    /// The plan's views for a mount, `width` × `height` pixels each, in plan order.
+    #[must_use]
+    pub fn views(&self, mount: &Mount, width: u32, height: u32) -> Vec<VirtualView> {
+        self.directions
+            .iter()
+            .map(|direction| VirtualView::new(direction, mount, width, height))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,42 @@
+use super::*;
+use crate::geometry::Pixel;
+
+#[test]
+fn the_paper_plan_has_four_rings_of_thirty_two_views() {
+    let plan = ViewPlan::paper(FieldOfViewReading::default());
+    assert_eq!(plan.directions().len(), 128);
+    for (ring, elevation) in plan.directions().chunks(32).zip([0.0, 0.3, 0.6, 0.9]) {
+        assert!(ring.iter().all(|view| view.elevation == elevation));
+        assert!((ring[0].azimuth + 3.14).abs() < 1e-12);
+        assert!((ring[31].azimuth - 3.06).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn the_three_readings_of_the_field_of_view_are_53_39_and_90_degrees() {
+    let degrees = |reading: FieldOfViewReading| reading.radians().to_degrees();
+    assert!((degrees(FieldOfViewReading::Horizontal) - 53.1301).abs() < 1e-4);
+    assert!((degrees(FieldOfViewReading::Diagonal) - 38.9424).abs() < 1e-4);
+    assert!((degrees(FieldOfViewReading::Literal) - 90.0).abs() < 1e-9);
+}
+
+#[test]
+fn the_rings_of_a_plan_reach_the_rim_of_a_180_degree_lens() {
+    for (plan, count) in [
+        (ViewPlan::thirteen_wide(), 13),
+        (ViewPlan::twenty_four(), 24),
+        (ViewPlan::fifty_two(), 52),
+    ] {
+        let views = plan.views(&Mount::default(), 301, 301);
+        assert_eq!(views.len(), count);
+        let reach = views
+            .iter()
+            .map(|view| view.ray_in_camera(&Pixel::new(150.0, 0.0)))
+            .map(|ray| ray.x.hypot(ray.y).atan2(ray.z))
+            .fold(0.0, f64::max);
+        assert!(
+            reach > 85_f64.to_radians(),
+            "a plan of {count} reaches {reach}"
+        );
+    }
+}

@@ -1,0 +1,141 @@
+//! Virtual views: pinhole cameras that share the fisheye camera's centre.
+
+use nalgebra::{Rotation3, Vector2, Vector3};
+
+use super::{Mount, Pixel, Ray};
+
+/// Where a view looks, relative to the axis its plan is centred on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewDirection {
+    /// Angle from the plan's axis, radians. Positive tilts toward image up, then `azimuth` spins.
+    pub elevation: f64,
+    /// Rotation about the plan's axis, radians, clockwise on the screen.
+    pub azimuth: f64,
+    /// Full horizontal opening angle, radians, below 180°.
+    pub field_of_view: f64,
+}
+
+/// A pinhole view of `width` × `height` pixels with square pixels and a central principal point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VirtualView {
+    camera_from_view: Rotation3<f64>,
+    focal: f64,
+    width: u32,
+    height: u32,
+}
+
+/// Up is undefined in a view whose axis is within this of it (sine of the angle).
+const UPRIGHT_MIN_SINE: f64 = 1e-3;
+
+impl VirtualView {
+    /// Places a view. `camera_from_view = camera_from_plan · Rz(azimuth) · Rx(elevation)`, so that
+    /// with a camera that looks straight down, image up in the view points outward and up: people
+    /// stand upright. Under any mount that the plan is not centred on, the view is rolled until
+    /// the projected `world_up` points up.
+    #[must_use]
+    pub fn new(direction: &ViewDirection, mount: &Mount, width: u32, height: u32) -> Self {
+        let spin = Rotation3::from_axis_angle(&Vector3::z_axis(), direction.azimuth);
+        let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), direction.elevation);
+        let unrolled = mount.camera_from_plan() * spin * tilt;
+        let camera_from_view = if mount.is_near_nadir() {
+            unrolled
+        } else {
+            unrolled * upright_roll(&unrolled, mount)
+        };
+        Self {
+            camera_from_view,
+            focal: f64::from(width) / 2.0 / (direction.field_of_view / 2.0).tan(),
+            width,
+            height,
+        }
+    }
+
+    /// Rotation from the view frame to the camera frame.
+    #[must_use]
+    pub fn camera_from_view(&self) -> &Rotation3<f64> {
+        &self.camera_from_view
+    }
+
+    /// Focal length, pixels.
+    #[must_use]
+    pub fn focal(&self) -> f64 {
+        self.focal
+    }
+
+    /// Width, pixels.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height, pixels.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The ray (camera frame, not of unit length) through a view pixel (pixel centres).
+    #[must_use]
+    pub fn ray_in_camera(&self, pixel: &Pixel) -> Ray {
+        self.camera_from_view * self.ray_in_view(pixel)
+    }
+
+    /// The ray (view frame, z = 1) through a view pixel (pixel centres).
+    #[must_use]
+    pub fn ray_in_view(&self, pixel: &Pixel) -> Ray {
+        let principal = self.principal_point();
+        Ray::new(
+            (pixel.x - principal.x) / self.focal,
+            (pixel.y - principal.y) / self.focal,
+            1.0,
+        )
+    }
+
+    /// Where a ray (camera frame) meets the view (pixel centres), also beyond its borders; `None`
+    /// for rays that point away from it.
+    #[must_use]
+    pub fn project(&self, ray_in_camera: &Ray) -> Option<Pixel> {
+        let ray = self
+            .camera_from_view
+            .inverse_transform_vector(ray_in_camera);
+        let principal = self.principal_point();
+        (ray.z > 0.0).then(|| {
+            Pixel::new(
+                self.focal * ray.x / ray.z + principal.x,
+                self.focal * ray.y / ray.z + principal.y,
+            )
+        })
+    }
+
+    /// The direction (unit length, view pixels) in which a vertical pole seen at `pixel` (pixel
+    /// centres) rises; `None` where the view looks along the vertical.
+    #[must_use]
+    pub fn vertical_at(&self, pixel: &Pixel, mount: &Mount) -> Option<Vector2<f64>> {
+        let up = self
+            .camera_from_view
+            .inverse_transform_vector(&mount.world_up());
+        let ray = self.ray_in_view(pixel);
+        // Derivative of the perspective projection along `up`, times the (positive) depth.
+        let direction = Vector2::new(up.x - ray.x * up.z, up.y - ray.y * up.z);
+        direction.try_normalize(f64::EPSILON)
+    }
+
+    fn principal_point(&self) -> Pixel {
+        Pixel::new(
+            f64::from(self.width - 1) / 2.0,
+            f64::from(self.height - 1) / 2.0,
+        )
+    }
+}
+
+/// The roll about the view axis after which the projected world up is image up.
+fn upright_roll(camera_from_view: &Rotation3<f64>, mount: &Mount) -> Rotation3<f64> {
+    let up = camera_from_view.inverse_transform_vector(&mount.world_up());
+    if up.x.hypot(up.y) < UPRIGHT_MIN_SINE {
+        return Rotation3::identity();
+    }
+    Rotation3::from_axis_angle(&Vector3::z_axis(), up.x.atan2(-up.y))
+}
+
+#[cfg(test)]
+mod tests;

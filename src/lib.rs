@@ -1,0 +1,3 @@
+//! Lookdown finds people in the pictures of ceiling fisheye cameras.
+
+pub mod geometry;

@@ -1,0 +1,2 @@
+//! Lookdown
+fn main() {}
