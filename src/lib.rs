@@ -1,3 +1,13 @@
 //! Lookdown finds people in the pictures of ceiling fisheye cameras.
+//!
+//! A frame becomes upright perspective views, a person detector trained on ordinary photographs
+//! runs on them, and its boxes are mapped back to the frame and merged. `ARCHITECTURE.md` has the
+//! map and the walk of one frame; dependencies between the modules point one way.
 
+pub mod calibration;
+pub mod detection;
+pub mod evaluation;
 pub mod geometry;
+pub mod imaging;
+pub mod inference;
+pub mod pipeline;

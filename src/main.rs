@@ -1,2 +1,2 @@
-//! Lookdown
+//! The `lookdown` binary.
 fn main() {}

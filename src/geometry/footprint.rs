@@ -65,6 +65,14 @@ impl Footprint {
         (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self { outline })
     }
 
+    /// The footprint of a box found in the frame itself: its corners.
+    #[must_use]
+    pub fn of_frame_box(frame_box: [f64; 4]) -> Self {
+        Self {
+            outline: corners(frame_box).to_vec(),
+        }
+    }
+
     /// The outline's points, corner-origin frame pixels.
     #[must_use]
     pub fn outline(&self) -> &[Pixel] {

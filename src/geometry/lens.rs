@@ -48,6 +48,9 @@ pub enum LensError {
         /// Its value.
         value: f64,
     },
+    /// The focal length is missing, or given in two ways.
+    #[error("give either focal, or both fx and fy")]
+    FocalLengths,
     /// The radius does not grow with the angle at the optical axis.
     #[error(
         "the lens curve of {model} does not rise at the optical axis: check the order and sign of \

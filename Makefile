@@ -1,0 +1,35 @@
+# The commands of README.md. Everything they fetch or build stays in this folder.
+PYTHON ?= python3
+
+.NOTPARALLEL:
+.PHONY: help setup serve test ci bless
+
+help: ## say what there is
+	@echo "make TARGET, where TARGET is:"
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
+		printf '  %-8s %s\n' "$$target" "$$text"; done
+
+setup: ## fetch ONNX Runtime and the default model, build target/release/lookdown
+	@$(PYTHON) scripts/setup.py
+	cargo build --release --locked --target-dir target
+
+serve: setup ## set up, then run the server
+	@exec target/release/lookdown serve
+
+test: ## set up, then everything that needs nothing but this repository: formatting, lints, tests, documentation
+	@$(PYTHON) scripts/setup.py
+	cargo fmt --check
+	cargo clippy --all-targets --locked -- -D warnings
+	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
+	cargo test --locked
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --locked
+
+ci: ## all that the continuous integration runs
+	.ci/run
+
+bless: ## regenerate the checked-in generated files: openapi/openapi.json and the snapshots
+	@$(PYTHON) scripts/setup.py
+	mkdir -p openapi
+	cargo run --release --locked -- openapi > openapi/openapi.json.new || { rm -f openapi/openapi.json.new; exit 1; }
+	mv openapi/openapi.json.new openapi/openapi.json
+	INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --locked

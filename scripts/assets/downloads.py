@@ -1,0 +1,77 @@
+"""Fetches archives through the registries' ordinary clients and keeps those that are what they should be."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from . import npm
+from .commands import run
+from .console import SetupError, megabytes, say
+from .pins import Archive, Requirement, Runtime
+from .places import Places, put_in_place, require_space
+from .private_python import PrivatePython, pip_environment
+from .sums import is_whole, require_sum
+
+# Measured for a whole cold set-up: 240 MB at its peak, 450 MB where Node.js has to be fetched as well.
+SPACE_NEEDED = 500_000_000
+
+
+def fetch_wheel(places: Places, runtime: Runtime, step: str) -> Path:
+    """The wheel that holds ONNX Runtime, by `pip download`."""
+
+    def command() -> list[str]:
+        return PrivatePython(places, step).pip(
+            *("download", "--no-deps", "--only-binary=:all:", "--no-cache-dir", "--dest=."),
+            *(f"--platform={runtime.platform}", f"--python-version={runtime.python_version}"),
+            *("--implementation=cp", f"--abi=cp{runtime.python_version.replace('.', '')}"),
+            f"{runtime.archive.package}=={runtime.archive.version}",
+        )
+
+    return fetch(places, runtime.archive, step, client="pip", command=command, environment=pip_environment())
+
+
+def fetch_npm_package(places: Places, archive: Archive, node: tuple[Requirement, ...], step: str) -> Path:
+    """An npm package's tarball, by `npm pack`."""
+
+    def command() -> list[str]:
+        return npm.pack_command(places, archive, node, step)
+
+    return fetch(places, archive, step, client="npm", command=command, environment=npm.environment())
+
+
+def fetch(
+    places: Places,
+    archive: Archive,
+    step: str,
+    *,
+    client: str,
+    command: Callable[[], list[str]],
+    environment: dict[str, str],
+) -> Path:
+    """The checked archive, kept in `.setup/downloads`.
+
+    `command` prepares the client and returns the command line that writes the archive into its current folder.
+    """
+    kept = places.downloads / archive.file
+    if is_whole(kept, archive.sha256):
+        say(step, f"{archive.file} was fetched before")
+        return kept
+    require_space(places.own, SPACE_NEEDED)
+    fetching = command()
+    say(step, f"fetching {archive.package} {archive.version} with {client} ({megabytes(archive.bytes)})")
+    with places.temporary() as folder:
+        run(
+            step,
+            fetching,
+            folder=folder,
+            environment=environment,
+            failure=f"{client} could not fetch {archive.package} {archive.version}. Check the network and {client}'s "
+            f"registry settings and run the set-up again, or put {archive.file} into {places.downloads} yourself. "
+            f"{client} said:",
+            size=archive.bytes,
+        )
+        fetched = folder / archive.file
+        if not fetched.is_file():
+            raise SetupError(f"{client} ran without an error but wrote no {archive.file}; run the set-up again.")
+        require_sum(fetched, archive.sha256, client)
+        put_in_place(fetched, kept)
+    return kept

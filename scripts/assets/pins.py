@@ -1,0 +1,127 @@
+"""The pinned versions and sums of `pins.toml`, checked as they are read."""
+
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from .console import SetupError
+
+SHA256 = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class Member:
+    """A file in an archive; `to` is where it goes in the repository, if it is a result itself."""
+
+    path: str
+    sha256: str
+    to: str | None
+
+
+@dataclass(frozen=True)
+class Archive:
+    """A package as its registry serves it."""
+
+    package: str
+    version: str
+    file: str
+    bytes: int
+    sha256: str
+    members: tuple[Member, ...]
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """ONNX Runtime for one kind of CPU; platform and Python version choose the wheel."""
+
+    archive: Archive
+    platform: str
+    python_version: str
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model, the module that converts it, and the sum of the ONNX file it gives."""
+
+    name: str
+    archive: Archive
+    converter: str
+    onnx_sha256: str
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A Python package for the private environment; any of the sums may match."""
+
+    package: str
+    version: str
+    marker: str | None
+    sha256: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Pins:
+    """All of `pins.toml`."""
+
+    runtime: dict[str, Runtime]
+    models: tuple[Model, ...]
+    converter: tuple[Requirement, ...]
+    node: tuple[Requirement, ...]
+
+
+def read_pins(file: Path) -> Pins:
+    """Reads the pins; a missing key or a malformed sum is an error that names the file."""
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        runtime = document["runtime"]
+        return Pins(
+            runtime={cpu: _runtime(runtime, runtime[cpu]) for cpu in ("x86_64", "aarch64")},
+            models=tuple(_model(name, table) for name, table in document["models"].items()),
+            converter=tuple(_requirement(table) for table in document["converter"]),
+            node=tuple(_requirement(table) for table in document["node"]),
+        )
+    except KeyError as missing:
+        raise SetupError(f"{file}: the key {missing} is missing.") from None
+    except (ValueError, tomllib.TOMLDecodeError) as error:
+        raise SetupError(f"{file}: {error}.") from None
+
+
+def _runtime(common: dict, table: dict) -> Runtime:
+    archive = _archive(common | table)
+    return Runtime(archive, platform=table["platform"], python_version=common["python_version"])
+
+
+def _model(name: str, table: dict) -> Model:
+    return Model(name, _archive(table), table["converter"], _sha256(table["onnx_sha256"]))
+
+
+def _archive(table: dict) -> Archive:
+    return Archive(
+        package=table["package"],
+        version=table["version"],
+        file=_inside(table["file"]),
+        bytes=table["bytes"],
+        sha256=_sha256(table["sha256"]),
+        members=tuple(
+            Member(member["path"], _sha256(member["sha256"]), _inside(member["to"]) if "to" in member else None)
+            for member in table["members"]
+        ),
+    )
+
+
+def _requirement(table: dict) -> Requirement:
+    sums = tuple(_sha256(value) for value in table["sha256"])
+    return Requirement(table["package"], table["version"], table.get("marker"), sums)
+
+
+def _sha256(value: str) -> str:
+    if not SHA256.fullmatch(value):
+        raise ValueError(f"'{value}' is not a sha256 sum of 64 lower-case hexadecimal digits")
+    return value
+
+
+def _inside(path: str) -> str:
+    if PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts:
+        raise ValueError(f"'{path}' leaves the repository")
+    return path

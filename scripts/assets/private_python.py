@@ -1,0 +1,110 @@
+"""A Python environment of the set-up's own, so that nothing of the user's is touched."""
+
+import importlib.util
+import os
+import shutil
+import sys
+
+from .commands import run
+from .console import SetupError, say
+from .pins import Requirement
+from .places import Places
+
+# What a user may say about how registries are reached. Every other PIP_ setting is about the user's own
+# environments (PIP_TARGET, PIP_NO_BINARY, PIP_REQUIRE_VIRTUALENV ...) and must not reach this one.
+REGISTRY_SETTINGS = {
+    *("PIP_INDEX_URL", "PIP_EXTRA_INDEX_URL", "PIP_NO_INDEX", "PIP_FIND_LINKS", "PIP_TRUSTED_HOST", "PIP_CERT"),
+    *("PIP_CLIENT_CERT", "PIP_PROXY", "PIP_TIMEOUT", "PIP_DEFAULT_TIMEOUT", "PIP_RETRIES", "PIP_KEYRING_PROVIDER"),
+    "PIP_CONFIG_FILE",
+}
+NO_PIP = (
+    "The set-up needs Python's venv module and pip, and this Python lacks one of them; install both "
+    "(Debian and Ubuntu: apt-get install python3-venv) and run the set-up again."
+)
+
+
+class PrivatePython:
+    """The environment in `.setup/venv`, made when it is first asked for."""
+
+    def __init__(self, places: Places, step: str):
+        self.places = places
+        self.step = step
+        self.folder = places.python
+        self.python = self.folder / "bin" / "python"
+
+    def pip(self, *arguments: str) -> list[str]:
+        """The command that runs pip for this environment; makes the environment if need be."""
+        self._make()
+        if has_module("ensurepip"):
+            return [str(self.python), "-m", "pip", *arguments]
+        return [sys.executable, "-m", "pip", "--python", str(self.python), *arguments]
+
+    def install(self, label: str, requirements: tuple[Requirement, ...]) -> None:
+        """Installs exactly these packages, by their sums; nothing is done if they are there already."""
+        wanted = requirements_text(requirements)
+        record = self.folder / f"{label}-requirements.txt"
+        command = self.pip("install", "--require-hashes", "--only-binary=:all:", "--no-deps", "--no-cache-dir")
+        if record.is_file() and record.read_text(encoding="utf-8") == wanted:
+            return
+        names = ", ".join(dict.fromkeys(pin.package for pin in requirements))
+        say(self.step, f"installing into .setup/venv with pip: {names}")
+        with self.places.temporary() as folder:
+            listed = folder / record.name
+            listed.write_text(wanted, encoding="utf-8")
+            run(
+                self.step,
+                [*command, "-r", str(listed)],
+                folder=folder,
+                environment=pip_environment(),
+                failure="pip could not install what the set-up needs; check the network and pip's index settings, "
+                "and run the set-up again. pip said:",
+            )
+            os.replace(listed, record)
+
+    def _make(self) -> None:
+        flags = [] if has_module("ensurepip") else ["--without-pip"]
+        identity = f"{sys.version}\n{os.path.realpath(sys.executable)} {flags}\n"
+        record = self.folder / "made-by.txt"
+        if record.is_file() and record.read_text(encoding="utf-8") == identity and self.python.exists():
+            return
+        if not has_module("venv") or not (has_module("ensurepip") or has_module("pip")):
+            raise SetupError(NO_PIP)
+        say(self.step, "making a private Python environment in .setup/venv")
+        shutil.rmtree(self.folder, ignore_errors=True)
+        with self.places.temporary() as folder:
+            run(
+                self.step,
+                [sys.executable, "-m", "venv", *flags, str(self.folder)],
+                folder=folder,
+                environment=pip_environment(),
+                failure=f"{NO_PIP} It said:",
+            )
+        # Written last: an environment without it was not finished and is made anew.
+        record.write_text(identity, encoding="utf-8")
+
+
+def has_module(name: str) -> bool:
+    """Whether this Python has the module; Debian leaves out some of the standard library."""
+    return importlib.util.find_spec(name) is not None
+
+
+def requirements_text(requirements: tuple[Requirement, ...]) -> str:
+    """The pins as a requirements file for `pip install --require-hashes`."""
+    lines = []
+    for pin in requirements:
+        marker = f" ; {pin.marker}" if pin.marker else ""
+        hashes = "".join(f" --hash=sha256:{value}" for value in pin.sha256)
+        lines.append(f"{pin.package}=={pin.version}{marker}{hashes}\n")
+    return "".join(lines)
+
+
+def pip_environment() -> dict[str, str]:
+    """The user's environment without what would lead pip or the private Python elsewhere."""
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name in REGISTRY_SETTINGS or not name.startswith(("PIP_", "PYTHON", "VIRTUAL_ENV"))
+    }
+    # These win over the user's configuration file as well.
+    quiet = {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_INPUT": "1", "PIP_ROOT_USER_ACTION": "ignore"}
+    return environment | quiet | {"PIP_REQUIRE_VIRTUALENV": "0", "PIP_USER": "0", "PYTHONNOUSERSITE": "1"}

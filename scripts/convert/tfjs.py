@@ -1,0 +1,65 @@
+"""Reads a TensorFlow.js graph model: a `model.json` and the weight shards it names, which lie beside it."""
+
+import base64
+import json
+import math
+from pathlib import Path
+
+import numpy
+
+from .tf_graph import ConversionError, TfGraph, TfNode
+
+ELEMENT_TYPES = {"float32": numpy.float32, "int32": numpy.int32}
+
+
+def read_tfjs(model_json: Path) -> TfGraph:
+    """The graph stored in `model_json`."""
+    document = json.loads(model_json.read_text(encoding="utf-8"))
+    nodes = {
+        node["name"]: TfNode(
+            operation=node["op"],
+            inputs=node.get("input") or [],
+            attributes={key: _attribute(value) for key, value in (node.get("attr") or {}).items()},
+        )
+        for node in document["modelTopology"]["node"]
+    }
+    constants = {}
+    for group in document["weightsManifest"]:
+        shards = b"".join((model_json.parent / shard).read_bytes() for shard in group["paths"])
+        constants.update(_weights(group["weights"], shards))
+    return TfGraph(nodes, constants)
+
+
+def _weights(entries: list[dict], shards: bytes) -> dict[str, numpy.ndarray]:
+    """Cuts the joined shards into tensors; the manifest lists them in order, without gaps."""
+    tensors = {}
+    offset = 0
+    for entry in entries:
+        if "quantization" in entry or entry["dtype"] not in ELEMENT_TYPES:
+            raise ConversionError(f"weights stored as {entry} are not read, only plain float32 and int32")
+        count = math.prod(entry["shape"])
+        tensor = numpy.frombuffer(shards, ELEMENT_TYPES[entry["dtype"]], count, offset)
+        tensors[entry["name"]] = tensor.reshape(entry["shape"])
+        offset += tensor.nbytes
+    if offset != len(shards):
+        raise ConversionError(f"the manifest describes {offset} bytes of weights, the shards hold {len(shards)}")
+    return tensors
+
+
+def _attribute(value: dict):
+    """The plain Python value of a node attribute; kinds that no operation asks for stay as they are."""
+    match value:
+        case {"s": list(codes)}:
+            return bytes(codes).decode()
+        case {"s": text}:
+            return base64.b64decode(text).decode()
+        case {"i": number}:
+            return int(number)
+        case {"f": number}:
+            return float(number)
+        case {"b": flag}:
+            return bool(flag)
+        case {"list": {"i": numbers}}:
+            return [int(number) for number in numbers]
+        case _:
+            return value

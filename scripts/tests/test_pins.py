@@ -1,0 +1,61 @@
+"""The pins: the shipped file is complete, and a damaged one is refused."""
+
+import re
+from pathlib import Path
+
+from assets.console import SetupError
+from assets.pins import read_pins
+
+from .support import InEmptyRepository
+
+SCRIPTS = Path(__file__).resolve().parents[1]
+SHIPPED = SCRIPTS / "pins.toml"
+
+
+class ShippedPins(InEmptyRepository):
+    def test_both_processors_get_the_library_and_its_licences_from_the_same_version(self):
+        for cpu, runtime in read_pins(SHIPPED).runtime.items():
+            self.assertIn(cpu, runtime.platform)
+            self.assertIn(cpu, runtime.archive.file)
+            self.assertIn(runtime.archive.version, runtime.archive.file)
+            results = {member.to for member in runtime.archive.members}
+            self.assertEqual(results, {"runtime/libonnxruntime.so", "runtime/LICENSE", "runtime/ThirdPartyNotices.txt"})
+
+    def test_every_model_has_a_converter_and_its_results_stay_in_its_folder(self):
+        models = read_pins(SHIPPED).models
+        self.assertEqual([model.name for model in models], ["ssdlite_mobilenet_v2"])
+        for model in models:
+            self.assertTrue((SCRIPTS / f"{model.converter.replace('.', '/')}.py").is_file())
+            for member in model.archive.members:
+                if member.to:
+                    self.assertTrue(member.to.startswith(f"models/{model.name}/"))
+
+    def test_no_sum_is_pinned_for_two_different_archives(self):
+        pins = read_pins(SHIPPED)
+        sums = [runtime.archive.sha256 for runtime in pins.runtime.values()]
+        sums += [model.archive.sha256 for model in pins.models]
+        sums += [value for requirement in pins.converter + pins.node for value in requirement.sha256]
+        self.assertEqual(len(sums), len(set(sums)))
+
+    def test_no_address_of_a_registry_is_written_down(self):
+        self.assertNotRegex(SHIPPED.read_text(encoding="utf-8"), r"https?:")
+
+
+class DamagedPins(InEmptyRepository):
+    def refused(self, pattern: str, replacement: str, message: str):
+        damaged, changes = re.subn(pattern, replacement, SHIPPED.read_text(encoding="utf-8"), count=1)
+        self.assertEqual(changes, 1)
+        with self.assertRaisesRegex(SetupError, f"pins.toml: .*{message}"):
+            read_pins(self.write("pins.toml", damaged.encode()))
+
+    def test_a_sum_that_is_too_short_is_refused(self):
+        self.refused(r'sha256 = "[0-9a-f]{4}', 'sha256 = "', "is not a sha256 sum")
+
+    def test_a_missing_key_is_named(self):
+        self.refused(r"converter = .*", "", "the key 'converter' is missing")
+
+    def test_a_result_outside_the_repository_is_refused(self):
+        self.refused(r'to = "runtime/LICENSE"', 'to = "../LICENSE"', "leaves the repository")
+
+    def test_a_file_that_is_no_toml_is_refused(self):
+        self.refused(r"\[runtime\]", "[runtime", "line")

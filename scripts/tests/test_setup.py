@@ -1,0 +1,72 @@
+"""The set-up as a whole: what it refuses, and that a repository with everything in place needs no client."""
+
+import contextlib
+import io
+import unittest
+from pathlib import Path
+from unittest import mock
+
+import setup
+from assets import main
+from assets.console import SetupError
+from assets.pins import Archive, Model, Pins, Runtime
+from assets.steps import install_model, install_runtime
+
+from .support import InEmptyRepository, member, sha256
+
+LIBRARY = member("lib.so", b"library", to="runtime/libonnxruntime.so")
+LICENCE = member("LICENSE", b"licence", to="models/net/LICENSE-weights")
+WEIGHTS = member("weights", b"weights")
+
+
+class OldPython(unittest.TestCase):
+    def test_a_python_that_is_too_old_is_told_its_version_and_the_remedy(self):
+        self.assertIsNone(setup.refusal_of((3, 11, 0)))
+        self.assertIn("3.11 or newer and this is Python 3.9", setup.refusal_of((3, 9, 2)))
+        self.assertIn("make setup PYTHON=", setup.refusal_of((2, 7, 18)))
+
+    def test_the_entry_is_readable_to_old_interpreters(self):
+        source = Path(setup.__file__).read_text(encoding="utf-8")
+        for too_new in ('f"', "->", ":="):
+            self.assertNotIn(too_new, source)
+
+
+class SecondRun(InEmptyRepository):
+    def test_nothing_is_fetched_when_everything_is_in_place(self):
+        for file, content in ((LIBRARY.to, b"library"), (LICENCE.to, b"licence"), ("models/net/model.onnx", b"onnx")):
+            self.write(file, content)
+        runtime = Runtime(Archive("r", "1", "r.whl", 1, "0" * 64, (LIBRARY,)), "any", "3.11")
+        package = Archive("m", "1", "m.tgz", 1, "0" * 64, (LICENCE, WEIGHTS))
+        model = Model("net", package, "convert.net", sha256(b"onnx"))
+        with mock.patch("subprocess.Popen", side_effect=AssertionError("a program was started")):
+            install_runtime(self.places, runtime)
+            install_model(self.places, model, Pins({}, (model,), (), ()))
+        self.assertIn("ONNX Runtime 1 is in place", self.printed.getvalue())
+        self.assertIn("net is in place", self.printed.getvalue())
+
+
+class Stopping(InEmptyRepository):
+    def stopped_by(self, cause: BaseException) -> tuple[int, str]:
+        errors = io.StringIO()
+        with mock.patch.object(main, "_set_up", side_effect=cause), contextlib.redirect_stderr(errors):
+            return main.main([]), errors.getvalue()
+
+    def test_what_the_user_can_put_right_is_said_without_a_traceback(self):
+        self.assertEqual(self.stopped_by(SetupError("Install this.")), (1, "\nThe set-up stopped. Install this.\n"))
+
+    def test_a_full_disk_and_a_foreign_folder_are_explained(self):
+        for number, part in ((28, "no space left for /x"), (13, "/x cannot be written by this user")):
+            status, text = self.stopped_by(OSError(number, "", "/x"))
+            self.assertEqual(status, 1)
+            self.assertIn(part, text)
+
+    def test_an_interruption_says_that_nothing_is_lost(self):
+        status, text = self.stopped_by(KeyboardInterrupt())
+        self.assertEqual(status, 130)
+        self.assertIn("What was finished is kept", text)
+
+    def test_an_unknown_step_is_refused_with_the_known_ones(self):
+        errors = io.StringIO()
+        with contextlib.redirect_stderr(errors):
+            self.assertEqual(main.main(["everything"]), 2)
+        self.assertIn("toolchain, runtime, model", errors.getvalue())

@@ -1,0 +1,45 @@
+"""Missing build programs are found before anything is fetched, each with its remedy."""
+
+from unittest import mock
+
+from assets.console import SetupError
+from assets.toolchain import check_toolchain
+
+from .support import InEmptyRepository
+
+
+class Toolchain(InEmptyRepository):
+    def setUp(self):
+        super().setUp()
+        self.write("Cargo.toml", b'[package]\nname = "lookdown"\nrust-version = "1.92"\n')
+        self.enterContext(mock.patch.dict("os.environ", {"PATH": str(self.places.root / "bin")}, clear=True))
+
+    def check_with(self, *programs: str, rust: str = "rustc 1.95.0 (abc 2026-01-01)"):
+        for program in programs:
+            file = self.write(f"bin/{program}", f"#!/bin/sh\necho '{rust}'\n".encode())
+            file.chmod(0o755)
+        check_toolchain(self.places.root)
+
+    def test_a_complete_toolchain_passes(self):
+        self.check_with("cargo", "rustc", "cc")
+        self.assertIn("Rust 1.95", self.printed.getvalue())
+
+    def test_missing_cargo_is_named_with_the_version_to_install(self):
+        with self.assertRaisesRegex(SetupError, "needs cargo, .*; install Rust 1.92 or newer"):
+            self.check_with("rustc", "cc")
+
+    def test_an_older_rust_is_refused_with_its_version(self):
+        with self.assertRaisesRegex(SetupError, "needs Rust 1.92 and this is 1.63"):
+            self.check_with("cargo", "rustc", "cc", rust="rustc 1.63.0")
+
+    def test_a_rustc_that_does_not_run_is_quoted(self):
+        with self.assertRaisesRegex(SetupError, "does not work: no toolchain"):
+            self.check_with("cargo", "rustc", "cc", rust="no toolchain")
+
+    def test_a_missing_linker_is_named_with_the_remedy(self):
+        with self.assertRaisesRegex(SetupError, "apt-get install gcc"):
+            self.check_with("cargo", "rustc")
+
+    def test_a_linker_of_the_users_own_is_enough(self):
+        with mock.patch.dict("os.environ", CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER="clang"):
+            self.check_with("cargo", "rustc")

@@ -1,0 +1,12 @@
+//! Calibrations: from a file to a checked camera.
+
+mod calibrated_camera;
+mod error;
+mod file;
+mod folder;
+mod id;
+
+pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
+pub use error::CalibrationError;
+pub use folder::CalibrationFolder;
+pub use id::CalibrationId;

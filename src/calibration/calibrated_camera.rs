@@ -1,0 +1,132 @@
+//! A checked calibration, and its fit to frames of other sizes.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+
+use super::{CalibrationError, CalibrationId, file};
+use crate::geometry::{Lens, Mount, Pixel};
+
+/// Digits of a revision: enough to tell versions of one calibration apart.
+const REVISION_DIGITS: usize = 12;
+/// A frame's height may differ by this from the calibration's aspect, pixels.
+const ASPECT_TOLERANCE: f64 = 1.0;
+
+/// A camera's calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    id: CalibrationId,
+    revision: String,
+    image_width: u32,
+    image_height: u32,
+    lens: Lens,
+    mount: Mount,
+}
+
+/// A calibration fitted to the frames at hand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraGeometry {
+    /// The lens, in pixels of the frame.
+    pub lens: Lens,
+    /// How the camera hangs.
+    pub mount: Mount,
+}
+
+/// A frame of another aspect than its calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameSizeMismatch {
+    /// Width the calibration was made for, pixels.
+    pub image_width: u32,
+    /// Height the calibration was made for, pixels.
+    pub image_height: u32,
+}
+
+impl Calibration {
+    /// Reads a native calibration file (`.json`, `.yaml`, `.yml` or `.toml`).
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when it cannot be read, is malformed, or describes no camera.
+    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
+        file::read(path)
+    }
+
+    pub(super) fn new(
+        id: CalibrationId,
+        content: &[u8],
+        image_width: u32,
+        image_height: u32,
+        lens: Lens,
+        mount: Mount,
+    ) -> Self {
+        let digest = Sha256::digest(content);
+        let mut revision: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        revision.truncate(REVISION_DIGITS);
+        Self {
+            id,
+            revision,
+            image_width,
+            image_height,
+            lens,
+            mount,
+        }
+    }
+
+    /// The calibration's ID.
+    #[must_use]
+    pub fn id(&self) -> &CalibrationId {
+        &self.id
+    }
+
+    /// Changes whenever the content of the file does.
+    #[must_use]
+    pub fn revision(&self) -> &str {
+        &self.revision
+    }
+
+    /// Width and height of the frames the calibration was made for, pixels.
+    #[must_use]
+    pub fn image_size(&self) -> (u32, u32) {
+        (self.image_width, self.image_height)
+    }
+
+    /// The camera for frames of `width` × `height` pixels.
+    ///
+    /// # Errors
+    /// [`FrameSizeMismatch`] when the frame has another aspect than the calibration.
+    pub fn for_frame(&self, width: u32, height: u32) -> Result<CameraGeometry, FrameSizeMismatch> {
+        let scale_x = f64::from(width) / f64::from(self.image_width);
+        let scale_y = f64::from(height) / f64::from(self.image_height);
+        let expected_height = f64::from(self.image_height) * scale_x;
+        if (expected_height - f64::from(height)).abs() > ASPECT_TOLERANCE {
+            return Err(FrameSizeMismatch {
+                image_width: self.image_width,
+                image_height: self.image_height,
+            });
+        }
+        Ok(CameraGeometry {
+            lens: self.lens.scaled(scale_x, scale_y),
+            mount: self.mount,
+        })
+    }
+
+    /// The calibration with its lens image ending at the farthest corner of the frame.
+    pub(super) fn limited_to_image(self) -> Self {
+        let right = f64::from(self.image_width) - 0.5;
+        let bottom = f64::from(self.image_height) - 0.5;
+        let corners = [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)];
+        let farthest = corners
+            .iter()
+            .map(|&(x, y)| match self.lens.unproject(&Pixel::new(x, y)) {
+                Some(ray) => ray.x.hypot(ray.y).atan2(ray.z),
+                None => self.lens.max_theta(),
+            })
+            .fold(0.0, f64::max);
+        Self {
+            lens: self.lens.limited_to(farthest),
+            ..self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,27 @@
+use super::*;
+
+fn calibration() -> Calibration {
+    let lens = Lens::equidistant_circle(399.5, 299.5, 300.0, 1.5).unwrap();
+    Calibration::new(
+        "yard".parse().unwrap(),
+        b"",
+        800,
+        600,
+        lens,
+        Mount::default(),
+    )
+}
+
+#[test]
+fn frames_of_the_same_aspect_are_scaled() {
+    let camera = calibration().for_frame(1600, 1200).unwrap();
+    assert_eq!(camera.lens.principal_point(), Pixel::new(799.5, 599.5));
+    // One pixel of rounding by whoever scaled the frame is forgiven.
+    assert!(calibration().for_frame(401, 300).is_ok());
+}
+
+#[test]
+fn frames_of_another_aspect_are_refused_with_the_size_wanted() {
+    let mismatch = calibration().for_frame(600, 600).unwrap_err();
+    assert_eq!((mismatch.image_width, mismatch.image_height), (800, 600));
+}

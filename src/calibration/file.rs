@@ -1,0 +1,239 @@
+//! The native calibration file: JSON, or YAML and TOML of the same shape.
+
+use std::path::Path;
+
+use nalgebra::{Unit, Vector3};
+use serde::Deserialize;
+
+use super::{Calibration, CalibrationError, CalibrationId};
+use crate::geometry::{
+    Lens, LensError, Mount,
+    lens::{ImagePlane, RadialCurve},
+};
+
+/// File endings that are read, in the order in which they are looked for.
+pub(super) const ENDINGS: [&str; 4] = ["json", "yaml", "yml", "toml"];
+/// Largest file that is read: a real calibration has a few hundred bytes.
+const MAX_BYTES: u64 = 1024 * 1024;
+/// Image sides accepted, pixels.
+const IMAGE_SIDE: std::ops::RangeInclusive<u32> = 16..=65_536;
+/// How far from unit length `world_up` may be.
+const UNIT_TOLERANCE: f64 = 1e-3;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawCalibration {
+    id: String,
+    image: RawImage,
+    lens: RawLens,
+    #[serde(default)]
+    mount: RawMount,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawImage {
+    width: u32,
+    height: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMount {
+    world_up: [f64; 3],
+    height_m: Option<f64>,
+}
+
+impl Default for RawMount {
+    fn default() -> Self {
+        Self {
+            world_up: [0.0, 0.0, -1.0],
+            height_m: None,
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "model", rename_all = "snake_case")]
+enum RawLens {
+    Equidistant(RawIdeal),
+    Equisolid(RawIdeal),
+    Stereographic(RawIdeal),
+    Orthographic(RawIdeal),
+    Rectilinear(RawIdeal),
+    KannalaBrandt(RawKannalaBrandt),
+    RadialPolynomial(RawRadialPolynomial),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawIdeal {
+    focal: Option<f64>,
+    fx: Option<f64>,
+    fy: Option<f64>,
+    cx: f64,
+    cy: f64,
+    max_theta: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawKannalaBrandt {
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    k: [f64; 4],
+    #[serde(default)]
+    skew: f64,
+    max_theta: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawRadialPolynomial {
+    coefficients: Vec<f64>,
+    #[serde(default = "square_pixels")]
+    aspect: f64,
+    cx: f64,
+    cy: f64,
+    max_theta: Option<f64>,
+}
+
+fn square_pixels() -> f64 {
+    1.0
+}
+
+/// Reads and checks one file.
+pub(super) fn read(path: &Path) -> Result<Calibration, CalibrationError> {
+    let unreadable = |source| CalibrationError::Unreadable {
+        path: path.to_owned(),
+        source,
+    };
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > MAX_BYTES {
+        return Err(malformed(
+            path,
+            format!("it has {size} bytes; at most {MAX_BYTES} are read"),
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let text = std::str::from_utf8(&bytes).map_err(|error| malformed(path, error.to_string()))?;
+    let raw = parse(path, text)?;
+    check(path, raw, &bytes)
+}
+
+fn malformed(path: &Path, detail: String) -> CalibrationError {
+    CalibrationError::Malformed {
+        path: path.to_owned(),
+        detail,
+    }
+}
+
+fn parse(path: &Path, text: &str) -> Result<RawCalibration, CalibrationError> {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    let parsed = match ending {
+        Some("json") => serde_json::from_str(text).map_err(|error| error.to_string()),
+        Some("yaml" | "yml") => serde_saphyr::from_str(text).map_err(|error| error.to_string()),
+        Some("toml") => toml::from_str(text).map_err(|error| error.to_string()),
+        _ => Err(format!(
+            "its name must end in one of {}",
+            ENDINGS.join(", ")
+        )),
+    };
+    parsed.map_err(|detail| malformed(path, detail))
+}
+
+fn check(path: &Path, raw: RawCalibration, bytes: &[u8]) -> Result<Calibration, CalibrationError> {
+    let invalid = |field, problem| CalibrationError::Invalid {
+        path: path.to_owned(),
+        field,
+        problem,
+    };
+    let id: CalibrationId = raw
+        .id
+        .parse()
+        .map_err(|error| invalid("id", format!("{error}")))?;
+    let RawImage { width, height } = raw.image;
+    if !(IMAGE_SIDE.contains(&width) && IMAGE_SIDE.contains(&height)) {
+        let (least, most) = IMAGE_SIDE.into_inner();
+        let problem = format!("{width}×{height} pixels; each side must be {least} to {most}");
+        return Err(invalid("image", problem));
+    }
+    let (lens, ends_explicitly) =
+        lens(raw.lens).map_err(|error| invalid("lens", error.to_string()))?;
+    let mount = mount(&raw.mount).map_err(|problem| invalid("mount", problem))?;
+    let calibration = Calibration::new(id, bytes, width, height, lens, mount);
+    // Where the file does not say where the lens image ends, it ends with the frame.
+    Ok(if ends_explicitly {
+        calibration
+    } else {
+        calibration.limited_to_image()
+    })
+}
+
+/// The lens, and whether the file says where its image ends.
+fn lens(raw: RawLens) -> Result<(Lens, bool), LensError> {
+    let (curve, plane, max_theta) = match raw {
+        RawLens::Equidistant(raw) => ideal(RadialCurve::Equidistant, &raw)?,
+        RawLens::Equisolid(raw) => ideal(RadialCurve::Equisolid, &raw)?,
+        RawLens::Stereographic(raw) => ideal(RadialCurve::Stereographic, &raw)?,
+        RawLens::Orthographic(raw) => ideal(RadialCurve::Orthographic, &raw)?,
+        RawLens::Rectilinear(raw) => ideal(RadialCurve::Rectilinear, &raw)?,
+        RawLens::KannalaBrandt(raw) => (
+            RadialCurve::KannalaBrandt { k: raw.k },
+            ImagePlane {
+                skew: raw.skew,
+                ..ImagePlane::new(raw.fx, raw.fy, raw.cx, raw.cy)
+            },
+            raw.max_theta,
+        ),
+        RawLens::RadialPolynomial(raw) => (
+            RadialCurve::Polynomial {
+                coefficients: raw.coefficients,
+            },
+            ImagePlane::new(1.0, raw.aspect, raw.cx, raw.cy),
+            raw.max_theta,
+        ),
+    };
+    Ok((Lens::new(curve, plane, max_theta)?, max_theta.is_some()))
+}
+
+fn ideal(
+    curve: RadialCurve,
+    raw: &RawIdeal,
+) -> Result<(RadialCurve, ImagePlane, Option<f64>), LensError> {
+    let (fx, fy) = match (raw.focal, raw.fx, raw.fy) {
+        (Some(focal), None, None) => (focal, focal),
+        (None, Some(fx), Some(fy)) => (fx, fy),
+        _ => return Err(LensError::FocalLengths),
+    };
+    Ok((
+        curve,
+        ImagePlane::new(fx, fy, raw.cx, raw.cy),
+        raw.max_theta,
+    ))
+}
+
+fn mount(raw: &RawMount) -> Result<Mount, String> {
+    let up = Vector3::from(raw.world_up);
+    let length = up.norm();
+    if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+        let [x, y, z] = raw.world_up;
+        return Err(format!(
+            "world_up is [{x}, {y}, {z}], of length {length:.3}: give a unit vector, such as \
+             [0, 0, -1] for a camera that looks straight down"
+        ));
+    }
+    if let Some(height) = raw.height_m
+        && !(height.is_finite() && height > 0.0)
+    {
+        return Err(format!(
+            "height_m is {height}: give metres above 0, or leave it out"
+        ));
+    }
+    Ok(Mount::new(Unit::new_normalize(up), raw.height_m))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,177 @@
+//! Axis-parallel boxes whose pixel space is part of their type.
+
+use std::marker::PhantomData;
+
+/// The pixels of one virtual view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ViewPixels;
+
+/// The pixels of the fisheye frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FramePixels;
+
+/// Numbers that are no box.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum BBoxError {
+    /// A coordinate is NaN, infinite or absurdly large.
+    #[error(
+        "box coordinate {0} is not a pixel position; use finite numbers within ±{limit:e}",
+        limit = MAX_COORDINATE
+    )]
+    Coordinate(f64),
+    /// The minimum of an axis lies beyond its maximum.
+    #[error("box {0:?} is inverted; give x_min, y_min, x_max, y_max with each min ≤ max")]
+    Inverted([f64; 4]),
+}
+
+/// Far beyond any picture, yet small enough that areas and sums over all boxes stay finite.
+const MAX_COORDINATE: f64 = 1e9;
+
+/// A box in the pixel space `S` ([`ViewPixels`] or [`FramePixels`]): corner-origin, continuous
+/// coordinates. Always finite, never inverted; zero width or height is allowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BBox<S> {
+    x_min: f64,
+    y_min: f64,
+    x_max: f64,
+    y_max: f64,
+    space: PhantomData<S>,
+}
+
+impl<S> BBox<S> {
+    /// The box `[x_min, y_min, x_max, y_max]`, pixels.
+    ///
+    /// # Errors
+    /// [`BBoxError`] when a coordinate is not finite or beyond ±1e9, or a min exceeds its max.
+    pub fn new(corners: [f64; 4]) -> Result<Self, BBoxError> {
+        let [x_min, y_min, x_max, y_max] = corners;
+        for coordinate in corners {
+            // NaN is in no range.
+            if !(-MAX_COORDINATE..=MAX_COORDINATE).contains(&coordinate) {
+                return Err(BBoxError::Coordinate(coordinate));
+            }
+        }
+        if x_min > x_max || y_min > y_max {
+            return Err(BBoxError::Inverted(corners));
+        }
+        Ok(Self::from_ordered(corners))
+    }
+
+    fn from_ordered([x_min, y_min, x_max, y_max]: [f64; 4]) -> Self {
+        Self {
+            x_min,
+            y_min,
+            x_max,
+            y_max,
+            space: PhantomData,
+        }
+    }
+
+    /// Left edge, pixels.
+    #[must_use]
+    pub fn x_min(&self) -> f64 {
+        self.x_min
+    }
+
+    /// Top edge, pixels.
+    #[must_use]
+    pub fn y_min(&self) -> f64 {
+        self.y_min
+    }
+
+    /// Right edge, pixels.
+    #[must_use]
+    pub fn x_max(&self) -> f64 {
+        self.x_max
+    }
+
+    /// Bottom edge, pixels.
+    #[must_use]
+    pub fn y_max(&self) -> f64 {
+        self.y_max
+    }
+
+    /// `[x_min, y_min, x_max, y_max]`, pixels.
+    #[must_use]
+    pub fn corners(&self) -> [f64; 4] {
+        [self.x_min, self.y_min, self.x_max, self.y_max]
+    }
+
+    /// Extent along x, pixels, at least 0.
+    #[must_use]
+    pub fn width(&self) -> f64 {
+        self.x_max - self.x_min
+    }
+
+    /// Extent along y, pixels, at least 0.
+    #[must_use]
+    pub fn height(&self) -> f64 {
+        self.y_max - self.y_min
+    }
+
+    /// Width times height, square pixels. No pixel is added to the sides: coordinates are
+    /// continuous.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.width() * self.height()
+    }
+
+    /// The middle, `[x, y]`, pixels.
+    #[must_use]
+    pub fn center(&self) -> [f64; 2] {
+        [
+            f64::midpoint(self.x_min, self.x_max),
+            f64::midpoint(self.y_min, self.y_max),
+        ]
+    }
+
+    /// Area shared with `other`, square pixels; 0 for boxes that only touch.
+    #[must_use]
+    pub fn intersection_area(&self, other: &Self) -> f64 {
+        // Each side is clamped alone: two negative overlaps must not multiply to a positive area.
+        let width = (self.x_max.min(other.x_max) - self.x_min.max(other.x_min)).max(0.0);
+        let height = (self.y_max.min(other.y_max) - self.y_min.max(other.y_min)).max(0.0);
+        width * height
+    }
+
+    /// Intersection over union, 0 to 1: shared area by covered area, and 0 when neither box has
+    /// any area.
+    #[must_use]
+    pub fn iou(&self, other: &Self) -> f64 {
+        let intersection = self.intersection_area(other);
+        let union = self.area() + other.area() - intersection;
+        if union > 0.0 {
+            intersection / union
+        } else {
+            0.0
+        }
+    }
+
+    /// The part inside `bounds`; `None` when that part has no area.
+    #[must_use]
+    pub fn clipped_to(&self, bounds: &Self) -> Option<Self> {
+        (self.intersection_area(bounds) > 0.0).then(|| {
+            Self::from_ordered([
+                self.x_min.max(bounds.x_min),
+                self.y_min.max(bounds.y_min),
+                self.x_max.min(bounds.x_max),
+                self.y_max.min(bounds.y_max),
+            ])
+        })
+    }
+
+    /// The box `share` (0 to 1) of the way from this one to `other`.
+    pub(super) fn moved_towards(&self, other: &Self, share: f64) -> Self {
+        // Both factors are the same for every edge and rounding is monotonic: min stays ≤ max.
+        let between = |here: f64, there: f64| here * (1.0 - share) + there * share;
+        Self::from_ordered([
+            between(self.x_min, other.x_min),
+            between(self.y_min, other.y_min),
+            between(self.x_max, other.x_max),
+            between(self.y_max, other.y_max),
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests;

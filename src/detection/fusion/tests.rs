@@ -1,0 +1,177 @@
+//! How candidates gather into persons, and what agreement is worth.
+
+use crate::detection::{
+    BBox, Candidate, MergedDetection, Refinement, RefinementParameters, refine,
+};
+
+const PERSON: [f64; 4] = [100.0, 100.0, 150.0, 200.0];
+const SHIFTED: [f64; 4] = [110.0, 100.0, 160.0, 200.0];
+
+fn candidate(corners: [f64; 4], score: f64, view: usize) -> Candidate {
+    Candidate {
+        bbox: BBox::new(corners).unwrap(),
+        score,
+        view,
+        coordinate_weight: 1.0,
+        expected_views: 1.0,
+    }
+}
+
+fn fuse(candidates: &[Candidate], iou_threshold: f64) -> Vec<MergedDetection> {
+    let parameters = RefinementParameters {
+        refinement: Refinement::Fusion,
+        iou_threshold,
+        sigma: 0.3,
+        score_threshold: 0.0,
+        max_detections: 100,
+    };
+    refine(candidates, &parameters)
+}
+
+fn assert_close(actual: f64, expected: f64) {
+    assert!(
+        (actual - expected).abs() < 1e-12,
+        "{actual} is not {expected}"
+    );
+}
+
+#[test]
+fn a_fused_box_is_the_mean_weighted_by_squared_score() {
+    let fused = fuse(
+        &[candidate(PERSON, 0.8, 0), candidate(SHIFTED, 0.4, 1)],
+        0.4,
+    );
+    assert_eq!(fused.len(), 1);
+    assert_close(fused[0].bbox.x_min(), (100.0 * 0.64 + 110.0 * 0.16) / 0.8);
+    assert_close(fused[0].bbox.y_max(), 200.0);
+    assert_close(fused[0].score, 0.8);
+    assert_eq!(fused[0].members, [0, 1]);
+}
+
+#[test]
+fn a_box_cut_off_by_its_view_hardly_moves_the_mean_but_counts_as_a_witness() {
+    let cut_off = Candidate {
+        coordinate_weight: 0.1,
+        expected_views: 2.0,
+        ..candidate(SHIFTED, 0.8, 1)
+    };
+    let whole = Candidate {
+        expected_views: 2.0,
+        ..candidate(PERSON, 0.8, 0)
+    };
+    let fused = fuse(&[whole, cut_off], 0.4);
+    assert_close(fused[0].bbox.x_min(), (100.0 + 110.0 * 0.1) / 1.1);
+    assert_close(fused[0].score, 0.8);
+}
+
+#[test]
+fn a_person_seen_in_one_of_four_expected_views_keeps_half_its_score() {
+    let lonely = Candidate {
+        expected_views: 4.0,
+        ..candidate(PERSON, 0.9, 0)
+    };
+    assert_close(fuse(&[lonely], 0.4)[0].score, 0.45);
+}
+
+#[test]
+fn a_view_that_reports_a_person_twice_is_one_witness() {
+    let expecting_two = |corners, score, view| Candidate {
+        expected_views: 2.0,
+        ..candidate(corners, score, view)
+    };
+    let same_view = [
+        expecting_two(PERSON, 0.9, 3),
+        expecting_two(SHIFTED, 0.8, 3),
+    ];
+    let two_views = [
+        expecting_two(PERSON, 0.9, 3),
+        expecting_two(SHIFTED, 0.8, 4),
+    ];
+    assert_close(fuse(&same_view, 0.4)[0].score, 0.9 * 0.5_f64.sqrt());
+    assert_close(fuse(&two_views, 0.4)[0].score, 0.9);
+}
+
+#[test]
+fn more_witnesses_than_expected_do_not_raise_a_score() {
+    let crowd: Vec<_> = (0..5).map(|view| candidate(PERSON, 0.7, view)).collect();
+    assert_close(fuse(&crowd, 0.4)[0].score, 0.7);
+}
+
+#[test]
+fn expected_views_are_averaged_like_the_coordinates() {
+    let sure = Candidate {
+        expected_views: 5.0,
+        ..candidate(PERSON, 0.8, 0)
+    };
+    let faint = Candidate {
+        expected_views: 10.0,
+        ..candidate(PERSON, 0.4, 1)
+    };
+    let expected: f64 = (5.0 * 0.64 + 10.0 * 0.16) / 0.8;
+    assert_close(
+        fuse(&[sure, faint], 0.4)[0].score,
+        0.8 * (2.0 / expected).sqrt(),
+    );
+}
+
+#[test]
+fn boxes_below_the_score_threshold_are_still_witnesses() {
+    let parameters = RefinementParameters {
+        refinement: Refinement::Fusion,
+        iou_threshold: 0.4,
+        sigma: 0.3,
+        score_threshold: 0.3,
+        max_detections: 100,
+    };
+    let expecting_two = |score, view| Candidate {
+        expected_views: 2.0,
+        ..candidate(PERSON, score, view)
+    };
+    let fused = refine(
+        &[expecting_two(0.35, 0), expecting_two(0.1, 1)],
+        &parameters,
+    );
+    assert_eq!(fused.len(), 1);
+    assert_close(fused[0].score, 0.35);
+}
+
+#[test]
+fn a_candidate_joins_the_cluster_it_overlaps_most() {
+    let left = candidate([0.0, 0.0, 10.0, 10.0], 0.9, 0);
+    let right = candidate([4.0, 0.0, 14.0, 10.0], 0.8, 1);
+    let nearer_right = candidate([3.0, 0.0, 13.0, 10.0], 0.7, 2);
+    let fused = fuse(&[left, right, nearer_right], 0.45);
+    assert_eq!(fused[0].members, [0]);
+    assert_eq!(fused[1].members, [1, 2]);
+}
+
+#[test]
+fn boxes_apart_are_never_fused_even_at_threshold_zero() {
+    let apart = [
+        candidate([0.0, 0.0, 10.0, 10.0], 0.9, 0),
+        candidate([20.0, 0.0, 30.0, 10.0], 0.8, 1),
+    ];
+    assert_eq!(fuse(&apart, 0.0).len(), 2);
+}
+
+#[test]
+fn the_tiniest_scores_still_average_to_a_box() {
+    let tiny = f64::MIN_POSITIVE;
+    let fused = fuse(
+        &[candidate(PERSON, tiny, 0), candidate(SHIFTED, tiny, 1)],
+        0.4,
+    );
+    assert_close(fused[0].bbox.x_min(), 105.0);
+}
+
+#[test]
+fn disagreement_can_reorder_persons() {
+    let doubted = Candidate {
+        expected_views: 9.0,
+        ..candidate(PERSON, 0.9, 0)
+    };
+    let agreed = candidate([500.0, 100.0, 550.0, 200.0], 0.5, 1);
+    let fused = fuse(&[doubted, agreed], 0.4);
+    assert_eq!(fused[0].members, [1]);
+    assert_eq!(fused[1].members, [0]);
+}

@@ -1,0 +1,215 @@
+//! Bytes from anywhere → a [`Frame`], within limits that hold before any pixel is decoded.
+//!
+//! The format is recognised from the content: file names and content types lie.
+
+mod container;
+mod error;
+
+use std::io::Cursor;
+
+use image::codecs::{jpeg::JpegDecoder, png::PngDecoder, webp::WebPDecoder};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage};
+
+use super::frame::Frame;
+pub use error::{DecodeError, ExceededLimit};
+
+/// How large a picture may be. All of these hold at once, and all are checked
+/// against the picture's header, before its pixels are decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DecodeLimits {
+    /// Greatest width in pixels, as stored (before the EXIF orientation is applied).
+    pub max_width: u32,
+    /// Greatest height in pixels, as stored.
+    pub max_height: u32,
+    /// Greatest number of pixels in all.
+    pub max_pixels: u64,
+    /// Greatest size of the decoded picture and its RGB copy together. The decoders'
+    /// own working memory comes on top: at most 8 bytes a pixel.
+    pub max_alloc_bytes: u64,
+}
+
+impl Default for DecodeLimits {
+    /// 8192 pixels a side, 50 megapixels, 512 MiB.
+    fn default() -> Self {
+        Self {
+            max_width: 8192,
+            max_height: 8192,
+            max_pixels: 50_000_000,
+            max_alloc_bytes: 512 * 1024 * 1024,
+        }
+    }
+}
+
+/// A decoded picture, upright.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DecodedFrame {
+    /// The pixels, after the EXIF orientation was applied.
+    pub frame: Frame,
+    /// Whether the EXIF orientation asked for a turn or a flip, so that the frame
+    /// differs from the pixels as stored.
+    pub orientation_applied: bool,
+}
+
+/// Decodes a JPEG, PNG or WebP picture to RGB.
+///
+/// The EXIF orientation is applied, transparency is laid over black (as the surround of
+/// a lens is), 16-bit samples are rounded to 8, and of an animation the first frame is
+/// taken. A file that ends early is refused, even where a lenient decoder would fill the
+/// missing rows with grey.
+///
+/// # Errors
+/// See [`DecodeError`]; no input panics.
+pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
+    if bytes.is_empty() {
+        return Err(DecodeError::Empty);
+    }
+    match image::guess_format(bytes) {
+        Ok(ImageFormat::Jpeg) => decode_jpeg(bytes, limits),
+        Ok(ImageFormat::Png) => decode_png(bytes, limits),
+        Ok(ImageFormat::WebP) => decode_webp(bytes, limits),
+        Ok(other) => Err(unsupported(format!("in the format {other:?}"))),
+        Err(_) if container::is_heif(bytes) => Err(unsupported("in the format HEIF")),
+        Err(_) => Err(unsupported("not in a known picture format")),
+    }
+}
+
+fn decode_jpeg(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
+    let task = Task::new("JPEG", limits);
+    let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| task.refusal(e))?;
+    task.check_size(decoder.dimensions())?;
+    task.require(container::jpeg_is_whole(bytes), "the file ends early")?;
+    task.read(decoder)
+}
+
+fn decode_png(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
+    let task = Task::new("PNG", limits);
+    let size = container::png_size(bytes);
+    task.check_size(size.ok_or_else(|| task.corrupt("its header is incomplete"))?)?;
+    task.require(container::png_is_whole(bytes), "the file ends early")?;
+    let mut memory = Limits::no_limits();
+    memory.max_alloc = Some(limits.max_alloc_bytes);
+    let decoder =
+        PngDecoder::with_limits(Cursor::new(bytes), memory).map_err(|e| task.refusal(e))?;
+    task.read(decoder)
+}
+
+fn decode_webp(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
+    let task = Task::new("WebP", limits);
+    let decoder = WebPDecoder::new(Cursor::new(bytes)).map_err(|e| task.refusal(e))?;
+    let size = decoder.dimensions();
+    task.check_size(size)?;
+    task.require(container::webp_is_whole(bytes), "the file ends early")?;
+    task.require(
+        container::webp_frames_fit(bytes, size),
+        "a frame is larger than the picture",
+    )?;
+    task.read(decoder)
+}
+
+/// One decoding: what its checks and its errors need to know.
+struct Task<'a> {
+    format: &'static str,
+    limits: &'a DecodeLimits,
+}
+
+impl<'a> Task<'a> {
+    fn new(format: &'static str, limits: &'a DecodeLimits) -> Self {
+        Self { format, limits }
+    }
+
+    fn check_size(&self, (width, height): (u32, u32)) -> Result<(), DecodeError> {
+        let DecodeLimits {
+            max_width,
+            max_height,
+            max_pixels,
+            ..
+        } = *self.limits;
+        let limit = if width > max_width || height > max_height {
+            ExceededLimit::Side {
+                max_width,
+                max_height,
+            }
+        } else if u64::from(width) * u64::from(height) > max_pixels {
+            ExceededLimit::Pixels { max_pixels }
+        } else {
+            return Ok(());
+        };
+        Err(DecodeError::TooLarge {
+            width,
+            height,
+            limit,
+        })
+    }
+
+    fn require(&self, holds: bool, otherwise: &str) -> Result<(), DecodeError> {
+        if holds {
+            Ok(())
+        } else {
+            Err(self.corrupt(otherwise))
+        }
+    }
+
+    fn read(&self, mut decoder: impl ImageDecoder) -> Result<DecodedFrame, DecodeError> {
+        let (width, height) = decoder.dimensions();
+        let rgb_bytes = u64::from(width) * u64::from(height) * 3;
+        if decoder.total_bytes().saturating_add(rgb_bytes) > self.limits.max_alloc_bytes {
+            return Err(DecodeError::TooLarge {
+                width,
+                height,
+                limit: ExceededLimit::Memory {
+                    max_bytes: self.limits.max_alloc_bytes,
+                },
+            });
+        }
+        let orientation = decoder.orientation().map_err(|e| self.refusal(e))?;
+        let picture = DynamicImage::from_decoder(decoder).map_err(|e| self.refusal(e))?;
+        let mut upright = DynamicImage::ImageRgb8(rgb_over_black(picture));
+        upright.apply_orientation(orientation);
+        let (width, height) = (upright.width(), upright.height());
+        let frame = Frame::new(width, height, upright.into_bytes())
+            .map_err(|e| self.corrupt(e.to_string()))?;
+        Ok(DecodedFrame {
+            frame,
+            orientation_applied: orientation != Orientation::NoTransforms,
+        })
+    }
+
+    fn corrupt(&self, reason: impl Into<String>) -> DecodeError {
+        DecodeError::Corrupt {
+            format: self.format,
+            reason: reason.into(),
+        }
+    }
+
+    fn refusal(&self, error: ImageError) -> DecodeError {
+        match error {
+            ImageError::Unsupported(reason) => {
+                unsupported(format!("a rare kind of {} ({reason})", self.format))
+            }
+            other => self.corrupt(other.to_string()),
+        }
+    }
+}
+
+fn unsupported(found: impl Into<String>) -> DecodeError {
+    DecodeError::UnsupportedFormat {
+        found: found.into(),
+    }
+}
+
+/// Transparent parts become black, which is what surrounds a lens circle.
+fn rgb_over_black(picture: DynamicImage) -> RgbImage {
+    if !picture.color().has_alpha() {
+        return picture.into_rgb8();
+    }
+    let rgba = picture.into_rgba8();
+    let over_black = |value: u8, alpha: u8| {
+        let rounded = (u16::from(value) * u16::from(alpha) + 127) / 255;
+        u8::try_from(rounded).unwrap_or(u8::MAX)
+    };
+    RgbImage::from_fn(rgba.width(), rgba.height(), |x, y| {
+        let [red, green, blue, alpha] = rgba.get_pixel(x, y).0;
+        image::Rgb([red, green, blue].map(|value| over_black(value, alpha)))
+    })
+}

@@ -1,0 +1,130 @@
+//! What a picture's outer structure says before any pixel is decoded.
+//!
+//! The decoders are lenient where a service should not be: the JPEG decoder fills the
+//! rows that a cut-off file lacks with grey, the PNG decoder tells the size only once
+//! it has reached the pixels, and the WebP decoder allocates for an inner frame before
+//! it compares that frame with the canvas. The walks here close those gaps; they only
+//! step over lengths and never read outside the bytes.
+
+/// Whether the bytes begin like HEIF/HEIC, which telephones send.
+pub(super) fn is_heif(bytes: &[u8]) -> bool {
+    bytes.get(4..8) == Some(b"ftyp")
+        && matches!(
+            bytes.get(8..12),
+            Some(b"heic" | b"heix" | b"hevc" | b"mif1" | b"msf1")
+        )
+}
+
+/// Width and height from a PNG's header chunk, which always comes first
+/// (PNG specification, section 11.2.1).
+pub(super) fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
+    if bytes.get(12..16)? != b"IHDR" {
+        return None;
+    }
+    let side = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    Some((side(16)?, side(20)?))
+}
+
+/// Whether a PNG goes on to its end chunk.
+pub(super) fn png_is_whole(bytes: &[u8]) -> bool {
+    let mut rest = bytes.get(8..);
+    while let Some([l0, l1, l2, l3, kind @ ..]) = rest {
+        let payload = u32::from_be_bytes([*l0, *l1, *l2, *l3]) as usize;
+        // Name, payload and checksum.
+        let (Some(name), Some(next)) = (kind.get(..4), kind.get(payload.saturating_add(8)..))
+        else {
+            return false;
+        };
+        if name == b"IEND" {
+            return true;
+        }
+        rest = Some(next);
+    }
+    false
+}
+
+/// Whether a JPEG goes on to its end-of-image marker (ITU-T T.81, annex B).
+///
+/// Segments are skipped by their length, so that the end marker of a thumbnail inside
+/// one does not count; bytes between segments are entropy-coded data, or padding.
+pub(super) fn jpeg_is_whole(bytes: &[u8]) -> bool {
+    const STUFFED_ZERO: u8 = 0x00;
+    const TEMPORARY: u8 = 0x01;
+    const FIRST_RESTART: u8 = 0xD0;
+    const START_OF_IMAGE: u8 = 0xD8;
+    const END_OF_IMAGE: u8 = 0xD9;
+
+    let mut rest = bytes;
+    loop {
+        match rest {
+            [0xFF, END_OF_IMAGE, ..] => return true,
+            // Markers without a payload; 0xFF before a marker is a fill byte.
+            [
+                0xFF,
+                STUFFED_ZERO | TEMPORARY | FIRST_RESTART..=START_OF_IMAGE,
+                ..,
+            ] => rest = &rest[2..],
+            [0xFF, 0xFF, ..] => rest = &rest[1..],
+            // The length counts its own two bytes, but not the marker's.
+            [0xFF, _, high, low, ..] => {
+                let length = usize::from(u16::from_be_bytes([*high, *low]));
+                match rest.get(2 + length..) {
+                    Some(next) => rest = next,
+                    None => return false,
+                }
+            }
+            [0xFF, ..] | [] => return false,
+            [_, next @ ..] => {
+                let entropy_coded = next.iter().take_while(|byte| **byte != 0xFF).count();
+                rest = &next[entropy_coded..];
+            }
+        }
+    }
+}
+
+/// Whether a WebP has all the bytes its RIFF header announces.
+pub(super) fn webp_is_whole(bytes: &[u8]) -> bool {
+    let announced = bytes
+        .get(4..8)
+        .and_then(|size| Some(u32::from_le_bytes(size.try_into().ok()?)));
+    announced.is_some_and(|size| bytes.len() as u64 >= u64::from(size) + 8)
+}
+
+/// Whether no lossy frame of a WebP is larger than the canvas that its header announces
+/// (RFC 9649, section 2).
+pub(super) fn webp_frames_fit(bytes: &[u8], (width, height): (u32, u32)) -> bool {
+    const ANIMATION_FRAME_HEADER: usize = 16;
+    chunks(bytes.get(12..).unwrap_or_default()).all(|(name, payload)| match &name {
+        b"ANMF" => chunks(payload.get(ANIMATION_FRAME_HEADER..).unwrap_or_default())
+            .filter(|(name, _)| name == b"VP8 ")
+            .all(|(_, payload)| lossy_frame_fits(payload, width, height)),
+        b"VP8 " => lossy_frame_fits(payload, width, height),
+        _ => true,
+    })
+}
+
+/// Sizes are 14 bits wide and follow a 3-byte tag and a 3-byte start code
+/// (RFC 6386, section 9.1).
+fn lossy_frame_fits(payload: &[u8], width: u32, height: u32) -> bool {
+    match payload {
+        [_, _, _, _, _, _, w0, w1, h0, h1, ..] => {
+            u32::from(u16::from_le_bytes([*w0, *w1]) & 0x3FFF) <= width
+                && u32::from(u16::from_le_bytes([*h0, *h1]) & 0x3FFF) <= height
+        }
+        _ => false,
+    }
+}
+
+/// Name and payload of each RIFF chunk; the last one may be cut off.
+fn chunks(mut bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
+    std::iter::from_fn(move || {
+        let [n0, n1, n2, n3, s0, s1, s2, s3, rest @ ..] = bytes else {
+            return None;
+        };
+        let size = u32::from_le_bytes([*s0, *s1, *s2, *s3]) as usize;
+        // Chunks are padded to an even length.
+        bytes = rest.get(size.next_multiple_of(2)..).unwrap_or_default();
+        let payload = rest.get(..size).unwrap_or(rest);
+        Some(([*n0, *n1, *n2, *n3], payload))
+    })
+}

@@ -1,0 +1,112 @@
+//! A decoded picture: the one pixel format every stage works on.
+
+/// A picture in 8-bit RGB, rows from top to bottom, without padding.
+///
+/// *Invariant:* both sides are at least 1 and there are exactly
+/// `width * height * 3` bytes.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Frame {
+    width: u32,
+    height: u32,
+    pixels: Vec<u8>,
+}
+
+/// Why bytes do not make a [`Frame`].
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// One side is zero.
+    #[error("a frame of {width}×{height} pixels has no pixels; both sides must be at least 1")]
+    NoPixels {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// The buffer does not fit the size.
+    #[error(
+        "a frame of {width}×{height} pixels takes width × height × 3 bytes of RGB, not {bytes}"
+    )]
+    WrongLength {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// Length of the buffer that was given.
+        bytes: usize,
+    },
+}
+
+impl Frame {
+    /// Wraps row-major RGB bytes.
+    ///
+    /// # Errors
+    /// When a side is zero, or `pixels` is not `width * height * 3` bytes long.
+    pub fn new(width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, FrameError> {
+        if width == 0 || height == 0 {
+            return Err(FrameError::NoPixels { width, height });
+        }
+        // Two u32 and a small factor cannot overflow a u128.
+        if u128::from(width) * u128::from(height) * 3 != pixels.len() as u128 {
+            return Err(FrameError::WrongLength {
+                width,
+                height,
+                bytes: pixels.len(),
+            });
+        }
+        Ok(Self {
+            width,
+            height,
+            pixels,
+        })
+    }
+
+    /// Width in pixels, at least 1.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels, at least 1.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// All bytes: R, G, B of the top-left pixel, then of the one to its right, and so on.
+    #[must_use]
+    pub fn pixels(&self) -> &[u8] {
+        &self.pixels
+    }
+
+    /// The same bytes, to be painted over.
+    pub fn pixels_mut(&mut self) -> &mut [u8] {
+        &mut self.pixels
+    }
+
+    /// R, G and B of the pixel in column `x` and row `y`.
+    ///
+    /// # Panics
+    /// When the pixel lies outside the frame.
+    #[must_use]
+    pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
+        assert!(
+            x < self.width && y < self.height,
+            "pixel ({x}, {y}) lies outside a frame of {}×{}",
+            self.width,
+            self.height
+        );
+        let start = 3 * (y as usize * self.width as usize + x as usize);
+        [
+            self.pixels[start],
+            self.pixels[start + 1],
+            self.pixels[start + 2],
+        ]
+    }
+}
+
+/// Size only: megabytes of pixels help nobody in a log line.
+impl std::fmt::Debug for Frame {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "Frame({}×{})", self.width, self.height)
+    }
+}

@@ -1,0 +1,119 @@
+//! Where the lens image lies in a fisheye frame: a bright disc on a black surround.
+//!
+//! 1. The corners tell how dark the surround is ([`surround`]).
+//! 2. Scans along rows and columns, from the border inward, meet the disc; a consensus
+//!    circle through those points ignores captions and unlit parts of the room
+//!    ([`outline`], [`consensus`]).
+//! 3. Along rays near that circle the rim is located to a fraction of a pixel, and a
+//!    robust least-squares circle is fitted to it ([`rim`], [`least_squares`]).
+
+mod consensus;
+mod least_squares;
+mod outline;
+mod rim;
+mod surround;
+
+use std::f64::consts::TAU;
+
+use super::frame::Frame;
+use rim::RimPoint;
+use surround::Surround;
+
+/// The edge of the lens image, in pixel centres: the top-left pixel's centre is (0, 0).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LensCircle {
+    /// Column of the centre, in pixels.
+    pub cx: f64,
+    /// Row of the centre, in pixels.
+    pub cy: f64,
+    /// Radius in pixels; the circle may reach beyond the frame.
+    pub radius: f64,
+}
+
+/// Sides below this show too little of a rim to measure.
+const MIN_SIDE: u32 = 32;
+/// A lens image smaller than half the frame's shorter side is taken for a lamp or a table.
+const MIN_RADIUS_IN_SHORT_SIDES: f64 = 0.25;
+/// Of the rays that meet the circle inside the frame, this part must show a rim.
+/// The rest may be dark room.
+const MIN_SUPPORT: f64 = 0.35;
+/// How far the rim is sought on either side of the circle known so far, as parts of the
+/// radius: wide first, to recover from a rough consensus.
+const REACHES: [f64; 3] = [0.04, 0.02, 0.02];
+/// The widest angle without any rim; beyond it, centre and radius trade off.
+const MAX_GAP_RADIANS: f64 = 3.5;
+
+/// Finds the lens circle, or `None` where no dark surround shows it: a frame that the
+/// lens image fills, a picture of an ordinary camera, a room too dark to tell.
+/// [`assumed_circle`] is what to use then.
+///
+/// Meant for any picture: takes a few milliseconds whatever its size, and gives the same
+/// answer for the same pixels.
+#[must_use]
+pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
+    let short_side = frame.width().min(frame.height());
+    if short_side < MIN_SIDE {
+        return None;
+    }
+    let surround = Surround::of(frame)?;
+    let mut circle = consensus::circle(&outline::points(frame, &surround))?;
+    let mut edge = Vec::new();
+    for reach in REACHES {
+        edge = rim::points(frame, &surround, &circle, reach);
+        let points: Vec<_> = edge.iter().map(|point| point.at).collect();
+        circle = least_squares::circle(&points, &circle)?;
+    }
+    let is_large = circle.radius >= MIN_RADIUS_IN_SHORT_SIDES * f64::from(short_side);
+    (is_large && is_shown(&edge, frame, &circle)).then_some(circle)
+}
+
+/// Whether enough of the circle's rim was seen, all around it.
+fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
+    let shown: Vec<f64> = edge
+        .iter()
+        .filter(|point| circle.distance(point.at).abs() <= circle.tolerance())
+        .map(|point| point.angle)
+        .collect();
+    let next_round = shown.first().map(|first| first + TAU);
+    let widest_gap = shown
+        .iter()
+        .zip(shown.iter().skip(1).chain(&next_round))
+        .map(|(angle, next)| next - angle)
+        .fold(0.0, f64::max);
+    let visible = rim::visible_rays(frame, circle);
+    #[expect(clippy::cast_precision_loss, reason = "a few hundred rays")]
+    let is_supported = shown.len() as f64 >= MIN_SUPPORT * visible as f64;
+    !shown.is_empty() && is_supported && widest_gap <= MAX_GAP_RADIANS
+}
+
+/// The largest circle that fits into a frame of this size, in its middle: the guess for
+/// frames in which no circle is found.
+#[must_use]
+pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
+    LensCircle {
+        cx: (f64::from(width) - 1.0) / 2.0,
+        cy: (f64::from(height) - 1.0) / 2.0,
+        radius: f64::from(width.min(height)) / 2.0,
+    }
+}
+
+impl LensCircle {
+    /// The point at a distance from the centre, in a direction.
+    fn on_ray(&self, angle: f64, radius: f64) -> [f64; 2] {
+        [
+            self.cx + radius * angle.cos(),
+            self.cy + radius * angle.sin(),
+        ]
+    }
+
+    /// Signed distance of a point from the circle in pixels, positive outside.
+    fn distance(&self, [x, y]: [f64; 2]) -> f64 {
+        (x - self.cx).hypot(y - self.cy) - self.radius
+    }
+
+    /// How far a point may lie from the circle and still count as its rim: half a
+    /// percent of the radius, but no less than pixels and compression blur.
+    fn tolerance(&self) -> f64 {
+        (0.005 * self.radius).max(1.5)
+    }
+}

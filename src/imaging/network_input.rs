@@ -1,0 +1,96 @@
+//! What a network wants to see, and batches of it.
+
+/// Order of the colour planes in a network's input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ChannelOrder {
+    /// Red, green, blue.
+    #[default]
+    Rgb,
+    /// Blue, green, red.
+    Bgr,
+}
+
+/// The input of a network: `[views, 3, height, width]`, `f32`, each value
+/// `pixel · scale + offset` with pixels 0 to 255.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NetworkInput {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Order of the colour planes.
+    pub channel_order: ChannelOrder,
+    /// Factor per plane, in the network's plane order.
+    pub scale: [f32; 3],
+    /// Offset per plane, in the network's plane order.
+    pub offset: [f32; 3],
+}
+
+impl NetworkInput {
+    /// Pixels 0 to 255 as they are, in RGB planes.
+    #[must_use]
+    pub fn plain(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            channel_order: ChannelOrder::Rgb,
+            scale: [1.0; 3],
+            offset: [0.0; 3],
+        }
+    }
+
+    /// Values in one plane of one view.
+    #[must_use]
+    pub fn plane_len(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Values in one view.
+    #[must_use]
+    pub fn view_len(&self) -> usize {
+        3 * self.plane_len()
+    }
+
+    /// For each plane of the input: which of red (0), green (1) and blue (2) it holds.
+    #[must_use]
+    pub fn source_channels(&self) -> [usize; 3] {
+        match self.channel_order {
+            ChannelOrder::Rgb => [0, 1, 2],
+            ChannelOrder::Bgr => [2, 1, 0],
+        }
+    }
+}
+
+/// Rendered views, ready for the network: `[views, 3, height, width]`, row-major.
+#[derive(Debug, Clone, Default)]
+pub struct ViewBatch {
+    values: Vec<f32>,
+    views: usize,
+}
+
+impl ViewBatch {
+    /// Makes room for `views` views of `input` and hands out one slice per view to render into.
+    /// The memory is kept from batch to batch.
+    pub fn prepare(
+        &mut self,
+        views: usize,
+        input: &NetworkInput,
+    ) -> std::slice::ChunksExactMut<'_, f32> {
+        self.views = views;
+        self.values.resize(views * input.view_len(), 0.0);
+        self.values.chunks_exact_mut(input.view_len())
+    }
+
+    /// How many views it holds.
+    #[must_use]
+    pub fn views(&self) -> usize {
+        self.views
+    }
+
+    /// The values, `[views, 3, height, width]`, row-major.
+    #[must_use]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+}

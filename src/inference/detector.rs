@@ -1,0 +1,71 @@
+//! What every detector offers.
+
+use std::path::PathBuf;
+
+use crate::{
+    detection::{BBox, ViewPixels},
+    imaging::{NetworkInput, ViewBatch},
+};
+
+/// A person found in a view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewDetection {
+    /// Where, corner-origin view pixels, within the view.
+    pub bbox: BBox<ViewPixels>,
+    /// Confidence, 0 to 1.
+    pub score: f64,
+}
+
+/// A person detector. Runs on one thread at a time.
+pub trait Detector: Send {
+    /// The model's name.
+    fn name(&self) -> &str;
+
+    /// Changes whenever the model's weights do.
+    fn revision(&self) -> &str;
+
+    /// What the network wants to see.
+    fn input(&self) -> &NetworkInput;
+
+    /// Finds persons in a batch rendered for [`Detector::input`]: one list per view, unsorted,
+    /// overlaps left in, scores at least the detector's floor.
+    ///
+    /// # Errors
+    /// [`InferenceError`] when the run-time fails or answers in another shape than it promised.
+    fn detect(&mut self, batch: &ViewBatch) -> Result<Vec<Vec<ViewDetection>>, InferenceError>;
+}
+
+/// A model that cannot be loaded or run. Every message is one sentence with the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum InferenceError {
+    /// The ONNX Runtime library cannot be used.
+    #[error(
+        "inference.library_path: ONNX Runtime cannot be loaded from {path}: {detail}; run `make \
+         setup`, or point it to libonnxruntime.so 1.24 or newer"
+    )]
+    Runtime {
+        /// Where it was looked for.
+        path: PathBuf,
+        /// What the loader said.
+        detail: String,
+    },
+    /// The model file or its manifest cannot be read.
+    #[error("model.path: {path} cannot be read: {detail}; run `make setup`, or name another model")]
+    Unreadable {
+        /// Which file.
+        path: PathBuf,
+        /// What went wrong.
+        detail: String,
+    },
+    /// The model is not one that can be used here.
+    #[error("model.path: {path} cannot be used: {problem}")]
+    Unusable {
+        /// Which file.
+        path: PathBuf,
+        /// What was found and what is needed.
+        problem: String,
+    },
+    /// The run-time failed on a batch.
+    #[error("the network failed: {0}")]
+    Run(String),
+}

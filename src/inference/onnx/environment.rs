@@ -1,0 +1,36 @@
+//! The process's one ONNX Runtime environment.
+
+use std::{
+    path::Path,
+    sync::{Mutex, OnceLock, PoisonError},
+};
+
+use ort::environment::Environment;
+
+use crate::inference::InferenceError;
+
+static ENVIRONMENT: OnceLock<Environment> = OnceLock::new();
+/// The run-time refuses a second environment, so only one thread may make the first.
+static LOADING: Mutex<()> = Mutex::new(());
+
+/// Loads the library on the first call; later calls return the same environment.
+pub(super) fn load(library: &Path) -> Result<&'static Environment, InferenceError> {
+    let _only_loader = LOADING.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(environment) = ENVIRONMENT.get() {
+        return Ok(environment);
+    }
+    let unusable = |detail: String| InferenceError::Runtime {
+        path: library.to_owned(),
+        detail,
+    };
+    // A bare path would be looked for beside the executable first.
+    let library = library
+        .canonicalize()
+        .map_err(|error| unusable(error.to_string()))?;
+    let environment = ort::environment::init_from(&library)
+        .map_err(|error| unusable(error.to_string()))?
+        .with_name("lookdown")
+        .build()
+        .map_err(|error| unusable(error.to_string()))?;
+    Ok(ENVIRONMENT.get_or_init(|| environment))
+}

@@ -1,0 +1,20 @@
+//! From the bytes of a frame to a report of the persons in it.
+
+mod camera_rig;
+mod engine;
+mod error;
+mod job;
+mod merge;
+mod parameters;
+mod profile;
+mod report;
+mod rig_cache;
+mod worker_pool;
+
+pub use engine::{Engine, EngineOptions, Observation};
+pub use error::PipelineError;
+pub use job::{DetectJob, Detected};
+pub use parameters::{DetectParameters, ParameterError, ParameterFault};
+pub use profile::Profile;
+pub use report::{CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings};
+pub use worker_pool::WorkerPool;

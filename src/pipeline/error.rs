@@ -1,0 +1,74 @@
+//! Why a frame got no report, by who is at fault.
+
+use super::ParameterError;
+use crate::imaging::decode::DecodeError;
+
+/// A frame that got no report.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// The caller's parameter cannot be used.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// The caller's picture cannot be used.
+    #[error(transparent)]
+    Image(#[from] DecodeError),
+    /// The caller named a calibration that does not exist.
+    #[error("calibration: there is no calibration {id:?}; GET /calibrations lists those there are")]
+    UnknownCalibration {
+        /// The ID asked for.
+        id: String,
+    },
+    /// The caller asked for a model that is not loaded.
+    #[error("model: {name:?} is not loaded; {loaded:?} is")]
+    UnknownModel {
+        /// The name asked for.
+        name: String,
+        /// The model there is.
+        loaded: String,
+    },
+    /// The caller's frame does not belong to the calibration it named.
+    #[error(
+        "image: the frame is {frame_width}×{frame_height} pixels, but calibration {id:?} was made \
+         for {calibration_width}×{calibration_height}, which is another aspect: send an uncropped \
+         frame or name another calibration"
+    )]
+    AspectMismatch {
+        /// The calibration's ID.
+        id: String,
+        /// Frame width, pixels.
+        frame_width: u32,
+        /// Frame height, pixels.
+        frame_height: u32,
+        /// Width the calibration was made for, pixels.
+        calibration_width: u32,
+        /// Height the calibration was made for, pixels.
+        calibration_height: u32,
+    },
+    /// The frame is too small to hold a lens image.
+    #[error("image: the frame is {width}×{height} pixels: at least {minimum}×{minimum} are needed")]
+    FrameTooSmall {
+        /// Frame width, pixels.
+        width: u32,
+        /// Frame height, pixels.
+        height: u32,
+        /// The smallest side accepted, pixels.
+        minimum: u32,
+    },
+    /// More frames are waiting than the queue holds.
+    #[error("all {capacity} places in the queue are taken: send fewer frames at a time, or retry")]
+    Overloaded {
+        /// How many frames may wait or be worked on.
+        capacity: usize,
+    },
+    /// The server is about to stop.
+    #[error("the server is shutting down: send the frame to another one")]
+    ShuttingDown,
+    /// Our fault: logged with its cause, shown without it.
+    #[error("the frame could not be processed because of a fault in the server")]
+    Internal(#[source] anyhow::Error),
+}
+
+/// Our own fault, with its cause.
+pub(super) fn internal(cause: anyhow::Error) -> PipelineError {
+    PipelineError::Internal(cause)
+}

@@ -1,0 +1,35 @@
+//! One frame to be looked at, and what came of it.
+
+use std::{sync::Arc, time::Instant};
+
+use bytes::Bytes;
+use jiff::Timestamp;
+
+use super::{DetectParameters, DetectionReport};
+use crate::{calibration::Calibration, imaging::Frame};
+
+/// One frame to be looked at.
+#[derive(Debug, Clone)]
+pub struct DetectJob {
+    /// Identifies the request in logs and answers.
+    pub request_id: String,
+    /// When the request arrived, by the calendar.
+    pub received_at: Timestamp,
+    /// When the whole request was in memory: stages are timed from here.
+    pub arrived: Instant,
+    /// The encoded frame.
+    pub image: Bytes,
+    /// The checked parameters.
+    pub parameters: DetectParameters,
+    /// A calibration at hand, used instead of looking up `parameters.calibration`.
+    pub calibration: Option<Arc<Calibration>>,
+}
+
+/// A report together with the frame it is about.
+#[derive(Debug, Clone)]
+pub struct Detected {
+    /// The persons and how they were found.
+    pub report: DetectionReport,
+    /// The decoded frame, EXIF orientation applied.
+    pub frame: Frame,
+}

@@ -1,0 +1,117 @@
+//! From boxes in views to persons in the frame.
+
+use super::{Person, camera_rig::CameraRig};
+use crate::{
+    detection::{BBox, Candidate, FramePixels, RefinementParameters, ViewPixels, refine},
+    geometry::{
+        BackProjection, Footprint, OrientedBox,
+        floor::{bearing, floor_position},
+        oriented_box::vertical_in_frame,
+    },
+    imaging::NetworkInput,
+    inference::ViewDetection,
+};
+
+/// A box this close to its view's border (share of the view's width) is probably cut off.
+const BORDER_SHARE: f64 = 0.0125;
+/// How much less the coordinates of a cut-off box count when boxes are averaged.
+const BORDER_WEIGHT: f64 = 0.1;
+
+/// A box of a view, with its footprint in the frame.
+struct Mapped {
+    candidate: Candidate,
+    footprint: Footprint,
+}
+
+/// Maps the boxes of every view to the frame and merges them into persons.
+pub(super) fn persons(
+    per_view: &[Vec<ViewDetection>],
+    rig: &CameraRig,
+    input: &NetworkInput,
+    back_projection: BackProjection,
+    parameters: &RefinementParameters,
+) -> Vec<Person> {
+    let mapped: Vec<Mapped> = per_view
+        .iter()
+        .enumerate()
+        .flat_map(|(view, detections)| detections.iter().map(move |found| (view, found)))
+        .filter_map(|(view, found)| map(view, found, rig, input, back_projection))
+        .collect();
+    let candidates: Vec<Candidate> = mapped.iter().map(|one| one.candidate).collect();
+    refine(&candidates, parameters)
+        .into_iter()
+        .filter_map(|merged| {
+            let members: Vec<&Mapped> = merged
+                .members
+                .iter()
+                .map(|&member| &mapped[member])
+                .collect();
+            person(merged.bbox, merged.score, &members, rig)
+        })
+        .collect()
+}
+
+fn map(
+    view: usize,
+    found: &ViewDetection,
+    rig: &CameraRig,
+    input: &NetworkInput,
+    back_projection: BackProjection,
+) -> Option<Mapped> {
+    let footprint = rig.footprint(view, &found.bbox, back_projection)?;
+    let bbox = BBox::new(footprint.bounds()).ok()?;
+    #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
+    let expected_views = rig.views_holding(&footprint).max(1) as f64;
+    let candidate = Candidate {
+        bbox,
+        score: found.score,
+        view,
+        coordinate_weight: if touches_border(&found.bbox, input) {
+            BORDER_WEIGHT
+        } else {
+            1.0
+        },
+        expected_views,
+    };
+    Some(Mapped {
+        candidate,
+        footprint,
+    })
+}
+
+fn touches_border(bbox: &BBox<ViewPixels>, input: &NetworkInput) -> bool {
+    let (width, height) = (f64::from(input.width), f64::from(input.height));
+    let margin = BORDER_SHARE * width;
+    bbox.x_min() < margin
+        || bbox.y_min() < margin
+        || bbox.x_max() > width - margin
+        || bbox.y_max() > height - margin
+}
+
+fn person(
+    bbox: BBox<FramePixels>,
+    score: f64,
+    members: &[&Mapped],
+    rig: &CameraRig,
+) -> Option<Person> {
+    let geometry = rig.geometry();
+    let center = nalgebra::Point2::from(bbox.center());
+    let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
+    let outlines = members.iter().map(|member| {
+        let weight = member.candidate.score.powi(2) * member.candidate.coordinate_weight;
+        // A score of 0 is allowed; its outline still has to count for something.
+        (weight.max(f64::MIN_POSITIVE), member.footprint.outline())
+    });
+    let oriented_box = OrientedBox::averaging(up, outlines)?;
+    let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
+    views.sort_unstable();
+    views.dedup();
+    Some(Person {
+        bbox,
+        score,
+        oriented_box,
+        bearing: bearing(center, &geometry.lens),
+        floor: floor_position(oriented_box.foot(), &geometry.lens, &geometry.mount),
+        views: views.len(),
+    })
+}

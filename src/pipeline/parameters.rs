@@ -1,0 +1,267 @@
+//! Request parameters: the same names and rules in multipart fields, query strings and
+//! command-line flags, checked once.
+
+use jiff::Timestamp;
+
+use super::Profile;
+use crate::{
+    calibration::CalibrationId,
+    detection::{Refinement, RefinementParameters},
+};
+
+/// Longest camera name.
+const MAX_CAMERA_CHARS: usize = 128;
+/// Most characters of an unknown name that are repeated to its sender.
+const MAX_NAME_CHARS: usize = 64;
+/// Most persons a report may hold, and the default.
+const MAX_DETECTIONS: usize = 10_000;
+const DEFAULT_MAX_DETECTIONS: usize = 1_000;
+/// N_t of hard NMS and linear Soft-NMS (Seidel et al., section IV: "IoU > 0.5").
+const DEFAULT_SUPPRESSION_IOU: f64 = 0.5;
+/// Boxes that overlap at least this much are fused.
+const DEFAULT_FUSION_IOU: f64 = 0.4;
+/// σ of Gaussian Soft-NMS; the paper does not state its best value.
+const DEFAULT_SIGMA: f64 = 0.3;
+
+/// A parameter that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{name}: {problem}")]
+pub struct ParameterError {
+    /// The parameter's name.
+    pub name: String,
+    /// One sentence: the value, and what would be right.
+    pub problem: String,
+    /// What is wrong with it.
+    pub fault: ParameterFault,
+}
+
+/// What is wrong with a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterFault {
+    /// There is no such parameter.
+    UnknownName,
+    /// It was given more than once.
+    Repeated,
+    /// Its value is out of range or no value of its kind.
+    BadValue,
+}
+
+/// The checked parameters of one detection request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectParameters {
+    /// Which calibration to use; without one the lens circle is found in the frame.
+    pub calibration: Option<CalibrationId>,
+    /// Under which name results are kept.
+    pub camera: Option<String>,
+    /// The profile.
+    pub profile: Profile,
+    /// Which model must answer; any by default.
+    pub model: Option<String>,
+    /// How overlapping boxes become persons.
+    pub refinement: RefinementParameters,
+    /// When the frame was taken.
+    pub captured_at: Option<Timestamp>,
+}
+
+impl DetectParameters {
+    /// The names every caller may use.
+    pub const NAMES: [&'static str; 10] = [
+        "calibration",
+        "camera",
+        "profile",
+        "refine",
+        "model",
+        "score_threshold",
+        "iou_threshold",
+        "sigma",
+        "max_detections",
+        "captured_at",
+    ];
+
+    /// Checks `(name, value)` pairs. `default_score_threshold` is C_t when the caller gives none.
+    ///
+    /// # Errors
+    /// [`ParameterError`] for an unknown or repeated name and for a value out of range.
+    pub fn parse<'a>(
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+        default_score_threshold: f64,
+    ) -> Result<Self, ParameterError> {
+        let mut given: [Option<&str>; Self::NAMES.len()] = [None; Self::NAMES.len()];
+        for (name, value) in pairs {
+            let Some(index) = Self::NAMES.iter().position(|known| *known == name) else {
+                let known = Self::NAMES.join(", ");
+                let problem = format!("there is no such parameter; the parameters are {known}");
+                return Err(ParameterError::new(
+                    name,
+                    problem,
+                    ParameterFault::UnknownName,
+                ));
+            };
+            if given[index].replace(value).is_some() {
+                let problem = "it is given twice: give it once".to_owned();
+                return Err(ParameterError::new(name, problem, ParameterFault::Repeated));
+            }
+        }
+        let [
+            calibration,
+            camera,
+            profile,
+            refine,
+            model,
+            score_threshold,
+            iou_threshold,
+            sigma,
+            max_detections,
+            captured_at,
+        ] = given;
+        let profile = profile.map_or(Ok(Profile::default()), parse_profile)?;
+        let refinement = refine.map_or(Ok(profile.default_refinement()), parse_refinement)?;
+        let default_iou_threshold = match refinement {
+            Refinement::Fusion => DEFAULT_FUSION_IOU,
+            _ => DEFAULT_SUPPRESSION_IOU,
+        };
+        Ok(Self {
+            calibration: calibration.map(parse_calibration).transpose()?,
+            camera: camera.map(parse_camera).transpose()?,
+            profile,
+            model: model.map(ToOwned::to_owned),
+            refinement: RefinementParameters {
+                refinement,
+                score_threshold: unit_interval(
+                    "score_threshold",
+                    score_threshold,
+                    default_score_threshold,
+                )?,
+                iou_threshold: unit_interval(
+                    "iou_threshold",
+                    iou_threshold,
+                    default_iou_threshold,
+                )?,
+                sigma: sigma.map_or(Ok(DEFAULT_SIGMA), parse_sigma)?,
+                max_detections: max_detections
+                    .map_or(Ok(DEFAULT_MAX_DETECTIONS), parse_max_detections)?,
+            },
+            captured_at: captured_at.map(parse_timestamp).transpose()?,
+        })
+    }
+}
+
+impl ParameterError {
+    fn new(name: &str, problem: String, fault: ParameterFault) -> Self {
+        Self {
+            // Enough to recognise a made-up name by, not enough to fill a log.
+            name: name.chars().take(MAX_NAME_CHARS).collect(),
+            problem,
+            fault,
+        }
+    }
+}
+
+fn problem(name: &str, problem: String) -> ParameterError {
+    ParameterError::new(name, problem, ParameterFault::BadValue)
+}
+
+/// As much of a value as helps its sender.
+fn shown(value: &str) -> String {
+    value.chars().take(MAX_NAME_CHARS).collect()
+}
+
+fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
+    Profile::from_name(value).ok_or_else(|| {
+        let known = Profile::ALL.map(Profile::name).join(", ");
+        problem(
+            "profile",
+            format!("{:?} is not a profile; use one of {known}", shown(value)),
+        )
+    })
+}
+
+fn parse_refinement(value: &str) -> Result<Refinement, ParameterError> {
+    value.parse().map_err(|_| {
+        let known = Refinement::ALL
+            .map(|refinement| refinement.to_string())
+            .join(", ");
+        problem(
+            "refine",
+            format!("{:?} is not a refinement; use one of {known}", shown(value)),
+        )
+    })
+}
+
+fn parse_calibration(value: &str) -> Result<CalibrationId, ParameterError> {
+    value
+        .parse()
+        .map_err(|error| problem("calibration", format!("{error}")))
+}
+
+fn parse_camera(value: &str) -> Result<String, ParameterError> {
+    let acceptable = !value.is_empty()
+        && value.chars().count() <= MAX_CAMERA_CHARS
+        && !value.chars().any(char::is_control);
+    if !acceptable {
+        let rule = format!("use 1 to {MAX_CAMERA_CHARS} characters without control characters");
+        return Err(problem(
+            "camera",
+            format!("the name cannot be used; {rule}"),
+        ));
+    }
+    Ok(value.to_owned())
+}
+
+fn number(name: &str, value: &str) -> Result<f64, ParameterError> {
+    value
+        .parse()
+        .map_err(|_| problem(name, format!("{:?} is not a number", shown(value))))
+}
+
+fn unit_interval(name: &str, value: Option<&str>, default: f64) -> Result<f64, ParameterError> {
+    let Some(value) = value else {
+        return Ok(default);
+    };
+    let parsed = number(name, value)?;
+    if !(0.0..=1.0).contains(&parsed) {
+        return Err(problem(name, format!("{} is outside 0 to 1", shown(value))));
+    }
+    Ok(parsed)
+}
+
+fn parse_sigma(value: &str) -> Result<f64, ParameterError> {
+    let sigma = number("sigma", value)?;
+    if !(sigma.is_finite() && sigma > 0.0) {
+        return Err(problem(
+            "sigma",
+            format!("{} is not a finite number above 0", shown(value)),
+        ));
+    }
+    Ok(sigma)
+}
+
+fn parse_max_detections(value: &str) -> Result<usize, ParameterError> {
+    value
+        .parse()
+        .ok()
+        .filter(|count| (1..=MAX_DETECTIONS).contains(count))
+        .ok_or_else(|| {
+            let rule = format!("a whole number from 1 to {MAX_DETECTIONS}");
+            problem(
+                "max_detections",
+                format!("{:?} is not {rule}", shown(value)),
+            )
+        })
+}
+
+fn parse_timestamp(value: &str) -> Result<Timestamp, ParameterError> {
+    value.parse().map_err(|_| {
+        let example = "2026-11-21T09:30:00Z";
+        problem(
+            "captured_at",
+            format!(
+                "{:?} is not an RFC 3339 time with an offset, such as {example}",
+                shown(value)
+            ),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+use super::*;
+
+fn parse(pairs: &[(&str, &str)]) -> Result<DetectParameters, ParameterError> {
+    DetectParameters::parse(pairs.iter().copied(), 0.3)
+}
+
+#[test]
+fn defaults_are_the_contract_s() {
+    let parameters = parse(&[]).unwrap();
+    assert_eq!(parameters.profile, Profile::Balanced);
+    assert_eq!(parameters.refinement.refinement, Refinement::Fusion);
+    assert_eq!(parameters.refinement.score_threshold, 0.3);
+    assert_eq!(parameters.calibration, None);
+
+    let paper = parse(&[("profile", "paper")]).unwrap();
+    assert_eq!(paper.refinement.refinement, Refinement::SoftNmsGaussian);
+    assert_eq!(paper.refinement.iou_threshold, 0.5);
+}
+
+#[test]
+fn every_parameter_is_taken_over() {
+    let parameters = parse(&[
+        ("calibration", "lobby"),
+        ("camera", "Lobby, north"),
+        ("profile", "quality"),
+        ("refine", "soft_nms_linear"),
+        ("model", "ssdlite_mobilenet_v2"),
+        ("score_threshold", "0"),
+        ("iou_threshold", "1"),
+        ("sigma", "0.7"),
+        ("max_detections", "5"),
+        ("captured_at", "2026-11-21T09:30:00+01:00"),
+    ])
+    .unwrap();
+    assert_eq!(parameters.calibration.unwrap().as_str(), "lobby");
+    assert_eq!(parameters.camera.unwrap(), "Lobby, north");
+    assert_eq!(parameters.refinement.refinement, Refinement::SoftNmsLinear);
+    assert_eq!(parameters.refinement.score_threshold, 0.0);
+    assert_eq!(parameters.refinement.iou_threshold, 1.0);
+    assert_eq!(parameters.refinement.sigma, 0.7);
+    assert_eq!(parameters.refinement.max_detections, 5);
+    assert_eq!(
+        parameters.captured_at.unwrap().to_string(),
+        "2026-11-21T08:30:00Z"
+    );
+}
+
+#[test]
+fn bad_values_are_refused_with_name_value_and_rule() {
+    for (name, value, expected) in [
+        (
+            "score_threshold",
+            "1.5",
+            "score_threshold: 1.5 is outside 0 to 1",
+        ),
+        (
+            "score_threshold",
+            "NaN",
+            "score_threshold: NaN is outside 0 to 1",
+        ),
+        (
+            "score_threshold",
+            "high",
+            "score_threshold: \"high\" is not a number",
+        ),
+        (
+            "iou_threshold",
+            "-0.1",
+            "iou_threshold: -0.1 is outside 0 to 1",
+        ),
+        ("sigma", "0", "sigma: 0 is not a finite number above 0"),
+        ("sigma", "inf", "sigma: inf is not a finite number above 0"),
+        (
+            "max_detections",
+            "0",
+            "max_detections: \"0\" is not a whole number from 1 to 10000",
+        ),
+        (
+            "profile",
+            "best",
+            "profile: \"best\" is not a profile; use one of paper, fast, balanced, quality, direct",
+        ),
+        (
+            "refine",
+            "soft",
+            "refine: \"soft\" is not a refinement; use one of nms, soft_nms_linear, \
+             soft_nms_gaussian, fusion",
+        ),
+        (
+            "captured_at",
+            "now",
+            "captured_at: \"now\" is not an RFC 3339 time with an offset, such as 2026-11-21T09:30:00Z",
+        ),
+        (
+            "camera",
+            "",
+            "camera: the name cannot be used; use 1 to 128 characters without control characters",
+        ),
+    ] {
+        let error = parse(&[(name, value)]).unwrap_err();
+        assert_eq!(error.to_string(), expected);
+        assert_eq!(error.fault, ParameterFault::BadValue);
+    }
+    assert!(
+        parse(&[("calibration", "../x")])
+            .unwrap_err()
+            .to_string()
+            .starts_with("calibration: \"../x\" is not a calibration ID")
+    );
+}
+
+#[test]
+fn unknown_and_repeated_names_are_refused() {
+    let unknown = parse(&[("threshold", "0.5")]).unwrap_err();
+    assert!(unknown.to_string().starts_with(
+        "threshold: there is no such parameter; the parameters are calibration, camera"
+    ));
+    assert_eq!(unknown.fault, ParameterFault::UnknownName);
+    let repeated = parse(&[("sigma", "0.5"), ("sigma", "0.6")]).unwrap_err();
+    assert_eq!(
+        repeated.to_string(),
+        "sigma: it is given twice: give it once"
+    );
+    assert_eq!(repeated.fault, ParameterFault::Repeated);
+}
+
+#[test]
+fn endless_names_and_values_are_not_repeated_in_full() {
+    let endless = "x".repeat(100_000);
+    assert!(parse(&[(&endless, "1")]).unwrap_err().to_string().len() < 400);
+    assert!(parse(&[("sigma", &endless)]).unwrap_err().to_string().len() < 400);
+}

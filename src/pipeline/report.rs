@@ -1,0 +1,105 @@
+//! What came of a frame: the persons found and how they were found.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+
+use super::Profile;
+use crate::{
+    detection::{BBox, FramePixels, RefinementParameters},
+    geometry::{
+        OrientedBox,
+        floor::{Bearing, FloorPosition},
+    },
+};
+
+/// The persons in one frame.
+#[derive(Debug, Clone)]
+pub struct DetectionReport {
+    /// Identifies the request in logs and answers.
+    pub request_id: String,
+    /// Which camera the frame came from; the calibration's ID unless the request named one.
+    pub camera: String,
+    /// When the request arrived.
+    pub received_at: Timestamp,
+    /// When the frame was taken, when the request said so.
+    pub captured_at: Option<Timestamp>,
+    /// The calibration used.
+    pub calibration: CalibrationUsed,
+    /// Frame width after EXIF orientation, pixels.
+    pub image_width: u32,
+    /// Frame height after EXIF orientation, pixels.
+    pub image_height: u32,
+    /// The detector used.
+    pub model: ModelUsed,
+    /// The profile used.
+    pub profile: Profile,
+    /// The refinement used, with all its parameters.
+    pub refinement: RefinementParameters,
+    /// Persons, highest score first.
+    pub persons: Vec<Person>,
+    /// How many views the network saw.
+    pub view_count: usize,
+    /// In how many batches it saw them.
+    pub batch_count: usize,
+    /// Where the time went.
+    pub timings: StageTimings,
+    /// What the caller should know: one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Which calibration a report is based on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CalibrationUsed {
+    /// The calibration's ID; `assumed` when none was named.
+    pub id: String,
+    /// Changes whenever the calibration's content does.
+    pub revision: String,
+    /// Whether the lens was assumed from the circle found in the frame.
+    pub assumed: bool,
+}
+
+/// Which detector a report is based on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModelUsed {
+    /// The model's name.
+    pub name: String,
+    /// Changes whenever the model's weights do.
+    pub revision: String,
+}
+
+/// One person.
+#[derive(Debug, Clone)]
+pub struct Person {
+    /// Axis-parallel box, corner-origin frame pixels.
+    pub bbox: BBox<FramePixels>,
+    /// Confidence, 0 to 1.
+    pub score: f64,
+    /// The box turned so that its height axis is the projected vertical.
+    pub oriented_box: OrientedBox,
+    /// The direction of the box centre; `None` when it lies outside the lens image.
+    pub bearing: Option<Bearing>,
+    /// Where the person stands, when the camera's height is known.
+    pub floor: Option<FloorPosition>,
+    /// How many views agreed.
+    pub views: usize,
+}
+
+/// Disjoint wall-clock spans of one frame; together they make `total` but for scheduling gaps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct StageTimings {
+    /// Bytes to pixels.
+    pub decode: Duration,
+    /// Finding the camera: calibration, lens circle, tables when they are new.
+    pub calibrate: Duration,
+    /// Waiting for a worker and for the network.
+    pub queue: Duration,
+    /// Frame to network input.
+    pub remap: Duration,
+    /// The network.
+    pub inference: Duration,
+    /// Back-projection and merge.
+    pub refine: Duration,
+    /// From the arrival of the whole request to the report.
+    pub total: Duration,
+}
