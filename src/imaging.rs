@@ -1,5 +1,6 @@
 //! Pixels: decoding with limits, finding the lens circle, remap tables, network input, drawing.
 
+pub mod annotate;
 pub mod decode;
 pub mod frame;
 pub mod lens_circle;

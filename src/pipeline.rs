@@ -9,6 +9,8 @@ mod parameters;
 mod profile;
 mod report;
 mod rig_cache;
+#[cfg(test)]
+mod test_support;
 mod worker_pool;
 
 pub use engine::{Engine, EngineOptions, Observation};

@@ -1,11 +1,11 @@
 //! Where the lens image lies in a fisheye frame: a bright disc on a black surround.
 //!
-//! 1. The corners tell how dark the surround is ([`surround`]).
+//! 1. The corners tell how dark the surround is (`surround`).
 //! 2. Scans along rows and columns, from the border inward, meet the disc; a consensus
 //!    circle through those points ignores captions and unlit parts of the room
-//!    ([`outline`], [`consensus`]).
+//!    (`outline`, `consensus`).
 //! 3. Along rays near that circle the rim is located to a fraction of a pixel, and a
-//!    robust least-squares circle is fitted to it ([`rim`], [`least_squares`]).
+//!    robust least-squares circle is fitted to it (`rim`, `least_squares`).
 
 mod consensus;
 mod least_squares;
@@ -30,32 +30,40 @@ pub struct LensCircle {
     pub radius: f64,
 }
 
-/// Sides below this show too little of a rim to measure.
+/// Frames with a shorter side than this show too little of a rim to measure.
 const MIN_SIDE: u32 = 32;
-/// A lens image smaller than half the frame's shorter side is taken for a lamp or a table.
-const MIN_RADIUS_IN_SHORT_SIDES: f64 = 0.25;
-/// Of the rays that meet the circle inside the frame, this part must show a rim.
-/// The rest may be dark room.
-const MIN_SUPPORT: f64 = 0.35;
-/// How far the rim is sought on either side of the circle known so far, as parts of the
-/// radius: wide first, to recover from a rough consensus.
+/// How much brighter than the surround the picture must be, in parts of the brightness of
+/// its middle. The first ignores stray light around the lens image; the second is for
+/// lenses that darken toward the rim.
+const MIN_CONTRASTS: [f64; 2] = [0.1, 0.03];
+/// How far the rim is sought on either side of the circle known so far, in radii: wide
+/// first, to recover from a rough consensus.
 const REACHES: [f64; 3] = [0.04, 0.02, 0.02];
-/// The widest angle without any rim; beyond it, centre and radius trade off.
+/// A circle smaller than this is a lamp or a table.
+const MIN_RADIUS_IN_SHORT_SIDES: f64 = 0.25;
+/// Of the rays that meet the circle inside the frame, this part must show a rim. The rest
+/// may be dark room.
+const MIN_SUPPORT: f64 = 0.35;
+/// The widest angle without any rim: beyond it, centre and radius trade off.
 const MAX_GAP_RADIANS: f64 = 3.5;
 
-/// Finds the lens circle, or `None` where no dark surround shows it: a frame that the
-/// lens image fills, a picture of an ordinary camera, a room too dark to tell.
-/// [`assumed_circle`] is what to use then.
+/// Finds the lens circle, to a fraction of a pixel; it may be cut off by the frame.
 ///
-/// Meant for any picture: takes a few milliseconds whatever its size, and gives the same
-/// answer for the same pixels.
+/// `None` where no dark surround shows it: a frame that the lens image fills, a picture of
+/// an ordinary camera, a room too dark to tell. [`assumed_circle`] is what to use then.
+/// The same pixels always give the same answer.
 #[must_use]
 pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
-    let short_side = frame.width().min(frame.height());
-    if short_side < MIN_SIDE {
+    if short_side(frame) < MIN_SIDE {
         return None;
     }
-    let surround = Surround::of(frame)?;
+    MIN_CONTRASTS
+        .into_iter()
+        .find_map(|min_contrast| find_at_contrast(frame, min_contrast))
+}
+
+fn find_at_contrast(frame: &Frame, min_contrast: f64) -> Option<LensCircle> {
+    let surround = Surround::of(frame, min_contrast)?;
     let mut circle = consensus::circle(&outline::points(frame, &surround))?;
     let mut edge = Vec::new();
     for reach in REACHES {
@@ -63,8 +71,12 @@ pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
         let points: Vec<_> = edge.iter().map(|point| point.at).collect();
         circle = least_squares::circle(&points, &circle)?;
     }
-    let is_large = circle.radius >= MIN_RADIUS_IN_SHORT_SIDES * f64::from(short_side);
+    let is_large = circle.radius >= MIN_RADIUS_IN_SHORT_SIDES * f64::from(short_side(frame));
     (is_large && is_shown(&edge, frame, &circle)).then_some(circle)
+}
+
+fn short_side(frame: &Frame) -> u32 {
+    frame.width().min(frame.height())
 }
 
 /// Whether enough of the circle's rim was seen, all around it.
@@ -86,8 +98,8 @@ fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
     !shown.is_empty() && is_supported && widest_gap <= MAX_GAP_RADIANS
 }
 
-/// The largest circle that fits into a frame of this size, in its middle: the guess for
-/// frames in which no circle is found.
+/// The largest circle in the middle of a frame of this size: the guess for frames in which
+/// no circle is found.
 #[must_use]
 pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
     LensCircle {
@@ -98,21 +110,13 @@ pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
 }
 
 impl LensCircle {
-    /// The point at a distance from the centre, in a direction.
-    fn on_ray(&self, angle: f64, radius: f64) -> [f64; 2] {
-        [
-            self.cx + radius * angle.cos(),
-            self.cy + radius * angle.sin(),
-        ]
-    }
-
     /// Signed distance of a point from the circle in pixels, positive outside.
     fn distance(&self, [x, y]: [f64; 2]) -> f64 {
         (x - self.cx).hypot(y - self.cy) - self.radius
     }
 
-    /// How far a point may lie from the circle and still count as its rim: half a
-    /// percent of the radius, but no less than pixels and compression blur.
+    /// How far a point may lie from the circle and still count as its rim: half a percent
+    /// of the radius, but no less than pixels and compression blur.
     fn tolerance(&self) -> f64 {
         (0.005 * self.radius).max(1.5)
     }

@@ -57,20 +57,23 @@ fn draw(state: &mut u64, points: &[[f64; 2]]) -> Option<[f64; 2]> {
 }
 
 /// The circle through three points; `None` when they are nearly on a line.
-fn through(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<LensCircle> {
-    let (bx, by) = (b[0] - a[0], b[1] - a[1]);
-    let (cx, cy) = (c[0] - a[0], c[1] - a[1]);
-    let twice_area = bx * cy - by * cx;
-    let (b_squared, c_squared) = (bx * bx + by * by, cx * cx + cy * cy);
+///
+/// Its centre is as far from the first point as from the two others: two linear equations,
+/// solved by Cramer's rule.
+fn through(first: [f64; 2], second: [f64; 2], third: [f64; 2]) -> Option<LensCircle> {
+    let [u, v] = [second[0] - first[0], second[1] - first[1]];
+    let [s, t] = [third[0] - first[0], third[1] - first[1]];
+    let (near, far) = (u * u + v * v, s * s + t * t);
+    let twice_area = u * t - v * s;
     // On a large circle, a short arc looks like a line: the area is small for the sides.
-    if twice_area.abs() < 0.01 * b_squared.max(c_squared) {
+    if twice_area.abs() < 0.01 * near.max(far) {
         return None;
     }
-    let x = (cy * b_squared - by * c_squared) / (2.0 * twice_area);
-    let y = (bx * c_squared - cx * b_squared) / (2.0 * twice_area);
+    let across = (t * near - v * far) / (2.0 * twice_area);
+    let down = (u * far - s * near) / (2.0 * twice_area);
     Some(LensCircle {
-        cx: a[0] + x,
-        cy: a[1] + y,
-        radius: x.hypot(y),
+        cx: first[0] + across,
+        cy: first[1] + down,
+        radius: across.hypot(down),
     })
 }

@@ -8,9 +8,11 @@ use crate::imaging::frame::Frame;
 
 /// Rays around the circle.
 const RAYS: u32 = 360;
-/// How far inside the rim its brightness is measured, as a part of the radius: farther
-/// than the blur of a rim reaches.
+/// How far inside the rim its brightness is measured, in radii: farther than the blur of
+/// a rim reaches.
 const INSIDE: f64 = 0.03;
+/// The same in pixels, at least.
+const MIN_INSIDE: f64 = 4.0;
 /// Samples in a row, one pixel apart, that must be lit: noise is shorter.
 const LIT_RUN: usize = 3;
 
@@ -22,31 +24,41 @@ pub(super) struct RimPoint {
     pub at: [f64; 2],
 }
 
-/// The rim on every ray that shows one within `reach` (a part of the radius) on either
-/// side of the circle, by growing angle.
+/// Brightness at a distance from the centre.
+#[derive(Clone, Copy)]
+struct Sample {
+    radius: f64,
+    value: f64,
+}
+
+/// The rim on every ray that shows one within `reach` (in radii) on either side of the
+/// circle, by growing angle.
 pub(super) fn points(
     frame: &Frame,
     surround: &Surround,
     circle: &LensCircle,
     reach: f64,
 ) -> Vec<RimPoint> {
+    let inside = (INSIDE * circle.radius).max(MIN_INSIDE);
+    let outermost = circle.radius * (1.0 + reach);
+    let innermost = circle.radius * (1.0 - reach) - inside;
     let mut profile = Vec::new();
     rays()
         .filter_map(|angle| {
-            let outermost = circle.radius * (1.0 + reach);
-            let length = circle.radius * (2.0 * reach + INSIDE) + 6.0;
+            let (sin, cos) = angle.sin_cos();
+            let on_ray = |radius: f64| [circle.cx + radius * cos, circle.cy + radius * sin];
+            let radii = (0..)
+                .map(|pixels| outermost - f64::from(pixels))
+                .take_while(|radius| *radius >= innermost);
             profile.clear();
-            profile.extend(
-                (0..)
-                    .map(f64::from)
-                    .take_while(|inward| *inward < length)
-                    .map(|inward| (outermost - inward, circle.on_ray(angle, outermost - inward)))
-                    .filter_map(|(radius, at)| Some((radius, sample(frame, at)?))),
-            );
-            let radius = rim_radius(&profile, surround, circle.radius * INSIDE)?;
+            profile.extend(radii.filter_map(|radius| {
+                let value = brightness_at(frame, on_ray(radius))?;
+                Some(Sample { radius, value })
+            }));
+            let radius = rim_radius(&profile, surround, inside)?;
             Some(RimPoint {
                 angle,
-                at: circle.on_ray(angle, radius),
+                at: on_ray(radius),
             })
         })
         .collect()
@@ -54,8 +66,15 @@ pub(super) fn points(
 
 /// Number of rays that meet the circle where the frame shows both of its sides.
 pub(super) fn visible_rays(frame: &Frame, circle: &LensCircle) -> usize {
+    let beyond = circle.radius + 2.0;
     rays()
-        .filter(|angle| sample(frame, circle.on_ray(*angle, circle.radius + 2.0)).is_some())
+        .map(|angle| {
+            [
+                circle.cx + beyond * angle.cos(),
+                circle.cy + beyond * angle.sin(),
+            ]
+        })
+        .filter(|at| brightness_at(frame, *at).is_some())
         .count()
 }
 
@@ -66,40 +85,42 @@ fn rays() -> impl Iterator<Item = f64> {
 /// Where, coming from outside, brightness passes halfway between the surround and the
 /// picture just inside: a symmetric blur leaves that point in place.
 ///
-/// `profile` holds radius and brightness by falling radius, one pixel apart.
-fn rim_radius(profile: &[(f64, f64)], surround: &Surround, inside: f64) -> Option<f64> {
-    let is_lit = |(_, value): &(f64, f64)| *value > surround.threshold;
+/// `profile` goes inward, one pixel at a time.
+fn rim_radius(profile: &[Sample], surround: &Surround, inside: f64) -> Option<f64> {
+    let is_lit = |sample: &Sample| sample.value > surround.threshold;
     let first_lit = profile
         .windows(LIT_RUN)
         .position(|run| run.iter().all(is_lit))?;
     // A ray that starts lit was cut off by the frame, or crosses a caption.
-    let before = first_lit.checked_sub(1)?;
-    let innermost = profile[first_lit].0 - inside.max(4.0);
-    let mut within: Vec<f64> = profile[first_lit..]
+    let last_dark = first_lit.checked_sub(1)?;
+    let innermost = profile.get(first_lit)?.radius - inside;
+    let lit: Vec<f64> = profile[first_lit..]
         .iter()
-        .take_while(|(radius, _)| *radius >= innermost)
-        .map(|(_, value)| *value)
+        .take_while(|sample| sample.radius >= innermost)
+        .map(|sample| sample.value)
         .collect();
-    let middle = within.len() / 2;
-    let (_, lit, _) = within.select_nth_unstable_by(middle, f64::total_cmp);
-    let halfway = f64::midpoint(surround.level, *lit);
-    profile[before..].windows(2).find_map(|pair| {
-        let [(outer_radius, outer), (_, inner)] = *pair else {
-            return None;
-        };
-        (outer < halfway && inner >= halfway)
-            .then(|| outer_radius - (halfway - outer) / (inner - outer))
+    let halfway = f64::midpoint(surround.level, median(lit)?);
+    profile[last_dark..].windows(2).find_map(|pair| {
+        let [outer, inner] = *pair else { return None };
+        (outer.value < halfway && inner.value >= halfway)
+            .then(|| outer.radius - (halfway - outer.value) / (inner.value - outer.value))
     })
 }
 
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(middle).copied()
+}
+
 /// Brightness between pixels, bilinear; `None` outside the frame.
-fn sample(frame: &Frame, [x, y]: [f64; 2]) -> Option<f64> {
+fn brightness_at(frame: &Frame, [x, y]: [f64; 2]) -> Option<f64> {
     let (left, top) = (x.floor(), y.floor());
-    let inside = left >= 0.0
+    let is_inside = left >= 0.0
         && top >= 0.0
         && left + 1.0 < f64::from(frame.width())
         && top + 1.0 < f64::from(frame.height());
-    if !inside {
+    if !is_inside {
         return None;
     }
     #[expect(

@@ -1,12 +1,14 @@
 //! How dark the surround of the lens image is, and what counts as brighter than it.
 
+use std::ops::Range;
+
 use crate::imaging::frame::Frame;
 
 /// A corner brighter than this (of 255) is picture, not surround.
 const MAX_LEVEL: f64 = 80.0;
-/// The least step from surround to picture that is told from noise.
-const MIN_STEP: f64 = 8.0;
-/// Steps are also at least this many interquartile ranges of the surround's noise.
+/// The least step from surround to picture that is told from compression noise.
+const MIN_STEP: f64 = 6.0;
+/// Steps are also at least this many interquartile ranges of the surround's own noise.
 const STEP_IN_NOISE: f64 = 3.0;
 
 /// Brightness of the surround.
@@ -30,35 +32,51 @@ pub(super) fn margin(frame: &Frame) -> u32 {
 }
 
 impl Surround {
-    /// Measures the four corners and takes the darkest, since a caption may cover the
-    /// others. `None` when even that one is too bright to be a surround.
-    pub(super) fn of(frame: &Frame) -> Option<Self> {
+    /// Measures the four corners and takes the darkest and calmest, since a caption may
+    /// cover the others. `None` when even that one is too bright to be a surround.
+    ///
+    /// `min_contrast` is the part of the brightness in the frame's middle by which the
+    /// picture must at least outshine the surround, 0 to 1.
+    pub(super) fn of(frame: &Frame, min_contrast: f64) -> Option<Self> {
         let (width, height) = (frame.width(), frame.height());
         let margin = margin(frame);
-        let patch = (width.min(height) / 32).max(4);
-        let far = |side: u32| side - margin - patch;
+        let side = (width.min(height) / 32).max(4);
+        let near = margin..margin + side;
+        let far = |length: u32| length - margin - side..length - margin;
         let corners = [
-            (margin, margin),
-            (far(width), margin),
-            (margin, far(height)),
+            (near.clone(), near.clone()),
+            (far(width), near.clone()),
+            (near, far(height)),
             (far(width), far(height)),
         ];
-        let (level, spread) = corners
-            .map(|(left, top)| level_and_spread(frame, left, top, patch))
+        let half = |length: u32| length / 4..length * 3 / 4;
+        let (middle, _) = level_and_spread(frame, half(width), half(height));
+        corners
             .into_iter()
-            .min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (level <= MAX_LEVEL).then(|| Self {
-            level,
-            threshold: level + MIN_STEP.max(STEP_IN_NOISE * spread),
-        })
+            .map(|(columns, rows)| {
+                let (level, spread) = level_and_spread(frame, columns, rows);
+                let step = MIN_STEP
+                    .max(STEP_IN_NOISE * spread)
+                    .max(min_contrast * (middle - level));
+                Self {
+                    level,
+                    threshold: level + step,
+                }
+            })
+            .min_by(|a, b| a.threshold.total_cmp(&b.threshold))
+            .filter(|surround| surround.level <= MAX_LEVEL)
     }
 }
 
-/// Median and interquartile range of the brightness in a square patch.
-fn level_and_spread(frame: &Frame, left: u32, top: u32, side: u32) -> (f64, f64) {
-    let mut values: Vec<u8> = (top..top + side)
-        .flat_map(|y| (left..left + side).map(move |x| (x, y)))
-        .map(|(x, y)| brightness(frame.pixel(x, y)))
+/// Median and interquartile range of the brightness in a rectangle, from some thousand of
+/// its pixels.
+fn level_and_spread(frame: &Frame, columns: Range<u32>, rows: Range<u32>) -> (f64, f64) {
+    let sparse = |range: Range<u32>| {
+        let step = range.len() / 64 + 1;
+        range.step_by(step)
+    };
+    let mut values: Vec<u8> = sparse(rows)
+        .flat_map(|y| sparse(columns.clone()).map(move |x| brightness(frame.pixel(x, y))))
         .collect();
     values.sort_unstable();
     let quantile = |quarters: usize| f64::from(values[(values.len() - 1) * quarters / 4]);

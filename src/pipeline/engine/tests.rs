@@ -1,1 +1,207 @@
+use super::*;
+use crate::pipeline::test_support::{BlobDetector, engine, frame_with_disc, job};
 
+const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 600, "height": 600},
+  "lens": {"model": "equidistant", "focal": 190.9859, "cx": 299.5, "cy": 299.5, "max_theta": 1.5707},
+  "mount": {"world_up": [0, 0, -1], "height_m": 3} }"#;
+
+fn engine_with_lobby() -> (Engine, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("lobby.json"), LOBBY).unwrap();
+    let calibrations = CalibrationFolder::open(folder.path()).unwrap();
+    (engine(BlobDetector::default(), Some(calibrations)), folder)
+}
+
+#[test]
+fn a_blob_is_found_where_it_is_in_every_profile() {
+    let (engine, _folder) = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    for profile in ["paper", "fast", "balanced", "quality", "direct"] {
+        let job = job(
+            image.clone(),
+            &[("profile", profile), ("calibration", "lobby")],
+        );
+        let report = engine.detect(&job).unwrap().report;
+        let best = report
+            .persons
+            .first()
+            .unwrap_or_else(|| panic!("{profile} found nothing"));
+        let [x, y] = best.bbox.center();
+        assert!(
+            (x - 420.0).abs() < 6.0 && (y - 300.0).abs() < 6.0,
+            "{profile}: {x}, {y}"
+        );
+        assert!(
+            (best.bbox.width() - 40.0).abs() < 14.0,
+            "{profile}: {}",
+            best.bbox.width()
+        );
+        assert!(best.views >= 1);
+        // To the right of the centre, 120 of 300 pixels out: 36° off axis.
+        let bearing = best.bearing.unwrap();
+        assert!((bearing.off_axis.to_degrees() - 36.0).abs() < 2.0);
+        assert!(bearing.azimuth.sin().abs() < 0.06);
+        let floor = best.floor.expect("the height is known");
+        assert!(
+            floor.x_m > 1.0 && floor.y_m.abs() < 0.3,
+            "{profile}: {floor:?}"
+        );
+    }
+}
+
+#[test]
+fn a_report_says_what_it_is_based_on() {
+    let (engine, _folder) = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let named = engine
+        .detect(&job(
+            image.clone(),
+            &[("calibration", "lobby"), ("camera", "north")],
+        ))
+        .unwrap()
+        .report;
+    assert_eq!(named.camera, "north");
+    assert_eq!(named.calibration.id, "lobby");
+    assert!(!named.calibration.assumed && named.warnings.is_empty());
+    assert_eq!((named.view_count, named.batch_count), (24, 5));
+    assert_eq!(named.model.name, "blob");
+
+    let assumed = engine.detect(&job(image, &[])).unwrap().report;
+    assert!(assumed.calibration.assumed);
+    assert_eq!(assumed.camera, "assumed");
+    assert!(
+        assumed.warnings[0].starts_with("no calibration was named"),
+        "{:?}",
+        assumed.warnings
+    );
+    assert_eq!(assumed.persons[0].floor, None);
+}
+
+#[test]
+fn an_assumed_lens_finds_what_the_true_calibration_finds() {
+    let (engine, _folder) = engine_with_lobby();
+    let image = frame_with_disc(600, [300.0, 180.0], 25.0);
+    let named = engine
+        .detect(&job(image.clone(), &[("calibration", "lobby")]))
+        .unwrap()
+        .report;
+    let assumed = engine.detect(&job(image, &[])).unwrap().report;
+    assert!(named.persons[0].bbox.iou(&assumed.persons[0].bbox) > 0.9);
+}
+
+#[test]
+fn a_frame_scaled_from_the_calibration_s_size_is_fine_and_another_aspect_is_not() {
+    let (engine, _folder) = engine_with_lobby();
+    let larger = frame_with_disc(900, [630.0, 450.0], 30.0);
+    let report = engine
+        .detect(&job(larger, &[("calibration", "lobby")]))
+        .unwrap()
+        .report;
+    assert!((report.persons[0].bbox.center()[0] - 630.0).abs() < 8.0);
+
+    let wide = Frame::new(800, 600, vec![90; 800 * 600 * 3]).unwrap();
+    let wide = crate::imaging::annotate::encode_png(&wide).unwrap();
+    let error = engine
+        .detect(&job(wide.into(), &[("calibration", "lobby")]))
+        .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "image: the frame is 800×600 pixels, but calibration \"lobby\" was made for 600×600, \
+         which is another aspect: send an uncropped frame or name another calibration"
+    );
+}
+
+#[test]
+fn what_does_not_exist_is_refused_by_name() {
+    let (engine, _folder) = engine_with_lobby();
+    let image = frame_with_disc(64, [30.0, 30.0], 5.0);
+    let refusal = |parameters: &[(&str, &str)]| {
+        engine
+            .detect(&job(image.clone(), parameters))
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(
+        refusal(&[("calibration", "yard")])
+            .starts_with("calibration: there is no calibration \"yard\"")
+    );
+    assert_eq!(
+        refusal(&[("model", "yolo")]),
+        "model: \"yolo\" is not loaded; \"blob\" is"
+    );
+    let tiny = frame_with_disc(16, [8.0, 8.0], 2.0);
+    let error = engine.detect(&job(tiny, &[])).unwrap_err().to_string();
+    assert!(
+        error.starts_with("image: the frame is 16×16 pixels"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_network_that_fails_is_our_fault_and_the_next_frame_is_served() {
+    let mut failures = vec![InferenceError::Run("out of memory".to_owned())];
+    let detector = BlobDetector {
+        before: Box::new(move || failures.pop().map_or(Ok(()), Err)),
+        ..BlobDetector::default()
+    };
+    let engine = engine(detector, None);
+    let image = frame_with_disc(200, [60.0, 100.0], 12.0);
+    let error = engine.detect(&job(image.clone(), &[])).unwrap_err();
+    assert!(matches!(error, PipelineError::Internal(_)));
+    assert!(
+        !error.to_string().contains("memory"),
+        "a caller must not see our causes: {error}"
+    );
+    assert_eq!(
+        engine
+            .detect(&job(image, &[]))
+            .unwrap()
+            .report
+            .persons
+            .len(),
+        1
+    );
+}
+
+#[test]
+fn stages_are_disjoint_and_within_the_total() {
+    let (engine, _folder) = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let timings = engine.detect(&job(image, &[])).unwrap().report.timings;
+    let sum = timings.decode
+        + timings.calibrate
+        + timings.queue
+        + timings.remap
+        + timings.inference
+        + timings.refine;
+    assert!(sum <= timings.total, "{timings:?}");
+    assert!(
+        timings.decode > std::time::Duration::ZERO && timings.remap > std::time::Duration::ZERO
+    );
+}
+
+#[test]
+fn other_refinements_of_an_observed_frame_need_no_network() {
+    let (engine, _folder) = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let job = job(image, &[("calibration", "lobby")]);
+    let observation = engine.observe(&job).unwrap();
+    let parameters = |refinement| RefinementParameters {
+        refinement,
+        ..job.parameters.refinement
+    };
+    let fused = engine.persons(
+        &observation,
+        &parameters(crate::detection::Refinement::Fusion),
+    );
+    let soft = engine.persons(
+        &observation,
+        &parameters(crate::detection::Refinement::SoftNmsGaussian),
+    );
+    assert_eq!(fused.len(), 1);
+    assert!(fused[0].views > 1, "several views see the blob");
+    assert!(
+        soft.iter().all(|person| person.views == 1),
+        "soft-NMS picks, it does not average"
+    );
+}

@@ -1,1 +1,116 @@
+use std::{
+    sync::mpsc::{Receiver, SyncSender, sync_channel},
+    time::Duration,
+};
 
+use super::*;
+use crate::pipeline::test_support::{BlobDetector, engine, frame_with_disc, job};
+
+/// A detector that reports each batch it begins and waits to be let go on.
+fn gated_pool(capacity: usize) -> (Arc<WorkerPool>, Receiver<()>, SyncSender<()>) {
+    let (begun, begins) = sync_channel(64);
+    let (go, gate) = sync_channel(64);
+    let detector = BlobDetector {
+        before: Box::new(move || {
+            begun.send(()).unwrap();
+            gate.recv_timeout(Duration::from_secs(60)).unwrap();
+            Ok(())
+        }),
+        ..BlobDetector::default()
+    };
+    let one = NonZeroUsize::MIN;
+    let engine = Arc::new(engine(detector, None));
+    let pool = WorkerPool::start(&engine, one, NonZeroUsize::new(capacity).unwrap()).unwrap();
+    (Arc::new(pool), begins, go)
+}
+
+fn direct_job() -> DetectJob {
+    job(
+        frame_with_disc(100, [30.0, 50.0], 8.0),
+        &[("profile", "direct")],
+    )
+}
+
+fn spawn(pool: &Arc<WorkerPool>) -> tokio::task::JoinHandle<Answer> {
+    let pool = Arc::clone(pool);
+    tokio::spawn(async move { pool.detect(direct_job()).await })
+}
+
+/// Lets the queue settle until `count` frames are pending.
+async fn until_pending(pool: &WorkerPool, count: usize) {
+    while pool.pending() != count {
+        tokio::task::yield_now().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_queue_refuses_at_once_and_serves_again_when_it_has_drained() {
+    let (pool, begins, go) = gated_pool(2);
+    let (first, second) = (spawn(&pool), spawn(&pool));
+    until_pending(&pool, 2).await;
+    begins.recv().unwrap();
+    let refused = pool.detect(direct_job()).await.unwrap_err();
+    assert!(matches!(refused, PipelineError::Overloaded { capacity: 2 }));
+
+    go.send(()).unwrap();
+    go.send(()).unwrap();
+    first.await.unwrap().unwrap();
+    second.await.unwrap().unwrap();
+    until_pending(&pool, 0).await;
+    go.send(()).unwrap();
+    pool.detect(direct_job()).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_frame_whose_client_has_left_is_not_worked_on() {
+    let (pool, begins, go) = gated_pool(4);
+    let first = spawn(&pool);
+    begins.recv().unwrap();
+    let second = spawn(&pool);
+    until_pending(&pool, 2).await;
+    second.abort();
+    assert!(second.await.unwrap_err().is_cancelled());
+    go.send(()).unwrap();
+    first.await.unwrap().unwrap();
+    until_pending(&pool, 0).await;
+    assert!(
+        begins.try_recv().is_err(),
+        "the second frame reached the network"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn shutting_down_finishes_what_was_taken_and_takes_no_more() {
+    let (pool, begins, go) = gated_pool(4);
+    let (first, second) = (spawn(&pool), spawn(&pool));
+    until_pending(&pool, 2).await;
+    begins.recv().unwrap();
+    let closing = Arc::clone(&pool);
+    let closing = tokio::task::spawn_blocking(move || closing.shut_down());
+    go.send(()).unwrap();
+    go.send(()).unwrap();
+    first.await.unwrap().unwrap();
+    second.await.unwrap().unwrap();
+    closing.await.unwrap();
+    let late = pool.detect(direct_job()).await.unwrap_err();
+    assert!(matches!(late, PipelineError::ShuttingDown));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_panic_on_one_frame_costs_one_answer_and_no_worker() {
+    let mut frames = 0;
+    let detector = BlobDetector {
+        before: Box::new(move || {
+            frames += 1;
+            assert_ne!(frames, 1, "the first frame goes wrong on purpose");
+            Ok(())
+        }),
+        ..BlobDetector::default()
+    };
+    let engine = Arc::new(engine(detector, None));
+    let pool = WorkerPool::start(&engine, NonZeroUsize::MIN, NonZeroUsize::MIN).unwrap();
+    let failed = pool.detect(direct_job()).await.unwrap_err();
+    assert!(matches!(failed, PipelineError::Internal(_)));
+    until_pending(&pool, 0).await;
+    pool.detect(direct_job()).await.unwrap();
+}

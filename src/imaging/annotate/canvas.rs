@@ -1,0 +1,176 @@
+//! Anti-aliased shapes: how much of a pixel is painted follows from its centre's distance
+//! to the shape.
+
+use std::ops::Range;
+
+use crate::imaging::frame::Frame;
+
+/// A colour, 8 bits a channel.
+pub(super) type Rgb = [u8; 3];
+
+/// Mixes a colour into one pixel; `opacity` from 0 to 1.
+pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, colour: Rgb, opacity: f64) {
+    let start = 3 * (y as usize * frame.width() as usize + x as usize);
+    let Some(pixel) = frame.pixels_mut().get_mut(start..start + 3) else {
+        return;
+    };
+    for (value, target) in pixel.iter_mut().zip(colour) {
+        let mixed = f64::from(*value) + (f64::from(target) - f64::from(*value)) * opacity;
+        // `as` saturates, and both ends are bytes.
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between two bytes"
+        )]
+        {
+            *value = mixed.round() as u8;
+        }
+    }
+}
+
+/// Pixels whose centres lie between two coordinates, cut to `0..length`.
+pub(super) fn pixels(from: f64, to: f64, length: u32) -> Range<u32> {
+    // `as` saturates, which is the cut; NaN becomes 0.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "cut to the frame"
+    )]
+    let bound = |coordinate: f64| ((coordinate - 0.5).ceil() as u32).min(length);
+    bound(from)..bound(to)
+}
+
+/// The outline of a quadrilateral, with round joints.
+pub(super) struct Outline {
+    corners: [[f64; 2]; 4],
+    half_width: f64,
+}
+
+impl Outline {
+    /// An outline of a width in pixels along four corners.
+    pub(super) fn new(corners: [[f64; 2]; 4], width: f64) -> Self {
+        Self {
+            corners,
+            half_width: width / 2.0,
+        }
+    }
+
+    /// Paints it, each pixel once, so that see-through lines stay even at their joints.
+    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) {
+        let reach = self.half_width + 0.5;
+        let rows = self.corners.map(|corner| corner[1]);
+        let top = rows.into_iter().fold(f64::INFINITY, f64::min) - reach;
+        let bottom = rows.into_iter().fold(f64::NEG_INFINITY, f64::max) + reach;
+        for y in pixels(top, bottom, frame.height()) {
+            let row = f64::from(y) + 0.5;
+            let mut spans = self
+                .edges()
+                .map(|edge| edge_span(edge, row, reach))
+                .map(|[from, to]| pixels(from, to, frame.width()));
+            spans.sort_unstable_by_key(|span| span.start);
+            let mut painted = 0;
+            for x in spans.into_iter().flatten() {
+                if x >= painted {
+                    painted = x + 1;
+                    let coverage = reach - self.distance([f64::from(x) + 0.5, row]);
+                    blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+                }
+            }
+        }
+    }
+
+    fn edges(&self) -> [[[f64; 2]; 2]; 4] {
+        let [a, b, c, d] = self.corners;
+        [[a, b], [b, c], [c, d], [d, a]]
+    }
+
+    fn distance(&self, point: [f64; 2]) -> f64 {
+        self.edges()
+            .map(|edge| edge_distance(edge, point))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Columns, from and to, outside of which a row has nothing within `reach` of an edge.
+fn edge_span([a, b]: [[f64; 2]; 2], row: f64, reach: f64) -> [f64; 2] {
+    let [upper, lower] = if a[1] <= b[1] { [a, b] } else { [b, a] };
+    let (from, to) = ((row - reach).max(upper[1]), (row + reach).min(lower[1]));
+    if from > to {
+        return [0.0, 0.0];
+    }
+    let drop = lower[1] - upper[1];
+    let column = |y: f64| upper[0] + (lower[0] - upper[0]) * (y - upper[1]) / drop;
+    let (first, last) = if drop > 0.0 {
+        (column(from), column(to))
+    } else {
+        (upper[0], lower[0])
+    };
+    [first.min(last) - reach, first.max(last) + reach]
+}
+
+fn edge_distance([a, b]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {
+    let (along, to_point) = (minus(b, a), minus(point, a));
+    let squared_length = dot(along, along);
+    let part = if squared_length > 0.0 {
+        (dot(to_point, along) / squared_length).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (to_point[0] - part * along[0]).hypot(to_point[1] - part * along[1])
+}
+
+fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+/// A filled rectangle with round corners.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plate {
+    /// Column of the left side.
+    pub left: f64,
+    /// Row of the upper side.
+    pub top: f64,
+    /// Width in pixels.
+    pub width: f64,
+    /// Height in pixels.
+    pub height: f64,
+    /// Radius of the corners in pixels.
+    pub radius: f64,
+}
+
+impl Plate {
+    /// Paints it.
+    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) {
+        let (right, bottom) = (self.left + self.width, self.top + self.height);
+        let centre = [self.left + self.width / 2.0, self.top + self.height / 2.0];
+        let straight = [
+            self.width / 2.0 - self.radius,
+            self.height / 2.0 - self.radius,
+        ];
+        for y in pixels(self.top - 0.5, bottom + 0.5, frame.height()) {
+            for x in pixels(self.left - 0.5, right + 0.5, frame.width()) {
+                let from_corner = [
+                    (f64::from(x) + 0.5 - centre[0]).abs() - straight[0],
+                    (f64::from(y) + 0.5 - centre[1]).abs() - straight[1],
+                ];
+                let outside = from_corner[0].max(0.0).hypot(from_corner[1].max(0.0));
+                let inside = from_corner[0].max(from_corner[1]).min(0.0);
+                let coverage = 0.5 + self.radius - outside - inside;
+                blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+            }
+        }
+    }
+
+    /// Whether two plates cover a common point.
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
+        self.left < other.left + other.width
+            && other.left < self.left + self.width
+            && self.top < other.top + other.height
+            && other.top < self.top + self.height
+    }
+}

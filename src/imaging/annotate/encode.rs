@@ -1,0 +1,57 @@
+//! A frame as bytes to send or save.
+
+use image::codecs::jpeg::JpegEncoder;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder, ImageError};
+
+use crate::imaging::frame::Frame;
+
+/// Why a frame cannot be encoded.
+#[derive(Debug, thiserror::Error)]
+#[error("a frame of {width}×{height} pixels cannot be written as {format}: {source}")]
+pub struct EncodeError {
+    format: &'static str,
+    width: u32,
+    height: u32,
+    source: ImageError,
+}
+
+/// The frame as JPEG; `quality` from 1 to 100, others are taken for the nearest of these.
+///
+/// # Errors
+/// When a side is longer than the 65535 pixels that JPEG can hold.
+pub fn encode_jpeg(frame: &Frame, quality: u8) -> Result<Vec<u8>, EncodeError> {
+    let mut bytes = Vec::new();
+    encode(
+        frame,
+        "JPEG",
+        JpegEncoder::new_with_quality(&mut bytes, quality),
+    )?;
+    Ok(bytes)
+}
+
+/// The frame as PNG, without loss.
+///
+/// # Errors
+/// When the encoder fails, which no frame is known to bring about.
+pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
+    let mut bytes = Vec::new();
+    encode(frame, "PNG", PngEncoder::new(&mut bytes))?;
+    Ok(bytes)
+}
+
+fn encode(
+    frame: &Frame,
+    format: &'static str,
+    encoder: impl ImageEncoder,
+) -> Result<(), EncodeError> {
+    let (width, height) = (frame.width(), frame.height());
+    encoder
+        .write_image(frame.pixels(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|source| EncodeError {
+            format,
+            width,
+            height,
+            source,
+        })
+}

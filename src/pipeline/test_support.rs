@@ -1,0 +1,133 @@
+//! A small real detector for tests: it finds bright blobs instead of persons, so that geometry,
+//! merging and scheduling can be tested without weights.
+
+use std::{num::NonZeroUsize, time::Instant};
+
+use bytes::Bytes;
+use jiff::Timestamp;
+
+use super::{DetectJob, DetectParameters, Engine, EngineOptions};
+use crate::{
+    calibration::CalibrationFolder,
+    detection::{BBox, ViewPixels},
+    geometry::FieldOfViewReading,
+    imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png, decode::DecodeLimits},
+    inference::{Detector, InferenceError, ViewDetection},
+};
+
+/// Finds the bounding box of everything brighter than this in a view.
+const BRIGHT: f32 = 200.0;
+
+pub(super) struct BlobDetector {
+    pub(super) input: NetworkInput,
+    /// Called before each batch.
+    pub(super) before: Box<dyn FnMut() -> Result<(), InferenceError> + Send>,
+}
+
+impl Default for BlobDetector {
+    fn default() -> Self {
+        Self {
+            input: NetworkInput::plain(96, 96),
+            before: Box::new(|| Ok(())),
+        }
+    }
+}
+
+impl Detector for BlobDetector {
+    fn name(&self) -> &'static str {
+        "blob"
+    }
+
+    fn revision(&self) -> &'static str {
+        "1"
+    }
+
+    fn input(&self) -> &NetworkInput {
+        &self.input
+    }
+
+    fn detect(&mut self, batch: &ViewBatch) -> Result<Vec<Vec<ViewDetection>>, InferenceError> {
+        (self.before)()?;
+        let views = batch.values().chunks_exact(self.input.view_len());
+        Ok(views.map(|view| self.find(view)).collect())
+    }
+}
+
+impl BlobDetector {
+    fn find(&self, view: &[f32]) -> Vec<ViewDetection> {
+        let width = self.input.width as usize;
+        let bright = view[..self.input.plane_len()]
+            .iter()
+            .enumerate()
+            .filter(|&(_, &value)| value > BRIGHT)
+            .map(|(index, _)| [index % width, index / width].map(|side| f64::from(side as u32)));
+        let hull = bright
+            .map(|[x, y]| [x, y, x + 1.0, y + 1.0])
+            .reduce(|a, b| {
+                [
+                    a[0].min(b[0]),
+                    a[1].min(b[1]),
+                    a[2].max(b[2]),
+                    a[3].max(b[3]),
+                ]
+            });
+        let found = hull.and_then(|sides| BBox::new(sides).ok());
+        // A blob cut off by the border is less sure, as with a real detector.
+        let whole = |bbox: &BBox<ViewPixels>| {
+            let sides = bbox.corners();
+            let right = f64::from(self.input.width);
+            sides.iter().all(|&side| side > 0.0 && side < right)
+        };
+        found
+            .map(|bbox| ViewDetection {
+                score: if whole(&bbox) { 0.9 } else { 0.2 },
+                bbox,
+            })
+            .into_iter()
+            .collect()
+    }
+}
+
+pub(super) fn engine(detector: BlobDetector, calibrations: Option<CalibrationFolder>) -> Engine {
+    let options = EngineOptions {
+        decode_limits: DecodeLimits::default(),
+        max_batch_views: NonZeroUsize::new(5).unwrap(),
+        paper_field_of_view: FieldOfViewReading::Horizontal,
+        rig_cache_bytes: 1 << 26,
+    };
+    Engine::new(Box::new(detector), calibrations, options)
+}
+
+/// A grey lens image on black, `side` pixels wide, with a white disc.
+pub(super) fn frame_with_disc(side: u32, center: [f64; 2], radius: f64) -> Bytes {
+    let middle = f64::from(side) / 2.0;
+    let mut pixels = Vec::with_capacity(side as usize * side as usize * 3);
+    for y in 0..side {
+        for x in 0..side {
+            let at = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+            let within = |c: [f64; 2], r: f64| (at[0] - c[0]).hypot(at[1] - c[1]) <= r;
+            let value = if within(center, radius) {
+                255
+            } else if within([middle, middle], middle - 1.0) {
+                110
+            } else {
+                0
+            };
+            pixels.extend([value; 3]);
+        }
+    }
+    encode_png(&Frame::new(side, side, pixels).unwrap())
+        .unwrap()
+        .into()
+}
+
+pub(super) fn job(image: Bytes, parameters: &[(&str, &str)]) -> DetectJob {
+    DetectJob {
+        request_id: "test".to_owned(),
+        received_at: Timestamp::UNIX_EPOCH,
+        arrived: Instant::now(),
+        image,
+        parameters: DetectParameters::parse(parameters.iter().copied(), 0.3).unwrap(),
+        calibration: None,
+    }
+}
