@@ -4,10 +4,18 @@
 //! runs on them, and its boxes are mapped back to the frame and merged. `ARCHITECTURE.md` has the
 //! map and the walk of one frame; dependencies between the modules point one way.
 
+pub mod api;
+pub mod app;
 pub mod calibration;
+pub mod cli;
 pub mod detection;
 pub mod evaluation;
 pub mod geometry;
 pub mod imaging;
 pub mod inference;
+pub mod metrics;
 pub mod pipeline;
+pub mod revision;
+pub mod settings;
+pub mod shutdown;
+pub mod telemetry;

@@ -1,2 +1,7 @@
 //! The `lookdown` binary.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    lookdown::cli::run()
+}

@@ -1,5 +1,4 @@
 //! A frame is a size and exactly the bytes for it.
-#![expect(clippy::unwrap_used, reason = "a refused frame is a failed test")]
 
 use lookdown::imaging::Frame;
 use lookdown::imaging::frame::FrameError;

@@ -1,6 +1,5 @@
 //! The paper's virtual views against known answers
 //! (`tests/fixtures/vectors/pipeline_views.json`; agrees with OpenCV's undistortion maps).
-#![expect(clippy::unwrap_used, reason = "a broken fixture should stop the test")]
 
 use lookdown::geometry::{FieldOfViewReading, Lens, Mount, Pixel, ViewPlan};
 use serde_json::Value;

@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use sha2::{Digest, Sha256};
-
 use super::{CalibrationError, CalibrationId, file};
-use crate::geometry::{Lens, Mount, Pixel};
+use crate::{
+    geometry::{Lens, Mount, Pixel},
+    revision::revision_of,
+};
 
-/// Digits of a revision: enough to tell versions of one calibration apart.
-const REVISION_DIGITS: usize = 12;
 /// A frame's height may differ by this from the calibration's aspect, pixels.
 const ASPECT_TOLERANCE: f64 = 1.0;
 
@@ -58,12 +57,9 @@ impl Calibration {
         lens: Lens,
         mount: Mount,
     ) -> Self {
-        let digest = Sha256::digest(content);
-        let mut revision: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-        revision.truncate(REVISION_DIGITS);
         Self {
             id,
-            revision,
+            revision: revision_of(content),
             image_width,
             image_height,
             lens,

@@ -218,7 +218,9 @@ fn ideal(
 fn mount(raw: &RawMount) -> Result<Mount, String> {
     let up = Vector3::from(raw.world_up);
     let length = up.norm();
-    if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+    // Written so that a length that is no number is refused, too.
+    let is_unit = (length - 1.0).abs() <= UNIT_TOLERANCE;
+    if !is_unit {
         let [x, y, z] = raw.world_up;
         return Err(format!(
             "world_up is [{x}, {y}, {z}], of length {length:.3}: give a unit vector, such as \

@@ -159,3 +159,6 @@ impl Axis {
 fn to_cell(position: f64) -> usize {
     position as usize
 }
+
+#[cfg(test)]
+mod tests;

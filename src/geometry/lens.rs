@@ -204,7 +204,9 @@ impl Lens {
         if radius == 0.0 {
             return Some(Ray::z());
         }
-        if !(radius <= self.max_radius * (1.0 + RIM_TOLERANCE)) {
+        // A radius that is no number is not within either.
+        let is_within = radius <= self.max_radius * (1.0 + RIM_TOLERANCE);
+        if !is_within {
             return None;
         }
         let radius_inside = radius.min(self.max_radius);

@@ -43,6 +43,10 @@ pub struct Ring {
     pub field_of_view: f64,
 }
 
+/// The paper's first azimuth is minus this: two decimals, not a half turn.
+#[expect(clippy::approx_constant, reason = "the paper's number")]
+const PAPER_FIRST_AZIMUTH: f64 = 3.14;
+
 /// The directions a camera is looked at from within.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewPlan {
@@ -58,7 +62,7 @@ impl ViewPlan {
         let directions = elevations.iter().flat_map(|&elevation| {
             (0..32).map(move |step| ViewDirection {
                 elevation,
-                azimuth: 0.2 * f64::from(step) - 3.14,
+                azimuth: 0.2 * f64::from(step) - PAPER_FIRST_AZIMUTH,
                 field_of_view: reading.radians(),
             })
         });

@@ -187,7 +187,7 @@ impl<'a> Task<'a> {
             ImageError::Unsupported(reason) => {
                 unsupported(format!("a rare kind of {} ({reason})", self.format))
             }
-            other => self.corrupt(other.to_string()),
+            other => self.corrupt(other.to_string().trim()),
         }
     }
 }

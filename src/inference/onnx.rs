@@ -8,16 +8,14 @@ use ort::{
     session::Session,
     value::{TensorRef, ValueType},
 };
-use sha2::{Digest, Sha256};
 
 use super::{Detector, InferenceError, ModelManifest, ViewDetection};
 use crate::{
     detection::BBox,
     imaging::{NetworkInput, ViewBatch},
+    revision::revision_of,
 };
 
-/// Digits of a model revision.
-const REVISION_DIGITS: usize = 12;
 /// Network input sides accepted, pixels.
 const INPUT_SIDE: std::ops::RangeInclusive<i64> = 32..=4096;
 
@@ -69,15 +67,10 @@ impl OnnxDetector {
             .map_err(|error| unusable(error.to_string()))?;
         let (input_name, width, height) = check_input(&session).map_err(unusable)?;
         check_outputs(&session).map_err(unusable)?;
-        let mut revision: String = Sha256::digest(&bytes)
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
-        revision.truncate(REVISION_DIGITS);
         Ok(Self {
             session,
             name: manifest.name,
-            revision,
+            revision: revision_of(&bytes),
             input_name,
             input: NetworkInput {
                 width,

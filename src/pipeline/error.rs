@@ -13,7 +13,9 @@ pub enum PipelineError {
     #[error(transparent)]
     Image(#[from] DecodeError),
     /// The caller named a calibration that does not exist.
-    #[error("calibration: there is no calibration {id:?}; GET /calibrations lists those there are")]
+    #[error(
+        "calibration: there is no calibration {id:?}: name one that is in the calibration folder, or leave it out"
+    )]
     UnknownCalibration {
         /// The ID asked for.
         id: String,

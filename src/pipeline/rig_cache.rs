@@ -62,7 +62,7 @@ impl RigCache {
     /// The rig for `key`, built by `build` unless it is there.
     pub(super) fn get_or_build(
         &self,
-        key: RigKey,
+        key: &RigKey,
         build: impl FnOnce() -> CameraRig,
     ) -> Arc<CameraRig> {
         let slot = {
@@ -74,7 +74,7 @@ impl RigCache {
             Arc::clone(&entry.rig)
         };
         let rig = Arc::clone(slot.get_or_init(|| Arc::new(build())));
-        self.evict_beyond_budget(&key);
+        self.evict_beyond_budget(key);
         rig
     }
 

@@ -55,12 +55,11 @@ impl Detector for BlobDetector {
 
 impl BlobDetector {
     fn find(&self, view: &[f32]) -> Vec<ViewDetection> {
-        let width = self.input.width as usize;
-        let bright = view[..self.input.plane_len()]
-            .iter()
-            .enumerate()
+        let width = self.input.width;
+        let bright = (0..)
+            .zip(&view[..self.input.plane_len()])
             .filter(|&(_, &value)| value > BRIGHT)
-            .map(|(index, _)| [index % width, index / width].map(|side| f64::from(side as u32)));
+            .map(|(index, _)| [index % width, index / width].map(f64::from));
         let hull = bright
             .map(|[x, y]| [x, y, x + 1.0, y + 1.0])
             .reduce(|a, b| {

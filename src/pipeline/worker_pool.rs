@@ -19,7 +19,7 @@ struct Ticket {
     answer: oneshot::Sender<Answer>,
     /// Travels with the work: a place is free again when the work has ended, not when its client
     /// has left.
-    _place: OwnedSemaphorePermit,
+    place: OwnedSemaphorePermit,
 }
 
 /// Named threads that run the engine on a bounded number of frames.
@@ -70,11 +70,7 @@ impl WorkerPool {
             }
         })?;
         let (answer, waiting) = oneshot::channel();
-        self.enqueue(Ticket {
-            job,
-            answer,
-            _place: place,
-        })?;
+        self.enqueue(Ticket { job, answer, place })?;
         waiting
             .await
             .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker died on a frame"))))
@@ -117,12 +113,7 @@ fn work(engine: &Engine, tickets: &Mutex<mpsc::Receiver<Ticket>>) {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .blocking_recv();
-        let Some(Ticket {
-            job,
-            answer,
-            _place,
-        }) = next
-        else {
+        let Some(Ticket { job, answer, place }) = next else {
             return;
         };
         if answer.is_closed() {
@@ -131,6 +122,8 @@ fn work(engine: &Engine, tickets: &Mutex<mpsc::Receiver<Ticket>>) {
         }
         let outcome = catch_unwind(AssertUnwindSafe(|| engine.detect(&job)))
             .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker panicked on a frame"))));
+        // Whoever sends the next frame on this answer must find the place free.
+        drop((job, place));
         // The client may have left meanwhile.
         let _ = answer.send(outcome);
     }

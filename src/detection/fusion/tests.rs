@@ -175,3 +175,13 @@ fn disagreement_can_reorder_persons() {
     assert_eq!(fused[0].members, [1]);
     assert_eq!(fused[1].members, [0]);
 }
+
+#[test]
+fn of_two_clusters_it_overlaps_equally_a_candidate_joins_the_older() {
+    let left = candidate([0.0, 0.0, 10.0, 10.0], 0.8, 0);
+    let right = candidate([4.0, 0.0, 14.0, 10.0], 0.9, 1);
+    let between = candidate([2.0, 0.0, 12.0, 10.0], 0.7, 2);
+    let fused = fuse(&[left, right, between], 0.45);
+    assert_eq!(fused[0].members, [1, 2]);
+    assert_eq!(fused[1].members, [0]);
+}

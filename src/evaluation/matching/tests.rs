@@ -127,3 +127,34 @@ fn a_duplicate_in_an_ignore_region_is_ignored_by_coco_and_wrong_by_voc() {
         [TruePositive, FalsePositive]
     );
 }
+
+#[test]
+fn of_two_persons_it_overlaps_equally_a_detection_takes_the_first_in_voc_and_the_last_in_coco() {
+    let (first, last) = (row(0.0, 10.0), row(4.0, 14.0));
+    let truth = truth(&[first, last], &[]);
+    let between = row(2.0, 12.0);
+    for (rule, taken) in [(MatchingRule::Voc, first), (MatchingRule::Coco, last)] {
+        let detections = [(between, 0.9), (taken, 0.8)];
+        assert_eq!(
+            outcomes(rule, &detections, &truth),
+            [TruePositive, FalsePositive]
+        );
+    }
+}
+
+#[test]
+fn at_a_threshold_of_1_coco_forgives_rounding() {
+    let truth = truth(&[row(0.0, 10.0)], &[]);
+    let nearly = [ScoredBox {
+        bbox: row(0.0, 10.0 - 5e-10),
+        score: 0.9,
+    }];
+    assert_eq!(
+        MatchingRule::Coco.outcomes(&nearly, &truth, 1.0),
+        [TruePositive]
+    );
+    assert_eq!(
+        MatchingRule::Voc.outcomes(&nearly, &truth, 1.0),
+        [FalsePositive]
+    );
+}

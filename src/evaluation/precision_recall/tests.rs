@@ -54,6 +54,14 @@ fn a_recall_of_three_tenths_reaches_the_level_of_three_tenths() {
 }
 
 #[test]
+fn the_coco_levels_are_those_of_pycocotools_to_the_last_bit() {
+    // Its level 35 × 0.01 is more than the recall 35 ÷ 100 in binary.
+    let right: Vec<_> = (0..35).map(|_| (0.9, true)).collect();
+    let ap = curve(&right, 100).average_precision();
+    assert_close(ap.coco_101_point, 35.0 / 101.0);
+}
+
+#[test]
 fn best_f1_is_the_point_before_the_false_positives() {
     let best = curve(&[(0.9, true), (0.8, true), (0.7, false), (0.6, false)], 3)
         .best_f1()

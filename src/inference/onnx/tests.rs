@@ -33,8 +33,8 @@ fn boxes_are_clipped_and_what_is_no_box_or_no_score_is_dropped() {
 #[test]
 fn the_best_boxes_of_a_view_are_kept() {
     let boxes = [0.0, 0.0, 10.0, 10.0].repeat(50);
-    let scores: Vec<f32> = (0..50)
-        .map(|index| (index * 7 % 50) as f32 / 50.0)
+    let scores: Vec<f32> = (0..50_u16)
+        .map(|index| f32::from(index * 7 % 50) / 50.0)
         .collect();
     let found = decode_view(
         &boxes,

@@ -133,7 +133,7 @@ impl Engine {
             profile,
             input_size: (self.input.width, self.input.height),
         };
-        self.rigs.get_or_build(key, || {
+        self.rigs.get_or_build(&key, || {
             let plan = profile.view_plan(self.options.paper_field_of_view);
             CameraRig::new(
                 geometry,

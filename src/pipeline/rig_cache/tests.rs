@@ -30,21 +30,21 @@ fn rig() -> CameraRig {
 #[test]
 fn a_rig_is_built_once_and_shared() {
     let cache = RigCache::new(usize::MAX);
-    let first = cache.get_or_build(key(1), rig);
-    let second = cache.get_or_build(key(1), || unreachable!("it is there already"));
+    let first = cache.get_or_build(&key(1), rig);
+    let second = cache.get_or_build(&key(1), || unreachable!("it is there already"));
     assert!(Arc::ptr_eq(&first, &second));
 }
 
 #[test]
 fn the_least_recently_used_rig_leaves_when_the_budget_is_spent() {
     let cache = RigCache::new(2 * rig().bytes());
-    cache.get_or_build(key(1), rig);
-    cache.get_or_build(key(2), rig);
-    cache.get_or_build(key(1), || unreachable!("it is there already"));
-    cache.get_or_build(key(3), rig);
-    cache.get_or_build(key(1), || unreachable!("it was used after the second"));
+    cache.get_or_build(&key(1), rig);
+    cache.get_or_build(&key(2), rig);
+    cache.get_or_build(&key(1), || unreachable!("it is there already"));
+    cache.get_or_build(&key(3), rig);
+    cache.get_or_build(&key(1), || unreachable!("it was used after the second"));
     let mut rebuilt = false;
-    cache.get_or_build(key(2), || {
+    cache.get_or_build(&key(2), || {
         rebuilt = true;
         rig()
     });
@@ -54,7 +54,7 @@ fn the_least_recently_used_rig_leaves_when_the_budget_is_spent() {
 #[test]
 fn a_rig_larger_than_the_budget_still_serves_its_frame() {
     let cache = RigCache::new(1);
-    assert!(cache.get_or_build(key(1), rig).bytes() > 1);
-    let kept = cache.get_or_build(key(1), || unreachable!("the newest stays"));
+    assert!(cache.get_or_build(&key(1), rig).bytes() > 1);
+    let kept = cache.get_or_build(&key(1), || unreachable!("the newest stays"));
     assert_eq!(kept.view_count(), 13);
 }

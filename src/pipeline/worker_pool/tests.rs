@@ -13,7 +13,7 @@ fn gated_pool(capacity: usize) -> (Arc<WorkerPool>, Receiver<()>, SyncSender<()>
     let detector = BlobDetector {
         before: Box::new(move || {
             begun.send(()).unwrap();
-            gate.recv_timeout(Duration::from_secs(60)).unwrap();
+            gate.recv_timeout(Duration::from_mins(1)).unwrap();
             Ok(())
         }),
         ..BlobDetector::default()

@@ -1,0 +1,120 @@
+//! One frame in, its persons out.
+
+use axum::{
+    Extension, Json,
+    extract::State,
+    http::{HeaderName, HeaderValue},
+    response::IntoResponse,
+};
+use tokio::time::timeout_at;
+
+use super::{
+    ApiState,
+    openapi::{DetectForm, DetectProblems, DetectQuery},
+    problem::{Problem, ProblemKind},
+    report::{Report, ReportTimings},
+    request_id::RequestId,
+    upload::Upload,
+};
+use crate::{
+    metrics::Metrics,
+    pipeline::{DetectJob, DetectParameters, Detected, DetectionReport},
+};
+
+/// `C_t` of requests that name none.
+const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
+const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+
+/// Find the persons in a frame.
+///
+/// Send the frame as the form field `img` with parameters as further fields, or as the body with
+/// parameters in the query. JPEG, PNG and WebP are read, whatever the content type says. Without
+/// `calibration` the lens circle is found in the frame and an ideal 180° equidistant lens that
+/// looks straight down is assumed.
+#[utoipa::path(
+    post, path = "/detect", tag = "detection", operation_id = "detect_persons",
+    params(DetectQuery),
+    request_body(
+        description = "The frame.",
+        content(
+            (DetectForm = "multipart/form-data"),
+            ("image/jpeg"), ("image/png"), ("image/webp"), ("application/octet-stream"),
+        )
+    ),
+    responses(
+        (status = OK, description = "The persons found, possibly none.", body = Report,
+         headers(
+            ("X-Request-Id" = String, description = "The request's own, or a new one."),
+            ("Server-Timing" = String, description = "The stages, milliseconds."),
+         )),
+        DetectProblems,
+    )
+)]
+pub(super) async fn detect_persons(
+    State(state): State<ApiState>,
+    Extension(request_id): Extension<RequestId>,
+    upload: Upload,
+) -> Result<impl IntoResponse, Problem> {
+    let deadline = upload.deadline;
+    let job = job(upload, &request_id)?;
+    let Detected { report, .. } = timeout_at(deadline, state.workers.detect(job))
+        .await
+        .map_err(|_| timed_out(&state))??;
+    record(&state.metrics, &report);
+    let report = Report::from(&report);
+    let timing = server_timing(&report.timings_ms);
+    Ok(([(SERVER_TIMING, timing)], Json(report)))
+}
+
+fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {
+    let pairs = upload.parameters.iter();
+    let pairs = pairs.map(|(name, value)| (name.as_str(), value.as_str()));
+    Ok(DetectJob {
+        parameters: DetectParameters::parse(pairs, DEFAULT_SCORE_THRESHOLD)?,
+        request_id: request_id.as_str().to_owned(),
+        received_at: upload.received_at,
+        arrived: upload.arrived,
+        image: upload.image,
+        calibration: None,
+    })
+}
+
+fn timed_out(state: &ApiState) -> Problem {
+    let seconds = state.options.request_timeout.as_secs_f64();
+    let detail = format!(
+        "the frame had no report within {seconds} s: use a faster profile, send fewer frames at \
+         a time, or raise server.request_timeout_millis"
+    );
+    Problem::new(ProblemKind::Timeout, detail)
+}
+
+fn record(metrics: &Metrics, report: &DetectionReport) {
+    let labels = [report.model.name.as_str(), report.profile.name()];
+    let timings = &report.timings;
+    for (histogram, span) in [
+        (&metrics.request_duration, timings.total),
+        (&metrics.queue_duration, timings.queue),
+        (
+            &metrics.compute_input_duration,
+            timings.decode + timings.calibrate + timings.remap,
+        ),
+        (&metrics.compute_infer_duration, timings.inference),
+        (&metrics.compute_output_duration, timings.refine),
+    ] {
+        histogram
+            .with_label_values(&labels)
+            .observe(span.as_secs_f64());
+    }
+    metrics.views.inc_by(report.view_count as u64);
+    metrics.batches.inc_by(report.batch_count as u64);
+    metrics.persons.inc_by(report.persons.len() as u64);
+}
+
+/// `decode;dur=3.1, …, total;dur=412.0`
+fn server_timing(timings: &ReportTimings) -> HeaderValue {
+    let stages = timings
+        .stages()
+        .map(|(stage, millis)| format!("{stage};dur={millis}"));
+    // Names and numbers are visible ASCII.
+    HeaderValue::from_str(&stages.join(", ")).unwrap_or(HeaderValue::from_static(""))
+}

@@ -1,0 +1,168 @@
+//! What surrounds every request: its ID, its log line, its metrics, and the one shape of failures.
+
+use std::{sync::Arc, time::Instant};
+
+use axum::{
+    Json, Router,
+    extract::{MatchedPath, Request, State},
+    http::{HeaderValue, Method, StatusCode, header},
+    middleware::{self, Next},
+    response::{IntoResponse, Response},
+};
+use tower_http::catch_panic::CatchPanicLayer;
+use tracing::Instrument;
+
+use super::{
+    problem::{Problem, ProblemKind},
+    request_id::{self, RequestId},
+};
+use crate::metrics::Metrics;
+
+/// The route of requests that no route matches.
+const UNMATCHED: &str = "unmatched";
+
+/// The router inside the envelope. A handler that panics costs its own request only.
+pub(super) fn around(router: Router, metrics: Arc<Metrics>) -> Router {
+    router
+        .layer(CatchPanicLayer::custom(|_| {
+            Problem::fault().into_response()
+        }))
+        .layer(middleware::from_fn_with_state(metrics, wrap))
+}
+
+async fn wrap(State(metrics): State<Arc<Metrics>>, mut request: Request, next: Next) -> Response {
+    let started = Instant::now();
+    let request_id = RequestId::of(request.headers());
+    let method = method_label(request.method());
+    let path = request.uri().path().to_owned();
+    let route = request.extensions().get::<MatchedPath>().cloned();
+    let route = route.as_ref().map_or(UNMATCHED, MatchedPath::as_str);
+    request.extensions_mut().insert(request_id.clone());
+
+    let span = tracing::info_span!("request", id = request_id.as_str(), method, route);
+    let mut response = next.run(request).instrument(span.clone()).await;
+    let _in_request = span.enter();
+    if let Some(problem) = problem_in(&mut response, method, &path) {
+        let reason = problem.kind().name();
+        metrics.failures.with_label_values(&[reason]).inc();
+        if let Some(cause) = problem.cause() {
+            tracing::error!("{cause:#}");
+        }
+        response = write_problem(response, problem, &path, &request_id);
+    }
+    let status = response.status();
+    let class = status_class(status);
+    metrics
+        .http_requests
+        .with_label_values(&[route, method, class])
+        .inc();
+    let elapsed = started.elapsed().as_secs_f64();
+    metrics
+        .http_request_duration
+        .with_label_values(&[route, method])
+        .observe(elapsed);
+    tracing::debug!(status = status.as_u16(), seconds = elapsed, "answered");
+    let headers = response.headers_mut();
+    headers.insert(request_id::HEADER, request_id.header_value());
+    response
+}
+
+/// The problem a response stands for; failures that the framework answered by itself get one, too.
+fn problem_in(response: &mut Response, method: &str, path: &str) -> Option<Problem> {
+    if let Some(problem) = response.extensions_mut().remove::<Problem>() {
+        return Some(problem);
+    }
+    match response.status() {
+        StatusCode::NOT_FOUND => Some(Problem::new(
+            ProblemKind::NotFound,
+            format!("there is nothing at {path}: GET /docs shows what there is"),
+        )),
+        StatusCode::METHOD_NOT_ALLOWED => Some(Problem::new(
+            ProblemKind::MethodNotAllowed,
+            format!("{path} does not offer {method}: the Allow header names what it offers"),
+        )),
+        status if status.is_client_error() => Some(Problem::new(
+            ProblemKind::MalformedRequest,
+            "the request cannot be understood: GET /docs shows how to ask",
+        )),
+        status if status.is_server_error() => Some(Problem::fault()),
+        _ => None,
+    }
+}
+
+/// The same response (`Allow`, `Retry-After` …) with the problem as its body.
+fn write_problem(
+    response: Response,
+    problem: Problem,
+    path: &str,
+    request_id: &RequestId,
+) -> Response {
+    let status = problem.kind().status();
+    let body = Json(problem.body(path, request_id.as_str())).into_response();
+    let (mut parts, _) = response.into_parts();
+    parts.status = status;
+    parts.headers.remove(header::CONTENT_LENGTH);
+    let problem_json = HeaderValue::from_static("application/problem+json");
+    parts.headers.insert(header::CONTENT_TYPE, problem_json);
+    Response::from_parts(parts, body.into_body())
+}
+
+/// A label from a fixed list: clients can invent methods.
+fn method_label(method: &Method) -> &'static str {
+    match *method {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::PUT => "PUT",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
+        Method::PATCH => "PATCH",
+        _ => "other",
+    }
+}
+
+fn status_class(status: StatusCode) -> &'static str {
+    match status.as_u16() / 100 {
+        2 => "2xx",
+        3 => "3xx",
+        4 => "4xx",
+        5 => "5xx",
+        _ => "1xx",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::{body::Body, routing::get};
+    use http_body_util::BodyExt;
+    use tower::ServiceExt;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_panicking_handler_costs_one_request_and_reveals_nothing() {
+        async fn panics() -> &'static str {
+            panic!("the secret cause")
+        }
+        let metrics = Arc::new(Metrics::new().unwrap());
+        let router = Router::new().route("/panics", get(panics));
+        let router = around(
+            router.route("/works", get(async || "fine")),
+            Arc::clone(&metrics),
+        );
+
+        let get = |path| Request::get(path).body(Body::empty()).unwrap();
+        let response = router.clone().oneshot(get("/panics")).await.unwrap();
+        assert_eq!(response.status(), StatusCode::INTERNAL_SERVER_ERROR);
+        let media_type = &response.headers()[header::CONTENT_TYPE];
+        assert_eq!(media_type, "application/problem+json");
+        let body = response.into_body().collect().await.unwrap().to_bytes();
+        let body = String::from_utf8_lossy(&body);
+        assert!(body.contains("urn:lookdown:problem:internal"), "{body}");
+        assert!(!body.contains("secret"), "{body}");
+        assert_eq!(metrics.failures.with_label_values(&["internal"]).get(), 1);
+
+        let response = router.oneshot(get("/works")).await.unwrap();
+        assert_eq!(response.status(), StatusCode::OK);
+    }
+}

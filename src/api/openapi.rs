@@ -1,0 +1,40 @@
+//! The API's own description. What a route takes and answers stands with the route; here is what
+//! they share.
+
+mod parameters;
+mod problems;
+
+use axum::Json;
+use utoipa::{OpenApi, openapi};
+
+pub(super) use parameters::{DetectForm, DetectQuery};
+pub(super) use problems::{DetectProblems, FaultProblem, NotReadyProblems};
+
+use super::problem::ProblemBody;
+
+#[derive(OpenApi)]
+#[openapi(
+    info(title = "Lookdown"),
+    servers((url = "/", description = "This server")),
+    tags(
+        (name = "detection", description = "Frames in, persons out."),
+        (name = "operation", description = "Probes, metrics and this document."),
+    ),
+    components(schemas(ProblemBody))
+)]
+pub(super) struct Common;
+
+/// The OpenAPI document of every route.
+#[must_use]
+pub fn document() -> openapi::OpenApi {
+    super::routes().into_openapi()
+}
+
+/// This document.
+#[utoipa::path(
+    get, path = "/openapi.json", tag = "operation", operation_id = "get_openapi",
+    responses((status = OK, description = "OpenAPI 3.1.", body = Object))
+)]
+pub(super) async fn openapi_json() -> Json<openapi::OpenApi> {
+    Json(document())
+}

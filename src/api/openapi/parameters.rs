@@ -1,0 +1,87 @@
+//! The request parameters as they are described. `pipeline::DetectParameters` reads and checks
+//! them; a test holds the two together.
+
+use utoipa::{IntoParams, ToSchema};
+
+/// Parameters in the query.
+#[derive(ToSchema, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[expect(dead_code, reason = "describes what pipeline::DetectParameters reads")]
+pub(in crate::api) struct DetectQuery {
+    /// The calibration's ID. Without it an ideal lens is assumed.
+    #[param(example = "lobby", pattern = "^[a-z0-9][a-z0-9_-]{0,63}$")]
+    #[schema(example = "lobby", pattern = "^[a-z0-9][a-z0-9_-]{0,63}$")]
+    calibration: Option<String>,
+    /// The name under which results are kept; the calibration's ID by default.
+    #[param(example = "lobby-north", max_length = 128)]
+    #[schema(example = "lobby-north", max_length = 128)]
+    camera: Option<String>,
+    /// How thoroughly to look: `balanced` by default; `paper` is the published method with its 128
+    /// views, `direct` runs the detector on the frame itself.
+    #[param(inline)]
+    #[schema(inline)]
+    profile: Option<ProfileName>,
+    /// How overlapping boxes become persons; `fusion` by default, in `paper` `soft_nms_gaussian`,
+    /// in `direct` `nms`.
+    #[param(inline)]
+    #[schema(inline)]
+    refine: Option<RefinementName>,
+    /// Refuse the request unless this model answers.
+    model: Option<String>,
+    /// Leave out persons with a lower score (`C_t`).
+    #[param(minimum = 0, maximum = 1, default = 0.3)]
+    #[schema(minimum = 0, maximum = 1, default = 0.3)]
+    score_threshold: Option<f64>,
+    /// Boxes that overlap at least this much are the same person (`N_t`): 0.4 by default for
+    /// `fusion`, otherwise 0.5.
+    #[param(minimum = 0, maximum = 1)]
+    #[schema(minimum = 0, maximum = 1)]
+    iou_threshold: Option<f64>,
+    /// σ of `soft_nms_gaussian`.
+    #[param(exclusive_minimum = 0, default = 0.3)]
+    #[schema(exclusive_minimum = 0, default = 0.3)]
+    sigma: Option<f64>,
+    /// Most persons in the report, best first.
+    #[param(minimum = 1, maximum = 10000, default = 1000)]
+    #[schema(minimum = 1, maximum = 10000, default = 1000)]
+    max_detections: Option<u32>,
+    /// When the frame was taken.
+    #[param(value_type = Option<String>, format = DateTime, example = "2026-11-21T09:30:00Z")]
+    #[schema(format = DateTime, example = "2026-11-21T09:30:00Z")]
+    captured_at: Option<String>,
+}
+
+/// The frame and parameters in a form.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "describes what upload::form reads")]
+pub(in crate::api) struct DetectForm {
+    /// The frame: a JPEG, PNG or WebP file. `image` is accepted as another name of this field.
+    #[schema(format = Binary, content_media_type = "application/octet-stream")]
+    img: String,
+    /// Any parameter of the query can be a field instead.
+    #[serde(flatten)]
+    parameters: DetectQuery,
+}
+
+/// A profile.
+#[derive(ToSchema)]
+#[schema(rename_all = "snake_case")]
+#[expect(dead_code, reason = "describes what pipeline::DetectParameters reads")]
+enum ProfileName {
+    Paper,
+    Fast,
+    Balanced,
+    Quality,
+    Direct,
+}
+
+/// A refinement.
+#[derive(ToSchema)]
+#[schema(rename_all = "snake_case")]
+#[expect(dead_code, reason = "describes what pipeline::DetectParameters reads")]
+enum RefinementName {
+    Nms,
+    SoftNmsLinear,
+    SoftNmsGaussian,
+    Fusion,
+}

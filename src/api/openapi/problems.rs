@@ -1,0 +1,84 @@
+//! The problems that a route answers, grouped by status.
+
+use std::collections::BTreeMap;
+
+use utoipa::{
+    IntoResponses, PartialSchema, ToSchema,
+    openapi::{
+        ContentBuilder, HeaderBuilder, Ref, RefOr, Response, ResponseBuilder, ResponsesBuilder,
+    },
+};
+
+use crate::api::problem::{ProblemBody, ProblemKind};
+
+/// What can go wrong with a frame.
+pub(in crate::api) struct DetectProblems;
+
+impl IntoResponses for DetectProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let kinds = ProblemKind::ALL.into_iter();
+        responses(
+            kinds.filter(|kind| {
+                !matches!(kind, ProblemKind::NotFound | ProblemKind::MethodNotAllowed)
+            }),
+        )
+    }
+}
+
+/// The server takes no frames now.
+pub(in crate::api) struct NotReadyProblems;
+
+impl IntoResponses for NotReadyProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses([ProblemKind::WarmingUp, ProblemKind::ShuttingDown])
+    }
+}
+
+/// A fault of ours.
+pub(in crate::api) struct FaultProblem;
+
+impl IntoResponses for FaultProblem {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses([ProblemKind::Internal])
+    }
+}
+
+fn responses(kinds: impl IntoIterator<Item = ProblemKind>) -> BTreeMap<String, RefOr<Response>> {
+    let mut by_status: BTreeMap<String, Vec<ProblemKind>> = BTreeMap::new();
+    for kind in kinds {
+        by_status
+            .entry(kind.status().as_str().to_owned())
+            .or_default()
+            .push(kind);
+    }
+    let responses = by_status
+        .into_iter()
+        .map(|(status, kinds)| (status, response(&kinds)));
+    ResponsesBuilder::new()
+        .responses_from_iter(responses)
+        .build()
+        .responses
+}
+
+/// One response for all kinds that share a status.
+fn response(kinds: &[ProblemKind]) -> Response {
+    let lines = kinds
+        .iter()
+        .map(|kind| format!("{} (`{}`).", kind.title(), kind.urn()));
+    let schema = Ref::from_schema_name(ProblemBody::name());
+    let content = ContentBuilder::new().schema(Some(schema)).build();
+    let response = ResponseBuilder::new()
+        .description(lines.collect::<Vec<_>>().join(" "))
+        .content("application/problem+json", content);
+    if kinds
+        .iter()
+        .all(|kind| kind.retry_after_seconds().is_none())
+    {
+        return response.build();
+    }
+    let retry_after = HeaderBuilder::new()
+        .schema(Some(u32::schema()))
+        .description(Some("Seconds to wait before trying again."))
+        .build();
+    response.header("Retry-After", retry_after).build()
+}

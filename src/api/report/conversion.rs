@@ -1,0 +1,90 @@
+//! The pipeline's report in the units and digits of the sent one.
+
+use super::{
+    Report, ReportBearing, ReportBox, ReportCalibration, ReportFloor, ReportImage, ReportModel,
+    ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings,
+    rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
+};
+use crate::pipeline::{self, DetectionReport};
+
+impl From<&DetectionReport> for Report {
+    fn from(report: &DetectionReport) -> Self {
+        let refinement = &report.refinement;
+        Self {
+            request_id: report.request_id.clone(),
+            camera: report.camera.clone(),
+            received_at: format!("{:.3}", report.received_at),
+            captured_at: report.captured_at.map(|time| time.to_string()),
+            calibration: ReportCalibration {
+                id: report.calibration.id.clone(),
+                revision: report.calibration.revision.clone(),
+                assumed: report.calibration.assumed,
+            },
+            image: ReportImage {
+                width: report.image_width,
+                height: report.image_height,
+            },
+            model: ReportModel {
+                name: report.model.name.clone(),
+                revision: report.model.revision.clone(),
+            },
+            profile: report.profile.name(),
+            refinement: ReportRefinement {
+                name: refinement.refinement.name(),
+                score_threshold: refinement.score_threshold,
+                iou_threshold: refinement.iou_threshold,
+                sigma: refinement.sigma,
+                max_detections: refinement.max_detections,
+            },
+            persons: report.persons.iter().map(ReportPerson::from).collect(),
+            timings_ms: ReportTimings::from(&report.timings),
+            warnings: report.warnings.clone(),
+        }
+    }
+}
+
+impl From<&pipeline::Person> for ReportPerson {
+    fn from(person: &pipeline::Person) -> Self {
+        let [x_min, y_min, x_max, y_max] = person.bbox.corners().map(pixels);
+        let oriented = &person.oriented_box;
+        Self {
+            bbox: ReportBox {
+                x_min,
+                y_min,
+                x_max,
+                y_max,
+            },
+            score: share(person.score),
+            oriented_box: ReportOrientedBox {
+                cx: pixels(oriented.center.x),
+                cy: pixels(oriented.center.y),
+                width: pixels(oriented.width),
+                height: pixels(oriented.height),
+                angle_deg: degrees(oriented.angle),
+            },
+            bearing: person.bearing.map(|bearing| ReportBearing {
+                azimuth_deg: azimuth_degrees(bearing.azimuth),
+                off_axis_deg: degrees(bearing.off_axis),
+            }),
+            floor: person.floor.map(|floor| ReportFloor {
+                x_m: metres(floor.x_m),
+                y_m: metres(floor.y_m),
+            }),
+            views: person.views,
+        }
+    }
+}
+
+impl From<&pipeline::StageTimings> for ReportTimings {
+    fn from(timings: &pipeline::StageTimings) -> Self {
+        Self {
+            decode: milliseconds(timings.decode),
+            calibrate: milliseconds(timings.calibrate),
+            queue: milliseconds(timings.queue),
+            remap: milliseconds(timings.remap),
+            inference: milliseconds(timings.inference),
+            refine: milliseconds(timings.refine),
+            total: milliseconds(timings.total),
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! What the handlers share.
+
+use std::{sync::Arc, time::Duration};
+
+use super::{Readiness, problem::ProblemKind, upload::UploadBudget};
+use crate::{metrics::Metrics, pipeline::WorkerPool};
+
+/// What a request may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct ApiOptions {
+    /// Largest request body, bytes.
+    pub max_body_bytes: usize,
+    /// Most bytes that all request bodies together may hold in memory.
+    pub max_upload_bytes: usize,
+    /// Longest a request may take, from its first byte to its answer.
+    pub request_timeout: Duration,
+}
+
+/// What the handlers share. Clones are cheap.
+#[derive(Clone)]
+pub struct ApiState {
+    pub(super) workers: Arc<WorkerPool>,
+    pub(super) metrics: Arc<Metrics>,
+    pub(super) readiness: Readiness,
+    pub(super) uploads: UploadBudget,
+    pub(super) options: ApiOptions,
+}
+
+impl ApiState {
+    /// A state around the workers that answer.
+    #[must_use]
+    pub fn new(
+        workers: Arc<WorkerPool>,
+        metrics: Arc<Metrics>,
+        readiness: Readiness,
+        options: ApiOptions,
+    ) -> Self {
+        // An alert must see the first failure, too: every counter is there from the start.
+        for kind in ProblemKind::ALL {
+            metrics.failures.with_label_values(&[kind.name()]);
+        }
+        Self {
+            workers,
+            metrics,
+            readiness,
+            uploads: UploadBudget::new(options.max_upload_bytes),
+            options,
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! `multipart/form-data`: the frame in the field `img` or `image`, parameters as text fields.
+
+use axum::{
+    body::Body,
+    extract::{
+        FromRequest, Multipart, Request,
+        multipart::{Field, MultipartError},
+    },
+    http::request::Parts,
+};
+use bytes::Bytes;
+
+use crate::{
+    api::problem::{Problem, ProblemKind},
+    pipeline::DetectParameters,
+};
+
+/// The names of the frame's field.
+const IMAGE_NAMES: [&str; 2] = ["img", "image"];
+/// Most fields of a form: every parameter and the frame, with room for repetitions that deserve
+/// a better answer than this limit.
+const MAX_FIELDS: usize = 16;
+/// Most bytes of a parameter's value.
+const MAX_VALUE_BYTES: usize = 1024;
+/// Most characters of an unknown name that are repeated to its sender.
+const MAX_NAME_CHARS: usize = 64;
+
+/// What a form held.
+pub(super) struct Form {
+    pub(super) image: Bytes,
+    pub(super) parameters: Vec<(String, String)>,
+}
+
+/// Takes a form apart. `body` is whole, so nothing here waits for the client.
+pub(super) async fn parse(parts: Parts, body: Bytes) -> Result<Form, Problem> {
+    let request = Request::from_parts(parts, Body::from(body));
+    let mut multipart = Multipart::from_request(request, &())
+        .await
+        .map_err(|_| malformed("the Content-Type must be multipart/form-data with a boundary"))?;
+    let mut image = None;
+    let mut parameters = Vec::new();
+    let mut fields = 0;
+    while let Some(field) = multipart.next_field().await.map_err(broken)? {
+        fields += 1;
+        if fields > MAX_FIELDS {
+            let detail = format!("the form has more than {MAX_FIELDS} fields: send each once");
+            return Err(malformed(&detail));
+        }
+        let name = field.name().unwrap_or_default().to_owned();
+        if IMAGE_NAMES.contains(&name.as_str()) {
+            let bytes = field.bytes().await.map_err(broken)?;
+            if image.replace(bytes).is_some() {
+                return Err(second_image(&name));
+            }
+        } else if DetectParameters::NAMES.contains(&name.as_str()) {
+            let value = value_of(&name, field).await?;
+            parameters.push((name, value));
+        } else {
+            return Err(unknown_field(&name));
+        }
+    }
+    Ok(Form {
+        image: image.ok_or_else(missing_image)?,
+        parameters,
+    })
+}
+
+async fn value_of(name: &str, field: Field<'_>) -> Result<String, Problem> {
+    let bytes = field.bytes().await.map_err(broken)?;
+    if bytes.len() > MAX_VALUE_BYTES {
+        let detail = format!("{name}: the value is longer than {MAX_VALUE_BYTES} bytes");
+        return Err(Problem::new(ProblemKind::InvalidParameter, detail));
+    }
+    let text = str::from_utf8(&bytes).map_err(|_| {
+        let detail = format!("{name}: the value is not UTF-8 text");
+        Problem::new(ProblemKind::InvalidParameter, detail)
+    })?;
+    Ok(text.to_owned())
+}
+
+fn missing_image() -> Problem {
+    let detail = "img: the form has no frame: send one in the field `img`, as in curl -F \
+                  img=@frame.jpg";
+    Problem::new(ProblemKind::MissingImage, detail)
+}
+
+fn second_image(name: &str) -> Problem {
+    let detail = format!("{name}: the form has two frames: send one frame per request");
+    Problem::new(ProblemKind::RepeatedParameter, detail)
+}
+
+fn unknown_field(name: &str) -> Problem {
+    let shown: String = name.chars().take(MAX_NAME_CHARS).collect();
+    let known = DetectParameters::NAMES.join(", ");
+    let detail = format!(
+        "{shown}: there is no such field: send the frame as `img` or `image`; the parameters are \
+         {known}"
+    );
+    Problem::new(ProblemKind::UnknownParameter, detail)
+}
+
+fn malformed(detail: &str) -> Problem {
+    Problem::new(ProblemKind::MalformedRequest, detail)
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "the shape map_err needs")]
+fn broken(error: MultipartError) -> Problem {
+    let reason = error.body_text();
+    malformed(&format!(
+        "the multipart form is malformed or cut off: {reason}"
+    ))
+}

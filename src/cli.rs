@@ -1,0 +1,84 @@
+//! The command line.
+
+mod annotate;
+mod detect;
+mod eval;
+mod parameters;
+mod serve;
+
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+    process::ExitCode,
+};
+
+use anyhow::Context;
+use clap::{Args, Parser, Subcommand};
+
+use crate::{
+    api,
+    settings::{self, Settings},
+    telemetry,
+};
+
+/// Finds people in the pictures of ceiling fisheye cameras.
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true)]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Start the HTTP server
+    Serve(SettingsFile),
+    /// Find the persons in pictures: one JSON report per line on standard output
+    Detect(Box<detect::Arguments>),
+    /// Measure how good detections are on a data set: average precision and speed
+    Eval(eval::Arguments),
+    /// Print the OpenAPI document
+    Openapi,
+}
+
+/// Where the settings come from.
+#[derive(Debug, Args)]
+struct SettingsFile {
+    /// Settings file (TOML); variables such as `LOOKDOWN__SERVER__LISTEN` overrule it
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+impl SettingsFile {
+    /// The checked settings, with logging started as they say.
+    fn load(&self) -> anyhow::Result<Settings> {
+        let settings = settings::load(self.config.as_deref(), settings::environment())?;
+        telemetry::start(&settings.log)?;
+        Ok(settings)
+    }
+}
+
+/// Does what the command line of this process asks for.
+#[must_use]
+pub fn run() -> ExitCode {
+    let outcome = match CommandLine::parse().command {
+        Command::Serve(settings_file) => serve::run(&settings_file),
+        Command::Detect(arguments) => detect::run(&arguments),
+        Command::Eval(arguments) => eval::run(&arguments),
+        Command::Openapi => print_openapi(),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => {
+            // Not through the log: it may not have been started, or not show this.
+            eprintln!("lookdown: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn print_openapi() -> anyhow::Result<ExitCode> {
+    let document = api::openapi_document().to_pretty_json()?;
+    writeln!(io::stdout(), "{document}").context("standard output cannot be written")?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,122 @@
+//! `lookdown detect`
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+    time::Instant,
+};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use jiff::Timestamp;
+
+use super::{SettingsFile, annotate, parameters::ParameterFlags};
+use crate::{
+    api::Report,
+    app::build_engine,
+    calibration::{Calibration, CalibrationId},
+    pipeline::{DetectJob, DetectParameters, Detected, Engine},
+};
+
+/// `C_t` without `--score-threshold`.
+const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
+
+/// Arguments of `lookdown detect`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Pictures: JPEG, PNG or WebP. A report's `request_id` is the path as given here
+    #[arg(required = true, value_name = "IMAGE")]
+    images: Vec<PathBuf>,
+    /// A calibration file, or the ID of one in the calibration folder [default: the lens circle
+    /// is found and an ideal lens assumed]
+    #[arg(long, value_name = "FILE|ID")]
+    calibration: Option<String>,
+    #[command(flatten)]
+    parameters: ParameterFlags,
+    /// Also draw the persons into the picture; takes a single IMAGE
+    #[arg(long, value_name = "OUT.jpg")]
+    annotate: Option<PathBuf>,
+    #[command(flatten)]
+    settings_file: SettingsFile,
+}
+
+/// Reports on every picture; those that cannot be used cost the exit code, not the others.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    if arguments.annotate.is_some() && arguments.images.len() > 1 {
+        bail!("--annotate draws one picture: give a single IMAGE, or leave it out");
+    }
+    let (parameters, calibration) = parameters(arguments)?;
+    let settings = arguments.settings_file.load()?;
+    let max_bytes = settings.server.max_body_bytes as u64;
+    let engine = build_engine(&settings)?;
+    let mut code = ExitCode::SUCCESS;
+    for image in &arguments.images {
+        let found = detect(&engine, image, max_bytes, &parameters, calibration.clone());
+        match found {
+            Ok(detected) => {
+                print(&detected)?;
+                if let Some(path) = &arguments.annotate {
+                    annotate::write(detected, path)?;
+                }
+            }
+            Err(error) => {
+                eprintln!("lookdown: {}: {error:#}", image.display());
+                code = ExitCode::FAILURE;
+            }
+        }
+    }
+    Ok(code)
+}
+
+/// The checked parameters, with the calibration when `--calibration` names a file.
+fn parameters(
+    arguments: &Arguments,
+) -> anyhow::Result<(DetectParameters, Option<Arc<Calibration>>)> {
+    let check = |id| arguments.parameters.check(id, DEFAULT_SCORE_THRESHOLD);
+    let Some(named) = arguments.calibration.as_deref() else {
+        return Ok((check(None)?, None));
+    };
+    let path = Path::new(named);
+    if path.is_file() {
+        let calibration = Calibration::read(path)?;
+        let parameters = check(Some(calibration.id().as_str()))?;
+        return Ok((parameters, Some(Arc::new(calibration))));
+    }
+    if named.parse::<CalibrationId>().is_err() {
+        bail!("--calibration: {named:?} is neither a file nor a calibration's ID");
+    }
+    Ok((check(Some(named))?, None))
+}
+
+fn detect(
+    engine: &Engine,
+    image: &Path,
+    max_bytes: u64,
+    parameters: &DetectParameters,
+    calibration: Option<Arc<Calibration>>,
+) -> anyhow::Result<Detected> {
+    let bytes = fs::metadata(image)
+        .context("the file cannot be read")?
+        .len();
+    if bytes > max_bytes {
+        bail!("the file has {bytes} bytes: server.max_body_bytes allows {max_bytes}");
+    }
+    let received_at = Timestamp::now();
+    let encoded = fs::read(image).context("the file cannot be read")?;
+    Ok(engine.detect(&DetectJob {
+        request_id: image.display().to_string(),
+        received_at,
+        arrived: Instant::now(),
+        image: encoded.into(),
+        parameters: parameters.clone(),
+        calibration,
+    })?)
+}
+
+fn print(detected: &Detected) -> anyhow::Result<()> {
+    let report = serde_json::to_string(&Report::from(&detected.report))?;
+    writeln!(io::stdout(), "{report}").context("standard output cannot be written")
+}

@@ -1,0 +1,120 @@
+//! What the operator may choose: defaults in code, then the settings file, then environment
+//! variables; checked once, before anything is started.
+//!
+//! `LOOKDOWN__SERVER__LISTEN` is the key `server.listen`. Variables of another shape, such as the
+//! `LOOKDOWN_PORT=tcp://…` that Kubernetes sets for a service called `lookdown`, are none of ours.
+
+mod check;
+mod error;
+mod locate;
+mod raw;
+mod source;
+
+use std::{net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration};
+
+pub use error::SettingsError;
+pub use raw::RawSettings;
+pub use source::{environment, load};
+
+use crate::geometry::FieldOfViewReading;
+
+/// Everything the operator may choose, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The HTTP server.
+    pub server: ServerSettings,
+    /// Where calibrations come from.
+    pub calibrations: CalibrationSettings,
+    /// Which detector answers.
+    pub model: ModelSettings,
+    /// How the detector is run.
+    pub inference: InferenceSettings,
+    /// What one frame, and all frames together, may cost.
+    pub limits: LimitSettings,
+    /// How the paper is read where it can be read in several ways.
+    pub paper: PaperSettings,
+    /// What is logged.
+    pub log: LogSettings,
+}
+
+/// The HTTP server.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServerSettings {
+    /// Address and port to listen on.
+    pub listen: SocketAddr,
+    /// Largest request body, bytes.
+    pub max_body_bytes: usize,
+    /// Longest a request may take, from its first byte to its answer.
+    pub request_timeout: Duration,
+}
+
+/// Where calibrations come from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationSettings {
+    /// Folder of calibration files. At its default place it may be missing.
+    pub path: PathBuf,
+    /// Most memory that the tables of cameras may hold, bytes.
+    pub cache_bytes: usize,
+}
+
+/// Which detector answers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelSettings {
+    /// Model folder.
+    pub path: PathBuf,
+}
+
+/// How the detector is run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InferenceSettings {
+    /// The ONNX Runtime library.
+    pub library_path: PathBuf,
+    /// Threads of the network.
+    pub threads: NonZeroUsize,
+    /// Most views in one run of the network.
+    pub max_batch_views: NonZeroUsize,
+    /// Candidates below this score are dropped before anything else looks at them, 0 to 1.
+    pub score_floor: f64,
+    /// Most candidates kept of one view, best first.
+    pub max_detections_per_view: NonZeroUsize,
+}
+
+/// What one frame, and all frames together, may cost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitSettings {
+    /// Longest side of a frame, pixels.
+    pub max_image_side: u32,
+    /// Most pixels of a frame.
+    pub max_image_pixels: u64,
+    /// Most memory that decoding one frame may take, bytes.
+    pub max_decode_bytes: u64,
+    /// Most frames that wait for a worker or are worked on.
+    pub max_frames_in_flight: NonZeroUsize,
+    /// Most bytes that all request bodies together may hold in memory.
+    pub max_upload_bytes: usize,
+}
+
+/// How the paper is read where it can be read in several ways.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaperSettings {
+    /// Its field of view.
+    pub field_of_view: FieldOfViewReading,
+}
+
+/// What is logged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogSettings {
+    /// The shape of a log line.
+    pub format: LogFormat,
+    /// Which events are logged: `info`, `warn,lookdown=debug` and the like.
+    pub filter: String,
+}
+
+/// The shape of a log line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogFormat {
+    /// For eyes.
+    Text,
+    /// One JSON object per line.
+    Json,
+}

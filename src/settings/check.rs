@@ -1,0 +1,195 @@
+//! Raw → checked settings, in one conversion.
+
+use std::{num::NonZeroUsize, ops::RangeInclusive, path::PathBuf, time::Duration};
+
+use super::{
+    CalibrationSettings, InferenceSettings, LimitSettings, LogFormat, LogSettings, ModelSettings,
+    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, raw,
+};
+use crate::geometry::FieldOfViewReading;
+
+/// A body smaller than this holds no picture.
+const MIN_BODY_BYTES: u64 = 1024;
+/// 2 GiB: more than any picture within the pixel limits.
+const MAX_BODY_BYTES: u64 = 2 << 30;
+/// 1 TiB: more memory than any machine spends on this.
+const MAX_BYTES: u64 = 1 << 40;
+/// Ten minutes.
+const MAX_TIMEOUT_MILLIS: u64 = 600_000;
+/// The longest side the JPEG format can state.
+const MAX_IMAGE_SIDE: u64 = 65_535;
+/// Beyond this only a mistake is possible.
+const MAX_COUNT: u64 = 65_536;
+
+impl TryFrom<RawSettings> for Settings {
+    type Error = SettingsError;
+
+    fn try_from(raw: RawSettings) -> Result<Self, SettingsError> {
+        let server = server(&raw.server)?;
+        Ok(Self {
+            limits: limits(&raw.limits, server.max_body_bytes)?,
+            server,
+            calibrations: CalibrationSettings {
+                path: path("calibrations.path", raw.calibrations.path)?,
+                cache_bytes: bytes(
+                    "calibrations.cache_bytes",
+                    raw.calibrations.cache_bytes,
+                    0..=MAX_BYTES,
+                )?,
+            },
+            model: ModelSettings {
+                path: path("model.path", raw.model.path)?,
+            },
+            inference: inference(raw.inference)?,
+            paper: PaperSettings {
+                field_of_view: choice(
+                    "paper.field_of_view",
+                    &raw.paper.field_of_view,
+                    &[
+                        ("horizontal", FieldOfViewReading::Horizontal),
+                        ("diagonal", FieldOfViewReading::Diagonal),
+                        ("literal", FieldOfViewReading::Literal),
+                    ],
+                )?,
+            },
+            log: log(raw.log)?,
+        })
+    }
+}
+
+fn server(raw: &raw::RawServer) -> Result<ServerSettings, SettingsError> {
+    let listen = raw.listen.parse().map_err(|_| SettingsError::Value {
+        key: "server.listen".to_owned(),
+        value: format!("{:?}", raw.listen),
+        remedy: "give an IP address and a port, such as 127.0.0.1:8080 or [::]:8080".to_owned(),
+    })?;
+    let millis = within(
+        "server.request_timeout_millis",
+        raw.request_timeout_millis,
+        1..=MAX_TIMEOUT_MILLIS,
+    )?;
+    Ok(ServerSettings {
+        listen,
+        max_body_bytes: bytes(
+            "server.max_body_bytes",
+            raw.max_body_bytes,
+            MIN_BODY_BYTES..=MAX_BODY_BYTES,
+        )?,
+        request_timeout: Duration::from_millis(millis),
+    })
+}
+
+fn inference(raw: raw::RawInference) -> Result<InferenceSettings, SettingsError> {
+    if !(0.0..=1.0).contains(&raw.score_floor) {
+        return Err(SettingsError::Value {
+            key: "inference.score_floor".to_owned(),
+            value: raw.score_floor.to_string(),
+            remedy: "give a number from 0 to 1".to_owned(),
+        });
+    }
+    let threads = within("inference.threads", raw.threads, 0..=MAX_COUNT)?;
+    Ok(InferenceSettings {
+        library_path: path("inference.library_path", raw.library_path)?,
+        threads: match usize::try_from(threads).ok().and_then(NonZeroUsize::new) {
+            Some(threads) => threads,
+            None => std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
+        },
+        max_batch_views: count("inference.max_batch_views", raw.max_batch_views)?,
+        score_floor: raw.score_floor,
+        max_detections_per_view: count(
+            "inference.max_detections_per_view",
+            raw.max_detections_per_view,
+        )?,
+    })
+}
+
+fn limits(raw: &raw::RawLimits, max_body_bytes: usize) -> Result<LimitSettings, SettingsError> {
+    let max_image_side = within(
+        "limits.max_image_side",
+        raw.max_image_side,
+        1..=MAX_IMAGE_SIDE,
+    )?;
+    Ok(LimitSettings {
+        max_image_side: u32::try_from(max_image_side).unwrap_or(u32::MAX),
+        max_image_pixels: within(
+            "limits.max_image_pixels",
+            raw.max_image_pixels,
+            1..=MAX_IMAGE_SIDE * MAX_IMAGE_SIDE,
+        )?,
+        max_decode_bytes: within(
+            "limits.max_decode_bytes",
+            raw.max_decode_bytes,
+            1..=MAX_BYTES,
+        )?,
+        max_frames_in_flight: count("limits.max_frames_in_flight", raw.max_frames_in_flight)?,
+        max_upload_bytes: bytes(
+            "limits.max_upload_bytes",
+            raw.max_upload_bytes,
+            max_body_bytes as u64..=MAX_BYTES,
+        )?,
+    })
+}
+
+fn log(raw: raw::RawLog) -> Result<LogSettings, SettingsError> {
+    let formats = [("text", LogFormat::Text), ("json", LogFormat::Json)];
+    if let Err(error) = tracing_subscriber::EnvFilter::try_new(&raw.filter) {
+        return Err(SettingsError::Value {
+            key: "log.filter".to_owned(),
+            value: format!("{:?}", raw.filter),
+            remedy: format!("{error}; give a level such as info, or info,lookdown=debug"),
+        });
+    }
+    Ok(LogSettings {
+        format: choice("log.format", &raw.format, &formats)?,
+        filter: raw.filter,
+    })
+}
+
+fn path(key: &str, value: String) -> Result<PathBuf, SettingsError> {
+    if value.is_empty() {
+        return Err(SettingsError::Value {
+            key: key.to_owned(),
+            value: "empty".to_owned(),
+            remedy: "give a path, or leave the key out".to_owned(),
+        });
+    }
+    Ok(value.into())
+}
+
+fn within(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<u64, SettingsError> {
+    if range.contains(&value) {
+        return Ok(value);
+    }
+    Err(SettingsError::Value {
+        key: key.to_owned(),
+        value: value.to_string(),
+        remedy: format!(
+            "give a whole number from {} to {}",
+            range.start(),
+            range.end()
+        ),
+    })
+}
+
+fn count(key: &str, value: u64) -> Result<NonZeroUsize, SettingsError> {
+    let value = within(key, value, 1..=MAX_COUNT)?;
+    let count = usize::try_from(value).ok().and_then(NonZeroUsize::new);
+    Ok(count.unwrap_or(NonZeroUsize::MIN))
+}
+
+fn bytes(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<usize, SettingsError> {
+    let value = within(key, value, range)?;
+    Ok(usize::try_from(value).unwrap_or(usize::MAX))
+}
+
+fn choice<T: Copy>(key: &str, value: &str, choices: &[(&str, T)]) -> Result<T, SettingsError> {
+    let chosen = choices.iter().find(|(name, _)| *name == value);
+    chosen.map(|(_, choice)| *choice).ok_or_else(|| {
+        let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+        SettingsError::Value {
+            key: key.to_owned(),
+            value: format!("{value:?}"),
+            remedy: format!("use one of {}", names.join(", ")),
+        }
+    })
+}

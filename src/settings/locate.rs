@@ -1,0 +1,80 @@
+//! Finding the files that settings name, and those whose place nobody set.
+
+use std::path::{Path, PathBuf};
+
+use super::{CalibrationSettings, InferenceSettings, ModelSettings, SettingsError};
+
+/// Default folder of calibration files.
+pub(super) const DEFAULT_CALIBRATIONS: &str = "calibrations";
+/// Default model folder.
+pub(super) const DEFAULT_MODEL: &str = "models/ssdlite_mobilenet_v2";
+/// Default ONNX Runtime library, where `make setup` puts it.
+pub(super) const DEFAULT_LIBRARY: &str = "runtime/libonnxruntime.so";
+
+impl CalibrationSettings {
+    /// The folder; `None` when nobody set one and there is none at the default place.
+    ///
+    /// # Errors
+    /// [`SettingsError::Missing`] when somebody set one that is not there.
+    pub fn find(&self) -> Result<Option<PathBuf>, SettingsError> {
+        let found = locate(&self.path, DEFAULT_CALIBRATIONS);
+        if found.is_none() && self.path != Path::new(DEFAULT_CALIBRATIONS) {
+            return Err(SettingsError::Missing {
+                key: "calibrations.path",
+                what: "folder",
+                path: self.path.clone(),
+                remedy: "create it, or set LOOKDOWN__CALIBRATIONS__PATH to another".to_owned(),
+            });
+        }
+        Ok(found)
+    }
+}
+
+impl ModelSettings {
+    /// The model's folder or file.
+    ///
+    /// # Errors
+    /// [`SettingsError::Missing`] when it is not there.
+    pub fn find(&self) -> Result<PathBuf, SettingsError> {
+        locate(&self.path, DEFAULT_MODEL).ok_or_else(|| SettingsError::Missing {
+            key: "model.path",
+            what: "model",
+            path: self.path.clone(),
+            remedy: "run `make setup`, or set LOOKDOWN__MODEL__PATH to a model folder".to_owned(),
+        })
+    }
+}
+
+impl InferenceSettings {
+    /// The ONNX Runtime library.
+    ///
+    /// # Errors
+    /// [`SettingsError::Missing`] when it is not there.
+    pub fn find_library(&self) -> Result<PathBuf, SettingsError> {
+        locate(&self.library_path, DEFAULT_LIBRARY).ok_or_else(|| SettingsError::Missing {
+            key: "inference.library_path",
+            what: "ONNX Runtime library",
+            path: self.library_path.clone(),
+            remedy: "run `make setup`, or set LOOKDOWN__INFERENCE__LIBRARY_PATH to \
+                     libonnxruntime.so"
+                .to_owned(),
+        })
+    }
+}
+
+/// The existing file or folder that `path` means.
+///
+/// A path somebody set is taken as it is. The default one is looked for in the current directory
+/// and then beside the executable and in the folders above it, so that
+/// `/anywhere/lookdown/target/release/lookdown` finds what belongs to it wherever it is called.
+fn locate(path: &Path, default: &str) -> Option<PathBuf> {
+    if path.exists() {
+        return Some(path.to_owned());
+    }
+    if path != Path::new(default) {
+        return None;
+    }
+    let executable = std::env::current_exe().ok()?;
+    let mut candidates = executable.ancestors().skip(1).map(|above| above.join(path));
+    candidates.find(|candidate| candidate.exists())
+}

@@ -1,0 +1,150 @@
+//! Settings as they are written, with their defaults.
+
+use serde::Deserialize;
+
+use super::locate;
+
+const MEBIBYTE: u64 = 1024 * 1024;
+
+/// Settings as they are written: one table per concern, unknown keys refused.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RawSettings {
+    pub(super) server: RawServer,
+    pub(super) calibrations: RawCalibrations,
+    pub(super) model: RawModel,
+    pub(super) inference: RawInference,
+    pub(super) limits: RawLimits,
+    pub(super) paper: RawPaper,
+    pub(super) log: RawLog,
+}
+
+/// Table `server`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawServer {
+    pub(super) listen: String,
+    pub(super) max_body_bytes: u64,
+    pub(super) request_timeout_millis: u64,
+}
+
+impl Default for RawServer {
+    fn default() -> Self {
+        Self {
+            listen: "127.0.0.1:8080".to_owned(),
+            max_body_bytes: 32 * MEBIBYTE,
+            request_timeout_millis: 30_000,
+        }
+    }
+}
+
+/// Table `calibrations`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawCalibrations {
+    pub(super) path: String,
+    pub(super) cache_bytes: u64,
+}
+
+impl Default for RawCalibrations {
+    fn default() -> Self {
+        Self {
+            path: locate::DEFAULT_CALIBRATIONS.to_owned(),
+            cache_bytes: 1024 * MEBIBYTE,
+        }
+    }
+}
+
+/// Table `model`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawModel {
+    pub(super) path: String,
+}
+
+impl Default for RawModel {
+    fn default() -> Self {
+        Self {
+            path: locate::DEFAULT_MODEL.to_owned(),
+        }
+    }
+}
+
+/// Table `inference`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawInference {
+    pub(super) library_path: String,
+    pub(super) threads: u64,
+    pub(super) max_batch_views: u64,
+    pub(super) score_floor: f64,
+    pub(super) max_detections_per_view: u64,
+}
+
+impl Default for RawInference {
+    fn default() -> Self {
+        Self {
+            library_path: locate::DEFAULT_LIBRARY.to_owned(),
+            threads: 0,
+            max_batch_views: 8,
+            score_floor: 0.01,
+            max_detections_per_view: 100,
+        }
+    }
+}
+
+/// Table `limits`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "the keys say what the limit is")]
+pub(super) struct RawLimits {
+    pub(super) max_image_side: u64,
+    pub(super) max_image_pixels: u64,
+    pub(super) max_decode_bytes: u64,
+    pub(super) max_frames_in_flight: u64,
+    pub(super) max_upload_bytes: u64,
+}
+
+impl Default for RawLimits {
+    fn default() -> Self {
+        Self {
+            max_image_side: 8192,
+            max_image_pixels: 50_000_000,
+            max_decode_bytes: 512 * MEBIBYTE,
+            max_frames_in_flight: 16,
+            max_upload_bytes: 256 * MEBIBYTE,
+        }
+    }
+}
+
+/// Table `paper`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawPaper {
+    pub(super) field_of_view: String,
+}
+
+impl Default for RawPaper {
+    fn default() -> Self {
+        Self {
+            field_of_view: "horizontal".to_owned(),
+        }
+    }
+}
+
+/// Table `log`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawLog {
+    pub(super) format: String,
+    pub(super) filter: String,
+}
+
+impl Default for RawLog {
+    fn default() -> Self {
+        Self {
+            format: "text".to_owned(),
+            filter: "info,ort=warn".to_owned(),
+        }
+    }
+}

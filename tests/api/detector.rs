@@ -1,0 +1,107 @@
+//! A detector that sees a person in the middle of every view, and does so when it is told.
+
+use std::{
+    sync::{Arc, Condvar, Mutex},
+    time::Duration,
+};
+
+use lookdown::{
+    detection::BBox,
+    imaging::{NetworkInput, ViewBatch},
+    inference::{Detector, InferenceError, ViewDetection},
+};
+
+/// A test that waits longer than this has failed.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Sees a person in every view.
+pub(crate) struct EagerDetector {
+    pub(crate) input: NetworkInput,
+    pub(crate) gate: Arc<Gate>,
+}
+
+/// Holds back the detector, and counts its runs.
+#[derive(Default)]
+pub(crate) struct Gate {
+    state: Mutex<GateState>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct GateState {
+    closed: bool,
+    panics: bool,
+    runs: usize,
+}
+
+impl Gate {
+    pub(crate) fn close(&self) {
+        self.change(|state| state.closed = true);
+    }
+
+    pub(crate) fn open(&self) {
+        self.change(|state| state.closed = false);
+    }
+
+    /// Makes the next run panic.
+    pub(crate) fn panic_once(&self) {
+        self.change(|state| state.panics = true);
+    }
+
+    /// How many runs have begun.
+    pub(crate) fn runs(&self) -> usize {
+        self.state.lock().unwrap().runs
+    }
+
+    /// Waits until `runs` runs have begun.
+    pub(crate) async fn has_begun(self: &Arc<Self>, runs: usize) {
+        let gate = Arc::clone(self);
+        let waiting = tokio::task::spawn_blocking(move || gate.wait(|state| state.runs >= runs));
+        waiting.await.unwrap();
+    }
+
+    fn pass(&self) {
+        self.change(|state| state.runs += 1);
+        let panics = self.wait(|state| !state.closed);
+        assert!(!panics, "the secret cause");
+    }
+
+    fn change(&self, change: impl FnOnce(&mut GateState)) {
+        change(&mut self.state.lock().unwrap());
+        self.changed.notify_all();
+    }
+
+    /// Waits for a state; returns whether the run is to panic.
+    fn wait(&self, reached: impl Fn(&GateState) -> bool) -> bool {
+        let state = self.state.lock().unwrap();
+        let (mut state, waited) = self
+            .changed
+            .wait_timeout_while(state, PATIENCE, |state| !reached(state))
+            .unwrap();
+        assert!(!waited.timed_out(), "nothing happened within {PATIENCE:?}");
+        std::mem::take(&mut state.panics)
+    }
+}
+
+impl Detector for EagerDetector {
+    fn name(&self) -> &'static str {
+        "eager"
+    }
+
+    fn revision(&self) -> &'static str {
+        "1"
+    }
+
+    fn input(&self) -> &NetworkInput {
+        &self.input
+    }
+
+    fn detect(&mut self, batch: &ViewBatch) -> Result<Vec<Vec<ViewDetection>>, InferenceError> {
+        self.gate.pass();
+        let person = ViewDetection {
+            bbox: BBox::new([24.0, 16.0, 40.0, 48.0]).unwrap(),
+            score: 0.9,
+        };
+        Ok(vec![vec![person]; batch.views()])
+    }
+}

@@ -1,0 +1,118 @@
+//! More than the service can do, clients that leave, and faults of its own.
+
+use std::time::Duration;
+
+use axum::{
+    body::Body,
+    http::{Request, StatusCode},
+};
+use tokio::task::JoinHandle;
+use tower::ServiceExt;
+
+use crate::service::{Bounds, Service, frame, incompressible_frame};
+
+const FAST: &str = "calibration=lobby&profile=fast";
+
+/// Sends a good frame and does not wait for the answer.
+fn begin(service: &Service, image: Vec<u8>) -> JoinHandle<StatusCode> {
+    let request = Request::post(format!("/detect?{FAST}"))
+        .body(Body::from(image))
+        .unwrap();
+    let answer = service.router.clone().oneshot(request);
+    tokio::spawn(async { answer.await.unwrap().status() })
+}
+
+#[tokio::test]
+async fn a_frame_without_a_place_is_refused_at_once_and_may_retry() {
+    let service = Service::within(&Bounds {
+        frames_in_flight: 1,
+        ..Bounds::default()
+    });
+    service.gate.close();
+    let first = begin(&service, frame());
+    service.gate.has_begun(1).await;
+    let refused = service.post_raw(FAST, frame()).await;
+    assert_eq!(refused.status, 429);
+    assert_eq!(refused.header("retry-after"), "1");
+    assert_eq!(refused.problem()["type"], "urn:lookdown:problem:overloaded");
+    service.gate.open();
+    assert_eq!(first.await.unwrap(), 200);
+    service.still_works().await;
+}
+
+#[tokio::test]
+async fn all_bodies_together_stay_within_their_memory() {
+    let image = incompressible_frame();
+    let service = Service::within(&Bounds {
+        max_upload_bytes: image.len() * 3 / 2,
+        ..Bounds::default()
+    });
+    service.gate.close();
+    let first = begin(&service, image.clone());
+    service.gate.has_begun(1).await;
+    let refused = service.post_raw(FAST, image.clone()).await;
+    assert_eq!(refused.status, 429);
+    assert!(
+        refused.problem()["detail"]
+            .as_str()
+            .unwrap()
+            .contains("bodies")
+    );
+    service.gate.open();
+    assert_eq!(first.await.unwrap(), 200);
+    assert_eq!(service.post_raw(FAST, image).await.status, 200);
+}
+
+#[tokio::test]
+async fn a_frame_whose_client_left_is_not_worked_on() {
+    let service = Service::start();
+    service.gate.close();
+    let first = begin(&service, frame());
+    service.gate.has_begun(1).await;
+    let leaving = begin(&service, frame());
+    while pending(&service).await < 2 {
+        tokio::task::yield_now().await;
+    }
+    leaving.abort();
+    assert!(leaving.await.unwrap_err().is_cancelled());
+    service.gate.open();
+    assert_eq!(first.await.unwrap(), 200);
+    service.still_works().await;
+    assert_eq!(
+        service.gate.runs(),
+        2,
+        "the frame of the client that left cost a run"
+    );
+}
+
+#[tokio::test]
+async fn a_frame_that_takes_too_long_is_given_up() {
+    let service = Service::within(&Bounds {
+        request_timeout: Duration::from_millis(50),
+        ..Bounds::default()
+    });
+    service.gate.close();
+    let answer = service.post_raw(FAST, frame()).await;
+    assert_eq!(answer.status, 504);
+    assert_eq!(answer.problem()["type"], "urn:lookdown:problem:timeout");
+    service.gate.open();
+}
+
+#[tokio::test]
+async fn a_panic_in_the_detector_costs_one_answer_and_reveals_nothing() {
+    let service = Service::start();
+    service.gate.panic_once();
+    let answer = service.post_raw(FAST, frame()).await;
+    assert_eq!(answer.status, 500);
+    assert_eq!(answer.problem()["type"], "urn:lookdown:problem:internal");
+    assert!(!answer.text().contains("secret"));
+    service.still_works().await;
+}
+
+async fn pending(service: &Service) -> usize {
+    let metrics = service.get("/metrics").await.text();
+    let line = metrics
+        .lines()
+        .find(|line| line.starts_with("lookdown_pending_frames "));
+    line.unwrap().rsplit(' ').next().unwrap().parse().unwrap()
+}

@@ -1,0 +1,11 @@
+//! The HTTP API around a real engine; only the network is a stand-in.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod detect;
+mod detector;
+mod load;
+mod operation;
+mod refusals;
+mod report;
+mod serve;
+mod service;

@@ -1,0 +1,88 @@
+//! Probes, metrics, and the pages that explain the API.
+
+use lookdown::api::Readiness;
+
+use crate::service::{Service, frame};
+
+#[tokio::test]
+async fn readiness_follows_the_life_of_the_server_and_liveness_does_not() {
+    let service = Service::start();
+    assert_eq!(service.get("/readyz").await.json()["status"], "ready");
+    service.readiness.stopping();
+    let answer = service.get("/readyz").await;
+    assert_eq!(answer.status, 503);
+    assert_eq!(
+        answer.problem()["type"],
+        "urn:lookdown:problem:shutting-down"
+    );
+    assert_eq!(answer.header("retry-after"), "1");
+    assert_eq!(service.get("/livez").await.status, 200);
+}
+
+#[test]
+fn a_warm_up_that_ends_after_the_order_to_stop_makes_nothing_ready() {
+    let readiness = Readiness::default();
+    readiness.stopping();
+    readiness.warmed_up();
+    assert_eq!(readiness.phase(), lookdown::api::Phase::Stopping);
+}
+
+#[tokio::test]
+async fn metrics_count_frames_views_persons_and_failures() {
+    let service = Service::start();
+    service
+        .post_raw("calibration=lobby&profile=fast", frame())
+        .await;
+    service.post_raw("sigma=0", frame()).await;
+    service.get("/made/up/path").await;
+    let answer = service.get("/metrics").await;
+    assert!(answer.header("content-type").starts_with("text/plain"));
+    let metrics = answer.text();
+    for line in [
+        "lookdown_http_requests_total{method=\"POST\",route=\"/detect\",status=\"2xx\"} 1",
+        "lookdown_http_requests_total{method=\"POST\",route=\"/detect\",status=\"4xx\"} 1",
+        "lookdown_http_requests_total{method=\"GET\",route=\"unmatched\",status=\"4xx\"} 1",
+        "lookdown_request_failures_total{reason=\"invalid-parameter\"} 1",
+        "lookdown_request_failures_total{reason=\"overloaded\"} 0",
+        "lookdown_request_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
+        "lookdown_queue_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
+        "lookdown_compute_input_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
+        "lookdown_compute_infer_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
+        "lookdown_compute_output_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
+        "lookdown_views_total 13",
+        "lookdown_batches_total 1",
+        "lookdown_pending_frames 0",
+    ] {
+        assert!(
+            metrics.lines().any(|told| told == line),
+            "{line} is not in\n{metrics}"
+        );
+    }
+    assert!(
+        !metrics.contains("made"),
+        "a path that a client made up became a label"
+    );
+}
+
+#[tokio::test]
+async fn the_root_leads_to_the_api_page_which_needs_nothing_from_elsewhere() {
+    let service = Service::start();
+    let root = service.get("/").await;
+    assert_eq!(
+        (root.status.as_u16(), root.header("location")),
+        (307, "docs/")
+    );
+    let page = service.get("/docs/").await.text();
+    assert!(page.contains("swagger-ui"), "{page}");
+    assert!(!page.contains("http"), "the page asks other hosts: {page}");
+    let script = service.get("/docs/swagger-initializer.js").await.text();
+    assert!(script.contains("\"../openapi.json\""), "{script}");
+    assert_eq!(service.get("/docs/swagger-ui-bundle.js").await.status, 200);
+}
+
+#[tokio::test]
+async fn the_server_hands_out_its_own_description() {
+    let answer = Service::start().get("/openapi.json").await;
+    let document: serde_json::Value = answer.json();
+    assert!(document["paths"]["/detect"]["post"].is_object());
+}

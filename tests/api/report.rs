@@ -1,0 +1,89 @@
+//! The report's JSON, field by field.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+use lookdown::{
+    api::Report,
+    detection::{BBox, Refinement, RefinementParameters},
+    geometry::{
+        OrientedBox, Pixel,
+        floor::{Bearing, FloorPosition},
+    },
+    pipeline::{CalibrationUsed, DetectionReport, ModelUsed, Person, Profile, StageTimings},
+};
+
+fn person() -> Person {
+    Person {
+        bbox: BBox::new([1102.4149, 700.0751, 1341.7, 842.600_000_1]).unwrap(),
+        score: 0.873_149,
+        oriented_box: OrientedBox {
+            center: Pixel::new(1222.9, 771.304),
+            width: 118.25,
+            height: 241.019,
+            angle: 79.84_f64.to_radians(),
+            up: nalgebra::Vector2::new(0.0, -1.0),
+        },
+        bearing: Some(Bearing {
+            azimuth: 349.871_f64.to_radians(),
+            off_axis: 41.709_f64.to_radians(),
+        }),
+        floor: Some(FloorPosition {
+            x_m: 1.873_49,
+            y_m: -0.000_1,
+        }),
+        views: 3,
+    }
+}
+
+fn report() -> DetectionReport {
+    let unknown_place = Person {
+        bearing: None,
+        floor: None,
+        ..person()
+    };
+    let micros = Duration::from_micros;
+    DetectionReport {
+        request_id: "0197a3c5-8f0e-7c3e-9a55-2f8e4b1d6c70".to_owned(),
+        camera: "lobby-north".to_owned(),
+        received_at: Timestamp::from_microsecond(1_795_253_400_412_345).unwrap(),
+        captured_at: Some("2026-11-21T10:30:00+01:00".parse().unwrap()),
+        calibration: CalibrationUsed {
+            id: "lobby".to_owned(),
+            revision: "9f86d081884c".to_owned(),
+            assumed: false,
+        },
+        image_width: 1680,
+        image_height: 1680,
+        model: ModelUsed {
+            name: "ssdlite_mobilenet_v2".to_owned(),
+            revision: "60303ae22b99".to_owned(),
+        },
+        profile: Profile::Balanced,
+        refinement: RefinementParameters {
+            refinement: Refinement::Fusion,
+            iou_threshold: 0.4,
+            sigma: 0.3,
+            score_threshold: 0.3,
+            max_detections: 1000,
+        },
+        persons: vec![person(), unknown_place],
+        view_count: 24,
+        batch_count: 3,
+        timings: StageTimings {
+            decode: micros(11_204),
+            calibrate: micros(15),
+            queue: micros(61),
+            remap: micros(21_377),
+            inference: micros(580_902),
+            refine: micros(412),
+            total: micros(614_122),
+        },
+        warnings: vec!["the frame was turned".to_owned()],
+    }
+}
+
+#[test]
+fn a_report_has_these_fields_units_and_digits() {
+    insta::assert_json_snapshot!("report", Report::from(&report()));
+}

@@ -1,0 +1,220 @@
+//! The service under test, and how to talk to it.
+
+use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+
+use axum::{
+    Router,
+    body::Body,
+    http::{HeaderMap, Request, StatusCode, header::CONTENT_TYPE},
+};
+use http_body_util::BodyExt;
+use lookdown::{
+    api::{self, ApiOptions, ApiState, Readiness},
+    calibration::CalibrationFolder,
+    geometry::FieldOfViewReading,
+    imaging::{Frame, NetworkInput, annotate::encode_png, decode::DecodeLimits},
+    metrics::Metrics,
+    pipeline::{Engine, EngineOptions, WorkerPool},
+};
+use serde_json::Value;
+use tempfile::TempDir;
+use tower::ServiceExt;
+
+use crate::detector::{EagerDetector, Gate};
+
+/// Sides of the frames that [`frame`] makes, and that `lobby` is calibrated for.
+pub(crate) const FRAME_SIDE: u32 = 200;
+const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
+  "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707},
+  "mount": {"world_up": [0, 0, -1], "height_m": 3} }"#;
+const BOUNDARY: &str = "edge-of-a-part";
+
+/// A running service without a socket.
+pub(crate) struct Service {
+    pub(crate) router: Router,
+    pub(crate) gate: Arc<Gate>,
+    pub(crate) readiness: Readiness,
+    /// Goes when the test does.
+    _calibrations: TempDir,
+}
+
+/// What a test may want to be tight.
+pub(crate) struct Bounds {
+    pub(crate) frames_in_flight: usize,
+    pub(crate) max_body_bytes: usize,
+    pub(crate) max_upload_bytes: usize,
+    pub(crate) request_timeout: Duration,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self {
+            frames_in_flight: 8,
+            max_body_bytes: 1 << 20,
+            max_upload_bytes: 1 << 24,
+            request_timeout: Duration::from_secs(20),
+        }
+    }
+}
+
+/// An answer, read to its end.
+pub(crate) struct Answer {
+    pub(crate) status: StatusCode,
+    pub(crate) headers: HeaderMap,
+    pub(crate) body: Vec<u8>,
+}
+
+impl Answer {
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_slice(&self.body).unwrap()
+    }
+
+    pub(crate) fn text(&self) -> String {
+        String::from_utf8(self.body.clone()).unwrap()
+    }
+
+    pub(crate) fn header(&self, name: &str) -> &str {
+        self.headers[name].to_str().unwrap()
+    }
+
+    /// The problem it is; checks the envelope.
+    pub(crate) fn problem(&self) -> Value {
+        assert_eq!(self.header("content-type"), "application/problem+json");
+        let problem = self.json();
+        assert_eq!(problem["status"], self.status.as_u16());
+        assert_eq!(problem["error"], problem["detail"]);
+        assert_eq!(problem["request_id"], self.header("x-request-id"));
+        assert!(problem["instance"].as_str().unwrap().starts_with('/'));
+        assert!(!problem["title"].as_str().unwrap().is_empty());
+        let kind = problem["type"].as_str().unwrap();
+        assert!(kind.starts_with("urn:lookdown:problem:"), "{kind}");
+        problem
+    }
+}
+
+/// An engine with the stand-in detector and the calibration `lobby`.
+pub(crate) fn engine(gate: &Arc<Gate>) -> (Engine, TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("lobby.json"), LOBBY).unwrap();
+    let detector = EagerDetector {
+        input: NetworkInput::plain(64, 64),
+        gate: Arc::clone(gate),
+    };
+    let options = EngineOptions {
+        decode_limits: DecodeLimits::default(),
+        max_batch_views: NonZeroUsize::new(128).unwrap(),
+        paper_field_of_view: FieldOfViewReading::default(),
+        rig_cache_bytes: 1 << 28,
+    };
+    let calibrations = CalibrationFolder::open(folder.path()).unwrap();
+    let engine = Engine::new(Box::new(detector), Some(calibrations), options);
+    (engine, folder)
+}
+
+impl Service {
+    pub(crate) fn start() -> Self {
+        Self::within(&Bounds::default())
+    }
+
+    /// A warm service with one worker.
+    pub(crate) fn within(bounds: &Bounds) -> Self {
+        let gate = Arc::new(Gate::default());
+        let (engine, calibrations) = engine(&gate);
+        let capacity = NonZeroUsize::new(bounds.frames_in_flight).unwrap();
+        let workers = WorkerPool::start(&Arc::new(engine), NonZeroUsize::MIN, capacity).unwrap();
+        let readiness = Readiness::default();
+        readiness.warmed_up();
+        let state = ApiState::new(
+            Arc::new(workers),
+            Arc::new(Metrics::new().unwrap()),
+            readiness.clone(),
+            ApiOptions {
+                max_body_bytes: bounds.max_body_bytes,
+                max_upload_bytes: bounds.max_upload_bytes,
+                request_timeout: bounds.request_timeout,
+            },
+        );
+        Self {
+            router: api::router(state),
+            gate,
+            readiness,
+            _calibrations: calibrations,
+        }
+    }
+
+    pub(crate) async fn send(&self, request: Request<Body>) -> Answer {
+        let response = self.router.clone().oneshot(request).await.unwrap();
+        let (parts, body) = response.into_parts();
+        Answer {
+            status: parts.status,
+            headers: parts.headers,
+            body: body.collect().await.unwrap().to_bytes().to_vec(),
+        }
+    }
+
+    pub(crate) async fn get(&self, path: &str) -> Answer {
+        self.send(Request::get(path).body(Body::empty()).unwrap())
+            .await
+    }
+
+    /// Sends a form; a part is a name, perhaps with `; filename=…`, and its content.
+    pub(crate) async fn post_form(&self, parts: &[(&str, &[u8])]) -> Answer {
+        self.send(form(parts)).await
+    }
+
+    /// Sends a body with parameters in the query.
+    pub(crate) async fn post_raw(&self, query: &str, body: Vec<u8>) -> Answer {
+        let path = format!("/detect?{query}");
+        self.send(Request::post(path).body(Body::from(body)).unwrap())
+            .await
+    }
+
+    /// A good request still works.
+    pub(crate) async fn still_works(&self) {
+        let answer = self
+            .post_raw("calibration=lobby&profile=fast", frame())
+            .await;
+        assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+    }
+}
+
+/// A form for `/detect`.
+pub(crate) fn form(parts: &[(&str, &[u8])]) -> Request<Body> {
+    let mut body = Vec::new();
+    for (name, content) in parts {
+        let head =
+            format!("--{BOUNDARY}\r\nContent-Disposition: form-data; name=\"{name}\"\r\n\r\n");
+        body.extend_from_slice(head.as_bytes());
+        body.extend_from_slice(content);
+        body.extend_from_slice(b"\r\n");
+    }
+    body.extend_from_slice(format!("--{BOUNDARY}--\r\n").as_bytes());
+    Request::post("/detect")
+        .header(
+            CONTENT_TYPE,
+            format!("multipart/form-data; boundary={BOUNDARY}"),
+        )
+        .body(Body::from(body))
+        .unwrap()
+}
+
+/// A grey PNG that fits the calibration `lobby`.
+pub(crate) fn frame() -> Vec<u8> {
+    frame_of(FRAME_SIDE, FRAME_SIDE)
+}
+
+pub(crate) fn frame_of(width: u32, height: u32) -> Vec<u8> {
+    let pixels = vec![128; 3 * width as usize * height as usize];
+    encode_png(&Frame::new(width, height, pixels).unwrap()).unwrap()
+}
+
+/// A PNG that takes about as many bytes as it has pixels, times three.
+pub(crate) fn incompressible_frame() -> Vec<u8> {
+    let mut state = 1_u32;
+    let noise = std::iter::repeat_with(|| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        state.to_be_bytes()[0]
+    });
+    let pixels = noise.take(3 * (FRAME_SIDE * FRAME_SIDE) as usize).collect();
+    encode_png(&Frame::new(FRAME_SIDE, FRAME_SIDE, pixels).unwrap()).unwrap()
+}

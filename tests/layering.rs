@@ -1,0 +1,238 @@
+//! Dependencies between the modules point one way, and few modules know the outside world.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Every module, and the modules of this crate it may use.
+const MAY_USE: [(&str, &[&str]); 15] = [
+    ("revision", &[]),
+    ("geometry", &[]),
+    ("detection", &[]),
+    ("metrics", &[]),
+    ("shutdown", &[]),
+    ("imaging", &["geometry"]),
+    ("calibration", &["geometry", "revision"]),
+    ("inference", &["detection", "imaging", "revision"]),
+    ("settings", &["geometry"]),
+    ("telemetry", &["settings"]),
+    (
+        "pipeline",
+        &[
+            "geometry",
+            "detection",
+            "imaging",
+            "calibration",
+            "inference",
+        ],
+    ),
+    (
+        "evaluation",
+        &[
+            "geometry",
+            "detection",
+            "imaging",
+            "calibration",
+            "inference",
+            "pipeline",
+        ],
+    ),
+    (
+        "api",
+        &[
+            "geometry",
+            "detection",
+            "imaging",
+            "calibration",
+            "inference",
+            "pipeline",
+            "metrics",
+        ],
+    ),
+    (
+        "app",
+        &[
+            "geometry",
+            "detection",
+            "imaging",
+            "calibration",
+            "inference",
+            "pipeline",
+            "metrics",
+            "settings",
+            "shutdown",
+            "telemetry",
+            "api",
+        ],
+    ),
+    (
+        "cli",
+        &[
+            "geometry",
+            "detection",
+            "imaging",
+            "calibration",
+            "inference",
+            "pipeline",
+            "evaluation",
+            "settings",
+            "shutdown",
+            "telemetry",
+            "api",
+            "app",
+        ],
+    ),
+];
+
+/// Crates that stand for the outside world, and the only modules that may name them.
+const ONLY_KNOWN_TO: [(&str, &[&str]); 10] = [
+    ("ort", &["inference"]),
+    ("image", &["imaging"]),
+    ("axum", &["api", "app"]),
+    ("tower_http", &["api"]),
+    ("utoipa", &["api"]),
+    ("utoipa_axum", &["api"]),
+    ("serde_json", &["api", "cli", "calibration", "evaluation"]),
+    ("clap", &["cli"]),
+    ("config", &["settings"]),
+    ("prometheus", &["metrics"]),
+];
+
+/// Every source file of the library with the top-level module it belongs to.
+fn sources() -> Vec<(String, PathBuf)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut folders = vec![root.clone()];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                let below = path.strip_prefix(&root).unwrap();
+                let module = below.iter().next().unwrap().to_str().unwrap();
+                files.push((module.trim_end_matches(".rs").to_owned(), path));
+            }
+        }
+    }
+    files.retain(|(module, _)| module != "lib" && module != "main");
+    files
+}
+
+/// The code of a file: no comments.
+fn code(text: &str) -> String {
+    let lines = text
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or_default());
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+fn leading_name(text: &str) -> &str {
+    let end = text.find(|c: char| !c.is_alphanumeric() && c != '_');
+    &text[..end.unwrap_or(text.len())]
+}
+
+/// The modules that follow `crate::`, also in a list of imports.
+fn used_modules(code: &str) -> BTreeSet<&str> {
+    let mut used = BTreeSet::new();
+    for (start, name) in code.match_indices("crate::") {
+        let before = code[..start].chars().next_back();
+        if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '$') {
+            continue;
+        }
+        let rest = &code[start + name.len()..];
+        let Some(list) = rest.strip_prefix('{') else {
+            used.insert(leading_name(rest));
+            continue;
+        };
+        let mut depth = 1;
+        let mut at_name = true;
+        for (index, character) in list.char_indices() {
+            match character {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                ',' => at_name = depth == 1,
+                c if c.is_whitespace() => {}
+                _ if at_name => {
+                    used.insert(leading_name(&list[index..]));
+                    at_name = false;
+                }
+                _ => {}
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+    }
+    used
+}
+
+/// Whether a path in the code begins with this crate.
+fn names_crate(code: &str, name: &str) -> bool {
+    code.match_indices(&format!("{name}::")).any(|(start, _)| {
+        let before = code[..start].chars().next_back();
+        !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':')
+    })
+}
+
+#[test]
+fn every_module_uses_only_what_lies_below_it() {
+    let mut breaches = Vec::new();
+    for (module, path) in sources() {
+        let code = code(&fs::read_to_string(&path).unwrap());
+        let Some((_, allowed)) = MAY_USE.iter().find(|(name, _)| *name == module) else {
+            breaches.push(format!("{module} has no place in MAY_USE"));
+            continue;
+        };
+        for used in used_modules(&code) {
+            if used != module && !allowed.contains(&used) {
+                breaches.push(format!("{}: {module} → {used}", path.display()));
+            }
+        }
+    }
+    assert!(breaches.is_empty(), "{}", breaches.join("\n"));
+}
+
+#[test]
+fn few_modules_know_the_outside_world() {
+    let mut breaches = Vec::new();
+    for (module, path) in sources() {
+        let code = code(&fs::read_to_string(&path).unwrap());
+        for (name, known_to) in ONLY_KNOWN_TO {
+            if !known_to.contains(&module.as_str()) && names_crate(&code, name) {
+                breaches.push(format!("{}: {module} names {name}", path.display()));
+            }
+        }
+    }
+    assert!(breaches.is_empty(), "{}", breaches.join("\n"));
+}
+
+#[test]
+fn files_stay_small() {
+    for (_, path) in sources() {
+        let lines = fs::read_to_string(&path).unwrap().lines().count();
+        assert!(
+            lines <= 400,
+            "{} has {lines} lines: give it parts",
+            path.display()
+        );
+    }
+}
+
+#[test]
+fn the_scan_sees_imports_in_every_shape() {
+    let found = used_modules(
+        "use crate::api; use crate::{\n    cli::{self, run},\n    metrics,\n};\nlet x = crate::app::f();",
+    );
+    assert_eq!(found, BTreeSet::from(["api", "app", "cli", "metrics"]));
+    assert!(used_modules("use $crate::routes; use other_crate::api;").is_empty());
+    assert!(used_modules(&code("// use crate::api;")).is_empty());
+    assert!(names_crate("use ort::session::Session;", "ort"));
+    assert!(!names_crate(
+        "use crate::ort::Session; use support::x;",
+        "ort"
+    ));
+}

@@ -1,0 +1,114 @@
+//! The checked-in API description, and what it promises.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use std::{collections::BTreeSet, fs};
+
+use lookdown::{api::openapi_document, pipeline::DetectParameters};
+use serde_json::Value;
+
+fn document() -> Value {
+    serde_json::to_value(openapi_document()).unwrap()
+}
+
+/// Every operation with its path.
+fn operations(document: &Value) -> Vec<(String, Value)> {
+    let paths = document["paths"].as_object().unwrap();
+    let operations = paths.iter().flat_map(|(path, item)| {
+        let operations = item.as_object().unwrap().values();
+        operations.map(|operation| (path.clone(), operation.clone()))
+    });
+    operations.collect()
+}
+
+#[test]
+fn the_checked_in_document_is_that_of_the_code() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");
+    let checked_in: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
+    assert!(
+        checked_in == document(),
+        "run `make bless` and look at the difference"
+    );
+}
+
+#[test]
+fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
+    let document = document();
+    let mut names = BTreeSet::new();
+    for (path, operation) in operations(&document) {
+        let name = operation["operationId"].as_str().unwrap();
+        assert!(
+            name.contains('_'),
+            "{path}: {name} is not <verb>_<resource>"
+        );
+        assert!(names.insert(name.to_owned()), "{name} is there twice");
+        assert!(operation["summary"].is_string(), "{path} has no summary");
+        assert!(operation["tags"][0].is_string(), "{path} has no tag");
+        assert!(
+            operation["responses"]["200"].is_object(),
+            "{path} never succeeds"
+        );
+    }
+    assert_eq!(document["info"]["license"]["identifier"], "Apache-2.0");
+    assert!(document["servers"][0]["url"].is_string());
+}
+
+#[test]
+fn every_failure_is_described_as_a_problem() {
+    for (path, operation) in operations(&document()) {
+        let responses = operation["responses"].as_object().unwrap();
+        for (status, response) in responses
+            .iter()
+            .filter(|(status, _)| *status >= &"400".to_owned())
+        {
+            let schema = &response["content"]["application/problem+json"]["schema"]["$ref"];
+            assert_eq!(schema, "#/components/schemas/Problem", "{path} {status}");
+            let retries = ["429", "503"].contains(&status.as_str());
+            let header = response["headers"]["Retry-After"].is_object();
+            assert_eq!(header, retries, "{path} {status}");
+        }
+    }
+}
+
+#[test]
+fn detection_describes_every_status_and_every_parameter() {
+    let document = document();
+    let detect = &document["paths"]["/detect"]["post"];
+    let statuses: Vec<_> = detect["responses"].as_object().unwrap().keys().collect();
+    let expected = [
+        "200", "400", "404", "408", "413", "415", "422", "429", "500", "503", "504",
+    ];
+    assert_eq!(statuses, expected);
+
+    let query = detect["parameters"].as_array().unwrap();
+    let query: Vec<_> = query
+        .iter()
+        .map(|parameter| parameter["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(query, DetectParameters::NAMES);
+
+    let form = serde_json::to_string(&document["components"]["schemas"]).unwrap();
+    for name in DetectParameters::NAMES {
+        assert!(
+            form.contains(&format!("\"{name}\"")),
+            "the form lacks {name}"
+        );
+    }
+    let bodies = detect["requestBody"]["content"].as_object().unwrap();
+    for media_type in [
+        "multipart/form-data",
+        "image/jpeg",
+        "image/png",
+        "image/webp",
+    ] {
+        assert!(bodies.contains_key(media_type), "{media_type} is missing");
+    }
+}
+
+#[test]
+fn the_example_report_has_the_fields_of_the_schema() {
+    let document = document();
+    let report = &document["components"]["schemas"]["Report"];
+    let fields: BTreeSet<_> = report["properties"].as_object().unwrap().keys().collect();
+    let example: BTreeSet<_> = report["example"].as_object().unwrap().keys().collect();
+    assert_eq!(fields, example);
+}

@@ -1,0 +1,283 @@
+//! Settings: layers, limits and what is said about mistakes.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use std::{collections::HashMap, fs, path::Path};
+
+use lookdown::settings::{RawSettings, Settings, SettingsError, load};
+
+fn environment(variables: &[(&str, &str)]) -> HashMap<String, String> {
+    let owned = |&(name, value): &(&str, &str)| (name.to_owned(), value.to_owned());
+    variables.iter().map(owned).collect()
+}
+
+fn from_environment(name: &str, value: &str) -> Result<Settings, SettingsError> {
+    load(None, environment(&[(name, value)]))
+}
+
+fn from_file(text: &str) -> Result<Settings, SettingsError> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lookdown.toml");
+    fs::write(&file, text).unwrap();
+    load(Some(&file), HashMap::new())
+}
+
+fn defaults() -> Settings {
+    RawSettings::default().try_into().unwrap()
+}
+
+/// The message of a refusal, which must be one line.
+fn refusal(result: Result<Settings, SettingsError>) -> String {
+    let message = result.unwrap_err().to_string();
+    assert!(!message.contains('\n'), "{message:?} is more than a line");
+    message
+}
+
+#[test]
+fn the_example_file_states_every_key_at_its_default() {
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/config/lookdown.toml");
+    let settings = load(Some(Path::new(example)), HashMap::new()).unwrap();
+    assert_eq!(settings, defaults());
+    let text = fs::read_to_string(example).unwrap();
+    let stated = text.lines().filter(|line| {
+        let key = line.split(" = ").next().unwrap_or_default();
+        !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
+    });
+    assert_eq!(stated.count(), 19, "a key is missing from {example}");
+}
+
+#[test]
+fn the_environment_overrules_the_file_and_the_file_the_defaults() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lookdown.toml");
+    fs::write(
+        &file,
+        "[server]\nlisten = \"[::1]:81\"\nmax_body_bytes = 4096\n",
+    )
+    .unwrap();
+    let variables = environment(&[("LOOKDOWN__SERVER__LISTEN", "0.0.0.0:82")]);
+    let settings = load(Some(&file), variables).unwrap();
+    assert_eq!(settings.server.listen.to_string(), "0.0.0.0:82");
+    assert_eq!(settings.server.max_body_bytes, 4096);
+    assert_eq!(settings.limits, defaults().limits);
+}
+
+#[test]
+fn every_kind_of_value_can_be_given_in_the_environment() {
+    let settings = load(
+        None,
+        environment(&[
+            ("LOOKDOWN__INFERENCE__THREADS", "3"),
+            ("LOOKDOWN__INFERENCE__SCORE_FLOOR", "0.25"),
+            ("LOOKDOWN__MODEL__PATH", "123"),
+            ("LOOKDOWN__PAPER__FIELD_OF_VIEW", "diagonal"),
+        ]),
+    )
+    .unwrap();
+    assert_eq!(settings.inference.threads.get(), 3);
+    assert!((settings.inference.score_floor - 0.25).abs() < f64::EPSILON);
+    assert_eq!(settings.model.path, Path::new("123"));
+}
+
+#[test]
+fn the_variables_kubernetes_sets_for_a_service_are_ignored() {
+    let variables = environment(&[
+        ("LOOKDOWN_PORT", "tcp://10.0.0.1:8080"),
+        ("LOOKDOWN_SERVICE_HOST", "10.0.0.1"),
+        ("LOOKDOWN_PORT_8080_TCP_ADDR", "10.0.0.1"),
+    ]);
+    assert_eq!(load(None, variables).unwrap(), defaults());
+}
+
+#[test]
+fn a_variable_set_to_nothing_counts_as_not_set() {
+    let settings = from_environment("LOOKDOWN__MODEL__PATH", "").unwrap();
+    assert_eq!(settings, defaults());
+}
+
+#[test]
+fn without_a_number_of_threads_the_machine_decides() {
+    let threads = defaults().inference.threads;
+    assert_eq!(threads, std::thread::available_parallelism().unwrap());
+}
+
+#[test]
+fn an_unknown_key_is_refused_by_name() {
+    let in_file = refusal(from_file("[server]\nlistn = \"127.0.0.1:1\"\n"));
+    assert!(in_file.contains("server"), "{in_file}");
+    assert!(
+        in_file.contains("`listn`") && in_file.contains("`listen`"),
+        "{in_file}"
+    );
+    let group = refusal(from_file("[sever]\nlisten = \"127.0.0.1:1\"\n"));
+    assert!(
+        group.contains("`sever`") && group.contains("`server`"),
+        "{group}"
+    );
+    let variable = refusal(from_environment("LOOKDOWN__INFERENCE__THREAD", "2"));
+    assert!(
+        variable.contains("`thread`") && variable.contains("`threads`"),
+        "{variable}"
+    );
+}
+
+#[test]
+fn a_value_that_cannot_be_used_is_refused_with_key_value_and_remedy() {
+    for (variable, value, key, remedy) in [
+        (
+            "SERVER__LISTEN",
+            "localhost",
+            "server.listen",
+            "127.0.0.1:8080",
+        ),
+        (
+            "SERVER__MAX_BODY_BYTES",
+            "12",
+            "server.max_body_bytes",
+            "from 1024",
+        ),
+        (
+            "SERVER__MAX_BODY_BYTES",
+            "many",
+            "server.max_body_bytes",
+            "integer",
+        ),
+        (
+            "SERVER__MAX_BODY_BYTES",
+            "-1",
+            "server.max_body_bytes",
+            "integer",
+        ),
+        (
+            "SERVER__REQUEST_TIMEOUT_MILLIS",
+            "0",
+            "server.request_timeout_millis",
+            "from 1",
+        ),
+        (
+            "INFERENCE__THREADS",
+            "100000",
+            "inference.threads",
+            "from 0 to",
+        ),
+        (
+            "INFERENCE__SCORE_FLOOR",
+            "2",
+            "inference.score_floor",
+            "from 0 to 1",
+        ),
+        (
+            "INFERENCE__SCORE_FLOOR",
+            "NaN",
+            "inference.score_floor",
+            "from 0 to 1",
+        ),
+        (
+            "INFERENCE__MAX_BATCH_VIEWS",
+            "0",
+            "inference.max_batch_views",
+            "from 1",
+        ),
+        (
+            "LIMITS__MAX_IMAGE_SIDE",
+            "65536",
+            "limits.max_image_side",
+            "65535",
+        ),
+        (
+            "LIMITS__MAX_FRAMES_IN_FLIGHT",
+            "0",
+            "limits.max_frames_in_flight",
+            "from 1",
+        ),
+        (
+            "LIMITS__MAX_UPLOAD_BYTES",
+            "1024",
+            "limits.max_upload_bytes",
+            "33554432",
+        ),
+        (
+            "PAPER__FIELD_OF_VIEW",
+            "wide",
+            "paper.field_of_view",
+            "horizontal, diagonal, literal",
+        ),
+        ("LOG__FORMAT", "xml", "log.format", "text, json"),
+        (
+            "LOG__FILTER",
+            "lookdown=loud",
+            "log.filter",
+            "lookdown=debug",
+        ),
+    ] {
+        let message = refusal(from_environment(&format!("LOOKDOWN__{variable}"), value));
+        for part in [key, value, remedy] {
+            assert!(message.contains(part), "{message:?} does not say {part:?}");
+        }
+    }
+}
+
+#[test]
+fn a_file_that_is_not_toml_is_refused_with_the_place() {
+    let message = refusal(from_file("[server]\nlisten = \n"));
+    assert!(message.contains("lookdown.toml"), "{message}");
+    assert!(message.contains("line 2"), "{message}");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_refused_by_name() {
+    let message = refusal(load(Some(Path::new("/nowhere/l.toml")), HashMap::new()));
+    assert!(
+        message.contains("/nowhere/l.toml") && message.contains("--config"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_path_somebody_chose_must_exist() {
+    let calibrations = from_environment("LOOKDOWN__CALIBRATIONS__PATH", "no/such/folder").unwrap();
+    let model = from_environment("LOOKDOWN__MODEL__PATH", "no/such/model").unwrap();
+    let library = from_environment("LOOKDOWN__INFERENCE__LIBRARY_PATH", "no/such.so").unwrap();
+    for (refused, parts) in [
+        (
+            calibrations.calibrations.find().unwrap_err(),
+            [
+                "calibrations.path",
+                "no/such/folder",
+                "LOOKDOWN__CALIBRATIONS__PATH",
+            ],
+        ),
+        (
+            model.model.find().unwrap_err(),
+            ["model.path", "no/such/model", "make setup"],
+        ),
+        (
+            library.inference.find_library().unwrap_err(),
+            ["inference.library_path", "no/such.so", "make setup"],
+        ),
+    ] {
+        for part in parts {
+            assert!(
+                refused.to_string().contains(part),
+                "{refused} does not say {part:?}"
+            );
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let chosen = folder.path().to_str().unwrap();
+    let settings = from_environment("LOOKDOWN__CALIBRATIONS__PATH", chosen).unwrap();
+    assert_eq!(
+        settings.calibrations.find().unwrap().unwrap(),
+        folder.path()
+    );
+}
+
+#[test]
+fn what_belongs_to_the_executable_is_found_from_anywhere() {
+    let folders = fs::canonicalize(env!("CARGO_MANIFEST_DIR")).unwrap();
+    // The model's folder is checked in, and this test's executable lies below it.
+    let found = defaults().model.find().unwrap();
+    assert_eq!(
+        fs::canonicalize(found).unwrap(),
+        folders.join("models/ssdlite_mobilenet_v2")
+    );
+}
