@@ -12,6 +12,7 @@ pub mod lens;
 pub mod mount;
 pub mod oriented_box;
 pub mod pixels;
+pub mod stature;
 pub mod view_plan;
 pub mod virtual_view;
 

@@ -6,6 +6,7 @@ mod error;
 mod job;
 mod merge;
 mod parameters;
+mod plausibility;
 mod profile;
 mod report;
 mod rig_cache;

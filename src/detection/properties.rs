@@ -141,7 +141,7 @@ fn fusion_reference(
                 coordinate_weight,
                 ..
             } = candidates[member];
-            let weight = score * score * coordinate_weight;
+            let weight = score * score * score * coordinate_weight;
             total += weight;
             for (sum, coordinate) in sums.iter_mut().zip(bbox.corners()) {
                 *sum += weight * coordinate;

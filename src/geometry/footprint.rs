@@ -1,10 +1,13 @@
 //! Footprints: what a box found in a view covers in the fisheye frame.
 
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
 use nalgebra::Vector2;
 
 use super::{
     Lens, Mount, Pixel, VirtualView,
     pixels::{PixelConvention, cross_half_pixel},
+    stature::Extremities,
 };
 
 /// Points on an inscribed ellipse: more change the hull by less than 0.2 % of its size.
@@ -32,6 +35,7 @@ pub enum BackProjection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
     outline: Vec<Pixel>,
+    extremities: Option<Extremities>,
 }
 
 impl Footprint {
@@ -46,9 +50,15 @@ impl Footprint {
         lens: &Lens,
         mount: &Mount,
     ) -> Option<Self> {
-        let outline_in_view = match back_projection {
-            BackProjection::CornerHull => corners(view_box).to_vec(),
-            BackProjection::TiltedEllipse => tilted_ellipse(view_box, view, mount),
+        let (outline_in_view, extremities) = match back_projection {
+            BackProjection::CornerHull => (corners(view_box).to_vec(), None),
+            BackProjection::TiltedEllipse => {
+                let ellipse = Ellipse::inscribed(view_box, view, mount);
+                (
+                    ellipse.outline().collect::<Vec<_>>(),
+                    Some(ellipse.extremities(view)),
+                )
+            }
         };
         let mut inside = 0_usize;
         let mut outline = Vec::with_capacity(outline_in_view.len());
@@ -62,7 +72,10 @@ impl Footprint {
         }
         #[expect(clippy::cast_precision_loss, reason = "at most 32 points")]
         let inside_share = inside as f64 / outline_in_view.len() as f64;
-        (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self { outline })
+        (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self {
+            outline,
+            extremities,
+        })
     }
 
     /// The footprint of a box found in the frame itself: its corners.
@@ -70,6 +83,7 @@ impl Footprint {
     pub fn of_frame_box(frame_box: [f64; 4]) -> Self {
         Self {
             outline: corners(frame_box).to_vec(),
+            extremities: None,
         }
     }
 
@@ -77,6 +91,13 @@ impl Footprint {
     #[must_use]
     pub fn outline(&self) -> &[Pixel] {
         &self.outline
+    }
+
+    /// The ends of the outline along the vertical and across it; `None` for corner hulls, which
+    /// know no vertical.
+    #[must_use]
+    pub fn extremities(&self) -> Option<&Extremities> {
+        self.extremities.as_ref()
     }
 
     /// The axis-parallel hull `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
@@ -105,26 +126,62 @@ fn corners([x_min, y_min, x_max, y_max]: [f64; 4]) -> [Pixel; 4] {
     ]
 }
 
-fn tilted_ellipse(
-    [x_min, y_min, x_max, y_max]: [f64; 4],
-    view: &VirtualView,
-    mount: &Mount,
-) -> Vec<Pixel> {
-    let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
-    let half_width = (x_max - x_min) / 2.0;
-    let half_height = (y_max - y_min) / 2.0;
-    let center_pixel = cross_half_pixel(center, PixelConvention::PixelCentre);
-    let (axis, along, across) = view
-        .vertical_at(&center_pixel, mount)
-        .and_then(|vertical| ellipse_axes(vertical, half_width, half_height))
-        .unwrap_or((Vector2::y(), half_height, half_width));
-    let normal = Vector2::new(axis.y, -axis.x);
-    (0..ELLIPSE_POINTS)
-        .map(|index| {
-            let angle = std::f64::consts::TAU * f64::from(index) / f64::from(ELLIPSE_POINTS);
-            center + axis * (along * angle.cos()) + normal * (across * angle.sin())
-        })
-        .collect()
+/// An ellipse in a view, corner-origin view pixels.
+struct Ellipse {
+    center: Pixel,
+    /// Unit vector from the feet to the head.
+    up: Vector2<f64>,
+    /// Semi-axis along `up`, pixels.
+    along: f64,
+    /// Semi-axis across `up`, pixels.
+    across: f64,
+}
+
+impl Ellipse {
+    /// The ellipse inscribed in a box whose major axis lies along the projected vertical.
+    fn inscribed(
+        [x_min, y_min, x_max, y_max]: [f64; 4],
+        view: &VirtualView,
+        mount: &Mount,
+    ) -> Self {
+        let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
+        let half_width = (x_max - x_min) / 2.0;
+        let half_height = (y_max - y_min) / 2.0;
+        let center_pixel = cross_half_pixel(center, PixelConvention::PixelCentre);
+        let (up, along, across) = view
+            .vertical_at(&center_pixel, mount)
+            .and_then(|vertical| ellipse_axes(vertical, half_width, half_height))
+            .unwrap_or((-Vector2::y(), half_height, half_width));
+        Self {
+            center,
+            up,
+            along,
+            across,
+        }
+    }
+
+    /// The point at `angle` radians from the head, clockwise.
+    fn at(&self, angle: f64) -> Pixel {
+        let right = Vector2::new(-self.up.y, self.up.x);
+        self.center + self.up * (self.along * angle.cos()) + right * (self.across * angle.sin())
+    }
+
+    fn outline(&self) -> impl Iterator<Item = Pixel> {
+        (0..ELLIPSE_POINTS).map(|index| self.at(TAU * f64::from(index) / f64::from(ELLIPSE_POINTS)))
+    }
+
+    fn extremities(&self, view: &VirtualView) -> Extremities {
+        let ray = |angle| {
+            let pixel = cross_half_pixel(self.at(angle), PixelConvention::PixelCentre);
+            view.ray_in_camera(&pixel)
+        };
+        Extremities {
+            head: ray(0.0),
+            right: ray(FRAC_PI_2),
+            foot: ray(PI),
+            left: ray(-FRAC_PI_2),
+        }
+    }
 }
 
 /// The semi-axes (along and across `vertical`) of the ellipse inscribed in a box.

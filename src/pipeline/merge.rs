@@ -1,8 +1,10 @@
 //! From boxes in views to persons in the frame.
 
-use super::{Person, camera_rig::CameraRig};
+use super::{Person, camera_rig::CameraRig, plausibility::worth};
 use crate::{
-    detection::{BBox, Candidate, FramePixels, RefinementParameters, ViewPixels, refine},
+    detection::{
+        BBox, Candidate, FramePixels, Refinement, RefinementParameters, ViewPixels, refine,
+    },
     geometry::{
         BackProjection, Footprint, OrientedBox,
         floor::{bearing, floor_position},
@@ -21,6 +23,22 @@ const BORDER_WEIGHT: f64 = 0.1;
 struct Mapped {
     candidate: Candidate,
     footprint: Footprint,
+    cut_off: bool,
+}
+
+impl Mapped {
+    /// The candidate with its score weighed by how plausible a person it makes.
+    fn weighed(&self, rig: &CameraRig) -> Candidate {
+        let mount = &rig.geometry().mount;
+        let stature = self
+            .footprint
+            .extremities()
+            .and_then(|extremities| extremities.stature(mount));
+        Candidate {
+            score: self.candidate.score * worth(self.cut_off, stature, mount),
+            ..self.candidate
+        }
+    }
 }
 
 /// Maps the boxes of every view to the frame and merges them into persons.
@@ -37,7 +55,11 @@ pub(super) fn persons(
         .flat_map(|(view, detections)| detections.iter().map(move |found| (view, found)))
         .filter_map(|(view, found)| map(view, found, rig, input, back_projection))
         .collect();
-    let candidates: Vec<Candidate> = mapped.iter().map(|one| one.candidate).collect();
+    // Suppression compares what the detector said; fusion weighs it.
+    let candidates: Vec<Candidate> = match parameters.refinement {
+        Refinement::Fusion => mapped.iter().map(|one| one.weighed(rig)).collect(),
+        _ => mapped.iter().map(|one| one.candidate).collect(),
+    };
     refine(&candidates, parameters)
         .into_iter()
         .filter_map(|merged| {
@@ -62,20 +84,18 @@ fn map(
     let bbox = BBox::new(footprint.bounds()).ok()?;
     #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
     let expected_views = rig.views_holding(&footprint).max(1) as f64;
+    let cut_off = touches_border(&found.bbox, input);
     let candidate = Candidate {
         bbox,
         score: found.score,
         view,
-        coordinate_weight: if touches_border(&found.bbox, input) {
-            BORDER_WEIGHT
-        } else {
-            1.0
-        },
+        coordinate_weight: if cut_off { BORDER_WEIGHT } else { 1.0 },
         expected_views,
     };
     Some(Mapped {
         candidate,
         footprint,
+        cut_off,
     })
 }
 
@@ -98,7 +118,7 @@ fn person(
     let center = nalgebra::Point2::from(bbox.center());
     let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
     let outlines = members.iter().map(|member| {
-        let weight = member.candidate.score.powi(2) * member.candidate.coordinate_weight;
+        let weight = member.candidate.score.powi(3) * member.candidate.coordinate_weight;
         // A score of 0 is allowed; its outline still has to count for something.
         (weight.max(f64::MIN_POSITIVE), member.footprint.outline())
     });

@@ -19,7 +19,7 @@ const DEFAULT_MAX_DETECTIONS: usize = 1_000;
 /// N_t of hard NMS and linear Soft-NMS (Seidel et al., section IV: "IoU > 0.5").
 const DEFAULT_SUPPRESSION_IOU: f64 = 0.5;
 /// Boxes that overlap at least this much are fused.
-const DEFAULT_FUSION_IOU: f64 = 0.4;
+const DEFAULT_FUSION_IOU: f64 = 0.5;
 /// σ of Gaussian Soft-NMS; the paper does not state its best value.
 const DEFAULT_SIGMA: f64 = 0.3;
 

@@ -15,10 +15,10 @@ pub enum Profile {
     Paper,
     /// 13 wide views.
     Fast,
-    /// 24 views.
+    /// 24 views, wide near the nadir and narrow at the rim.
     #[default]
     Balanced,
-    /// 52 narrow views.
+    /// 56 views with more overlap at every distance.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -59,8 +59,8 @@ impl Profile {
         match self {
             Self::Paper => Some(ViewPlan::paper(paper_reading)),
             Self::Fast => Some(ViewPlan::thirteen_wide()),
-            Self::Balanced => Some(ViewPlan::twenty_four()),
-            Self::Quality => Some(ViewPlan::fifty_two()),
+            Self::Balanced => Some(ViewPlan::balanced()),
+            Self::Quality => Some(ViewPlan::quality()),
             Self::Direct => None,
         }
     }

@@ -36,13 +36,16 @@ fn assert_close(actual: f64, expected: f64) {
 }
 
 #[test]
-fn a_fused_box_is_the_mean_weighted_by_squared_score() {
+fn a_fused_box_is_the_mean_weighted_by_cubed_score() {
     let fused = fuse(
         &[candidate(PERSON, 0.8, 0), candidate(SHIFTED, 0.4, 1)],
         0.4,
     );
     assert_eq!(fused.len(), 1);
-    assert_close(fused[0].bbox.x_min(), (100.0 * 0.64 + 110.0 * 0.16) / 0.8);
+    assert_close(
+        fused[0].bbox.x_min(),
+        (100.0 * 0.512 + 110.0 * 0.064) / 0.576,
+    );
     assert_close(fused[0].bbox.y_max(), 200.0);
     assert_close(fused[0].score, 0.8);
     assert_eq!(fused[0].members, [0, 1]);
@@ -65,12 +68,14 @@ fn a_box_cut_off_by_its_view_hardly_moves_the_mean_but_counts_as_a_witness() {
 }
 
 #[test]
-fn a_person_seen_in_one_of_four_expected_views_keeps_half_its_score() {
-    let lonely = Candidate {
-        expected_views: 4.0,
+fn missing_witnesses_count_as_zero_up_to_three_of_those_expected() {
+    let lonely = |expected_views| Candidate {
+        expected_views,
         ..candidate(PERSON, 0.9, 0)
     };
-    assert_close(fuse(&[lonely], 0.4)[0].score, 0.45);
+    assert_close(fuse(&[lonely(1.0)], 0.4)[0].score, 0.9);
+    assert_close(fuse(&[lonely(2.0)], 0.4)[0].score, 0.45);
+    assert_close(fuse(&[lonely(40.0)], 0.4)[0].score, 0.3);
 }
 
 #[test]
@@ -87,31 +92,50 @@ fn a_view_that_reports_a_person_twice_is_one_witness() {
         expecting_two(PERSON, 0.9, 3),
         expecting_two(SHIFTED, 0.8, 4),
     ];
-    assert_close(fuse(&same_view, 0.4)[0].score, 0.9 * 0.5_f64.sqrt());
-    assert_close(fuse(&two_views, 0.4)[0].score, 0.9);
+    assert_close(fuse(&same_view, 0.4)[0].score, 0.45);
+    assert_close(fuse(&two_views, 0.4)[0].score, 0.85);
 }
 
 #[test]
-fn more_witnesses_than_expected_do_not_raise_a_score() {
-    let crowd: Vec<_> = (0..5).map(|view| candidate(PERSON, 0.7, view)).collect();
+fn more_witnesses_than_expected_neither_raise_nor_lower_a_score() {
+    let crowd: Vec<_> = [0.7, 0.6, 0.5, 0.4, 0.3]
+        .into_iter()
+        .enumerate()
+        .map(|(view, score)| candidate(PERSON, score, view))
+        .collect();
     assert_close(fuse(&crowd, 0.4)[0].score, 0.7);
 }
 
 #[test]
 fn expected_views_are_averaged_like_the_coordinates() {
-    let sure = Candidate {
-        expected_views: 5.0,
-        ..candidate(PERSON, 0.8, 0)
+    let expecting = |expected_views, score, view| Candidate {
+        expected_views,
+        ..candidate(PERSON, score, view)
     };
-    let faint = Candidate {
-        expected_views: 10.0,
-        ..candidate(PERSON, 0.4, 1)
-    };
-    let expected: f64 = (5.0 * 0.64 + 10.0 * 0.16) / 0.8;
-    assert_close(
-        fuse(&[sure, faint], 0.4)[0].score,
-        0.8 * (2.0 / expected).sqrt(),
+    // (1 · 0.512 + 3 · 0.064) / 0.576 = 1.22: one witness is enough.
+    let fused = fuse(&[expecting(1.0, 0.8, 0), expecting(3.0, 0.4, 1)], 0.4);
+    assert_close(fused[0].score, 0.8);
+    // (3 · 0.512 + 1 · 0.064) / 0.576 = 2.78: three are wanted, one is missing.
+    let fused = fuse(&[expecting(3.0, 0.8, 0), expecting(1.0, 0.4, 1)], 0.4);
+    assert_close(fused[0].score, 0.4);
+}
+
+#[test]
+fn a_box_within_a_better_one_is_doubted_and_one_beside_it_is_not() {
+    let legs = [100.0, 170.0, 150.0, 200.0];
+    let beside = [160.0, 100.0, 210.0, 200.0];
+    let fused = fuse(
+        &[
+            candidate(PERSON, 0.9, 0),
+            candidate(legs, 0.8, 1),
+            candidate(beside, 0.7, 2),
+        ],
+        0.4,
     );
+    let scores: Vec<f64> = fused.iter().map(|detection| detection.score).collect();
+    assert_close(scores[0], 0.9);
+    assert_close(scores[1], 0.7);
+    assert_close(scores[2], 0.4);
 }
 
 #[test]
@@ -128,11 +152,11 @@ fn boxes_below_the_score_threshold_are_still_witnesses() {
         ..candidate(PERSON, score, view)
     };
     let fused = refine(
-        &[expecting_two(0.35, 0), expecting_two(0.1, 1)],
+        &[expecting_two(0.55, 0), expecting_two(0.1, 1)],
         &parameters,
     );
     assert_eq!(fused.len(), 1);
-    assert_close(fused[0].score, 0.35);
+    assert_close(fused[0].score, 0.325);
 }
 
 #[test]

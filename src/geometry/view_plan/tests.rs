@@ -24,8 +24,8 @@ fn the_three_readings_of_the_field_of_view_are_53_39_and_90_degrees() {
 fn the_rings_of_a_plan_reach_the_rim_of_a_180_degree_lens() {
     for (plan, count) in [
         (ViewPlan::thirteen_wide(), 13),
-        (ViewPlan::twenty_four(), 24),
-        (ViewPlan::fifty_two(), 52),
+        (ViewPlan::balanced(), 24),
+        (ViewPlan::quality(), 56),
     ] {
         let views = plan.views(&Mount::default(), 301, 301);
         assert_eq!(views.len(), count);

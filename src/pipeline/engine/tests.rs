@@ -198,7 +198,6 @@ fn other_refinements_of_an_observed_frame_need_no_network() {
         &observation,
         &parameters(crate::detection::Refinement::SoftNmsGaussian),
     );
-    assert_eq!(fused.len(), 1);
     assert!(fused[0].views > 1, "several views see the blob");
     assert!(
         soft.iter().all(|person| person.views == 1),
