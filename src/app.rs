@@ -1,6 +1,8 @@
 //! Where everything is put together: settings → engine → workers → service.
 
-use std::{net::SocketAddr, num::NonZeroUsize, sync::Arc};
+mod models;
+
+use std::{net::SocketAddr, sync::Arc};
 
 use anyhow::Context;
 use axum::serve::ListenerExt;
@@ -10,30 +12,27 @@ use crate::{
     api::{self, ApiOptions, ApiState, Phase, Readiness},
     calibration::CalibrationFolder,
     imaging::decode::DecodeLimits,
-    inference::{OnnxDetector, OnnxOptions},
+    inference::{ModelRepository, ModelWatcher},
     metrics::Metrics,
-    pipeline::{Engine, EngineOptions, ModelUsed, WorkerPool},
+    pipeline::{DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     settings::Settings,
     shutdown::Shutdown,
 };
 
-/// The next frame is decoded while the network works on the current one.
-const WORKERS: NonZeroUsize = NonZeroUsize::new(2).unwrap();
+/// An engine and the models it looks with.
+pub struct Assembly {
+    /// The engine.
+    pub engine: Engine,
+    /// Its models.
+    pub models: Arc<ModelRepository>,
+}
 
-/// The engine that the settings describe: loads ONNX Runtime and the model.
+/// The engine that the settings describe, with no model loaded yet.
 ///
 /// # Errors
 /// One sentence that names the setting: a file that is missing or cannot be used.
-pub fn build_engine(settings: &Settings) -> anyhow::Result<Engine> {
-    let inference = &settings.inference;
-    let library = inference.find_library()?;
-    let model = settings.model.find()?;
-    let options = OnnxOptions {
-        threads: inference.threads,
-        score_floor: inference.score_floor,
-        max_detections_per_view: inference.max_detections_per_view.get(),
-    };
-    let detector = OnnxDetector::load(&library, &model, options)?;
+pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
+    let (models, default_models) = models::open(settings)?;
     let limits = &settings.limits;
     let options = EngineOptions {
         decode_limits: DecodeLimits {
@@ -42,20 +41,41 @@ pub fn build_engine(settings: &Settings) -> anyhow::Result<Engine> {
             max_pixels: limits.max_image_pixels,
             max_alloc_bytes: limits.max_decode_bytes,
         },
-        max_batch_views: inference.max_batch_views,
+        default_models,
+        max_batch_views: settings.inference.max_batch_views,
+        remap_threads: settings.threads.remapping,
         paper_field_of_view: settings.paper.field_of_view,
         rig_cache_bytes: settings.calibrations.cache_bytes,
     };
-    Ok(Engine::new(
-        Box::new(detector),
-        open_calibrations(settings)?,
-        options,
-    ))
+    let calibrations = open_calibrations(settings)?;
+    let engine = Engine::new(Arc::clone(models.registry()), calibrations, options)
+        .context("the operating system gives no threads")?;
+    let models = Arc::new(models);
+    Ok(Assembly { engine, models })
+}
+
+/// The engine that the settings describe, with the models that requests with any of these
+/// parameters need.
+///
+/// # Errors
+/// One sentence that names the setting: a file that is missing or cannot be used.
+pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow::Result<Engine> {
+    let Assembly { engine, models } = assemble(settings)?;
+    for request in requests {
+        let default = || engine.default_models().of(request.profile);
+        let name = request.model.as_deref().unwrap_or_else(default);
+        if models.registry().get(name).is_none() {
+            models.load(name)?;
+        }
+    }
+    Ok(engine)
 }
 
 /// A running service without its socket.
 pub struct App {
-    engine: Arc<Engine>,
+    /// Names of the models to load, the one that readiness waits for first.
+    to_load: Vec<String>,
+    models: Arc<ModelRepository>,
     workers: Arc<WorkerPool>,
     readiness: Readiness,
     state: ApiState,
@@ -63,14 +83,18 @@ pub struct App {
 }
 
 impl App {
-    /// Starts the workers. The network is still cold: [`App::serve`] warms it up.
+    /// Starts the workers. No model is loaded yet: [`App::serve`] does that.
     ///
     /// # Errors
     /// When the operating system gives no thread.
-    pub fn start(engine: Engine, settings: Settings) -> anyhow::Result<Self> {
-        let engine = Arc::new(engine);
-        let capacity = settings.limits.max_frames_in_flight;
-        let workers = WorkerPool::start(&engine, WORKERS, capacity)
+    pub fn start(assembly: Assembly, settings: Settings) -> anyhow::Result<Self> {
+        let Assembly { engine, models } = assembly;
+        let to_load = models_to_load(engine.default_models(), &settings.model.also_load);
+        let (workers, capacity) = (
+            settings.threads.frame_workers,
+            settings.limits.max_frames_in_flight,
+        );
+        let workers = WorkerPool::start(&Arc::new(engine), workers, capacity)
             .context("the operating system gives no thread for a worker")?;
         let workers = Arc::new(workers);
         let metrics = Metrics::new()?;
@@ -83,15 +107,19 @@ impl App {
             max_body_bytes: settings.server.max_body_bytes,
             max_upload_bytes: settings.limits.max_upload_bytes,
             request_timeout: settings.server.request_timeout,
+            // Nobody else reaches a server that listens to its own machine only.
+            administration: settings.server.listen.ip().is_loopback(),
         };
         let state = ApiState::new(
             Arc::clone(&workers),
+            Arc::clone(&models),
             Arc::new(metrics),
             readiness.clone(),
             options,
         );
         Ok(Self {
-            engine,
+            to_load,
+            models,
             workers,
             readiness,
             state,
@@ -110,10 +138,16 @@ impl App {
     /// request to stop ends that, too.
     ///
     /// # Errors
-    /// When the network cannot run or the socket fails.
+    /// When a model cannot be loaded or the socket fails.
     pub async fn serve(self, listener: TcpListener, shutdown: Shutdown) -> anyhow::Result<()> {
         let address = listener.local_addr()?;
-        log_start(&self.settings, self.engine.model(), address);
+        log_start(&self.settings, address);
+        let poll_seconds = self.settings.model.poll_seconds;
+        let watcher = poll_seconds.map(|seconds| {
+            ModelWatcher::start(Arc::clone(&self.models), seconds)
+                .context("the operating system gives no thread for the model watcher")
+        });
+        let _watcher = watcher.transpose()?;
         let stop = shutdown.clone();
         let readiness = self.readiness.clone();
         let stopping = async move {
@@ -127,9 +161,9 @@ impl App {
         });
         let connections = axum::serve(listener, api::router(self.state.clone()));
         let connections = connections.with_graceful_shutdown(stopping);
-        // Both must end: the process must not exit while the network still warms up.
+        // Both must end: the process must not exit while a model is still being loaded.
         let finished = async {
-            tokio::try_join!(self.warm_up(address), async { Ok(connections.await?) })?;
+            tokio::try_join!(self.load_models(address), async { Ok(connections.await?) })?;
             anyhow::Ok(())
         };
         let patience = self.settings.server.request_timeout;
@@ -155,17 +189,35 @@ impl App {
         Ok(())
     }
 
-    /// Runs the network once.
-    async fn warm_up(&self, address: SocketAddr) -> anyhow::Result<()> {
-        let engine = Arc::clone(&self.engine);
-        spawn_blocking(move || engine.warm_up()).await??;
-        self.readiness.warmed_up();
-        if self.readiness.phase() == Phase::Ready {
-            let port = address.port();
-            tracing::info!("ready: try curl -F img=@samples/office.jpg localhost:{port}/detect");
+    /// Loads the models. The server is ready when it has the first.
+    async fn load_models(&self, address: SocketAddr) -> anyhow::Result<()> {
+        for name in self.to_load.clone() {
+            let models = Arc::clone(&self.models);
+            spawn_blocking(move || models.load(&name)).await??;
+            if self.readiness.phase() == Phase::WarmingUp {
+                self.readiness.warmed_up();
+                let port = address.port();
+                tracing::info!(
+                    "ready: try curl -F img=@samples/office.jpg localhost:{port}/detect"
+                );
+            }
         }
         Ok(())
     }
+}
+
+fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
+    let mut names: Vec<_> = defaults
+        .names()
+        .into_iter()
+        .map(ToOwned::to_owned)
+        .collect();
+    for name in also {
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
+    }
+    names
 }
 
 fn open_calibrations(settings: &Settings) -> anyhow::Result<Option<CalibrationFolder>> {
@@ -175,12 +227,12 @@ fn open_calibrations(settings: &Settings) -> anyhow::Result<Option<CalibrationFo
 }
 
 /// Says what runs, and where.
-fn log_start(settings: &Settings, model: &ModelUsed, address: SocketAddr) {
+fn log_start(settings: &Settings, address: SocketAddr) {
     tracing::info!(
         version = env!("CARGO_PKG_VERSION"),
-        model = model.name,
-        revision = model.revision,
-        threads = settings.inference.threads,
+        device = %settings.inference.device,
+        network_threads = settings.threads.network,
+        remap_threads = settings.threads.remapping,
         calibrations = %settings.calibrations.path.display(),
         "listening on http://{address}, API page at http://{address}/docs"
     );

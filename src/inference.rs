@@ -1,9 +1,23 @@
 //! Person detectors: views in, boxes with scores out.
 
 mod detector;
+mod device;
+pub mod heads;
 mod manifest;
+mod model;
 mod onnx;
+mod onnx_file;
+mod registry;
+mod repository;
 
 pub use detector::{Detector, InferenceError, ViewDetection};
-pub use manifest::ModelManifest;
-pub use onnx::{OnnxDetector, OnnxOptions};
+pub use device::{Device, UnknownDevice};
+pub use heads::HeadOutput;
+pub use manifest::{Layout, ManifestInput, ModelManifest};
+pub use model::Model;
+pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor};
+pub use registry::{ModelRegistry, RegistryFull};
+pub use repository::{
+    DetectorLoader, LoadCounts, ModelRepository, ModelWatcher, RepositoryError, RepositoryOptions,
+    RepositoryRow, is_fetched,
+};

@@ -3,6 +3,11 @@
 
 mod kind;
 
+use std::{
+    collections::BTreeSet,
+    sync::{Mutex, PoisonError},
+};
+
 use prometheus::{
     Encoder, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Registry, TextEncoder,
 };
@@ -15,6 +20,7 @@ macro_rules! metrics {
         /// The metrics of one server.
         pub struct Metrics {
             registry: Registry,
+            shown_models: Mutex<BTreeSet<(String, String)>>,
             $($(#[doc = $help])+ pub $field: $kind,)+
         }
 
@@ -30,7 +36,7 @@ macro_rules! metrics {
                     let $field = <$kind as Kind>::create($name, help, &[$($label),*])?;
                     registry.register(Box::new($field.clone()))?;
                 )+
-                Ok(Self { registry, $($field,)+ })
+                Ok(Self { registry, shown_models: Mutex::default(), $($field,)+ })
             }
         }
     };
@@ -55,17 +61,49 @@ metrics! {
     views: IntCounter = "views_total" [];
     /// Runs of the network for frames that got a report.
     batches: IntCounter = "batches_total" [];
+    /// Candidates of the network dropped because a number of theirs was not finite.
+    non_finite: IntCounter = "non_finite_candidates_total" [];
     /// Persons reported.
     persons: IntCounter = "persons_total" [];
     /// Requests that were answered with a problem, by its kind.
     failures: IntCounterVec = "request_failures_total" ["reason"];
     /// Frames that wait for a worker or are worked on.
     pending_frames: IntGauge = "pending_frames" [];
+    /// Always 1; says which models answer.
+    model_info: IntGaugeVec = "model_info" ["model", "revision"];
+    /// Models loaded, and models that were refused when they were to be.
+    model_loads: IntCounterVec = "model_loads_total" ["result"];
     /// Always 1; says which version runs.
     build_info: IntGaugeVec = "build_info" ["version"];
 }
 
 impl Metrics {
+    /// Shows these models, each by name and revision, and no others, and how many loads came out
+    /// how since the start.
+    pub fn show_models(&self, models: &[(&str, &str)], loads: &[(&str, u64)]) {
+        let mut shown = self
+            .shown_models
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        shown.retain(|(name, revision)| {
+            let stays = models.contains(&(name, revision));
+            if !stays {
+                // It was there, so it can be removed.
+                let _ = self.model_info.remove_label_values(&[name, revision]);
+            }
+            stays
+        });
+        for (name, revision) in models {
+            self.model_info.with_label_values(&[name, revision]).set(1);
+            shown.insert(((*name).to_owned(), (*revision).to_owned()));
+        }
+        for (result, count) in loads {
+            // Under the lock, as another scrape would add the same.
+            let counter = self.model_loads.with_label_values(&[result]);
+            counter.inc_by(count.saturating_sub(counter.get()));
+        }
+    }
+
     /// All metrics in the Prometheus text format.
     ///
     /// # Errors
@@ -98,5 +136,24 @@ mod tests {
         let bucket =
             "lookdown_queue_duration_seconds_bucket{model=\"m\",profile=\"fast\",le=\"0.25\"} 1";
         assert!(text.contains(bucket), "{text}");
+    }
+    #[test]
+    fn a_model_that_was_replaced_is_shown_no_more() {
+        let metrics = Metrics::new().unwrap();
+        metrics.show_models(&[("a", "1"), ("b", "1")], &[("success", 2)]);
+        metrics.show_models(&[("a", "2"), ("b", "1")], &[("success", 3)]);
+        let loads = metrics.model_loads.with_label_values(&["success"]);
+        assert_eq!(loads.get(), 3);
+        let text = metrics.render().unwrap();
+        let shown = text
+            .lines()
+            .filter(|line| line.starts_with("lookdown_model_info"));
+        assert_eq!(
+            shown.collect::<Vec<_>>(),
+            [
+                "lookdown_model_info{model=\"a\",revision=\"2\"} 1",
+                "lookdown_model_info{model=\"b\",revision=\"1\"} 1",
+            ]
+        );
     }
 }

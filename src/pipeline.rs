@@ -1,6 +1,7 @@
 //! From the bytes of a frame to a report of the persons in it.
 
 mod camera_rig;
+mod default_models;
 mod engine;
 mod error;
 mod job;
@@ -14,6 +15,7 @@ mod rig_cache;
 mod test_support;
 mod worker_pool;
 
+pub use default_models::DefaultModels;
 pub use engine::{Engine, EngineOptions, Observation};
 pub use error::PipelineError;
 pub use job::{DetectJob, Detected};

@@ -4,21 +4,26 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-/// Bytes of the hash that are shown: enough to tell the versions of one thing apart.
-const SHOWN_BYTES: usize = 6;
+/// Digits of the hash that are shown: enough to tell the versions of one thing apart.
+const SHOWN_DIGITS: usize = 12;
+
+/// The SHA-256 of `content`, hexadecimal.
+#[must_use]
+pub fn sha256_of(content: &[u8]) -> String {
+    let digest = Sha256::digest(content);
+    digest.iter().fold(String::new(), |mut digits, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(digits, "{byte:02x}");
+        digits
+    })
+}
 
 /// The revision of `content`: twelve hexadecimal digits that change whenever the content does.
 #[must_use]
 pub fn revision_of(content: &[u8]) -> String {
-    let digest = Sha256::digest(content);
-    digest
-        .iter()
-        .take(SHOWN_BYTES)
-        .fold(String::new(), |mut digits, byte| {
-            // Writing to a string cannot fail.
-            let _ = write!(digits, "{byte:02x}");
-            digits
-        })
+    let mut digits = sha256_of(content);
+    digits.truncate(SHOWN_DIGITS);
+    digits
 }
 
 #[cfg(test)]

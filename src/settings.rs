@@ -9,14 +9,21 @@ mod error;
 mod locate;
 mod raw;
 mod source;
+mod threads;
 
-use std::{net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration};
+use std::{
+    net::SocketAddr,
+    num::{NonZeroU64, NonZeroUsize},
+    path::PathBuf,
+    time::Duration,
+};
 
 pub use error::SettingsError;
 pub use raw::RawSettings;
 pub use source::{environment, load};
+pub use threads::ThreadPlan;
 
-use crate::geometry::FieldOfViewReading;
+use crate::{geometry::FieldOfViewReading, inference::Device};
 
 /// Everything the operator may choose, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,10 +32,12 @@ pub struct Settings {
     pub server: ServerSettings,
     /// Where calibrations come from.
     pub calibrations: CalibrationSettings,
-    /// Which detector answers.
+    /// Which detectors answer.
     pub model: ModelSettings,
     /// How the detector is run.
     pub inference: InferenceSettings,
+    /// How the cores are shared.
+    pub threads: ThreadPlan,
     /// What one frame, and all frames together, may cost.
     pub limits: LimitSettings,
     /// How the paper is read where it can be read in several ways.
@@ -57,11 +66,17 @@ pub struct CalibrationSettings {
     pub cache_bytes: usize,
 }
 
-/// Which detector answers.
+/// Which detectors answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSettings {
-    /// Model folder.
-    pub path: PathBuf,
+    /// The one model for all profiles; without it each profile has its own.
+    pub path: Option<PathBuf>,
+    /// Folder of model folders.
+    pub repository: PathBuf,
+    /// Models of the repository to load at the start beside those of the profiles.
+    pub also_load: Vec<String>,
+    /// How often the files of loaded models are looked at, seconds; `None` for never.
+    pub poll_seconds: Option<NonZeroU64>,
 }
 
 /// How the detector is run.
@@ -69,8 +84,8 @@ pub struct ModelSettings {
 pub struct InferenceSettings {
     /// The ONNX Runtime library.
     pub library_path: PathBuf,
-    /// Threads of the network.
-    pub threads: NonZeroUsize,
+    /// What networks run on.
+    pub device: Device,
     /// Most views in one run of the network.
     pub max_batch_views: NonZeroUsize,
     /// Candidates below this score are dropped before anything else looks at them, 0 to 1.

@@ -17,7 +17,7 @@ const MAY_USE: [(&str, &[&str]); 15] = [
     ("imaging", &["geometry"]),
     ("calibration", &["geometry", "revision"]),
     ("inference", &["detection", "imaging", "revision"]),
-    ("settings", &["geometry"]),
+    ("settings", &["geometry", "inference"]),
     ("telemetry", &["settings"]),
     (
         "pipeline",

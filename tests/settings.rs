@@ -42,7 +42,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 19, "a key is missing from {example}");
+    assert_eq!(stated.count(), 23, "a key is missing from {example}");
 }
 
 #[test]
@@ -73,9 +73,9 @@ fn every_kind_of_value_can_be_given_in_the_environment() {
         ]),
     )
     .unwrap();
-    assert_eq!(settings.inference.threads.get(), 3);
+    assert_eq!(settings.threads.network.get(), 3);
     assert!((settings.inference.score_floor - 0.25).abs() < f64::EPSILON);
-    assert_eq!(settings.model.path, Path::new("123"));
+    assert_eq!(settings.model.path.as_deref(), Some(Path::new("123")));
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn a_variable_set_to_nothing_counts_as_not_set() {
 
 #[test]
 fn without_a_number_of_threads_the_machine_decides() {
-    let threads = defaults().inference.threads;
+    let threads = defaults().threads.network;
     assert_eq!(threads, std::thread::available_parallelism().unwrap());
 }
 
@@ -120,95 +120,110 @@ fn an_unknown_key_is_refused_by_name() {
     );
 }
 
+/// Variable, value, and what the refusal has to say: the key and a remedy.
+const UNUSABLE: [(&str, &str, &str, &str); 17] = [
+    (
+        "SERVER__LISTEN",
+        "localhost",
+        "server.listen",
+        "127.0.0.1:8080",
+    ),
+    (
+        "SERVER__MAX_BODY_BYTES",
+        "12",
+        "server.max_body_bytes",
+        "from 1024",
+    ),
+    (
+        "SERVER__MAX_BODY_BYTES",
+        "many",
+        "server.max_body_bytes",
+        "integer",
+    ),
+    (
+        "SERVER__MAX_BODY_BYTES",
+        "-1",
+        "server.max_body_bytes",
+        "integer",
+    ),
+    (
+        "SERVER__REQUEST_TIMEOUT_MILLIS",
+        "0",
+        "server.request_timeout_millis",
+        "from 1",
+    ),
+    (
+        "INFERENCE__THREADS",
+        "100000",
+        "inference.threads",
+        "from 0 to",
+    ),
+    (
+        "INFERENCE__SCORE_FLOOR",
+        "2",
+        "inference.score_floor",
+        "from 0 to 1",
+    ),
+    (
+        "INFERENCE__SCORE_FLOOR",
+        "NaN",
+        "inference.score_floor",
+        "from 0 to 1",
+    ),
+    (
+        "INFERENCE__DEVICE",
+        "gpu",
+        "inference.device",
+        "cpu, cuda:N or tensorrt:N",
+    ),
+    (
+        "MODEL__POLL_SECONDS",
+        "100000",
+        "model.poll_seconds",
+        "from 0 to",
+    ),
+    (
+        "INFERENCE__MAX_BATCH_VIEWS",
+        "0",
+        "inference.max_batch_views",
+        "from 1",
+    ),
+    (
+        "LIMITS__MAX_IMAGE_SIDE",
+        "65536",
+        "limits.max_image_side",
+        "65535",
+    ),
+    (
+        "LIMITS__MAX_FRAMES_IN_FLIGHT",
+        "0",
+        "limits.max_frames_in_flight",
+        "from 1",
+    ),
+    (
+        "LIMITS__MAX_UPLOAD_BYTES",
+        "1024",
+        "limits.max_upload_bytes",
+        "33554432",
+    ),
+    (
+        "PAPER__FIELD_OF_VIEW",
+        "wide",
+        "paper.field_of_view",
+        "horizontal, diagonal, literal",
+    ),
+    ("LOG__FORMAT", "xml", "log.format", "text, json"),
+    (
+        "LOG__FILTER",
+        "lookdown=loud",
+        "log.filter",
+        "lookdown=debug",
+    ),
+];
+
 #[test]
 fn a_value_that_cannot_be_used_is_refused_with_key_value_and_remedy() {
-    for (variable, value, key, remedy) in [
-        (
-            "SERVER__LISTEN",
-            "localhost",
-            "server.listen",
-            "127.0.0.1:8080",
-        ),
-        (
-            "SERVER__MAX_BODY_BYTES",
-            "12",
-            "server.max_body_bytes",
-            "from 1024",
-        ),
-        (
-            "SERVER__MAX_BODY_BYTES",
-            "many",
-            "server.max_body_bytes",
-            "integer",
-        ),
-        (
-            "SERVER__MAX_BODY_BYTES",
-            "-1",
-            "server.max_body_bytes",
-            "integer",
-        ),
-        (
-            "SERVER__REQUEST_TIMEOUT_MILLIS",
-            "0",
-            "server.request_timeout_millis",
-            "from 1",
-        ),
-        (
-            "INFERENCE__THREADS",
-            "100000",
-            "inference.threads",
-            "from 0 to",
-        ),
-        (
-            "INFERENCE__SCORE_FLOOR",
-            "2",
-            "inference.score_floor",
-            "from 0 to 1",
-        ),
-        (
-            "INFERENCE__SCORE_FLOOR",
-            "NaN",
-            "inference.score_floor",
-            "from 0 to 1",
-        ),
-        (
-            "INFERENCE__MAX_BATCH_VIEWS",
-            "0",
-            "inference.max_batch_views",
-            "from 1",
-        ),
-        (
-            "LIMITS__MAX_IMAGE_SIDE",
-            "65536",
-            "limits.max_image_side",
-            "65535",
-        ),
-        (
-            "LIMITS__MAX_FRAMES_IN_FLIGHT",
-            "0",
-            "limits.max_frames_in_flight",
-            "from 1",
-        ),
-        (
-            "LIMITS__MAX_UPLOAD_BYTES",
-            "1024",
-            "limits.max_upload_bytes",
-            "33554432",
-        ),
-        (
-            "PAPER__FIELD_OF_VIEW",
-            "wide",
-            "paper.field_of_view",
-            "horizontal, diagonal, literal",
-        ),
-        ("LOG__FORMAT", "xml", "log.format", "text, json"),
-        (
-            "LOG__FILTER",
-            "lookdown=loud",
-            "log.filter",
-            "lookdown=debug",
-        ),
-    ] {
+    for (variable, value, key, remedy) in UNUSABLE {
         let message = refusal(from_environment(&format!("LOOKDOWN__{variable}"), value));
         for part in [key, value, remedy] {
             assert!(message.contains(part), "{message:?} does not say {part:?}");
@@ -236,6 +251,7 @@ fn a_file_that_is_not_there_is_refused_by_name() {
 fn a_path_somebody_chose_must_exist() {
     let calibrations = from_environment("LOOKDOWN__CALIBRATIONS__PATH", "no/such/folder").unwrap();
     let model = from_environment("LOOKDOWN__MODEL__PATH", "no/such/model").unwrap();
+    let repository = from_environment("LOOKDOWN__MODEL__REPOSITORY", "no/such/models").unwrap();
     let library = from_environment("LOOKDOWN__INFERENCE__LIBRARY_PATH", "no/such.so").unwrap();
     for (refused, parts) in [
         (
@@ -247,8 +263,12 @@ fn a_path_somebody_chose_must_exist() {
             ],
         ),
         (
-            model.model.find().unwrap_err(),
-            ["model.path", "no/such/model", "make setup"],
+            model.model.find_one().unwrap_err(),
+            ["model.path", "no/such/model", "LOOKDOWN__MODEL__PATH"],
+        ),
+        (
+            repository.model.find_repository().unwrap_err(),
+            ["model.repository", "no/such/models", "make setup"],
         ),
         (
             library.inference.find_library().unwrap_err(),
@@ -274,10 +294,7 @@ fn a_path_somebody_chose_must_exist() {
 #[test]
 fn what_belongs_to_the_executable_is_found_from_anywhere() {
     let folders = fs::canonicalize(env!("CARGO_MANIFEST_DIR")).unwrap();
-    // The model's folder is checked in, and this test's executable lies below it.
-    let found = defaults().model.find().unwrap();
-    assert_eq!(
-        fs::canonicalize(found).unwrap(),
-        folders.join("models/ssdlite_mobilenet_v2")
-    );
+    // The models' folder is checked in, and this test's executable lies below it.
+    let found = defaults().model.find_repository().unwrap();
+    assert_eq!(fs::canonicalize(found).unwrap(), folders.join("models"));
 }

@@ -1,1 +1,1 @@
-"""Fetches ONNX Runtime and the default model: pinned, checked, resumable, all of it inside the repository."""
+"""Fetches ONNX Runtime and the models: pinned, checked, resumable, all of it inside the repository."""

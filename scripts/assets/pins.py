@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 from .console import SetupError
 
 SHA256 = re.compile(r"[0-9a-f]{64}")
+REGISTRIES = ("npm", "pypi")
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,6 @@ class Archive:
     file: str
     bytes: int
     sha256: str
-    members: tuple[Member, ...]
 
 
 @dataclass(frozen=True)
@@ -36,18 +36,28 @@ class Runtime:
     """ONNX Runtime for one kind of CPU; platform and Python version choose the wheel."""
 
     archive: Archive
+    members: tuple[Member, ...]
     platform: str
     python_version: str
 
 
 @dataclass(frozen=True)
 class Model:
-    """A model, the module that converts it, and the sum of the ONNX file it gives."""
+    """A model, how it is converted, and the sum of the ONNX file it gives.
+
+    `converter` is a module and what it is told after the names of its source and its result. `registry` is where
+    the archive comes from. `default` models belong to every set-up. `caution` is what a user should know before
+    using the weights, if anything.
+    """
 
     name: str
     archive: Archive
-    converter: str
+    registry: str
+    members: tuple[Member, ...]
+    converter: tuple[str, ...]
     onnx_sha256: str
+    default: bool
+    caution: str | None
 
 
 @dataclass(frozen=True)
@@ -68,6 +78,7 @@ class Pins:
     models: tuple[Model, ...]
     converter: tuple[Requirement, ...]
     node: tuple[Requirement, ...]
+    builder: tuple[Requirement, ...]
 
 
 def read_pins(file: Path) -> Pins:
@@ -77,9 +88,13 @@ def read_pins(file: Path) -> Pins:
         runtime = document["runtime"]
         return Pins(
             runtime={cpu: _runtime(runtime, runtime[cpu]) for cpu in ("x86_64", "aarch64")},
-            models=tuple(_model(name, table) for name, table in document["models"].items()),
+            models=tuple(
+                _model(name, table, document["archives"][table["archive"]])
+                for name, table in document["models"].items()
+            ),
             converter=tuple(_requirement(table) for table in document["converter"]),
             node=tuple(_requirement(table) for table in document["node"]),
+            builder=tuple(_requirement(table) for table in document["builder"]),
         )
     except KeyError as missing:
         raise SetupError(f"{file}: the key {missing} is missing.") from None
@@ -88,12 +103,27 @@ def read_pins(file: Path) -> Pins:
 
 
 def _runtime(common: dict, table: dict) -> Runtime:
-    archive = _archive(common | table)
-    return Runtime(archive, platform=table["platform"], python_version=common["python_version"])
+    return Runtime(
+        archive=_archive(common | table),
+        members=_members(table),
+        platform=table["platform"],
+        python_version=common["python_version"],
+    )
 
 
-def _model(name: str, table: dict) -> Model:
-    return Model(name, _archive(table), table["converter"], _sha256(table["onnx_sha256"]))
+def _model(name: str, table: dict, archive: dict) -> Model:
+    if archive["registry"] not in REGISTRIES:
+        raise ValueError(f"'{archive['registry']}' is not one of the registries {', '.join(REGISTRIES)}")
+    return Model(
+        name=name,
+        archive=_archive(archive),
+        registry=archive["registry"],
+        members=_members(table),
+        converter=tuple(table["converter"]),
+        onnx_sha256=_sha256(table["onnx_sha256"]),
+        default=table.get("default", False),
+        caution=table.get("caution"),
+    )
 
 
 def _archive(table: dict) -> Archive:
@@ -103,10 +133,13 @@ def _archive(table: dict) -> Archive:
         file=_inside(table["file"]),
         bytes=table["bytes"],
         sha256=_sha256(table["sha256"]),
-        members=tuple(
-            Member(member["path"], _sha256(member["sha256"]), _inside(member["to"]) if "to" in member else None)
-            for member in table["members"]
-        ),
+    )
+
+
+def _members(table: dict) -> tuple[Member, ...]:
+    return tuple(
+        Member(member["path"], _sha256(member["sha256"]), _inside(member["to"]) if "to" in member else None)
+        for member in table["members"]
     )
 
 

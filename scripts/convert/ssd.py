@@ -2,8 +2,9 @@
 
 import numpy
 
+from .errors import ConversionError
 from .onnx_builder import OnnxBuilder
-from .tf_graph import ConversionError, TfGraph
+from .tf_graph import TfGraph
 from .translate import Translator
 
 # The network predicts offsets multiplied by these, for the centre and for the logarithm of the size.

@@ -4,9 +4,7 @@ from dataclasses import dataclass
 
 import numpy
 
-
-class ConversionError(Exception):
-    """The source is not what the converter was written for."""
+from .errors import ConversionError
 
 
 @dataclass

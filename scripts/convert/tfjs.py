@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy
 
-from .tf_graph import ConversionError, TfGraph, TfNode
+from .errors import ConversionError
+from .tf_graph import TfGraph, TfNode
 
-ELEMENT_TYPES = {"float32": numpy.float32, "int32": numpy.int32}
+ELEMENT_TYPES = {"float32": numpy.float32, "int32": numpy.int32, "float16": numpy.float16}
 
 
 def read_tfjs(model_json: Path) -> TfGraph:
@@ -35,12 +36,12 @@ def _weights(entries: list[dict], shards: bytes) -> dict[str, numpy.ndarray]:
     tensors = {}
     offset = 0
     for entry in entries:
-        if "quantization" in entry or entry["dtype"] not in ELEMENT_TYPES:
-            raise ConversionError(f"weights stored as {entry} are not read, only plain float32 and int32")
-        count = math.prod(entry["shape"])
-        tensor = numpy.frombuffer(shards, ELEMENT_TYPES[entry["dtype"]], count, offset)
-        tensors[entry["name"]] = tensor.reshape(entry["shape"])
-        offset += tensor.nbytes
+        stored_as = entry.get("quantization", entry)["dtype"]
+        if stored_as not in ELEMENT_TYPES or entry["dtype"] not in ELEMENT_TYPES:
+            raise ConversionError(f"weights stored as {entry} are not read, only float16, float32 and int32")
+        stored = numpy.frombuffer(shards, ELEMENT_TYPES[stored_as], math.prod(entry["shape"]), offset)
+        tensors[entry["name"]] = stored.astype(ELEMENT_TYPES[entry["dtype"]], copy=False).reshape(entry["shape"])
+        offset += stored.nbytes
     if offset != len(shards):
         raise ConversionError(f"the manifest describes {offset} bytes of weights, the shards hold {len(shards)}")
     return tensors
@@ -61,5 +62,7 @@ def _attribute(value: dict):
             return bool(flag)
         case {"list": {"i": numbers}}:
             return [int(number) for number in numbers]
+        case {"list": {"s": texts}}:
+            return [base64.b64decode(text).decode() for text in texts]
         case _:
             return value

@@ -6,25 +6,60 @@ made here is of the second kind, so only weights and constants are ever turned r
 
 import numpy
 
+from .errors import ConversionError
 from .onnx_builder import OnnxBuilder
-from .tf_graph import ConversionError, TfGraph, TfNode
+from .tf_graph import TfGraph, TfNode
+
+# Where a TensorFlow axis of N, height, width, channels lies in N, channels, height, width.
+AXES_CHANNELS_FIRST = (0, 2, 3, 1)
+TO_CHANNELS_LAST = [0, 2, 3, 1]
+TO_CHANNELS_FIRST = [0, 3, 1, 2]
 
 
 class Translator:
     """Adds TensorFlow nodes, and what they depend on, to an ONNX graph; each node once."""
 
-    def __init__(self, graph: TfGraph, builder: OnnxBuilder, feeds: dict[str, str]):
-        """`feeds` says where to stop: TensorFlow node name to the ONNX tensor that takes its place."""
+    def __init__(
+        self,
+        graph: TfGraph,
+        builder: OnnxBuilder,
+        feeds: dict[str, str],
+        *,
+        channels_first_feeds: frozenset[str] = frozenset(),
+        resize_factors: dict[str, float] | None = None,
+    ):
+        """`feeds` says where to stop: TensorFlow node name to the ONNX tensor that takes its place.
+
+        `channels_first_feeds` are those whose TensorFlow node is itself N, channels, height, width, as in graphs
+        that were exported from elsewhere. `resize_factors` says by how much each bilinear resize multiplies height
+        and width; the TensorFlow graph states the resulting sizes, which would fit a single input size.
+        """
         self.graph = graph
         self.builder = builder
         self._tensors = dict(feeds)
+        self._channels_first = set(channels_first_feeds)
+        self._resize_factors = resize_factors or {}
         self._operations = {
             "Conv2D": self._convolution,
+            "_FusedConv2D": self._convolution,
             "DepthwiseConv2dNative": self._depthwise_convolution,
+            "FusedDepthwiseConv2dNative": self._depthwise_convolution,
             "FusedBatchNorm": self._batch_normalisation,
+            "MaxPool": self._max_pool,
+            "Mean": self._mean,
+            "Pad": self._pad,
+            "PadV2": self._pad,
+            "ConcatV2": self._concatenation,
+            "ResizeBilinear": self._resize,
+            "Transpose": self._transpose,
+            "Relu": self._elementwise("Relu"),
+            "Sigmoid": self._elementwise("Sigmoid"),
             "Relu6": self._relu6,
+            "LeakyRelu": self._leaky_relu,
             "Mul": self._arithmetic("Mul"),
+            "Sub": self._arithmetic("Sub"),
             "Add": self._arithmetic("Add"),
+            "AddV2": self._arithmetic("Add"),
             "AddN": self._arithmetic("Add"),
             "BiasAdd": self._arithmetic("Add"),
         }
@@ -36,6 +71,8 @@ class Translator:
             if node.operation not in self._operations:
                 raise ConversionError(f"node '{name}' is a {node.operation}, which has no translation yet")
             self._tensors[name] = self._operations[node.operation](name, node)
+            if node.operation != "Transpose" and not self._channels_first.isdisjoint(node.inputs):
+                self._channels_first.add(name)
         return self._tensors[name]
 
     def _convolution(self, name: str, node: TfNode) -> str:
@@ -51,19 +88,27 @@ class Translator:
         return self._convolve(name, node, turned, groups=channels)
 
     def _convolve(self, name: str, node: TfNode, weights: numpy.ndarray, groups: int) -> str:
-        if node.attributes["padding"] != "SAME":
-            raise ConversionError(f"node '{name}' pads {node.attributes['padding']}, only SAME is translated")
-        return self.builder.node(
+        bias, activation = _fused(name, node)
+        inputs = [self.feature_map(node.inputs[0]), self.builder.constant(weights, f"{name}/weights")]
+        if bias:
+            inputs.append(self.builder.constant(self.graph.constant(node.inputs[2]), f"{name}/bias"))
+        convolved = self.builder.node(
             "Conv",
-            [self.feature_map(node.inputs[0]), self.builder.constant(weights, f"{name}/weights")],
-            name,
+            inputs,
+            f"{name}/convolved" if activation else name,
             kernel_shape=list(weights.shape[2:]),
             strides=node.attributes["strides"][1:3],
-            dilations=node.attributes["dilations"][1:3],
+            dilations=node.attributes.get("dilations", [1, 1, 1, 1])[1:3],
             group=groups,
-            # TensorFlow puts the odd pixel of padding at the lower right.
-            auto_pad="SAME_UPPER",
+            **_padding(name, node),
         )
+        match activation:
+            case None:
+                return convolved
+            case "Relu6":
+                return self.builder.node("Clip", [convolved, *self._zero_and_six(name)], name)
+            case _:
+                return self.builder.node(activation, [convolved], name)
 
     def _batch_normalisation(self, name: str, node: TfNode) -> str:
         parameters = [
@@ -73,9 +118,72 @@ class Translator:
         inputs = [self.feature_map(node.inputs[0]), *parameters]
         return self.builder.node("BatchNormalization", inputs, name, epsilon=node.attributes["epsilon"])
 
+    def _max_pool(self, name: str, node: TfNode) -> str:
+        return self.builder.node(
+            "MaxPool",
+            [self.feature_map(node.inputs[0])],
+            name,
+            kernel_shape=node.attributes["ksize"][1:3],
+            strides=node.attributes["strides"][1:3],
+            **_padding(name, node),
+        )
+
+    def _mean(self, name: str, node: TfNode) -> str:
+        image = self.feature_map(node.inputs[0])
+        axes = [self._axis(node.inputs[0], int(axis)) for axis in self.graph.constant(node.inputs[1])]
+        return self.builder.node("ReduceMean", [image], name, axes=axes, keepdims=int(node.attributes["keep_dims"]))
+
+    def _pad(self, name: str, node: TfNode) -> str:
+        image = self.feature_map(node.inputs[0])
+        pads = numpy.zeros((2, 4), numpy.int64)
+        for axis, before_and_after in enumerate(self.graph.constant(node.inputs[1])):
+            pads[:, self._axis(node.inputs[0], axis)] = before_and_after
+        inputs = [image, self.builder.constant(pads.reshape(-1), f"{name}/pads")]
+        if len(node.inputs) == 3:
+            inputs.append(self.builder.constant(self.graph.constant(node.inputs[2]), f"{name}/value"))
+        return self.builder.node("Pad", inputs, name)
+
+    def _concatenation(self, name: str, node: TfNode) -> str:
+        parts = [self.feature_map(part) for part in node.inputs[:-1]]
+        axis = int(self.graph.constant(node.inputs[-1]))
+        return self.builder.node("Concat", parts, name, axis=self._axis(node.inputs[0], axis))
+
+    def _resize(self, name: str, node: TfNode) -> str:
+        if name not in self._resize_factors or node.attributes.get("align_corners"):
+            raise ConversionError(f"node '{name}' resizes, and no factor was given for it, or it aligns corners")
+        factor = self._resize_factors[name]
+        factors = self.builder.constant(numpy.array([1, 1, factor, factor], numpy.float32), f"{name}/factors")
+        pixels = "half_pixel" if node.attributes.get("half_pixel_centers") else "asymmetric"
+        inputs = [self.feature_map(node.inputs[0]), "", factors]
+        return self.builder.node("Resize", inputs, name, mode="linear", coordinate_transformation_mode=pixels)
+
+    def _transpose(self, name: str, node: TfNode) -> str:
+        """Only the order of TensorFlow's axes changes; the ONNX tensor is channels-first before and after."""
+        image = self.feature_map(node.inputs[0])
+        was_channels_first = node.inputs[0] in self._channels_first
+        order = self.graph.constant(node.inputs[1]).tolist()
+        if order != (TO_CHANNELS_LAST if was_channels_first else TO_CHANNELS_FIRST):
+            raise ConversionError(f"node '{name}' transposes by {order}, which is no change of the channels' place")
+        if not was_channels_first:
+            self._channels_first.add(name)
+        return image
+
     def _relu6(self, name: str, node: TfNode) -> str:
-        limits = [self.builder.constant(0.0, f"{name}/low"), self.builder.constant(6.0, f"{name}/high")]
+        limits = self._zero_and_six(name)
         return self.builder.node("Clip", [self.feature_map(node.inputs[0]), *limits], name)
+
+    def _zero_and_six(self, name: str) -> list[str]:
+        return [self.builder.constant(0.0, f"{name}/low"), self.builder.constant(6.0, f"{name}/high")]
+
+    def _leaky_relu(self, name: str, node: TfNode) -> str:
+        image = self.feature_map(node.inputs[0])
+        return self.builder.node("LeakyRelu", [image], name, alpha=node.attributes["alpha"])
+
+    def _elementwise(self, operation: str):
+        def translate(name: str, node: TfNode) -> str:
+            return self.builder.node(operation, [self.feature_map(node.inputs[0])], name)
+
+        return translate
 
     def _arithmetic(self, operation: str):
         def translate(name: str, node: TfNode) -> str:
@@ -88,3 +196,31 @@ class Translator:
         if name not in self.graph.constants:
             return self.feature_map(name)
         return self.builder.constant(self.graph.constant(name).reshape(1, -1, 1, 1), f"{user}/per_channel")
+
+    def _axis(self, name: str, axis: int) -> int:
+        """Where an axis of a TensorFlow feature map lies in the ONNX tensor."""
+        return axis if name in self._channels_first else AXES_CHANNELS_FIRST[axis]
+
+
+def _padding(name: str, node: TfNode) -> dict:
+    match node.attributes["padding"]:
+        case "SAME":
+            # TensorFlow puts the odd pixel of padding at the lower right.
+            return {"auto_pad": "SAME_UPPER"}
+        case "VALID":
+            return {}
+        case other:
+            raise ConversionError(f"node '{name}' pads {other}, only SAME and VALID are translated")
+
+
+def _fused(name: str, node: TfNode) -> tuple[bool, str | None]:
+    """Whether a convolution adds a bias, and the activation it applies."""
+    match node.attributes.get("fused_ops", []):
+        case []:
+            return False, None
+        case ["BiasAdd"]:
+            return True, None
+        case ["BiasAdd", ("Relu" | "Relu6") as activation]:
+            return True, activation
+        case other:
+            raise ConversionError(f"node '{name}' is fused with {other}, which has no translation yet")

@@ -1,6 +1,7 @@
 """What several tests share: a repository of its own for each test, and small archives to put in it."""
 
 import contextlib
+import dataclasses
 import hashlib
 import io
 import tarfile
@@ -9,7 +10,7 @@ import unittest
 import zipfile
 from pathlib import Path
 
-from assets.pins import Archive, Member
+from assets.pins import Archive, Member, Model
 from assets.places import Places
 
 
@@ -37,7 +38,13 @@ def sha256(content: bytes) -> str:
 
 def archive_of(content: bytes, file: str = "thing-1.0.tgz") -> Archive:
     """The pin of an archive with this content."""
-    return Archive("thing", "1.0", file, len(content), sha256(content), members=())
+    return Archive("thing", "1.0", file, len(content), sha256(content))
+
+
+def model_of(archive: Archive, members: tuple[Member, ...], onnx: bytes, **changes) -> Model:
+    """The pin of a model that comes out of an archive and becomes these bytes."""
+    model = Model("net", archive, "npm", members, ("convert.net",), sha256(onnx), default=True, caution=None)
+    return dataclasses.replace(model, **changes)
 
 
 def wheel(files: dict[str, bytes]) -> bytes:

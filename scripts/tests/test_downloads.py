@@ -20,7 +20,7 @@ class Downloads(InEmptyRepository):
             PIN,
             "model",
             client="npm",
-            command=lambda: [sys.executable, "-c", script],
+            command=lambda folder: [sys.executable, "-c", script],
             environment=dict(os.environ),
         )
 

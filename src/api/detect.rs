@@ -107,6 +107,7 @@ fn record(metrics: &Metrics, report: &DetectionReport) {
     }
     metrics.views.inc_by(report.view_count as u64);
     metrics.batches.inc_by(report.batch_count as u64);
+    metrics.non_finite.inc_by(report.non_finite as u64);
     metrics.persons.inc_by(report.persons.len() as u64);
 }
 

@@ -113,6 +113,19 @@ pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Health>
 pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoResponse, Problem> {
     let pending = i64::try_from(state.workers.pending()).unwrap_or(i64::MAX);
     state.metrics.pending_frames.set(pending);
+    show_models(&state);
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
+}
+
+/// The models as they are at this scrape.
+fn show_models(state: &ApiState) {
+    let models = state.models.registry().all();
+    let rows: Vec<_> = models
+        .iter()
+        .map(|model| (model.name(), model.revision()))
+        .collect();
+    let counts = state.models.load_counts();
+    let loads = [("success", counts.succeeded), ("failure", counts.failed)];
+    state.metrics.show_models(&rows, &loads);
 }

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{Readiness, problem::ProblemKind, upload::UploadBudget};
-use crate::{metrics::Metrics, pipeline::WorkerPool};
+use crate::{inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool};
 
 /// What a request may cost.
 #[derive(Debug, Clone, Copy)]
@@ -14,12 +14,15 @@ pub struct ApiOptions {
     pub max_upload_bytes: usize,
     /// Longest a request may take, from its first byte to its answer.
     pub request_timeout: Duration,
+    /// Whether whoever reaches the server may change which models it has.
+    pub administration: bool,
 }
 
 /// What the handlers share. Clones are cheap.
 #[derive(Clone)]
 pub struct ApiState {
     pub(super) workers: Arc<WorkerPool>,
+    pub(super) models: Arc<ModelRepository>,
     pub(super) metrics: Arc<Metrics>,
     pub(super) readiness: Readiness,
     pub(super) uploads: UploadBudget,
@@ -31,6 +34,7 @@ impl ApiState {
     #[must_use]
     pub fn new(
         workers: Arc<WorkerPool>,
+        models: Arc<ModelRepository>,
         metrics: Arc<Metrics>,
         readiness: Readiness,
         options: ApiOptions,
@@ -41,6 +45,7 @@ impl ApiState {
         }
         Self {
             workers,
+            models,
             metrics,
             readiness,
             uploads: UploadBudget::new(options.max_upload_bytes),

@@ -16,7 +16,7 @@ use jiff::Timestamp;
 use super::{SettingsFile, annotate, parameters::ParameterFlags};
 use crate::{
     api::Report,
-    app::build_engine,
+    app::engine_for,
     calibration::{Calibration, CalibrationId},
     pipeline::{DetectJob, DetectParameters, Detected, Engine},
 };
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let (parameters, calibration) = parameters(arguments)?;
     let settings = arguments.settings_file.load()?;
     let max_bytes = settings.server.max_body_bytes as u64;
-    let engine = build_engine(&settings)?;
+    let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
     let mut code = ExitCode::SUCCESS;
     for image in &arguments.images {
         let found = detect(&engine, image, max_bytes, &parameters, calibration.clone());

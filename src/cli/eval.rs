@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::SettingsFile;
 use crate::{
-    app::build_engine,
+    app::engine_for,
     detection::Refinement,
     evaluation::{DataSet, EvaluatedRow, evaluate},
     pipeline::{DetectParameters, Profile},
@@ -33,6 +33,9 @@ pub(super) struct Arguments {
     /// How overlapping boxes become persons; may be repeated [default: all refinements]
     #[arg(long, value_name = "NAME")]
     refine: Vec<String>,
+    /// Look with this model [default: the profile's]
+    #[arg(long, value_name = "NAME")]
+    model: Option<String>,
     /// Leave out persons with a lower score, 0 to 1
     #[arg(long, value_name = "SCORE", default_value = DEFAULT_SCORE_THRESHOLD)]
     score_threshold: String,
@@ -58,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     let settings = arguments.settings_file.load()?;
     let data_set = DataSet::open(&arguments.data_set)?;
-    let engine = build_engine(&settings)?;
+    let engine = engine_for(&settings, &variants.concat())?;
     let mut out = io::stdout().lock();
     if !arguments.json {
         writeln!(out, "{TABLE_HEAD}").context("standard output cannot be written")?;
@@ -69,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             show_progress(name, done, data_set.images.len());
         })?;
         for row in rows {
-            let row = Row::new(&row, &engine.model().name);
+            let row = Row::new(&row);
             let line = if arguments.json {
                 serde_json::to_string(&row)?
             } else {
@@ -92,6 +95,7 @@ fn variants(arguments: &Arguments, profile: &str) -> anyhow::Result<Vec<DetectPa
         let given = [
             ("profile", Some(profile)),
             ("refine", Some(refinement.as_str())),
+            ("model", arguments.model.as_deref()),
             ("score_threshold", Some(arguments.score_threshold.as_str())),
             ("iou_threshold", arguments.iou_threshold.as_deref()),
             ("sigma", arguments.sigma.as_deref()),
@@ -138,17 +142,19 @@ struct Row<'a> {
     ap50_eleven_point: f64,
     ap50_coco: f64,
     f1: f64,
+    /// The score threshold of `f1`.
+    f1_score_threshold: Option<f64>,
     recall: f64,
     seconds_per_image: f64,
 }
 
 impl<'a> Row<'a> {
-    fn new(row: &EvaluatedRow, model: &'a str) -> Self {
+    fn new(row: &'a EvaluatedRow) -> Self {
         let summary = &row.summary;
         Self {
             profile: row.profile.name(),
             refine: row.refinement.name(),
-            model,
+            model: &row.model,
             images: summary.images,
             persons: summary.persons,
             views: row.views,
@@ -158,6 +164,7 @@ impl<'a> Row<'a> {
             ap50_eleven_point: summary.ap50.eleven_point,
             ap50_coco: summary.ap50.coco_101_point,
             f1: summary.f1,
+            f1_score_threshold: summary.f1_score_threshold,
             recall: summary.recall,
             seconds_per_image: row.time_per_image.as_secs_f64(),
         }

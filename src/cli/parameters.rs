@@ -19,7 +19,7 @@ pub(super) struct ParameterFlags {
     /// [default: the profile's]
     #[arg(long, value_name = "NAME")]
     refine: Option<String>,
-    /// Refuse to answer with another model
+    /// Look with this model [default: the profile's]
     #[arg(long, value_name = "NAME")]
     model: Option<String>,
     /// Leave out persons with a lower score, 0 to 1 [default: 0.3]

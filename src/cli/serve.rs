@@ -7,7 +7,7 @@ use tokio::{net::TcpListener, runtime, task::spawn_blocking};
 
 use super::SettingsFile;
 use crate::{
-    app::{App, build_engine},
+    app::{App, assemble},
     settings::Settings,
     shutdown::Shutdown,
 };
@@ -35,6 +35,6 @@ async fn serve(settings: Settings) -> anyhow::Result<()> {
     let listener = TcpListener::bind(address).await.with_context(|| {
         format!("server.listen: cannot listen on {address}: set LOOKDOWN__SERVER__LISTEN to a free address")
     })?;
-    let app = spawn_blocking(move || App::start(build_engine(&settings)?, settings)).await??;
+    let app = spawn_blocking(move || App::start(assemble(&settings)?, settings)).await??;
     app.serve(listener, shutdown).await
 }

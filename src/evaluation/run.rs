@@ -20,6 +20,8 @@ pub struct EvaluatedRow {
     pub profile: Profile,
     /// The refinement.
     pub refinement: Refinement,
+    /// The model that looked.
+    pub model: String,
     /// How many views the network saw per image, on average.
     pub views: f64,
     /// Wall-clock time per image: observing it and this refinement of it.
@@ -66,6 +68,7 @@ pub fn evaluate(
     let mut per_variant = vec![Vec::with_capacity(data_set.images.len()); variants.len()];
     let mut times = vec![Duration::ZERO; variants.len()];
     let mut views = 0;
+    let mut model = String::new();
     for (done, image) in data_set.images.iter().enumerate() {
         let Some(first) = variants.first() else { break };
         let started = Instant::now();
@@ -78,6 +81,7 @@ pub fn evaluate(
                 })?;
         let observing = started.elapsed();
         views += observation.view_count();
+        observation.model().name().clone_into(&mut model);
         for ((variant, images), time) in variants.iter().zip(&mut per_variant).zip(&mut times) {
             let refining = Instant::now();
             let persons = engine.persons(&observation, &variant.refinement);
@@ -97,6 +101,7 @@ pub fn evaluate(
         Ok(EvaluatedRow {
             profile: variant.profile,
             refinement: variant.refinement.refinement,
+            model: model.clone(),
             views: views_per_image,
             time_per_image: time / count,
             summary: Summary::of_images(images, MatchingRule::Coco)?,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::{Device, HeadOutput};
 use crate::{
     detection::{BBox, ViewPixels},
     imaging::{NetworkInput, ViewBatch},
@@ -21,7 +22,7 @@ pub trait Detector: Send {
     /// The model's name.
     fn name(&self) -> &str;
 
-    /// Changes whenever the model's weights do.
+    /// Changes whenever the model does.
     fn revision(&self) -> &str;
 
     /// What the network wants to see.
@@ -32,7 +33,7 @@ pub trait Detector: Send {
     ///
     /// # Errors
     /// [`InferenceError`] when the run-time fails or answers in another shape than it promised.
-    fn detect(&mut self, batch: &ViewBatch) -> Result<Vec<Vec<ViewDetection>>, InferenceError>;
+    fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError>;
 }
 
 /// A model that cannot be loaded or run. Every message is one sentence with the remedy.
@@ -49,8 +50,33 @@ pub enum InferenceError {
         /// What the loader said.
         detail: String,
     },
+    /// The library has no support for the device.
+    #[error(
+        "inference.device: {device} needs a library that can use it, and {path} cannot; point \
+         inference.library_path to the libonnxruntime.so of the package onnxruntime-gpu, or use cpu"
+    )]
+    NoProvider {
+        /// The device asked for.
+        device: Device,
+        /// The library.
+        path: PathBuf,
+    },
+    /// The device is not there, or its driver is not.
+    #[error(
+        "inference.device: {device} cannot be used: {detail}; check the GPU's number and its \
+         driver, CUDA and cuDNN libraries, or use cpu"
+    )]
+    NoDevice {
+        /// The device asked for.
+        device: Device,
+        /// What the run-time said.
+        detail: String,
+    },
     /// The model file or its manifest cannot be read.
-    #[error("model.path: {path} cannot be read: {detail}; run `make setup`, or name another model")]
+    #[error(
+        "model: {path} cannot be read: {detail}; `make setup` fetches the default models and \
+         `make models` the others"
+    )]
     Unreadable {
         /// Which file.
         path: PathBuf,
@@ -58,7 +84,7 @@ pub enum InferenceError {
         detail: String,
     },
     /// The model is not one that can be used here.
-    #[error("model.path: {path} cannot be used: {problem}")]
+    #[error("model: {path} cannot be used: {problem}")]
     Unusable {
         /// Which file.
         path: PathBuf,

@@ -1,86 +1,179 @@
 //! Model manifests: what a model is, beside its ONNX file.
 
-use std::path::{Path, PathBuf};
+mod input;
+
+use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::InferenceError;
-use crate::imaging::ChannelOrder;
+use super::{InferenceError, heads::Head};
+
+pub use input::{Layout, ManifestInput};
 
 /// The manifest's name in a model's folder.
-const FILE_NAME: &str = "model.toml";
+pub(super) const FILE_NAME: &str = "model.toml";
+/// Longest manifest, bytes.
+const MAX_BYTES: u64 = 1 << 20;
 
-/// What a model is and where it comes from.
+/// What a model is and where it comes from. What the ONNX file tells, a manifest may leave out.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelManifest {
-    /// The model's name in reports.
+    /// The model's name in requests and reports: letters, digits, `_`, `-` and `.`, at most 64.
     pub name: String,
-    /// The ONNX file, relative to the manifest.
+    /// The ONNX file, relative to the manifest and within its folder.
     pub onnx: PathBuf,
+    /// The ONNX file's SHA-256, hexadecimal; a file with another one is refused.
+    #[serde(default)]
+    pub sha256: Option<String>,
     /// SPDX identifier of the weights' licence.
-    pub licence: String,
+    #[serde(default)]
+    pub licence: Option<String>,
     /// Where the weights come from.
-    pub source: String,
+    #[serde(default)]
+    pub source: Option<String>,
     /// How pixels become network input.
     #[serde(default)]
     pub input: ManifestInput,
-}
-
-/// How pixels become network input: `pixel · scale + offset`, per plane.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ManifestInput {
-    /// Order of the colour planes.
-    pub channel_order: ChannelOrder,
-    /// Factor per plane.
-    pub scale: [f32; 3],
-    /// Offset per plane.
-    pub offset: [f32; 3],
-}
-
-impl Default for ManifestInput {
-    fn default() -> Self {
-        Self {
-            channel_order: ChannelOrder::Rgb,
-            scale: [1.0; 3],
-            offset: [0.0; 3],
-        }
-    }
+    /// How the outputs become boxes.
+    #[serde(default)]
+    pub output: Head,
 }
 
 impl ModelManifest {
-    /// Reads the manifest of a model's folder, or makes one for a bare ONNX file (RGB, 0 to 255).
-    /// The manifest's `onnx` comes back as a path that can be opened.
+    /// The manifest that `model` means: a folder with a `model.toml`, that file itself, or an ONNX
+    /// file. An ONNX file without a manifest beside it that names it gets one in which nothing is
+    /// said. `onnx` comes back as a path that can be opened.
     ///
     /// # Errors
-    /// [`InferenceError`] when the manifest is missing or malformed.
-    pub fn locate(model_path: &Path) -> Result<Self, InferenceError> {
-        let unreadable = |path: &Path, detail: String| InferenceError::Unreadable {
-            path: path.to_owned(),
+    /// [`InferenceError`] when the manifest is missing or malformed, or names an ONNX file outside
+    /// its folder.
+    pub fn locate(model: &Path) -> Result<Self, InferenceError> {
+        if model.is_dir() {
+            return Self::read(model);
+        }
+        let folder = model.parent().unwrap_or(Path::new(""));
+        if model.file_name().is_some_and(|name| name == FILE_NAME) {
+            return Self::read(folder);
+        }
+        if model.extension().is_none_or(|ending| ending != "onnx") {
+            return Self::read(model);
+        }
+        if folder.join(FILE_NAME).is_file() {
+            let manifest = Self::read(folder)?;
+            if manifest.onnx.file_name() == model.file_name() {
+                return Ok(manifest);
+            }
+        }
+        let stem = model.file_stem().unwrap_or_default();
+        Ok(Self {
+            name: name_from(&stem.to_string_lossy()),
+            onnx: model.to_owned(),
+            sha256: None,
+            licence: None,
+            source: None,
+            input: ManifestInput::default(),
+            output: Head::default(),
+        })
+    }
+
+    fn read(folder: &Path) -> Result<Self, InferenceError> {
+        let path = folder.join(FILE_NAME);
+        let unreadable = |detail: String| InferenceError::Unreadable {
+            path: path.clone(),
             detail,
         };
-        if model_path
-            .extension()
-            .is_some_and(|ending| ending == "onnx")
-        {
-            let stem = model_path.file_stem().unwrap_or_default();
-            return Ok(Self {
-                name: stem.to_string_lossy().into_owned(),
-                onnx: model_path.to_owned(),
-                licence: "unknown".to_owned(),
-                source: "given by path".to_owned(),
-                input: ManifestInput::default(),
-            });
+        let unusable = |problem: String| InferenceError::Unusable {
+            path: path.clone(),
+            problem,
+        };
+        let bytes = path
+            .metadata()
+            .map_err(|error| unreadable(error.to_string()))?
+            .len();
+        if bytes > MAX_BYTES {
+            return Err(unusable(format!("it has {bytes} bytes, no manifest")));
         }
-        let path = model_path.join(FILE_NAME);
-        let text =
-            std::fs::read_to_string(&path).map_err(|error| unreadable(&path, error.to_string()))?;
+        let text = std::fs::read_to_string(&path).map_err(|error| unreadable(error.to_string()))?;
         let manifest: Self =
-            toml::from_str(&text).map_err(|error| unreadable(&path, error.to_string()))?;
+            toml::from_str(&text).map_err(|error| unusable(one_line(&error, &text)))?;
+        manifest.check().map_err(unusable)?;
         Ok(Self {
-            onnx: model_path.join(&manifest.onnx),
+            onnx: within(folder, &manifest.onnx).map_err(unusable)?,
             ..manifest
         })
     }
+
+    fn check(&self) -> Result<(), String> {
+        if !is_name(&self.name) {
+            return Err(format!(
+                "name is {:?}: use 1 to {MAX_NAME} letters, digits, _, - and .",
+                self.name
+            ));
+        }
+        let is_sum = |sum: &String| sum.len() == 64 && sum.chars().all(|c| c.is_ascii_hexdigit());
+        match &self.sha256 {
+            Some(sum) if !is_sum(sum) => Err(format!(
+                "sha256 is {sum:?}: 64 hexadecimal digits are needed"
+            )),
+            _ => self.input.normalisation().map(drop),
+        }
+    }
 }
+
+/// Longest name of a model, characters.
+const MAX_NAME: usize = 64;
+
+/// Whether a model can be called that: it becomes a folder, a label and a part of a URL.
+pub(super) fn is_name(name: &str) -> bool {
+    let usable = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+    (1..=MAX_NAME).contains(&name.len()) && !name.starts_with('.') && name.chars().all(usable)
+}
+
+/// A name made of a file's.
+fn name_from(stem: &str) -> String {
+    let usable = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+    let name: String = stem
+        .chars()
+        .take(MAX_NAME)
+        .map(|c| if usable(c) { c } else { '_' })
+        .collect();
+    if name.is_empty() {
+        "model".to_owned()
+    } else {
+        name
+    }
+}
+
+/// The path of `file` in `folder`, links followed; an error when that is somewhere else.
+fn within(folder: &Path, file: &Path) -> Result<PathBuf, String> {
+    let outside = || {
+        format!(
+            "onnx is {:?}: the file must be in the manifest's own folder",
+            file.display().to_string()
+        )
+    };
+    let plain = |part| matches!(part, Component::Normal(_) | Component::CurDir);
+    if !file.components().all(plain) {
+        return Err(outside());
+    }
+    let path = folder.join(file);
+    match (path.canonicalize(), folder.canonicalize()) {
+        (Ok(real), Ok(folder)) if !real.starts_with(&folder) => Err(outside()),
+        // A file that is missing is told about when it is read.
+        _ => Ok(path),
+    }
+}
+
+/// A TOML error as one sentence with its line.
+fn one_line(error: &toml::de::Error, text: &str) -> String {
+    let message = error.message().replace('\n', " ");
+    let before = error.span().and_then(|span| text.get(..span.start));
+    match before {
+        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
+        None => message,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,27 +1,33 @@
 //! Detectors run by ONNX Runtime. The only module that names `ort`.
 
+mod description;
 mod environment;
+mod provider;
+mod signature;
+mod staging;
 
 use std::{num::NonZeroUsize, path::Path};
 
-use ort::{
-    session::Session,
-    value::{TensorRef, ValueType},
-};
+use ort::{session::Session, value::TensorRef};
 
-use super::{Detector, InferenceError, ModelManifest, ViewDetection};
+use self::{signature::Signature, staging::Staging};
+use super::{
+    Detector, Device, HeadOutput, InferenceError, ModelManifest, ViewDetection,
+    heads::{Head, TensorView},
+    onnx_file,
+};
 use crate::{
-    detection::BBox,
     imaging::{NetworkInput, ViewBatch},
-    revision::revision_of,
+    revision::{revision_of, sha256_of},
 };
 
-/// Network input sides accepted, pixels.
-const INPUT_SIDE: std::ops::RangeInclusive<i64> = 32..=4096;
+pub use description::{ModelDescription, OnnxTensor};
 
 /// How a model is run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OnnxOptions {
+    /// What it runs on.
+    pub device: Device,
     /// Threads within one run of the network.
     pub threads: NonZeroUsize,
     /// Boxes with a lower score are dropped, 0 to 1.
@@ -30,14 +36,11 @@ pub struct OnnxOptions {
     pub max_detections_per_view: usize,
 }
 
-/// A model with the outputs `boxes` `[views, candidates, 4]` (`x_min, y_min, x_max, y_max`, view
-/// pixels) and `scores` `[views, candidates]` (of being a person, 0 to 1).
+/// A model in an ONNX file, with the output head that its manifest names.
 pub struct OnnxDetector {
     session: Session,
-    name: String,
-    revision: String,
-    input_name: String,
-    input: NetworkInput,
+    description: ModelDescription,
+    staging: Staging,
     options: OnnxOptions,
 }
 
@@ -46,7 +49,7 @@ impl OnnxDetector {
     /// with a `model.toml`, or an ONNX file.
     ///
     /// # Errors
-    /// [`InferenceError`] when the library or the model cannot be used.
+    /// [`InferenceError`] when the library, the device or the model cannot be used.
     pub fn load(
         library: &Path,
         model: &Path,
@@ -55,182 +58,160 @@ impl OnnxDetector {
         let environment = environment::load(library)?;
         let manifest = ModelManifest::locate(model)?;
         let path = manifest.onnx.as_path();
-        let bytes = std::fs::read(path).map_err(|error| InferenceError::Unreadable {
-            path: path.to_owned(),
-            detail: error.to_string(),
-        })?;
         let unusable = |problem: String| InferenceError::Unusable {
             path: path.to_owned(),
             problem,
         };
-        let session = build_session(environment, &bytes, options.threads)
-            .map_err(|error| unusable(error.to_string()))?;
-        let (input_name, width, height) = check_input(&session).map_err(unusable)?;
-        check_outputs(&session).map_err(unusable)?;
+        let bytes = onnx_file::read(path).map_err(|detail| InferenceError::Unreadable {
+            path: path.to_owned(),
+            detail,
+        })?;
+        let sha256 = sha256_of(&bytes);
+        check_sum(&manifest, &sha256).map_err(unusable)?;
+        onnx_file::check(&bytes).map_err(unusable)?;
+
+        let builder = provider::builder(environment, library, &options)?;
+        let session = builder
+            .commit(&bytes)
+            .map_err(|error| unusable(first_line(&error)))?;
+        let metadata = description::metadata(&session);
+        let (inputs, outputs) = description::tensors(&session);
+        let signature = Signature::of(&inputs, &manifest.input, &metadata).map_err(unusable)?;
+        let shapes: Vec<_> = description::float_shapes(&outputs).collect();
+        let size = (signature.width, signature.height);
+        manifest.output.check(&shapes, size).map_err(unusable)?;
+        let (scale, offset) = manifest.input.normalisation().map_err(unusable)?;
+        let input = NetworkInput {
+            width: signature.width,
+            height: signature.height,
+            channel_order: manifest.input.channel_order,
+            scale,
+            offset,
+        };
+        // The weights alone do not make a model: how it is fed and read counts, too.
+        let used = format!("{sha256} {:?} {:?}", manifest.input, manifest.output);
         Ok(Self {
-            session,
-            name: manifest.name,
-            revision: revision_of(&bytes),
-            input_name,
-            input: NetworkInput {
-                width,
-                height,
-                channel_order: manifest.input.channel_order,
-                scale: manifest.input.scale,
-                offset: manifest.input.offset,
+            staging: Staging::new(&signature),
+            description: ModelDescription {
+                revision: revision_of(used.as_bytes()),
+                bytes: bytes.len(),
+                sha256,
+                input,
+                inputs,
+                outputs,
+                layout: signature.layout,
+                views_per_run: signature.views_per_run,
+                licence: manifest.licence.clone().or(metadata.licence),
+                manifest,
             },
+            session,
             options,
         })
     }
+
+    /// What was understood of the model.
+    #[must_use]
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
 }
 
-fn build_session(
-    environment: &ort::environment::Environment,
-    model: &[u8],
-    threads: NonZeroUsize,
-) -> Result<Session, ort::Error> {
-    // Idle pool threads must not spin: they would steal the cores that decode and remap.
-    Session::builder(environment)?
-        .with_intra_threads(threads.get())?
-        .with_intra_op_spinning(false)?
-        .commit_from_memory(model)
-}
-
-/// The name, width and height of the model's only input, `[views, 3, height, width]` of `f32`.
-fn check_input(session: &Session) -> Result<(String, u32, u32), String> {
-    let [input] = session.inputs() else {
-        let count = session.inputs().len();
-        return Err(format!(
-            "it has {count} inputs; one picture input is needed"
-        ));
-    };
-    let wanted = "[views, 3, height, width] of 32-bit floats";
-    let ValueType::Tensor { ty, shape, .. } = input.dtype() else {
-        return Err(format!(
-            "its input {:?} is no tensor; {wanted} is needed",
-            input.name()
-        ));
-    };
-    let dimensions: &[i64] = shape;
-    let sides = match *dimensions {
-        [views, 3, height, width] if views != 0 => Some((width, height)),
-        _ => None,
-    };
-    match sides {
-        Some((width, height))
-            if *ty == ort::value::TensorElementType::Float32
-                && INPUT_SIDE.contains(&width)
-                && INPUT_SIDE.contains(&height) =>
-        {
-            let side = |pixels: i64| u32::try_from(pixels).unwrap_or(u32::MAX);
-            Ok((input.name().to_owned(), side(width), side(height)))
-        }
-        _ => Err(format!(
-            "its input {:?} is {ty:?} {dimensions:?}; {wanted} with fixed sides of {} to {} is \
-             needed",
-            input.name(),
-            INPUT_SIDE.start(),
-            INPUT_SIDE.end()
+fn check_sum(manifest: &ModelManifest, found: &str) -> Result<(), String> {
+    match &manifest.sha256 {
+        Some(wanted) if !wanted.eq_ignore_ascii_case(found) => Err(format!(
+            "its SHA-256 is {found}, but the manifest says {wanted}: fetch it again, or correct \
+             the manifest"
         )),
+        _ => Ok(()),
     }
 }
 
-fn check_outputs(session: &Session) -> Result<(), String> {
-    for name in ["boxes", "scores"] {
-        if !session.outputs().iter().any(|output| output.name() == name) {
-            let found: Vec<_> = session
-                .outputs()
-                .iter()
-                .map(ort::value::Outlet::name)
-                .collect();
-            return Err(format!(
-                "it has the outputs {}; `boxes` and `scores` are needed",
-                found.join(", ")
-            ));
-        }
-    }
-    Ok(())
+/// The run-time's own words without its call stack.
+fn first_line(error: &ort::Error) -> String {
+    let text = error.to_string();
+    let line = text.lines().next().unwrap_or_default().trim();
+    line.trim_end_matches('.').to_owned()
 }
 
 impl Detector for OnnxDetector {
     fn name(&self) -> &str {
-        &self.name
+        &self.description.manifest.name
     }
 
     fn revision(&self) -> &str {
-        &self.revision
+        &self.description.revision
     }
 
     fn input(&self) -> &NetworkInput {
-        &self.input
+        &self.description.input
     }
 
-    fn detect(&mut self, batch: &ViewBatch) -> Result<Vec<Vec<ViewDetection>>, InferenceError> {
-        let failed = |error: ort::Error| InferenceError::Run(error.to_string());
-        let shape = [
-            batch.views(),
-            3,
-            self.input.height as usize,
-            self.input.width as usize,
-        ];
-        let tensor = TensorRef::from_array_view((shape, batch.values())).map_err(failed)?;
-        let outputs = self
-            .session
-            .run(ort::inputs![self.input_name.as_str() => tensor])
-            .map_err(failed)?;
-        let (_, boxes) = outputs["boxes"]
-            .try_extract_tensor::<f32>()
-            .map_err(failed)?;
-        let (_, scores) = outputs["scores"]
-            .try_extract_tensor::<f32>()
-            .map_err(failed)?;
-        let candidates = scores.len() / batch.views().max(1);
-        if candidates * batch.views() != scores.len() || boxes.len() != scores.len() * 4 {
-            return Err(InferenceError::Run(format!(
-                "{} scores and {} box sides came back for {} views",
-                scores.len(),
-                boxes.len(),
-                batch.views()
-            )));
+    fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
+        let Self {
+            session,
+            description,
+            staging,
+            options,
+        } = self;
+        let input = &description.input;
+        let mut found = HeadOutput::default();
+        for piece in staging.pieces(batch, input) {
+            let staged = staging.stage(piece, input);
+            let head = &description.manifest.output;
+            let output = run(session, head, &staged, input, options)?;
+            found.non_finite += output.non_finite;
+            let views = piece.len() / input.view_len();
+            found
+                .per_view
+                .extend(output.per_view.into_iter().take(views));
         }
-        let per_view = boxes
-            .chunks_exact(candidates.max(1) * 4)
-            .zip(scores.chunks_exact(candidates.max(1)));
-        Ok(per_view
-            .map(|(boxes, scores)| decode_view(boxes, scores, &self.input, &self.options))
-            .collect())
+        for view in &mut found.per_view {
+            keep_best(view, options.max_detections_per_view);
+        }
+        Ok(found)
     }
 }
 
-/// Keeps the best boxes above the floor, clipped to the view. Values that are not finite are
-/// dropped here, where they arise.
-fn decode_view(
-    boxes: &[f32],
-    scores: &[f32],
+/// One run of the network.
+fn run(
+    session: &mut Session,
+    head: &Head,
+    staged: &staging::Staged<'_>,
     input: &NetworkInput,
     options: &OnnxOptions,
-) -> Vec<ViewDetection> {
-    let view = BBox::new([0.0, 0.0, f64::from(input.width), f64::from(input.height)]).ok();
-    let mut found: Vec<ViewDetection> = boxes
-        .chunks_exact(4)
-        .zip(scores)
-        .filter(|&(_, &score)| f64::from(score) >= options.score_floor && score <= 1.0)
-        .filter_map(|(sides, &score)| {
-            let sides = [0, 1, 2, 3].map(|side| f64::from(sides[side]));
-            let bbox = BBox::new(sides).ok()?.clipped_to(&view?)?;
-            Some(ViewDetection {
-                bbox,
-                score: f64::from(score),
-            })
+) -> Result<HeadOutput, InferenceError> {
+    let failed = |error: ort::Error| InferenceError::Run(first_line(&error));
+    let views = staged.shape[0];
+    let tensor = TensorRef::from_array_view((staged.shape, staged.values)).map_err(failed)?;
+    let outputs = session
+        .run(ort::inputs![staged.name => tensor])
+        .map_err(failed)?;
+    let outputs: Vec<_> = outputs.iter().collect();
+    let mut shaped = Vec::new();
+    for (name, value) in &outputs {
+        // Heads read floats alone; a model may have other outputs, too.
+        if let Ok((shape, values)) = value.try_extract_tensor::<f32>() {
+            let side = |&side: &i64| usize::try_from(side).unwrap_or(0);
+            shaped.push((name, shape.iter().map(side).collect::<Vec<_>>(), values));
+        }
+    }
+    let tensors: Vec<_> = shaped
+        .iter()
+        .map(|(name, shape, values)| TensorView {
+            name,
+            shape,
+            values,
         })
         .collect();
-    if found.len() > options.max_detections_per_view {
-        found.select_nth_unstable_by(options.max_detections_per_view, |a, b| {
-            b.score.total_cmp(&a.score)
-        });
-        found.truncate(options.max_detections_per_view);
+    head.decode(&tensors, views, input, options.score_floor)
+}
+
+/// Keeps the best `count` detections of a view.
+fn keep_best(found: &mut Vec<ViewDetection>, count: usize) {
+    if found.len() > count {
+        found.select_nth_unstable_by(count, |a, b| b.score.total_cmp(&a.score));
+        found.truncate(count);
     }
-    found
 }
 
 #[cfg(test)]

@@ -3,24 +3,27 @@
 mod camera;
 
 use std::{
-    sync::{Mutex, PoisonError},
+    num::NonZeroUsize,
+    sync::{Arc, Mutex, PoisonError},
     time::Instant,
 };
 
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+
 use self::camera::FrameCamera;
 use super::{
-    DetectJob, Detected, DetectionReport, Person, PipelineError, Profile, StageTimings,
-    error::internal, merge, report::ModelUsed, rig_cache::RigCache,
+    DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person, PipelineError,
+    Profile, StageTimings, error::internal, merge, report::ModelUsed, rig_cache::RigCache,
 };
 use crate::{
     calibration::CalibrationFolder,
     detection::RefinementParameters,
     geometry::FieldOfViewReading,
     imaging::{
-        Frame, NetworkInput, ViewBatch,
+        Frame, ViewBatch,
         decode::{DecodeLimits, decode},
     },
-    inference::{Detector, InferenceError, ViewDetection},
+    inference::{Model, ModelRegistry, ViewDetection},
 };
 
 /// The smallest frame side that can hold a lens image, pixels.
@@ -31,8 +34,12 @@ const MIN_FRAME_SIDE: u32 = 32;
 pub struct EngineOptions {
     /// What a picture may cost before it is decoded.
     pub decode_limits: DecodeLimits,
+    /// Which model answers requests that name none.
+    pub default_models: DefaultModels,
     /// Most views given to the network at once.
-    pub max_batch_views: std::num::NonZeroUsize,
+    pub max_batch_views: NonZeroUsize,
+    /// Threads that render views.
+    pub remap_threads: NonZeroUsize,
     /// How the paper's field of view is read.
     pub paper_field_of_view: FieldOfViewReading,
     /// Most memory that remap tables may hold, bytes.
@@ -41,10 +48,10 @@ pub struct EngineOptions {
 
 /// Finds persons in frames.
 pub struct Engine {
-    /// One frame at a time is in the network; the session itself uses several threads.
-    detector: Mutex<Box<dyn Detector>>,
-    input: NetworkInput,
-    model: ModelUsed,
+    models: Arc<ModelRegistry>,
+    /// One frame at a time is in a network, whichever: the networks share their cores.
+    network_turn: Mutex<()>,
+    remappers: ThreadPool,
     calibrations: Option<CalibrationFolder>,
     rigs: RigCache,
     options: EngineOptions,
@@ -56,9 +63,11 @@ pub struct Observation {
     /// The decoded frame, EXIF orientation applied.
     pub frame: Frame,
     camera: FrameCamera,
+    model: Arc<Model>,
     profile: Profile,
     per_view: Vec<Vec<ViewDetection>>,
     batch_count: usize,
+    non_finite: usize,
     /// All but `refine` and `total`, which are still to come.
     timings: StageTimings,
     warnings: Vec<String>,
@@ -70,46 +79,42 @@ impl Observation {
     pub fn view_count(&self) -> usize {
         self.camera.rig.view_count()
     }
+
+    /// The model that looked.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
 }
 
 impl Engine {
-    /// An engine around a detector; without `calibrations` every lens is assumed.
-    #[must_use]
+    /// An engine that looks with `models`; without `calibrations` every lens is assumed.
+    ///
+    /// # Errors
+    /// When the operating system gives no threads.
     pub fn new(
-        detector: Box<dyn Detector>,
+        models: Arc<ModelRegistry>,
         calibrations: Option<CalibrationFolder>,
         options: EngineOptions,
-    ) -> Self {
-        Self {
-            input: detector.input().clone(),
-            model: ModelUsed {
-                name: detector.name().to_owned(),
-                revision: detector.revision().to_owned(),
-            },
-            detector: Mutex::new(detector),
+    ) -> Result<Self, ThreadPoolBuildError> {
+        let remappers = ThreadPoolBuilder::new()
+            .num_threads(options.remap_threads.get())
+            .thread_name(|index| format!("remap-{index}"))
+            .build()?;
+        Ok(Self {
+            models,
+            network_turn: Mutex::new(()),
+            remappers,
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes),
             options,
-        }
+        })
     }
 
-    /// The model that answers.
+    /// Which model answers requests that name none.
     #[must_use]
-    pub fn model(&self) -> &ModelUsed {
-        &self.model
-    }
-
-    /// Runs the network once on blank views, so that the first frame finds it warm.
-    ///
-    /// # Errors
-    /// [`InferenceError`] when the network cannot run.
-    pub fn warm_up(&self) -> Result<(), InferenceError> {
-        let mut batch = ViewBatch::default();
-        for slot in batch.prepare(self.options.max_batch_views.get(), &self.input) {
-            slot.fill(0.0);
-        }
-        let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-        detector.detect(&batch).map(|_| ())
+    pub fn default_models(&self) -> &DefaultModels {
+        &self.options.default_models
     }
 
     /// Finds the persons in a frame. Blocks; keep it off the async runtime.
@@ -133,12 +138,16 @@ impl Engine {
             calibration,
             image_width: observation.frame.width(),
             image_height: observation.frame.height(),
-            model: self.model.clone(),
+            model: ModelUsed {
+                name: observation.model.name().to_owned(),
+                revision: observation.model.revision().to_owned(),
+            },
             profile: parameters.profile,
             refinement: parameters.refinement,
             persons,
             view_count: observation.camera.rig.view_count(),
             batch_count: observation.batch_count,
+            non_finite: observation.non_finite,
             timings: StageTimings {
                 refine: refining.elapsed(),
                 total: job.arrived.elapsed(),
@@ -158,7 +167,7 @@ impl Engine {
     /// [`PipelineError`], by who is at fault.
     pub fn observe(&self, job: &DetectJob) -> Result<Observation, PipelineError> {
         let started = Instant::now();
-        self.check_model(job.parameters.model.as_deref())?;
+        let model = self.model(&job.parameters)?;
         let decoded = decode(&job.image, &self.options.decode_limits)?;
         let frame = decoded.frame;
         check_size(&frame)?;
@@ -172,13 +181,14 @@ impl Engine {
                     .to_owned(),
             );
         }
-        let camera = self.camera(job, &frame, &mut warnings)?;
+        let camera = self.camera(job, &frame, &model, &mut warnings)?;
         let calibrated_at = Instant::now();
 
         let mut observation = Observation {
             profile: job.parameters.profile,
             per_view: Vec::with_capacity(camera.rig.view_count()),
             batch_count: 0,
+            non_finite: 0,
             timings: StageTimings {
                 decode: decoded_at - started,
                 calibrate: calibrated_at - decoded_at,
@@ -187,6 +197,7 @@ impl Engine {
             },
             frame,
             camera,
+            model,
             warnings,
         };
         self.infer(&mut observation)?;
@@ -203,27 +214,36 @@ impl Engine {
         merge::persons(
             &observation.per_view,
             &observation.camera.rig,
-            &self.input,
+            observation.model.input(),
             observation.profile.back_projection(),
             refinement,
         )
     }
 
-    fn check_model(&self, wanted: Option<&str>) -> Result<(), PipelineError> {
-        match wanted {
-            Some(name) if name != self.model.name => Err(PipelineError::UnknownModel {
-                name: name.to_owned(),
-                loaded: self.model.name.clone(),
-            }),
-            _ => Ok(()),
-        }
+    /// The model that a request named, or the one for its profile.
+    fn model(&self, parameters: &DetectParameters) -> Result<Arc<Model>, PipelineError> {
+        let Some(name) = &parameters.model else {
+            let name = self.options.default_models.of(parameters.profile);
+            return self.models.get(name).ok_or(PipelineError::ModelStarting);
+        };
+        self.models.get(name).ok_or_else(|| {
+            let loaded = self.models.all();
+            let loaded: Vec<_> = loaded.iter().map(|model| model.name()).collect();
+            PipelineError::UnknownModel {
+                name: name.clone(),
+                loaded: loaded.join(", "),
+            }
+        })
     }
 
     /// Renders the views and runs the network on them, batch by batch.
     fn infer(&self, observation: &mut Observation) -> Result<(), PipelineError> {
         let waiting = Instant::now();
-        // A panic inside the run-time leaves no half-changed state of ours behind.
-        let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
+        // Guards nothing that a panic could leave half changed.
+        let _turn = self
+            .network_turn
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         observation.timings.queue += waiting.elapsed();
         let mut batch = ViewBatch::default();
         let views = observation.view_count();
@@ -231,15 +251,22 @@ impl Engine {
         for start in (0..views).step_by(step) {
             let remapping = Instant::now();
             let range = start..views.min(start + step);
-            let rig = &observation.camera.rig;
-            rig.render(&observation.frame, range, &self.input, &mut batch);
+            let Observation {
+                frame,
+                camera,
+                model,
+                ..
+            } = &*observation;
+            self.remappers
+                .install(|| camera.rig.render(frame, range, model.input(), &mut batch));
             let inferring = Instant::now();
-            let found = detector
+            let found = model
                 .detect(&batch)
                 .map_err(|error| internal(anyhow::Error::new(error)))?;
             observation.timings.remap += inferring - remapping;
             observation.timings.inference += inferring.elapsed();
-            observation.per_view.extend(found);
+            observation.per_view.extend(found.per_view);
+            observation.non_finite += found.non_finite;
             observation.batch_count += 1;
         }
         Ok(())

@@ -21,13 +21,16 @@ pub enum PipelineError {
         id: String,
     },
     /// The caller asked for a model that is not loaded.
-    #[error("model: {name:?} is not loaded; {loaded:?} is")]
+    #[error("model: {name:?} is not loaded; use one of {loaded}, or leave it out")]
     UnknownModel {
         /// The name asked for.
         name: String,
-        /// The model there is.
+        /// The models there are.
         loaded: String,
     },
+    /// The model that answers is still being loaded.
+    #[error("the server is loading its models: try again in a second")]
+    ModelStarting,
     /// The caller's frame does not belong to the calibration it named.
     #[error(
         "image: the frame is {frame_width}×{frame_height} pixels, but calibration {id:?} was made \

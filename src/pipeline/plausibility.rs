@@ -49,27 +49,30 @@ mod tests {
 
     use super::*;
 
-    fn stature(height: f64, width: f64, off_nadir: f64) -> Option<Stature> {
-        Some(Stature {
+    fn stature(height: f64, width: f64, off_nadir: f64) -> Stature {
+        Stature {
             height,
             width,
             off_nadir,
-        })
+        }
     }
 
     #[test]
     fn people_keep_their_score_and_the_impossible_loses_most_of_it() {
         let mount = Mount::default();
-        assert_eq!(worth(false, stature(0.6, 0.2, 1.0), &mount), 1.0);
-        assert!((worth(false, stature(0.05, 0.2, 1.0), &mount) - 0.3).abs() < 1e-12);
-        assert!((worth(false, stature(0.6, 2.0, 1.0), &mount) - 0.3).abs() < 1e-12);
+        assert_eq!(worth(false, Some(stature(0.6, 0.2, 1.0)), &mount), 1.0);
+        assert!((worth(false, Some(stature(0.05, 0.2, 1.0)), &mount) - 0.3).abs() < 1e-12);
+        assert!((worth(false, Some(stature(0.6, 2.0, 1.0)), &mount) - 0.3).abs() < 1e-12);
         assert!((worth(true, None, &mount) - 0.7).abs() < 1e-12);
     }
 
     #[test]
     fn heights_tell_nothing_below_the_camera_or_for_a_camera_on_a_wall() {
-        assert_eq!(worth(false, stature(0.0, 0.2, 0.1), &Mount::default()), 1.0);
+        assert_eq!(
+            worth(false, Some(stature(0.0, 0.2, 0.1)), &Mount::default()),
+            1.0
+        );
         let wall = Mount::new(-Vector3::y_axis(), None);
-        assert_eq!(worth(false, stature(1.0, 0.2, 1.0), &wall), 1.0);
+        assert_eq!(worth(false, Some(stature(1.0, 0.2, 1.0)), &wall), 1.0);
     }
 }

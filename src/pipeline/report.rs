@@ -42,6 +42,8 @@ pub struct DetectionReport {
     pub view_count: usize,
     /// In how many batches it saw them.
     pub batch_count: usize,
+    /// Candidates of the network dropped because a number of theirs was not finite.
+    pub non_finite: usize,
     /// Where the time went.
     pub timings: StageTimings,
     /// What the caller should know: one sentence each.

@@ -1,18 +1,18 @@
 //! A small real detector for tests: it finds bright blobs instead of persons, so that geometry,
 //! merging and scheduling can be tested without weights.
 
-use std::{num::NonZeroUsize, time::Instant};
+use std::{num::NonZeroUsize, sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{DetectJob, DetectParameters, Engine, EngineOptions};
+use super::{DefaultModels, DetectJob, DetectParameters, Engine, EngineOptions};
 use crate::{
     calibration::CalibrationFolder,
     detection::{BBox, ViewPixels},
     geometry::FieldOfViewReading,
     imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png, decode::DecodeLimits},
-    inference::{Detector, InferenceError, ViewDetection},
+    inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},
 };
 
 /// Finds the bounding box of everything brighter than this in a view.
@@ -46,10 +46,13 @@ impl Detector for BlobDetector {
         &self.input
     }
 
-    fn detect(&mut self, batch: &ViewBatch) -> Result<Vec<Vec<ViewDetection>>, InferenceError> {
+    fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
         (self.before)()?;
         let views = batch.values().chunks_exact(self.input.view_len());
-        Ok(views.map(|view| self.find(view)).collect())
+        Ok(HeadOutput {
+            per_view: views.map(|view| self.find(view)).collect(),
+            non_finite: 0,
+        })
     }
 }
 
@@ -90,11 +93,17 @@ impl BlobDetector {
 pub(super) fn engine(detector: BlobDetector, calibrations: Option<CalibrationFolder>) -> Engine {
     let options = EngineOptions {
         decode_limits: DecodeLimits::default(),
+        default_models: DefaultModels::One("blob".to_owned()),
         max_batch_views: NonZeroUsize::new(5).unwrap(),
+        remap_threads: NonZeroUsize::new(2).unwrap(),
         paper_field_of_view: FieldOfViewReading::Horizontal,
         rig_cache_bytes: 1 << 26,
     };
-    Engine::new(Box::new(detector), calibrations, options)
+    let models = ModelRegistry::default();
+    models
+        .put(Arc::new(Model::new(Box::new(detector))))
+        .unwrap();
+    Engine::new(Arc::new(models), calibrations, options).unwrap()
 }
 
 /// A grey lens image on black, `side` pixels wide, with a white disc.

@@ -1,12 +1,20 @@
 //! Raw → checked settings, in one conversion.
 
-use std::{num::NonZeroUsize, ops::RangeInclusive, path::PathBuf, time::Duration};
+use std::{
+    num::{NonZeroU64, NonZeroUsize},
+    ops::RangeInclusive,
+    path::PathBuf,
+    time::Duration,
+};
 
 use super::{
     CalibrationSettings, InferenceSettings, LimitSettings, LogFormat, LogSettings, ModelSettings,
-    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, raw,
+    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, ThreadPlan, raw,
 };
-use crate::geometry::FieldOfViewReading;
+use crate::{
+    geometry::FieldOfViewReading,
+    inference::{Device, UnknownDevice},
+};
 
 /// A body smaller than this holds no picture.
 const MIN_BODY_BYTES: u64 = 1024;
@@ -16,6 +24,8 @@ const MAX_BODY_BYTES: u64 = 2 << 30;
 const MAX_BYTES: u64 = 1 << 40;
 /// Ten minutes.
 const MAX_TIMEOUT_MILLIS: u64 = 600_000;
+/// A day.
+const MAX_POLL_SECONDS: u64 = 86_400;
 /// The longest side the JPEG format can state.
 const MAX_IMAGE_SIDE: u64 = 65_535;
 /// Beyond this only a mistake is possible.
@@ -26,6 +36,7 @@ impl TryFrom<RawSettings> for Settings {
 
     fn try_from(raw: RawSettings) -> Result<Self, SettingsError> {
         let server = server(&raw.server)?;
+        let inference = inference(&raw.inference)?;
         Ok(Self {
             limits: limits(&raw.limits, server.max_body_bytes)?,
             server,
@@ -37,10 +48,9 @@ impl TryFrom<RawSettings> for Settings {
                     0..=MAX_BYTES,
                 )?,
             },
-            model: ModelSettings {
-                path: path("model.path", raw.model.path)?,
-            },
-            inference: inference(raw.inference)?,
+            model: model(raw.model)?,
+            threads: threads(raw.inference.threads, inference.device)?,
+            inference,
             paper: PaperSettings {
                 field_of_view: choice(
                     "paper.field_of_view",
@@ -79,7 +89,21 @@ fn server(raw: &raw::RawServer) -> Result<ServerSettings, SettingsError> {
     })
 }
 
-fn inference(raw: raw::RawInference) -> Result<InferenceSettings, SettingsError> {
+fn model(raw: raw::RawModel) -> Result<ModelSettings, SettingsError> {
+    let names = raw.also_load.split(',').map(str::trim);
+    let poll_seconds = within("model.poll_seconds", raw.poll_seconds, 0..=MAX_POLL_SECONDS)?;
+    Ok(ModelSettings {
+        path: (!raw.path.is_empty()).then(|| raw.path.into()),
+        repository: path("model.repository", raw.repository)?,
+        also_load: names
+            .filter(|name| !name.is_empty())
+            .map(ToOwned::to_owned)
+            .collect(),
+        poll_seconds: NonZeroU64::new(poll_seconds),
+    })
+}
+
+fn inference(raw: &raw::RawInference) -> Result<InferenceSettings, SettingsError> {
     if !(0.0..=1.0).contains(&raw.score_floor) {
         return Err(SettingsError::Value {
             key: "inference.score_floor".to_owned(),
@@ -87,13 +111,16 @@ fn inference(raw: raw::RawInference) -> Result<InferenceSettings, SettingsError>
             remedy: "give a number from 0 to 1".to_owned(),
         });
     }
-    let threads = within("inference.threads", raw.threads, 0..=MAX_COUNT)?;
     Ok(InferenceSettings {
-        library_path: path("inference.library_path", raw.library_path)?,
-        threads: match usize::try_from(threads).ok().and_then(NonZeroUsize::new) {
-            Some(threads) => threads,
-            None => std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
-        },
+        library_path: path("inference.library_path", raw.library_path.clone())?,
+        device: raw
+            .device
+            .parse()
+            .map_err(|error: UnknownDevice| SettingsError::Value {
+                key: "inference.device".to_owned(),
+                value: format!("{:?}", raw.device),
+                remedy: error.to_string(),
+            })?,
         max_batch_views: count("inference.max_batch_views", raw.max_batch_views)?,
         score_floor: raw.score_floor,
         max_detections_per_view: count(
@@ -101,6 +128,12 @@ fn inference(raw: raw::RawInference) -> Result<InferenceSettings, SettingsError>
             raw.max_detections_per_view,
         )?,
     })
+}
+
+fn threads(network: u64, device: Device) -> Result<ThreadPlan, SettingsError> {
+    let network = within("inference.threads", network, 0..=MAX_COUNT)?;
+    let network = usize::try_from(network).ok().and_then(NonZeroUsize::new);
+    Ok(ThreadPlan::for_this_process(device, network))
 }
 
 fn limits(raw: &raw::RawLimits, max_body_bytes: usize) -> Result<LimitSettings, SettingsError> {

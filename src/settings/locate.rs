@@ -6,8 +6,8 @@ use super::{CalibrationSettings, InferenceSettings, ModelSettings, SettingsError
 
 /// Default folder of calibration files.
 pub(super) const DEFAULT_CALIBRATIONS: &str = "calibrations";
-/// Default model folder.
-pub(super) const DEFAULT_MODEL: &str = "models/ssdlite_mobilenet_v2";
+/// Default folder of models.
+pub(super) const DEFAULT_REPOSITORY: &str = "models";
 /// Default ONNX Runtime library, where `make setup` puts it.
 pub(super) const DEFAULT_LIBRARY: &str = "runtime/libonnxruntime.so";
 
@@ -31,17 +31,40 @@ impl CalibrationSettings {
 }
 
 impl ModelSettings {
-    /// The model's folder or file.
+    /// The folder or file of the one model for all profiles, when somebody set one.
     ///
     /// # Errors
     /// [`SettingsError::Missing`] when it is not there.
-    pub fn find(&self) -> Result<PathBuf, SettingsError> {
-        locate(&self.path, DEFAULT_MODEL).ok_or_else(|| SettingsError::Missing {
-            key: "model.path",
-            what: "model",
-            path: self.path.clone(),
-            remedy: "run `make setup`, or set LOOKDOWN__MODEL__PATH to a model folder".to_owned(),
-        })
+    pub fn find_one(&self) -> Result<Option<PathBuf>, SettingsError> {
+        match &self.path {
+            Some(path) if !path.exists() => Err(SettingsError::Missing {
+                key: "model.path",
+                what: "model",
+                path: path.clone(),
+                remedy: "set LOOKDOWN__MODEL__PATH to a model folder, or leave it out".to_owned(),
+            }),
+            path => Ok(path.clone()),
+        }
+    }
+
+    /// The folder of models. May be missing at its default place when there is one model for all
+    /// profiles.
+    ///
+    /// # Errors
+    /// [`SettingsError::Missing`] when it is not there.
+    pub fn find_repository(&self) -> Result<PathBuf, SettingsError> {
+        let is_default = self.repository == Path::new(DEFAULT_REPOSITORY);
+        match locate(&self.repository, DEFAULT_REPOSITORY) {
+            Some(found) => Ok(found),
+            None if is_default && self.path.is_some() => Ok(self.repository.clone()),
+            None => Err(SettingsError::Missing {
+                key: "model.repository",
+                what: "folder of models",
+                path: self.repository.clone(),
+                remedy: "run `make setup`, or set LOOKDOWN__MODEL__REPOSITORY to another"
+                    .to_owned(),
+            }),
+        }
     }
 }
 

@@ -60,12 +60,18 @@ impl Default for RawCalibrations {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawModel {
     pub(super) path: String,
+    pub(super) repository: String,
+    pub(super) also_load: String,
+    pub(super) poll_seconds: u64,
 }
 
 impl Default for RawModel {
     fn default() -> Self {
         Self {
-            path: locate::DEFAULT_MODEL.to_owned(),
+            path: String::new(),
+            repository: locate::DEFAULT_REPOSITORY.to_owned(),
+            also_load: String::new(),
+            poll_seconds: 5,
         }
     }
 }
@@ -75,6 +81,7 @@ impl Default for RawModel {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawInference {
     pub(super) library_path: String,
+    pub(super) device: String,
     pub(super) threads: u64,
     pub(super) max_batch_views: u64,
     pub(super) score_floor: f64,
@@ -85,6 +92,7 @@ impl Default for RawInference {
     fn default() -> Self {
         Self {
             library_path: locate::DEFAULT_LIBRARY.to_owned(),
+            device: "cpu".to_owned(),
             threads: 0,
             max_batch_views: 8,
             score_floor: 0.01,

@@ -8,7 +8,7 @@ use std::{
 use lookdown::{
     detection::BBox,
     imaging::{NetworkInput, ViewBatch},
-    inference::{Detector, InferenceError, ViewDetection},
+    inference::{Detector, HeadOutput, InferenceError, ViewDetection},
 };
 
 /// A test that waits longer than this has failed.
@@ -46,6 +46,11 @@ impl Gate {
     /// Makes the next run panic.
     pub(crate) fn panic_once(&self) {
         self.change(|state| state.panics = true);
+    }
+
+    /// Counts from here.
+    pub(crate) fn forget_runs(&self) {
+        self.change(|state| state.runs = 0);
     }
 
     /// How many runs have begun.
@@ -96,12 +101,15 @@ impl Detector for EagerDetector {
         &self.input
     }
 
-    fn detect(&mut self, batch: &ViewBatch) -> Result<Vec<Vec<ViewDetection>>, InferenceError> {
+    fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
         self.gate.pass();
         let person = ViewDetection {
             bbox: BBox::new([24.0, 16.0, 40.0, 48.0]).unwrap(),
             score: 0.9,
         };
-        Ok(vec![vec![person]; batch.views()])
+        Ok(HeadOutput {
+            per_view: vec![vec![person]; batch.views()],
+            non_finite: 0,
+        })
     }
 }

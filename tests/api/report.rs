@@ -70,6 +70,7 @@ fn report() -> DetectionReport {
         persons: vec![person(), unknown_place],
         view_count: 24,
         batch_count: 3,
+        non_finite: 0,
         timings: StageTimings {
             decode: micros(11_204),
             calibrate: micros(15),

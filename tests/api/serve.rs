@@ -22,7 +22,7 @@ use tokio::{
 
 use crate::{
     detector::Gate,
-    service::{engine, frame},
+    service::{assembly, frame},
 };
 
 struct Server {
@@ -39,8 +39,8 @@ impl Server {
         let variable = "LOOKDOWN__SERVER__REQUEST_TIMEOUT_MILLIS".to_owned();
         let environment = HashMap::from([(variable, timeout_millis.to_owned())]);
         let settings = settings::load(None, environment).unwrap();
-        let (engine, calibrations) = engine(&gate);
-        let app = App::start(engine, settings).unwrap();
+        let (assembly, calibrations) = assembly(&gate);
+        let app = App::start(assembly, settings).unwrap();
         let readiness = app.readiness();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();

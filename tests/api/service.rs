@@ -10,11 +10,13 @@ use axum::{
 use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
+    app::Assembly,
     calibration::CalibrationFolder,
     geometry::FieldOfViewReading,
     imaging::{Frame, NetworkInput, annotate::encode_png, decode::DecodeLimits},
+    inference::{ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{Engine, EngineOptions, WorkerPool},
+    pipeline::{DefaultModels, Engine, EngineOptions, WorkerPool},
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -44,6 +46,7 @@ pub(crate) struct Bounds {
     pub(crate) max_body_bytes: usize,
     pub(crate) max_upload_bytes: usize,
     pub(crate) request_timeout: Duration,
+    pub(crate) administration: bool,
 }
 
 impl Default for Bounds {
@@ -53,6 +56,7 @@ impl Default for Bounds {
             max_body_bytes: 1 << 20,
             max_upload_bytes: 1 << 24,
             request_timeout: Duration::from_secs(20),
+            administration: true,
         }
     }
 }
@@ -92,23 +96,39 @@ impl Answer {
     }
 }
 
-/// An engine with the stand-in detector and the calibration `lobby`.
-pub(crate) fn engine(gate: &Arc<Gate>) -> (Engine, TempDir) {
+/// An engine with the stand-in detector, not loaded yet, and the calibration `lobby`.
+pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("lobby.json"), LOBBY).unwrap();
-    let detector = EagerDetector {
-        input: NetworkInput::plain(64, 64),
-        gate: Arc::clone(gate),
-    };
+    let gate = Arc::clone(gate);
+    let one_view = NonZeroUsize::MIN;
+    let models = ModelRepository::new(
+        RepositoryOptions {
+            folder: folder.path().join("models"),
+            elsewhere: Some(("eager".to_owned(), "nowhere".into())),
+            warm_up_views: one_view,
+            kept: vec!["eager".to_owned()],
+        },
+        Box::new(move |_| {
+            Ok(Box::new(EagerDetector {
+                input: NetworkInput::plain(64, 64),
+                gate: Arc::clone(&gate),
+            }))
+        }),
+    );
     let options = EngineOptions {
         decode_limits: DecodeLimits::default(),
+        default_models: DefaultModels::One("eager".to_owned()),
         max_batch_views: NonZeroUsize::new(128).unwrap(),
+        remap_threads: one_view,
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 28,
     };
     let calibrations = CalibrationFolder::open(folder.path()).unwrap();
-    let engine = Engine::new(Box::new(detector), Some(calibrations), options);
-    (engine, folder)
+    let registry = Arc::clone(models.registry());
+    let engine = Engine::new(registry, Some(calibrations), options).unwrap();
+    let models = Arc::new(models);
+    (Assembly { engine, models }, folder)
 }
 
 impl Service {
@@ -119,19 +139,23 @@ impl Service {
     /// A warm service with one worker.
     pub(crate) fn within(bounds: &Bounds) -> Self {
         let gate = Arc::new(Gate::default());
-        let (engine, calibrations) = engine(&gate);
+        let (Assembly { engine, models }, calibrations) = assembly(&gate);
+        models.load("eager").unwrap();
+        gate.forget_runs();
         let capacity = NonZeroUsize::new(bounds.frames_in_flight).unwrap();
         let workers = WorkerPool::start(&Arc::new(engine), NonZeroUsize::MIN, capacity).unwrap();
         let readiness = Readiness::default();
         readiness.warmed_up();
         let state = ApiState::new(
             Arc::new(workers),
+            models,
             Arc::new(Metrics::new().unwrap()),
             readiness.clone(),
             ApiOptions {
                 max_body_bytes: bounds.max_body_bytes,
                 max_upload_bytes: bounds.max_upload_bytes,
                 request_timeout: bounds.request_timeout,
+                administration: bounds.administration,
             },
         );
         Self {

@@ -26,7 +26,9 @@ pub(in crate::api) struct DetectQuery {
     #[param(inline)]
     #[schema(inline)]
     refine: Option<RefinementName>,
-    /// Refuse the request unless this model answers.
+    /// Look with this model; the profile's by default.
+    #[param(example = "ssdlite_mobilenet_v2")]
+    #[schema(example = "ssdlite_mobilenet_v2")]
     model: Option<String>,
     /// Leave out persons with a lower score (`C_t`).
     #[param(minimum = 0, maximum = 1, default = 0.3)]

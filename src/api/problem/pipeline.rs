@@ -16,6 +16,7 @@ impl From<PipelineError> for Problem {
             PipelineError::AspectMismatch { .. } | PipelineError::FrameTooSmall { .. } => {
                 ProblemKind::UnfitImage
             }
+            PipelineError::ModelStarting => ProblemKind::WarmingUp,
             PipelineError::Overloaded { .. } => ProblemKind::Overloaded,
             PipelineError::ShuttingDown => ProblemKind::ShuttingDown,
             PipelineError::Internal(_) => ProblemKind::Internal,

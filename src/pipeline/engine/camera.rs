@@ -7,9 +7,10 @@ use crate::{
     calibration::{Calibration, CalibrationId, CameraGeometry},
     geometry::{Lens, Mount},
     imaging::{
-        Frame,
+        Frame, NetworkInput,
         lens_circle::{assumed_circle, find_lens_circle},
     },
+    inference::Model,
     pipeline::{
         DetectJob, PipelineError, Profile,
         camera_rig::CameraRig,
@@ -34,13 +35,14 @@ impl Engine {
         &self,
         job: &DetectJob,
         frame: &Frame,
+        model: &Model,
         warnings: &mut Vec<String>,
     ) -> Result<FrameCamera, PipelineError> {
         let profile = job.parameters.profile;
         let calibration = match (&job.calibration, &job.parameters.calibration) {
             (Some(calibration), _) => Arc::clone(calibration),
             (None, Some(id)) => self.find_calibration(id)?,
-            (None, None) => return self.assumed_camera(frame, profile, warnings),
+            (None, None) => return self.assumed_camera(frame, profile, model, warnings),
         };
         let geometry = calibration
             .for_frame(frame.width(), frame.height())
@@ -60,7 +62,7 @@ impl Engine {
             id: used.id.clone(),
             revision: used.revision.clone(),
         };
-        let rig = self.rig(camera, geometry, frame, profile);
+        let rig = self.rig(camera, geometry, frame, profile, model.input());
         Ok(FrameCamera { used, rig })
     }
 
@@ -78,6 +80,7 @@ impl Engine {
         &self,
         frame: &Frame,
         profile: Profile,
+        model: &Model,
         warnings: &mut Vec<String>,
     ) -> Result<FrameCamera, PipelineError> {
         let (circle, how) = match find_lens_circle(frame) {
@@ -116,7 +119,7 @@ impl Engine {
             revision: format!("{:.0}-{:.0}-{:.0}", circle.cx, circle.cy, circle.radius),
             assumed: true,
         };
-        let rig = self.rig(camera, geometry, frame, profile);
+        let rig = self.rig(camera, geometry, frame, profile, model.input());
         Ok(FrameCamera { used, rig })
     }
 
@@ -126,22 +129,19 @@ impl Engine {
         geometry: CameraGeometry,
         frame: &Frame,
         profile: Profile,
+        input: &NetworkInput,
     ) -> Arc<CameraRig> {
         let key = RigKey {
             camera,
             frame_size: (frame.width(), frame.height()),
             profile,
-            input_size: (self.input.width, self.input.height),
+            input_size: (input.width, input.height),
         };
         self.rigs.get_or_build(&key, || {
             let plan = profile.view_plan(self.options.paper_field_of_view);
-            CameraRig::new(
-                geometry,
-                frame.width(),
-                frame.height(),
-                plan.as_ref(),
-                &self.input,
-            )
+            let (width, height) = (frame.width(), frame.height());
+            self.remappers
+                .install(|| CameraRig::new(geometry, width, height, plan.as_ref(), input))
         })
     }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::inference::InferenceError;
 use crate::pipeline::test_support::{BlobDetector, engine, frame_with_disc, job};
 
 const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 600, "height": 600},
@@ -127,7 +128,7 @@ fn what_does_not_exist_is_refused_by_name() {
     );
     assert_eq!(
         refusal(&[("model", "yolo")]),
-        "model: \"yolo\" is not loaded; \"blob\" is"
+        "model: \"yolo\" is not loaded; use one of blob, or leave it out"
     );
     let tiny = frame_with_disc(16, [8.0, 8.0], 2.0);
     let error = engine.detect(&job(tiny, &[])).unwrap_err().to_string();

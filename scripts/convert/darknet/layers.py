@@ -1,0 +1,132 @@
+"""The layers without weights of darknet networks: pooling, joining, adding, repeating and reordering.
+
+Shapes follow darknet's rules for rounding and padding, which its source states and its papers do not.
+"""
+
+import numpy
+
+from ..onnx_builder import OnnxBuilder
+from .activations import activate, activation_of
+from .cfg import Section
+from .layer import Layer, Shape, steps
+
+
+class MaxPool(Layer):
+    """The largest of each window. The missing rows and columns lie more at the lower right, as in TensorFlow."""
+
+    kind = "maxpool"
+
+    def __init__(self, section: Section, index: int, shapes: dict[int, Shape]):
+        section.allow_only("size", "stride", "padding")
+        self.sources = (index - 1,)
+        source = shapes[index - 1]
+        self.stride = section.whole("stride", 1, least=1)
+        self.size = section.whole("size", self.stride, least=1)
+        padding = section.whole("padding", self.size - 1)
+        height = steps(section, source.height + padding, self.size, self.stride)
+        width = steps(section, source.width + padding, self.size, self.stride)
+        self.shape = Shape(source.channels, height, width)
+        before = padding // 2
+
+        def after(places: int, extent: int) -> int:
+            return max(0, (places - 1) * self.stride + self.size - before - extent)
+
+        self.pads = [before, before, after(height, source.height), after(width, source.width)]
+
+    def add_to(self, builder: OnnxBuilder, inputs: list[str], weights: numpy.ndarray) -> str:
+        size, strides = [self.size, self.size], [self.stride, self.stride]
+        return builder.node("MaxPool", inputs, kernel_shape=size, strides=strides, pads=self.pads)
+
+
+class Route(Layer):
+    """Earlier layers, one channel after the other."""
+
+    kind = "route"
+
+    def __init__(self, section: Section, index: int, shapes: dict[int, Shape]):
+        section.allow_only("layers")
+        self.sources = tuple(_earlier(section, number, index) for number in section.wholes("layers"))
+        if not self.sources:
+            raise section.refusal("names no layers")
+        parts = [shapes[source] for source in self.sources]
+        if len({(part.height, part.width) for part in parts}) > 1:
+            raise section.refusal(f"joins layers of different sizes: {', '.join(map(str, parts))}")
+        self.shape = Shape(sum(part.channels for part in parts), parts[0].height, parts[0].width)
+
+    def add_to(self, builder: OnnxBuilder, inputs: list[str], weights: numpy.ndarray) -> str:
+        return inputs[0] if len(inputs) == 1 else builder.node("Concat", inputs, axis=1)
+
+
+class Shortcut(Layer):
+    """The sum of the layer before and an earlier one."""
+
+    kind = "shortcut"
+
+    def __init__(self, section: Section, index: int, shapes: dict[int, Shape]):
+        section.allow_only("from", "activation")
+        numbers = section.wholes("from")
+        if len(numbers) != 1:
+            raise section.refusal("is translated with a single layer in 'from' only")
+        self.sources = (index - 1, _earlier(section, numbers[0], index))
+        self.shape, added = (shapes[source] for source in self.sources)
+        self.activation = activation_of(section, "linear")
+        if self.shape != added:
+            raise section.refusal(f"adds layers of different shapes: {self.shape} and {added}")
+
+    def add_to(self, builder: OnnxBuilder, inputs: list[str], weights: numpy.ndarray) -> str:
+        return activate(builder, self.activation, builder.node("Add", inputs))
+
+
+class Upsample(Layer):
+    """Every pixel repeated."""
+
+    kind = "upsample"
+
+    def __init__(self, section: Section, index: int, shapes: dict[int, Shape]):
+        section.allow_only("stride")
+        self.sources = (index - 1,)
+        source = shapes[index - 1]
+        self.stride = section.whole("stride", 2, least=1)
+        self.shape = Shape(source.channels, source.height * self.stride, source.width * self.stride)
+
+    def add_to(self, builder: OnnxBuilder, inputs: list[str], weights: numpy.ndarray) -> str:
+        factors = builder.constant(numpy.array([1, 1, self.stride, self.stride], numpy.float32))
+        how = {"mode": "nearest", "coordinate_transformation_mode": "asymmetric", "nearest_mode": "floor"}
+        return builder.node("Resize", [*inputs, "", factors], **how)
+
+
+class Reorg(Layer):
+    """Fewer pixels and more channels, in darknet's own order.
+
+    Darknet reads the memory of a map of C channels, H x W, as one of C / s^2 channels, s H x s W, and sorts the
+    pixels of every s x s block of that into channels of their own. What comes out lies in memory as C channels,
+    H x W again, and is taken for C s^2 channels, H / s x W / s. For C = 64, s = 2 this is no mere space-to-depth.
+    """
+
+    kind = "reorg"
+
+    def __init__(self, section: Section, index: int, shapes: dict[int, Shape]):
+        section.allow_only("stride")
+        self.sources = (index - 1,)
+        self.source = shapes[index - 1]
+        self.stride = section.whole("stride", 1, least=1)
+        if self.source.channels % self.stride**2 or self.source.height % self.stride or self.source.width % self.stride:
+            raise section.refusal(f"with stride {self.stride} cannot part {self.source}")
+        height, width = self.source.height // self.stride, self.source.width // self.stride
+        self.shape = Shape(self.source.channels * self.stride**2, height, width)
+
+    def add_to(self, builder: OnnxBuilder, inputs: list[str], weights: numpy.ndarray) -> str:
+        channels, stride = self.source.channels // self.stride**2, self.stride
+        blocks = [0, channels, self.source.height, stride, self.source.width, stride]
+        parted = builder.reshape(inputs[0], blocks)
+        # N, channel, row, row in block, column, column in block -> both places in the block come first.
+        sorted_out = builder.node("Transpose", [parted], perm=[0, 3, 5, 1, 2, 4])
+        return builder.reshape(sorted_out, [0, self.shape.channels, self.shape.height, self.shape.width])
+
+
+def _earlier(section: Section, number: int, index: int) -> int:
+    """The index of an earlier layer, which is counted from the start, or backwards from this one if negative."""
+    source = number if number >= 0 else index + number
+    if not 0 <= source < index:
+        raise section.refusal(f"refers to layer {number}; it is layer {index} itself, and the first is 0")
+    return source

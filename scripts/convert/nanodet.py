@@ -1,0 +1,109 @@
+"""NanoDet-g trained on COCO, from its TensorFlow.js form: `MODEL_JSON ONNX`.
+
+NanoDet predicts, per cell, the distances from the cell's centre to the four sides of the box, each as a
+distribution over whole strides (Li et al., Generalized Focal Loss, 2020).
+"""
+
+import sys
+from pathlib import Path
+
+import numpy
+
+from .onnx_builder import OnnxBuilder
+from .tf_graph import TfGraph
+from .tfjs import read_tfjs
+from .translate import Translator
+
+SIZE = 416
+CLASSES = 80
+PERSON_CLASS = 0
+DISTANCE_BINS = 11
+# Stride in pixels -> the convolution that predicts classes and distances there, and the addition of its bias.
+HEADS = {
+    8: ("PartitionedCall/convolution_29", "PartitionedCall/Add_29"),
+    16: ("PartitionedCall/convolution_31", "PartitionedCall/Add_33"),
+    32: ("PartitionedCall/convolution_33", "PartitionedCall/Add_37"),
+}
+FIRST_CONVOLUTION = "PartitionedCall/convolution"
+RESIZE_FACTORS = {
+    "PartitionedCall/resize/ResizeBilinear": 2.0,
+    "PartitionedCall/resize_1/ResizeBilinear": 2.0,
+    "PartitionedCall/resize_2/ResizeBilinear": 0.5,
+    "PartitionedCall/resize_3/ResizeBilinear": 0.5,
+}
+# Of the pictures NanoDet was trained on: red, green, blue. The network itself wants blue first.
+MEAN = (123.675, 116.28, 103.53)
+DEVIATION = (58.395, 57.12, 57.375)
+DESCRIPTION = (
+    "NanoDet-g (COCO), person class only. images: RGB 0..255, N x 3 x 416 x 416. "
+    "boxes: x_min, y_min, x_max, y_max in input pixels, before non-maximum suppression. scores: 0..1."
+)
+
+
+def convert(model_json: Path, onnx_file: Path) -> None:
+    """Reads the TensorFlow.js model and writes the ONNX file."""
+    graph = read_tfjs(model_json)
+    _keep_person_class(graph)
+    _take_red_first(graph)
+    builder = OnnxBuilder()
+    centred = builder.node("Sub", ["images", _per_channel(builder, MEAN)])
+    normalised = builder.node("Mul", [centred, _per_channel(builder, 1 / numpy.array(DEVIATION))])
+    translator = Translator(
+        graph,
+        builder,
+        feeds={"input_1": normalised},
+        channels_first_feeds=frozenset({"input_1"}),
+        resize_factors=RESIZE_FACTORS,
+    )
+    levels = [_level(builder, translator.feature_map(output), stride) for stride, (_, output) in HEADS.items()]
+    boxes, scores = zip(*levels, strict=True)
+    builder.save_detector(
+        onnx_file,
+        boxes=builder.node("Concat", list(boxes), axis=1),
+        scores=builder.node("Concat", list(scores), axis=1),
+        size=SIZE,
+        anchors=sum((SIZE // stride) ** 2 for stride in HEADS),
+        description=DESCRIPTION,
+    )
+
+
+def _keep_person_class(graph: TfGraph) -> None:
+    """Drops the other classes from the last convolutions: channels are the classes, then 4 sides x 11 bins."""
+    channels = [PERSON_CLASS, *range(CLASSES, CLASSES + 4 * DISTANCE_BINS)]
+    for convolution, output in HEADS.values():
+        for name in (graph.node(convolution).inputs[1], graph.node(output).inputs[1]):
+            graph.constants[name] = graph.constant(name)[..., channels]
+
+
+def _take_red_first(graph: TfGraph) -> None:
+    """Turns the first convolution's input channels round, so that the picture may come as red, green, blue."""
+    name = graph.node(FIRST_CONVOLUTION).inputs[1]
+    graph.constants[name] = graph.constant(name)[:, :, ::-1, :]
+
+
+def _level(builder: OnnxBuilder, head: str, stride: int) -> tuple[str, str]:
+    """Boxes `[N, cells, 4]` and scores `[N, cells]` of one stride's head `[N, 1 + 44, rows, columns]`."""
+    logits, bins = builder.split(head, [1, 4 * DISTANCE_BINS], axis=1)
+    scores = builder.reshape(builder.node("Sigmoid", [logits]), [0, -1])
+    chances = builder.node("Softmax", [builder.reshape(bins, [0, 4, DISTANCE_BINS, -1])], axis=2)
+    strides = builder.constant(numpy.arange(DISTANCE_BINS, dtype=numpy.float32).reshape(1, 1, -1, 1))
+    over_bins = builder.constant(numpy.array([2], numpy.int64))
+    distances = builder.node("ReduceSum", [builder.node("Mul", [chances, strides]), over_bins], keepdims=0)
+    outwards = builder.constant(numpy.array([-stride, -stride, stride, stride], numpy.float32))
+    shifts = builder.node("Mul", [builder.node("Transpose", [distances], perm=[0, 2, 1]), outwards])
+    return builder.node("Add", [shifts, builder.constant(_cell_centres(stride))]), scores
+
+
+def _cell_centres(stride: int) -> numpy.ndarray:
+    """Centres of the cells in pixels, row by row, as x, y, x, y: `[1, cells, 4]`."""
+    along = (numpy.arange(SIZE // stride, dtype=numpy.float32) + 0.5) * stride
+    y, x = numpy.meshgrid(along, along, indexing="ij")
+    return numpy.stack([x, y, x, y], axis=-1).reshape(1, -1, 4)
+
+
+def _per_channel(builder: OnnxBuilder, values) -> str:
+    return builder.constant(numpy.array(values, numpy.float32).reshape(1, 3, 1, 1))
+
+
+if __name__ == "__main__":
+    convert(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,124 @@
+"""Networks' layers once more, one pixel after the other in float64, to hold the converters' graphs against.
+
+It shares no code with the converters and follows what darknet and YOLOX compute, not what ONNX offers.
+"""
+
+import numpy
+
+
+def parse(cfg: str) -> list[tuple[str, dict[str, str]]]:
+    """Kinds and options of the sections."""
+    sections = []
+    for line in filter(None, map(str.strip, cfg.splitlines())):
+        if line.startswith("["):
+            sections.append((line.strip("[]"), {}))
+        else:
+            name, _, value = line.partition("=")
+            sections[-1][1][name] = value
+    return sections
+
+
+def run(cfg: str, numbers: numpy.ndarray, picture: numpy.ndarray) -> list[numpy.ndarray]:
+    """What the heads get, each `[channels, height, width]`, for a picture `[3, height, width]`."""
+    maps, heads, numbers = [], [], numbers.astype(numpy.float64)
+    last = picture.astype(numpy.float64)
+    for kind, options in parse(cfg)[1:]:
+        whole = {name: int(value) for name, value in options.items() if value.lstrip("-").isdigit()}
+        match kind:
+            case "convolutional":
+                last, numbers = convolved(last, options, whole, numbers)
+            case "maxpool":
+                size, stride = whole["size"], whole["stride"]
+                last = pooled(last, size, stride, whole.get("padding", size - 1))
+            case "route":
+                wanted = [int(part) for part in options["layers"].split(",")]
+                last = numpy.concatenate([maps[number if number >= 0 else len(maps) + number] for number in wanted])
+            case "shortcut":
+                last = activated(last + maps[len(maps) + whole["from"]], options.get("activation", "linear"))
+            case "upsample":
+                rows, columns = (numpy.arange(extent * whole["stride"]) // whole["stride"] for extent in last.shape[1:])
+                last = last[:, rows][:, :, columns]
+            case "reorg":
+                last = reordered(last, whole["stride"])
+            case "region" | "yolo":
+                heads.append(last)
+        maps.append(last)
+    assert not numbers.size, "the network left weights over"
+    return heads
+
+
+def convolved(image, options, whole, numbers):
+    """A convolution, and the numbers it left."""
+    filters, size, stride = whole["filters"], whole["size"], whole["stride"]
+    groups = whole.get("groups", 1)
+    channels = image.shape[0] // groups
+    bias, numbers = numpy.split(numbers, [filters])
+    if whole.get("batch_normalize"):
+        scales, means, variances, numbers = numpy.split(numbers, [filters, 2 * filters, 3 * filters])
+    kernel, numbers = numpy.split(numbers, [filters * channels * size * size])
+    padding = size // 2 if whole.get("pad") else whole.get("padding", 0)
+    result = correlated(image, kernel.reshape(filters, channels, size, size), stride, padding, groups)
+    if whole.get("batch_normalize"):
+        for index in range(filters):
+            result[index] = (result[index] - means[index]) / numpy.sqrt(variances[index] + 1e-6) * scales[index]
+    return activated(result + bias[:, None, None], options["activation"]), numbers
+
+
+def correlated(image, kernel, stride, padding, groups=1):
+    """The sum of kernel times window at every place."""
+    filters, channels, size, _ = kernel.shape
+    padded = numpy.pad(image, ((0, 0), (padding, padding), (padding, padding)))
+    height, width = ((extent + 2 * padding - size) // stride + 1 for extent in image.shape[1:])
+    result = numpy.empty((filters, height, width))
+    per_group, rows_of_kernel = filters // groups, kernel.reshape(filters, -1)
+    for row in range(height):
+        for column in range(width):
+            patch = padded[:, row * stride : row * stride + size, column * stride : column * stride + size]
+            for group in range(groups):
+                own = slice(group * per_group, (group + 1) * per_group)
+                seen = patch[group * channels : (group + 1) * channels].ravel()
+                result[own, row, column] = rows_of_kernel[own] @ seen
+    return result
+
+
+def activated(values, activation):
+    """The activation of every value."""
+    match activation:
+        case "linear":
+            return values
+        case "leaky":
+            return numpy.where(values > 0, values, 0.1 * values)
+        case "relu":
+            return numpy.where(values > 0, values, 0)
+        case "logistic":
+            return 1 / (1 + numpy.exp(-values))
+        case "mish":
+            return values * numpy.tanh(numpy.log(1 + numpy.exp(values)))
+
+
+def pooled(image, size, stride, padding):
+    """The largest value of each window; places outside the image do not count."""
+    channels, height, width = image.shape
+    rows, columns = ((extent + padding - size) // stride + 1 for extent in (height, width))
+    result = numpy.full((channels, rows, columns), -numpy.inf)
+    for row in range(rows):
+        for column in range(columns):
+            top, left = row * stride - padding // 2, column * stride - padding // 2
+            window = image[:, max(top, 0) : top + size, max(left, 0) : left + size]
+            result[:, row, column] = window.max(axis=(1, 2))
+    return result
+
+
+def reordered(image, stride):
+    """Place by place through the memory: the map is read as one with fewer channels and larger sides."""
+    channels, height, width = image.shape
+    memory, result = image.ravel(), numpy.empty(image.size)
+    coarse = channels // stride**2
+    for place in range(image.size):
+        channel, inside = divmod(place, height * width)
+        row, column = divmod(inside, width)
+        shift, source_channel = divmod(channel, coarse)
+        source_row = row * stride + shift // stride
+        source_column = column * stride + shift % stride
+        result[place] = memory[(source_channel * height * stride + source_row) * width * stride + source_column]
+    return result.reshape(channels * stride**2, height // stride, width // stride)

@@ -1,0 +1,71 @@
+//! The models that the settings describe.
+
+use std::path::Path;
+
+use crate::{
+    inference::{
+        DetectorLoader, ModelManifest, ModelRepository, OnnxDetector, OnnxOptions,
+        RepositoryOptions, is_fetched,
+    },
+    pipeline::DefaultModels,
+    settings::{Settings, SettingsError},
+};
+
+/// The repository, none of its models loaded, and which of them answer by default.
+///
+/// # Errors
+/// One sentence that names the setting: a file that is missing or cannot be used.
+pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, DefaultModels)> {
+    let loader = loader(settings)?;
+    let folder = settings.model.find_repository()?;
+    let one = settings.model.find_one()?;
+    let elsewhere = match one {
+        Some(path) => Some((ModelManifest::locate(&path)?.name, path)),
+        None => None,
+    };
+    let defaults = match &elsewhere {
+        Some((name, _)) => DefaultModels::One(name.clone()),
+        None => per_profile(&folder),
+    };
+    let options = RepositoryOptions {
+        folder,
+        elsewhere,
+        warm_up_views: settings.inference.max_batch_views,
+        kept: defaults
+            .names()
+            .into_iter()
+            .map(ToOwned::to_owned)
+            .collect(),
+    };
+    Ok((ModelRepository::new(options, loader), defaults))
+}
+
+/// Makes detectors as the settings say.
+pub(crate) fn loader(settings: &Settings) -> Result<DetectorLoader, SettingsError> {
+    let library = settings.inference.find_library()?;
+    let options = onnx_options(settings);
+    Ok(Box::new(move |path| {
+        let detector = OnnxDetector::load(&library, path, options.clone())?;
+        Ok(Box::new(detector))
+    }))
+}
+
+/// How the settings want networks to be run.
+pub(crate) fn onnx_options(settings: &Settings) -> OnnxOptions {
+    OnnxOptions {
+        device: settings.inference.device,
+        threads: settings.threads.network,
+        score_floor: settings.inference.score_floor,
+        max_detections_per_view: settings.inference.max_detections_per_view.get(),
+    }
+}
+
+fn per_profile(folder: &Path) -> DefaultModels {
+    let defaults = DefaultModels::per_profile(|name| is_fetched(&folder.join(name)));
+    if let DefaultModels::PerProfile { missing } = &defaults {
+        for name in missing {
+            tracing::warn!("{name} is not there, so a smaller model stands in: run `make models`");
+        }
+    }
+    defaults
+}

@@ -1,0 +1,162 @@
+//! Output heads: what a network answers, turned into person boxes. Pure functions.
+//!
+//! A [`Head`] is the `[output]` table of a model's manifest. Every head reads the score of the
+//! person class alone and drops what lies below the floor before it computes a box. Boxes come
+//! out in view pixels, clipped to the view, overlapping as the network left them. Arithmetic is
+//! in `f64`.
+
+mod boxes_scores;
+mod centernet;
+mod detr;
+mod end_to_end;
+mod finds;
+mod grid;
+mod nanodet;
+mod outputs;
+mod score;
+mod shape;
+mod ssd;
+mod tensor;
+mod yolo_v2;
+mod yolo_v3;
+mod yolo_v8;
+mod yolox;
+
+use serde::Deserialize;
+
+use self::{finds::Finds, shape::Batch};
+use super::{InferenceError, ViewDetection};
+use crate::imaging::NetworkInput;
+
+pub use self::{
+    boxes_scores::BoxesScoresHead,
+    centernet::{CenternetHead, CenternetUnit},
+    detr::DetrHead,
+    end_to_end::{Column, EndToEndHead, EndToEndUnit},
+    nanodet::{NanodetHead, PriorPosition},
+    score::{Activation, ClassActivation},
+    ssd::{AnchorGenerator, SsdHead},
+    tensor::{OutputShape, TensorView},
+    yolo_v2::YoloV2Head,
+    yolo_v3::YoloV3Head,
+    yolo_v8::{YoloV8Head, YoloV8Layout},
+    yolox::YoloxHead,
+};
+
+/// How a model's outputs become boxes. In a manifest: `head = "yolox"` and that head's fields.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "head", rename_all = "snake_case")]
+pub enum Head {
+    /// The graph decodes: boxes and person scores come out.
+    BoxesScores(BoxesScoresHead),
+    /// SSD: offsets to anchors, class scores.
+    Ssd(SsdHead),
+    /// `YOLOv2`: one grid, softmax over classes.
+    YoloV2(YoloV2Head),
+    /// `YOLOv3`: a grid per scale, a sigmoid per class.
+    YoloV3(YoloV3Head),
+    /// YOLOX: anchor-free, with objectness.
+    Yolox(YoloxHead),
+    /// `NanoDet`: distances to the sides as distributions.
+    Nanodet(NanodetHead),
+    /// `YOLOv8` and its successors: decoded boxes and class scores in one tensor.
+    YoloV8(YoloV8Head),
+    /// The DETR family: a set of queries.
+    Detr(DetrHead),
+    /// `CenterNet`: peaks of a heat map.
+    Centernet(CenternetHead),
+    /// The graph suppresses overlaps too: rows of finished detections.
+    EndToEnd(EndToEndHead),
+}
+
+/// What a batch of views came to.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HeadOutput {
+    /// The persons of each view, in the order of the network's candidates.
+    pub per_view: Vec<Vec<ViewDetection>>,
+    /// Candidates dropped because their score was not finite, or because it reached the floor
+    /// and their box was not finite or beyond ±1e9 pixels.
+    pub non_finite: usize,
+}
+
+/// What every head does. `batch.views` is known in [`Decoder::decode`] only.
+trait Decoder {
+    /// Whether outputs of these shapes can be decoded; otherwise a sentence.
+    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String>;
+
+    /// Checks the outputs, then hands every candidate to `finds`.
+    fn decode(
+        &self,
+        outputs: &[TensorView<'_>],
+        batch: &Batch,
+        finds: &mut Finds,
+    ) -> Result<(), String>;
+}
+
+impl Head {
+    /// Whether a model with these outputs and an input of `(width, height)` pixels can be
+    /// decoded. Dimensions the model leaves open are -1.
+    ///
+    /// # Errors
+    /// One sentence about the model ("its output …"): what was found, what is needed.
+    pub fn check(&self, outputs: &[OutputShape<'_>], input: (u32, u32)) -> Result<(), String> {
+        let batch = Batch {
+            views: None,
+            width: input.0,
+            height: input.1,
+        };
+        self.decoder().check(outputs, &batch)
+    }
+
+    /// The persons in `views` views whose score is at least `floor` (0 to 1).
+    ///
+    /// # Errors
+    /// [`InferenceError::Run`] when an output is missing or has another shape than this head
+    /// needs, or holds scores that are no probabilities where the manifest says they are.
+    pub fn decode(
+        &self,
+        outputs: &[TensorView<'_>],
+        views: usize,
+        input: &NetworkInput,
+        floor: f64,
+    ) -> Result<HeadOutput, InferenceError> {
+        let batch = Batch {
+            views: Some(views),
+            width: input.width,
+            height: input.height,
+        };
+        let mut finds = Finds::new(views, input, floor);
+        outputs
+            .iter()
+            .try_for_each(TensorView::check_len)
+            .and_then(|()| self.decoder().decode(outputs, &batch, &mut finds))
+            .and_then(|()| finds.finish())
+            .map_err(InferenceError::Run)
+    }
+
+    fn decoder(&self) -> &dyn Decoder {
+        match self {
+            Self::BoxesScores(head) => head,
+            Self::Ssd(head) => head,
+            Self::YoloV2(head) => head,
+            Self::YoloV3(head) => head,
+            Self::Yolox(head) => head,
+            Self::Nanodet(head) => head,
+            Self::YoloV8(head) => head,
+            Self::Detr(head) => head,
+            Self::Centernet(head) => head,
+            Self::EndToEnd(head) => head,
+        }
+    }
+}
+
+impl Default for Head {
+    fn default() -> Self {
+        Self::BoxesScores(BoxesScoresHead::default())
+    }
+}
+
+#[cfg(test)]
+mod properties;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,74 @@
+//! Graphs that decode by themselves.
+
+use serde::Deserialize;
+
+use super::{
+    Decoder,
+    finds::{Finds, four},
+    outputs::named,
+    score::Activation,
+    shape::{Axis, Batch},
+    tensor::{Output, OutputShape, TensorView},
+};
+
+/// Boxes `[views, candidates, 4]` (`x_min, y_min, x_max, y_max`, view pixels) and scores
+/// `[views, candidates]` of being a person, 0 to 1.
+///
+/// ```toml
+/// [output]              # may be left out altogether
+/// head = "boxes_scores"
+/// boxes = "boxes"       # default
+/// scores = "scores"     # default
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BoxesScoresHead {
+    /// The output with the boxes.
+    pub boxes: String,
+    /// The output with the scores.
+    pub scores: String,
+}
+
+impl Default for BoxesScoresHead {
+    fn default() -> Self {
+        Self {
+            boxes: "boxes".to_owned(),
+            scores: "scores".to_owned(),
+        }
+    }
+}
+
+impl BoxesScoresHead {
+    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<[&'o T; 2], String> {
+        let boxes = named(outputs, &self.boxes)?;
+        let scores = named(outputs, &self.scores)?;
+        let candidates = Axis::AtLeast(0, "candidates");
+        batch.require(&[
+            (boxes, &[Axis::Views, candidates, Axis::Exactly(4)]),
+            (scores, &[Axis::Views, candidates]),
+        ])?;
+        Ok([boxes, scores])
+    }
+}
+
+impl Decoder for BoxesScoresHead {
+    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
+        self.select(outputs, batch).map(drop)
+    }
+
+    fn decode(
+        &self,
+        outputs: &[TensorView<'_>],
+        batch: &Batch,
+        finds: &mut Finds,
+    ) -> Result<(), String> {
+        let [boxes, scores] = self.select(outputs, batch)?;
+        for (view, (boxes, scores)) in boxes.views().zip(scores.views()).enumerate() {
+            for (corners, &raw) in boxes.chunks_exact(4).zip(scores) {
+                let score = Activation::None.score(raw, finds.floor);
+                finds.offer(view, score, || four(corners));
+            }
+        }
+        Ok(())
+    }
+}

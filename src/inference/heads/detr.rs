@@ -1,0 +1,91 @@
+//! The DETR family.
+
+use serde::Deserialize;
+
+use super::{
+    Decoder,
+    finds::{Finds, corners_around, four},
+    outputs::boxes_and_scores,
+    score::ClassActivation,
+    shape::{Axis, Batch},
+    tensor::{Output, OutputShape, TensorView},
+};
+
+/// DETR and descendants (RT-DETR, D-FINE, RF-DETR), raw: class logits
+/// `[views, queries, classes]` and boxes `[views, queries, 4]` (centre x, centre y, width,
+/// height, in shares of the view).
+///
+/// The score is a sigmoid per class; in the original DETR a softmax over the classes and "no
+/// object".
+///
+/// Sources: Carion et al., "End-to-End Object Detection with Transformers", 2020, section 3;
+/// Zhao et al., "DETRs Beat YOLOs on Real-time Object Detection", 2024.
+///
+/// ```toml
+/// [output]
+/// head = "detr"
+/// person_class = 0               # 80 COCO classes; 1 where they are numbered as in COCO (RF-DETR, DETR)
+/// score_activation = "sigmoid"   # default; DETR: "softmax"
+/// # boxes = "pred_boxes"         # where the shapes do not tell them apart
+/// # scores = "logits"
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DetrHead {
+    /// Index of the person among the classes.
+    pub person_class: u16,
+    /// What is left to do to the class scores.
+    #[serde(default)]
+    pub score_activation: ClassActivation,
+    /// The output with the boxes; by default the one whose last axis is 4.
+    #[serde(default)]
+    pub boxes: Option<String>,
+    /// The output with the class scores; by default the other one with three axes.
+    #[serde(default)]
+    pub scores: Option<String>,
+}
+
+impl DetrHead {
+    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<[&'o T; 2], String> {
+        let names = [self.boxes.as_deref(), self.scores.as_deref()];
+        let [boxes, scores] = boxes_and_scores(outputs, names)?;
+        let queries = Axis::AtLeast(0, "queries");
+        let classes = Axis::AtLeast(usize::from(self.person_class) + 1, "classes");
+        batch.require(&[
+            (boxes, &[Axis::Views, queries, Axis::Exactly(4)]),
+            (scores, &[Axis::Views, queries, classes]),
+        ])?;
+        Ok([boxes, scores])
+    }
+}
+
+impl Decoder for DetrHead {
+    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
+        self.select(outputs, batch).map(drop)
+    }
+
+    fn decode(
+        &self,
+        outputs: &[TensorView<'_>],
+        batch: &Batch,
+        finds: &mut Finds,
+    ) -> Result<(), String> {
+        let [boxes, scores] = self.select(outputs, batch)?;
+        let person = usize::from(self.person_class);
+        let [view_width, view_height] = [batch.width, batch.height].map(f64::from);
+        for (view, (boxes, all_scores)) in boxes.views().zip(scores.views()).enumerate() {
+            let queries = boxes
+                .chunks_exact(4)
+                .zip(all_scores.chunks_exact(scores.shape[2]));
+            for (sides, scores) in queries {
+                let score = self.score_activation.score(scores, person, finds.floor);
+                finds.offer(view, score, || {
+                    let [x, y, width, height] = four(sides);
+                    let center = [x * view_width, y * view_height];
+                    corners_around(center, [width * view_width, height * view_height])
+                });
+            }
+        }
+        Ok(())
+    }
+}

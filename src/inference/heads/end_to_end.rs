@@ -1,0 +1,156 @@
+//! Graphs with suppression inside.
+
+mod columns;
+
+use serde::Deserialize;
+
+use self::columns::Places;
+use super::{
+    Decoder,
+    finds::Finds,
+    outputs::named_or_only,
+    score::Activation,
+    shape::{Axis, Batch},
+    tensor::{Output, OutputShape, TensorView},
+};
+
+pub use columns::Column;
+
+/// Graphs that suppress overlaps themselves: rows of finished detections, either
+/// `[views, rows, columns]`, or, where a column says which view a row belongs to,
+/// `[…, rows, columns]` with any leading axes. Rows of padding (view -1, score 0) fall away.
+///
+/// Six columns are by default `x_min, y_min, x_max, y_max, score, class` (`YOLOv10`, YOLO26 and
+/// exports "with NMS"). There is no usual order of seven, so it has to be said: `YOLOv7` writes
+/// `view, x_min, y_min, x_max, y_max, class, score`, Caffe and `OpenVINO` write
+/// `view, class, score, x_min, y_min, x_max, y_max` in shares of the view.
+///
+/// ```toml
+/// [output]
+/// head = "end_to_end"
+/// person_class = 0     # COCO, 80 classes
+/// columns = ["view", "x_min", "y_min", "x_max", "y_max", "class", "score"]
+/// unit = "pixels"      # default; or "share" of the view's width and height
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EndToEndHead {
+    /// The person's number in the class column.
+    pub person_class: u16,
+    /// What the first columns hold; columns beyond are left alone.
+    #[serde(default)]
+    pub columns: Option<Vec<Column>>,
+    /// What box sides are measured in.
+    #[serde(default)]
+    pub unit: EndToEndUnit,
+    /// The output to read; by default the only one.
+    #[serde(default)]
+    pub name: Option<String>,
+}
+
+/// What box sides are measured in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndToEndUnit {
+    /// Pixels of the network's input.
+    #[default]
+    Pixels,
+    /// Shares of the input's width and height.
+    Share,
+}
+
+impl EndToEndHead {
+    fn select<'o, T: Output>(
+        &self,
+        outputs: &'o [T],
+        batch: &Batch,
+    ) -> Result<(&'o T, Places), String> {
+        let rows = named_or_only(outputs, self.name.as_deref())?;
+        let dimensions = rows.dimensions();
+        let columns = match (&self.columns, dimensions.last().copied().flatten()) {
+            (Some(columns), _) => columns,
+            (None, None | Some(6)) => &columns::SIX[..],
+            (None, Some(found)) => {
+                return Err(format!(
+                    "its output {:?} has rows of {found}; list what they hold as `columns` in the \
+                     manifest's [output]",
+                    rows.name()
+                ));
+            }
+        };
+        let places = Places::of(columns)?;
+        let mut axes = match places.view {
+            None => vec![Axis::Views],
+            Some(_) => vec![Axis::Any; dimensions.len().saturating_sub(2)],
+        };
+        axes.extend([
+            Axis::AtLeast(0, "rows"),
+            Axis::AtLeast(columns.len(), "columns"),
+        ]);
+        batch.require(&[(rows, &axes)])?;
+        Ok((rows, places))
+    }
+
+    fn offer(&self, row: &[f32], places: &Places, view: usize, batch: &Batch, finds: &mut Finds) {
+        let class = row[places.class];
+        if !class.is_finite() {
+            return finds.count_non_finite();
+        }
+        if (class - f32::from(self.person_class)).abs() >= 0.5 {
+            return;
+        }
+        let [width, height] = match self.unit {
+            EndToEndUnit::Pixels => [1.0; 2],
+            EndToEndUnit::Share => [batch.width, batch.height].map(f64::from),
+        };
+        let score = Activation::None.score(row[places.score], finds.floor);
+        finds.offer(view, score, || {
+            let [x_min, y_min, x_max, y_max] = places.sides.map(|place| f64::from(row[place]));
+            [x_min * width, y_min * height, x_max * width, y_max * height]
+        });
+    }
+}
+
+/// The view numbered `raw`, if it is one of so many.
+fn view_number(raw: f32, views: usize) -> Option<usize> {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the cast saturates and negative numbers are ruled out"
+    )]
+    (raw > -0.5)
+        .then_some(raw.round() as usize)
+        .filter(|&view| view < views)
+}
+
+impl Decoder for EndToEndHead {
+    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
+        self.select(outputs, batch).map(drop)
+    }
+
+    fn decode(
+        &self,
+        outputs: &[TensorView<'_>],
+        batch: &Batch,
+        finds: &mut Finds,
+    ) -> Result<(), String> {
+        let (rows, places) = self.select(outputs, batch)?;
+        let columns = rows.shape[rows.shape.len() - 1];
+        let Some(place) = places.view else {
+            for (view, values) in rows.views().enumerate() {
+                for row in values.chunks_exact(columns) {
+                    self.offer(row, &places, view, batch, finds);
+                }
+            }
+            return Ok(());
+        };
+        for row in rows.values.chunks_exact(columns) {
+            if !row[place].is_finite() {
+                finds.count_non_finite();
+            } else if let Some(view) = view_number(row[place], batch.views.unwrap_or(0)) {
+                self.offer(row, &places, view, batch, finds);
+            }
+        }
+        Ok(())
+    }
+}

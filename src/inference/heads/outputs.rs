@@ -1,0 +1,64 @@
+//! Finding a head's outputs among all of a model's.
+
+use super::tensor::Output;
+
+/// The output of that name.
+pub(super) fn named<'o, T: Output>(outputs: &'o [T], name: &str) -> Result<&'o T, String> {
+    let found = outputs.iter().find(|output| output.name() == name);
+    found.ok_or_else(|| {
+        format!(
+            "it has no output {name:?}, only {}; name the right one in the manifest's [output]",
+            names(outputs)
+        )
+    })
+}
+
+/// The output of that name; without a name, the only one.
+pub(super) fn named_or_only<'o, T: Output>(
+    outputs: &'o [T],
+    name: Option<&str>,
+) -> Result<&'o T, String> {
+    match (name, outputs) {
+        (Some(name), _) => named(outputs, name),
+        (None, [only]) => Ok(only),
+        (None, _) => Err(format!(
+            "it has the outputs {}; say which one to read with `name` in the manifest's [output]",
+            names(outputs)
+        )),
+    }
+}
+
+/// The outputs with boxes and with the scores of all classes: those named, else those told
+/// apart by shape. Both have three axes, the last axis of the boxes is 4.
+pub(super) fn boxes_and_scores<'o, T: Output>(
+    outputs: &'o [T],
+    [boxes, scores]: [Option<&str>; 2],
+) -> Result<[&'o T; 2], String> {
+    let find = |name: Option<&str>, last_axis_is_four: bool| {
+        if let Some(name) = name {
+            return named(outputs, name).map(Some);
+        }
+        // An axis that is not known yet could be either.
+        let mut fitting = outputs.iter().filter(|output| {
+            let dimensions = output.dimensions();
+            let last = dimensions.last().copied().flatten();
+            dimensions.len() == 3
+                && last.is_none_or(|last| last_axis_is_four == (last == 4))
+                && ![boxes, scores].contains(&Some(output.name()))
+        });
+        Ok(fitting.next().filter(|_| fitting.next().is_none()))
+    };
+    if let (Some(boxes), Some(scores)) = (find(boxes, true)?, find(scores, false)?) {
+        return Ok([boxes, scores]);
+    }
+    Err(format!(
+        "which of its outputs {} hold boxes and scores cannot be told by shape; name them with \
+         `boxes` and `scores` in the manifest's [output]",
+        names(outputs)
+    ))
+}
+
+pub(super) fn names<T: Output>(outputs: &[T]) -> String {
+    let names: Vec<_> = outputs.iter().map(|o| format!("{:?}", o.name())).collect();
+    names.join(", ")
+}

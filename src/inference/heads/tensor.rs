@@ -1,0 +1,79 @@
+//! A network's outputs: their promised shapes, and their values.
+
+/// An output as the model declares it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutputShape<'a> {
+    /// The output's name in the model.
+    pub name: &'a str,
+    /// Its dimensions; -1 (or any negative number) for one that is known only at run time.
+    pub shape: &'a [i64],
+}
+
+/// An output of one run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TensorView<'a> {
+    /// The output's name in the model.
+    pub name: &'a str,
+    /// Its dimensions. Their product must be the number of values; [`super::Head::decode`]
+    /// refuses the tensor otherwise.
+    pub shape: &'a [usize],
+    /// Its values, row-major.
+    pub values: &'a [f32],
+}
+
+/// What shape checks need to know of an output, before and after a run.
+pub(super) trait Output {
+    fn name(&self) -> &str;
+
+    /// The dimensions; `None` for one that is not known yet.
+    fn dimensions(&self) -> Vec<Option<usize>>;
+}
+
+impl Output for OutputShape<'_> {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn dimensions(&self) -> Vec<Option<usize>> {
+        self.shape
+            .iter()
+            .map(|&d| usize::try_from(d).ok())
+            .collect()
+    }
+}
+
+impl Output for TensorView<'_> {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn dimensions(&self) -> Vec<Option<usize>> {
+        self.shape.iter().copied().map(Some).collect()
+    }
+}
+
+impl<'a> TensorView<'a> {
+    /// Refuses a shape that its values do not fill exactly.
+    pub(super) fn check_len(&self) -> Result<(), String> {
+        let product = self.shape.iter().try_fold(1_usize, |product, &dimension| {
+            product.checked_mul(dimension)
+        });
+        if product == Some(self.values.len()) {
+            return Ok(());
+        }
+        Err(format!(
+            "its output {:?} came back with {} values for the shape {:?}",
+            self.name,
+            self.values.len(),
+            self.shape
+        ))
+    }
+
+    /// The values of each entry of the first axis.
+    pub(super) fn views(&self) -> impl Iterator<Item = &'a [f32]> + use<'a> {
+        let views = self.shape.first().copied().unwrap_or(0);
+        let values = self.values;
+        let len = values.len().checked_div(views).unwrap_or(0);
+        (0..views).map(move |view| &values[view * len..][..len])
+    }
+}

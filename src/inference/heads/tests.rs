@@ -1,0 +1,135 @@
+//! How every head treats floors, edges and broken values.
+
+mod known_models;
+mod refusals;
+
+use super::{Head, HeadOutput, InferenceError, TensorView};
+use crate::{detection::BBox, imaging::NetworkInput};
+
+/// The head of a manifest's `[output]` table.
+fn head(manifest: &str) -> Head {
+    toml::from_str(manifest).unwrap()
+}
+
+fn decode(
+    head: &Head,
+    outputs: &[(&str, &[usize], &[f32])],
+    floor: f64,
+) -> Result<HeadOutput, InferenceError> {
+    let outputs: Vec<TensorView<'_>> = outputs
+        .iter()
+        .map(|&(name, shape, values)| TensorView {
+            name,
+            shape,
+            values,
+        })
+        .collect();
+    head.decode(&outputs, 1, &NetworkInput::plain(100, 50), floor)
+}
+
+/// What comes of one box with one score.
+fn decode_one(corners: [f32; 4], score: f32, floor: f64) -> HeadOutput {
+    decode(
+        &Head::default(),
+        &[
+            ("boxes", &[1, 1, 4], &corners),
+            ("scores", &[1, 1], &[score]),
+        ],
+        floor,
+    )
+    .unwrap()
+}
+
+const INSIDE: [f32; 4] = [10.0, 10.0, 30.0, 40.0];
+
+#[test]
+fn a_box_beyond_the_view_is_clipped_to_it() {
+    let found = decode_one([-20.0, 10.0, 130.0, 70.0], 0.9, 0.5);
+    let clipped = BBox::new([0.0, 10.0, 100.0, 50.0]).unwrap();
+    assert_eq!(found.per_view[0][0].bbox, clipped);
+}
+
+#[test]
+fn boxes_without_area_in_the_view_are_dropped_and_not_counted() {
+    for corners in [
+        [110.0, 10.0, 130.0, 30.0],
+        [100.0, 10.0, 130.0, 30.0],
+        [10.0, 10.0, 10.0, 30.0],
+        [30.0, 10.0, 10.0, 30.0],
+    ] {
+        let found = decode_one(corners, 0.9, 0.5);
+        assert_eq!((found.per_view[0].len(), found.non_finite), (0, 0));
+    }
+}
+
+#[test]
+fn values_that_are_not_finite_are_dropped_and_counted() {
+    let [x_min, y_min, x_max, _] = INSIDE;
+    for (corners, score) in [
+        (INSIDE, f32::NAN),
+        (INSIDE, f32::INFINITY),
+        (INSIDE, f32::NEG_INFINITY),
+        ([f32::NAN, y_min, x_max, 40.0], 0.9),
+        ([x_min, y_min, x_max, f32::INFINITY], 0.9),
+        ([x_min, y_min, x_max, 1e20], 0.9),
+    ] {
+        let found = decode_one(corners, score, 0.5);
+        assert_eq!((found.per_view[0].len(), found.non_finite), (0, 1));
+    }
+}
+
+#[test]
+fn the_box_of_a_low_score_is_not_looked_at() {
+    let found = decode_one([f32::NAN; 4], 0.4, 0.5);
+    assert_eq!((found.per_view[0].len(), found.non_finite), (0, 0));
+}
+
+#[test]
+fn an_exponential_beyond_all_pictures_is_counted() {
+    let yolo = head("head = 'yolo_v2'\nperson_class = 0\nanchors = [[1, 1]]");
+    let raw = [0.0, 0.0, 1000.0, 0.0, 9.0, 9.0];
+    let found = decode(&yolo, &[("grid", &[1, 6, 1, 1], &raw)], 0.5).unwrap();
+    assert_eq!((found.per_view[0].len(), found.non_finite), (0, 1));
+}
+
+#[test]
+fn only_the_person_class_counts() {
+    let rows = head("head = 'end_to_end'\nperson_class = 2");
+    let row = |class: f32| [10.0, 10.0, 30.0, 40.0, 0.9, class];
+    let values: Vec<f32> = [0.0, 1.0, 2.0, 3.0].into_iter().flat_map(row).collect();
+    let found = decode(&rows, &[("rows", &[1, 4, 6], &values)], 0.5).unwrap();
+    assert_eq!(found.per_view[0].len(), 1);
+}
+
+#[test]
+fn a_table_without_rows_is_an_empty_view() {
+    let rows = head("head = 'end_to_end'\nperson_class = 0");
+    let found = decode(&rows, &[("rows", &[1, 0, 6], &[])], 0.5).unwrap();
+    assert_eq!(found.per_view, [vec![]]);
+}
+
+/// A heat map of 5×10 equal cells, each of 10×10 pixels, without offsets.
+fn plateau(max_peaks: usize) -> Vec<[f64; 2]> {
+    let peaks = head(&format!(
+        "head = 'centernet'\nperson_class = 0\nheat_map = 'hm'\nsize = 'wh'\n\
+         max_peaks = {max_peaks}"
+    ));
+    let outputs: [(&str, &[usize], &[f32]); 2] = [
+        ("hm", &[1, 1, 5, 10], &[0.8; 50]),
+        ("wh", &[1, 2, 5, 10], &[1.0; 100]),
+    ];
+    let found = decode(&peaks, &outputs, 0.5).unwrap();
+    let persons = found.per_view[0].iter();
+    persons.map(|person| person.bbox.center()).collect()
+}
+
+#[test]
+fn every_cell_of_a_plateau_is_a_peak() {
+    assert_eq!(plateau(50).len(), 50);
+}
+
+#[test]
+fn of_too_many_equal_peaks_the_first_are_kept() {
+    assert_eq!(plateau(3), [[5.0, 5.0], [15.0, 5.0], [25.0, 5.0]]);
+    assert!(plateau(0).is_empty());
+}

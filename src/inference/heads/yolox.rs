@@ -1,0 +1,98 @@
+//! YOLOX.
+
+use std::num::NonZeroU32;
+
+use serde::Deserialize;
+
+use super::{
+    Decoder,
+    finds::{Finds, corners_around, four},
+    grid::{Grid, default_strides, pyramid, pyramid_len},
+    outputs::named_or_only,
+    score::Activation,
+    shape::{Axis, Batch},
+    tensor::{Output, OutputShape, TensorView},
+};
+
+/// YOLOX: `[views, cells, 5 + classes]`, per cell `t_x, t_y, t_w, t_h`, objectness and class
+/// scores; cells level by level, row by row.
+///
+/// Centre `((t_x + column) · stride, (t_y + row) · stride)`, size
+/// `(stride · e^t_w, stride · e^t_h)`; score `objectness · class`.
+///
+/// Sources: Ge et al., "YOLOX: Exceeding YOLO Series in 2021", section 2.1; `decode_outputs` of
+/// the reference implementation, whose export applies the sigmoids but does not decode boxes.
+///
+/// ```toml
+/// [output]
+/// head = "yolox"
+/// person_class = 0            # COCO, 80 classes
+/// strides = [8, 16, 32]       # default
+/// decode_in_graph = false     # default; true: centre and size come in pixels
+/// score_activation = "none"   # default; or "sigmoid"
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct YoloxHead {
+    /// Index of the person among the classes.
+    pub person_class: u16,
+    /// Pixels per cell of each level, in the network's order.
+    #[serde(default = "default_strides")]
+    pub strides: Vec<NonZeroU32>,
+    /// Whether boxes come as centre and size in pixels.
+    #[serde(default)]
+    pub decode_in_graph: bool,
+    /// What is left to do to objectness and class scores.
+    #[serde(default)]
+    pub score_activation: Activation,
+    /// The output to read; by default the only one.
+    #[serde(default)]
+    pub name: Option<String>,
+}
+
+impl YoloxHead {
+    fn select<'o, T: Output>(&self, outputs: &'o [T], batch: &Batch) -> Result<&'o T, String> {
+        let candidates = named_or_only(outputs, self.name.as_deref())?;
+        let cells = Axis::Exactly(pyramid_len(&self.strides, batch));
+        let columns = Axis::AtLeast(6 + usize::from(self.person_class), "columns");
+        batch.require(&[(candidates, &[Axis::Views, cells, columns])])?;
+        Ok(candidates)
+    }
+
+    fn corners(&self, values: &[f32], grid: Grid, [column, row]: [f64; 2]) -> [f64; 4] {
+        let [x, y, width, height] = four(values);
+        if self.decode_in_graph {
+            return corners_around([x, y], [width, height]);
+        }
+        let center = grid.pixels([x + column, y + row]);
+        corners_around(center, grid.pixels([width.exp(), height.exp()]))
+    }
+}
+
+impl Decoder for YoloxHead {
+    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String> {
+        self.select(outputs, batch).map(drop)
+    }
+
+    fn decode(
+        &self,
+        outputs: &[TensorView<'_>],
+        batch: &Batch,
+        finds: &mut Finds,
+    ) -> Result<(), String> {
+        let candidates = self.select(outputs, batch)?;
+        let person = 5 + usize::from(self.person_class);
+        let floor = finds.floor;
+        for (view, values) in candidates.views().enumerate() {
+            let rows = values.chunks_exact(candidates.shape[2]);
+            for (values, (grid, cell)) in rows.zip(pyramid(&self.strides, batch)) {
+                let score = self
+                    .score_activation
+                    .score(values[4], floor)
+                    .times(floor, || self.score_activation.score(values[person], floor));
+                finds.offer(view, score, || self.corners(values, grid, cell));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,76 @@
+//! Sessions on the device that the settings name.
+
+use std::path::Path;
+
+use ort::{
+    environment::Environment,
+    ep::{CUDA, ExecutionProvider, ExecutionProviderDispatch, TensorRT},
+    session::{Session, builder::SessionBuilder},
+};
+
+use super::{OnnxOptions, first_line};
+use crate::inference::{Device, InferenceError};
+
+/// Makes sessions.
+pub(super) struct Builder(SessionBuilder);
+
+impl Builder {
+    pub(super) fn commit(mut self, model: &[u8]) -> Result<Session, ort::Error> {
+        self.0.commit_from_memory(model)
+    }
+}
+
+/// A builder of sessions on the options' device: they run there or not at all.
+pub(super) fn builder(
+    environment: &Environment,
+    library: &Path,
+    options: &OnnxOptions,
+) -> Result<Builder, InferenceError> {
+    let device = options.device;
+    let (providers, available) = providers(device);
+    if !available {
+        return Err(InferenceError::NoProvider {
+            device,
+            path: library.to_owned(),
+        });
+    }
+    let failed = |error: ort::Error| InferenceError::Run(first_line(&error));
+    let builder = Session::builder(environment)
+        .map_err(failed)?
+        .with_intra_threads(options.threads.get())
+        .map_err(|error| failed(error.into()))?
+        // Idle pool threads must not spin: they would steal the cores that decode and remap.
+        .with_intra_op_spinning(false)
+        .map_err(|error| failed(error.into()))?
+        .with_execution_providers(providers)
+        .map_err(|error| InferenceError::NoDevice {
+            device,
+            detail: first_line(&error.into()),
+        })?;
+    Ok(Builder(builder))
+}
+
+/// The device's execution providers, first choice first, and whether the library has them. The
+/// processor is always the last choice, for operators that a GPU has no code for.
+fn providers(device: Device) -> (Vec<ExecutionProviderDispatch>, bool) {
+    let cuda = |number| {
+        CUDA::default()
+            .with_device_id(number)
+            .build()
+            .error_on_failure()
+    };
+    match device {
+        Device::Cpu => (Vec::new(), true),
+        Device::Cuda(number) => (vec![cuda(number)], has::<CUDA>()),
+        Device::TensorRt(number) => {
+            let tensor_rt = TensorRT::default().with_device_id(number).build();
+            let providers = vec![tensor_rt.error_on_failure(), cuda(number)];
+            (providers, has::<TensorRT>() && has::<CUDA>())
+        }
+    }
+}
+
+/// Whether the library was built with this provider.
+fn has<P: ExecutionProvider>() -> bool {
+    P::is_available().unwrap_or(false)
+}

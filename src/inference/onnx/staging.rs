@@ -1,0 +1,149 @@
+//! Batches as a model wants them: in pieces of its fixed size, in its order of axes.
+
+use std::num::NonZeroUsize;
+
+use super::signature::Signature;
+use crate::{
+    imaging::{NetworkInput, ViewBatch},
+    inference::Layout,
+};
+
+/// Turns batches into inputs.
+pub(super) struct Staging {
+    input_name: String,
+    layout: Layout,
+    views_per_run: Option<NonZeroUsize>,
+    /// Kept from run to run; empty for models that take batches as they are.
+    values: Vec<f32>,
+}
+
+/// The input of one run.
+pub(super) struct Staged<'a> {
+    pub(super) name: &'a str,
+    pub(super) shape: [usize; 4],
+    pub(super) values: &'a [f32],
+}
+
+impl Staging {
+    pub(super) fn new(signature: &Signature) -> Self {
+        Self {
+            input_name: signature.input_name.clone(),
+            layout: signature.layout,
+            views_per_run: signature.views_per_run,
+            values: Vec::new(),
+        }
+    }
+
+    /// The batch's values, as many as go into one run each.
+    pub(super) fn pieces<'b>(
+        &self,
+        batch: &'b ViewBatch,
+        input: &NetworkInput,
+    ) -> std::slice::Chunks<'b, f32> {
+        let views = self.views_per_run.map_or(batch.views(), NonZeroUsize::get);
+        batch.values().chunks(views.max(1) * input.view_len())
+    }
+
+    /// A piece as input. Where it has fewer views than the model wants, black ones follow.
+    pub(super) fn stage<'a>(&'a mut self, piece: &'a [f32], input: &NetworkInput) -> Staged<'a> {
+        let given = piece.len() / input.view_len();
+        let views = self.views_per_run.map_or(given, NonZeroUsize::get);
+        let (width, height) = (input.width as usize, input.height as usize);
+        let shape = match self.layout {
+            Layout::Nchw => [views, 3, height, width],
+            Layout::Nhwc => [views, height, width, 3],
+        };
+        let as_it_is = self.layout == Layout::Nchw && given == views;
+        if !as_it_is {
+            self.values.resize(views * input.view_len(), 0.0);
+            let (used, spare) = self.values.split_at_mut(piece.len());
+            match self.layout {
+                Layout::Nchw => used.copy_from_slice(piece),
+                Layout::Nhwc => interleave(piece, used, input),
+            }
+            spare.fill(0.0);
+        }
+        Staged {
+            name: &self.input_name,
+            shape,
+            values: if as_it_is { piece } else { &self.values },
+        }
+    }
+}
+
+/// Plane by plane to pixel by pixel.
+fn interleave(piece: &[f32], out: &mut [f32], input: &NetworkInput) {
+    let views = piece.chunks_exact(input.view_len());
+    for (view, out) in views.zip(out.chunks_exact_mut(input.view_len())) {
+        for (plane, values) in view.chunks_exact(input.plane_len()).enumerate() {
+            for (pixel, &value) in out.chunks_exact_mut(3).zip(values) {
+                pixel[plane] = value;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn staging(layout: Layout, views_per_run: usize) -> Staging {
+        Staging::new(&Signature {
+            input_name: "images".to_owned(),
+            layout,
+            views_per_run: NonZeroUsize::new(views_per_run),
+            width: 2,
+            height: 1,
+        })
+    }
+
+    /// Values 1, 2, 3, … in views of 2×1 pixels.
+    fn batch(views: u8) -> (ViewBatch, NetworkInput) {
+        let input = NetworkInput::plain(2, 1);
+        let mut batch = ViewBatch::default();
+        let mut next = 0.0;
+        for value in batch.prepare(views.into(), &input).flatten() {
+            next += 1.0;
+            *value = next;
+        }
+        (batch, input)
+    }
+
+    #[test]
+    fn any_number_of_views_goes_in_as_it_is() {
+        let (batch, input) = batch(3);
+        let mut staging = staging(Layout::Nchw, 0);
+        let pieces: Vec<_> = staging.pieces(&batch, &input).collect();
+        assert_eq!(pieces, [batch.values()]);
+        let staged = staging.stage(pieces[0], &input);
+        assert_eq!(
+            (staged.shape, staged.values),
+            ([3, 3, 1, 2], batch.values())
+        );
+    }
+
+    #[test]
+    fn a_fixed_batch_is_cut_into_pieces_and_the_last_one_filled_up() {
+        let (batch, input) = batch(3);
+        let mut staging = staging(Layout::Nchw, 2);
+        let pieces: Vec<_> = staging.pieces(&batch, &input).collect();
+        assert_eq!(pieces.len(), 2);
+        assert_eq!(
+            staging.stage(pieces[0], &input).values,
+            &batch.values()[..12]
+        );
+        let last = staging.stage(pieces[1], &input);
+        assert_eq!(last.shape, [2, 3, 1, 2]);
+        assert_eq!(last.values[..6], batch.values()[12..]);
+        assert_eq!(last.values[6..], [0.0; 6]);
+    }
+
+    #[test]
+    fn planes_become_pixels_where_the_model_wants_them_last() {
+        let (batch, input) = batch(1);
+        let mut staging = staging(Layout::Nhwc, 0);
+        let staged = staging.stage(batch.values(), &input);
+        assert_eq!(staged.shape, [1, 1, 2, 3]);
+        assert_eq!(staged.values, [1.0, 3.0, 5.0, 2.0, 4.0, 6.0]);
+    }
+}

@@ -1,0 +1,153 @@
+//! Reading ONNX files that may be anything: bounded, and searched for references to other files
+//! before the run-time sees a byte of them.
+//!
+//! An ONNX tensor may keep its values in another file, by a path of the model's choice. The
+//! run-time resolves such paths even for models given to it as bytes, so the graph is walked here
+//! first. The field numbers are those of `onnx.proto`, which are stable.
+
+mod protobuf;
+
+use std::{fs::File, io::Read, path::Path};
+
+use self::protobuf::{Field, Value, fields};
+
+/// Largest ONNX file, bytes. Protocol buffers end at 2 GiB.
+pub(super) const MAX_BYTES: u64 = 1 << 30;
+/// Most values of one tensor in a file.
+const MAX_VALUES: u64 = 1 << 29;
+/// Deepest nesting of graphs within graphs.
+const MAX_DEPTH: usize = 64;
+/// The operator that stands for an execution provider's compiled engine, mostly in another file.
+const ENGINE: &[u8] = b"EPContext";
+
+/// Reads a file whole.
+///
+/// # Errors
+/// One sentence: what the operating system said, or that it is too large.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let metadata = file.metadata().map_err(|error| error.to_string())?;
+    if !metadata.is_file() {
+        return Err("it is no file".to_owned());
+    }
+    // Not trusted, as the file may grow: one byte more than allowed tells.
+    let mut bytes = Vec::with_capacity(usize::try_from(metadata.len().min(MAX_BYTES)).unwrap_or(0));
+    file.take(MAX_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(format!(
+            "it has more than {MAX_BYTES} bytes, the largest model accepted"
+        ));
+    }
+    Ok(bytes)
+}
+
+/// Whether the run-time may see this file.
+///
+/// # Errors
+/// One sentence: that it is no ONNX model, that it refers to other files, or that it holds a
+/// tensor of absurd size.
+pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
+    let mut has_graph = false;
+    for field in fields(bytes) {
+        has_graph |= field.map_err(|()| no_model())?.number == 7;
+    }
+    if !has_graph {
+        return Err(no_model());
+    }
+    Message::Model.check(bytes, 0)
+}
+
+fn no_model() -> String {
+    "it is no ONNX model, or is cut off".to_owned()
+}
+
+/// The messages of `onnx.proto` on the way to a tensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Message {
+    Model,
+    Training,
+    Function,
+    Graph,
+    Node,
+    Attribute,
+    SparseTensor,
+    Tensor,
+}
+
+impl Message {
+    /// The message in a field of this one.
+    fn child(self, field: u64) -> Option<Self> {
+        match (self, field) {
+            (Self::Model, 7) | (Self::Training, 1 | 2) | (Self::Attribute, 6 | 11) => {
+                Some(Self::Graph)
+            }
+            (Self::Model, 20) => Some(Self::Training),
+            (Self::Model, 25) => Some(Self::Function),
+            (Self::Function, 7) | (Self::Graph, 1) => Some(Self::Node),
+            (Self::Function, 11) | (Self::Node, 5) => Some(Self::Attribute),
+            (Self::Graph, 5) | (Self::Attribute, 5 | 10) | (Self::SparseTensor, 1 | 2) => {
+                Some(Self::Tensor)
+            }
+            (Self::Graph, 15) | (Self::Attribute, 22 | 23) => Some(Self::SparseTensor),
+            _ => None,
+        }
+    }
+
+    fn check(self, bytes: &[u8], depth: usize) -> Result<(), String> {
+        if depth > MAX_DEPTH {
+            return Err(format!("its graphs are nested more than {MAX_DEPTH} deep"));
+        }
+        if self == Self::Tensor {
+            return check_tensor(bytes);
+        }
+        for field in fields(bytes) {
+            let Field { number, value } = field.map_err(|()| no_model())?;
+            match (self, number, value) {
+                (Self::Node, 4, Value::Bytes(ENGINE)) => {
+                    return Err("it holds a compiled engine: save the model it was made of".into());
+                }
+                (_, _, Value::Bytes(bytes)) => {
+                    if let Some(child) = self.child(number) {
+                        child.check(bytes, depth + 1)?;
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `TensorProto`: 1 `dims`, 13 `external_data`, 14 `data_location` (1 is external).
+fn check_tensor(bytes: &[u8]) -> Result<(), String> {
+    let mut values: u64 = 1;
+    for field in fields(bytes) {
+        let Field { number, value } = field.map_err(|()| no_model())?;
+        match (number, value) {
+            (13, _) | (14, Value::Varint(1..)) => {
+                return Err(
+                    "it keeps tensors in other files, which is refused: save it as one \
+                            file"
+                        .to_owned(),
+                );
+            }
+            (1, dimensions) => {
+                for dimension in dimensions.varints() {
+                    // A negative dimension is a very large number here.
+                    let dimension = dimension.map_err(|()| no_model())?;
+                    values = values.saturating_mul(dimension.max(1));
+                }
+            }
+            _ => {}
+        }
+    }
+    if values > MAX_VALUES {
+        return Err(format!("it has a tensor of more than {MAX_VALUES} values"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,114 @@
+//! The models that answer, by name.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, PoisonError, RwLock},
+};
+
+use super::Model;
+
+/// Most models loaded at once: each holds its weights and its working memory.
+const MAX_MODELS: usize = 16;
+
+/// The models that answer, by name. Replacing one is a single step: a frame sees the old one or
+/// the new one, and finishes with what it saw.
+#[derive(Default)]
+pub struct ModelRegistry(RwLock<BTreeMap<String, Arc<Model>>>);
+
+/// There is no room for another model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{MAX_MODELS} models are loaded, and no more can be: unload one first")]
+pub struct RegistryFull;
+
+impl ModelRegistry {
+    /// The model of that name.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<Arc<Model>> {
+        let models = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        models.get(name).cloned()
+    }
+
+    /// Every model, by name.
+    #[must_use]
+    pub fn all(&self) -> Vec<Arc<Model>> {
+        let models = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        models.values().cloned().collect()
+    }
+
+    /// Adds a model, or puts it in the place of the one of its name, which is returned.
+    ///
+    /// # Errors
+    /// [`RegistryFull`] when it would be one too many.
+    pub fn put(&self, model: Arc<Model>) -> Result<Option<Arc<Model>>, RegistryFull> {
+        let mut models = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        if models.len() >= MAX_MODELS && !models.contains_key(model.name()) {
+            return Err(RegistryFull);
+        }
+        Ok(models.insert(model.name().to_owned(), model))
+    }
+
+    /// Takes a model out. Frames that began with it finish with it.
+    pub fn remove(&self, name: &str) -> Option<Arc<Model>> {
+        let mut models = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        models.remove(name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        imaging::{NetworkInput, ViewBatch},
+        inference::{Detector, HeadOutput, InferenceError},
+    };
+
+    struct Blind(String, NetworkInput);
+
+    impl Detector for Blind {
+        fn name(&self) -> &str {
+            &self.0
+        }
+
+        fn revision(&self) -> &'static str {
+            "1"
+        }
+
+        fn input(&self) -> &NetworkInput {
+            &self.1
+        }
+
+        fn detect(&mut self, _batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
+            Ok(HeadOutput::default())
+        }
+    }
+
+    fn blind(name: &str) -> Arc<Model> {
+        let detector = Blind(name.to_owned(), NetworkInput::plain(32, 32));
+        Arc::new(Model::new(Box::new(detector)))
+    }
+
+    #[test]
+    fn a_replaced_model_lives_as_long_as_its_last_frame() {
+        let registry = ModelRegistry::default();
+        assert!(registry.put(blind("a")).unwrap().is_none());
+        let frame = registry.get("a").unwrap();
+        let replaced = Arc::downgrade(&registry.put(blind("a")).unwrap().unwrap());
+        assert!(!Arc::ptr_eq(&registry.get("a").unwrap(), &frame));
+        assert!(replaced.upgrade().is_some());
+        drop(frame);
+        assert!(replaced.upgrade().is_none());
+    }
+
+    #[test]
+    fn there_is_room_for_so_many_models_and_replacing_takes_none() {
+        let registry = ModelRegistry::default();
+        for index in 0..MAX_MODELS {
+            registry.put(blind(&index.to_string())).unwrap();
+        }
+        assert!(matches!(registry.put(blind("more")), Err(RegistryFull)));
+        assert!(registry.put(blind("0")).unwrap().is_some());
+        assert!(registry.remove("0").is_some());
+        registry.put(blind("more")).unwrap();
+        assert_eq!(registry.all().len(), MAX_MODELS);
+    }
+}

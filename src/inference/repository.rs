@@ -1,0 +1,304 @@
+//! The folder of models, and which of them are loaded: loaded and unloaded on request, reloaded
+//! when their files change.
+//!
+//! A model takes its place only after it was loaded, checked and run once. One that fails leaves
+//! the model it was to replace where it is.
+
+mod error;
+mod stamp;
+mod watcher;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError, TryLockError,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+use self::stamp::{files_of, stamp};
+use super::{
+    Detector, InferenceError, Model, ModelManifest, ModelRegistry,
+    manifest::{FILE_NAME, is_name},
+    model::ModelFiles,
+};
+
+pub use error::RepositoryError;
+pub(super) use stamp::Stamp;
+pub use watcher::ModelWatcher;
+
+/// Most folders looked at when the repository is listed.
+const MAX_FOLDERS: usize = 1000;
+
+/// Makes a detector of a model's folder or ONNX file.
+pub type DetectorLoader =
+    Box<dyn Fn(&Path) -> Result<Box<dyn Detector>, InferenceError> + Send + Sync>;
+
+/// Which models there are, and how they are treated.
+#[derive(Debug, Clone)]
+pub struct RepositoryOptions {
+    /// The folder; each model has a folder of its name in it.
+    pub folder: PathBuf,
+    /// A model by its name that is somewhere else.
+    pub elsewhere: Option<(String, PathBuf)>,
+    /// How many views a model has to see before it takes its place.
+    pub warm_up_views: NonZeroUsize,
+    /// Models that requests rely on without naming them: they are never unloaded.
+    pub kept: Vec<String>,
+}
+
+/// The folder of models, and which of them are loaded.
+pub struct ModelRepository {
+    options: RepositoryOptions,
+    registry: Arc<ModelRegistry>,
+    loader: DetectorLoader,
+    /// Held while a model is loaded: one at a time.
+    memory: Mutex<Memory>,
+    succeeded: AtomicU64,
+    failed: AtomicU64,
+}
+
+/// What is known of models beside those that are loaded.
+#[derive(Default)]
+struct Memory {
+    /// Why a model's last load failed.
+    failures: BTreeMap<String, String>,
+    /// What changed files were like when they were last looked at.
+    changed: BTreeMap<String, Stamp>,
+    /// What files were like that are not to be tried again.
+    refused: BTreeMap<String, Stamp>,
+}
+
+/// A model of the repository.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RepositoryRow {
+    /// Its name.
+    pub name: String,
+    /// The revision that answers, if one does.
+    pub revision: Option<String>,
+    /// Why it is not loaded, or why its last load failed.
+    pub reason: Option<String>,
+}
+
+/// How many loads succeeded and failed since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LoadCounts {
+    /// Loads whose model answers, or has answered.
+    pub succeeded: u64,
+    /// Loads whose model was refused.
+    pub failed: u64,
+}
+
+impl ModelRepository {
+    /// The models that `options` describe, none of them loaded.
+    #[must_use]
+    pub fn new(options: RepositoryOptions, loader: DetectorLoader) -> Self {
+        Self {
+            options,
+            registry: Arc::default(),
+            loader,
+            memory: Mutex::default(),
+            succeeded: AtomicU64::new(0),
+            failed: AtomicU64::new(0),
+        }
+    }
+
+    /// The models that answer.
+    #[must_use]
+    pub fn registry(&self) -> &Arc<ModelRegistry> {
+        &self.registry
+    }
+
+    /// How many loads succeeded and failed.
+    #[must_use]
+    pub fn load_counts(&self) -> LoadCounts {
+        LoadCounts {
+            succeeded: self.succeeded.load(Ordering::Relaxed),
+            failed: self.failed.load(Ordering::Relaxed),
+        }
+    }
+
+    /// Loads the model of that name, or loads it again. Blocks.
+    ///
+    /// # Errors
+    /// [`RepositoryError`] when there is no such model, it fails its check, there is no room, or
+    /// another model is being loaded.
+    pub fn load(&self, name: &str) -> Result<Arc<Model>, RepositoryError> {
+        let mut memory = self.memory.try_lock().or_else(|error| match error {
+            TryLockError::Poisoned(poisoned) => Ok(poisoned.into_inner()),
+            TryLockError::WouldBlock => Err(RepositoryError::Busy),
+        })?;
+        let path = self.find(name)?;
+        self.replace(&mut memory, name, &path)
+    }
+
+    /// Takes a model out. Frames that began with it finish with it.
+    ///
+    /// # Errors
+    /// [`RepositoryError`] when it is not loaded, or must be kept.
+    pub fn unload(&self, name: &str) -> Result<(), RepositoryError> {
+        if self.options.kept.iter().any(|kept| kept == name) {
+            return Err(RepositoryError::Kept {
+                name: name.to_owned(),
+            });
+        }
+        let removed = self.registry.remove(name);
+        let removed = removed.ok_or_else(|| RepositoryError::NotLoaded {
+            name: name.to_owned(),
+        })?;
+        tracing::info!(model = name, revision = removed.revision(), "unloaded");
+        Ok(())
+    }
+
+    /// Every model that is loaded or in the folder, by name.
+    #[must_use]
+    pub fn rows(&self) -> Vec<RepositoryRow> {
+        let mut rows: BTreeMap<String, RepositoryRow> = BTreeMap::new();
+        let failures = self.lock().failures.clone();
+        let row = |name: &str, revision, reason: Option<String>| RepositoryRow {
+            name: name.to_owned(),
+            revision,
+            reason: failures.get(name).cloned().or(reason),
+        };
+        for name in self.names() {
+            let reason = self.why_not_loaded(&name);
+            rows.insert(name.clone(), row(&name, None, Some(reason)));
+        }
+        for model in self.registry.all() {
+            let revision = Some(model.revision().to_owned());
+            rows.insert(model.name().to_owned(), row(model.name(), revision, None));
+        }
+        rows.into_values().collect()
+    }
+
+    /// Reloads the models whose files have changed. Files must be the same at two looks, so that
+    /// none is read while it is written, and a model that failed is not tried again until they
+    /// change again.
+    pub fn reload_changed(&self) {
+        let mut memory = self.lock();
+        for model in self.registry.all() {
+            let Some(files) = model.files() else { continue };
+            let name = model.name();
+            let found = stamp(&files_of(&files.path));
+            let is_news =
+                found.is_some() && found != files.stamp && memory.refused.get(name) != Some(&found);
+            if !is_news {
+                memory.changed.remove(name);
+            } else if memory.changed.get(name) == Some(&found) {
+                memory.changed.remove(name);
+                // It was logged, and the rows tell it.
+                let _ = self.replace(&mut memory, name, &files.path);
+            } else {
+                memory.changed.insert(name.to_owned(), found);
+            }
+        }
+    }
+
+    /// Load, check, warm up, replace.
+    fn replace(
+        &self,
+        memory: &mut Memory,
+        name: &str,
+        path: &Path,
+    ) -> Result<Arc<Model>, RepositoryError> {
+        // Before reading: a file that changes meanwhile is read again.
+        let stamp = stamp(&files_of(path));
+        let outcome = self.checked(name, path, &stamp).and_then(|model| {
+            let model = Arc::new(model);
+            let replaced = self.registry.put(Arc::clone(&model))?;
+            Ok((model, replaced))
+        });
+        match outcome {
+            Ok((model, replaced)) => {
+                self.succeeded.fetch_add(1, Ordering::Relaxed);
+                memory.failures.remove(name);
+                memory.refused.remove(name);
+                let replaced = replaced.as_ref().map(|replaced| replaced.revision());
+                tracing::info!(
+                    model = name,
+                    revision = model.revision(),
+                    replaced,
+                    "loaded"
+                );
+                Ok(model)
+            }
+            Err(error) => {
+                self.failed.fetch_add(1, Ordering::Relaxed);
+                memory.failures.insert(name.to_owned(), error.to_string());
+                memory.refused.insert(name.to_owned(), stamp);
+                tracing::error!(model = name, "not loaded: {error}");
+                Err(error)
+            }
+        }
+    }
+
+    fn checked(&self, name: &str, path: &Path, stamp: &Stamp) -> Result<Model, RepositoryError> {
+        let detector = (self.loader)(path)?;
+        if detector.name() != name {
+            return Err(RepositoryError::OtherName {
+                name: name.to_owned(),
+                found: detector.name().to_owned(),
+                path: path.to_owned(),
+            });
+        }
+        let model = Model::new(detector).with_files(ModelFiles {
+            path: path.to_owned(),
+            stamp: stamp.clone(),
+        });
+        model.warm_up(self.options.warm_up_views.get())?;
+        Ok(model)
+    }
+
+    fn find(&self, name: &str) -> Result<PathBuf, RepositoryError> {
+        match &self.options.elsewhere {
+            Some((there, path)) if there == name => return Ok(path.clone()),
+            _ => {}
+        }
+        let path = self.options.folder.join(name);
+        if is_name(name) && path.join(FILE_NAME).is_file() {
+            return Ok(path);
+        }
+        Err(RepositoryError::Unknown {
+            name: name.chars().take(64).collect(),
+            known: self.names().join(", "),
+        })
+    }
+
+    /// The names of all models, sorted.
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.options.folder)
+            .into_iter()
+            .flatten();
+        let folders = entries.take(MAX_FOLDERS).flatten().filter_map(|entry| {
+            let name = entry.file_name().into_string().ok()?;
+            (is_name(&name) && entry.path().join(FILE_NAME).is_file()).then_some(name)
+        });
+        let elsewhere = self.options.elsewhere.iter().map(|(name, _)| name.clone());
+        let names: BTreeSet<_> = folders.chain(elsewhere).collect();
+        names.into_iter().collect()
+    }
+
+    fn why_not_loaded(&self, name: &str) -> String {
+        if self.find(name).is_ok_and(|path| is_fetched(&path)) {
+            format!("it is not loaded: POST /v2/repository/models/{name}/load loads it")
+        } else {
+            "its ONNX file is not there: run `make models`".to_owned()
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Memory> {
+        // What a panic leaves behind are complete entries.
+        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Whether a model's ONNX file is there; weights are fetched, manifests are not.
+#[must_use]
+pub fn is_fetched(model: &Path) -> bool {
+    ModelManifest::locate(model).is_ok_and(|manifest| manifest.onnx.is_file())
+}
+
+#[cfg(test)]
+mod tests;

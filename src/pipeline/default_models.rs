@@ -1,0 +1,97 @@
+//! Which model answers requests that name none.
+
+use super::Profile;
+
+/// A profile's model: the one table of them.
+fn preferred(profile: Profile) -> &'static str {
+    match profile {
+        Profile::Paper | Profile::Fast | Profile::Direct => STAND_IN,
+        Profile::Balanced | Profile::Quality => "nanodet_g_416",
+    }
+}
+
+/// Stands in for models that were not fetched: the smallest set-up has this one.
+const STAND_IN: &str = "ssdlite_mobilenet_v2";
+
+/// Which model answers requests of a profile that name none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum DefaultModels {
+    /// One for all profiles.
+    One(String),
+    /// Each profile's own, or a smaller one that every set-up has.
+    PerProfile {
+        /// The profiles' models that are missing.
+        missing: Vec<&'static str>,
+    },
+}
+
+impl DefaultModels {
+    /// Each profile's own model, as far as `is_fetched` says that it is there.
+    #[must_use]
+    pub fn per_profile(is_fetched: impl Fn(&str) -> bool) -> Self {
+        let mut missing: Vec<_> = Profile::ALL
+            .map(preferred)
+            .into_iter()
+            .filter(|name| *name != STAND_IN && !is_fetched(name))
+            .collect();
+        missing.sort_unstable();
+        missing.dedup();
+        Self::PerProfile { missing }
+    }
+
+    /// The model of a profile.
+    #[must_use]
+    pub fn of(&self, profile: Profile) -> &str {
+        match self {
+            Self::One(name) => name,
+            Self::PerProfile { missing } => {
+                let name = preferred(profile);
+                if missing.contains(&name) {
+                    STAND_IN
+                } else {
+                    name
+                }
+            }
+        }
+    }
+
+    /// All of them, each once; that of the default profile comes first.
+    #[must_use]
+    pub fn names(&self) -> Vec<&str> {
+        let mut names = vec![self.of(Profile::default())];
+        for profile in Profile::ALL {
+            let name = self.of(profile);
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_that_was_not_fetched_has_a_stand_in() {
+        let all = DefaultModels::per_profile(|_| true);
+        assert_eq!(
+            all.names(),
+            [all.of(Profile::Balanced), all.of(Profile::Fast)]
+        );
+        let few = DefaultModels::per_profile(|_| false);
+        assert_eq!(few.names(), [STAND_IN]);
+    }
+
+    #[test]
+    fn one_model_can_answer_for_all_profiles() {
+        let one = DefaultModels::One("mine".to_owned());
+        assert!(
+            Profile::ALL
+                .iter()
+                .all(|profile| one.of(*profile) == "mine")
+        );
+        assert_eq!(one.names(), ["mine"]);
+    }
+}
