@@ -6,6 +6,7 @@ mod health;
 mod openapi;
 mod problem;
 mod report;
+mod repository;
 mod request_id;
 mod state;
 mod upload;
@@ -27,6 +28,9 @@ fn routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(health::readyz))
         .routes(routes!(health::metrics))
         .routes(routes!(openapi::openapi_json))
+        .routes(routes!(repository::index))
+        .routes(routes!(repository::load))
+        .routes(routes!(repository::unload))
 }
 
 /// The whole service.

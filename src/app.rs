@@ -19,6 +19,8 @@ use crate::{
     shutdown::Shutdown,
 };
 
+pub(crate) use models::onnx_options;
+
 /// An engine and the models it looks with.
 pub struct Assembly {
     /// The engine.

@@ -3,6 +3,7 @@
 mod annotate;
 mod detect;
 mod eval;
+mod model;
 mod parameters;
 mod serve;
 
@@ -37,6 +38,9 @@ enum Command {
     Detect(Box<detect::Arguments>),
     /// Measure how good detections are on a data set: average precision and speed
     Eval(eval::Arguments),
+    /// Look into person models
+    #[command(subcommand)]
+    Model(model::Command),
     /// Print the OpenAPI document
     Openapi,
 }
@@ -65,6 +69,7 @@ pub fn run() -> ExitCode {
         Command::Serve(settings_file) => serve::run(&settings_file),
         Command::Detect(arguments) => detect::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
+        Command::Model(command) => model::run(&command),
         Command::Openapi => print_openapi(),
     };
     match outcome {

@@ -19,6 +19,7 @@ use std::{
 };
 
 pub use error::SettingsError;
+pub use locate::find_beside_executable;
 pub use raw::RawSettings;
 pub use source::{environment, load};
 pub use threads::ThreadPlan;

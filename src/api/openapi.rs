@@ -8,7 +8,9 @@ use axum::Json;
 use utoipa::{OpenApi, openapi};
 
 pub(super) use parameters::{DetectForm, DetectQuery};
-pub(super) use problems::{DetectProblems, FaultProblem, NotReadyProblems};
+pub(super) use problems::{
+    DetectProblems, FaultProblem, IndexProblems, LoadProblems, NotReadyProblems,
+};
 
 use super::problem::ProblemBody;
 
@@ -18,6 +20,7 @@ use super::problem::ProblemBody;
     servers((url = "/", description = "This server")),
     tags(
         (name = "detection", description = "Frames in, persons out."),
+        (name = "models", description = "Which models answer. For administrators."),
         (name = "operation", description = "Probes, metrics and this document."),
     ),
     components(schemas(ProblemBody))

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::{
     inference::{
-        DetectorLoader, ModelManifest, ModelRepository, OnnxDetector, OnnxOptions,
+        DetectorLoader, ModelFolder, ModelManifest, ModelRepository, OnnxDetector, OnnxOptions,
         RepositoryOptions, is_fetched,
     },
     pipeline::DefaultModels,
@@ -17,7 +17,7 @@ use crate::{
 /// One sentence that names the setting: a file that is missing or cannot be used.
 pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, DefaultModels)> {
     let loader = loader(settings)?;
-    let folder = settings.model.find_repository()?;
+    let path = settings.model.find_repository()?;
     let one = settings.model.find_one()?;
     let elsewhere = match one {
         Some(path) => Some((ModelManifest::locate(&path)?.name, path)),
@@ -25,11 +25,10 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
     };
     let defaults = match &elsewhere {
         Some((name, _)) => DefaultModels::One(name.clone()),
-        None => per_profile(&folder),
+        None => per_profile(&path),
     };
     let options = RepositoryOptions {
-        folder,
-        elsewhere,
+        folder: ModelFolder { path, elsewhere },
         warm_up_views: settings.inference.max_batch_views,
         kept: defaults
             .names()
@@ -41,7 +40,7 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
 }
 
 /// Makes detectors as the settings say.
-pub(crate) fn loader(settings: &Settings) -> Result<DetectorLoader, SettingsError> {
+fn loader(settings: &Settings) -> Result<DetectorLoader, SettingsError> {
     let library = settings.inference.find_library()?;
     let options = onnx_options(settings);
     Ok(Box::new(move |path| {

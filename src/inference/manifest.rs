@@ -174,6 +174,3 @@ fn one_line(error: &toml::de::Error, text: &str) -> String {
         None => message,
     }
 }
-
-#[cfg(test)]
-mod tests;

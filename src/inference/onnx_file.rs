@@ -30,12 +30,14 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
     if !metadata.is_file() {
         return Err("it is no file".to_owned());
     }
-    // Not trusted, as the file may grow: one byte more than allowed tells.
-    let mut bytes = Vec::with_capacity(usize::try_from(metadata.len().min(MAX_BYTES)).unwrap_or(0));
-    file.take(MAX_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|error| error.to_string())?;
-    if bytes.len() as u64 > MAX_BYTES {
+    let mut bytes = Vec::new();
+    if metadata.len() <= MAX_BYTES {
+        // One byte more than allowed, as the file may grow meanwhile.
+        file.take(MAX_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| error.to_string())?;
+    }
+    if metadata.len().max(bytes.len() as u64) > MAX_BYTES {
         return Err(format!(
             "it has more than {MAX_BYTES} bytes, the largest model accepted"
         ));

@@ -5,13 +5,14 @@
 //! the model it was to replace where it is.
 
 mod error;
+mod folder;
 mod stamp;
 mod watcher;
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     num::NonZeroUsize,
-    path::{Path, PathBuf},
+    path::Path,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError, TryLockError,
         atomic::{AtomicU64, Ordering},
@@ -19,18 +20,12 @@ use std::{
 };
 
 use self::stamp::{files_of, stamp};
-use super::{
-    Detector, InferenceError, Model, ModelManifest, ModelRegistry,
-    manifest::{FILE_NAME, is_name},
-    model::ModelFiles,
-};
+use super::{Detector, InferenceError, Model, ModelRegistry, model::ModelFiles};
 
 pub use error::RepositoryError;
+pub use folder::{ModelFolder, is_fetched};
 pub(super) use stamp::Stamp;
 pub use watcher::ModelWatcher;
-
-/// Most folders looked at when the repository is listed.
-const MAX_FOLDERS: usize = 1000;
 
 /// Makes a detector of a model's folder or ONNX file.
 pub type DetectorLoader =
@@ -39,10 +34,8 @@ pub type DetectorLoader =
 /// Which models there are, and how they are treated.
 #[derive(Debug, Clone)]
 pub struct RepositoryOptions {
-    /// The folder; each model has a folder of its name in it.
-    pub folder: PathBuf,
-    /// A model by its name that is somewhere else.
-    pub elsewhere: Option<(String, PathBuf)>,
+    /// Where they are.
+    pub folder: ModelFolder,
     /// How many views a model has to see before it takes its place.
     pub warm_up_views: NonZeroUsize,
     /// Models that requests rely on without naming them: they are never unloaded.
@@ -130,7 +123,7 @@ impl ModelRepository {
             TryLockError::Poisoned(poisoned) => Ok(poisoned.into_inner()),
             TryLockError::WouldBlock => Err(RepositoryError::Busy),
         })?;
-        let path = self.find(name)?;
+        let path = self.options.folder.find(name)?;
         self.replace(&mut memory, name, &path)
     }
 
@@ -162,8 +155,8 @@ impl ModelRepository {
             revision,
             reason: failures.get(name).cloned().or(reason),
         };
-        for name in self.names() {
-            let reason = self.why_not_loaded(&name);
+        for name in self.options.folder.names() {
+            let reason = self.options.folder.why_not_loaded(&name);
             rows.insert(name.clone(), row(&name, None, Some(reason)));
         }
         for model in self.registry.all() {
@@ -251,54 +244,8 @@ impl ModelRepository {
         Ok(model)
     }
 
-    fn find(&self, name: &str) -> Result<PathBuf, RepositoryError> {
-        match &self.options.elsewhere {
-            Some((there, path)) if there == name => return Ok(path.clone()),
-            _ => {}
-        }
-        let path = self.options.folder.join(name);
-        if is_name(name) && path.join(FILE_NAME).is_file() {
-            return Ok(path);
-        }
-        Err(RepositoryError::Unknown {
-            name: name.chars().take(64).collect(),
-            known: self.names().join(", "),
-        })
-    }
-
-    /// The names of all models, sorted.
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.options.folder)
-            .into_iter()
-            .flatten();
-        let folders = entries.take(MAX_FOLDERS).flatten().filter_map(|entry| {
-            let name = entry.file_name().into_string().ok()?;
-            (is_name(&name) && entry.path().join(FILE_NAME).is_file()).then_some(name)
-        });
-        let elsewhere = self.options.elsewhere.iter().map(|(name, _)| name.clone());
-        let names: BTreeSet<_> = folders.chain(elsewhere).collect();
-        names.into_iter().collect()
-    }
-
-    fn why_not_loaded(&self, name: &str) -> String {
-        if self.find(name).is_ok_and(|path| is_fetched(&path)) {
-            format!("it is not loaded: POST /v2/repository/models/{name}/load loads it")
-        } else {
-            "its ONNX file is not there: run `make models`".to_owned()
-        }
-    }
-
     fn lock(&self) -> MutexGuard<'_, Memory> {
         // What a panic leaves behind are complete entries.
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
-
-/// Whether a model's ONNX file is there; weights are fetched, manifests are not.
-#[must_use]
-pub fn is_fetched(model: &Path) -> bool {
-    ModelManifest::locate(model).is_ok_and(|manifest| manifest.onnx.is_file())
-}
-
-#[cfg(test)]
-mod tests;

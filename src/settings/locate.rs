@@ -85,19 +85,26 @@ impl InferenceSettings {
     }
 }
 
+/// The existing file or folder at `path` in the current directory, or else beside the executable or
+/// in the folders above it.
+#[must_use]
+pub fn find_beside_executable(path: &Path) -> Option<PathBuf> {
+    if path.exists() {
+        return Some(path.to_owned());
+    }
+    let executable = std::env::current_exe().ok()?;
+    let mut candidates = executable.ancestors().skip(1).map(|above| above.join(path));
+    candidates.find(|candidate| candidate.exists())
+}
+
 /// The existing file or folder that `path` means.
 ///
 /// A path somebody set is taken as it is. The default one is looked for in the current directory
 /// and then beside the executable and in the folders above it, so that
 /// `/anywhere/lookdown/target/release/lookdown` finds what belongs to it wherever it is called.
 fn locate(path: &Path, default: &str) -> Option<PathBuf> {
-    if path.exists() {
-        return Some(path.to_owned());
+    if path == Path::new(default) {
+        return find_beside_executable(path);
     }
-    if path != Path::new(default) {
-        return None;
-    }
-    let executable = std::env::current_exe().ok()?;
-    let mut candidates = executable.ancestors().skip(1).map(|above| above.join(path));
-    candidates.find(|candidate| candidate.exists())
+    path.exists().then(|| path.to_owned())
 }

@@ -16,6 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Sees a person in every view.
 pub(crate) struct EagerDetector {
+    pub(crate) name: String,
     pub(crate) input: NetworkInput,
     pub(crate) gate: Arc<Gate>,
 }
@@ -89,8 +90,8 @@ impl Gate {
 }
 
 impl Detector for EagerDetector {
-    fn name(&self) -> &'static str {
-        "eager"
+    fn name(&self) -> &str {
+        &self.name
     }
 
     fn revision(&self) -> &'static str {

@@ -7,5 +7,6 @@ mod load;
 mod operation;
 mod refusals;
 mod report;
+mod repository;
 mod serve;
 mod service;

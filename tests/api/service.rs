@@ -14,7 +14,7 @@ use lookdown::{
     calibration::CalibrationFolder,
     geometry::FieldOfViewReading,
     imaging::{Frame, NetworkInput, annotate::encode_png, decode::DecodeLimits},
-    inference::{ModelRepository, RepositoryOptions},
+    inference::{InferenceError, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
     pipeline::{DefaultModels, Engine, EngineOptions, WorkerPool},
 };
@@ -36,8 +36,8 @@ pub(crate) struct Service {
     pub(crate) router: Router,
     pub(crate) gate: Arc<Gate>,
     pub(crate) readiness: Readiness,
-    /// Goes when the test does.
-    _calibrations: TempDir,
+    /// The calibration `lobby`, and models in `models/`. Goes when the test does.
+    pub(crate) folder: TempDir,
 }
 
 /// What a test may want to be tight.
@@ -104,13 +104,23 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
     let one_view = NonZeroUsize::MIN;
     let models = ModelRepository::new(
         RepositoryOptions {
-            folder: folder.path().join("models"),
-            elsewhere: Some(("eager".to_owned(), "nowhere".into())),
+            folder: ModelFolder {
+                path: folder.path().join("models"),
+                elsewhere: Some(("eager".to_owned(), "eager".into())),
+            },
             warm_up_views: one_view,
             kept: vec!["eager".to_owned()],
         },
-        Box::new(move |_| {
+        Box::new(move |path| {
+            if path.join("broken").exists() {
+                return Err(InferenceError::Unusable {
+                    path: path.to_owned(),
+                    problem: "it is broken".to_owned(),
+                });
+            }
+            let name = path.file_name().unwrap().to_str().unwrap();
             Ok(Box::new(EagerDetector {
+                name: name.to_owned(),
                 input: NetworkInput::plain(64, 64),
                 gate: Arc::clone(&gate),
             }))
@@ -139,7 +149,7 @@ impl Service {
     /// A warm service with one worker.
     pub(crate) fn within(bounds: &Bounds) -> Self {
         let gate = Arc::new(Gate::default());
-        let (Assembly { engine, models }, calibrations) = assembly(&gate);
+        let (Assembly { engine, models }, folder) = assembly(&gate);
         models.load("eager").unwrap();
         gate.forget_runs();
         let capacity = NonZeroUsize::new(bounds.frames_in_flight).unwrap();
@@ -162,7 +172,7 @@ impl Service {
             router: api::router(state),
             gate,
             readiness,
-            _calibrations: calibrations,
+            folder,
         }
     }
 
@@ -179,6 +189,11 @@ impl Service {
     pub(crate) async fn get(&self, path: &str) -> Answer {
         self.send(Request::get(path).body(Body::empty()).unwrap())
             .await
+    }
+
+    pub(crate) async fn post(&self, path: &str, body: &str) -> Answer {
+        let body = Body::from(body.to_owned());
+        self.send(Request::post(path).body(body).unwrap()).await
     }
 
     /// Sends a form; a part is a name, perhaps with `; filename=…`, and its content.

@@ -16,12 +16,19 @@ pub(in crate::api) struct DetectProblems;
 
 impl IntoResponses for DetectProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_other_routes = |kind: &ProblemKind| {
+            matches!(
+                kind,
+                ProblemKind::NotFound
+                    | ProblemKind::MethodNotAllowed
+                    | ProblemKind::Forbidden
+                    | ProblemKind::ModelConflict
+                    | ProblemKind::ModelRefused
+                    | ProblemKind::ModelBusy
+            )
+        };
         let kinds = ProblemKind::ALL.into_iter();
-        responses(
-            kinds.filter(|kind| {
-                !matches!(kind, ProblemKind::NotFound | ProblemKind::MethodNotAllowed)
-            }),
-        )
+        responses(kinds.filter(|kind| !of_other_routes(kind)))
     }
 }
 
@@ -31,6 +38,38 @@ pub(in crate::api) struct NotReadyProblems;
 impl IntoResponses for NotReadyProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
         responses([ProblemKind::WarmingUp, ProblemKind::ShuttingDown])
+    }
+}
+
+/// What can go wrong with listing the models.
+pub(in crate::api) struct IndexProblems;
+
+/// What can go wrong with every request of an administrator.
+const OF_ADMINISTRATION: [ProblemKind; 4] = [
+    ProblemKind::MalformedRequest,
+    ProblemKind::Forbidden,
+    ProblemKind::SlowUpload,
+    ProblemKind::Internal,
+];
+
+impl IntoResponses for IndexProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses(OF_ADMINISTRATION)
+    }
+}
+
+/// What can go wrong with loading or unloading a model.
+pub(in crate::api) struct LoadProblems;
+
+impl IntoResponses for LoadProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_models = [
+            ProblemKind::UnknownModel,
+            ProblemKind::ModelConflict,
+            ProblemKind::ModelRefused,
+            ProblemKind::ModelBusy,
+        ];
+        responses(OF_ADMINISTRATION.into_iter().chain(of_models))
     }
 }
 

@@ -13,12 +13,20 @@ pub(in crate::api) enum ProblemKind {
     RepeatedParameter,
     /// No frame was sent.
     MissingImage,
+    /// The sender may not do this.
+    Forbidden,
     /// Nothing is at this path.
     NotFound,
     /// The calibration does not exist.
     UnknownCalibration,
     /// The model is not loaded.
     UnknownModel,
+    /// The models that are loaded do not allow it.
+    ModelConflict,
+    /// The model failed its check.
+    ModelRefused,
+    /// Another model is being loaded.
+    ModelBusy,
     /// The path does not offer this method.
     MethodNotAllowed,
     /// The body took too long to arrive.
@@ -49,14 +57,18 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 20] = [
+    pub(in crate::api) const ALL: [Self; 24] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
         Self::MissingImage,
+        Self::Forbidden,
         Self::NotFound,
         Self::UnknownCalibration,
         Self::UnknownModel,
+        Self::ModelConflict,
+        Self::ModelRefused,
+        Self::ModelBusy,
         Self::MethodNotAllowed,
         Self::SlowUpload,
         Self::BodyTooLarge,
@@ -72,104 +84,45 @@ impl ProblemKind {
         Self::Timeout,
     ];
 
-    /// Name, status and title.
-    fn row(self) -> (&'static str, StatusCode, &'static str) {
-        use StatusCode as Status;
+    /// Name and title.
+    fn texts(self) -> (&'static str, &'static str) {
         match self {
-            Self::MalformedRequest => (
-                "malformed-request",
-                Status::BAD_REQUEST,
-                "The request is malformed",
+            Self::MalformedRequest => ("malformed-request", "The request is malformed"),
+            Self::UnknownParameter => ("unknown-parameter", "There is no such parameter"),
+            Self::RepeatedParameter => ("repeated-parameter", "A parameter is given twice"),
+            Self::MissingImage => ("missing-image", "No frame was sent"),
+            Self::Forbidden => ("forbidden", "That is not allowed"),
+            Self::NotFound => ("not-found", "There is nothing here"),
+            Self::UnknownCalibration => ("unknown-calibration", "There is no such calibration"),
+            Self::UnknownModel => ("unknown-model", "There is no such model"),
+            Self::ModelConflict => (
+                "model-conflict",
+                "The models that are loaded do not allow that",
             ),
-            Self::UnknownParameter => (
-                "unknown-parameter",
-                Status::BAD_REQUEST,
-                "There is no such parameter",
-            ),
-            Self::RepeatedParameter => (
-                "repeated-parameter",
-                Status::BAD_REQUEST,
-                "A parameter is given twice",
-            ),
-            Self::MissingImage => ("missing-image", Status::BAD_REQUEST, "No frame was sent"),
-            Self::NotFound => ("not-found", Status::NOT_FOUND, "There is nothing here"),
-            Self::UnknownCalibration => (
-                "unknown-calibration",
-                Status::NOT_FOUND,
-                "There is no such calibration",
-            ),
-            Self::UnknownModel => ("unknown-model", Status::NOT_FOUND, "There is no such model"),
-            Self::MethodNotAllowed => (
-                "method-not-allowed",
-                Status::METHOD_NOT_ALLOWED,
-                "The method is not offered",
-            ),
-            Self::SlowUpload => (
-                "slow-upload",
-                Status::REQUEST_TIMEOUT,
-                "The body took too long to arrive",
-            ),
-            Self::BodyTooLarge => (
-                "body-too-large",
-                Status::PAYLOAD_TOO_LARGE,
-                "The body is too large",
-            ),
-            Self::ImageTooLarge => (
-                "image-too-large",
-                Status::PAYLOAD_TOO_LARGE,
-                "The frame has too many pixels",
-            ),
+            Self::ModelRefused => ("model-refused", "The model cannot be used"),
+            Self::ModelBusy => ("model-busy", "Another model is being loaded"),
+            Self::MethodNotAllowed => ("method-not-allowed", "The method is not offered"),
+            Self::SlowUpload => ("slow-upload", "The body took too long to arrive"),
+            Self::BodyTooLarge => ("body-too-large", "The body is too large"),
+            Self::ImageTooLarge => ("image-too-large", "The frame has too many pixels"),
             Self::UnsupportedImage => (
                 "unsupported-image",
-                Status::UNSUPPORTED_MEDIA_TYPE,
                 "The frame is not in a format that can be read",
             ),
-            Self::InvalidParameter => (
-                "invalid-parameter",
-                Status::UNPROCESSABLE_ENTITY,
-                "A parameter cannot be used",
-            ),
-            Self::DamagedImage => (
-                "damaged-image",
-                Status::UNPROCESSABLE_ENTITY,
-                "The frame is damaged or cut off",
-            ),
-            Self::UnfitImage => (
-                "unfit-image",
-                Status::UNPROCESSABLE_ENTITY,
-                "The frame does not fit",
-            ),
-            Self::Overloaded => (
-                "overloaded",
-                Status::TOO_MANY_REQUESTS,
-                "Too many frames are waiting",
-            ),
-            Self::Internal => (
-                "internal",
-                Status::INTERNAL_SERVER_ERROR,
-                "There is a fault in the server",
-            ),
-            Self::WarmingUp => (
-                "warming-up",
-                Status::SERVICE_UNAVAILABLE,
-                "The server is warming up",
-            ),
-            Self::ShuttingDown => (
-                "shutting-down",
-                Status::SERVICE_UNAVAILABLE,
-                "The server is shutting down",
-            ),
-            Self::Timeout => (
-                "timeout",
-                Status::GATEWAY_TIMEOUT,
-                "The deadline has passed",
-            ),
+            Self::InvalidParameter => ("invalid-parameter", "A parameter cannot be used"),
+            Self::DamagedImage => ("damaged-image", "The frame is damaged or cut off"),
+            Self::UnfitImage => ("unfit-image", "The frame does not fit"),
+            Self::Overloaded => ("overloaded", "Too many frames are waiting"),
+            Self::Internal => ("internal", "There is a fault in the server"),
+            Self::WarmingUp => ("warming-up", "The server is warming up"),
+            Self::ShuttingDown => ("shutting-down", "The server is shutting down"),
+            Self::Timeout => ("timeout", "The deadline has passed"),
         }
     }
 
     /// The short name: the end of the URN, and the metrics' label.
     pub(in crate::api) fn name(self) -> &'static str {
-        self.row().0
+        self.texts().0
     }
 
     /// Identifies the kind to programs.
@@ -179,19 +132,38 @@ impl ProblemKind {
 
     /// The HTTP status.
     pub(in crate::api) fn status(self) -> StatusCode {
-        self.row().1
+        match self {
+            Self::MalformedRequest
+            | Self::UnknownParameter
+            | Self::RepeatedParameter
+            | Self::MissingImage => StatusCode::BAD_REQUEST,
+            Self::Forbidden => StatusCode::FORBIDDEN,
+            Self::NotFound | Self::UnknownCalibration | Self::UnknownModel => StatusCode::NOT_FOUND,
+            Self::ModelConflict => StatusCode::CONFLICT,
+            Self::ModelRefused | Self::InvalidParameter | Self::DamagedImage | Self::UnfitImage => {
+                StatusCode::UNPROCESSABLE_ENTITY
+            }
+            Self::ModelBusy | Self::Overloaded => StatusCode::TOO_MANY_REQUESTS,
+            Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
+            Self::SlowUpload => StatusCode::REQUEST_TIMEOUT,
+            Self::BodyTooLarge | Self::ImageTooLarge => StatusCode::PAYLOAD_TOO_LARGE,
+            Self::UnsupportedImage => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+            Self::WarmingUp | Self::ShuttingDown => StatusCode::SERVICE_UNAVAILABLE,
+            Self::Timeout => StatusCode::GATEWAY_TIMEOUT,
+        }
     }
 
     /// The kind in words.
     pub(in crate::api) fn title(self) -> &'static str {
-        self.row().2
+        self.texts().1
     }
 
     /// How long to wait before trying again, where that helps, seconds.
     pub(in crate::api) fn retry_after_seconds(self) -> Option<u32> {
         matches!(
             self,
-            Self::Overloaded | Self::WarmingUp | Self::ShuttingDown
+            Self::Overloaded | Self::ModelBusy | Self::WarmingUp | Self::ShuttingDown
         )
         .then_some(1)
     }

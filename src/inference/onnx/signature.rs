@@ -166,6 +166,3 @@ fn views_per_run(
         views => Ok(views.and_then(|views| NonZeroUsize::new(views as usize))),
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -28,6 +28,9 @@ pub(super) fn files_of(model: &Path) -> Vec<PathBuf> {
 
 /// What the files are like now.
 pub(super) fn stamp(files: &[PathBuf]) -> Stamp {
+    if files.is_empty() {
+        return None;
+    }
     let stamps = files.iter().map(|file| {
         let metadata = file.metadata().ok()?;
         Some((metadata.ino(), metadata.len(), metadata.modified().ok()?))

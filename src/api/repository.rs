@@ -1,0 +1,180 @@
+//! The models of the server: the model repository extension of the Open Inference Protocol, as
+//! Triton describes it. For administrators only.
+
+mod body;
+
+use axum::{
+    Json,
+    body::Body,
+    extract::{FromRequestParts, Path, State},
+    http::request::Parts,
+};
+use serde::Serialize;
+use tokio::task::spawn_blocking;
+use utoipa::ToSchema;
+
+use super::{
+    ApiState,
+    openapi::{IndexProblems, LoadProblems},
+    problem::{Problem, ProblemKind},
+};
+use crate::inference::{Model, RepositoryError, RepositoryRow};
+use body::{IndexRequest, LoadRequest, UnloadRequest, read};
+
+/// Whoever sent the request may change which models the server has.
+pub(super) struct Administrator;
+
+impl FromRequestParts<ApiState> for Administrator {
+    type Rejection = Problem;
+
+    async fn from_request_parts(_parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        if state.options.administration {
+            return Ok(Self);
+        }
+        let detail = "models are changed on the server's own machine only: this server listens to \
+                      others, too (server.listen)";
+        Err(Problem::new(ProblemKind::Forbidden, detail))
+    }
+}
+
+/// A model of the repository.
+#[derive(Serialize, ToSchema)]
+#[schema(example = json!({ "name": "nanodet_g_416", "version": "3f1c22ab90de", "state": "READY" }))]
+pub(super) struct RepositoryEntry {
+    /// The model's name.
+    name: String,
+    /// The revision that answers, as in reports.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    version: Option<String>,
+    /// `READY` when it answers, else `UNAVAILABLE`.
+    state: &'static str,
+    /// Why it does not answer, or why its last load failed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+}
+
+impl From<RepositoryRow> for RepositoryEntry {
+    fn from(row: RepositoryRow) -> Self {
+        Self {
+            state: if row.revision.is_some() {
+                "READY"
+            } else {
+                "UNAVAILABLE"
+            },
+            name: row.name,
+            version: row.revision,
+            reason: row.reason,
+        }
+    }
+}
+
+impl From<&Model> for RepositoryEntry {
+    fn from(model: &Model) -> Self {
+        Self::from(RepositoryRow {
+            name: model.name().to_owned(),
+            revision: Some(model.revision().to_owned()),
+            reason: None,
+        })
+    }
+}
+
+/// Which models are there?
+///
+/// Those that are loaded, and those in the repository's folder that can be.
+#[utoipa::path(
+    post, path = "/v2/repository/index", tag = "models", operation_id = "list_models",
+    request_body(content = Option<IndexRequest>, description = "May be left out."),
+    responses(
+        (status = OK, description = "The models, by name.", body = Vec<RepositoryEntry>),
+        IndexProblems,
+    )
+)]
+pub(super) async fn index(
+    State(state): State<ApiState>,
+    _administrator: Administrator,
+    body: Body,
+) -> Result<Json<Vec<RepositoryEntry>>, Problem> {
+    let IndexRequest { ready } = read(&state, body).await?;
+    let rows = blocking(move || Ok(state.models.rows())).await?;
+    let rows = rows
+        .into_iter()
+        .filter(|row| !ready || row.revision.is_some());
+    Ok(Json(rows.map(RepositoryEntry::from).collect()))
+}
+
+/// Load a model, or load it again.
+///
+/// It takes its place when it has passed its check and run once; until then, and when it fails,
+/// the one that answers now goes on.
+#[utoipa::path(
+    post, path = "/v2/repository/models/{name}/load", tag = "models",
+    operation_id = "load_model",
+    params(("name" = String, Path, description = "The model's name.")),
+    request_body(content = Option<LoadRequest>, description = "May be left out."),
+    responses(
+        (status = OK, description = "The model answers.", body = RepositoryEntry),
+        LoadProblems,
+    )
+)]
+pub(super) async fn load(
+    State(state): State<ApiState>,
+    _administrator: Administrator,
+    Path(name): Path<String>,
+    body: Body,
+) -> Result<Json<RepositoryEntry>, Problem> {
+    let LoadRequest {} = read(&state, body).await?;
+    let model = blocking(move || state.models.load(&name)).await?;
+    Ok(Json(RepositoryEntry::from(&*model)))
+}
+
+/// Unload a model.
+///
+/// Frames that began with it are finished. Models that answer requests which name none stay.
+#[utoipa::path(
+    post, path = "/v2/repository/models/{name}/unload", tag = "models",
+    operation_id = "unload_model",
+    params(("name" = String, Path, description = "The model's name.")),
+    request_body(content = Option<UnloadRequest>, description = "May be left out."),
+    responses(
+        (status = OK, description = "The model answers no more.", body = RepositoryEntry),
+        LoadProblems,
+    )
+)]
+pub(super) async fn unload(
+    State(state): State<ApiState>,
+    _administrator: Administrator,
+    Path(name): Path<String>,
+    body: Body,
+) -> Result<Json<RepositoryEntry>, Problem> {
+    let UnloadRequest { .. } = read(&state, body).await?;
+    let unloaded = name.clone();
+    blocking(move || state.models.unload(&unloaded)).await?;
+    Ok(Json(RepositoryEntry::from(RepositoryRow {
+        name,
+        revision: None,
+        reason: None,
+    })))
+}
+
+/// Files are read and networks run off the async runtime.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, RepositoryError> + Send + 'static,
+) -> Result<T, Problem> {
+    Ok(spawn_blocking(work).await.map_err(Problem::internal)??)
+}
+
+impl From<RepositoryError> for Problem {
+    fn from(error: RepositoryError) -> Self {
+        let kind = match &error {
+            RepositoryError::Unknown { .. } | RepositoryError::NotLoaded { .. } => {
+                ProblemKind::UnknownModel
+            }
+            RepositoryError::Kept { .. } | RepositoryError::Full(_) => ProblemKind::ModelConflict,
+            RepositoryError::Busy => ProblemKind::ModelBusy,
+            RepositoryError::OtherName { .. } | RepositoryError::Refused(_) => {
+                ProblemKind::ModelRefused
+            }
+        };
+        Self::new(kind, error.to_string())
+    }
+}

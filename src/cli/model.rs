@@ -1,0 +1,147 @@
+//! `lookdown model`
+
+mod description;
+
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use jiff::Timestamp;
+
+use super::{SettingsFile, annotate};
+use crate::{
+    app::{engine_for, onnx_options},
+    imaging::ViewBatch,
+    inference::{Detector, InferenceError, OnnxDetector},
+    pipeline::{DetectJob, DetectParameters, Detected},
+    settings::{Settings, find_beside_executable},
+};
+
+/// The picture that models are tried on when no other is given: a fisheye frame.
+const SAMPLE: &str = "samples/office.jpg";
+const SCORE_THRESHOLD: f64 = 0.3;
+/// Timed runs of the network; their median is told.
+const RUNS: usize = 5;
+
+/// What to do with a model.
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Say what is understood of a model, run it on a sample and draw what it finds
+    Check(Arguments),
+}
+
+/// Arguments of `lookdown model check`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A model folder (with a model.toml) or an ONNX file
+    #[arg(value_name = "FILE|FOLDER")]
+    model: PathBuf,
+    /// Try it on this picture, seen as it is [default: a fisheye sample, seen through views]
+    #[arg(long, value_name = "IMAGE")]
+    sample: Option<PathBuf>,
+    /// Draw the persons found into the sample
+    #[arg(long, value_name = "OUT.jpg")]
+    annotate: Option<PathBuf>,
+    #[command(flatten)]
+    settings_file: SettingsFile,
+}
+
+/// Does what the command asks for.
+pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
+    let Command::Check(arguments) = command;
+    let mut settings = arguments.settings_file.load()?;
+    let library = settings.inference.find_library()?;
+    let loading = Instant::now();
+    let mut detector = OnnxDetector::load(&library, &arguments.model, onnx_options(&settings))?;
+    let loaded = loading.elapsed();
+    let mut out = io::stdout().lock();
+    write!(out, "{}", description::Lines(detector.description())).context(UNWRITABLE)?;
+    writeln!(out, "loaded in    {}", millis(loaded)).context(UNWRITABLE)?;
+    let most = settings.inference.max_batch_views.get();
+    let one_view = millis(time(&mut detector, 1)?);
+    let most_views = millis(time(&mut detector, most)?);
+    let (device, threads) = (settings.inference.device, settings.threads.network);
+    writeln!(
+        out,
+        "runs in      {one_view} with 1 view, {most_views} with {most} (on {device}, {threads} threads)"
+    )
+    .context(UNWRITABLE)?;
+    drop(detector);
+
+    settings.model.path = Some(arguments.model.clone());
+    let given = arguments.sample.as_deref();
+    let Some((sample, profile)) = given
+        .map(|path| (path.to_owned(), "direct"))
+        .or_else(|| Some((find_beside_executable(Path::new(SAMPLE))?, "fast")))
+    else {
+        writeln!(out, "sample       none: give one with --sample").context(UNWRITABLE)?;
+        return Ok(ExitCode::SUCCESS);
+    };
+    let detected = look(&settings, &sample, profile)?;
+    let persons = &detected.report.persons;
+    let views = detected.report.view_count;
+    writeln!(
+        out,
+        "sample       {}: {} persons in {views} views",
+        sample.display(),
+        persons.len()
+    )
+    .context(UNWRITABLE)?;
+    for person in persons {
+        let [x_min, y_min, x_max, y_max] = person.bbox.corners().map(f64::round);
+        writeln!(
+            out,
+            "  {:.2}         {x_min}, {y_min} to {x_max}, {y_max}",
+            person.score
+        )
+        .context(UNWRITABLE)?;
+    }
+    if let Some(path) = &arguments.annotate {
+        annotate::write(detected, path)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+const UNWRITABLE: &str = "standard output cannot be written";
+
+fn millis(time: Duration) -> String {
+    format!("{:.1} ms", time.as_secs_f64() * 1e3)
+}
+
+/// The median time of a run on blank views, the first one left out.
+fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, InferenceError> {
+    let mut batch = ViewBatch::default();
+    for slot in batch.prepare(views, detector.input()) {
+        slot.fill(0.0);
+    }
+    detector.detect(&batch)?;
+    let mut times = Vec::with_capacity(RUNS);
+    for _ in 0..RUNS {
+        let started = Instant::now();
+        detector.detect(&batch)?;
+        times.push(started.elapsed());
+    }
+    times.sort_unstable();
+    Ok(times[RUNS / 2])
+}
+
+/// Looks at the sample with the model of the settings.
+fn look(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
+    let parameters = DetectParameters::parse([("profile", profile)], SCORE_THRESHOLD)?;
+    let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
+    let image = std::fs::read(sample)
+        .with_context(|| format!("--sample: {} cannot be read", sample.display()))?;
+    Ok(engine.detect(&DetectJob {
+        request_id: sample.display().to_string(),
+        received_at: Timestamp::now(),
+        arrived: Instant::now(),
+        image: image.into(),
+        parameters,
+        calibration: None,
+    })?)
+}

@@ -1,0 +1,71 @@
+//! Where models are.
+
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
+
+use super::RepositoryError;
+use crate::inference::{
+    ModelManifest,
+    manifest::{FILE_NAME, is_name},
+};
+
+/// Most entries of the folder looked at when it is listed.
+const MAX_ENTRIES: usize = 1000;
+/// Most characters of a name that are repeated to its sender.
+const MAX_NAME_CHARS: usize = 64;
+
+/// A folder with a folder for each model, called as the model is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModelFolder {
+    /// The folder.
+    pub path: PathBuf,
+    /// A model by its name that is somewhere else: a folder or an ONNX file.
+    pub elsewhere: Option<(String, PathBuf)>,
+}
+
+impl ModelFolder {
+    /// Where the model of that name is.
+    pub(super) fn find(&self, name: &str) -> Result<PathBuf, RepositoryError> {
+        match &self.elsewhere {
+            Some((there, path)) if there == name => return Ok(path.clone()),
+            _ => {}
+        }
+        let path = self.path.join(name);
+        if is_name(name) && path.join(FILE_NAME).is_file() {
+            return Ok(path);
+        }
+        Err(RepositoryError::Unknown {
+            name: name.chars().take(MAX_NAME_CHARS).collect(),
+            known: self.names().join(", "),
+        })
+    }
+
+    /// The names of all models, sorted.
+    pub(super) fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.path).into_iter().flatten();
+        let folders = entries.take(MAX_ENTRIES).flatten().filter_map(|entry| {
+            let name = entry.file_name().into_string().ok()?;
+            (is_name(&name) && entry.path().join(FILE_NAME).is_file()).then_some(name)
+        });
+        let elsewhere = self.elsewhere.iter().map(|(name, _)| name.clone());
+        let names: BTreeSet<_> = folders.chain(elsewhere).collect();
+        names.into_iter().collect()
+    }
+
+    /// What is to be done about a model that does not answer.
+    pub(super) fn why_not_loaded(&self, name: &str) -> String {
+        if self.find(name).is_ok_and(|path| is_fetched(&path)) {
+            format!("it is not loaded: POST /v2/repository/models/{name}/load loads it")
+        } else {
+            "its ONNX file is not there: run `make models`".to_owned()
+        }
+    }
+}
+
+/// Whether a model's ONNX file is there; weights are fetched, manifests are not.
+#[must_use]
+pub fn is_fetched(model: &Path) -> bool {
+    ModelManifest::locate(model).is_ok_and(|manifest| manifest.onnx.is_file())
+}

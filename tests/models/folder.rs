@@ -1,0 +1,63 @@
+//! Model folders for tests.
+
+use std::{
+    fs,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+};
+
+use lookdown::inference::{Device, InferenceError, OnnxDetector, OnnxOptions};
+use tempfile::TempDir;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// A file of the repository.
+pub(crate) fn of_repository(path: &str) -> PathBuf {
+    Path::new(ROOT).join(path)
+}
+
+/// An ONNX file made for tests.
+pub(crate) fn fixture(name: &str) -> PathBuf {
+    of_repository("tests/fixtures/models").join(format!("{name}.onnx"))
+}
+
+/// The ONNX Runtime library of the set-up.
+pub(crate) fn library() -> PathBuf {
+    of_repository("runtime/libonnxruntime.so")
+}
+
+/// How tests run networks.
+pub(crate) fn options() -> OnnxOptions {
+    OnnxOptions {
+        device: Device::Cpu,
+        threads: NonZeroUsize::new(2).unwrap(),
+        score_floor: 0.01,
+        max_detections_per_view: 100,
+    }
+}
+
+/// Writes a model folder: a manifest called `name` that goes on with `more`, and an ONNX file.
+pub(crate) fn write(folder: &Path, name: &str, more: &str, onnx: &Path) {
+    fs::create_dir_all(folder).unwrap();
+    // A copy under another name first, as whoever replaces a model does it.
+    fs::copy(onnx, folder.join("model.onnx.new")).unwrap();
+    fs::rename(folder.join("model.onnx.new"), folder.join("model.onnx")).unwrap();
+    let manifest = format!("name = \"{name}\"\nonnx = \"model.onnx\"\n{more}");
+    fs::write(folder.join("model.toml"), manifest).unwrap();
+}
+
+/// Loads a model made for tests with a manifest.
+pub(crate) fn load(onnx: &str, more: &str) -> Result<OnnxDetector, InferenceError> {
+    let folder = TempDir::new().unwrap();
+    write(folder.path(), "mine", more, &fixture(onnx));
+    OnnxDetector::load(&library(), folder.path(), options())
+}
+
+/// Why such a model is refused.
+#[track_caller]
+pub(crate) fn refusal(onnx: &str, more: &str) -> String {
+    match load(onnx, more) {
+        Ok(_) => panic!("{onnx} was loaded"),
+        Err(error) => error.to_string(),
+    }
+}

@@ -1,0 +1,191 @@
+//! Loading, reloading and unloading, and what failures leave behind.
+
+use std::{fs, num::NonZeroUsize, path::Path};
+
+use lookdown::inference::{
+    ModelFolder, ModelRepository, OnnxDetector, RepositoryError, RepositoryOptions, RepositoryRow,
+};
+use tempfile::TempDir;
+
+use crate::folder::{fixture, library, options, write};
+
+const OTHER_ORDER: &str = "[input]\nchannel_order = \"bgr\"";
+
+struct Models {
+    repository: ModelRepository,
+    folder: TempDir,
+}
+
+impl Models {
+    /// A repository with the models `a` and `b`, of which `a` must stay.
+    fn new() -> Self {
+        let folder = TempDir::new().unwrap();
+        for name in ["a", "b"] {
+            write(&folder.path().join(name), name, "", &fixture("any_batch"));
+        }
+        let options_of_repository = RepositoryOptions {
+            folder: ModelFolder {
+                path: folder.path().to_owned(),
+                elsewhere: None,
+            },
+            warm_up_views: NonZeroUsize::new(3).unwrap(),
+            kept: vec!["a".to_owned()],
+        };
+        let loader =
+            |path: &Path| Ok(Box::new(OnnxDetector::load(&library(), path, options())?) as _);
+        Self {
+            repository: ModelRepository::new(options_of_repository, Box::new(loader)),
+            folder,
+        }
+    }
+
+    fn write(&self, name: &str, more: &str, onnx: &str) {
+        write(&self.folder.path().join(name), name, more, &fixture(onnx));
+    }
+
+    fn revision(&self, name: &str) -> Option<String> {
+        let model = self.repository.registry().get(name);
+        model.map(|model| model.revision().to_owned())
+    }
+
+    fn row(&self, name: &str) -> RepositoryRow {
+        let rows = self.repository.rows();
+        rows.into_iter().find(|row| row.name == name).unwrap()
+    }
+
+    fn counts(&self) -> (u64, u64) {
+        let counts = self.repository.load_counts();
+        (counts.succeeded, counts.failed)
+    }
+}
+
+#[test]
+fn models_are_loaded_listed_and_unloaded_by_name() {
+    let models = Models::new();
+    let states = || {
+        let rows = models.repository.rows();
+        let states = rows
+            .iter()
+            .map(|row| (row.name.clone(), row.revision.is_some()));
+        states.collect::<Vec<_>>()
+    };
+    let state = |name: &str, loaded| (name.to_owned(), loaded);
+    assert_eq!(states(), [state("a", false), state("b", false)]);
+    models.repository.load("a").unwrap();
+    models.repository.load("b").unwrap();
+    assert_eq!(states(), [state("a", true), state("b", true)]);
+    models.repository.unload("b").unwrap();
+    assert_eq!(states(), [state("a", true), state("b", false)]);
+    let again = models.repository.unload("b").unwrap_err();
+    assert!(
+        matches!(again, RepositoryError::NotLoaded { .. }),
+        "{again}"
+    );
+    let kept = models.repository.unload("a").unwrap_err();
+    assert!(matches!(kept, RepositoryError::Kept { .. }), "{kept}");
+    assert_eq!(models.counts(), (2, 0));
+}
+
+#[test]
+fn only_what_is_in_the_folder_can_be_loaded() {
+    let models = Models::new();
+    let long = "x".repeat(1000);
+    for name in ["c", "", ".", "..", "../a", "a/../b", "/etc", &long] {
+        let error = models.repository.load(name).err().unwrap();
+        assert!(matches!(error, RepositoryError::Unknown { .. }), "{error}");
+        assert!(error.to_string().ends_with("there are a, b") && error.to_string().len() < 200);
+    }
+    write(
+        &models.folder.path().join("c"),
+        "a",
+        "",
+        &fixture("any_batch"),
+    );
+    let error = models.repository.load("c").err().unwrap().to_string();
+    assert!(error.contains("calls itself \"a\""), "{error}");
+}
+
+#[test]
+fn a_model_whose_files_change_is_replaced_once_they_keep_still() {
+    let models = Models::new();
+    models.repository.load("a").unwrap();
+    let before = models.revision("a");
+    models.repository.reload_changed();
+    assert_eq!(models.counts(), (1, 0));
+
+    models.write("a", OTHER_ORDER, "any_batch");
+    models.repository.reload_changed();
+    assert_eq!(
+        models.revision("a"),
+        before,
+        "the files may still be written to"
+    );
+    models.repository.reload_changed();
+    let after = models.revision("a");
+    assert_ne!(after, before);
+    models.repository.reload_changed();
+    models.repository.reload_changed();
+    assert_eq!((models.revision("a"), models.counts()), (after, (2, 0)));
+}
+
+#[test]
+fn a_model_that_fails_its_check_leaves_the_old_one_at_work() {
+    for (onnx, reason) in [
+        ("external_in_a_branch", "tensors in other files"),
+        ("huge_tensor", "a tensor of more than"),
+        ("four_planes", "32-bit floats"),
+        ("other_names", "\"dets\""),
+        ("balloon", "the network failed"),
+    ] {
+        let models = Models::new();
+        models.repository.load("a").unwrap();
+        let before = models.revision("a");
+        models.write("a", "", onnx);
+        let error = models.repository.load("a").err().unwrap().to_string();
+        assert!(error.contains(reason), "{error}");
+        assert_eq!(models.revision("a"), before);
+        assert_eq!(models.row("a").reason, Some(error));
+        // What was refused is not tried again and again.
+        models.repository.reload_changed();
+        models.repository.reload_changed();
+        assert_eq!(models.counts(), (1, 1));
+
+        models.write("a", OTHER_ORDER, "any_batch");
+        models.repository.reload_changed();
+        models.repository.reload_changed();
+        assert_ne!(models.revision("a"), before);
+        assert_eq!(models.row("a").reason, None);
+    }
+}
+
+#[test]
+fn a_model_whose_files_are_gone_stays_at_work() {
+    let models = Models::new();
+    models.repository.load("a").unwrap();
+    fs::remove_dir_all(models.folder.path().join("a")).unwrap();
+    models.repository.reload_changed();
+    models.repository.reload_changed();
+    assert!(models.revision("a").is_some());
+    assert_eq!(models.counts(), (1, 0));
+}
+
+#[test]
+fn a_manifest_that_breaks_is_told_about_once_and_changes_nothing() {
+    let models = Models::new();
+    models.repository.load("a").unwrap();
+    fs::write(models.folder.path().join("a/model.toml"), "name = ").unwrap();
+    for _ in 0..4 {
+        models.repository.reload_changed();
+    }
+    assert_eq!(models.counts(), (1, 1));
+    assert!(models.row("a").reason.unwrap().contains("line 1"));
+}
+
+#[test]
+fn a_model_that_was_not_fetched_says_how_to() {
+    let models = Models::new();
+    fs::remove_file(models.folder.path().join("b/model.onnx")).unwrap();
+    assert!(models.row("b").reason.unwrap().contains("make models"));
+    let error = models.repository.load("b").err().unwrap().to_string();
+    assert!(error.contains("make models"), "{error}");
+}
