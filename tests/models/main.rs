@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 mod brought;
+mod darknet;
 mod folder;
 mod lifecycle;
 mod refusals;
