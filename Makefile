@@ -17,7 +17,8 @@ models: ## fetch and convert every model that Lookdown ships a manifest for (256
 	@$(PYTHON) scripts/setup.py models
 
 serve: setup ## set up, then run the server
-	@exec target/release/lookdown serve
+	@# Without this, glibc keeps the memory of models that were replaced: docs/models.md.
+	@MALLOC_MMAP_THRESHOLD_=131072 exec target/release/lookdown serve
 
 test: ## set up, then everything that needs nothing but this repository: formatting, lints, tests, documentation
 	@$(PYTHON) scripts/setup.py toolchain runtime model converters
