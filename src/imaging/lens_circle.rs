@@ -7,6 +7,7 @@
 //! 3. Along rays near that circle the rim is located to a fraction of a pixel, and a
 //!    robust least-squares circle is fitted to it (`rim`, `least_squares`).
 
+mod agreement;
 mod consensus;
 mod least_squares;
 mod outline;
@@ -16,6 +17,7 @@ mod surround;
 use std::f64::consts::TAU;
 
 use super::frame::Frame;
+pub use agreement::{AgreedCircle, agreed_circle};
 use rim::RimPoint;
 use surround::Surround;
 
