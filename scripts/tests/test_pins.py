@@ -1,5 +1,6 @@
 """The pins: the shipped file is complete, and a damaged one is refused."""
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -30,10 +31,16 @@ class ShippedPins(InEmptyRepository):
                     self.assertTrue(member.to.startswith(f"models/{model.name}/"))
 
     def test_every_model_has_a_manifest_of_its_name(self):
-        for model in read_pins(SHIPPED).models:
+        pins = read_pins(SHIPPED)
+        for model in pins.models + pins.quantised:
             text = (SCRIPTS.parent / "models" / model.name / "model.toml").read_text(encoding="utf-8")
             manifest = tomllib.loads(text)
             self.assertEqual((manifest["name"], manifest["onnx"]), (model.name, "model.onnx"))
+
+    def test_every_int8_form_has_the_ranges_of_the_very_model_it_is_made_from(self):
+        for model in read_pins(SHIPPED).quantised:
+            text = (SCRIPTS.parent / "models" / model.name / "activation_ranges.json").read_text(encoding="utf-8")
+            self.assertEqual(json.loads(text)["model_sha256"], model.source.onnx_sha256)
 
     def test_weights_without_a_stated_licence_come_with_a_caution(self):
         for model in read_pins(SHIPPED).models:
@@ -48,7 +55,7 @@ class ShippedPins(InEmptyRepository):
     def test_no_sum_is_pinned_for_two_different_archives(self):
         pins = read_pins(SHIPPED)
         archives = {model.archive for model in pins.models}
-        sums = [archive.sha256 for archive in archives] + [model.onnx_sha256 for model in pins.models]
+        sums = [archive.sha256 for archive in archives] + [model.onnx_sha256 for model in pins.models + pins.quantised]
         sums += [runtime.archive.sha256 for runtime in pins.runtime.values()]
         sums += [value for pin in pins.converter + pins.node + pins.builder for value in pin.sha256]
         self.assertEqual(len(sums), len(set(sums)))
@@ -75,6 +82,9 @@ class DamagedPins(InEmptyRepository):
 
     def test_a_model_from_an_archive_that_is_not_pinned_is_refused(self):
         self.refused(r'archive = "human"', 'archive = "humans"', "the key 'humans' is missing")
+
+    def test_an_int8_form_of_a_model_that_is_not_pinned_is_refused(self):
+        self.refused(r'source = "nanodet_g_416"', 'source = "nanodet"', "the key 'nanodet' is missing")
 
     def test_a_result_outside_the_repository_is_refused(self):
         self.refused(r'to = "runtime/LICENSE"', 'to = "../LICENSE"', "leaves the repository")

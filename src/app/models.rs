@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::{
     inference::{
-        DetectorLoader, ModelFolder, ModelManifest, ModelRepository, OnnxDetector, OnnxOptions,
-        RepositoryOptions, is_fetched,
+        DetectorLoader, Device, ModelFolder, ModelManifest, ModelRepository, OnnxDetector,
+        OnnxOptions, RepositoryOptions, is_fetched,
     },
     pipeline::DefaultModels,
     settings::{Settings, SettingsError},
@@ -25,7 +25,7 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
     };
     let defaults = match &elsewhere {
         Some((name, _)) => DefaultModels::One(name.clone()),
-        None => per_profile(&path),
+        None => per_profile(&path, settings.inference.device),
     };
     let options = RepositoryOptions {
         folder: ModelFolder { path, elsewhere },
@@ -59,11 +59,11 @@ pub(crate) fn onnx_options(settings: &Settings) -> OnnxOptions {
     }
 }
 
-fn per_profile(folder: &Path) -> DefaultModels {
-    let defaults = DefaultModels::per_profile(|name| is_fetched(&folder.join(name)));
-    if let DefaultModels::PerProfile { missing } = &defaults {
+fn per_profile(folder: &Path, device: Device) -> DefaultModels {
+    let defaults = DefaultModels::per_profile(device, |name| is_fetched(&folder.join(name)));
+    if let DefaultModels::PerProfile { missing, .. } = &defaults {
         for name in missing {
-            tracing::warn!("{name} is not there, so a smaller model stands in: run `make models`");
+            tracing::warn!("{name} is not there, so another model stands in: run `make setup`");
         }
     }
     defaults

@@ -1,14 +1,19 @@
 //! Which model answers requests that name none.
 
 use super::Profile;
+use crate::inference::Device;
 
 /// A profile's model: the one table of them.
-fn preferred(profile: Profile) -> &'static str {
-    match profile {
-        Profile::Paper | Profile::Fast | Profile::Direct => STAND_IN,
-        Profile::Balanced | Profile::Quality => "nanodet_g_416",
+fn preferred(profile: Profile, device: Device) -> &'static str {
+    match (profile, device) {
+        (Profile::Paper | Profile::Fast | Profile::Direct, Device::Cpu) => SSDLITE_INT8,
+        (Profile::Paper | Profile::Fast | Profile::Direct, _) => STAND_IN,
+        (Profile::Balanced | Profile::Quality, _) => "nanodet_g_416",
     }
 }
+
+/// ONNX Runtime has integer kernels for it on processors alone.
+const SSDLITE_INT8: &str = "ssdlite_mobilenet_v2_int8";
 
 /// Stands in for models that were not fetched: the smallest set-up has this one.
 const STAND_IN: &str = "ssdlite_mobilenet_v2";
@@ -18,25 +23,27 @@ const STAND_IN: &str = "ssdlite_mobilenet_v2";
 pub enum DefaultModels {
     /// One for all profiles.
     One(String),
-    /// Each profile's own, or a smaller one that every set-up has.
+    /// Each profile's own, or another one that every set-up has.
     PerProfile {
+        /// What networks run on.
+        device: Device,
         /// The profiles' models that are missing.
         missing: Vec<&'static str>,
     },
 }
 
 impl DefaultModels {
-    /// Each profile's own model, as far as `is_fetched` says that it is there.
+    /// Each profile's own model for this device, as far as `is_fetched` says that it is there.
     #[must_use]
-    pub fn per_profile(is_fetched: impl Fn(&str) -> bool) -> Self {
+    pub fn per_profile(device: Device, is_fetched: impl Fn(&str) -> bool) -> Self {
         let mut missing: Vec<_> = Profile::ALL
-            .map(preferred)
+            .map(|profile| preferred(profile, device))
             .into_iter()
             .filter(|name| *name != STAND_IN && !is_fetched(name))
             .collect();
         missing.sort_unstable();
         missing.dedup();
-        Self::PerProfile { missing }
+        Self::PerProfile { device, missing }
     }
 
     /// The model of a profile.
@@ -44,8 +51,8 @@ impl DefaultModels {
     pub fn of(&self, profile: Profile) -> &str {
         match self {
             Self::One(name) => name,
-            Self::PerProfile { missing } => {
-                let name = preferred(profile);
+            Self::PerProfile { device, missing } => {
+                let name = preferred(profile, *device);
                 if missing.contains(&name) {
                     STAND_IN
                 } else {
@@ -75,13 +82,22 @@ mod tests {
 
     #[test]
     fn a_model_that_was_not_fetched_has_a_stand_in() {
-        let all = DefaultModels::per_profile(|_| true);
+        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
         assert_eq!(
             all.names(),
             [all.of(Profile::Balanced), all.of(Profile::Fast)]
         );
-        let few = DefaultModels::per_profile(|_| false);
+        let few = DefaultModels::per_profile(Device::Cpu, |_| false);
         assert_eq!(few.names(), [STAND_IN]);
+    }
+
+    #[test]
+    fn only_a_processor_gets_the_int8_form() {
+        let gpu = DefaultModels::per_profile(Device::Cuda(0), |_| true);
+        assert_eq!(gpu.of(Profile::Fast), STAND_IN);
+        let cpu = DefaultModels::per_profile(Device::Cpu, |_| true);
+        assert_eq!(cpu.of(Profile::Fast), SSDLITE_INT8);
+        assert_eq!(cpu.of(Profile::Quality), gpu.of(Profile::Quality));
     }
 
     #[test]

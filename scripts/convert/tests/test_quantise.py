@@ -1,0 +1,192 @@
+"""INT8 models: what is folded, how weights are rounded, which nodes stay, and that the answers hardly change."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy
+import onnx
+from onnx.reference import ReferenceEvaluator
+
+from ..errors import ConversionError
+from ..onnx_builder import OnnxBuilder
+from ..quantisation.folding import fold
+from ..quantisation.graph import OnnxGraph
+from ..quantisation.ranges import ActivationRanges, sha256_of
+from ..quantisation.regions import FLOAT_CONVOLUTIONS, int8_tensors, moved_tensors
+from ..quantisation.weights import quantise_weights
+from ..quantise import quantise
+from .support import MaxPool
+
+SIZE, CHANNELS = 12, 4
+RANDOM_SEED = 3
+
+
+class MadeUpNetwork:
+    """A network with what the converters write around convolutions: six of them, the last one decoded."""
+
+    def __init__(self):
+        self.builder = OnnxBuilder()
+        self._random = numpy.random.default_rng(RANDOM_SEED)
+        scaled = self.builder.node("Mul", ["images", self.builder.constant(2 / 255)])
+        first = self.relu6(self.shifted(self.multiplied(self.convolution(scaled, inputs=3))))
+        second = self.convolution(self.padded(self.leaky(self.normalised(first)), 0.0), pads=None)
+        windows = {"kernel_shape": [3, 3], "pads": [0, 0, 0, 0], "strides": [2, 2]}
+        pooled = self.builder.node("MaxPool", [self.padded(second, -numpy.inf)], **windows)
+        third = self.relu6(self.shifted(self.convolution(pooled)))
+        summed = self.builder.node("Add", [self.convolution(third), third])
+        last = self.convolution(self.leaky(self.shifted(summed)), outputs=1)
+        self.scores = self.builder.reshape(self.builder.node("Sigmoid", [last]), [0, -1])
+
+    def save(self, file: Path) -> None:
+        cells = (SIZE // 2) ** 2
+        outputs = {"scores": (self.scores, [cells])}
+        self.builder.save(file, outputs=outputs, height=SIZE, width=SIZE, description="Made up.")
+
+    def numbers(self, *shape: int, middle: float = 0.0) -> str:
+        return self.builder.constant(self._random.normal(middle, 0.3, shape).astype(numpy.float32))
+
+    def convolution(self, tensor: str, inputs=CHANNELS, outputs=CHANNELS, pads=(1, 1, 1, 1)) -> str:
+        weights = self.numbers(outputs, inputs, 3, 3)
+        stated = {"pads": list(pads)} if pads else {}
+        return self.builder.node("Conv", [tensor, weights], kernel_shape=[3, 3], **stated)
+
+    def multiplied(self, tensor: str) -> str:
+        return self.builder.node("Mul", [tensor, self.numbers(1, CHANNELS, 1, 1, middle=1)])
+
+    def shifted(self, tensor: str) -> str:
+        return self.builder.node("Add", [self.numbers(1, CHANNELS, 1, 1, middle=0.5), tensor])
+
+    def normalised(self, tensor: str) -> str:
+        convolved = self.convolution(tensor)
+        parameters = [self.numbers(CHANNELS, middle=middle) for middle in (1, 0, 0)]
+        variance = self.builder.constant(self._random.uniform(0.5, 2, CHANNELS).astype(numpy.float32))
+        return self.builder.node("BatchNormalization", [convolved, *parameters, variance], epsilon=0.01)
+
+    def padded(self, tensor: str, value: float) -> str:
+        pads = self.builder.constant(numpy.array([0, 0, 1, 1, 0, 0, 1, 1]))
+        return self.builder.node("Pad", [tensor, pads, self.builder.constant(value)])
+
+    def relu6(self, tensor: str) -> str:
+        return self.builder.node("Clip", [tensor, self.builder.constant(0.0), self.builder.constant(6.0)])
+
+    def leaky(self, tensor: str) -> str:
+        return self.builder.node("LeakyRelu", [tensor], alpha=0.1)
+
+
+class WithNetwork(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.fp32, self.folded, self.int8 = (self.folder / f"{name}.onnx" for name in ("fp32", "folded", "int8"))
+        self.ranges = self.folder / "activation_ranges.json"
+        MadeUpNetwork().save(self.fp32)
+        graph = OnnxGraph(self.fp32)
+        fold(graph)
+        self.tensors = int8_tensors(graph)
+        graph.save(self.folded)
+        shape = (2, 3, SIZE, SIZE)
+        self.pictures = numpy.random.default_rng(RANDOM_SEED).uniform(0, 255, shape).astype(numpy.float32)
+
+    def answer(self, file: Path, tensors: list[str] | None = None) -> list[numpy.ndarray]:
+        model = onnx.load(file)
+        # The evaluator knows DequantizeLinear from this version on; it means the same.
+        model.opset_import[0].version = 19
+        model.graph.output.extend(onnx.ValueInfoProto(name=tensor) for tensor in tensors or [])
+        return ReferenceEvaluator(model, new_ops=[MaxPool]).run(tensors, {"images": self.pictures})
+
+    def write_ranges(self, model_sha256: str) -> None:
+        values = self.answer(self.folded, self.tensors)
+        ends = {name: (float(v.min()), float(v.max())) for name, v in zip(self.tensors, values, strict=True)}
+        ActivationRanges(model_sha256, ends).write(self.ranges)
+
+
+class Folding(WithNetwork):
+    def test_scales_shifts_and_pads_go_into_the_convolutions_and_the_answers_stay(self):
+        left = [node.op_type for node in onnx.load(self.folded).graph.node]
+        self.assertEqual(left.count("Conv"), 6)
+        self.assertEqual(left.count("Add"), 1)
+        self.assertTrue({"Pad", "BatchNormalization"}.isdisjoint(left))
+        self.assertEqual(left.count("Mul"), 1)
+        [expected], [found] = self.answer(self.fp32), self.answer(self.folded)
+        self.assertGreater(expected.std(), 0.01)
+        numpy.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
+
+
+class Moving(WithNetwork):
+    def test_tensors_between_which_values_only_move_are_one_group(self):
+        network = MadeUpNetwork()
+        builder, tensor = network.builder, network.convolution("images", inputs=3)
+        for _ in range(FLOAT_CONVOLUTIONS):
+            tensor = network.convolution(tensor)
+        pooled = builder.node("MaxPool", [tensor], kernel_shape=[3, 3], pads=[1] * 4, strides=[1, 1])
+        beside = network.relu6(network.convolution(pooled))
+        together = builder.node("Concat", [pooled, beside], axis=1)
+        scores = builder.reshape(network.convolution(network.convolution(together, inputs=2 * CHANNELS)), [0, -1])
+        outputs = {"scores": (scores, [SIZE * SIZE * CHANNELS])}
+        builder.save(self.fp32, outputs=outputs, height=SIZE, width=SIZE, description="Moves values.")
+        graph = OnnxGraph(self.fp32)
+        fold(graph)
+        self.assertEqual(moved_tensors(graph), [{tensor, pooled, beside, together}])
+
+
+class Weights(unittest.TestCase):
+    def setUp(self):
+        random = numpy.random.default_rng(RANDOM_SEED)
+        self.weights = random.normal(0, 1, (64, 16, 3, 3)).astype(numpy.float32)
+        self.bias = random.normal(0, 1, 64).astype(numpy.float32)
+
+    def test_they_are_rounded_to_the_nearest_step_of_their_channel(self):
+        integers, bias, scales = quantise_weights(self.weights, self.bias, 0.02)
+        steps = scales[:, None, None, None]
+        self.assertLessEqual(numpy.abs((integers * steps - self.weights) / steps).max(), 0.5001)
+        numpy.testing.assert_allclose(bias * scales * 0.02, self.bias, atol=1e-3)
+
+    def test_two_neighbours_times_the_largest_activation_fit_into_16_bits(self):
+        self.weights[0, :2] = 1.0
+        self.weights[1, 4:6] = -1.0
+        integers, _, _ = quantise_weights(self.weights, self.bias, 0.02)
+        pairs = integers.astype(int).transpose(0, 2, 3, 1).reshape(-1, 2)
+        self.assertLessEqual(255 * numpy.maximum(pairs, 0).sum(axis=1).max(), 2**15 - 1)
+        self.assertGreaterEqual(255 * numpy.minimum(pairs, 0).sum(axis=1).min(), -(2**15))
+
+    def test_depthwise_weights_use_all_of_the_8_bits(self):
+        integers, _, _ = quantise_weights(self.weights[:, :1], self.bias, 0.02)
+        self.assertEqual(numpy.abs(integers).reshape(64, -1).max(axis=1).tolist(), [127] * 64)
+
+    def test_a_channel_without_weights_keeps_its_bias(self):
+        self.weights[5], self.bias[5] = 1e-25, 2.0
+        _, bias, scales = quantise_weights(self.weights, self.bias, 0.02)
+        self.assertAlmostEqual(bias[5] * float(scales[5]) * 0.02, 2.0, places=5)
+
+
+class Quantising(WithNetwork):
+    def setUp(self):
+        super().setUp()
+        self.write_ranges(sha256_of(self.fp32))
+
+    def test_the_answers_hardly_change_and_the_same_files_give_the_same_bytes(self):
+        quantise(self.fp32, self.int8, self.ranges)
+        written = self.int8.read_bytes()
+        [expected], [found] = self.answer(self.fp32), self.answer(self.int8)
+        numpy.testing.assert_allclose(found, expected, atol=0.03)
+        self.assertFalse(numpy.array_equal(found, expected))
+        quantise(self.fp32, self.int8, self.ranges)
+        self.assertEqual(self.int8.read_bytes(), written)
+
+    def test_the_first_three_and_the_last_convolution_keep_their_numbers(self):
+        quantise(self.fp32, self.int8, self.ranges)
+        graph = OnnxGraph(self.int8)
+        convolutions = [node for node in graph.nodes if node.op_type == "Conv"]
+        in_int8 = [graph.producer(node.input[1]) is not None for node in convolutions]
+        self.assertEqual(in_int8, [False, False, False, True, True, False])
+
+    def test_ranges_of_another_model_are_refused(self):
+        self.write_ranges("0" * 64)
+        with self.assertRaisesRegex(ConversionError, "measured on another model than .*fp32.onnx"):
+            quantise(self.fp32, self.int8, self.ranges)
+
+    def test_a_tensor_whose_range_is_missing_or_useless_is_named(self):
+        for ends, reason in ({}, "was not measured"), ({self.tensors[0]: (0.0, 0.0)}, "cannot be divided"):
+            ActivationRanges(sha256_of(self.fp32), ends).write(self.ranges)
+            with self.assertRaisesRegex(ConversionError, f"'{self.tensors[0]}'.*{reason}"):
+                quantise(self.fp32, self.int8, self.ranges)
