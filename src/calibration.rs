@@ -5,6 +5,7 @@ mod error;
 mod file;
 mod folder;
 mod id;
+pub mod native;
 
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
 pub use error::CalibrationError;

@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use nalgebra::{Unit, Vector3};
-use serde::Deserialize;
 
-use super::{Calibration, CalibrationError, CalibrationId};
+use super::{
+    Calibration, CalibrationError, CalibrationId,
+    native::{NativeCalibration, NativeIdeal, NativeImage, NativeLens, NativeMount},
+};
 use crate::geometry::{
     Lens, LensError, Mount,
     lens::{ImagePlane, RadialCurve},
@@ -19,90 +21,6 @@ const MAX_BYTES: u64 = 1024 * 1024;
 const IMAGE_SIDE: std::ops::RangeInclusive<u32> = 16..=65_536;
 /// How far from unit length `world_up` may be.
 const UNIT_TOLERANCE: f64 = 1e-3;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawCalibration {
-    id: String,
-    image: RawImage,
-    lens: RawLens,
-    #[serde(default)]
-    mount: RawMount,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawImage {
-    width: u32,
-    height: u32,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawMount {
-    world_up: [f64; 3],
-    height_m: Option<f64>,
-}
-
-impl Default for RawMount {
-    fn default() -> Self {
-        Self {
-            world_up: [0.0, 0.0, -1.0],
-            height_m: None,
-        }
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(tag = "model", rename_all = "snake_case")]
-enum RawLens {
-    Equidistant(RawIdeal),
-    Equisolid(RawIdeal),
-    Stereographic(RawIdeal),
-    Orthographic(RawIdeal),
-    Rectilinear(RawIdeal),
-    KannalaBrandt(RawKannalaBrandt),
-    RadialPolynomial(RawRadialPolynomial),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawIdeal {
-    focal: Option<f64>,
-    fx: Option<f64>,
-    fy: Option<f64>,
-    cx: f64,
-    cy: f64,
-    max_theta: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawKannalaBrandt {
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    k: [f64; 4],
-    #[serde(default)]
-    skew: f64,
-    max_theta: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawRadialPolynomial {
-    coefficients: Vec<f64>,
-    #[serde(default = "square_pixels")]
-    aspect: f64,
-    cx: f64,
-    cy: f64,
-    max_theta: Option<f64>,
-}
-
-fn square_pixels() -> f64 {
-    1.0
-}
 
 /// Reads and checks one file.
 pub(super) fn read(path: &Path) -> Result<Calibration, CalibrationError> {
@@ -130,7 +48,7 @@ fn malformed(path: &Path, detail: String) -> CalibrationError {
     }
 }
 
-fn parse(path: &Path, text: &str) -> Result<RawCalibration, CalibrationError> {
+fn parse(path: &Path, text: &str) -> Result<NativeCalibration, CalibrationError> {
     let ending = path.extension().and_then(|ending| ending.to_str());
     let parsed = match ending {
         Some("json") => serde_json::from_str(text).map_err(|error| error.to_string()),
@@ -144,7 +62,11 @@ fn parse(path: &Path, text: &str) -> Result<RawCalibration, CalibrationError> {
     parsed.map_err(|detail| malformed(path, detail))
 }
 
-fn check(path: &Path, raw: RawCalibration, bytes: &[u8]) -> Result<Calibration, CalibrationError> {
+fn check(
+    path: &Path,
+    raw: NativeCalibration,
+    bytes: &[u8],
+) -> Result<Calibration, CalibrationError> {
     let invalid = |field, problem| CalibrationError::Invalid {
         path: path.to_owned(),
         field,
@@ -154,7 +76,7 @@ fn check(path: &Path, raw: RawCalibration, bytes: &[u8]) -> Result<Calibration, 
         .id
         .parse()
         .map_err(|error| invalid("id", format!("{error}")))?;
-    let RawImage { width, height } = raw.image;
+    let NativeImage { width, height } = raw.image;
     if !(IMAGE_SIDE.contains(&width) && IMAGE_SIDE.contains(&height)) {
         let (least, most) = IMAGE_SIDE.into_inner();
         let problem = format!("{width}×{height} pixels; each side must be {least} to {most}");
@@ -173,14 +95,14 @@ fn check(path: &Path, raw: RawCalibration, bytes: &[u8]) -> Result<Calibration, 
 }
 
 /// The lens, and whether the file says where its image ends.
-fn lens(raw: RawLens) -> Result<(Lens, bool), LensError> {
+fn lens(raw: NativeLens) -> Result<(Lens, bool), LensError> {
     let (curve, plane, max_theta) = match raw {
-        RawLens::Equidistant(raw) => ideal(RadialCurve::Equidistant, &raw)?,
-        RawLens::Equisolid(raw) => ideal(RadialCurve::Equisolid, &raw)?,
-        RawLens::Stereographic(raw) => ideal(RadialCurve::Stereographic, &raw)?,
-        RawLens::Orthographic(raw) => ideal(RadialCurve::Orthographic, &raw)?,
-        RawLens::Rectilinear(raw) => ideal(RadialCurve::Rectilinear, &raw)?,
-        RawLens::KannalaBrandt(raw) => (
+        NativeLens::Equidistant(raw) => ideal(RadialCurve::Equidistant, &raw)?,
+        NativeLens::Equisolid(raw) => ideal(RadialCurve::Equisolid, &raw)?,
+        NativeLens::Stereographic(raw) => ideal(RadialCurve::Stereographic, &raw)?,
+        NativeLens::Orthographic(raw) => ideal(RadialCurve::Orthographic, &raw)?,
+        NativeLens::Rectilinear(raw) => ideal(RadialCurve::Rectilinear, &raw)?,
+        NativeLens::KannalaBrandt(raw) => (
             RadialCurve::KannalaBrandt { k: raw.k },
             ImagePlane {
                 skew: raw.skew,
@@ -188,20 +110,27 @@ fn lens(raw: RawLens) -> Result<(Lens, bool), LensError> {
             },
             raw.max_theta,
         ),
-        RawLens::RadialPolynomial(raw) => (
+        NativeLens::RadialPolynomial(raw) => (
             RadialCurve::Polynomial {
                 coefficients: raw.coefficients,
             },
             ImagePlane::new(1.0, raw.aspect, raw.cx, raw.cy),
             raw.max_theta,
         ),
+        NativeLens::Ucm(_)
+        | NativeLens::Eucm(_)
+        | NativeLens::Mei(_)
+        | NativeLens::DoubleSphere(_)
+        | NativeLens::Ocam(_)
+        | NativeLens::Fov(_)
+        | NativeLens::FTheta(_) => return Err(LensError::FocalLengths),
     };
     Ok((Lens::new(curve, plane, max_theta)?, max_theta.is_some()))
 }
 
 fn ideal(
     curve: RadialCurve,
-    raw: &RawIdeal,
+    raw: &NativeIdeal,
 ) -> Result<(RadialCurve, ImagePlane, Option<f64>), LensError> {
     let (fx, fy) = match (raw.focal, raw.fx, raw.fy) {
         (Some(focal), None, None) => (focal, focal),
@@ -215,7 +144,7 @@ fn ideal(
     ))
 }
 
-fn mount(raw: &RawMount) -> Result<Mount, String> {
+fn mount(raw: &NativeMount) -> Result<Mount, String> {
     let up = Vector3::from(raw.world_up);
     let length = up.norm();
     // Written so that a length that is no number is refused, too.
