@@ -5,6 +5,7 @@ mod error;
 mod file;
 mod folder;
 mod id;
+mod lens_fields;
 pub mod native;
 
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};

@@ -6,12 +6,9 @@ use nalgebra::{Unit, Vector3};
 
 use super::{
     Calibration, CalibrationError, CalibrationId,
-    native::{NativeCalibration, NativeIdeal, NativeImage, NativeLens, NativeMount},
+    native::{NativeCalibration, NativeImage, NativeMount},
 };
-use crate::geometry::{
-    Lens, LensError, Mount,
-    lens::{ImagePlane, RadialCurve},
-};
+use crate::geometry::Mount;
 
 /// File endings that are read, in the order in which they are looked for.
 pub(super) const ENDINGS: [&str; 4] = ["json", "yaml", "yml", "toml"];
@@ -82,8 +79,11 @@ fn check(
         let problem = format!("{width}×{height} pixels; each side must be {least} to {most}");
         return Err(invalid("image", problem));
     }
-    let (lens, ends_explicitly) =
-        lens(raw.lens).map_err(|error| invalid("lens", error.to_string()))?;
+    let ends_explicitly = raw.lens.max_theta().is_some();
+    let lens = raw
+        .lens
+        .into_lens()
+        .map_err(|error| invalid("lens", error.to_string()))?;
     let mount = mount(&raw.mount).map_err(|problem| invalid("mount", problem))?;
     let calibration = Calibration::new(id, bytes, width, height, lens, mount);
     // Where the file does not say where the lens image ends, it ends with the frame.
@@ -92,56 +92,6 @@ fn check(
     } else {
         calibration.limited_to_image()
     })
-}
-
-/// The lens, and whether the file says where its image ends.
-fn lens(raw: NativeLens) -> Result<(Lens, bool), LensError> {
-    let (curve, plane, max_theta) = match raw {
-        NativeLens::Equidistant(raw) => ideal(RadialCurve::Equidistant, &raw)?,
-        NativeLens::Equisolid(raw) => ideal(RadialCurve::Equisolid, &raw)?,
-        NativeLens::Stereographic(raw) => ideal(RadialCurve::Stereographic, &raw)?,
-        NativeLens::Orthographic(raw) => ideal(RadialCurve::Orthographic, &raw)?,
-        NativeLens::Rectilinear(raw) => ideal(RadialCurve::Rectilinear, &raw)?,
-        NativeLens::KannalaBrandt(raw) => (
-            RadialCurve::KannalaBrandt { k: raw.k },
-            ImagePlane {
-                skew: raw.skew,
-                ..ImagePlane::new(raw.fx, raw.fy, raw.cx, raw.cy)
-            },
-            raw.max_theta,
-        ),
-        NativeLens::RadialPolynomial(raw) => (
-            RadialCurve::Polynomial {
-                coefficients: raw.coefficients,
-            },
-            ImagePlane::new(1.0, raw.aspect, raw.cx, raw.cy),
-            raw.max_theta,
-        ),
-        NativeLens::Ucm(_)
-        | NativeLens::Eucm(_)
-        | NativeLens::Mei(_)
-        | NativeLens::DoubleSphere(_)
-        | NativeLens::Ocam(_)
-        | NativeLens::Fov(_)
-        | NativeLens::FTheta(_) => return Err(LensError::FocalLengths),
-    };
-    Ok((Lens::new(curve, plane, max_theta)?, max_theta.is_some()))
-}
-
-fn ideal(
-    curve: RadialCurve,
-    raw: &NativeIdeal,
-) -> Result<(RadialCurve, ImagePlane, Option<f64>), LensError> {
-    let (fx, fy) = match (raw.focal, raw.fx, raw.fy) {
-        (Some(focal), None, None) => (focal, focal),
-        (None, Some(fx), Some(fy)) => (fx, fy),
-        _ => return Err(LensError::FocalLengths),
-    };
-    Ok((
-        curve,
-        ImagePlane::new(fx, fy, raw.cx, raw.cy),
-        raw.max_theta,
-    ))
 }
 
 fn mount(raw: &NativeMount) -> Result<Mount, String> {

@@ -49,7 +49,7 @@ impl Default for NativeMount {
 }
 
 /// A lens: its model and the parameters of that model. `cx`, `cy` are pixel centres, angles
-/// radians; formulas and sources are with [`crate::geometry::lens::RadialCurve`].
+/// radians; formulas and sources are with [`crate::geometry::lens::LensModel`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case")]
 pub enum NativeLens {

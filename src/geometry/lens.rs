@@ -1,18 +1,27 @@
 //! Lens models: where a ray meets the image, and which ray a pixel saw.
 //!
-//! Every model here is rotationally symmetric up to an affine map of the image plane: a
-//! [`RadialCurve`] gives the normalised radius for the angle `theta` from the optical axis, an
-//! [`ImagePlane`] turns normalised coordinates into pixels. A ray or pixel outside the valid range
-//! is refused with `None`, never mapped to a made-up place.
+//! Three stages make every lens: the curve of its [`LensModel`] gives the radius in the normalised
+//! plane for the angle `theta` from the optical axis, `mei` then distorts that plane
+//! ([`RadialTangential`]), and an affine [`ImagePlane`] turns it into pixels. A ray or pixel
+//! outside the valid range is refused with `None`, never mapped to a made-up place.
 
-mod curve;
+use std::f64::consts::PI;
+
+mod closed_curve;
+mod distortion;
+mod error;
 mod image_plane;
 mod inversion;
+mod model;
+mod polynomial;
+mod radial_map;
 
-pub use curve::RadialCurve;
+pub use distortion::RadialTangential;
+pub use error::LensError;
 pub use image_plane::ImagePlane;
+pub use model::{FThetaPolynomial, LensModel};
 
-use self::inversion::AngleTable;
+use self::{inversion::first_stationary_point, radial_map::RadialMap};
 use super::{Pixel, Ray};
 
 /// Rays this little beyond `max_theta` still count as on the rim: rounding, not geometry.
@@ -21,109 +30,54 @@ const RIM_TOLERANCE: f64 = 1e-12;
 /// A calibrated lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
-    curve: RadialCurve,
+    model: &'static str,
+    radial: RadialMap,
+    distortion: Option<RadialTangential>,
     plane: ImagePlane,
     max_theta: f64,
+    /// The radius at `max_theta`, before distortion.
     max_radius: f64,
-    /// Speeds up the inversion of curves that have no closed form.
-    angle_table: Option<AngleTable>,
-}
-
-/// A lens that cannot be.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum LensError {
-    /// A parameter is NaN or infinite.
-    #[error("{name} is {value}: a finite number is needed")]
-    NotFinite {
-        /// The parameter's name in a calibration file.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// A focal length or a scale is zero or negative.
-    #[error("{name} is {value}: it must be greater than 0")]
-    NotPositive {
-        /// The parameter's name in a calibration file.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// The focal length is missing, or given in two ways.
-    #[error("give either focal, or both fx and fy")]
-    FocalLengths,
-    /// The radius does not grow with the angle at the optical axis.
-    #[error(
-        "the lens curve of {model} does not rise at the optical axis: check the order and sign of \
-         its coefficients"
-    )]
-    NotRising {
-        /// The lens model's name.
-        model: &'static str,
-    },
-    /// A radial polynomial that does not start at the principal point.
-    #[error("coefficients[0] is {value}: the radius at the optical axis must be 0")]
-    TornAtAxis {
-        /// The constant coefficient.
-        value: f64,
-    },
-    /// A radial polynomial of absurd degree.
-    #[error("coefficients has {count} entries: between 2 and {limit} are accepted")]
-    CoefficientCount {
-        /// How many were given.
-        count: usize,
-        /// The most that are accepted.
-        limit: usize,
-    },
-    /// `max_theta` lies outside the range in which the model maps one to one.
-    #[error(
-        "max_theta is {value} rad, but this {model} lens is one-to-one only up to {limit:.4} rad: \
-         give a value above 0 and at most that"
-    )]
-    MaxThetaOutOfRange {
-        /// The lens model's name.
-        model: &'static str,
-        /// The value given.
-        value: f64,
-        /// The largest value the model allows.
-        limit: f64,
-    },
 }
 
 impl Lens {
-    /// Builds a lens. Without `max_theta` the lens reaches as far as its curve is one-to-one.
+    /// Builds a lens. Without `max_theta` the lens reaches as far as its model is one-to-one.
     ///
     /// # Errors
-    /// [`LensError`] when a parameter is not finite, a scale is not positive, the curve does not
-    /// rise at the axis, or `max_theta` lies beyond the curve's limit.
+    /// [`LensError`] when a parameter is not finite or out of its range, the curve does not rise
+    /// at the axis, or `max_theta` lies beyond the model's limit.
     pub fn new(
-        curve: RadialCurve,
+        model: LensModel,
         plane: ImagePlane,
         max_theta: Option<f64>,
     ) -> Result<Self, LensError> {
-        curve.check()?;
+        let name = model.name();
+        let is_polynomial = model.is_polynomial();
+        let (radial, distortion) = model.into_parts()?;
         plane.check()?;
-        let limit = curve.limit();
-        if limit <= 0.0 {
-            return Err(LensError::NotRising {
-                model: curve.name(),
-            });
-        }
+        let limit = match &distortion {
+            None => radial.limit(),
+            Some(distortion) => first_stationary_point(
+                |theta| distortion.least_stretch(radial.radius(theta)),
+                radial.limit(),
+            ),
+        };
         let max_theta = max_theta.unwrap_or(limit);
-        if !(max_theta > 0.0 && max_theta <= limit + RIM_TOLERANCE) {
-            return Err(LensError::MaxThetaOutOfRange {
-                model: curve.name(),
-                value: max_theta,
-                limit,
-            });
+        let max_radius = radial.radius(max_theta.min(limit));
+        let rises = limit > 0.0 && max_radius.is_finite();
+        if !rises {
+            return Err(LensError::NotRising { model: name });
         }
-        let max_theta = max_theta.min(limit);
-        let angle_table = (!curve.has_closed_inverse()).then(|| AngleTable::new(&curve, max_theta));
+        let is_within = max_theta > 0.0 && max_theta <= limit + RIM_TOLERANCE;
+        if !is_within {
+            return Err(beyond_limit(name, is_polynomial, max_theta, limit));
+        }
         Ok(Self {
-            max_radius: curve.radius(max_theta),
-            curve,
+            model: name,
+            radial,
+            distortion,
             plane,
-            max_theta,
-            angle_table,
+            max_theta: max_theta.min(limit),
+            max_radius,
         })
     }
 
@@ -140,13 +94,13 @@ impl Lens {
     ) -> Result<Self, LensError> {
         let focal = radius / max_theta;
         let plane = ImagePlane::new(focal, focal, cx, cy);
-        Self::new(RadialCurve::Equidistant, plane, Some(max_theta))
+        Self::new(LensModel::Equidistant, plane, Some(max_theta))
     }
 
     /// The name of the model, as in calibration files.
     #[must_use]
     pub fn model(&self) -> &'static str {
-        self.curve.name()
+        self.model
     }
 
     /// Where the lens image ends: the largest angle from the optical axis, in radians.
@@ -173,10 +127,9 @@ impl Lens {
         if !(theta <= self.max_theta + RIM_TOLERANCE && off_axis.is_finite()) {
             return None;
         }
-        let scale = self.curve.radius(theta.min(self.max_theta)) / off_axis;
-        Some(
-            self.plane
-                .pixel_from_normalised(ray.x * scale, ray.y * scale),
+        self.pixel_at(
+            ray,
+            self.radial.radius(theta.min(self.max_theta)) / off_axis,
         )
     }
 
@@ -188,11 +141,18 @@ impl Lens {
         if off_axis.atan2(ray.z) <= self.max_theta || off_axis == 0.0 {
             return self.project(ray);
         }
-        let scale = self.max_radius / off_axis;
-        scale.is_finite().then(|| {
-            self.plane
-                .pixel_from_normalised(ray.x * scale, ray.y * scale)
-        })
+        self.pixel_at(ray, self.max_radius / off_axis)
+    }
+
+    /// The pixel of the point `scale · (x, y)` in the plane before distortion.
+    fn pixel_at(&self, ray: &Ray, scale: f64) -> Option<Pixel> {
+        let (x, y) = (ray.x * scale, ray.y * scale);
+        let (x, y) = match &self.distortion {
+            None => (x, y),
+            Some(distortion) => distortion.distort(x, y),
+        };
+        let pixel = self.plane.pixel_from_normalised(x, y);
+        (pixel.x.is_finite() && pixel.y.is_finite()).then_some(pixel)
     }
 
     /// The unit ray in the camera frame that `pixel` (pixel centres) sees, or `None` outside the
@@ -200,6 +160,10 @@ impl Lens {
     #[must_use]
     pub fn unproject(&self, pixel: &Pixel) -> Option<Ray> {
         let (x, y) = self.plane.normalised_from_pixel(pixel);
+        let (x, y) = match &self.distortion {
+            None => (x, y),
+            Some(distortion) => distortion.undistort(x, y, self.max_radius)?,
+        };
         let radius = x.hypot(y);
         if radius == 0.0 {
             return Some(Ray::z());
@@ -209,13 +173,9 @@ impl Lens {
         if !is_within {
             return None;
         }
-        let radius_inside = radius.min(self.max_radius);
-        let theta = match &self.angle_table {
-            Some(table) => table.angle(&self.curve, radius_inside),
-            None => self.curve.closed_inverse(radius_inside),
-        };
-        let (sin, cos) = theta.sin_cos();
-        Some(Ray::new(sin * x / radius, sin * y / radius, cos))
+        let (sin, cos) = self.radial.angle(radius.min(self.max_radius)).sin_cos();
+        sin.is_finite()
+            .then(|| Ray::new(sin * x / radius, sin * y / radius, cos))
     }
 
     /// The same lens for a frame `scale_x`, `scale_y` times as large. Pixel centres move with
@@ -234,9 +194,27 @@ impl Lens {
         let max_theta = max_theta.min(self.max_theta);
         Self {
             max_theta,
-            max_radius: self.curve.radius(max_theta),
+            max_radius: self.radial.radius(max_theta),
             ..self.clone()
         }
+    }
+}
+
+/// Why `max_theta` is refused. The limit is rounded down, so that it may be copied.
+fn beyond_limit(model: &'static str, is_polynomial: bool, value: f64, limit: f64) -> LensError {
+    let turns_back = is_polynomial && value > limit && limit < PI;
+    let limit = (limit * 1e4).floor() / 1e4;
+    if turns_back {
+        return LensError::TurnsBack {
+            model,
+            value,
+            limit,
+        };
+    }
+    LensError::MaxThetaOutOfRange {
+        model,
+        value,
+        limit,
     }
 }
 

@@ -3,7 +3,7 @@
 use super::LensError;
 use crate::geometry::Pixel;
 
-/// `u = fx·x + skew·y + cx`, `v = fy·y + cy`: normalised coordinates to pixel centres.
+/// `u = fx·x + skew·y + cx`, `v = row_skew·x + fy·y + cy`: normalised coordinates to pixel centres.
 ///
 /// Kannala-Brandt files give the skew as `alpha` with `skew = fx·alpha`
 /// (OpenCV's fisheye module).
@@ -15,6 +15,8 @@ pub struct ImagePlane {
     pub fy: f64,
     /// Horizontal shift per unit of normalised `y`, pixels; 0 for almost every camera.
     pub skew: f64,
+    /// Vertical shift per unit of normalised `x`, pixels; only `ocam` and `f_theta` files have it.
+    pub row_skew: f64,
     /// Principal point, horizontal, pixel centres.
     pub cx: f64,
     /// Principal point, vertical, pixel centres.
@@ -29,6 +31,7 @@ impl ImagePlane {
             fx,
             fy,
             skew: 0.0,
+            row_skew: 0.0,
             cx,
             cy,
         }
@@ -39,6 +42,7 @@ impl ImagePlane {
             ("fx", self.fx),
             ("fy", self.fy),
             ("skew", self.skew),
+            ("row_skew", self.row_skew),
             ("cx", self.cx),
             ("cy", self.cy),
         ] {
@@ -51,17 +55,36 @@ impl ImagePlane {
                 return Err(LensError::NotPositive { name, value });
             }
         }
+        let is_orienting = self.determinant() > 0.0;
+        if !is_orienting {
+            return Err(LensError::NotOrienting {
+                fx: self.fx,
+                skew: self.skew,
+                row_skew: self.row_skew,
+                fy: self.fy,
+            });
+        }
         Ok(())
     }
 
+    fn determinant(&self) -> f64 {
+        self.fx * self.fy - self.skew * self.row_skew
+    }
+
     pub(super) fn pixel_from_normalised(&self, x: f64, y: f64) -> Pixel {
-        Pixel::new(self.fx * x + self.skew * y + self.cx, self.fy * y + self.cy)
+        Pixel::new(
+            self.fx * x + self.skew * y + self.cx,
+            self.row_skew * x + self.fy * y + self.cy,
+        )
     }
 
     pub(super) fn normalised_from_pixel(&self, pixel: &Pixel) -> (f64, f64) {
-        let y = (pixel.y - self.cy) / self.fy;
-        let x = (pixel.x - self.cx - self.skew * y) / self.fx;
-        (x, y)
+        let (right, down) = (pixel.x - self.cx, pixel.y - self.cy);
+        let determinant = self.determinant();
+        (
+            (self.fy * right - self.skew * down) / determinant,
+            (self.fx * down - self.row_skew * right) / determinant,
+        )
     }
 
     pub(super) fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
@@ -69,6 +92,7 @@ impl ImagePlane {
             fx: self.fx * scale_x,
             fy: self.fy * scale_y,
             skew: self.skew * scale_x,
+            row_skew: self.row_skew * scale_y,
             cx: (self.cx + 0.5) * scale_x - 0.5,
             cy: (self.cy + 0.5) * scale_y - 0.5,
         }

@@ -1,74 +1,111 @@
-//! Numeric inversion of radial curves that have no closed form.
+//! Numeric inversion of curves that have no closed form.
 //!
 //! Newton from `theta = r` diverges or lands on another branch beyond 90°; a monotone table
 //! brackets the root first, and Newton steps that leave the bracket become bisections.
 
-use super::RadialCurve;
+use super::polynomial::Rising;
 
 /// Entries of the bracketing table: one Newton step from a bracket this narrow is nearly exact.
 const TABLE_ENTRIES: usize = 257;
 /// Bound on refinement steps; three suffice for real lenses, bisection alone needs about fifty.
 const MAX_STEPS: usize = 64;
-/// Samples of the slope when looking for the first angle at which a curve stops rising.
+/// Samples of the slope when looking for the first place at which a curve stops rising.
 const SLOPE_SAMPLES: usize = 20_000;
 
-/// Radii of a curve at evenly spaced angles from 0 to `max_theta`.
+/// A function that rises from 0 to its `end`, and a table of its values there.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct AngleTable {
-    radii: Vec<f64>,
-    step: f64,
+pub(super) struct Tabulated<F> {
+    function: F,
+    end: f64,
+    values: Vec<f64>,
 }
 
-impl AngleTable {
-    /// Tabulates `curve`, which must rise from 0 to `max_theta`.
-    pub(super) fn new(curve: &RadialCurve, max_theta: f64) -> Self {
-        let step = max_theta / fraction(TABLE_ENTRIES - 1);
-        let radii = (0..TABLE_ENTRIES)
-            .map(|index| curve.radius(step * fraction(index)))
-            .collect();
-        Self { radii, step }
+impl<F: Rising> Tabulated<F> {
+    pub(super) fn new(function: F, end: f64) -> Self {
+        let places = (0..TABLE_ENTRIES).map(|index| place(end, index));
+        Self {
+            values: places.map(|x| function.value(x)).collect(),
+            function,
+            end,
+        }
     }
 
-    /// The angle at which `curve` reaches `radius`, which must lie within the tabulated range.
-    pub(super) fn angle(&self, curve: &RadialCurve, radius: f64) -> f64 {
+    /// The same function with an earlier end.
+    pub(super) fn limited_to(self, end: f64) -> Self {
+        Self::new(self.function, end)
+    }
+
+    pub(super) fn end(&self) -> f64 {
+        self.end
+    }
+
+    pub(super) fn value(&self, x: f64) -> f64 {
+        self.function.value(x)
+    }
+
+    /// Where the function reaches `value`, which must lie within the table.
+    pub(super) fn invert(&self, value: f64) -> f64 {
         let above = self
-            .radii
-            .partition_point(|&tabulated| tabulated < radius)
+            .values
+            .partition_point(|&tabulated| tabulated < value)
             .clamp(1, TABLE_ENTRIES - 1);
-        let (mut low, mut high) = (self.step * fraction(above - 1), self.step * fraction(above));
-        let rise = self.radii[above] - self.radii[above - 1];
+        let (low, high) = (place(self.end, above - 1), place(self.end, above));
+        let rise = self.values[above] - self.values[above - 1];
         let share = if rise > 0.0 {
-            ((radius - self.radii[above - 1]) / rise).clamp(0.0, 1.0)
+            ((value - self.values[above - 1]) / rise).clamp(0.0, 1.0)
         } else {
             0.5
         };
-        let mut theta = low + share * (high - low);
-        for _ in 0..MAX_STEPS {
-            let excess = curve.radius(theta) - radius;
-            if excess > 0.0 {
-                high = theta;
-            } else {
-                low = theta;
-            }
-            let newton = theta - excess / curve.slope(theta);
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                f64::midpoint(low, high)
-            };
-            if (next - theta).abs() <= f64::EPSILON * theta || excess == 0.0 {
-                break;
-            }
-            theta = next;
-        }
-        theta
+        rising_root(
+            |x| self.function.value(x),
+            |x| self.function.slope(x),
+            value,
+            (low, high),
+            low + share * (high - low),
+        )
     }
 }
 
-/// The first angle in (0, `end`] at which `slope` is no longer positive; `end` when it stays
+/// Where the table entry `index` lies in a table that ends at `end`.
+fn place(end: f64, index: usize) -> f64 {
+    end / fraction(TABLE_ENTRIES - 1) * fraction(index)
+}
+
+/// Where `function`, which rises from `low` to `high`, reaches `value`; the nearer end when it does
+/// not. Newton from `start`, kept within the bracket by bisection.
+pub(super) fn rising_root(
+    function: impl Fn(f64) -> f64,
+    slope: impl Fn(f64) -> f64,
+    value: f64,
+    (mut low, mut high): (f64, f64),
+    start: f64,
+) -> f64 {
+    let mut x = start;
+    for _ in 0..MAX_STEPS {
+        let excess = function(x) - value;
+        if excess > 0.0 {
+            high = x;
+        } else {
+            low = x;
+        }
+        let newton = x - excess / slope(x);
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            f64::midpoint(low, high)
+        };
+        if (next - x).abs() <= f64::EPSILON * x || excess == 0.0 {
+            break;
+        }
+        x = next;
+    }
+    x
+}
+
+/// The first place in (0, `end`] at which `slope` is no longer positive; `end` when it stays
 /// positive, 0 when it is not positive at 0.
 pub(super) fn first_stationary_point(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
-    let rises = |theta: f64| slope(theta) > 0.0;
+    let rises = |x: f64| slope(x) > 0.0;
     if !rises(0.0) {
         return 0.0;
     }

@@ -14,17 +14,18 @@ fn plane() -> ImagePlane {
 /// Every lens model with plausible parameters, each reaching as far as it can.
 fn every_model() -> impl Strategy<Value = Lens> {
     let kannala_brandt =
-        prop::array::uniform4(-0.02..0.02).prop_map(|k| RadialCurve::KannalaBrandt { k });
-    let polynomial =
-        (200.0..400.0, -30.0..30.0, -30.0..30.0).prop_map(|(c1, c2, c3)| RadialCurve::Polynomial {
+        prop::array::uniform4(-0.02..0.02).prop_map(|k| LensModel::KannalaBrandt { k });
+    let polynomial = (200.0..400.0, -30.0..30.0, -30.0..30.0).prop_map(|(c1, c2, c3)| {
+        LensModel::RadialPolynomial {
             coefficients: vec![0.0, c1, c2, c3],
-        });
+        }
+    });
     let curve = prop_oneof![
-        Just(RadialCurve::Equidistant),
-        Just(RadialCurve::Equisolid),
-        Just(RadialCurve::Stereographic),
-        Just(RadialCurve::Orthographic),
-        Just(RadialCurve::Rectilinear),
+        Just(LensModel::Equidistant),
+        Just(LensModel::Equisolid),
+        Just(LensModel::Stereographic),
+        Just(LensModel::Orthographic),
+        Just(LensModel::Rectilinear),
         kannala_brandt,
         polynomial,
     ];
@@ -90,7 +91,7 @@ proptest! {
 
 #[test]
 fn the_optical_axis_meets_the_principal_point() {
-    let lens = Lens::new(RadialCurve::Equidistant, plane(), None).expect("plausible");
+    let lens = Lens::new(LensModel::Equidistant, plane(), None).expect("plausible");
     assert_eq!(lens.project(&Ray::z()), Some(Pixel::new(299.5, 301.25)));
     assert_eq!(lens.project(&-Ray::z()), None);
     assert_eq!(lens.project(&Ray::zeros()), None);
@@ -99,14 +100,14 @@ fn the_optical_axis_meets_the_principal_point() {
 
 #[test]
 fn a_max_theta_beyond_the_turning_point_is_refused_with_the_limit() {
-    let curve = RadialCurve::KannalaBrandt {
+    let curve = LensModel::KannalaBrandt {
         k: [-0.3, 0.0, 0.0, 0.0],
     };
     let error = Lens::new(curve, plane(), Some(1.5)).expect_err("turns over at 1.054 rad");
     assert_eq!(
         error.to_string(),
-        "max_theta is 1.5 rad, but this kannala_brandt lens is one-to-one only up to 1.0541 rad: \
-         give a value above 0 and at most that"
+        "max_theta is 1.5 rad, but the curve of this kannala_brandt lens turns back at 1.054 rad: \
+         check its coefficients, or give at most that"
     );
 }
 
@@ -120,7 +121,7 @@ fn parameters_that_make_no_lens_are_refused_by_name() {
     };
     let flat = ImagePlane { fx: 0.0, ..plane() };
     assert_eq!(
-        build(RadialCurve::Equidistant, flat),
+        build(LensModel::Equidistant, flat),
         "fx is 0: it must be greater than 0"
     );
     let lost = ImagePlane {
@@ -128,18 +129,18 @@ fn parameters_that_make_no_lens_are_refused_by_name() {
         ..plane()
     };
     assert_eq!(
-        build(RadialCurve::Equidistant, lost),
+        build(LensModel::Equidistant, lost),
         "cy is NaN: a finite number is needed"
     );
-    let falling = RadialCurve::Polynomial {
+    let falling = LensModel::RadialPolynomial {
         coefficients: vec![0.0, -3.0],
     };
     assert!(build(falling, plane()).contains("does not rise"));
-    let torn = RadialCurve::Polynomial {
+    let torn = LensModel::RadialPolynomial {
         coefficients: vec![4.0, 3.0],
     };
     assert!(build(torn, plane()).contains("coefficients[0] is 4"));
-    let constant = RadialCurve::Polynomial {
+    let constant = LensModel::RadialPolynomial {
         coefficients: vec![0.0],
     };
     assert!(build(constant, plane()).contains("1 entries"));

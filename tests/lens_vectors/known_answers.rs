@@ -1,0 +1,52 @@
+//! The common shape of all sets of known answers.
+
+use lookdown::{
+    calibration::native::NativeLens,
+    geometry::{Lens, Pixel, Ray},
+};
+use serde_json::Value;
+
+/// What one camera does to rays and pixels; `None` where it must refuse.
+pub struct KnownAnswers {
+    pub name: String,
+    /// The lens as in a native calibration file.
+    pub lens_fields: Value,
+    pub projections: Vec<(Ray, Option<Pixel>)>,
+    pub unprojections: Vec<(Pixel, Option<Ray>)>,
+    pub tolerance_px: f64,
+    pub tolerance_ray: f64,
+    /// Where the reference says that the lens ends, radians.
+    pub max_theta: Option<f64>,
+}
+
+impl KnownAnswers {
+    pub fn lens(&self) -> Lens {
+        let fields: NativeLens = serde_json::from_value(self.lens_fields.clone()).unwrap();
+        fields.into_lens().unwrap()
+    }
+}
+
+pub fn fixture(name: &str) -> Value {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/vectors");
+    serde_json::from_str(&std::fs::read_to_string(format!("{folder}/{name}.json")).unwrap())
+        .unwrap()
+}
+
+pub fn numbers(value: &Value) -> Vec<f64> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+/// The items of a list, none when it is missing.
+pub fn items(value: &Value) -> &[Value] {
+    value.as_array().map_or(&[], Vec::as_slice)
+}
+
+pub fn ray(value: &Value) -> Ray {
+    let [x, y, z] = numbers(value).try_into().unwrap();
+    Ray::new(x, y, z)
+}
+
+pub fn pixel(value: &Value) -> Pixel {
+    let [x, y] = numbers(value).try_into().unwrap();
+    Pixel::new(x, y)
+}
