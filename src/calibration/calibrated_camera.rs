@@ -85,6 +85,12 @@ impl Calibration {
         (self.image_width, self.image_height)
     }
 
+    /// The lens, in pixels of frames of [`Calibration::image_size`].
+    #[must_use]
+    pub fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
     /// The camera for frames of `width` × `height` pixels.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ use nalgebra::{Unit, Vector3};
 use super::{
     Calibration, CalibrationError, CalibrationId,
     native::{NativeCalibration, NativeImage, NativeMount},
+    plausibility,
 };
 use crate::geometry::Mount;
 
@@ -49,14 +50,21 @@ fn parse(path: &Path, text: &str) -> Result<NativeCalibration, CalibrationError>
     let ending = path.extension().and_then(|ending| ending.to_str());
     let parsed = match ending {
         Some("json") => serde_json::from_str(text).map_err(|error| error.to_string()),
-        Some("yaml" | "yml") => serde_saphyr::from_str(text).map_err(|error| error.to_string()),
-        Some("toml") => toml::from_str(text).map_err(|error| error.to_string()),
+        Some("yaml" | "yml") => serde_saphyr::from_str(text).map_err(|error| first_line(&error)),
+        Some("toml") => toml::from_str(text)
+            .map_err(|error| format!("{}: {}", first_line(&error), error.message())),
         _ => Err(format!(
             "its name must end in one of {}",
             ENDINGS.join(", ")
         )),
     };
     parsed.map_err(|detail| malformed(path, detail))
+}
+
+/// What a parser says before it draws the place.
+fn first_line(error: &impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    text.lines().next().unwrap_or_default().to_owned()
 }
 
 fn check(
@@ -85,13 +93,12 @@ fn check(
         .into_lens()
         .map_err(|error| invalid("lens", error.to_string()))?;
     let mount = mount(&raw.mount).map_err(|problem| invalid("mount", problem))?;
-    let calibration = Calibration::new(id, bytes, width, height, lens, mount);
+    let whole = Calibration::new(id, bytes, width, height, lens, mount);
+    let within_frame = whole.clone().limited_to_image();
+    plausibility::check(whole.lens(), width, height, within_frame.lens().max_theta())
+        .map_err(|problem| invalid("lens", problem))?;
     // Where the file does not say where the lens image ends, it ends with the frame.
-    Ok(if ends_explicitly {
-        calibration
-    } else {
-        calibration.limited_to_image()
-    })
+    Ok(if ends_explicitly { whole } else { within_frame })
 }
 
 fn mount(raw: &NativeMount) -> Result<Mount, String> {

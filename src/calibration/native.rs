@@ -1,6 +1,8 @@
 //! The shape of the native calibration file, before its values are checked: what is read, and what
 //! other formats are turned into. Writing one gives a file that reads back as the same camera.
 
+mod read_lens;
+
 use serde::{Deserialize, Serialize};
 
 /// A whole calibration file.
@@ -50,7 +52,7 @@ impl Default for NativeMount {
 
 /// A lens: its model and the parameters of that model. `cx`, `cy` are pixel centres, angles
 /// radians; formulas and sources are with [`crate::geometry::lens::LensModel`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "model", rename_all = "snake_case")]
 pub enum NativeLens {
     /// `r = theta`.

@@ -11,6 +11,8 @@ pub struct KnownAnswers {
     pub name: String,
     /// The lens as in a native calibration file.
     pub lens_fields: Value,
+    /// Width and height of the frame, pixels.
+    pub image: [u32; 2],
     pub projections: Vec<(Ray, Option<Pixel>)>,
     pub unprojections: Vec<(Pixel, Option<Ray>)>,
     pub tolerance_px: f64,

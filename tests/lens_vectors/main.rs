@@ -9,7 +9,8 @@ mod public_calibrations;
 use std::f64::consts::PI;
 
 use known_answers::KnownAnswers;
-use lookdown::geometry::Ray;
+use lookdown::{calibration::Calibration, geometry::Ray};
+use serde_json::json;
 
 /// All sets: 22 of made-up and published cameras with rays all around, 16 of calibrations that
 /// others have published.
@@ -109,4 +110,21 @@ fn every_model_of_the_contract_has_known_answers() {
     models.sort_unstable();
     models.dedup();
     assert_eq!(models.len(), 14, "{models:?}");
+}
+
+#[test]
+fn every_calibration_passes_the_checks_of_a_calibration_file() {
+    let folder = tempfile::tempdir().unwrap();
+    for set in every_set() {
+        let path = folder.path().join(format!("{}.json", set.name));
+        let [width, height] = set.image;
+        let file = json!({
+            "id": set.name,
+            "image": {"width": width, "height": height},
+            "lens": set.lens_fields,
+        });
+        std::fs::write(&path, file.to_string()).unwrap();
+        let calibration = Calibration::read(&path).unwrap();
+        assert_eq!(calibration.lens().model(), set.lens().model());
+    }
 }

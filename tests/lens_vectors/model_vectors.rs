@@ -41,6 +41,7 @@ fn read(name: &str) -> KnownAnswers {
     KnownAnswers {
         name: name.to_owned(),
         lens_fields: lens_fields(&fixture),
+        image: serde_json::from_value(fixture["image_size"].clone()).unwrap(),
         projections: projections
             .map(|case| {
                 let uv = is_valid(case).then(|| pixel(&case["uv"]));

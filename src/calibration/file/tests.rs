@@ -42,45 +42,97 @@ fn json_yaml_and_toml_of_one_shape_make_the_same_camera() {
     assert_eq!(json.id().as_str(), "lobby");
 }
 
+fn with_lens(lens: &str) -> String {
+    LOBBY.replace(
+        r#"{"model": "equidistant", "focal": 534.76, "cx": 839.5, "cy": 839.5, "max_theta": 1.5708}"#,
+        lens,
+    )
+}
+
+/// Lenses of every model of the contract but `equidistant`, and the names of the models.
+const LENSES: [(&str, &str); 14] = [
+    (
+        r#"{"model":"equisolid","fx":600,"fy":601,"cx":840,"cy":840}"#,
+        "equisolid",
+    ),
+    (
+        r#"{"model":"stereographic","focal":400,"cx":840,"cy":840}"#,
+        "stereographic",
+    ),
+    (
+        r#"{"model":"orthographic","focal":800,"cx":840,"cy":840}"#,
+        "orthographic",
+    ),
+    (
+        r#"{"model":"rectilinear","focal":800,"cx":840,"cy":840}"#,
+        "rectilinear",
+    ),
+    (
+        r#"{"model":"kannala_brandt","fx":500,"fy":500,"cx":840,"cy":840,"k":[0.01,0,0,0],"skew":0.1}"#,
+        "kannala_brandt",
+    ),
+    (
+        r#"{"model":"radial_polynomial","coefficients":[0,938.16,44.013,-46.56],"cx":840,"cy":840,"aspect":1.01}"#,
+        "radial_polynomial",
+    ),
+    (
+        r#"{"model":"ucm","fx":500,"fy":500,"cx":840,"cy":840,"alpha":0.6}"#,
+        "ucm",
+    ),
+    (
+        r#"{"model":"eucm","fx":500,"fy":500,"cx":840,"cy":840,"alpha":0.6,"beta":1.1}"#,
+        "eucm",
+    ),
+    (
+        r#"{"model":"mei","fx":1200,"fy":1200,"cx":840,"cy":840,"xi":1.2,"k1":-0.1,"k2":0.1,"p1":0.001,"p2":0,"skew":0.2}"#,
+        "mei",
+    ),
+    (
+        r#"{"model":"double_sphere","fx":500,"fy":500,"cx":840,"cy":840,"xi":-0.2,"alpha":0.6}"#,
+        "double_sphere",
+    ),
+    (
+        r#"{"model":"ocam","polynomial":[-471.4,0,7.4e-4,-3.8e-7,5.8e-10],"cx":840,"cy":840,"c":1.0003,"d":-0.0003,"e":0.0009}"#,
+        "ocam",
+    ),
+    (
+        r#"{"model":"fov","fx":800,"fy":800,"cx":840,"cy":840,"omega":0.93}"#,
+        "fov",
+    ),
+    (
+        r#"{"model":"f_theta","angle_to_pixel":[0,560,4,-9,2,-0.4],"cx":840,"cy":840,"c":1.001,"max_theta":1.5}"#,
+        "f_theta",
+    ),
+    (
+        r#"{"model":"f_theta","pixel_to_angle":[0,0.0018,0,0,0,0],"cx":840,"cy":840}"#,
+        "f_theta",
+    ),
+];
+
 #[test]
 fn every_lens_model_of_the_contract_is_read() {
-    let lens = |lens: &str| {
-        LOBBY.replace(
-            r#"{"model": "equidistant", "focal": 534.76, "cx": 839.5, "cy": 839.5, "max_theta": 1.5708}"#,
-            lens,
-        )
-    };
-    for (text, model) in [
-        (
-            r#"{"model":"equisolid","fx":600,"fy":601,"cx":840,"cy":840}"#,
-            "equisolid",
-        ),
-        (
-            r#"{"model":"stereographic","focal":400,"cx":840,"cy":840}"#,
-            "stereographic",
-        ),
-        (
-            r#"{"model":"orthographic","focal":800,"cx":840,"cy":840}"#,
-            "orthographic",
-        ),
-        (
-            r#"{"model":"rectilinear","focal":800,"cx":840,"cy":840}"#,
-            "rectilinear",
-        ),
-        (
-            r#"{"model":"kannala_brandt","fx":500,"fy":500,"cx":840,"cy":840,"k":[0.01,0,0,0],"skew":0.1}"#,
-            "kannala_brandt",
-        ),
-        (
-            r#"{"model":"radial_polynomial","coefficients":[0,938.16,44.013,-46.56],"cx":840,"cy":840,"aspect":1.01}"#,
-            "radial_polynomial",
-        ),
-    ] {
-        let camera = read_text("lobby.json", &lens(text))
-            .unwrap()
-            .for_frame(1680, 1680)
-            .unwrap();
-        assert_eq!(camera.lens.model(), model);
+    for (lens, model) in LENSES {
+        let calibration = read_text("lobby.json", &with_lens(lens)).unwrap();
+        assert_eq!(calibration.lens().model(), model);
+    }
+}
+
+#[test]
+fn what_is_written_is_read_back_as_the_same_camera() {
+    for (lens, _) in LENSES {
+        let text = with_lens(lens);
+        let native: NativeCalibration = serde_json::from_str(&text).unwrap();
+        let expected = read_text("lobby.json", &text).unwrap();
+        for (name, written) in [
+            ("lobby.json", serde_json::to_string(&native).unwrap()),
+            ("lobby.yaml", serde_saphyr::to_string(&native).unwrap()),
+            ("lobby.toml", toml::to_string(&native).unwrap()),
+        ] {
+            let read = read_text(name, &written).unwrap();
+            let camera = |calibration: &Calibration| calibration.for_frame(1680, 1680).unwrap();
+            assert_eq!(camera(&read), camera(&expected), "{written}");
+            assert!(!written.contains("null"), "{written}");
+        }
     }
 }
 
@@ -108,7 +160,51 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
             "8, \"height\": 8",
             "image: 8×8 pixels; each side must be 16",
         ),
-        ("534.76", "-5", "lens: fx is -5: it must be greater than 0"),
+        (
+            "534.76",
+            "-5",
+            "lens: focal is -5: it must be greater than 0",
+        ),
+        (
+            "\"cx\": 839.5",
+            "\"cx\": 8390.5",
+            "lens: its centre, cx 8390.5 and cy 839.5, lies outside the frame of 1680×1680 pixels",
+        ),
+        (
+            "\"focal\": 534.76",
+            "\"fx\": 534.76, \"fy\": 53.476",
+            "lens: an angle is 10.000 times as long across the frame as down it",
+        ),
+        (
+            "534.76",
+            "53.476",
+            "lens: its image ends 84 pixels from the centre, a speck in a frame of 1680×1680",
+        ),
+        (
+            "534.76",
+            "5347.6",
+            "lens: the corners of a frame of 1680×1680 pixels are only 12.7° off its axis",
+        ),
+        (
+            "equidistant",
+            "ucm",
+            "not a calibration file: lens.focal: unknown field `focal`, expected one of `fx`, `fy`, `cx`",
+        ),
+        (
+            "534.76",
+            "\"534.76\"",
+            "not a calibration file: lens.focal: invalid type: string \"534.76\", expected f64",
+        ),
+        (
+            r#"{"model": "equidistant", "focal": 534.76,"#,
+            r#"{"model": "kannala_brandt", "fx": 534.76, "fy": 534.76, "k": [0.1, 0, 0],"#,
+            "not a calibration file: lens.k: invalid length 3, expected an array of length 4",
+        ),
+        (
+            r#"{"model": "equidistant", "focal": 534.76,"#,
+            r#"{"model": "f_theta","#,
+            "lens: give either angle_to_pixel or pixel_to_angle",
+        ),
         (
             "1.5708",
             "9",
@@ -128,7 +224,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
         (
             "equidistant",
             "equidistance",
-            "not a calibration file: unknown variant `equidistance`",
+            "not a calibration file: lens.model: \"equidistance\" is none of equidistant, equisolid,",
         ),
         (
             "height_m",
@@ -143,6 +239,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
     ] {
         let text = refusal(&LOBBY.replace(from, to));
         assert!(text.starts_with(expected), "{text}");
+        assert!(!text.contains('\n'), "one sentence: {text}");
     }
 }
 
@@ -153,4 +250,30 @@ fn a_file_too_large_to_be_a_calibration_is_not_read() {
         error.to_string().contains("at most 1048576 are read"),
         "{error}"
     );
+}
+
+#[test]
+fn what_yaml_and_toml_parsers_say_is_one_line_with_the_place() {
+    for (name, text, expected) in [
+        (
+            "lobby.yaml",
+            "id: lobby\nimage: {width: 16, height: .nan}\n",
+            "line 2 column 28",
+        ),
+        (
+            "lobby.toml",
+            "id = \"lobby\"\nimage = {width = 1680, height = -1}\n",
+            "TOML parse error at line 2, column 33: invalid value: integer `-1`, expected u32",
+        ),
+        (
+            "lobby.toml",
+            "id = \"lobby\"\nimage = {width = 1680, height = 1680}\n[lens]\nmodel = \"ucm\"\n\
+             alpha = nan\n",
+            "lens.alpha: invalid type: null, expected f64",
+        ),
+    ] {
+        let error = read_text(name, text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+        assert!(!error.contains('\n'), "{error}");
+    }
 }

@@ -7,29 +7,78 @@ use super::*;
 fn plane() -> ImagePlane {
     ImagePlane {
         skew: 0.3,
+        row_skew: -0.2,
         ..ImagePlane::new(210.0, 205.0, 299.5, 301.25)
     }
 }
 
-/// Every lens model with plausible parameters, each reaching as far as it can.
-fn every_model() -> impl Strategy<Value = Lens> {
+/// Every lens model with plausible and not so plausible parameters.
+fn every_model() -> impl Strategy<Value = LensModel> {
+    let ideal = prop::sample::select(vec![
+        LensModel::Equidistant,
+        LensModel::Equisolid,
+        LensModel::Stereographic,
+        LensModel::Orthographic,
+        LensModel::Rectilinear,
+    ]);
     let kannala_brandt =
         prop::array::uniform4(-0.02..0.02).prop_map(|k| LensModel::KannalaBrandt { k });
-    let polynomial = (200.0..400.0, -30.0..30.0, -30.0..30.0).prop_map(|(c1, c2, c3)| {
-        LensModel::RadialPolynomial {
-            coefficients: vec![0.0, c1, c2, c3],
-        }
+    let polynomial = (200.0..400.0, -30.0..30.0, -30.0..30.0);
+    let radial_polynomial =
+        polynomial
+            .clone()
+            .prop_map(|(c1, c2, c3)| LensModel::RadialPolynomial {
+                coefficients: vec![0.0, c1, c2, c3],
+            });
+    let angle_to_pixel = polynomial.prop_map(|(c1, c2, c3)| {
+        LensModel::FTheta(FThetaPolynomial::AngleToPixel([0.0, c1, c2, c3, 2.0, -0.4]))
     });
-    let curve = prop_oneof![
-        Just(LensModel::Equidistant),
-        Just(LensModel::Equisolid),
-        Just(LensModel::Stereographic),
-        Just(LensModel::Orthographic),
-        Just(LensModel::Rectilinear),
+    let pixel_to_angle = (0.002..0.02, -1e-6..1e-6, -1e-9..1e-9).prop_map(|(c1, c2, c3)| {
+        LensModel::FTheta(FThetaPolynomial::PixelToAngle([0.0, c1, c2, c3, 0.0, 0.0]))
+    });
+    let unit = 0.0..=1.0;
+    let ucm = unit.clone().prop_map(|alpha| LensModel::Ucm { alpha });
+    let eucm = (unit.clone(), 0.2..4.0).prop_map(|(alpha, beta)| LensModel::Eucm { alpha, beta });
+    let double_sphere =
+        (-0.9..1.5, unit).prop_map(|(xi, alpha)| LensModel::DoubleSphere { xi, alpha });
+    let tangential = -0.01..0.01;
+    let mei = (
+        -0.5..4.0,
+        -0.4..0.3,
+        -0.1..0.2,
+        tangential.clone(),
+        tangential,
+    )
+        .prop_map(|(xi, k1, k2, p1, p2)| LensModel::Mei {
+            xi,
+            distortion: RadialTangential { k1, k2, p1, p2 },
+        });
+    let ocam =
+        (-800.0..-100.0, -1e-3..1e-3, -1e-6..1e-6, -1e-9..1e-8).prop_map(|(a0, a2, a3, a4)| {
+            LensModel::Ocam {
+                polynomial: vec![a0, 0.0, a2, a3, a4],
+            }
+        });
+    let fov = (0.01..3.1).prop_map(|omega| LensModel::Fov { omega });
+    prop_oneof![
+        ideal,
         kannala_brandt,
-        polynomial,
-    ];
-    curve.prop_map(|curve| Lens::new(curve, plane(), None).expect("the parameters are plausible"))
+        radial_polynomial,
+        angle_to_pixel,
+        pixel_to_angle,
+        ucm,
+        eucm,
+        double_sphere,
+        mei,
+        ocam,
+        fov,
+    ]
+}
+
+/// Every lens model, each reaching as far as it can.
+fn every_lens() -> impl Strategy<Value = Lens> {
+    every_model()
+        .prop_map(|model| Lens::new(model, plane(), None).expect("the parameters make a lens"))
 }
 
 fn ray_at(theta: f64, azimuth: f64) -> Ray {
@@ -43,7 +92,7 @@ fn ray_at(theta: f64, azimuth: f64) -> Ray {
 proptest! {
     #[test]
     fn every_model_returns_the_ray_it_projected(
-        lens in every_model(),
+        lens in every_lens(),
         share in 0.0..0.999,
         azimuth in -PI..PI,
         length in 0.01..100.0,
@@ -61,12 +110,12 @@ proptest! {
 
     #[test]
     fn every_model_refuses_rays_beyond_its_rim(
-        lens in every_model(),
-        excess in 1e-6..1.0,
+        lens in every_lens(),
+        share in 1e-6..0.999,
         azimuth in -PI..PI,
     ) {
-        let theta = lens.max_theta() + excess;
-        prop_assume!(theta < PI);
+        let lens = lens.limited_to(lens.max_theta().min(3.0));
+        let theta = lens.max_theta() + share * (PI - lens.max_theta());
         let ray = ray_at(theta, azimuth);
         prop_assert_eq!(lens.project(&ray), None);
         let rim = lens.project_to_rim(&ray).expect("a ray with an azimuth reaches the rim");
@@ -74,8 +123,56 @@ proptest! {
     }
 
     #[test]
+    fn every_model_sees_more_of_the_world_farther_from_its_centre(
+        lens in every_lens(),
+        share in 0.0..0.999,
+        azimuth in -PI..PI,
+    ) {
+        let centre = lens.principal_point();
+        let distance = |share: f64| {
+            let ray = ray_at(lens.max_theta() * share, azimuth);
+            (lens.project(&ray).expect("inside the valid range") - centre).norm()
+        };
+        prop_assert!(distance(share) < distance(share + 1e-3));
+    }
+
+    #[test]
+    fn every_model_makes_a_finite_answer_or_none_of_anything(
+        lens in every_lens(),
+        x in prop::num::f64::ANY,
+        y in prop::num::f64::ANY,
+        z in prop::num::f64::ANY,
+    ) {
+        for pixel in [lens.project(&Ray::new(x, y, z)), lens.project_to_rim(&Ray::new(x, y, z))] {
+            prop_assert!(pixel.is_none_or(|pixel| pixel.coords.iter().all(|v| v.is_finite())));
+        }
+        if let Some(ray) = lens.unproject(&Pixel::new(x, y)) {
+            prop_assert!((ray.norm() - 1.0).abs() < 1e-9, "{ray}");
+        }
+    }
+
+    #[test]
+    fn what_a_limited_lens_no_longer_sees_is_only_what_lies_beyond(
+        lens in every_lens(),
+        limit in 0.1..0.9,
+        share in 0.0..1.0,
+        azimuth in -PI..PI,
+    ) {
+        let limited = lens.limited_to(lens.max_theta() * limit);
+        let ray = ray_at(lens.max_theta() * share, azimuth);
+        let pixel = lens.project(&ray).expect("inside the valid range");
+        if share < limit {
+            prop_assert_eq!(limited.project(&ray), Some(pixel));
+            prop_assert!(limited.unproject(&pixel).is_some());
+        } else if share > limit + 1e-6 {
+            prop_assert_eq!(limited.project(&ray), None);
+            prop_assert_eq!(limited.unproject(&pixel), None);
+        }
+    }
+
+    #[test]
     fn a_scaled_lens_sees_the_same_ray_at_the_scaled_place(
-        lens in every_model(),
+        lens in every_lens(),
         scale in 0.1..8.0,
         share in 0.0..0.99,
         azimuth in -PI..PI,
@@ -144,4 +241,103 @@ fn parameters_that_make_no_lens_are_refused_by_name() {
         coefficients: vec![0.0],
     };
     assert!(build(constant, plane()).contains("1 entries"));
+}
+
+#[test]
+fn a_parameter_outside_its_range_is_refused_with_the_range() {
+    let build = |model| {
+        Lens::new(model, plane(), None)
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
+    };
+    let distortion = RadialTangential {
+        k1: 0.1,
+        k2: f64::INFINITY,
+        p1: 0.0,
+        p2: 0.0,
+    };
+    for (model, expected) in [
+        (
+            LensModel::Ucm { alpha: 1.2 },
+            "alpha is 1.2: this ucm parameter must be from 0 to 1",
+        ),
+        (
+            LensModel::Eucm {
+                alpha: 0.5,
+                beta: 0.0,
+            },
+            "beta is 0: this eucm parameter must be above 0",
+        ),
+        (
+            LensModel::DoubleSphere {
+                xi: -1.0,
+                alpha: 0.5,
+            },
+            "xi is -1: this double_sphere parameter must be above -1",
+        ),
+        (
+            LensModel::Fov { omega: 3.5 },
+            "omega is 3.5: this fov parameter must be radians above 0 and below 3.1416",
+        ),
+        (
+            LensModel::Mei {
+                xi: 0.8,
+                distortion,
+            },
+            "k2 is inf: a finite number is needed",
+        ),
+        (
+            LensModel::Ocam {
+                polynomial: vec![471.0, 0.0, -7e-4],
+            },
+            "polynomial[0] is 471: this ocam parameter must be below 0; OCamCalib's z axis points \
+             into the camera",
+        ),
+        (
+            LensModel::Ocam { polynomial: vec![] },
+            "polynomial has 0 entries: between 1 and 64 are accepted",
+        ),
+        (
+            LensModel::FTheta(FThetaPolynomial::PixelToAngle([
+                1e-3, 2e-3, 0.0, 0.0, 0.0, 0.0,
+            ])),
+            "pixel_to_angle[0] is 0.001: the radius at the optical axis must be 0",
+        ),
+    ] {
+        assert_eq!(build(model), expected);
+    }
+}
+
+#[test]
+fn an_affine_part_that_mirrors_the_image_is_refused() {
+    let mirroring = ImagePlane {
+        skew: 300.0,
+        row_skew: 200.0,
+        ..plane()
+    };
+    let error = Lens::new(LensModel::Equidistant, mirroring, None).expect_err("mirrors");
+    assert!(error.to_string().contains("flattens or mirrors"), "{error}");
+}
+
+#[test]
+fn the_lens_ends_where_the_distortion_folds() {
+    let distortion = RadialTangential {
+        k1: -0.3,
+        k2: 0.0,
+        p1: 0.0,
+        p2: 0.0,
+    };
+    let lens = Lens::new(
+        LensModel::Mei {
+            xi: 1.0,
+            distortion,
+        },
+        plane(),
+        None,
+    );
+    // r (1 − 0.3 r²) turns back at r = 1/√0.9, and with xi 1 r is tan(theta / 2).
+    let expected = 2.0 * (1.0 / 0.9_f64.sqrt()).atan();
+    let found = lens.expect("plausible").max_theta();
+    assert!((found - expected).abs() < 1e-9, "{found}");
 }
