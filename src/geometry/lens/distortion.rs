@@ -73,30 +73,25 @@ impl RadialTangential {
             if excess_x.hypot(excess_y) <= f64::EPSILON * distance {
                 break;
             }
-            let [[a, b], [c, d]] = self.jacobian(u, v);
-            let determinant = a * d - b * c;
-            u -= (d * excess_x - b * excess_y) / determinant;
-            v -= (a * excess_y - c * excess_x) / determinant;
+            let (along_x, mixed, along_y) = self.jacobian(u, v);
+            let determinant = along_x * along_y - mixed * mixed;
+            u -= (along_y * excess_x - mixed * excess_y) / determinant;
+            v -= (along_x * excess_y - mixed * excess_x) / determinant;
         }
         let (found_x, found_y) = self.distort(u, v);
         let residual = (found_x - x).hypot(found_y - y);
         (residual <= RESIDUAL_TOLERANCE * distance).then_some((u, v))
     }
 
-    fn jacobian(&self, x: f64, y: f64) -> [[f64; 2]; 2] {
+    /// The derivatives du/dx, du/dy (which is dv/dx) and dv/dy.
+    fn jacobian(&self, x: f64, y: f64) -> (f64, f64, f64) {
         let square = x * x + y * y;
         let radial = 1.0 + square * (self.k1 + square * self.k2);
         let growth = 2.0 * (self.k1 + 2.0 * square * self.k2);
-        let mixed = x * y * growth + 2.0 * (self.p1 * x + self.p2 * y);
-        [
-            [
-                radial + x * x * growth + 2.0 * self.p1 * y + 6.0 * self.p2 * x,
-                mixed,
-            ],
-            [
-                mixed,
-                radial + y * y * growth + 2.0 * self.p2 * x + 6.0 * self.p1 * y,
-            ],
-        ]
+        (
+            radial + x * x * growth + 2.0 * self.p1 * y + 6.0 * self.p2 * x,
+            x * y * growth + 2.0 * (self.p1 * x + self.p2 * y),
+            radial + y * y * growth + 2.0 * self.p2 * x + 6.0 * self.p1 * y,
+        )
     }
 }
