@@ -96,7 +96,7 @@ impl Default for RawInference {
             threads: 0,
             max_batch_views: 8,
             score_floor: 0.01,
-            max_detections_per_view: 100,
+            max_detections_per_view: 300,
         }
     }
 }

@@ -39,7 +39,8 @@ fn yolov2_of_full_size_finds_what_the_reference_finds() {
     let folder = TempDir::new().unwrap();
     let model = folder.path().join("yolov2");
     script("made_up_yolov2.py", &[folder.path()]);
-    let [cfg, weights] = ["cfg", "weights"].map(|kind| folder.path().join(format!("yolov2.{kind}")));
+    let [cfg, weights] =
+        ["cfg", "weights"].map(|kind| folder.path().join(format!("yolov2.{kind}")));
     script("convert_darknet.py", &[&cfg, &weights, &model]);
     let thresholds_off = OnnxOptions {
         score_floor: 0.0,
