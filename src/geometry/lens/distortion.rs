@@ -78,6 +78,9 @@ impl RadialTangential {
             u -= (along_y * excess_x - mixed * excess_y) / determinant;
             v -= (along_x * excess_y - mixed * excess_x) / determinant;
         }
+        // Where the distortion folds, rounding carries the solution a little beyond the rim.
+        let inward = (max_radius / u.hypot(v)).min(1.0);
+        let (u, v) = (u * inward, v * inward);
         let (found_x, found_y) = self.distort(u, v);
         let residual = (found_x - x).hypot(found_y - y);
         (residual <= RESIDUAL_TOLERANCE * distance).then_some((u, v))

@@ -341,3 +341,25 @@ fn the_lens_ends_where_the_distortion_folds() {
     let found = lens.expect("plausible").max_theta();
     assert!((found - expected).abs() < 1e-9, "{found}");
 }
+
+#[test]
+fn the_rim_of_a_folding_distortion_still_belongs_to_the_lens() {
+    let distortion = RadialTangential {
+        k1: 0.0,
+        k2: 0.0,
+        p1: 0.009_583_660_270_634_51,
+        p2: -0.008_671_048_736_876_826,
+    };
+    let model = LensModel::Mei {
+        xi: 0.0,
+        distortion,
+    };
+    let lens = Lens::new(model, plane(), None).expect("plausible");
+    for step in 0..1000 {
+        let ray = ray_at(3.0, f64::from(step) * 1e-3 * 2.0 * PI);
+        let rim = lens.project_to_rim(&ray).expect("has an azimuth");
+        let back = lens.unproject(&rim).expect("on the rim");
+        let theta = back.x.hypot(back.y).atan2(back.z);
+        assert!((theta - lens.max_theta()).abs() < 1e-6, "{theta}");
+    }
+}
