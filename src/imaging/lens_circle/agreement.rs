@@ -46,7 +46,6 @@ pub fn agreed_circle(circles: &[LensCircle]) -> Option<AgreedCircle> {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
 
