@@ -13,7 +13,8 @@ use std::collections::BTreeMap;
 use lookdown::{
     detection::{BBox, FramePixels},
     evaluation::{
-        EvaluatedImage, GroundTruth, MatchingRule, PrecisionRecallCurve, ScoredBox, Summary,
+        AnnotatedPerson, EvaluatedImage, GroundTruth, MatchingRule, PrecisionRecallCurve,
+        ScoredBox, Summary,
     },
 };
 use serde::Deserialize;
@@ -87,7 +88,10 @@ fn images(
         .keys()
         .map(|image| EvaluatedImage {
             truth: GroundTruth {
-                persons: boxes_of(persons, image),
+                persons: boxes_of(persons, image)
+                    .into_iter()
+                    .map(AnnotatedPerson::from)
+                    .collect(),
                 ignore_regions: boxes_of(ignore_regions, image),
             },
             detections: detections

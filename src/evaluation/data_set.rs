@@ -1,136 +1,217 @@
-//! Data set folders: `annotations.json` (COCO detection with a `calibration` per image),
-//! `images/` and `calibrations/<id>.json`.
+//! Data sets: pictures with the persons in them, in the file formats in use.
+//!
+//! What is at a path is recognised from its files; [`DataSet::open`] lists them. The readers give
+//! a picture's file, its truth and, where the data has it, its calibration and size.
+
+mod coco;
+mod error;
+mod heads;
+mod image_id;
+mod pictures;
+mod text;
+mod voc;
 
 use std::{
-    collections::HashMap,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use serde::Deserialize;
+pub use error::{DataSetError, ScoringMismatch};
+pub use image_id::ImageId;
 
-use super::GroundTruth;
+use self::pictures::{Files, PictureIndex};
+use super::{AnnotatedPerson, GroundTruth, Outline, Scoring};
 use crate::{
-    calibration::{Calibration, CalibrationError, CalibrationFolder, CalibrationId},
-    detection::{BBox, FramePixels},
+    calibration::Calibration,
+    geometry::{
+        Lens,
+        pixels::{PixelConvention, cross_half_pixel},
+    },
 };
 
-/// Pictures with their calibrations and the persons in them.
+/// Pictures with the persons in them.
 #[derive(Debug)]
 pub struct DataSet {
-    /// The pictures, in the order of the annotation file.
+    /// The pictures, in the order of the annotation files.
     pub images: Vec<DataSetImage>,
+    /// What the truth looks like.
+    pub scoring: Scoring,
 }
 
 /// One picture of a data set.
 #[derive(Debug)]
 pub struct DataSetImage {
+    /// What the annotations call it.
+    pub id: ImageId,
     /// The picture's file.
     pub path: PathBuf,
-    /// The camera's calibration.
-    pub calibration: Arc<Calibration>,
+    /// The camera's calibration; without one a lens is assumed.
+    pub calibration: Option<Arc<Calibration>>,
+    /// `[width, height]` as annotated, pixels.
+    pub size: Option<[u32; 2]>,
     /// Who is in it.
-    pub truth: GroundTruth<BBox<FramePixels>>,
-}
-
-/// A folder that is no data set.
-#[derive(Debug, thiserror::Error)]
-pub enum DataSetError {
-    /// The annotations cannot be used.
-    #[error("{path}: {problem}")]
-    Annotations {
-        /// The annotation file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: String,
-    },
-    /// A calibration cannot be used.
-    #[error(transparent)]
-    Calibration(#[from] CalibrationError),
-}
-
-#[derive(Deserialize)]
-struct CocoFile {
-    images: Vec<CocoImage>,
-    annotations: Vec<CocoAnnotation>,
-}
-
-#[derive(Deserialize)]
-struct CocoImage {
-    id: u64,
-    file_name: PathBuf,
-    calibration: String,
-}
-
-#[derive(Deserialize)]
-struct CocoAnnotation {
-    image_id: u64,
-    /// Left, top, width, height; corner-origin pixels.
-    bbox: [f64; 4],
-    #[serde(default)]
-    iscrowd: u8,
+    pub truth: GroundTruth<Outline>,
 }
 
 impl DataSet {
-    /// Opens the data set in `folder`.
+    /// Opens the data set at `path`, which is one of
+    ///
+    /// * a folder with `annotations.json` (COCO, each image with a `calibration`), `images/` and
+    ///   `calibrations/<id>.json`;
+    /// * a COCO file, or a folder with `annotations.json`, `annotations/*.json` or `*.json` and
+    ///   the pictures anywhere below it; boxes of five numbers are rotated (CEPDOF, RAPiD);
+    /// * a folder with Pascal VOC XML files and the pictures of the same names anywhere below it
+    ///   (VOC, boxes for PIROPO);
+    /// * a PIROPO folder with head points, `Ground_Truth_Annotations/groundTruth_<sequence>.csv`
+    ///   beside `<sequence>/`, or one such CSV file.
     ///
     /// # Errors
     /// [`DataSetError`] naming the file and what is wrong with it.
-    pub fn open(folder: &Path) -> Result<Self, DataSetError> {
-        let path = folder.join("annotations.json");
-        let wrong = |problem: String| DataSetError::Annotations {
-            path: path.clone(),
-            problem,
+    pub fn open(path: &Path) -> Result<Self, DataSetError> {
+        let unreadable = |source| DataSetError::Unreadable {
+            path: path.to_owned(),
+            source,
         };
-        let text = std::fs::read_to_string(&path)
-            .map_err(|error| wrong(format!("cannot be read: {error}")))?;
-        let file: CocoFile = serde_json::from_str(&text)
-            .map_err(|error| wrong(format!("not a COCO annotation file: {error}")))?;
-        let mut truths: HashMap<u64, GroundTruth<BBox<FramePixels>>> = HashMap::new();
-        for (index, annotation) in file.annotations.iter().enumerate() {
-            let [left, top, width, height] = annotation.bbox;
-            let bbox = BBox::new([left, top, left + width, top + height])
-                .map_err(|error| wrong(format!("annotations[{index}].bbox: {error}")))?;
-            let truth = truths.entry(annotation.image_id).or_insert_with(nobody);
-            if annotation.iscrowd == 0 {
-                truth.persons.push(bbox);
-            } else {
-                truth.ignore_regions.push(bbox);
+        if std::fs::metadata(path).map_err(unreadable)?.is_file() {
+            return Self::open_file(path);
+        }
+        let annotations = path.join("annotations.json");
+        if annotations.is_file() && path.join("calibrations").is_dir() {
+            return coco::read_own_folder(path, &annotations);
+        }
+        let files = Files::below(path)?;
+        let json = files.of_coco_layout(path);
+        if !json.is_empty() {
+            return coco::read_files(&json, &files.pictures());
+        }
+        let xml = files.ending_in("xml");
+        if !xml.is_empty() {
+            return voc::read_files(&xml, &files.pictures());
+        }
+        let heads = files.named(heads::is_head_file);
+        if !heads.is_empty() {
+            return heads::read_files(&heads);
+        }
+        Err(DataSetError::Unrecognised {
+            path: path.to_owned(),
+        })
+    }
+
+    fn open_file(path: &Path) -> Result<Self, DataSetError> {
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        let folder = path.parent().unwrap_or(Path::new("."));
+        match ending {
+            Some("json") => {
+                let root = match folder.file_name() {
+                    Some(name) if name == "annotations" => folder.parent().unwrap_or(folder),
+                    _ => folder,
+                };
+                let pictures: PictureIndex = Files::below(root)?.pictures();
+                coco::read_files(&[path.to_owned()], &pictures)
+            }
+            Some("csv") if heads::is_head_file(path) => heads::read_files(&[path.to_owned()]),
+            _ => Err(DataSetError::Unrecognised {
+                path: path.to_owned(),
+            }),
+        }
+    }
+
+    /// The same data set with `calibration` for every picture.
+    #[must_use]
+    pub fn with_calibration(mut self, calibration: &Arc<Calibration>) -> Self {
+        for image in &mut self.images {
+            image.calibration = Some(Arc::clone(calibration));
+        }
+        self
+    }
+
+    /// The same data set with truths to be scored as `scoring`. Rotated boxes can be made
+    /// axis-parallel: the bounds of the ellipse inscribed in each.
+    ///
+    /// # Errors
+    /// [`ScoringMismatch`] when the truth cannot be brought into that shape.
+    pub fn scored_as(mut self, scoring: Scoring) -> Result<Self, ScoringMismatch> {
+        if scoring == self.scoring {
+            return Ok(self);
+        }
+        if (self.scoring, scoring) != (Scoring::Rotated, Scoring::AxisParallel) {
+            return Err(ScoringMismatch {
+                truth: self.scoring,
+                wanted: scoring,
+            });
+        }
+        for image in &mut self.images {
+            let persons = image.truth.persons.iter_mut();
+            let persons = persons.map(|person| &mut person.outline);
+            for outline in persons.chain(&mut image.truth.ignore_regions) {
+                *outline = made_axis_parallel(outline);
             }
         }
-        let calibrations = CalibrationFolder::open(&folder.join("calibrations"))?;
-        let images = file.images.into_iter().map(|image| {
-            let id: CalibrationId = image
-                .calibration
-                .parse()
-                .map_err(|error| wrong(format!("images: calibration: {error}")))?;
-            let calibration = calibrations.get(&id)?.ok_or_else(|| {
-                wrong(format!(
-                    "images: there is no calibrations/{id}.json beside it"
-                ))
-            })?;
-            Ok(DataSetImage {
-                path: folder.join("images").join(image.file_name),
-                calibration,
-                truth: truths.remove(&image.id).unwrap_or_else(nobody),
-            })
-        });
-        let images = images.collect::<Result<_, DataSetError>>()?;
-        if let Some(id) = truths.keys().next() {
-            return Err(wrong(format!(
-                "annotations: image_id {id} is no image's id"
-            )));
+        self.scoring = Scoring::AxisParallel;
+        Ok(self)
+    }
+}
+
+fn made_axis_parallel(outline: &Outline) -> Outline {
+    match outline {
+        Outline::Rotated(rotated) => rotated
+            .inscribed_ellipse_bounds()
+            .map_or(*outline, Outline::AxisParallel),
+        other => *other,
+    }
+}
+
+impl DataSetImage {
+    /// A picture in which nobody is annotated so far.
+    fn empty(id: ImageId, path: PathBuf) -> Self {
+        Self {
+            id,
+            path,
+            calibration: None,
+            size: None,
+            truth: GroundTruth::default(),
         }
-        Ok(Self { images })
+    }
+
+    fn add(&mut self, person: AnnotatedPerson<Outline>) {
+        self.truth.persons.push(person);
+    }
+
+    /// `[width, height]` in pixels as annotated, or else as calibrated; `None` when neither is
+    /// known.
+    #[must_use]
+    pub fn frame_size(&self) -> Option<[u32; 2]> {
+        let calibrated = || {
+            let (width, height) = self.calibration.as_ref()?.image_size();
+            Some([width, height])
+        };
+        self.size.or_else(calibrated)
+    }
+
+    /// The angle in degrees between the optical axis and the ray to a point (corner-origin
+    /// pixels), through the calibrated lens or else through the equidistant lens of 180° whose
+    /// circle is the largest in the frame. Beyond the lens image, that of its rim; `None` where
+    /// the size of the frame is not known.
+    #[must_use]
+    pub fn off_axis_deg(&self, [x, y]: [f64; 2]) -> Option<f64> {
+        let [width, height] = self.frame_size()?;
+        let Some(calibration) = &self.calibration else {
+            let (width, height) = (f64::from(width), f64::from(height));
+            let from_center = (x - width / 2.0).hypot(y - height / 2.0);
+            return Some((from_center / (width.min(height) / 2.0)).min(1.0) * 90.0);
+        };
+        let camera = calibration.for_frame(width, height).ok()?;
+        let pixel = cross_half_pixel([x, y].into(), PixelConvention::PixelCentre);
+        Some(off_axis(&camera.lens, &pixel).to_degrees())
     }
 }
 
-fn nobody() -> GroundTruth<BBox<FramePixels>> {
-    GroundTruth {
-        persons: Vec::new(),
-        ignore_regions: Vec::new(),
-    }
+fn off_axis(lens: &Lens, pixel: &crate::geometry::Pixel) -> f64 {
+    lens.unproject(pixel)
+        .map_or(lens.max_theta(), |ray| ray.x.hypot(ray.y).atan2(ray.z))
 }
 
+#[cfg(test)]
+mod test_support;
 #[cfg(test)]
 mod tests;

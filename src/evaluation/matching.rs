@@ -12,21 +12,22 @@ pub enum Outcome {
     TruePositive,
     /// It found nothing, or a person found before.
     FalsePositive,
-    /// It lies in an ignore region: neither.
+    /// It found a person that does not count, or lies in an ignore region: neither.
     Ignored,
 }
 
 /// Which person a detection is compared with. Detections take their turns by descending score.
 ///
-/// In both rules a detection that no person decides is ignored when at least the threshold's
-/// share of its area lies in an ignore region.
+/// In both rules a detection of a person that does not count is ignored, and so is one that no
+/// person decides when at least the threshold's share of its area lies in an ignore region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MatchingRule {
     /// PASCAL VOC (Everingham et al., IJCV 2010): the person of greatest IoU, of equal ones the
     /// first, decides. If another detection has it, this one is a duplicate: a false positive.
+    /// A person that does not count may be found any number of times.
     Voc,
     /// COCO (as in `pycocotools`): the person of greatest IoU, of equal ones the last, among
-    /// those not yet found.
+    /// those not yet found; only where none of these counts, one that does not.
     Coco,
 }
 
@@ -51,60 +52,93 @@ impl MatchingRule {
         let mut outcomes = vec![Outcome::FalsePositive; detections.len()];
         for index in order {
             let bbox = &detections[index].bbox;
-            let person = match self {
-                Self::Voc => nearest_person(bbox, truth, min_iou),
-                Self::Coco => nearest_free_person(bbox, truth, min_iou, &found),
-            };
-            outcomes[index] = match person {
-                Some(person) if found[person] => Outcome::FalsePositive,
-                Some(person) => {
-                    found[person] = true;
-                    Outcome::TruePositive
-                }
-                None if lies_in_ignore_region(bbox, truth, min_iou) => Outcome::Ignored,
-                None => Outcome::FalsePositive,
+            outcomes[index] = match self {
+                Self::Voc => voc_outcome(bbox, truth, min_iou, &mut found),
+                Self::Coco => coco_outcome(bbox, truth, min_iou, &mut found),
             };
         }
         outcomes
     }
 }
 
-fn nearest_person<B: Region>(bbox: &B, truth: &GroundTruth<B>, min_iou: f64) -> Option<usize> {
+fn voc_outcome<B: Region>(
+    bbox: &B,
+    truth: &GroundTruth<B>,
+    min_iou: f64,
+    found: &mut [bool],
+) -> Outcome {
     let mut nearest = None;
     let mut greatest = f64::NEG_INFINITY;
     for (index, person) in truth.persons.iter().enumerate() {
-        let iou = bbox.iou(person);
+        let iou = bbox.iou(&person.outline);
         if iou >= min_iou && iou > greatest {
             greatest = iou;
             nearest = Some(index);
         }
     }
-    nearest
+    match nearest {
+        Some(person) if !truth.persons[person].counts => Outcome::Ignored,
+        Some(person) if found[person] => Outcome::FalsePositive,
+        Some(person) => {
+            found[person] = true;
+            Outcome::TruePositive
+        }
+        None if greatest_share_in_ignore_region(bbox, truth) >= min_iou => Outcome::Ignored,
+        None => Outcome::FalsePositive,
+    }
 }
 
-fn nearest_free_person<B: Region>(
+fn coco_outcome<B: Region>(
+    bbox: &B,
+    truth: &GroundTruth<B>,
+    min_iou: f64,
+    found: &mut [bool],
+) -> Outcome {
+    if let Some((person, _)) = nearest_free(bbox, truth, min_iou, found, true) {
+        found[person] = true;
+        return Outcome::TruePositive;
+    }
+    let share = greatest_share_in_ignore_region(bbox, truth);
+    match nearest_free(bbox, truth, min_iou, found, false) {
+        Some((person, iou)) if iou >= share => {
+            found[person] = true;
+            Outcome::Ignored
+        }
+        // Nobody is used up by a detection that lies in a region even more than on a person.
+        _ if share >= min_iou => Outcome::Ignored,
+        _ => Outcome::FalsePositive,
+    }
+}
+
+/// The person of greatest IoU, and that IoU, among those not yet found that do or do not count.
+fn nearest_free<B: Region>(
     bbox: &B,
     truth: &GroundTruth<B>,
     min_iou: f64,
     found: &[bool],
-) -> Option<usize> {
+    counts: bool,
+) -> Option<(usize, f64)> {
     let mut nearest = None;
     let mut greatest = min_iou;
     for (index, person) in truth.persons.iter().enumerate() {
-        let iou = bbox.iou(person);
-        if !found[index] && iou >= greatest {
+        if found[index] || person.counts != counts {
+            continue;
+        }
+        let iou = bbox.iou(&person.outline);
+        if iou >= greatest {
             greatest = iou;
-            nearest = Some(index);
+            nearest = Some((index, iou));
         }
     }
     nearest
 }
 
-fn lies_in_ignore_region<B: Region>(bbox: &B, truth: &GroundTruth<B>, min_share: f64) -> bool {
+fn greatest_share_in_ignore_region<B: Region>(bbox: &B, truth: &GroundTruth<B>) -> f64 {
     truth
         .ignore_regions
         .iter()
-        .any(|region| bbox.share_in(region) >= min_share)
+        .map(|region| bbox.share_in(region))
+        .fold(0.0, f64::max)
 }
 
 #[cfg(test)]

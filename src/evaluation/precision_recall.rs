@@ -32,16 +32,24 @@ impl PrecisionRecallCurve {
         rule: MatchingRule,
         min_iou: f64,
     ) -> Option<Self> {
-        let persons =
-            NonZeroUsize::new(images.iter().map(|image| image.truth.persons.len()).sum())?;
-        let counted = images
-            .iter()
-            .flat_map(|image| {
-                let outcomes = rule.outcomes(&image.detections, &image.truth, min_iou);
-                image.detections.iter().zip(outcomes)
-            })
+        let persons = images.iter().map(|image| image.truth.person_count()).sum();
+        let outcomes = images.iter().flat_map(|image| {
+            let outcomes = rule.outcomes(&image.detections, &image.truth, min_iou);
+            let scores = image.detections.iter().map(|detection| detection.score);
+            scores.zip(outcomes)
+        });
+        Self::of_outcomes(outcomes, persons)
+    }
+
+    /// The curve of scores and outcomes, image by image; `None` without persons to find.
+    pub(super) fn of_outcomes(
+        outcomes: impl Iterator<Item = (f64, Outcome)>,
+        persons: usize,
+    ) -> Option<Self> {
+        let persons = NonZeroUsize::new(persons)?;
+        let counted = outcomes
             .filter(|(_, outcome)| *outcome != Outcome::Ignored)
-            .map(|(detection, outcome)| (detection.score, outcome == Outcome::TruePositive))
+            .map(|(score, outcome)| (score, outcome == Outcome::TruePositive))
             .collect();
         Some(Self::of_detections(counted, persons))
     }

@@ -7,10 +7,10 @@ use std::{
 
 use jiff::Timestamp;
 
-use super::{DataSet, DataSetImage, EvaluatedImage, MatchingRule, NoPersons, ScoredBox, Summary};
+use super::{DataSet, DataSetImage, EvaluatedImage, MatchingRule, NoPersons, Summary};
 use crate::{
-    detection::{BBox, FramePixels, Refinement},
-    pipeline::{DetectJob, DetectParameters, Engine, Person, PipelineError, Profile},
+    detection::Refinement,
+    pipeline::{DetectJob, DetectParameters, Engine, PipelineError, Profile},
 };
 
 /// The figures of one profile and refinement.
@@ -80,15 +80,17 @@ pub fn evaluate(
                     source,
                 })?;
         let observing = started.elapsed();
+        let frame_size = [observation.frame.width(), observation.frame.height()];
         views += observation.view_count();
         observation.model().name().clone_into(&mut model);
         for ((variant, images), time) in variants.iter().zip(&mut per_variant).zip(&mut times) {
             let refining = Instant::now();
             let persons = engine.persons(&observation, &variant.refinement);
             *time += observing + refining.elapsed();
+            let scored = |person| data_set.scoring.scored(person, frame_size);
             images.push(EvaluatedImage {
                 truth: image.truth.clone(),
-                detections: persons.iter().map(scored_box).collect(),
+                detections: persons.iter().map(scored).collect(),
             });
         }
         progress(done + 1);
@@ -121,13 +123,6 @@ fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob,
         arrived: Instant::now(),
         image: bytes.into(),
         parameters: parameters.clone(),
-        calibration: Some(image.calibration.clone()),
+        calibration: image.calibration.clone(),
     })
-}
-
-fn scored_box(person: &Person) -> ScoredBox<BBox<FramePixels>> {
-    ScoredBox {
-        bbox: person.bbox,
-        score: person.score,
-    }
 }

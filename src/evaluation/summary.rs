@@ -24,6 +24,10 @@ pub struct Summary {
     pub f1: f64,
     /// The score threshold of `f1`; `None` without detections.
     pub f1_score_threshold: Option<f64>,
+    /// The share of detections that are right at that threshold, 0 to 1.
+    pub f1_precision: f64,
+    /// The share of persons found at that threshold, 0 to 1.
+    pub f1_recall: f64,
     /// The share of persons found by any detection at `O_t` = 0.5, 0 to 1.
     pub recall: f64,
 }
@@ -46,7 +50,7 @@ impl Summary {
         let best = at_50.best_f1();
         Ok(Self {
             images: images.len(),
-            persons: images.iter().map(|image| image.truth.persons.len()).sum(),
+            persons: images.iter().map(|image| image.truth.person_count()).sum(),
             ap50: at_50.average_precision(),
             ap75: average_at(75)?,
             ap50_95: mean(
@@ -57,6 +61,8 @@ impl Summary {
             ),
             f1: best.map_or(0.0, |point| point.f1),
             f1_score_threshold: best.map(|point| point.score),
+            f1_precision: best.map_or(0.0, |point| point.precision),
+            f1_recall: best.map_or(0.0, |point| point.recall),
             recall: at_50.final_recall(),
         })
     }

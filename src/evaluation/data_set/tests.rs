@@ -1,69 +1,90 @@
-use super::*;
+//! What is recognised, and what can be done with a data set of any kind.
 
-fn folder(annotations: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("annotations.json"), annotations).unwrap();
-    std::fs::create_dir(folder.path().join("calibrations")).unwrap();
-    std::fs::write(
-        folder.path().join("calibrations/lobby.json"),
-        r#"{"id":"lobby","image":{"width":600,"height":600},
-            "lens":{"model":"equidistant","focal":190,"cx":299.5,"cy":299.5}}"#,
-    )
-    .unwrap();
-    folder
-}
+use std::path::Path;
 
-const GOOD: &str = r#"{"images":[{"id":7,"file_name":"a.jpg","calibration":"lobby"},
-    {"id":8,"file_name":"b.jpg","calibration":"lobby"}],
-  "annotations":[{"image_id":7,"bbox":[10,20,30,40]},{"image_id":7,"bbox":[0,0,5,5],"iscrowd":1}]}"#;
+use super::{
+    test_support::{boxes, folder, open, refusal},
+    *,
+};
+use crate::detection::BBox;
+
+const CALIBRATION: &str = r#"{"id":"lobby","image":{"width":600,"height":600},
+    "lens":{"model":"equidistant","focal":190,"cx":299.5,"cy":299.5}}"#;
+const ROTATED: &str = r#"{"images":[{"id":"a_1","file_name":"a_1.jpg","width":600,"height":600}],
+    "annotations":[{"image_id":"a_1","bbox":[300,200,20,60,90]},
+        {"image_id":"a_1","bbox":[100,200,20,60,0],"iscrowd":1}]}"#;
 
 #[test]
-fn persons_and_ignore_regions_are_told_apart() {
-    let folder = folder(GOOD);
-    let data_set = DataSet::open(folder.path()).unwrap();
-    assert_eq!(
-        data_set.images[0].truth.persons[0].corners(),
-        [10.0, 20.0, 40.0, 60.0]
+fn a_folder_of_anything_else_is_no_data_set() {
+    let folder = folder(&[("readme.txt", ""), ("a.jpg", "")]);
+    let message = refusal(&folder);
+    assert!(
+        message.contains("holds no data set that is known"),
+        "{message}"
     );
-    assert_eq!(data_set.images[0].truth.ignore_regions.len(), 1);
-    assert_eq!(data_set.images[1].truth, nobody());
-    assert!(data_set.images[0].path.ends_with("images/a.jpg"));
-}
-
-#[test]
-fn what_is_wrong_is_named() {
-    for (from, to, expected) in [
-        (
-            "\"calibration\":\"lobby\"",
-            "\"calibration\":\"yard\"",
-            "there is no calibrations/yard.json",
-        ),
-        (
-            "\"image_id\":7",
-            "\"image_id\":9",
-            "image_id 9 is no image's id",
-        ),
-        (
-            "[10,20,30,40]",
-            "[10,20,-30,40]",
-            "annotations[0].bbox: box",
-        ),
-        (
-            "\"images\"",
-            "\"pictures\"",
-            "not a COCO annotation file: missing field `images`",
-        ),
-    ] {
-        let folder = folder(&GOOD.replace(from, to));
-        let error = DataSet::open(folder.path()).unwrap_err().to_string();
-        assert!(error.contains("annotations.json: "), "{error}");
-        assert!(error.contains(expected), "{error}");
-    }
-    let error = DataSet::open(Path::new("/nowhere"))
+    let file = DataSet::open(&folder.path().join("readme.txt"));
+    assert!(matches!(file, Err(DataSetError::Unrecognised { .. })));
+    let nowhere = DataSet::open(Path::new("/nowhere"))
         .unwrap_err()
         .to_string();
-    assert!(
-        error.starts_with("/nowhere/annotations.json: cannot be read"),
-        "{error}"
+    assert!(nowhere.starts_with("/nowhere: cannot be read"), "{nowhere}");
+}
+
+#[test]
+fn one_calibration_can_be_given_to_every_picture() {
+    let files = [
+        ("annotations.json", ROTATED),
+        ("a_1.jpg", ""),
+        ("lobby.json", CALIBRATION),
+    ];
+    let folder = folder(&files);
+    let data_set = open(&folder);
+    assert_eq!(data_set.images[0].calibration, None);
+    let calibration = Calibration::read(&folder.path().join("lobby.json")).unwrap();
+    let data_set = data_set.with_calibration(&Arc::new(calibration));
+    let given = data_set.images[0].calibration.as_ref().unwrap();
+    assert_eq!(given.id().as_str(), "lobby");
+}
+
+#[test]
+fn rotated_truth_can_be_scored_as_the_bounds_of_inscribed_ellipses() {
+    let folder = folder(&[("annotations.json", ROTATED), ("a_1.jpg", "")]);
+    let data_set = open(&folder).scored_as(Scoring::Rotated).unwrap();
+    let data_set = data_set.scored_as(Scoring::AxisParallel).unwrap();
+    assert_eq!(data_set.scoring, Scoring::AxisParallel);
+    let [corners] = boxes(&data_set.images[0])[..] else {
+        panic!("one person")
+    };
+    for (actual, expected) in corners.into_iter().zip([270.0, 190.0, 330.0, 210.0]) {
+        assert!((actual - expected).abs() < 1e-9, "{corners:?}");
+    }
+    let region = BBox::new([90.0, 170.0, 110.0, 230.0]).unwrap();
+    assert_eq!(
+        data_set.images[0].truth.ignore_regions,
+        [Outline::AxisParallel(region)]
     );
+    let error = data_set.scored_as(Scoring::Rotated).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "this data set has axis-parallel boxes and cannot be scored by rotated boxes; only \
+         rotated boxes can be made axis-parallel"
+    );
+}
+
+#[test]
+fn the_distance_from_the_centre_is_an_angle_through_the_lens() {
+    let folder = folder(&[("lobby.json", CALIBRATION)]);
+    let mut image = DataSetImage::empty(ImageId::Number(1), PathBuf::new());
+    assert_eq!(image.off_axis_deg([300.0, 300.0]), None);
+    // No calibration: 90° at the edge of the shorter side, and no more anywhere.
+    image.size = Some([800, 600]);
+    assert_eq!(image.off_axis_deg([400.0, 300.0]), Some(0.0));
+    assert_eq!(image.off_axis_deg([400.0, 150.0]), Some(45.0));
+    assert_eq!(image.off_axis_deg([0.0, 300.0]), Some(90.0));
+    // Twice the size of the calibration: 380 pixels a radian.
+    image.size = Some([1200, 1200]);
+    let calibration = Calibration::read(&folder.path().join("lobby.json")).unwrap();
+    image.calibration = Some(Arc::new(calibration));
+    let angle = image.off_axis_deg([600.0, 600.0 - 380.0]).unwrap();
+    assert!((angle - 1_f64.to_degrees()).abs() < 1e-9, "{angle}");
 }

@@ -5,7 +5,10 @@ use super::{
     Outcome::{self, FalsePositive, Ignored, TruePositive},
     ScoredBox,
 };
-use crate::detection::{BBox, FramePixels};
+use crate::{
+    detection::{BBox, FramePixels},
+    evaluation::AnnotatedPerson,
+};
 
 type FrameBox = BBox<FramePixels>;
 
@@ -15,7 +18,7 @@ fn row(x_min: f64, x_max: f64) -> FrameBox {
 
 fn truth(persons: &[FrameBox], ignore_regions: &[FrameBox]) -> GroundTruth<FrameBox> {
     GroundTruth {
-        persons: persons.to_vec(),
+        persons: persons.iter().copied().map(AnnotatedPerson::from).collect(),
         ignore_regions: ignore_regions.to_vec(),
     }
 }
@@ -157,4 +160,39 @@ fn at_a_threshold_of_1_coco_forgives_rounding() {
         MatchingRule::Voc.outcomes(&nearly, &truth, 1.0),
         [FalsePositive]
     );
+}
+
+fn of_no_account(outline: FrameBox) -> AnnotatedPerson<FrameBox> {
+    AnnotatedPerson {
+        counts: false,
+        ..AnnotatedPerson::from(outline)
+    }
+}
+
+#[test]
+fn finding_a_person_that_does_not_count_is_neither_right_nor_wrong() {
+    let mut truth = truth(&[], &[]);
+    truth.persons.push(of_no_account(row(0.0, 10.0)));
+    let twice = [(row(0.0, 10.0), 0.9), (row(1.0, 10.0), 0.8)];
+    // In COCO each person, counting or not, is there for one detection.
+    assert_eq!(
+        outcomes(MatchingRule::Voc, &twice, &truth),
+        [Ignored, Ignored]
+    );
+    assert_eq!(
+        outcomes(MatchingRule::Coco, &twice, &truth),
+        [Ignored, FalsePositive]
+    );
+}
+
+#[test]
+fn coco_prefers_a_person_that_counts_to_a_nearer_one_that_does_not() {
+    let mut truth = truth(&[row(2.0, 12.0)], &[]);
+    truth.persons.push(of_no_account(row(0.0, 10.0)));
+    let between = [(row(0.0, 10.0), 0.9)];
+    assert_eq!(
+        outcomes(MatchingRule::Coco, &between, &truth),
+        [TruePositive]
+    );
+    assert_eq!(outcomes(MatchingRule::Voc, &between, &truth), [Ignored]);
 }

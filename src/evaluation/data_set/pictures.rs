@@ -1,0 +1,174 @@
+//! The files below a folder, and which of them is the picture that annotations speak of.
+
+use std::{
+    collections::HashMap,
+    ffi::OsStr,
+    path::{Path, PathBuf},
+};
+
+use super::DataSetError;
+
+/// Endings of pictures that can be decoded, in lower case.
+const PICTURE_ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+/// Folders within folders; the largest sets have five levels.
+const MAX_DEPTH: usize = 12;
+/// Files and folders; the largest sets have some 300 000.
+const MAX_ENTRIES: usize = 2_000_000;
+
+/// Every file below a folder, sorted.
+pub(super) struct Files(Vec<PathBuf>);
+
+/// Pictures by name.
+pub(super) struct PictureIndex {
+    by_stem: HashMap<Box<OsStr>, Vec<PathBuf>>,
+}
+
+impl Files {
+    /// Lists the files below `root`.
+    pub(super) fn below(root: &Path) -> Result<Self, DataSetError> {
+        let mut files = Vec::new();
+        let mut folders = vec![(root.to_owned(), 0)];
+        let mut entries = 0;
+        while let Some((folder, depth)) = folders.pop() {
+            let unreadable = |source| DataSetError::Unreadable {
+                path: folder.clone(),
+                source,
+            };
+            for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+                let path = entry.map_err(unreadable)?.path();
+                entries += 1;
+                let is_folder = path.is_dir();
+                if entries > MAX_ENTRIES || (is_folder && depth == MAX_DEPTH) {
+                    return Err(DataSetError::Annotations {
+                        path: root.to_owned(),
+                        problem: format!(
+                            "has more than {MAX_ENTRIES} files or {MAX_DEPTH} levels of folders; \
+                             name the data set's own folder"
+                        ),
+                    });
+                }
+                if is_folder {
+                    folders.push((path, depth + 1));
+                } else {
+                    files.push(path);
+                }
+            }
+        }
+        files.sort_unstable();
+        Ok(Self(files))
+    }
+
+    /// The JSON files where COCO files lie: `annotations.json`, or else those in `annotations/`,
+    /// or else those in `root` itself.
+    pub(super) fn of_coco_layout(&self, root: &Path) -> Vec<PathBuf> {
+        let single = root.join("annotations.json");
+        if self.0.binary_search(&single).is_ok() {
+            return vec![single];
+        }
+        let json_in = |folder: &Path| {
+            let mut json = self.ending_in("json");
+            json.retain(|path| path.parent() == Some(folder));
+            json
+        };
+        let in_annotations = json_in(&root.join("annotations"));
+        if in_annotations.is_empty() {
+            json_in(root)
+        } else {
+            in_annotations
+        }
+    }
+
+    /// The files of one ending, given in lower case.
+    pub(super) fn ending_in(&self, ending: &str) -> Vec<PathBuf> {
+        self.named(|path| has_ending(path, ending))
+    }
+
+    /// The files that `is_wanted`.
+    pub(super) fn named(&self, is_wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
+        let wanted = self.0.iter().filter(|path| is_wanted(path));
+        wanted.cloned().collect()
+    }
+
+    /// The pictures among the files.
+    pub(super) fn pictures(&self) -> PictureIndex {
+        let mut by_stem: HashMap<Box<OsStr>, Vec<PathBuf>> = HashMap::new();
+        for path in self.0.iter().filter(|path| is_picture(path)) {
+            if let Some(stem) = path.file_stem() {
+                by_stem.entry(stem.into()).or_default().push(path.clone());
+            }
+        }
+        PictureIndex { by_stem }
+    }
+}
+
+impl PictureIndex {
+    /// The picture that annotations call `file_name`, with or without folders before it.
+    pub(super) fn by_file_name(&self, file_name: &Path) -> Result<PathBuf, String> {
+        let name = file_name.file_name();
+        let same_name = self.of_stem(file_name.file_stem());
+        let same_name: Vec<_> = same_name
+            .iter()
+            .filter(|path| path.file_name() == name)
+            .collect();
+        let same_folders = same_name.iter().filter(|path| path.ends_with(file_name));
+        let same_folders: Vec<_> = same_folders.copied().collect();
+        let found = if same_folders.is_empty() {
+            same_name
+        } else {
+            same_folders
+        };
+        the_only(&found, file_name)
+    }
+
+    /// The picture named like the annotation file `beside`: in the same folder, or else anywhere.
+    pub(super) fn named_like(&self, beside: &Path) -> Result<PathBuf, String> {
+        let same_stem: Vec<_> = self.of_stem(beside.file_stem()).iter().collect();
+        let here = same_stem
+            .iter()
+            .copied()
+            .find(|path| path.parent() == beside.parent());
+        match (here, beside.file_stem()) {
+            (Some(here), _) => Ok(here.clone()),
+            (None, stem) => the_only(&same_stem, Path::new(stem.unwrap_or_default())),
+        }
+    }
+
+    fn of_stem(&self, stem: Option<&OsStr>) -> &[PathBuf] {
+        stem.and_then(|stem| self.by_stem.get(stem))
+            .map_or(&[], Vec::as_slice)
+    }
+}
+
+/// The pictures directly in `folder`, by name.
+pub(super) fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, DataSetError> {
+    let mut pictures = Files::below(folder)?.named(is_picture);
+    pictures.retain(|path| path.parent() == Some(folder));
+    Ok(pictures)
+}
+
+fn the_only(found: &[&PathBuf], name: &Path) -> Result<PathBuf, String> {
+    match found {
+        [only] => Ok((*only).clone()),
+        [] => Err(format!("the picture {} is nowhere below", name.display())),
+        [first, second, ..] => Err(format!(
+            "the picture {} may be {} or {}; keep one of them, or evaluate their folders apart",
+            name.display(),
+            first.display(),
+            second.display()
+        )),
+    }
+}
+
+fn is_picture(path: &Path) -> bool {
+    PICTURE_ENDINGS
+        .iter()
+        .any(|ending| has_ending(path, ending))
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension()
+        .is_some_and(|actual| actual.eq_ignore_ascii_case(ending))
+}
+
+#[cfg(test)]
+mod tests;

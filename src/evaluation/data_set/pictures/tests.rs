@@ -1,0 +1,69 @@
+//! Which picture annotations speak of.
+
+use super::*;
+
+/// A folder with empty files.
+fn folder(files: &[&str]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for file in files {
+        let path = folder.path().join(file);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, "").unwrap();
+    }
+    folder
+}
+
+fn pictures(folder: &tempfile::TempDir) -> PictureIndex {
+    Files::below(folder.path()).unwrap().pictures()
+}
+
+#[test]
+fn a_picture_is_found_by_its_name_wherever_it_lies() {
+    let folder = folder(&["deep/er/a.jpg", "b.PNG", "a.txt"]);
+    let pictures = pictures(&folder);
+    let found = pictures.by_file_name(Path::new("a.jpg")).unwrap();
+    assert!(found.ends_with("deep/er/a.jpg"));
+    let found = pictures.by_file_name(Path::new("elsewhere/b.PNG")).unwrap();
+    assert!(found.ends_with("b.PNG"));
+    let problem = pictures.by_file_name(Path::new("c.jpg")).unwrap_err();
+    assert_eq!(problem, "the picture c.jpg is nowhere below");
+}
+
+#[test]
+fn pictures_of_the_same_name_are_told_apart_by_their_folders_or_not_at_all() {
+    let folder = folder(&["one/a.jpg", "two/a.jpg", "three/a.png"]);
+    let pictures = pictures(&folder);
+    let found = pictures.by_file_name(Path::new("two/a.jpg")).unwrap();
+    assert!(found.ends_with("two/a.jpg"));
+    let problem = pictures.by_file_name(Path::new("a.jpg")).unwrap_err();
+    assert!(problem.contains("one/a.jpg") && problem.contains("two/a.jpg"));
+    // Beside its annotations, a picture needs no other name.
+    let beside = folder.path().join("three/a.xml");
+    assert!(
+        pictures
+            .named_like(&beside)
+            .unwrap()
+            .ends_with("three/a.png")
+    );
+    let nowhere = folder.path().join("annotations/a.xml");
+    assert!(pictures.named_like(&nowhere).is_err());
+}
+
+#[test]
+fn a_dot_in_a_name_is_part_of_the_name() {
+    let folder = folder(&[
+        "omni/2015-05-12T12-42-29.320Z.jpg",
+        "omni/2015-05-12T12-42-29.jpg",
+    ]);
+    let annotations = folder.path().join("xml/2015-05-12T12-42-29.320Z.xml");
+    let found = pictures(&folder).named_like(&annotations).unwrap();
+    assert!(found.ends_with("omni/2015-05-12T12-42-29.320Z.jpg"));
+}
+
+#[test]
+fn folders_that_go_on_and_on_are_refused() {
+    let deep = "x/".repeat(MAX_DEPTH + 1) + "a.jpg";
+    let folder = folder(&[&deep]);
+    let error = Files::below(folder.path()).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("levels of folders"), "{error}");
+}

@@ -1,0 +1,119 @@
+//! Pascal VOC XML: one file per picture, of the same name. Boxes for PIROPO (Tamura et al.,
+//! "Omnidirectional Pedestrian Detection by Rotation Invariant Training", WACV 2019, the
+//! annotations they call `normal`) have this form, too.
+//!
+//! `bndbox` is read as corner-origin pixels, as written by today's annotation tools. The VOC
+//! challenge itself counts pixels from 1; a pixel more or less is far below what matters here.
+
+use std::path::{Path, PathBuf};
+
+use roxmltree::{Document, Node};
+
+use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
+use crate::{
+    detection::BBox,
+    evaluation::{AnnotatedPerson, Outline, Scoring},
+};
+
+/// A picture of a crowd has some 100 kB.
+const MAX_BYTES: u64 = 16 * 1024 * 1024;
+
+/// Reads one file per picture.
+pub(super) fn read_files(
+    files: &[PathBuf],
+    pictures: &PictureIndex,
+) -> Result<DataSet, DataSetError> {
+    let mut images = Vec::with_capacity(files.len());
+    let mut is_anything_annotated = false;
+    for path in files {
+        let wrong = |problem| DataSetError::Annotations {
+            path: path.clone(),
+            problem,
+        };
+        let text = read_text(path, MAX_BYTES)?;
+        let document =
+            Document::parse(&text).map_err(|error| wrong(format!("not XML: {error}")))?;
+        let root = document.root_element();
+        is_anything_annotated |= objects(root).next().is_some();
+        images.push(read(path, root, pictures).map_err(wrong)?);
+    }
+    let is_somebody_there = images
+        .iter()
+        .any(|image: &DataSetImage| !image.truth.persons.is_empty());
+    match files.first() {
+        Some(first) if is_anything_annotated && !is_somebody_there => {
+            Err(DataSetError::Annotations {
+                path: first.clone(),
+                problem: "no object here or in the other files is named person; name persons so"
+                    .to_owned(),
+            })
+        }
+        _ => Ok(DataSet {
+            images,
+            scoring: Scoring::AxisParallel,
+        }),
+    }
+}
+
+fn read(path: &Path, root: Node<'_, '_>, pictures: &PictureIndex) -> Result<DataSetImage, String> {
+    if root.tag_name().name() != "annotation" {
+        return Err(format!(
+            "not a VOC annotation: its root is <{}> instead of <annotation>",
+            root.tag_name().name()
+        ));
+    }
+    let picture = pictures.named_like(path)?;
+    let name = path.file_stem().unwrap_or_default();
+    let id = ImageId::Text(name.to_string_lossy().into_owned());
+    let mut image = DataSetImage::empty(id, picture);
+    image.size = match child(root, "size") {
+        Some(size) => Some([number(size, "width")?, number(size, "height")?]),
+        None => None,
+    };
+    for object in objects(root).filter(is_person) {
+        let bndbox = child(object, "bndbox").ok_or("an object has no bndbox; give it one")?;
+        let corners = [
+            number(bndbox, "xmin")?,
+            number(bndbox, "ymin")?,
+            number(bndbox, "xmax")?,
+            number(bndbox, "ymax")?,
+        ];
+        let bbox = BBox::new(corners).map_err(|error| format!("bndbox: {error}"))?;
+        let is_difficult = child(object, "difficult").is_some_and(|node| text_of(node) == "1");
+        image.add(AnnotatedPerson {
+            counts: !is_difficult,
+            ..AnnotatedPerson::from(Outline::AxisParallel(bbox))
+        });
+    }
+    Ok(image)
+}
+
+fn objects<'a, 'input>(root: Node<'a, 'input>) -> impl Iterator<Item = Node<'a, 'input>> {
+    root.children().filter(|node| node.has_tag_name("object"))
+}
+
+/// VOC has one class of persons, named `person`.
+fn is_person(object: &Node<'_, '_>) -> bool {
+    child(*object, "name").is_some_and(|name| text_of(name).eq_ignore_ascii_case("person"))
+}
+
+fn child<'a, 'input>(parent: Node<'a, 'input>, name: &str) -> Option<Node<'a, 'input>> {
+    parent.children().find(|node| node.has_tag_name(name))
+}
+
+fn text_of<'a>(node: Node<'a, '_>) -> &'a str {
+    node.text().unwrap_or_default().trim()
+}
+
+fn number<T: std::str::FromStr>(parent: Node<'_, '_>, name: &str) -> Result<T, String> {
+    let text = child(parent, name).map(text_of).unwrap_or_default();
+    text.parse().map_err(|_| {
+        format!(
+            "{}: {name} is {text:?}; give a number of pixels",
+            parent.tag_name().name()
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests;

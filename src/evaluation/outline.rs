@@ -1,0 +1,101 @@
+//! The outline of a person, as annotated or as found, in the shape that is compared.
+
+use super::{Region, RotatedBox, ScoredBox};
+use crate::{
+    detection::{BBox, FramePixels},
+    pipeline::Person,
+};
+
+/// What a truth looks like, and so what of a detection is compared with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scoring {
+    /// Axis-parallel boxes by their intersection over union.
+    AxisParallel,
+    /// Rotated boxes by the intersection over union of their masks.
+    Rotated,
+    /// Head points: an axis-parallel box is right when the point lies in it.
+    HeadPoint,
+}
+
+/// The outline of a person in frame pixels.
+///
+/// An axis-parallel and a rotated box are never compared; a data set knows one shape of truth and
+/// [`Scoring`] gives detections the shape that goes with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outline {
+    /// An axis-parallel box.
+    AxisParallel(BBox<FramePixels>),
+    /// A rotated box.
+    Rotated(RotatedBox),
+    /// The centre of a head, `[x, y]`, corner-origin.
+    Head([f64; 2]),
+}
+
+impl Scoring {
+    /// What is compared of a person found in a frame of `[width, height]` pixels.
+    #[must_use]
+    pub fn scored(self, person: &Person, frame: [u32; 2]) -> ScoredBox<Outline> {
+        let outline = match self {
+            Self::AxisParallel | Self::HeadPoint => Outline::AxisParallel(person.bbox),
+            Self::Rotated => RotatedBox::of_oriented_box(&person.oriented_box, frame)
+                .map_or(Outline::AxisParallel(person.bbox), Outline::Rotated),
+        };
+        ScoredBox {
+            bbox: outline,
+            score: person.score,
+        }
+    }
+}
+
+impl Outline {
+    /// The middle, `[x, y]`, corner-origin frame pixels.
+    #[must_use]
+    pub fn center(&self) -> [f64; 2] {
+        match self {
+            Self::AxisParallel(bbox) => bbox.center(),
+            Self::Rotated(rotated) => rotated.center(),
+            Self::Head(point) => *point,
+        }
+    }
+
+    /// Width times height, square pixels; `None` of a point.
+    #[must_use]
+    pub fn area(&self) -> Option<f64> {
+        match self {
+            Self::AxisParallel(bbox) => Some(bbox.area()),
+            Self::Rotated(rotated) => Some(rotated.full_area()),
+            Self::Head(_) => None,
+        }
+    }
+}
+
+impl Region for Outline {
+    /// Intersection over union of equal shapes; of a box and a head 1 if the head lies in it
+    /// (edges included), else 0.
+    fn iou(&self, other: &Self) -> f64 {
+        match (self, other) {
+            (Self::AxisParallel(a), Self::AxisParallel(b)) => a.iou(b),
+            (Self::Rotated(a), Self::Rotated(b)) => Region::iou(a, b),
+            (Self::AxisParallel(bbox), Self::Head(point))
+            | (Self::Head(point), Self::AxisParallel(bbox)) => {
+                f64::from(u8::from(holds(bbox, *point)))
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn share_in(&self, other: &Self) -> f64 {
+        match (self, other) {
+            (Self::AxisParallel(a), Self::AxisParallel(b)) => a.share_in(b),
+            (Self::Rotated(a), Self::Rotated(b)) => a.share_in(b),
+            _ => 0.0,
+        }
+    }
+}
+
+fn holds(bbox: &BBox<FramePixels>, [x, y]: [f64; 2]) -> bool {
+    (bbox.x_min()..=bbox.x_max()).contains(&x) && (bbox.y_min()..=bbox.y_max()).contains(&y)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,61 @@
+//! Which shapes are compared, and how.
+
+use super::*;
+use crate::{
+    evaluation::{GroundTruth, MatchingRule, Outcome},
+    geometry::{OrientedBox, Pixel},
+};
+
+fn boxed(corners: [f64; 4]) -> Outline {
+    Outline::AxisParallel(BBox::new(corners).unwrap())
+}
+
+fn person() -> Person {
+    Person {
+        bbox: BBox::new([10.0, 20.0, 50.0, 60.0]).unwrap(),
+        score: 0.7,
+        oriented_box: OrientedBox {
+            center: Pixel::new(30.0, 40.0),
+            width: 20.0,
+            height: 40.0,
+            angle: 0.5,
+            up: nalgebra::Vector2::new(0.5_f64.sin(), -0.5_f64.cos()),
+        },
+        bearing: None,
+        floor: None,
+        views: 3,
+    }
+}
+
+#[test]
+fn rotated_truth_is_compared_with_the_oriented_box_and_other_truth_with_the_box() {
+    let frame = [100, 100];
+    let rotated = RotatedBox::new([30.0, 40.0, 20.0, 40.0], 0.5, frame).unwrap();
+    let scored = Scoring::Rotated.scored(&person(), frame);
+    assert_eq!(scored.bbox, Outline::Rotated(rotated));
+    assert_eq!(scored.score, 0.7);
+    for scoring in [Scoring::AxisParallel, Scoring::HeadPoint] {
+        let scored = scoring.scored(&person(), frame);
+        assert_eq!(scored.bbox, boxed([10.0, 20.0, 50.0, 60.0]));
+    }
+}
+
+#[test]
+fn a_box_finds_one_person_whose_head_lies_in_it_and_a_second_box_the_next() {
+    let truth = GroundTruth {
+        persons: vec![
+            Outline::Head([30.0, 30.0]).into(),
+            Outline::Head([35.0, 30.0]).into(),
+            Outline::Head([90.0, 90.0]).into(),
+        ],
+        ignore_regions: Vec::new(),
+    };
+    let around = |x: f64, score| ScoredBox {
+        bbox: boxed([x - 10.0, 20.0, x + 10.0, 60.0]),
+        score,
+    };
+    let detections = [around(32.0, 0.9), around(33.0, 0.8), around(32.5, 0.7)];
+    let outcomes = MatchingRule::Coco.outcomes(&detections, &truth, 0.75);
+    use Outcome::{FalsePositive, TruePositive};
+    assert_eq!(outcomes, [TruePositive, TruePositive, FalsePositive]);
+}
