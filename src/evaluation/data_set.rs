@@ -23,8 +23,9 @@ use self::pictures::{Files, PictureIndex};
 use super::{AnnotatedPerson, GroundTruth, Outline, Scoring};
 use crate::{
     calibration::Calibration,
+    detection::{BBox, FramePixels},
     geometry::{
-        Lens,
+        Lens, OrientedBox, Pixel,
         pixels::{PixelConvention, cross_half_pixel},
     },
 };
@@ -114,6 +115,19 @@ impl DataSet {
                 path: path.to_owned(),
             }),
         }
+    }
+
+    /// What is compared with the truth of `image` when a person was found in it with this box and
+    /// this oriented box. A data set of rotated boxes knows the size of every frame.
+    #[must_use]
+    pub fn outline(
+        &self,
+        image: &DataSetImage,
+        bbox: BBox<FramePixels>,
+        oriented_box: Option<&OrientedBox>,
+    ) -> Outline {
+        let frame = image.size.unwrap_or_default();
+        self.scoring.outline(bbox, oriented_box, frame)
     }
 
     /// The same data set with `calibration` for every picture.
@@ -206,7 +220,7 @@ impl DataSetImage {
     }
 }
 
-fn off_axis(lens: &Lens, pixel: &crate::geometry::Pixel) -> f64 {
+fn off_axis(lens: &Lens, pixel: &Pixel) -> f64 {
     lens.unproject(pixel)
         .map_or(lens.max_theta(), |ray| ray.x.hypot(ray.y).atan2(ray.z))
 }

@@ -1,9 +1,9 @@
 //! The outline of a person, as annotated or as found, in the shape that is compared.
 
-use super::{Region, RotatedBox, ScoredBox};
+use super::{Region, RotatedBox};
 use crate::{
     detection::{BBox, FramePixels},
-    pipeline::Person,
+    geometry::OrientedBox,
 };
 
 /// What a truth looks like, and so what of a detection is compared with it.
@@ -32,18 +32,24 @@ pub enum Outline {
 }
 
 impl Scoring {
-    /// What is compared of a person found in a frame of `[width, height]` pixels.
+    /// What is compared of a person found in a frame of `[width, height]` pixels: where the truth
+    /// is rotated the oriented box, or for want of one the axis-parallel box.
     #[must_use]
-    pub fn scored(self, person: &Person, frame: [u32; 2]) -> ScoredBox<Outline> {
-        let outline = match self {
-            Self::AxisParallel | Self::HeadPoint => Outline::AxisParallel(person.bbox),
-            Self::Rotated => RotatedBox::of_oriented_box(&person.oriented_box, frame)
-                .map_or(Outline::AxisParallel(person.bbox), Outline::Rotated),
+    pub fn outline(
+        self,
+        bbox: BBox<FramePixels>,
+        oriented_box: Option<&OrientedBox>,
+        frame: [u32; 2],
+    ) -> Outline {
+        let rotated = match (self, oriented_box) {
+            (Self::AxisParallel | Self::HeadPoint, _) => None,
+            (Self::Rotated, Some(oriented_box)) => RotatedBox::of_oriented_box(oriented_box, frame),
+            (Self::Rotated, None) => {
+                let [cx, cy] = bbox.center();
+                RotatedBox::new([cx, cy, bbox.width(), bbox.height()], 0.0, frame)
+            }
         };
-        ScoredBox {
-            bbox: outline,
-            score: person.score,
-        }
+        rotated.map_or(Outline::AxisParallel(bbox), Outline::Rotated)
     }
 }
 

@@ -27,18 +27,21 @@ pub struct RotatedBox {
 
 /// Far beyond any picture, yet small enough that areas stay finite.
 const MAX_COORDINATE: f64 = 1e9;
+/// The largest side of a frame; what a comparison may cost.
+const MAX_FRAME_SIDE: u32 = 65_536;
 
 impl RotatedBox {
     /// The box `[cx, cy, width, height]` (corner-origin frame pixels) turned clockwise by `angle`
     /// radians, in a frame of `[width, height]` pixels. `None` unless all numbers are finite and
-    /// within ±1e9 and the extents are not negative.
+    /// within ±1e9, the extents are not negative and the frame's sides at most 65 536.
     #[must_use]
     pub fn new([cx, cy, width, height]: [f64; 4], angle: f64, frame: [u32; 2]) -> Option<Self> {
         let within = |value: f64| (-MAX_COORDINATE..=MAX_COORDINATE).contains(&value);
         let valid = [cx, cy, width, height].into_iter().all(within)
             && width >= 0.0
             && height >= 0.0
-            && angle.is_finite();
+            && angle.is_finite()
+            && frame.iter().all(|side| *side <= MAX_FRAME_SIDE);
         let (sin, cos) = angle.sin_cos();
         valid.then_some(Self {
             center: [cx, cy],
@@ -119,6 +122,11 @@ impl RotatedBox {
         first_and_end(left, right, self.frame[0])
     }
 
+    /// Of the circle through the corners, pixels.
+    fn radius(&self) -> f64 {
+        self.width.hypot(self.height) / 2.0
+    }
+
     /// Pixels in the mask.
     fn area(&self) -> f64 {
         let [first, end] = self.rows();
@@ -127,6 +135,10 @@ impl RotatedBox {
 
     /// Pixels in both masks.
     fn intersection_area(&self, other: &Self) -> f64 {
+        let [dx, dy] = [0, 1].map(|axis| self.center[axis] - other.center[axis]);
+        if dx.hypot(dy) > self.radius() + other.radius() {
+            return 0.0;
+        }
         let (mine, theirs) = (self.rows(), other.rows());
         rows(mine[0].max(theirs[0]), mine[1].min(theirs[1]))
             .map(|row| {

@@ -7,10 +7,10 @@ use std::{
 
 use jiff::Timestamp;
 
-use super::{DataSet, DataSetImage, EvaluatedImage, MatchingRule, NoPersons, Summary};
+use super::{DataSet, DataSetImage, EvaluatedImage, MatchingRule, NoPersons, ScoredBox, Summary};
 use crate::{
     detection::Refinement,
-    pipeline::{DetectJob, DetectParameters, Engine, PipelineError, Profile},
+    pipeline::{DetectJob, DetectParameters, Engine, Person, PipelineError, Profile},
 };
 
 /// The figures of one profile and refinement.
@@ -80,14 +80,16 @@ pub fn evaluate(
                     source,
                 })?;
         let observing = started.elapsed();
-        let frame_size = [observation.frame.width(), observation.frame.height()];
         views += observation.view_count();
         observation.model().name().clone_into(&mut model);
         for ((variant, images), time) in variants.iter().zip(&mut per_variant).zip(&mut times) {
             let refining = Instant::now();
             let persons = engine.persons(&observation, &variant.refinement);
             *time += observing + refining.elapsed();
-            let scored = |person| data_set.scoring.scored(person, frame_size);
+            let scored = |person: &Person| ScoredBox {
+                bbox: data_set.outline(image, person.bbox, Some(&person.oriented_box)),
+                score: person.score,
+            };
             images.push(EvaluatedImage {
                 truth: image.truth.clone(),
                 detections: persons.iter().map(scored).collect(),

@@ -6,7 +6,6 @@ use super::{
     test_support::{boxes, folder, open, refusal},
     *,
 };
-use crate::detection::BBox;
 
 const CALIBRATION: &str = r#"{"id":"lobby","image":{"width":600,"height":600},
     "lens":{"model":"equidistant","focal":190,"cx":299.5,"cy":299.5}}"#;

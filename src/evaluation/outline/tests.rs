@@ -1,42 +1,45 @@
 //! Which shapes are compared, and how.
 
+use nalgebra::Vector2;
+
 use super::*;
 use crate::{
-    evaluation::{GroundTruth, MatchingRule, Outcome},
-    geometry::{OrientedBox, Pixel},
+    evaluation::{
+        GroundTruth, MatchingRule,
+        Outcome::{FalsePositive, TruePositive},
+        ScoredBox,
+    },
+    geometry::Pixel,
 };
 
 fn boxed(corners: [f64; 4]) -> Outline {
     Outline::AxisParallel(BBox::new(corners).unwrap())
 }
 
-fn person() -> Person {
-    Person {
-        bbox: BBox::new([10.0, 20.0, 50.0, 60.0]).unwrap(),
-        score: 0.7,
-        oriented_box: OrientedBox {
-            center: Pixel::new(30.0, 40.0),
-            width: 20.0,
-            height: 40.0,
-            angle: 0.5,
-            up: nalgebra::Vector2::new(0.5_f64.sin(), -0.5_f64.cos()),
-        },
-        bearing: None,
-        floor: None,
-        views: 3,
-    }
-}
-
 #[test]
 fn rotated_truth_is_compared_with_the_oriented_box_and_other_truth_with_the_box() {
     let frame = [100, 100];
-    let rotated = RotatedBox::new([30.0, 40.0, 20.0, 40.0], 0.5, frame).unwrap();
-    let scored = Scoring::Rotated.scored(&person(), frame);
-    assert_eq!(scored.bbox, Outline::Rotated(rotated));
-    assert_eq!(scored.score, 0.7);
+    let bbox = BBox::new([10.0, 20.0, 50.0, 60.0]).unwrap();
+    let oriented_box = OrientedBox {
+        center: Pixel::new(30.0, 40.0),
+        width: 20.0,
+        height: 44.0,
+        angle: 0.5,
+        up: Vector2::new(0.5_f64.sin(), -0.5_f64.cos()),
+    };
+    let rotated =
+        |numbers, angle| Outline::Rotated(RotatedBox::new(numbers, angle, frame).unwrap());
+    assert_eq!(
+        Scoring::Rotated.outline(bbox, Some(&oriented_box), frame),
+        rotated([30.0, 40.0, 20.0, 44.0], 0.5)
+    );
+    assert_eq!(
+        Scoring::Rotated.outline(bbox, None, frame),
+        rotated([30.0, 40.0, 40.0, 40.0], 0.0)
+    );
     for scoring in [Scoring::AxisParallel, Scoring::HeadPoint] {
-        let scored = scoring.scored(&person(), frame);
-        assert_eq!(scored.bbox, boxed([10.0, 20.0, 50.0, 60.0]));
+        let outline = scoring.outline(bbox, Some(&oriented_box), frame);
+        assert_eq!(outline, Outline::AxisParallel(bbox));
     }
 }
 
@@ -56,6 +59,5 @@ fn a_box_finds_one_person_whose_head_lies_in_it_and_a_second_box_the_next() {
     };
     let detections = [around(32.0, 0.9), around(33.0, 0.8), around(32.5, 0.7)];
     let outcomes = MatchingRule::Coco.outcomes(&detections, &truth, 0.75);
-    use Outcome::{FalsePositive, TruePositive};
     assert_eq!(outcomes, [TruePositive, TruePositive, FalsePositive]);
 }

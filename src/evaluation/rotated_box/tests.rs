@@ -66,6 +66,7 @@ fn numbers_that_are_no_box_are_refused() {
         assert_eq!(RotatedBox::new(numbers, 0.0, FRAME), None, "{numbers:?}");
     }
     assert_eq!(RotatedBox::new([0.0; 4], f64::NAN, FRAME), None);
+    assert_eq!(RotatedBox::new([0.0; 4], 0.0, [u32::MAX, 80]), None);
 }
 
 proptest! {
