@@ -72,56 +72,67 @@ fn assert_everybody_was_found(row: &Value, persons: usize) {
     }
 }
 
-#[test]
-fn a_data_set_of_what_was_found_is_found_completely_in_every_form() {
-    let found = found();
-    let coco_file = |annotations: Vec<Value>| {
-        let image = json!({"id": "office", "file_name": "o.jpg", "width": 960, "height": 960});
-        json!({"images": [image], "annotations": annotations}).to_string()
-    };
+/// A COCO file of the sample with these boxes.
+fn coco_file(boxes: impl Iterator<Item = Vec<f64>>) -> String {
+    let annotations: Vec<_> = boxes
+        .map(|bbox| json!({"image_id": "office", "bbox": bbox}))
+        .collect();
+    let image = json!({"id": "office", "file_name": "o.jpg", "width": 960, "height": 960});
+    json!({"images": [image], "annotations": annotations}).to_string()
+}
 
-    let rotated = found.iter().map(|person| {
+#[test]
+fn rotated_boxes_are_found_by_the_oriented_boxes_they_were_made_of() {
+    let found = found();
+    let boxes = found.iter().map(|person| {
         let names = ["cx", "cy", "width", "height", "angle_deg"];
-        json!({"image_id": "office", "bbox": numbers(&person["oriented_box"], names)})
+        numbers(&person["oriented_box"], names).to_vec()
     });
-    let file = ("annotations/office.json", coco_file(rotated.collect()));
+    let file = ("annotations/office.json", coco_file(boxes));
     let row = evaluated("office/o.jpg", &[file]);
     assert_everybody_was_found(&row, found.len());
+}
 
-    let upright = found.iter().map(|person| {
+#[test]
+fn boxes_of_a_coco_file_are_found() {
+    let found = found();
+    let boxes = found.iter().map(|person| {
         let [x_min, y_min, x_max, y_max] = corners(person);
-        json!({"image_id": "office", "bbox": [x_min, y_min, x_max - x_min, y_max - y_min]})
+        vec![x_min, y_min, x_max - x_min, y_max - y_min]
     });
-    let file = ("annotations.json", coco_file(upright.collect()));
-    let row = evaluated("images/o.jpg", &[file]);
+    let row = evaluated("images/o.jpg", &[("annotations.json", coco_file(boxes))]);
     assert_everybody_was_found(&row, found.len());
+}
 
-    let objects: String = found
-        .iter()
-        .map(|person| {
-            let [x_min, y_min, x_max, y_max] = corners(person);
-            format!(
-                "<object><name>person</name><bndbox><xmin>{x_min}</xmin><ymin>{y_min}</ymin>\
-                 <xmax>{x_max}</xmax><ymax>{y_max}</ymax></bndbox></object>"
-            )
-        })
-        .collect();
-    let xml = format!("<annotation>{objects}</annotation>");
+#[test]
+fn boxes_of_voc_files_are_found() {
+    let found = found();
+    let objects = found.iter().map(|person| {
+        let [x_min, y_min, x_max, y_max] = corners(person);
+        format!(
+            "<object><name>person</name><bndbox><xmin>{x_min}</xmin><ymin>{y_min}</ymin>\
+             <xmax>{x_max}</xmax><ymax>{y_max}</ymax></bndbox></object>"
+        )
+    });
+    let objects: Vec<_> = objects.collect();
+    let xml = format!("<annotation>{}</annotation>", objects.concat());
     let row = evaluated("JPEGImages/o.jpg", &[("Annotations/o.xml", xml)]);
     assert_everybody_was_found(&row, found.len());
+}
 
-    let heads: String = found
-        .iter()
-        .map(|person| {
-            let [x_min, y_min, x_max, y_max] = corners(person);
-            format!(
-                ",{},{}",
-                f64::midpoint(x_min, x_max),
-                f64::midpoint(y_min, y_max)
-            )
-        })
-        .collect();
+#[test]
+fn heads_are_found_by_the_boxes_they_lie_in() {
+    let found = found();
+    let heads = found.iter().map(|person| {
+        let [x_min, y_min, x_max, y_max] = corners(person);
+        let (x, y) = (f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
+        format!(",{x},{y}")
+    });
+    let heads: Vec<_> = heads.collect();
     let csv = "Ground_Truth_Annotations/groundTruth_omni1A_test1.csv";
-    let row = evaluated("omni1A_test1/o.jpg", &[(csv, format!("1{heads}\n"))]);
+    let row = evaluated(
+        "omni1A_test1/o.jpg",
+        &[(csv, format!("1{}\n", heads.concat()))],
+    );
     assert_everybody_was_found(&row, found.len());
 }
