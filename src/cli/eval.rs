@@ -144,9 +144,6 @@ struct Row<'a> {
     f1: f64,
     /// The score threshold of `f1`.
     f1_score_threshold: Option<f64>,
-    /// Precision and recall at that threshold.
-    f1_precision: f64,
-    f1_recall: f64,
     recall: f64,
     seconds_per_image: f64,
 }
@@ -168,8 +165,6 @@ impl<'a> Row<'a> {
             ap50_coco: summary.ap50.coco_101_point,
             f1: summary.f1,
             f1_score_threshold: summary.f1_score_threshold,
-            f1_precision: summary.f1_precision,
-            f1_recall: summary.f1_recall,
             recall: summary.recall,
             seconds_per_image: row.time_per_image.as_secs_f64(),
         }
