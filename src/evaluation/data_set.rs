@@ -87,7 +87,7 @@ impl DataSet {
         }
         let xml = files.ending_in("xml");
         if !xml.is_empty() {
-            return voc::read_files(&xml, &files.pictures());
+            return voc::read_files(path, &xml, &files.pictures());
         }
         let heads = files.named(heads::is_head_file);
         if !heads.is_empty() {

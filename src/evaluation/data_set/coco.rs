@@ -79,6 +79,7 @@ pub(super) fn read_files(
 #[derive(Default)]
 struct Reader {
     images: Vec<DataSetImage>,
+    index_by_id: HashMap<ImageId, usize>,
     /// That of the boxes read so far.
     scoring: Option<Scoring>,
 }
@@ -96,11 +97,13 @@ impl Reader {
         };
         let file: CocoFile = serde_json::from_str(&read_text(path, MAX_BYTES)?)
             .map_err(|error| wrong(format!("not a COCO annotation file: {error}")))?;
-        let mut index_by_id = HashMap::new();
         for image in &file.images {
             let index = self.images.len();
-            if index_by_id.insert(image.id.clone(), index).is_some() {
-                return Err(wrong(format!("images: the id {} occurs twice", image.id)));
+            if self.index_by_id.insert(image.id.clone(), index).is_some() {
+                return Err(wrong(format!(
+                    "images: the id {} occurs twice in the data set",
+                    image.id
+                )));
             }
             let picture =
                 picture(&image.file_name).map_err(|problem| wrong(format!("images: {problem}")))?;
@@ -124,10 +127,11 @@ impl Reader {
                 continue;
             }
             let id = &annotation.image_id;
-            let index = index_by_id
+            let index = *self
+                .index_by_id
                 .get(id)
                 .ok_or_else(|| wrong(format!("annotations: image_id {id} is no image's id")))?;
-            self.annotate(*index, annotation)
+            self.annotate(index, annotation)
                 .map_err(|problem| wrong(format!("annotations[{position}].{problem}")))?;
         }
         Ok(())

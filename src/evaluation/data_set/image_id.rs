@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub enum ImageId {
     /// A number, as in COCO.
     Number(u64),
-    /// A text, as in CEPDOF; of pictures without an ID their name.
+    /// A text, as in CEPDOF; of pictures without an ID their path in the data set.
     Text(String),
 }
 

@@ -120,17 +120,28 @@ impl PictureIndex {
         the_only(&found, file_name)
     }
 
-    /// The picture named like the annotation file `beside`: in the same folder, or else anywhere.
+    /// The picture named like the annotation file `beside`: in the same folder, or else in one of
+    /// the same name but for underscores (PIROPO's `omni1A_test2` is `omni_1A_test2` in the
+    /// boxes for it), or else anywhere.
     pub(super) fn named_like(&self, beside: &Path) -> Result<PathBuf, String> {
         let same_stem: Vec<_> = self.of_stem(beside.file_stem()).iter().collect();
         let here = same_stem
             .iter()
-            .copied()
             .find(|path| path.parent() == beside.parent());
-        match (here, beside.file_stem()) {
-            (Some(here), _) => Ok(here.clone()),
-            (None, stem) => the_only(&same_stem, Path::new(stem.unwrap_or_default())),
+        if let Some(here) = here {
+            return Ok((*here).clone());
         }
+        let folder = bare_folder_name(beside);
+        let same_folder = same_stem
+            .iter()
+            .filter(|path| bare_folder_name(path) == folder);
+        let same_folder: Vec<_> = same_folder.copied().collect();
+        let found = if same_folder.is_empty() {
+            same_stem
+        } else {
+            same_folder
+        };
+        the_only(&found, Path::new(beside.file_stem().unwrap_or_default()))
     }
 
     fn of_stem(&self, stem: Option<&OsStr>) -> &[PathBuf] {
@@ -144,6 +155,12 @@ pub(super) fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, DataSetError> {
     let mut pictures = Files::below(folder)?.named(is_picture);
     pictures.retain(|path| path.parent() == Some(folder));
     Ok(pictures)
+}
+
+/// The name of the folder that a file is in, without underscores.
+fn bare_folder_name(path: &Path) -> Option<String> {
+    let folder = path.parent()?.file_name()?;
+    Some(folder.to_string_lossy().replace('_', ""))
 }
 
 fn the_only(found: &[&PathBuf], name: &Path) -> Result<PathBuf, String> {

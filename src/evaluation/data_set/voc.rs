@@ -18,8 +18,9 @@ use crate::{
 /// A picture of a crowd has some 100 kB.
 const MAX_BYTES: u64 = 16 * 1024 * 1024;
 
-/// Reads one file per picture.
+/// Reads one file per picture; its path below `root` is the ID of the picture.
 pub(super) fn read_files(
+    root: &Path,
     files: &[PathBuf],
     pictures: &PictureIndex,
 ) -> Result<DataSet, DataSetError> {
@@ -33,9 +34,11 @@ pub(super) fn read_files(
         let text = read_text(path, MAX_BYTES)?;
         let document =
             Document::parse(&text).map_err(|error| wrong(format!("not XML: {error}")))?;
-        let root = document.root_element();
-        is_anything_annotated |= objects(root).next().is_some();
-        images.push(read(path, root, pictures).map_err(wrong)?);
+        let annotation = document.root_element();
+        is_anything_annotated |= objects(annotation).next().is_some();
+        let id = path.strip_prefix(root).unwrap_or(path).with_extension("");
+        let id = ImageId::Text(id.to_string_lossy().into_owned());
+        images.push(read(path, id, annotation, pictures).map_err(wrong)?);
     }
     let is_somebody_there = images
         .iter()
@@ -55,22 +58,25 @@ pub(super) fn read_files(
     }
 }
 
-fn read(path: &Path, root: Node<'_, '_>, pictures: &PictureIndex) -> Result<DataSetImage, String> {
-    if root.tag_name().name() != "annotation" {
+fn read(
+    path: &Path,
+    id: ImageId,
+    annotation: Node<'_, '_>,
+    pictures: &PictureIndex,
+) -> Result<DataSetImage, String> {
+    if annotation.tag_name().name() != "annotation" {
         return Err(format!(
             "not a VOC annotation: its root is <{}> instead of <annotation>",
-            root.tag_name().name()
+            annotation.tag_name().name()
         ));
     }
     let picture = pictures.named_like(path)?;
-    let name = path.file_stem().unwrap_or_default();
-    let id = ImageId::Text(name.to_string_lossy().into_owned());
     let mut image = DataSetImage::empty(id, picture);
-    image.size = match child(root, "size") {
+    image.size = match child(annotation, "size") {
         Some(size) => Some([number(size, "width")?, number(size, "height")?]),
         None => None,
     };
-    for object in objects(root).filter(is_person) {
+    for object in objects(annotation).filter(is_person) {
         let bndbox = child(object, "bndbox").ok_or("an object has no bndbox; give it one")?;
         let corners = [
             number(bndbox, "xmin")?,

@@ -45,6 +45,9 @@ fn pictures_of_the_same_name_are_told_apart_by_their_folders_or_not_at_all() {
             .unwrap()
             .ends_with("three/a.png")
     );
+    let like_named = folder.path().join("annotations/t_wo/a.xml");
+    let found = pictures.named_like(&like_named).unwrap();
+    assert!(found.ends_with("two/a.jpg"));
     let nowhere = folder.path().join("annotations/a.xml");
     assert!(pictures.named_like(&nowhere).is_err());
 }

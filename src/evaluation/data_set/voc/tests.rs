@@ -31,7 +31,7 @@ fn persons_are_read_and_difficult_ones_do_not_count() {
     assert_eq!(boxes(first), [[626.25, 186.0, 664.5, 212.25]]);
     assert_eq!(first.truth.persons.len(), 2);
     assert_eq!(first.size, Some([800, 600]));
-    assert_eq!(first.id.to_string(), "000001");
+    assert_eq!(first.id.to_string(), "Annotations/000001");
     assert!(first.path.ends_with("JPEGImages/000001.jpg"));
     assert!(second.truth.persons.is_empty());
 }
