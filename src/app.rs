@@ -15,7 +15,7 @@ use crate::{
     inference::{ModelRepository, ModelWatcher},
     metrics::Metrics,
     pipeline::{DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
-    settings::Settings,
+    settings::{LimitSettings, Settings},
     shutdown::Shutdown,
 };
 
@@ -35,14 +35,8 @@ pub struct Assembly {
 /// One sentence that names the setting: a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
     let (models, default_models) = models::open(settings)?;
-    let limits = &settings.limits;
     let options = EngineOptions {
-        decode_limits: DecodeLimits {
-            max_width: limits.max_image_side,
-            max_height: limits.max_image_side,
-            max_pixels: limits.max_image_pixels,
-            max_alloc_bytes: limits.max_decode_bytes,
-        },
+        decode_limits: decode_limits(&settings.limits),
         default_models,
         max_batch_views: settings.inference.max_batch_views,
         remap_threads: settings.threads.remapping,
@@ -54,6 +48,16 @@ pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
         .context("the operating system gives no threads")?;
     let models = Arc::new(models);
     Ok(Assembly { engine, models })
+}
+
+/// What the settings let a picture cost.
+pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
+    DecodeLimits {
+        max_width: limits.max_image_side,
+        max_height: limits.max_image_side,
+        max_pixels: limits.max_image_pixels,
+        max_alloc_bytes: limits.max_decode_bytes,
+    }
 }
 
 /// The engine that the settings describe, with the models that requests with any of these

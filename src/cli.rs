@@ -5,6 +5,7 @@ mod detect;
 mod eval;
 mod model;
 mod parameters;
+mod progress;
 mod serve;
 
 use std::{
@@ -37,7 +38,7 @@ enum Command {
     /// Find the persons in pictures: one JSON report per line on standard output
     Detect(Box<detect::Arguments>),
     /// Measure how good detections are on a data set: average precision and speed
-    Eval(eval::Arguments),
+    Eval(Box<eval::Arguments>),
     /// Look into person models
     #[command(subcommand)]
     Model(model::Command),

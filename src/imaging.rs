@@ -6,9 +6,12 @@ pub mod frame;
 pub mod lens_circle;
 mod letterbox;
 mod network_input;
+pub mod picture_grid;
 mod remap_table;
+mod thumbnail;
 
-pub use frame::Frame;
+pub use frame::{Frame, FrameError};
 pub use letterbox::Letterbox;
 pub use network_input::{ChannelOrder, NetworkInput, ViewBatch};
 pub use remap_table::RemapTable;
+pub use thumbnail::thumbnail;

@@ -88,7 +88,7 @@ const MAY_USE: [(&str, &[&str]); 15] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 10] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 12] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api", "app"]),
@@ -97,6 +97,8 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 10] = [
     ("utoipa_axum", &["api"]),
     ("serde_json", &["api", "cli", "calibration", "evaluation"]),
     ("clap", &["cli"]),
+    ("indicatif", &["cli"]),
+    ("plotters", &["evaluation"]),
     ("config", &["settings"]),
     ("prometheus", &["metrics"]),
 ];

@@ -1,21 +1,26 @@
 //! `lookdown eval`
 
+mod output;
+mod plot_file;
+mod sweep;
+mod table;
+mod variants;
+
 use std::{
-    io::{self, IsTerminal, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
-use serde::Serialize;
 
-use super::SettingsFile;
+use self::{output::Output, plot_file::PlotFile};
+use super::{SettingsFile, progress::Progress};
 use crate::{
     app::engine_for,
-    detection::Refinement,
-    evaluation::{DataSet, EvaluatedRow, evaluate},
-    pipeline::{DetectParameters, Profile},
+    evaluation::{DataSet, DetectedRow, EvaluationError, detect},
+    pipeline::{DetectParameters, Engine},
+    settings::Settings,
 };
 
 /// C_t without `--score-threshold`: low, since average precision looks at all scores.
@@ -28,11 +33,25 @@ pub(super) struct Arguments {
     /// calibrations/
     data_set: PathBuf,
     /// How thoroughly to look: paper, fast, balanced, quality or direct; may be repeated
-    #[arg(long, value_name = "NAME", default_value = Profile::default().name())]
+    /// [default: balanced; with --sweep: paper]
+    #[arg(long, value_name = "NAME")]
     profile: Vec<String>,
     /// How overlapping boxes become persons; may be repeated [default: all refinements]
     #[arg(long, value_name = "NAME")]
     refine: Vec<String>,
+    /// The rows of the paper's table: its three refinements, and the detector without views
+    #[arg(long, conflicts_with_all = ["profile", "refine"])]
+    paper: bool,
+    /// The paper's sweeps, into this folder: cells.csv (AP of NMS and Soft-NMS over N_t from 0 to
+    /// 1, of Gaussian Soft-NMS over C_t and sigma), iou_threshold.svg (AP over N_t) and matrix.png
+    /// (what each C_t and sigma finds in the image with the most persons)
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        conflicts_with_all = ["refine", "paper", "iou_threshold", "sigma", "plot",
+                              "save_detections", "from_detections"]
+    )]
+    sweep: Option<PathBuf>,
     /// Look with this model [default: the profile's]
     #[arg(long, value_name = "NAME")]
     model: Option<String>,
@@ -48,140 +67,104 @@ pub(super) struct Arguments {
     /// Print one JSON object per row instead of a table
     #[arg(long)]
     json: bool,
+    /// Also draw the precision-recall curves of all rows into one picture
+    #[arg(long, value_name = "OUT.svg|OUT.png")]
+    plot: Option<PlotFile>,
+    /// Also write what was found, as COCO results: a file per row, named
+    /// PROFILE.REFINEMENT.MODEL.json
+    #[arg(long, value_name = "FOLDER")]
+    save_detections: Option<PathBuf>,
+    /// Score these COCO results instead of looking: a file, or all .json files of a folder; may
+    /// be repeated
+    #[arg(
+        long,
+        value_name = "FILE|FOLDER",
+        conflicts_with_all = ["profile", "refine", "paper", "model", "score_threshold",
+                              "iou_threshold", "sigma", "save_detections"]
+    )]
+    from_detections: Vec<PathBuf>,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
 
 /// Scores every profile with every refinement.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let variants = arguments
-        .profile
-        .iter()
-        .map(|profile| variants(arguments, profile))
-        .collect::<anyhow::Result<Vec<_>>>()?;
-    let settings = arguments.settings_file.load()?;
-    let data_set = DataSet::open(&arguments.data_set)?;
-    let engine = engine_for(&settings, &variants.concat())?;
-    let mut out = io::stdout().lock();
-    if !arguments.json {
-        writeln!(out, "{TABLE_HEAD}").context("standard output cannot be written")?;
+    if let Some(folder) = &arguments.sweep {
+        sweep::run(arguments, folder)?;
+        return Ok(ExitCode::SUCCESS);
     }
-    for of_profile in variants {
-        let name = of_profile.first().map_or("", |first| first.profile.name());
-        let rows = evaluate(&engine, &data_set, &of_profile, |done| {
-            show_progress(name, done, data_set.images.len());
-        })?;
-        for row in rows {
-            let row = Row::new(&row);
-            let line = if arguments.json {
-                serde_json::to_string(&row)?
-            } else {
-                row.table_line()
-            };
-            writeln!(out, "{line}").context("standard output cannot be written")?;
+    let mut output = Output::new(arguments);
+    if arguments.from_detections.is_empty() {
+        look(arguments, &mut output)?;
+    } else {
+        let data_set = DataSet::open(&arguments.data_set)?;
+        for path in saved_rows(&arguments.from_detections)? {
+            output.print(DetectedRow::load(&path, &data_set)?, &data_set)?;
         }
     }
+    output.plot()?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn variants(arguments: &Arguments, profile: &str) -> anyhow::Result<Vec<DetectParameters>> {
-    let all = Refinement::ALL.map(|refinement| refinement.name().to_owned());
-    let refinements = if arguments.refine.is_empty() {
-        &all[..]
-    } else {
-        &arguments.refine
-    };
-    let parse = |refinement: &String| {
-        let given = [
-            ("profile", Some(profile)),
-            ("refine", Some(refinement.as_str())),
-            ("model", arguments.model.as_deref()),
-            ("score_threshold", Some(arguments.score_threshold.as_str())),
-            ("iou_threshold", arguments.iou_threshold.as_deref()),
-            ("sigma", arguments.sigma.as_deref()),
-        ];
-        let pairs = given
-            .into_iter()
-            .filter_map(|(name, value)| Some((name, value?)));
-        // The threshold is always among the pairs, so the default is never used.
-        Ok(DetectParameters::parse(pairs, 0.0)?)
-    };
-    refinements.iter().map(parse).collect()
-}
-
-/// One line that is written over on a terminal, one line per image elsewhere.
-fn show_progress(profile: &str, done: usize, total: usize) {
-    let mut err = io::stderr().lock();
-    let (start, end) = if err.is_terminal() {
-        ("\r", if done == total { "\n" } else { "" })
-    } else {
-        ("", "\n")
-    };
-    // Progress that nobody can read is no reason to stop.
-    let _ =
-        write!(err, "{start}{profile}: {done} of {total} images{end}").and_then(|()| err.flush());
-}
-
-const TABLE_HEAD: &str = "\
-profile   refine              views   AP50   AP75  AP50:95     F1  recall  s/image";
-
-/// One row, as printed.
-#[derive(Debug, Serialize)]
-struct Row<'a> {
-    profile: &'static str,
-    refine: &'static str,
-    model: &'a str,
-    images: usize,
-    persons: usize,
-    /// Views per image that the network saw.
-    views: f64,
-    /// Areas under the precision-recall curve, all points.
-    ap50: f64,
-    ap75: f64,
-    ap50_95: f64,
-    ap50_eleven_point: f64,
-    ap50_coco: f64,
-    f1: f64,
-    /// The score threshold of `f1`.
-    f1_score_threshold: Option<f64>,
-    recall: f64,
-    seconds_per_image: f64,
-}
-
-impl<'a> Row<'a> {
-    fn new(row: &'a EvaluatedRow) -> Self {
-        let summary = &row.summary;
-        Self {
-            profile: row.profile.name(),
-            refine: row.refinement.name(),
-            model: &row.model,
-            images: summary.images,
-            persons: summary.persons,
-            views: row.views,
-            ap50: summary.ap50.all_point_area,
-            ap75: summary.ap75.all_point_area,
-            ap50_95: summary.ap50_95.all_point_area,
-            ap50_eleven_point: summary.ap50.eleven_point,
-            ap50_coco: summary.ap50.coco_101_point,
-            f1: summary.f1,
-            f1_score_threshold: summary.f1_score_threshold,
-            recall: summary.recall,
-            seconds_per_image: row.time_per_image.as_secs_f64(),
+/// Looks at the data set with every profile.
+fn look(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
+    let groups = variants::groups(arguments)?;
+    let settings = arguments.settings_file.load()?;
+    let data_set = DataSet::open(&arguments.data_set)?;
+    let engine = engine_for(&settings, &groups.concat())?;
+    for group in groups {
+        for row in detect_group(&engine, &data_set, &group, &settings)? {
+            if let Some(folder) = &arguments.save_detections {
+                row.save(folder, &data_set)?;
+            }
+            output.print(row, &data_set)?;
         }
     }
+    Ok(())
+}
 
-    fn table_line(&self) -> String {
-        format!(
-            "{:<9} {:<18} {:>6.1} {:>6.3} {:>6.3} {:>8.3} {:>6.3} {:>7.3} {:>8.3}",
-            self.profile,
-            self.refine,
-            self.views,
-            self.ap50,
-            self.ap75,
-            self.ap50_95,
-            self.f1,
-            self.recall,
-            self.seconds_per_image
-        )
+fn detect_group(
+    engine: &Engine,
+    data_set: &DataSet,
+    group: &[DetectParameters],
+    settings: &Settings,
+) -> Result<Vec<DetectedRow>, EvaluationError> {
+    let name = group.first().map_or("", |first| first.profile.name());
+    let progress = Progress::start(name, data_set.images.len());
+    let at_once = settings.threads.frame_workers;
+    let rows = detect(engine, data_set, group, at_once, || progress.advance());
+    progress.finish();
+    rows
+}
+
+/// The files that `--from-detections` means, those of a folder in the order of their names.
+fn saved_rows(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            files.extend(json_files(path)?);
+        } else {
+            files.push(path.clone());
+        }
     }
+    Ok(files)
+}
+
+fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let unreadable = || format!("{}: cannot be read", folder.display());
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(unreadable)? {
+        let path = entry.with_context(unreadable)?.path();
+        if path.extension().is_some_and(|ending| ending == "json") {
+            files.push(path);
+        }
+    }
+    if files.is_empty() {
+        bail!(
+            "{}: there is no .json file of detections in it",
+            folder.display()
+        );
+    }
+    files.sort();
+    Ok(files)
 }

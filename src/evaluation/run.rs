@@ -1,36 +1,19 @@
-//! Runs the engine over a data set and scores what it found.
+//! Runs the engine over the images of a data set.
 
 use std::{
+    num::NonZeroUsize,
     path::PathBuf,
     time::{Duration, Instant},
 };
 
 use jiff::Timestamp;
 
-use super::{DataSet, DataSetImage, EvaluatedImage, MatchingRule, NoPersons, ScoredBox, Summary};
-use crate::{
-    detection::Refinement,
-    pipeline::{DetectJob, DetectParameters, Engine, Person, PipelineError, Profile},
+use super::{
+    DataSet, DataSetImage, DetectedRow, FoundPerson, RowCost, RowName, in_order::in_order,
 };
+use crate::pipeline::{DetectJob, DetectParameters, Engine, PipelineError};
 
-/// The figures of one profile and refinement.
-#[derive(Debug, Clone)]
-pub struct EvaluatedRow {
-    /// The profile.
-    pub profile: Profile,
-    /// The refinement.
-    pub refinement: Refinement,
-    /// The model that looked.
-    pub model: String,
-    /// How many views the network saw per image, on average.
-    pub views: f64,
-    /// Wall-clock time per image: observing it and this refinement of it.
-    pub time_per_image: Duration,
-    /// How good it was.
-    pub summary: Summary,
-}
-
-/// An evaluation that could not be finished.
+/// An image that got no detections.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluationError {
     /// A picture cannot be read.
@@ -49,69 +32,67 @@ pub enum EvaluationError {
         /// What the engine said.
         source: PipelineError,
     },
-    /// There is nothing to find.
-    #[error(transparent)]
-    NoPersons(#[from] NoPersons),
 }
 
-/// Evaluates each of `variants`, which differ in nothing but their refinement, on one inference
-/// per image. `progress` is told how many images are done.
+/// What came of one image.
+struct Seen {
+    model: String,
+    views: usize,
+    /// Up to and including the network.
+    observing: Duration,
+    /// What each variant found in it, and how long its refinement took.
+    variants: Vec<(Vec<FoundPerson>, Duration)>,
+}
+
+/// Finds the persons in every image with each of `variants`, which differ in nothing but their
+/// refinement, on one inference per image. `at_once` images are in memory at a time. `done` is
+/// called after each, from any thread. The results do not depend on `at_once`, but for the times.
 ///
 /// # Errors
-/// [`EvaluationError`] at the first picture that cannot be used.
-pub fn evaluate(
+/// [`EvaluationError`] of the first picture that cannot be used.
+pub fn detect(
     engine: &Engine,
     data_set: &DataSet,
     variants: &[DetectParameters],
-    mut progress: impl FnMut(usize),
-) -> Result<Vec<EvaluatedRow>, EvaluationError> {
-    let mut per_variant = vec![Vec::with_capacity(data_set.images.len()); variants.len()];
-    let mut times = vec![Duration::ZERO; variants.len()];
-    let mut views = 0;
-    let mut model = String::new();
-    for (done, image) in data_set.images.iter().enumerate() {
-        let Some(first) = variants.first() else { break };
-        let started = Instant::now();
-        let observation =
-            engine
-                .observe(&job(image, first)?)
-                .map_err(|source| EvaluationError::Failed {
-                    path: image.path.clone(),
-                    source,
-                })?;
-        let observing = started.elapsed();
-        views += observation.view_count();
-        observation.model().name().clone_into(&mut model);
-        for ((variant, images), time) in variants.iter().zip(&mut per_variant).zip(&mut times) {
-            let refining = Instant::now();
-            let persons = engine.persons(&observation, &variant.refinement);
-            *time += observing + refining.elapsed();
-            let scored = |person: &Person| ScoredBox {
-                bbox: data_set.outline(image, person.bbox, Some(&person.oriented_box)),
-                score: person.score,
-            };
-            images.push(EvaluatedImage {
-                truth: image.truth.clone(),
-                detections: persons.iter().map(scored).collect(),
-            });
-        }
-        progress(done + 1);
-    }
-    let count = u32::try_from(data_set.images.len().max(1)).unwrap_or(u32::MAX);
-    #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
-    let views_per_image = views as f64 / f64::from(count);
-    let rows = variants.iter().zip(&per_variant).zip(times);
-    rows.map(|((variant, images), time)| {
-        Ok(EvaluatedRow {
-            profile: variant.profile,
-            refinement: variant.refinement.refinement,
-            model: model.clone(),
-            views: views_per_image,
-            time_per_image: time / count,
-            summary: Summary::of_images(images, MatchingRule::Coco)?,
-        })
+    at_once: NonZeroUsize,
+    done: impl Fn() + Sync,
+) -> Result<Vec<DetectedRow>, EvaluationError> {
+    let Some(first) = variants.first() else {
+        return Ok(Vec::new());
+    };
+    let seen = in_order(&data_set.images, at_once, |image| {
+        let seen = look(engine, image, first, variants);
+        done();
+        seen
+    })?;
+    Ok(rows(seen, variants))
+}
+
+fn look(
+    engine: &Engine,
+    image: &DataSetImage,
+    first: &DetectParameters,
+    variants: &[DetectParameters],
+) -> Result<Seen, EvaluationError> {
+    let observation =
+        engine
+            .observe(&job(image, first)?)
+            .map_err(|source| EvaluationError::Failed {
+                path: image.path.clone(),
+                source,
+            })?;
+    let refined = variants.iter().map(|variant| {
+        let refining = Instant::now();
+        let persons = engine.persons(&observation, &variant.refinement);
+        let took = refining.elapsed();
+        (persons.iter().map(FoundPerson::from).collect(), took)
+    });
+    Ok(Seen {
+        model: observation.model().name().to_owned(),
+        views: observation.view_count(),
+        observing: observation.timings().worked(),
+        variants: refined.collect(),
     })
-    .collect()
 }
 
 fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob, EvaluationError> {
@@ -127,4 +108,38 @@ fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob,
         parameters: parameters.clone(),
         calibration: image.calibration.clone(),
     })
+}
+
+fn rows(seen: Vec<Seen>, variants: &[DetectParameters]) -> Vec<DetectedRow> {
+    let model = seen.first().map_or("", |image| &image.model).to_owned();
+    let count = u32::try_from(seen.len().max(1)).unwrap_or(u32::MAX);
+    let views: usize = seen.iter().map(|image| image.views).sum();
+    #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
+    let views_per_image = views as f64 / f64::from(count);
+    let observing: Duration = seen.iter().map(|image| image.observing).sum();
+    let mut rows: Vec<_> = variants
+        .iter()
+        .map(|variant| DetectedRow {
+            name: RowName {
+                profile: Some(variant.profile),
+                refinement: Some(variant.refinement.refinement),
+                model: model.clone(),
+            },
+            refinement: Some(variant.refinement),
+            cost: Some(RowCost {
+                views: views_per_image,
+                time_per_image: observing / count,
+            }),
+            images: Vec::with_capacity(seen.len()),
+        })
+        .collect();
+    for image in seen {
+        for (row, (found, refining)) in rows.iter_mut().zip(image.variants) {
+            row.images.push(found);
+            if let Some(cost) = &mut row.cost {
+                cost.time_per_image += refining / count;
+            }
+        }
+    }
+    rows
 }

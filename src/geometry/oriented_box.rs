@@ -26,6 +26,19 @@ pub struct OrientedBox {
 }
 
 impl OrientedBox {
+    /// The box of these extents whose height axis is turned clockwise from image up by `angle`,
+    /// radians; its head is at the upper end, as an axis alone does not tell.
+    #[must_use]
+    pub fn turned(center: Pixel, width: f64, height: f64, angle: f64) -> Self {
+        Self {
+            center,
+            width,
+            height,
+            angle,
+            up: Vector2::new(angle.sin(), -angle.cos()),
+        }
+    }
+
     /// The middle of the lower short side: where the feet are. Corner-origin frame pixels.
     #[must_use]
     pub fn foot(&self) -> Pixel {

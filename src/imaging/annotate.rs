@@ -5,6 +5,7 @@
 mod canvas;
 mod encode;
 mod label;
+pub(super) mod text;
 
 use super::frame::Frame;
 use canvas::{Outline, Rgb};

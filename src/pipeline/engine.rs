@@ -68,7 +68,6 @@ pub struct Observation {
     per_view: Vec<Vec<ViewDetection>>,
     batch_count: usize,
     non_finite: usize,
-    /// All but `refine` and `total`, which are still to come.
     timings: StageTimings,
     warnings: Vec<String>,
 }
@@ -78,6 +77,12 @@ impl Observation {
     #[must_use]
     pub fn view_count(&self) -> usize {
         self.camera.rig.view_count()
+    }
+
+    /// Where the time went so far: `refine` and `total` are still to come.
+    #[must_use]
+    pub fn timings(&self) -> &StageTimings {
+        &self.timings
     }
 
     /// The model that looked.

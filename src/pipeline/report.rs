@@ -105,3 +105,11 @@ pub struct StageTimings {
     /// From the arrival of the whole request to the report.
     pub total: Duration,
 }
+
+impl StageTimings {
+    /// The time in which the frame was worked on: all stages but the queue.
+    #[must_use]
+    pub fn worked(&self) -> Duration {
+        self.decode + self.calibrate + self.remap + self.inference + self.refine
+    }
+}

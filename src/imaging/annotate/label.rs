@@ -1,9 +1,8 @@
 //! Plates with text, placed at their boxes where they stay inside the frame and clear of
 //! each other.
 
-use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
-
-use super::canvas::{Plate, Rgb, blend, pixels};
+use super::canvas::{Plate, Rgb};
+use super::text::Text;
 use super::{Mark, line_width};
 use crate::imaging::frame::Frame;
 
@@ -12,8 +11,7 @@ const PLATE_OPACITY: f64 = 0.92;
 
 /// The plates of one frame.
 pub(super) struct Plates {
-    font: FontRef<'static>,
-    scale: PxScale,
+    text: Text,
     /// Between a box and its plate, in pixels.
     gap: f64,
     frame_size: [f64; 2],
@@ -23,15 +21,9 @@ pub(super) struct Plates {
 impl Plates {
     /// No plates yet; sizes fit the frame.
     pub(super) fn new(frame: &Frame) -> Self {
-        #[expect(clippy::expect_used, reason = "the font is part of the program")]
-        let font = FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR)
-            .expect("the embedded font is whole");
         let frame_size = [f64::from(frame.width()), f64::from(frame.height())];
-        #[expect(clippy::cast_possible_truncation, reason = "a size in pixels")]
-        let text_height = (frame_size[0].min(frame_size[1]) / 48.0).max(12.0) as f32;
         Self {
-            font,
-            scale: PxScale::from(text_height),
+            text: Text::new((frame_size[0].min(frame_size[1]) / 48.0).max(12.0)),
             gap: line_width(frame),
             frame_size,
             placed: Vec::new(),
@@ -40,17 +32,18 @@ impl Plates {
 
     /// Draws the label of a mark, unless it is empty.
     pub(super) fn draw(&mut self, frame: &mut Frame, mark: &Mark, colour: Rgb) {
-        let text_width = self.text_width(&mark.label);
+        let text_width = self.text.width(&mark.label);
         if text_width <= 0.0 {
             return;
         }
-        let line_height = f64::from(self.scale.y);
+        let line_height = self.text.height();
         let padding = 0.3 * line_height;
         let height = 1.15 * line_height;
         let plate = self.place(mark, [text_width + 2.0 * padding, height]);
         plate.draw(frame, colour, PLATE_OPACITY);
         let text_top = plate.top + (height - line_height) / 2.0;
-        self.write(frame, &mark.label, [plate.left + padding, text_top]);
+        let corner = [plate.left + padding, text_top];
+        self.text.write(frame, &mark.label, corner, INK);
         self.placed.push(plate);
     }
 
@@ -82,35 +75,5 @@ impl Plates {
         .filter(|plate| plate.top >= 0.0 && plate.top + height <= rows)
         .find(|plate| !self.placed.iter().any(|other| plate.overlaps(other)))
         .unwrap_or_else(|| at(left, above.min(rows - height).max(0.0)))
-    }
-
-    fn text_width(&self, text: &str) -> f64 {
-        let font = self.font.as_scaled(self.scale);
-        let advance = |letter| font.h_advance(font.glyph_id(letter));
-        f64::from(text.chars().map(advance).sum::<f32>())
-    }
-
-    #[expect(clippy::cast_possible_truncation, reason = "positions in a frame")]
-    fn write(&self, frame: &mut Frame, text: &str, [left, top]: [f64; 2]) {
-        let font = self.font.as_scaled(self.scale);
-        let mut pen = point(left as f32, top as f32 + font.ascent());
-        for letter in text.chars() {
-            let glyph = font.glyph_id(letter);
-            let placed = glyph.with_scale_and_position(self.scale, pen);
-            pen.x += font.h_advance(glyph);
-            let Some(outline) = self.font.outline_glyph(placed) else {
-                continue;
-            };
-            let corner = outline.px_bounds().min;
-            outline.draw(|x, y, coverage| {
-                let column = f64::from(corner.x) + f64::from(x);
-                let row = f64::from(corner.y) + f64::from(y);
-                for y in pixels(row, row + 1.0, frame.height()) {
-                    for x in pixels(column, column + 1.0, frame.width()) {
-                        blend(frame, x, y, INK, f64::from(coverage.min(1.0)));
-                    }
-                }
-            });
-        }
     }
 }

@@ -1,0 +1,194 @@
+//! Detections in files: COCO results, one file per row, which `pycocotools` reads as well.
+//!
+//! A file is a JSON array of `{"image_id", "category_id", "bbox": [left, top, width, height],
+//! "score"}`, corner-origin pixels. Ours carry an `oriented_box`, too.
+
+use std::{
+    collections::HashMap,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{DataSet, DetectedRow, FoundPerson, ImageId, RowName};
+use crate::{
+    detection::BBox,
+    geometry::{OrientedBox, Pixel},
+    pipeline::Profile,
+};
+
+/// `person` in COCO; detections of other things are passed over.
+const PERSON: u64 = 1;
+/// Results of a hundred thousand crowded images.
+const MAX_BYTES: u64 = 1024 * 1024 * 1024;
+
+/// Detections that cannot be saved or read.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {problem}")]
+pub struct SavedDetectionsError {
+    path: PathBuf,
+    problem: String,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Entry {
+    image_id: ImageId,
+    category_id: u64,
+    bbox: [f64; 4],
+    score: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    oriented_box: Option<Oriented>,
+}
+
+/// As in reports, with all digits.
+#[derive(Serialize, Deserialize)]
+struct Oriented {
+    cx: f64,
+    cy: f64,
+    width: f64,
+    height: f64,
+    angle_deg: f64,
+}
+
+impl RowName {
+    /// The name of the row's file: `<profile>.<refinement>.<model>.json`.
+    #[must_use]
+    pub fn file_name(&self) -> String {
+        match (self.profile, self.refinement) {
+            (Some(profile), Some(refinement)) => {
+                format!("{}.{refinement}.{}.json", profile.name(), self.model)
+            }
+            _ => format!("{}.json", self.model),
+        }
+    }
+
+    /// What a file's name says; a name of another form is all model.
+    fn from_file(path: &Path) -> Self {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        Self::from_stem(&stem).unwrap_or_else(|| Self {
+            profile: None,
+            refinement: None,
+            model: stem.into_owned(),
+        })
+    }
+
+    fn from_stem(stem: &str) -> Option<Self> {
+        let (profile, rest) = stem.split_once('.')?;
+        let (refinement, model) = rest.split_once('.')?;
+        Some(Self {
+            profile: Some(Profile::from_name(profile)?),
+            refinement: Some(refinement.parse().ok()?),
+            model: model.to_owned(),
+        })
+    }
+}
+
+impl DetectedRow {
+    /// Writes the row to its file in `folder`, which is made where it is missing.
+    ///
+    /// # Errors
+    /// [`SavedDetectionsError`] when the file cannot be written.
+    pub fn save(&self, folder: &Path, data_set: &DataSet) -> Result<(), SavedDetectionsError> {
+        let path = folder.join(self.name.file_name());
+        let images = data_set.images.iter().zip(&self.images);
+        let entries: Vec<Entry> = images
+            .flat_map(|(image, found)| found.iter().map(|person| entry(&image.id, person)))
+            .collect();
+        let write = || {
+            fs::create_dir_all(folder)?;
+            let file = io::BufWriter::new(fs::File::create(&path)?);
+            serde_json::to_writer(file, &entries)?;
+            io::Result::Ok(())
+        };
+        write().map_err(|error| SavedDetectionsError {
+            problem: format!("cannot be written: {error}"),
+            path: path.clone(),
+        })
+    }
+
+    /// Reads a row of detections in the images of `data_set`: one of ours, or COCO results of
+    /// any detector.
+    ///
+    /// # Errors
+    /// [`SavedDetectionsError`] saying what is wrong with the file.
+    pub fn load(path: &Path, data_set: &DataSet) -> Result<Self, SavedDetectionsError> {
+        let wrong = |problem| SavedDetectionsError {
+            path: path.to_owned(),
+            problem,
+        };
+        let unreadable = |error| wrong(format!("cannot be read: {error}"));
+        let bytes = fs::metadata(path).map_err(unreadable)?.len();
+        if bytes > MAX_BYTES {
+            return Err(wrong(format!(
+                "has {bytes} bytes; split files of more than {MAX_BYTES}"
+            )));
+        }
+        let text = fs::read_to_string(path).map_err(unreadable)?;
+        let entries: Vec<Entry> = serde_json::from_str(&text)
+            .map_err(|error| wrong(format!("not COCO results: {error}")))?;
+        let positions = data_set.images.iter().enumerate();
+        let position_of: HashMap<_, _> = positions
+            .map(|(position, image)| (&image.id, position))
+            .collect();
+        let mut images: Vec<Vec<FoundPerson>> = vec![Vec::new(); data_set.images.len()];
+        for (index, entry) in entries.iter().enumerate() {
+            if entry.category_id != PERSON {
+                continue;
+            }
+            let position = position_of.get(&entry.image_id).ok_or_else(|| {
+                wrong(format!(
+                    "[{index}].image_id: {} is no image of the data set",
+                    entry.image_id
+                ))
+            })?;
+            let found = found(entry).map_err(|problem| wrong(format!("[{index}].{problem}")))?;
+            images[*position].push(found);
+        }
+        Ok(Self {
+            name: RowName::from_file(path),
+            refinement: None,
+            cost: None,
+            images,
+        })
+    }
+}
+
+fn entry(image_id: &ImageId, person: &FoundPerson) -> Entry {
+    let [left, top, _, _] = person.bbox.corners();
+    Entry {
+        image_id: image_id.clone(),
+        category_id: PERSON,
+        bbox: [left, top, person.bbox.width(), person.bbox.height()],
+        score: person.score,
+        oriented_box: person.oriented_box.map(|oriented| Oriented {
+            cx: oriented.center.x,
+            cy: oriented.center.y,
+            width: oriented.width,
+            height: oriented.height,
+            angle_deg: oriented.angle.to_degrees(),
+        }),
+    }
+}
+
+fn found(entry: &Entry) -> Result<FoundPerson, String> {
+    let [left, top, width, height] = entry.bbox;
+    let bbox = BBox::new([left, top, left + width, top + height])
+        .map_err(|error| format!("bbox: {error}"))?;
+    let oriented_box = entry.oriented_box.as_ref().map(|oriented| {
+        OrientedBox::turned(
+            Pixel::new(oriented.cx, oriented.cy),
+            oriented.width,
+            oriented.height,
+            oriented.angle_deg.to_radians(),
+        )
+    });
+    Ok(FoundPerson {
+        bbox,
+        oriented_box,
+        score: entry.score,
+    })
+}
+
+#[cfg(test)]
+mod tests;
