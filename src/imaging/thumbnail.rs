@@ -1,0 +1,66 @@
+//! Small versions of pictures.
+
+use image::{
+    ImageBuffer, Rgb,
+    imageops::{FilterType, resize},
+};
+
+use super::Frame;
+
+/// The picture made as small as its longer side says, every pixel taking part; a picture that is
+/// no longer stays as it is.
+#[must_use]
+pub fn thumbnail(frame: &Frame, longer_side: u32) -> Frame {
+    let (width, height) = (frame.width(), frame.height());
+    let longest = width.max(height);
+    if longest <= longer_side {
+        return frame.clone();
+    }
+    let scaled = |side: u32| {
+        let scaled = u64::from(side) * u64::from(longer_side) / u64::from(longest);
+        u32::try_from(scaled).unwrap_or(longer_side).max(1)
+    };
+    ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(width, height, frame.pixels())
+        .map(|picture| {
+            resize(
+                &picture,
+                scaled(width),
+                scaled(height),
+                FilterType::Triangle,
+            )
+        })
+        .and_then(|small| Frame::new(small.width(), small.height(), small.into_raw()).ok())
+        // Neither can fail: a frame has as many bytes as its pixels take.
+        .unwrap_or_else(|| frame.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thumbnail_keeps_the_shape_and_averages_what_it_leaves_out() {
+        let stripes = [0, 0, 0, 200, 200, 200].repeat(4 * 8);
+        let frame = Frame::new(8, 8, stripes).unwrap();
+        let small = thumbnail(&frame, 2);
+        assert_eq!((small.width(), small.height()), (2, 2));
+        assert!(
+            small
+                .pixels()
+                .iter()
+                .all(|value| (80..=120).contains(value))
+        );
+        let wide = Frame::new(400, 100, vec![7; 400 * 100 * 3]).unwrap();
+        let small = thumbnail(&wide, 40);
+        assert_eq!((small.width(), small.height()), (40, 10));
+        assert_eq!(small.pixel(39, 9), [7; 3]);
+    }
+
+    #[test]
+    fn a_small_picture_stays_as_it_is() {
+        let frame = Frame::new(3, 2, (0..18).collect()).unwrap();
+        assert_eq!(thumbnail(&frame, 3), frame);
+        let line = Frame::new(1000, 1, vec![9; 3000]).unwrap();
+        assert_eq!(thumbnail(&line, 10).height(), 1);
+    }
+}
