@@ -136,6 +136,119 @@ fn a_person_is_drawn_into_the_picture_on_request() {
 }
 
 #[test]
+fn a_folder_of_pictures_becomes_annotations_instead_of_reports() {
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/samples");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("labels");
+    let flags = ["--profile", "fast", "--format", "coco", "--out"];
+    let arguments = [&["detect", samples], &flags[..], &[out.to_str().unwrap()]].concat();
+    let output = lookdown(&arguments, &[]);
+    let messages = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{messages}");
+    assert!(output.stdout.is_empty());
+    assert!(messages.contains("fast: 3 of 3 images"), "{messages}");
+    let text = std::fs::read_to_string(out.join("annotations.json")).unwrap();
+    let annotations: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let images = annotations["images"].as_array().unwrap();
+    let names: Vec<_> = images
+        .iter()
+        .map(|image| image["file_name"].as_str())
+        .collect();
+    assert_eq!(names, ["canteen.jpg", "lounge.jpg", "office.jpg"].map(Some));
+    assert!(!annotations["annotations"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn pictures_that_would_share_their_annotations_are_refused_before_anything_is_loaded() {
+    let flags = ["--format", "voc", "--out", "/nowhere/labels"];
+    let arguments = [&["detect", "a/1.jpg", "b/1.png"], &flags[..]].concat();
+    let output = lookdown(&arguments, &[]);
+    assert_fails_with(&output, &["--format voc", "a/1.jpg", "b/1.png"]);
+}
+
+#[test]
+fn turned_boxes_are_refused_where_the_format_has_none() {
+    let flags = ["--format", "yolo", "--out", "labels", "--oriented"];
+    let output = lookdown(&[&["detect", "a.jpg"], &flags[..]].concat(), &[]);
+    assert_fails_with(&output, &["--oriented", "yolo", "cvat"]);
+}
+
+/// The samples as a data set folder with the truth as detections, one missing and one made up.
+fn samples_with_detections() -> tempfile::TempDir {
+    let samples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples");
+    let folder = tempfile::tempdir().unwrap();
+    let calibrations = folder.path().join("calibrations");
+    std::fs::create_dir(&calibrations).unwrap();
+    for name in ["office", "canteen", "lounge"] {
+        let file = format!("{name}.json");
+        std::fs::copy(
+            samples.join("calibrations").join(&file),
+            calibrations.join(&file),
+        )
+        .unwrap();
+    }
+    let text = std::fs::read_to_string(samples.join("annotations.json")).unwrap();
+    std::fs::write(folder.path().join("annotations.json"), &text).unwrap();
+    let truth: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let persons = truth["annotations"].as_array().unwrap();
+    let result = |image: &serde_json::Value, bbox: serde_json::Value, score: f64| serde_json::json!({"image_id": image, "category_id": 1, "bbox": bbox, "score": score});
+    let found = persons[1..].iter();
+    let mut results: Vec<_> = found
+        .map(|person| result(&person["image_id"], person["bbox"].clone(), 0.9))
+        .collect();
+    let nowhere = serde_json::json!([0, 0, 10, 10]);
+    results.push(result(&persons[0]["image_id"], nowhere, 0.95));
+    let rows = folder.path().join("rows");
+    std::fs::create_dir(&rows).unwrap();
+    let results = serde_json::Value::from(results).to_string();
+    std::fs::write(rows.join("paper.nms.tiny.json"), &results).unwrap();
+    std::fs::write(rows.join("another detector.json"), &results).unwrap();
+    folder
+}
+
+#[test]
+fn saved_detections_are_scored_and_plotted_without_looking() {
+    let folder = samples_with_detections();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (rows, plot) = (path("rows"), path("curves.svg"));
+    let data_set = folder.path().to_str().unwrap();
+    let flags = ["--from-detections", &rows, "--json", "--plot", &plot];
+    let no_library = [("LOOKDOWN__INFERENCE__LIBRARY_PATH", "/nowhere.so")];
+    let output = lookdown(&[&["eval", data_set], &flags[..]].concat(), &no_library);
+    assert!(output.status.success(), "{output:?}");
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let rows: Vec<serde_json::Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(rows[0]["profile"], serde_json::Value::Null);
+    assert_eq!(rows[0]["model"], "another detector");
+    assert_eq!(
+        (&rows[1]["profile"], &rows[1]["refine"]),
+        (&"paper".into(), &"nms".into())
+    );
+    for row in &rows {
+        assert_eq!((&row["persons"], &row["images"]), (&18.into(), &3.into()));
+        // 17 of 18 persons at a precision of 17 / 18.
+        let expected = (17.0 / 18.0) * (17.0 / 18.0);
+        assert!(
+            (row["ap50"].as_f64().unwrap() - expected).abs() < 1e-9,
+            "{row}"
+        );
+        assert_eq!(row["seconds_per_image"], serde_json::Value::Null);
+    }
+    let svg = std::fs::read_to_string(plot).unwrap();
+    assert!(svg.contains("another detector") && svg.contains("paper nms tiny"));
+}
+
+#[test]
+fn a_sweep_takes_one_profile() {
+    let flags = ["--sweep", "out", "--profile", "fast", "--profile", "paper"];
+    let output = lookdown(&[&["eval", "somewhere"], &flags[..]].concat(), &[]);
+    assert_fails_with(&output, &["--sweep", "one --profile"]);
+}
+
+#[test]
 fn a_termination_signal_ends_the_server_in_order() {
     let mut server = Command::new(env!("CARGO_BIN_EXE_lookdown"))
         .arg("serve")

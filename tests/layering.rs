@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 15] = [
+const MAY_USE: [(&str, &[&str]); 16] = [
     ("revision", &[]),
     ("geometry", &[]),
     ("detection", &[]),
@@ -40,9 +40,11 @@ const MAY_USE: [(&str, &[&str]); 15] = [
             "pipeline",
         ],
     ),
+    ("annotation_formats", &["geometry", "detection"]),
     (
         "api",
         &[
+            "annotation_formats",
             "geometry",
             "detection",
             "imaging",
@@ -71,6 +73,7 @@ const MAY_USE: [(&str, &[&str]); 15] = [
     (
         "cli",
         &[
+            "annotation_formats",
             "geometry",
             "detection",
             "imaging",
@@ -95,7 +98,16 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 12] = [
     ("tower_http", &["api"]),
     ("utoipa", &["api"]),
     ("utoipa_axum", &["api"]),
-    ("serde_json", &["api", "cli", "calibration", "evaluation"]),
+    (
+        "serde_json",
+        &[
+            "annotation_formats",
+            "api",
+            "calibration",
+            "cli",
+            "evaluation",
+        ],
+    ),
     ("clap", &["cli"]),
     ("indicatif", &["cli"]),
     ("plotters", &["evaluation"]),

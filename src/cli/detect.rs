@@ -1,5 +1,8 @@
 //! `lookdown detect`
 
+mod labels;
+mod pictures;
+
 use std::{
     fs,
     io::{self, Write},
@@ -13,8 +16,13 @@ use anyhow::{Context, bail};
 use clap::Args;
 use jiff::Timestamp;
 
-use super::{SettingsFile, annotate, parameters::ParameterFlags};
+use self::{
+    labels::Labels,
+    pictures::{Picture, pictures},
+};
+use super::{SettingsFile, annotate, parameters::ParameterFlags, progress::Progress};
 use crate::{
+    annotation_formats::{AnnotationFormat, BoxKind},
     api::Report,
     app::engine_for,
     calibration::{Calibration, CalibrationId},
@@ -27,8 +35,9 @@ const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
 /// Arguments of `lookdown detect`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Pictures: JPEG, PNG or WebP. A report's `request_id` is the path as given here
-    #[arg(required = true, value_name = "IMAGE")]
+    /// Pictures (JPEG, PNG or WebP), and folders with pictures in them. A report's `request_id`
+    /// is the path as given here
+    #[arg(required = true, value_name = "IMAGE|FOLDER")]
     images: Vec<PathBuf>,
     /// A calibration file, or the ID of one in the calibration folder [default: the lens circle
     /// is found and an ideal lens assumed]
@@ -39,36 +48,78 @@ pub(super) struct Arguments {
     /// Also draw the persons into the picture; takes a single IMAGE
     #[arg(long, value_name = "OUT.jpg")]
     annotate: Option<PathBuf>,
+    /// Write annotations to be corrected in the usual tools, into the folder --out, instead of
+    /// reports: `coco` (annotations.json), `cvat` (annotations.xml, CVAT for images 1.1), `yolo`
+    /// (labels/, data.yaml, classes.txt) or `voc` (Annotations/)
+    #[arg(long, value_name = "FORMAT", requires = "out")]
+    format: Option<AnnotationFormat>,
+    /// The folder for --format
+    #[arg(long, value_name = "FOLDER", requires = "format")]
+    out: Option<PathBuf>,
+    /// Write boxes turned along the persons; with --format cvat
+    #[arg(long, requires = "format")]
+    oriented: bool,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
 
 /// Reports on every picture; those that cannot be used cost the exit code, not the others.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    if arguments.annotate.is_some() && arguments.images.len() > 1 {
+    let pictures = pictures(&arguments.images)?;
+    if arguments.annotate.is_some() && pictures.len() > 1 {
         bail!("--annotate draws one picture: give a single IMAGE, or leave it out");
     }
     let (parameters, calibration) = parameters(arguments)?;
+    let mut labels = labels(arguments, &pictures)?;
     let settings = arguments.settings_file.load()?;
     let max_bytes = settings.server.max_body_bytes as u64;
     let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
+    // Reports show by themselves how far it is.
+    let progress = labels
+        .as_ref()
+        .map(|_| Progress::start(parameters.profile.name(), pictures.len()));
     let mut code = ExitCode::SUCCESS;
-    for image in &arguments.images {
-        let found = detect(&engine, image, max_bytes, &parameters, calibration.clone());
-        match found {
+    for picture in &pictures {
+        let path = &picture.path;
+        match detect(&engine, path, max_bytes, &parameters, calibration.clone()) {
             Ok(detected) => {
-                print(&detected)?;
+                match &mut labels {
+                    Some(labels) => labels.add(picture, &detected.report),
+                    None => print(&detected)?,
+                }
                 if let Some(path) = &arguments.annotate {
                     annotate::write(detected, path)?;
                 }
             }
             Err(error) => {
-                eprintln!("lookdown: {}: {error:#}", image.display());
+                eprintln!("lookdown: {}: {error:#}", path.display());
                 code = ExitCode::FAILURE;
             }
         }
+        if let Some(progress) = &progress {
+            progress.advance();
+        }
+    }
+    if let Some(progress) = progress {
+        progress.finish();
+    }
+    if let Some(labels) = labels {
+        labels.write()?;
     }
     Ok(code)
+}
+
+/// What `--format`, `--out` and `--oriented` ask for.
+fn labels(arguments: &Arguments, pictures: &[Picture]) -> anyhow::Result<Option<Labels>> {
+    let (Some(format), Some(folder)) = (arguments.format, &arguments.out) else {
+        return Ok(None);
+    };
+    let boxes = match arguments.oriented {
+        false => BoxKind::AxisParallel,
+        true if format.has_oriented_boxes() => BoxKind::Oriented,
+        true => bail!("--oriented: {format} has no turned boxes; use --format cvat"),
+    };
+    Labels::start(format, boxes, folder, pictures).map(Some)
 }
 
 /// The checked parameters, with the calibration when `--calibration` names a file.

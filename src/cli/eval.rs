@@ -43,7 +43,7 @@ pub(super) struct Arguments {
     #[arg(long, conflicts_with_all = ["profile", "refine"])]
     paper: bool,
     /// The paper's sweeps, into this folder: cells.csv (AP of NMS and Soft-NMS over N_t from 0 to
-    /// 1, of Gaussian Soft-NMS over C_t and sigma), iou_threshold.svg (AP over N_t) and matrix.png
+    /// 1, of Gaussian Soft-NMS over C_t and sigma), iou_threshold.svg (AP over N_t) and matrix.jpg
     /// (what each C_t and sigma finds in the image with the most persons)
     #[arg(
         long,

@@ -68,7 +68,8 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     let (device, threads) = (settings.inference.device, settings.threads.network);
     writeln!(
         out,
-        "runs in      {one_view} with 1 view, {most_views} with {most} (on {device}, {threads} threads)"
+        "runs in      {one_view} with 1 view, {most_views} with {most} (on {device}, {})",
+        count(threads.get(), "thread")
     )
     .context(UNWRITABLE)?;
     drop(detector);
@@ -87,9 +88,10 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     let views = detected.report.view_count;
     writeln!(
         out,
-        "sample       {}: {} persons in {views} views",
+        "sample       {}: {} in {}",
         sample.display(),
-        persons.len()
+        count(persons.len(), "person"),
+        count(views, "view")
     )
     .context(UNWRITABLE)?;
     for person in persons {
@@ -108,6 +110,13 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
 }
 
 const UNWRITABLE: &str = "standard output cannot be written";
+
+fn count(number: usize, thing: &str) -> String {
+    match number {
+        1 => format!("1 {thing}"),
+        _ => format!("{number} {thing}s"),
+    }
+}
 
 fn millis(time: Duration) -> String {
     format!("{:.1} ms", time.as_secs_f64() * 1e3)

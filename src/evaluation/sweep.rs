@@ -11,7 +11,7 @@ use crate::{
     pipeline::DetectParameters,
 };
 
-pub use matrix::{MATRIX_CELL_SIDE, matrix};
+pub use matrix::matrix;
 
 /// `N_t` from 0 to 1.
 const IOU_STEPS: u8 = 10;

@@ -1,5 +1,7 @@
 //! A decoded picture: the one pixel format every stage works on.
 
+use std::ops::Range;
+
 /// A picture in 8-bit RGB, rows from top to bottom, without padding.
 ///
 /// *Invariant:* both sides are at least 1 and there are exactly
@@ -81,6 +83,25 @@ impl Frame {
     /// The same bytes, to be painted over.
     pub fn pixels_mut(&mut self) -> &mut [u8] {
         &mut self.pixels
+    }
+
+    /// The part in these columns and rows, as far as they lie inside.
+    ///
+    /// # Errors
+    /// [`FrameError::NoPixels`] when nothing of it lies inside.
+    pub fn crop(&self, columns: Range<u32>, rows: Range<u32>) -> Result<Self, FrameError> {
+        let columns = columns.start..columns.end.min(self.width);
+        let rows = rows.start..rows.end.min(self.height);
+        let (width, height) = (columns.len(), rows.len());
+        let mut pixels = Vec::with_capacity(width * height * 3);
+        if width > 0 {
+            for row in rows {
+                let start = 3 * (row as usize * self.width as usize + columns.start as usize);
+                pixels.extend_from_slice(&self.pixels[start..start + 3 * width]);
+            }
+        }
+        let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+        Self::new(side(width), side(height), pixels)
     }
 
     /// R, G and B of the pixel in column `x` and row `y`.

@@ -16,9 +16,11 @@ use super::{
 use crate::{
     app::{decode_limits, engine_for},
     evaluation::{DataSet, DetectedRow, EvaluatedRow, sweep},
-    imaging::{Frame, annotate::encode_png, decode::decode},
+    imaging::{Frame, annotate::encode_jpeg, decode::decode},
     settings::LimitSettings,
 };
+
+const JPEG_QUALITY: u8 = 90;
 
 /// A cell of the sweep and how good it is.
 type Cells = [(DetectedRow, EvaluatedRow)];
@@ -46,9 +48,10 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     write(folder, "cells.csv", sweep::table(&cells).as_bytes())?;
     write(folder, "iou_threshold.svg", plot.as_bytes())?;
     let (position, frame) = most_crowded(&data_set, &settings.limits)?;
-    let title = format!("{name}: Gaussian Soft-NMS");
+    let images = data_set.images.len();
+    let title = format!("{name}: Gaussian Soft-NMS in one image; AP (IoU ≥ 0.5) of all {images}");
     let matrix = sweep::matrix(title, &cells, &frame, position)?;
-    write(folder, "matrix.png", &encode_png(&matrix)?)
+    write(folder, "matrix.jpg", &encode_jpeg(&matrix, JPEG_QUALITY)?)
 }
 
 fn print(cells: &Cells, json: bool) -> anyhow::Result<()> {

@@ -1,5 +1,7 @@
 //! The picture of the matrix: one image with what is found in it at each `C_t` and σ.
 
+use std::ops::Range;
+
 use super::{SCORE_THRESHOLDS, SIGMAS};
 use crate::{
     detection::Refinement,
@@ -12,12 +14,14 @@ use crate::{
     },
 };
 
+/// Room around the boxes, a share of the side of the square that holds them.
+const ROOM_SHARE: f64 = 0.06;
 /// Longer side of the image in each cell, pixels.
-pub const MATRIX_CELL_SIDE: u32 = 300;
+const CELL_SIDE: u32 = 300;
 
-/// The image `frame`, that in `position` of the data set, with the boxes of each cell: rows of
-/// `C_t`, columns of σ. Below each cell its boxes are counted, and the AP of the whole data set is
-/// told.
+/// The part of the image `frame`, that in `position` of the data set, in which boxes are, with the
+/// boxes of each cell: rows of `C_t`, columns of σ. Below each cell its boxes are counted, and the
+/// AP of the whole data set is told.
 ///
 /// # Errors
 /// [`FrameError`] when the picture would be too large.
@@ -27,18 +31,22 @@ pub fn matrix(
     frame: &Frame,
     position: usize,
 ) -> Result<Frame, FrameError> {
-    let small = thumbnail(frame, MATRIX_CELL_SIDE);
-    let scale = f64::from(small.width()) / f64::from(frame.width());
+    let boxes = cells.iter().filter(|cell| of_matrix(cell).is_some());
+    let boxes = boxes.filter_map(|(detected, _)| detected.images.get(position));
+    let (columns, rows) = part_with(boxes.flatten(), frame);
+    let corner = [f64::from(columns.start), f64::from(rows.start)];
+    let part = frame.crop(columns, rows)?;
+    let small = thumbnail(&part, CELL_SIDE);
+    let scale = f64::from(small.width()) / f64::from(part.width());
     let cell = |score_threshold: f64, sigma: f64| {
-        let (detected, evaluated) = cells.iter().find(|(detected, _)| {
-            detected.refinement.is_some_and(|numbers| {
-                numbers.refinement == Refinement::SoftNmsGaussian
-                    && numbers.score_threshold == score_threshold
-                    && numbers.sigma == sigma
-            })
-        })?;
+        let (detected, evaluated) = cells
+            .iter()
+            .find(|cell| of_matrix(cell) == Some((score_threshold, sigma)))?;
         let found = detected.images.get(position)?;
-        let marks: Vec<Mark> = found.iter().map(|person| mark(person, scale)).collect();
+        let marks: Vec<Mark> = found
+            .iter()
+            .map(|person| mark(person, corner, scale))
+            .collect();
         let mut picture = small.clone();
         annotate(&mut picture, &marks);
         let boxes = if found.len() == 1 { "box" } else { "boxes" };
@@ -62,10 +70,59 @@ pub fn matrix(
     .drawn()
 }
 
+/// `C_t` and σ of a cell of the matrix.
+fn of_matrix((detected, _): &(DetectedRow, EvaluatedRow)) -> Option<(f64, f64)> {
+    let numbers = detected.refinement?;
+    (numbers.refinement == Refinement::SoftNmsGaussian)
+        .then_some((numbers.score_threshold, numbers.sigma))
+}
+
+/// Columns and rows of the square around all boxes, with room for the outlines; the whole frame
+/// without boxes.
+fn part_with<'a>(
+    boxes: impl Iterator<Item = &'a FoundPerson>,
+    frame: &Frame,
+) -> (Range<u32>, Range<u32>) {
+    let corners = boxes.map(|person| person.bbox.corners());
+    let hull = corners.reduce(|a, b| {
+        [
+            a[0].min(b[0]),
+            a[1].min(b[1]),
+            a[2].max(b[2]),
+            a[3].max(b[3]),
+        ]
+    });
+    let Some([x_min, y_min, x_max, y_max]) = hull else {
+        return (0..frame.width(), 0..frame.height());
+    };
+    let side = (x_max - x_min).max(y_max - y_min) * (1.0 + 2.0 * ROOM_SHARE);
+    let around = |from: f64, to: f64, length: u32| {
+        let length = f64::from(length);
+        let start = (f64::midpoint(from, to) - side / 2.0)
+            .min(length - side)
+            .max(0.0);
+        // `as` saturates, and the frame cuts what is too long.
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the frame"
+        )]
+        {
+            start as u32..(start + side).ceil().max(1.0) as u32
+        }
+    };
+    (
+        around(x_min, x_max, frame.width()),
+        around(y_min, y_max, frame.height()),
+    )
+}
+
 /// The box that is compared with the truth, without its score: cells are small.
-fn mark(person: &FoundPerson, scale: f64) -> Mark {
+fn mark(person: &FoundPerson, [left, top]: [f64; 2], scale: f64) -> Mark {
+    let [x_min, y_min, x_max, y_max] = person.bbox.corners();
+    let bbox = [x_min - left, y_min - top, x_max - left, y_max - top];
     Mark {
-        bbox: person.bbox.corners().map(|side| side * scale),
+        bbox: bbox.map(|side| side * scale),
         oriented: None,
         label: String::new(),
     }

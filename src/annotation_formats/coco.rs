@@ -1,0 +1,111 @@
+//! COCO detection: one JSON document. Beside COCO's keys, `score` and `oriented_box` of each
+//! annotation and the `calibration` of each image, which `lookdown eval` reads.
+
+use serde::Serialize;
+
+use super::{AnnotatedBox, AnnotatedImage, LABEL, pixels, share};
+
+/// `person` in COCO.
+const PERSON: u64 = 1;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    images: Vec<Image<'a>>,
+    annotations: Vec<Annotation>,
+    categories: [Category; 1],
+}
+
+#[derive(Serialize)]
+struct Image<'a> {
+    id: u64,
+    file_name: &'a str,
+    width: u32,
+    height: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct Annotation {
+    id: u64,
+    image_id: u64,
+    category_id: u64,
+    bbox: [f64; 4],
+    area: f64,
+    iscrowd: u8,
+    /// Asked for by some tools, though there are no masks.
+    segmentation: [f64; 0],
+    score: f64,
+    oriented_box: Oriented,
+}
+
+#[derive(Serialize)]
+struct Oriented {
+    cx: f64,
+    cy: f64,
+    width: f64,
+    height: f64,
+    angle_deg: f64,
+}
+
+#[derive(Serialize)]
+struct Category {
+    id: u64,
+    name: &'static str,
+    supercategory: &'static str,
+}
+
+pub(super) fn document(images: &[AnnotatedImage]) -> String {
+    let mut document = Document {
+        images: Vec::with_capacity(images.len()),
+        annotations: Vec::new(),
+        categories: [Category {
+            id: PERSON,
+            name: LABEL,
+            supercategory: LABEL,
+        }],
+    };
+    for (image_id, image) in (1..).zip(images) {
+        document.images.push(Image {
+            id: image_id,
+            file_name: &image.file_name,
+            width: image.width,
+            height: image.height,
+            calibration: image.calibration.as_deref(),
+        });
+        for (corners, person) in image.boxes() {
+            let id = document.annotations.len() as u64 + 1;
+            let annotation = annotation(id, image_id, corners, person);
+            document.annotations.push(annotation);
+        }
+    }
+    // Numbers and texts in fixed places always have a JSON form.
+    serde_json::to_string_pretty(&document).unwrap_or_default()
+}
+
+fn annotation(
+    id: u64,
+    image_id: u64,
+    [left, top, right, bottom]: [f64; 4],
+    person: &AnnotatedBox,
+) -> Annotation {
+    let (width, height) = (pixels(right - left), pixels(bottom - top));
+    let oriented = &person.oriented_box;
+    Annotation {
+        id,
+        image_id,
+        category_id: PERSON,
+        bbox: [left, top, width, height],
+        area: pixels(width * height),
+        iscrowd: 0,
+        segmentation: [],
+        score: share(person.score),
+        oriented_box: Oriented {
+            cx: pixels(oriented.center.x),
+            cy: pixels(oriented.center.y),
+            width: pixels(oriented.width),
+            height: pixels(oriented.height),
+            angle_deg: pixels(oriented.angle.to_degrees()),
+        },
+    }
+}

@@ -1,0 +1,140 @@
+use super::*;
+use crate::geometry::Pixel;
+
+fn person(corners: [f64; 4], angle_deg: f64) -> AnnotatedBox {
+    AnnotatedBox {
+        bbox: BBox::new(corners).unwrap(),
+        oriented_box: OrientedBox::turned(
+            Pixel::new(60.0, 50.0),
+            20.0,
+            40.0,
+            angle_deg.to_radians(),
+        ),
+        score: 0.876_54,
+    }
+}
+
+/// A picture of 200×100 pixels with one person in it, one half outside and one outside.
+fn image(file_name: &str) -> AnnotatedImage {
+    AnnotatedImage {
+        file_name: file_name.to_owned(),
+        width: 200,
+        height: 100,
+        calibration: Some("lobby".to_owned()),
+        persons: vec![
+            person([40.0, 30.0, 80.0, 70.0], -30.0),
+            person([190.0, -20.0, 230.0, 10.004], 0.0),
+            person([210.0, 20.0, 230.0, 40.0], 0.0),
+        ],
+    }
+}
+
+fn content(format: AnnotationFormat, path: &str) -> String {
+    let images = [image("hall/a & b.jpg"), image("c.png")];
+    let files = format.files(&images, BoxKind::AxisParallel);
+    let file = files.into_iter().find(|file| file.path == path);
+    file.unwrap().content
+}
+
+#[test]
+fn coco_numbers_images_and_boxes_and_keeps_what_only_we_know() {
+    let text = content(AnnotationFormat::Coco, "annotations.json");
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let expected = serde_json::json!({
+        "id": 4, "image_id": 2, "category_id": 1, "bbox": [190.0, 0.0, 10.0, 10.0],
+        "area": 100.0, "iscrowd": 0, "segmentation": [], "score": 0.8765,
+        "oriented_box": {"cx": 60.0, "cy": 50.0, "width": 20.0, "height": 40.0, "angle_deg": 0.0},
+    });
+    assert_eq!(document["annotations"][3], expected);
+    let expected = serde_json::json!(
+        {"id": 1, "file_name": "hall/a & b.jpg", "width": 200, "height": 100,
+         "calibration": "lobby"});
+    assert_eq!(document["images"][0], expected);
+    assert_eq!(document["categories"][0]["name"], "person");
+}
+
+#[test]
+fn cvat_has_a_box_element_per_person_and_escaped_names() {
+    let text = content(AnnotationFormat::Cvat, "annotations.xml");
+    let expected = r#"
+  <image id="0" name="hall/a &amp; b.jpg" width="200" height="100">
+    <box label="person" source="auto" occluded="0" xtl="40.00" ytl="30.00" xbr="80.00" ybr="70.00" z_order="0">
+      <attribute name="score">0.8765</attribute>
+    </box>
+    <box label="person" source="auto" occluded="0" xtl="190.00" ytl="0.00" xbr="200.00" ybr="10.00" z_order="0">
+      <attribute name="score">0.8765</attribute>
+    </box>
+  </image>
+"#;
+    assert!(text.contains(expected), "{text}");
+}
+
+#[test]
+fn cvat_turns_boxes_clockwise_about_their_centre_on_request() {
+    let files = AnnotationFormat::Cvat.files(&[image("a.jpg")], BoxKind::Oriented);
+    let expected =
+        r#"xtl="50.00" ytl="30.00" xbr="70.00" ybr="70.00" z_order="0" rotation="330.00""#;
+    assert!(files[0].content.contains(expected), "{}", files[0].content);
+    let rotations = files[0].content.matches("rotation=\"").count();
+    assert_eq!(rotations, 2);
+}
+
+#[test]
+fn yolo_has_shares_of_the_picture_a_file_per_picture_and_the_class() {
+    assert_eq!(
+        content(AnnotationFormat::Yolo, "labels/hall/a & b.txt"),
+        "0 0.300000 0.500000 0.200000 0.400000\n0 0.975000 0.050000 0.050000 0.100000\n"
+    );
+    assert_eq!(content(AnnotationFormat::Yolo, "classes.txt"), "person\n");
+    assert!(content(AnnotationFormat::Yolo, "data.yaml").contains("  0: person\n"));
+}
+
+#[test]
+fn voc_has_corners_in_a_file_per_picture() {
+    let text = content(AnnotationFormat::Voc, "Annotations/hall/a & b.xml");
+    assert!(text.contains("<folder>hall</folder>\n  <filename>a &amp; b.jpg</filename>"));
+    let corners = "<xmin>190.00</xmin>\n      <ymin>0.00</ymin>\n      <xmax>200.00</xmax>\n      \
+                   <ymax>10.00</ymax>";
+    assert!(text.contains(corners), "{text}");
+    assert_eq!(text.matches("<object>").count(), 2);
+}
+
+#[test]
+fn the_own_file_of_an_image_is_among_the_files() {
+    for format in AnnotationFormat::ALL {
+        let image = image("hall.2/left");
+        let own = format.own_file(&image.file_name);
+        let files = format.files(&[image], BoxKind::AxisParallel);
+        assert!(own.is_none_or(|own| files.iter().any(|file| file.path == own)));
+    }
+    assert_eq!(
+        AnnotationFormat::Voc.own_file("hall.2/left").unwrap(),
+        "Annotations/hall.2/left.xml"
+    );
+}
+
+#[test]
+fn a_picture_without_persons_has_its_place_in_every_format() {
+    let empty = AnnotatedImage {
+        persons: Vec::new(),
+        calibration: None,
+        ..image("a.jpg")
+    };
+    for format in AnnotationFormat::ALL {
+        let files = format.files(std::slice::from_ref(&empty), BoxKind::Oriented);
+        let named =
+            |file: &AnnotationFile| file.path.contains("/a.") || file.content.contains("a.jpg");
+        assert!(files.iter().any(named), "{format}");
+    }
+}
+
+#[test]
+fn no_name_breaks_the_xml() {
+    let nasty = "<a> \"b\" 'c' &amp; \t\n\r\u{1}\u{ffff}.jpg";
+    for format in [AnnotationFormat::Cvat, AnnotationFormat::Voc] {
+        let text = &format.files(&[image(nasty)], BoxKind::AxisParallel)[0].content;
+        let expected =
+            "&lt;a&gt; &quot;b&quot; &apos;c&apos; &amp;amp; &#9;&#10;&#13;\u{fffd}\u{fffd}.jpg";
+        assert!(text.contains(expected), "{text}");
+    }
+}

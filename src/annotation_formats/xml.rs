@@ -1,0 +1,98 @@
+//! As much XML as annotation files need, always well-formed text.
+
+use std::{borrow::Cow, fmt::Write};
+
+const INDENT: &str = "  ";
+
+/// A document that grows element by element.
+pub(super) struct Xml {
+    text: String,
+    depth: usize,
+}
+
+impl Xml {
+    /// A document with nothing in it.
+    pub(super) fn document() -> Self {
+        Self {
+            text: "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n".to_owned(),
+            depth: 0,
+        }
+    }
+
+    /// Begins an element that holds others.
+    pub(super) fn open(&mut self, name: &str, attributes: &[(&str, &str)]) {
+        self.begin(name, attributes);
+        self.text.push_str(">\n");
+        self.depth += 1;
+    }
+
+    /// Ends the element begun last.
+    pub(super) fn close(&mut self, name: &str) {
+        self.depth = self.depth.saturating_sub(1);
+        self.indent();
+        self.end(name);
+    }
+
+    /// An element with a text in it.
+    pub(super) fn element(&mut self, name: &str, attributes: &[(&str, &str)], text: &str) {
+        self.begin(name, attributes);
+        self.text.push('>');
+        self.text.push_str(&escaped(text));
+        self.end(name);
+    }
+
+    /// An element with nothing but a text in it.
+    pub(super) fn text(&mut self, name: &str, text: &str) {
+        self.element(name, &[], text);
+    }
+
+    /// The whole document.
+    pub(super) fn finish(self) -> String {
+        self.text
+    }
+
+    fn begin(&mut self, name: &str, attributes: &[(&str, &str)]) {
+        self.indent();
+        self.text.push('<');
+        self.text.push_str(name);
+        for (attribute, value) in attributes {
+            // Writing to a string cannot fail.
+            let _ = write!(self.text, " {attribute}=\"{}\"", escaped(value));
+        }
+    }
+
+    fn end(&mut self, name: &str) {
+        // As above.
+        let _ = writeln!(self.text, "</{name}>");
+    }
+
+    fn indent(&mut self) {
+        self.text.push_str(&INDENT.repeat(self.depth));
+    }
+}
+
+/// Characters with a meaning as references, and those that XML cannot hold (XML 1.0, section 2.2)
+/// as U+FFFD.
+fn escaped(text: &str) -> Cow<'_, str> {
+    let is_plain = |c: char| c >= ' ' && !"&<>\"'\u{fffe}\u{ffff}".contains(c);
+    if text.chars().all(is_plain) {
+        return Cow::Borrowed(text);
+    }
+    let mut result = String::with_capacity(text.len() + 16);
+    for character in text.chars() {
+        match character {
+            '&' => result.push_str("&amp;"),
+            '<' => result.push_str("&lt;"),
+            '>' => result.push_str("&gt;"),
+            '"' => result.push_str("&quot;"),
+            '\'' => result.push_str("&apos;"),
+            // A reader would turn them into spaces.
+            '\t' => result.push_str("&#9;"),
+            '\n' => result.push_str("&#10;"),
+            '\r' => result.push_str("&#13;"),
+            other if is_plain(other) => result.push(other),
+            _ => result.push(char::REPLACEMENT_CHARACTER),
+        }
+    }
+    Cow::Owned(result)
+}

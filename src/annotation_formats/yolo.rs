@@ -1,0 +1,42 @@
+//! YOLO: a text file per image in `labels/`, each line `class cx cy width height` in shares of the
+//! image's sides, with `data.yaml` (Ultralytics) and `classes.txt` (Label Studio) beside them. The
+//! pictures belong in `images/`.
+
+use std::fmt::Write;
+
+use super::{AnnotatedImage, AnnotationFile, LABEL, file, stem};
+
+/// The path of an image's file.
+pub(super) fn path(image_file_name: &str) -> String {
+    format!("labels/{}.txt", stem(image_file_name))
+}
+
+pub(super) fn files(images: &[AnnotatedImage]) -> Vec<AnnotationFile> {
+    let data = format!("path: .\ntrain: images\nval: images\nnames:\n  0: {LABEL}\n");
+    let mut files = vec![
+        file("data.yaml", data),
+        file("classes.txt", format!("{LABEL}\n")),
+    ];
+    files.extend(images.iter().map(|image| AnnotationFile {
+        path: path(&image.file_name),
+        content: labels(image),
+    }));
+    files
+}
+
+fn labels(image: &AnnotatedImage) -> String {
+    let (width, height) = (f64::from(image.width), f64::from(image.height));
+    let mut lines = String::new();
+    for ([left, top, right, bottom], _) in image.boxes() {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            lines,
+            "0 {:.6} {:.6} {:.6} {:.6}",
+            f64::midpoint(left, right) / width,
+            f64::midpoint(top, bottom) / height,
+            (right - left) / width,
+            (bottom - top) / height,
+        );
+    }
+    lines
+}

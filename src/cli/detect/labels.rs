@@ -1,0 +1,92 @@
+//! `--format`: what was found, as files for annotation tools.
+
+use std::{
+    collections::HashMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail};
+
+use super::pictures::Picture;
+use crate::{
+    annotation_formats::{AnnotatedBox, AnnotatedImage, AnnotationFormat, BoxKind},
+    pipeline::DetectionReport,
+};
+
+/// The annotations of one run.
+pub(super) struct Labels {
+    format: AnnotationFormat,
+    boxes: BoxKind,
+    folder: PathBuf,
+    images: Vec<AnnotatedImage>,
+}
+
+impl Labels {
+    /// No annotations yet. Looking takes long, so that what would fail at the end fails now.
+    ///
+    /// # Errors
+    /// When two pictures would share a name or a file, or `folder` cannot be made.
+    pub(super) fn start(
+        format: AnnotationFormat,
+        boxes: BoxKind,
+        folder: &Path,
+        pictures: &[Picture],
+    ) -> anyhow::Result<Self> {
+        let mut taken: HashMap<String, &Path> = HashMap::new();
+        for picture in pictures {
+            let own_file = format.own_file(&picture.name);
+            let place = own_file.unwrap_or_else(|| picture.name.clone());
+            if let Some(other) = taken.insert(place, &picture.path) {
+                bail!(
+                    "--format {format}: {} and {} would share their annotations: rename one, or \
+                     name the folder above both",
+                    other.display(),
+                    picture.path.display()
+                );
+            }
+        }
+        fs::create_dir_all(folder).with_context(|| unwritable(folder))?;
+        Ok(Self {
+            format,
+            boxes,
+            folder: folder.to_owned(),
+            images: Vec::with_capacity(pictures.len()),
+        })
+    }
+
+    /// Takes in what was found in a picture.
+    pub(super) fn add(&mut self, picture: &Picture, report: &DetectionReport) {
+        let calibration = &report.calibration;
+        self.images.push(AnnotatedImage {
+            file_name: picture.name.clone(),
+            width: report.image_width,
+            height: report.image_height,
+            calibration: (!calibration.assumed).then(|| calibration.id.clone()),
+            persons: report
+                .persons
+                .iter()
+                .map(|person| AnnotatedBox {
+                    bbox: person.bbox,
+                    oriented_box: person.oriented_box,
+                    score: person.score,
+                })
+                .collect(),
+        });
+    }
+
+    /// Writes the files.
+    pub(super) fn write(&self) -> anyhow::Result<()> {
+        for file in self.format.files(&self.images, self.boxes) {
+            let path = self.folder.join(&file.path);
+            let folder = path.parent().unwrap_or(&self.folder);
+            fs::create_dir_all(folder).with_context(|| unwritable(folder))?;
+            fs::write(&path, file.content).with_context(|| unwritable(&path))?;
+        }
+        Ok(())
+    }
+}
+
+fn unwritable(path: &Path) -> String {
+    format!("--out: {} cannot be written", path.display())
+}

@@ -1,0 +1,159 @@
+//! The pictures that were asked for: files as they are named, folders with all that is in them.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+/// Endings of pictures that can be read, in lower case.
+const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+/// Most pictures of one run.
+const MAX_PICTURES: usize = 100_000;
+/// Most folders within each other.
+const MAX_DEPTH: usize = 32;
+
+/// A picture to look at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Picture {
+    /// Its file.
+    pub path: PathBuf,
+    /// Its path from the folder that was named, with `/` between its parts.
+    pub name: String,
+}
+
+/// Pictures that cannot be listed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum PicturesError {
+    #[error("{path}: the folder cannot be read: {source}")]
+    Unreadable { path: PathBuf, source: io::Error },
+    #[error("{0}: there is no .jpg, .jpeg, .png or .webp file in this folder")]
+    NoPictures(PathBuf),
+    #[error("{0}: more than {MAX_PICTURES} pictures at once; name fewer")]
+    TooMany(PathBuf),
+    #[error("{0}: folders lie more than {MAX_DEPTH} deep; name one further down")]
+    TooDeep(PathBuf),
+}
+
+/// The files among `paths`, and the pictures below the folders among them in the order of their
+/// names. Hidden files and folders are left out, and links to folders are not followed.
+pub(super) fn pictures(paths: &[PathBuf]) -> Result<Vec<Picture>, PicturesError> {
+    let mut pictures = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let before = pictures.len();
+            walk(path, "", MAX_DEPTH, &mut pictures)?;
+            if pictures.len() == before {
+                return Err(PicturesError::NoPictures(path.clone()));
+            }
+        } else {
+            let name = path.file_name().unwrap_or(path.as_os_str());
+            pictures.push(Picture {
+                path: path.clone(),
+                name: name.to_string_lossy().into_owned(),
+            });
+        }
+    }
+    Ok(pictures)
+}
+
+fn walk(
+    folder: &Path,
+    prefix: &str,
+    depth: usize,
+    pictures: &mut Vec<Picture>,
+) -> Result<(), PicturesError> {
+    if depth == 0 {
+        return Err(PicturesError::TooDeep(folder.to_owned()));
+    }
+    let unreadable = |source| PicturesError::Unreadable {
+        path: folder.to_owned(),
+        source,
+    };
+    let entries = fs::read_dir(folder).map_err(unreadable)?;
+    let mut entries: Vec<_> = entries.collect::<Result<_, _>>().map_err(unreadable)?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let path = entry.path();
+        if name.starts_with('.') {
+            continue;
+        }
+        if entry.file_type().map_err(unreadable)?.is_dir() {
+            walk(&path, &format!("{prefix}{name}/"), depth - 1, pictures)?;
+        } else if is_picture(&path) {
+            if pictures.len() >= MAX_PICTURES {
+                return Err(PicturesError::TooMany(folder.to_owned()));
+            }
+            pictures.push(Picture {
+                path,
+                name: format!("{prefix}{name}"),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn is_picture(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    ending.is_some_and(|ending| ENDINGS.contains(&ending.to_ascii_lowercase().as_str()))
+        && path.is_file()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder_with(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = folder.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        folder
+    }
+
+    fn names(paths: &[PathBuf]) -> Vec<String> {
+        let pictures = pictures(paths).unwrap();
+        pictures.into_iter().map(|picture| picture.name).collect()
+    }
+
+    #[test]
+    fn a_folder_gives_its_pictures_in_the_order_of_their_names_and_nothing_else() {
+        let folder = folder_with(&[
+            "b.JPG",
+            "a/2.webp",
+            "a/1.png",
+            "notes.txt",
+            ".x.jpg",
+            ".git/y.png",
+        ]);
+        let path = folder.path().to_owned();
+        assert_eq!(names(&[path]), ["a/1.png", "a/2.webp", "b.JPG"]);
+    }
+
+    #[test]
+    fn a_file_is_taken_as_it_is_named() {
+        let folder = folder_with(&["sub/picture.dat"]);
+        let file = folder.path().join("sub/picture.dat");
+        assert_eq!(
+            names(&[file, "nowhere.jpg".into()]),
+            ["picture.dat", "nowhere.jpg"]
+        );
+    }
+
+    #[test]
+    fn a_folder_without_pictures_is_refused() {
+        let folder = folder_with(&["notes.txt"]);
+        let error = pictures(&[folder.path().to_owned()]).unwrap_err();
+        assert!(error.to_string().contains("there is no .jpg"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_linked_into_itself_ends() {
+        let folder = folder_with(&["a.jpg"]);
+        std::os::unix::fs::symlink(folder.path(), folder.path().join("again")).unwrap();
+        assert_eq!(names(&[folder.path().to_owned()]), ["a.jpg"]);
+    }
+}
