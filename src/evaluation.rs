@@ -15,6 +15,7 @@ mod run;
 mod saved;
 mod strata;
 mod summary;
+pub mod sweep;
 
 pub use average_precision::AveragePrecision;
 pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch};

@@ -6,7 +6,7 @@ use std::{fs, path::Path};
 use lookdown::{
     annotation_formats::{AnnotatedBox, AnnotatedImage, AnnotationFormat, BoxKind},
     detection::BBox,
-    evaluation::DataSet,
+    evaluation::{AnnotatedPerson, DataSet, Outline},
     geometry::{OrientedBox, Pixel},
 };
 
@@ -46,9 +46,37 @@ fn coco_with_calibrations_beside_it_is_a_data_set() {
     write(AnnotationFormat::Coco, &images, folder.path());
 
     let data_set = DataSet::open(folder.path()).unwrap();
-    assert_eq!(data_set.images.len(), 2);
     assert!(data_set.images[1].path.ends_with("images/hall/b.jpg"));
-    for (read, written) in data_set.images.iter().zip(&images) {
-        assert_eq!(read.truth.persons, [written.persons[0].bbox]);
+    assert!(
+        data_set
+            .images
+            .iter()
+            .all(|image| image.calibration.is_some())
+    );
+    assert_same_persons(&data_set, &images);
+}
+
+#[test]
+fn voc_with_pictures_beside_it_is_a_data_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = [image("a & b.jpg", 10.25), image("hall/c.jpg", 300.0)];
+    for image in &images {
+        let path = folder.path().join("images").join(&image.file_name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, "").unwrap();
+    }
+    write(AnnotationFormat::Voc, &images, folder.path());
+
+    let data_set = DataSet::open(folder.path()).unwrap();
+    assert_eq!(data_set.images[0].size, Some([960, 960]));
+    assert_same_persons(&data_set, &images);
+}
+
+#[track_caller]
+fn assert_same_persons(data_set: &DataSet, images: &[AnnotatedImage]) {
+    assert_eq!(data_set.images.len(), images.len());
+    for (read, written) in data_set.images.iter().zip(images) {
+        let expected = AnnotatedPerson::from(Outline::AxisParallel(written.persons[0].bbox));
+        assert_eq!(read.truth.persons, [expected]);
     }
 }

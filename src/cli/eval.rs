@@ -29,8 +29,8 @@ const DEFAULT_SCORE_THRESHOLD: &str = "0.01";
 /// Arguments of `lookdown eval`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Data set folder: annotations.json (COCO with a `calibration` per image), images/,
-    /// calibrations/
+    /// Data set: a folder with annotations.json (COCO with a `calibration` per image), images/
+    /// and calibrations/; or one in the form of COCO, CEPDOF, Pascal VOC or PIROPO
     data_set: PathBuf,
     /// How thoroughly to look: paper, fast, balanced, quality or direct; may be repeated
     /// [default: balanced; with --sweep: paper]

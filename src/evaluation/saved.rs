@@ -91,6 +91,7 @@ impl DetectedRow {
     /// [`SavedDetectionsError`] when the file cannot be written.
     pub fn save(&self, folder: &Path, data_set: &DataSet) -> Result<(), SavedDetectionsError> {
         let path = folder.join(self.name.file_name());
+        positions(data_set, &path)?;
         let images = data_set.images.iter().zip(&self.images);
         let entries: Vec<Entry> = images
             .flat_map(|(image, found)| found.iter().map(|person| entry(&image.id, person)))
@@ -127,10 +128,7 @@ impl DetectedRow {
         let text = fs::read_to_string(path).map_err(unreadable)?;
         let entries: Vec<Entry> = serde_json::from_str(&text)
             .map_err(|error| wrong(format!("not COCO results: {error}")))?;
-        let positions = data_set.images.iter().enumerate();
-        let position_of: HashMap<_, _> = positions
-            .map(|(position, image)| (&image.id, position))
-            .collect();
+        let position_of = positions(data_set, path)?;
         let mut images: Vec<Vec<FoundPerson>> = vec![Vec::new(); data_set.images.len()];
         for (index, entry) in entries.iter().enumerate() {
             if entry.category_id != PERSON {
@@ -152,6 +150,27 @@ impl DetectedRow {
             images,
         })
     }
+}
+
+/// Where each image is in its data set, by what results call it.
+fn positions<'a>(
+    data_set: &'a DataSet,
+    path: &Path,
+) -> Result<HashMap<&'a ImageId, usize>, SavedDetectionsError> {
+    let mut position_of = HashMap::with_capacity(data_set.images.len());
+    for (position, image) in data_set.images.iter().enumerate() {
+        if position_of.insert(&image.id, position).is_some() {
+            return Err(SavedDetectionsError {
+                path: path.to_owned(),
+                problem: format!(
+                    "the data set has several images with the ID {}; give its annotation files \
+                     one by one",
+                    image.id
+                ),
+            });
+        }
+    }
+    Ok(position_of)
 }
 
 fn entry(image_id: &ImageId, person: &FoundPerson) -> Entry {

@@ -74,7 +74,7 @@ fn print(cells: &Cells, json: bool) -> anyhow::Result<()> {
 fn most_crowded(data_set: &DataSet, limits: &LimitSettings) -> anyhow::Result<(usize, Frame)> {
     let images = data_set.images.iter().enumerate().rev();
     let (position, image) = images
-        .max_by_key(|(_, image)| image.truth.persons.len())
+        .max_by_key(|(_, image)| image.truth.person_count())
         .context("the data set has no images")?;
     let path = &image.path;
     let bytes = fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;

@@ -29,9 +29,13 @@ pub(super) struct Row<'a> {
     ap50_95: f64,
     ap50_eleven_point: f64,
     ap50_coco: f64,
+    ap75_coco: f64,
+    ap50_95_coco: f64,
     f1: f64,
-    /// The score threshold of `f1`.
+    /// The score threshold of `f1`, with precision and recall there.
     f1_score_threshold: Option<f64>,
+    f1_precision: f64,
+    f1_recall: f64,
     recall: f64,
     /// Working on an image, without waiting for others in flight.
     seconds_per_image: Option<f64>,
@@ -56,8 +60,12 @@ impl<'a> Row<'a> {
             ap50_95: summary.ap50_95.all_point_area,
             ap50_eleven_point: summary.ap50.eleven_point,
             ap50_coco: summary.ap50.coco_101_point,
+            ap75_coco: summary.ap75.coco_101_point,
+            ap50_95_coco: summary.ap50_95.coco_101_point,
             f1: summary.f1,
             f1_score_threshold: summary.f1_score_threshold,
+            f1_precision: summary.f1_precision,
+            f1_recall: summary.f1_recall,
             recall: summary.recall,
             seconds_per_image: cost.map(|cost| cost.time_per_image.as_secs_f64()),
         }

@@ -118,3 +118,12 @@ fn what_is_wrong_with_a_file_is_named() {
     let missing = DetectedRow::load(&folder.path().join("none.json"), &data_set);
     assert!(missing.unwrap_err().to_string().contains("cannot be read"));
 }
+
+#[test]
+fn images_that_share_an_id_are_told_instead_of_mixed_up() {
+    let (folder, mut data_set) = data_set();
+    data_set.images[1].id = data_set.images[0].id.clone();
+    let error = row(vec![vec![], vec![]]).save(folder.path(), &data_set);
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("several images with the ID 7"), "{error}");
+}

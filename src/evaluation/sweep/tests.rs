@@ -43,7 +43,7 @@ fn swept() -> Vec<(DetectedRow, EvaluatedRow)> {
         score,
     };
     let truth = GroundTruth {
-        persons: vec![bbox(20.0), bbox(140.0)],
+        persons: vec![bbox(20.0).into(), bbox(140.0).into()],
         ignore_regions: Vec::new(),
     };
     let row = |parameters: DetectParameters| {
