@@ -42,9 +42,9 @@ pub(super) struct Arguments {
     /// The rows of the paper's table: its three refinements, and the detector without views
     #[arg(long, conflicts_with_all = ["profile", "refine"])]
     paper: bool,
-    /// The paper's sweeps, into this folder: cells.csv (AP of NMS and Soft-NMS over N_t from 0 to
-    /// 1, of Gaussian Soft-NMS over C_t and sigma), iou_threshold.svg (AP over N_t) and matrix.jpg
-    /// (what each C_t and sigma finds in the image with the most persons)
+    /// The paper's sweeps, into this folder: `cells.csv` (AP of NMS and Soft-NMS over N_t from 0
+    /// to 1, of Gaussian Soft-NMS over C_t and sigma), `iou_threshold.svg` (AP over N_t) and
+    /// `matrix.jpg` (what each C_t and sigma finds in the image with the most persons)
     #[arg(
         long,
         value_name = "FOLDER",
@@ -99,7 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else {
         let data_set = DataSet::open(&arguments.data_set)?;
         for path in saved_rows(&arguments.from_detections)? {
-            output.print(DetectedRow::load(&path, &data_set)?, &data_set)?;
+            output.print(&DetectedRow::load(&path, &data_set)?, &data_set)?;
         }
     }
     output.plot()?;
@@ -117,7 +117,7 @@ fn look(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
             if let Some(folder) = &arguments.save_detections {
                 row.save(folder, &data_set)?;
             }
-            output.print(row, &data_set)?;
+            output.print(&row, &data_set)?;
         }
     }
     Ok(())

@@ -99,6 +99,7 @@ impl LinePlot {
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "goes into `map_err`")]
 fn failed<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {
     PlotError::Drawing(error.to_string())
 }

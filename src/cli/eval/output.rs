@@ -29,11 +29,11 @@ impl<'a> Output<'a> {
 
     pub(super) fn print(
         &mut self,
-        detected: DetectedRow,
+        detected: &DetectedRow,
         data_set: &DataSet,
     ) -> anyhow::Result<()> {
         let evaluated = detected.evaluate(data_set)?;
-        let row = Row::new(&detected, &evaluated);
+        let row = Row::new(detected, &evaluated);
         let line = if self.arguments.json {
             serde_json::to_string(&row)?
         } else {

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::{
     detection::Refinement,
     evaluation::{DetectedRow, EvaluatedRow},
+    pipeline::Profile,
 };
 
 /// One row: a JSON object, or a line of the table by its `Display`. What is not known of
@@ -46,8 +47,8 @@ impl<'a> Row<'a> {
         let summary = &evaluated.summary;
         let (name, numbers, cost) = (&detected.name, detected.refinement, detected.cost);
         Self {
-            profile: name.profile.map(|profile| profile.name()),
-            refine: name.refinement.map(|refinement| refinement.name()),
+            profile: name.profile.map(Profile::name),
+            refine: name.refinement.map(Refinement::name),
             model: &name.model,
             score_threshold: numbers.map(|numbers| numbers.score_threshold),
             iou_threshold: numbers.map(|numbers| numbers.iou_threshold),

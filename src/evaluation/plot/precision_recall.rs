@@ -29,17 +29,58 @@ pub fn precision_recall_plot<'a>(
 
 /// The corners of the envelope, from recall 0 to the last.
 fn steps(curve: &PrecisionRecallCurve) -> Vec<[f64; 2]> {
+    let envelope = curve.envelope();
+    // Of the points at one recall the first is the highest.
+    let levels = envelope
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter_map(|points| points.first().copied());
     let mut corners: Vec<[f64; 2]> = Vec::new();
     let mut reached = 0.0;
-    for (recall, precision) in curve.envelope() {
-        if corners.last().is_none_or(|last| last[1] != precision) {
-            corners.push([reached, precision]);
-        } else if corners.len() > 1 && corners[corners.len() - 2][1] == precision {
-            // Along a level only its ends matter.
-            corners.pop();
+    for (recall, precision) in levels {
+        match corners.last_mut() {
+            Some(end) if end[1] == precision => end[0] = recall,
+            _ => corners.extend([[reached, precision], [recall, precision]]),
         }
-        corners.push([recall, precision]);
         reached = recall;
     }
     corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        detection::{BBox, FramePixels},
+        evaluation::{EvaluatedImage, GroundTruth, MatchingRule, ScoredBox},
+    };
+
+    #[test]
+    fn a_line_has_the_corners_of_the_envelope_and_its_area_is_the_average_precision() {
+        let bbox = |left: f64| BBox::<FramePixels>::new([left, 0.0, left + 5.0, 5.0]).unwrap();
+        let persons = [0.0, 10.0, 20.0, 30.0].map(|left| bbox(left).into());
+        // Right, right, wrong, wrong, right, wrong; one person is never found.
+        let found = [0.0, 10.0, 50.0, 60.0, 20.0, 70.0]
+            .iter()
+            .zip([9, 8, 7, 6, 5, 4]);
+        let image = EvaluatedImage {
+            truth: GroundTruth {
+                persons: persons.into(),
+                ignore_regions: Vec::new(),
+            },
+            detections: found
+                .map(|(left, score)| ScoredBox {
+                    bbox: bbox(*left),
+                    score: f64::from(score) / 10.0,
+                })
+                .collect(),
+        };
+        let curve = PrecisionRecallCurve::of_images(&[image], MatchingRule::Coco, 0.5).unwrap();
+        let steps = steps(&curve);
+        assert_eq!(steps, [[0.0, 1.0], [0.5, 1.0], [0.5, 0.6], [0.75, 0.6]]);
+        let area: f64 = steps
+            .windows(2)
+            .map(|pair| (pair[1][0] - pair[0][0]) * pair[0][1])
+            .sum();
+        assert!((area - curve.average_precision().all_point_area).abs() < 1e-12);
+    }
 }
