@@ -226,7 +226,7 @@ fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
     names
 }
 
-fn open_calibrations(settings: &Settings) -> anyhow::Result<Option<CalibrationFolder>> {
+pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Option<CalibrationFolder>> {
     let folder = settings.calibrations.find()?;
     let opened = folder.map(|folder| CalibrationFolder::open(&folder));
     Ok(opened.transpose()?)

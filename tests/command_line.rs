@@ -242,6 +242,48 @@ fn saved_detections_are_scored_and_plotted_without_looking() {
 }
 
 #[test]
+fn saved_detections_are_scored_by_stratum() {
+    let folder = samples_with_detections();
+    let rows = folder.path().join("rows/paper.nms.tiny.json");
+    let data_set = folder.path().to_str().unwrap();
+    let by = ["--by", "size", "--by", "visibility"];
+    let flags = ["--from-detections", rows.to_str().unwrap()];
+    let arguments = [&["eval", data_set], &flags[..], &by].concat();
+    let table = lookdown(&arguments, &[]);
+    assert!(table.status.success(), "{table:?}");
+    let table = String::from_utf8(table.stdout).unwrap();
+    assert_eq!(table.lines().count(), 1 + 1 + 3 + 3, "{table}");
+    assert!(table.contains("90% visible and more"), "{table}");
+
+    let json = lookdown(&[&arguments[..], &["--json"]].concat(), &[]);
+    let row: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    for by in ["size", "visibility"] {
+        let strata = row["strata"].as_array().unwrap().iter();
+        let persons = strata.filter(|stratum| stratum["by"] == by);
+        let persons: u64 = persons.filter_map(|s| s["persons"].as_u64()).sum();
+        assert_eq!(persons, 18, "{row}");
+    }
+
+    let output = lookdown(&[&arguments[..4], &["--by", "age"]].concat(), &[]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("distance, size, visibility"), "{message}");
+}
+
+#[test]
+fn a_calibration_for_every_picture_must_exist() {
+    let folder = samples_with_detections();
+    let data_set = folder.path().to_str().unwrap();
+    let flags = [
+        "--from-detections",
+        "x.json",
+        "--calibration",
+        "no/such.json",
+    ];
+    let output = lookdown(&[&["eval", data_set], &flags[..]].concat(), &[]);
+    assert_fails_with(&output, &["--calibration", "no/such.json"]);
+}
+
+#[test]
 fn a_sweep_takes_one_profile() {
     let flags = ["--sweep", "out", "--profile", "fast", "--profile", "paper"];
     let output = lookdown(&[&["eval", "somewhere"], &flags[..]].concat(), &[]);

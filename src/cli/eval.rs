@@ -4,6 +4,7 @@ mod output;
 mod plot_file;
 mod sweep;
 mod table;
+mod truth;
 mod variants;
 
 use std::{
@@ -14,7 +15,7 @@ use std::{
 use anyhow::{Context, bail};
 use clap::Args;
 
-use self::{output::Output, plot_file::PlotFile};
+use self::{output::Output, plot_file::PlotFile, truth::TruthFlags};
 use super::{SettingsFile, progress::Progress};
 use crate::{
     app::engine_for,
@@ -29,9 +30,8 @@ const DEFAULT_SCORE_THRESHOLD: &str = "0.01";
 /// Arguments of `lookdown eval`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Data set: a folder with annotations.json (COCO with a `calibration` per image), images/
-    /// and calibrations/; or one in the form of COCO, CEPDOF, Pascal VOC or PIROPO
-    data_set: PathBuf,
+    #[command(flatten)]
+    truth: TruthFlags,
     /// How thoroughly to look: paper, fast, balanced, quality or direct; may be repeated
     /// [default: balanced; with --sweep: paper]
     #[arg(long, value_name = "NAME")]
@@ -97,7 +97,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if arguments.from_detections.is_empty() {
         look(arguments, &mut output)?;
     } else {
-        let data_set = DataSet::open(&arguments.data_set)?;
+        let data_set = arguments.truth.open(&arguments.settings_file)?;
         for path in saved_rows(&arguments.from_detections)? {
             output.print(&DetectedRow::load(&path, &data_set)?, &data_set)?;
         }
@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 fn look(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
     let groups = variants::groups(arguments)?;
     let settings = arguments.settings_file.load()?;
-    let data_set = DataSet::open(&arguments.data_set)?;
+    let data_set = arguments.truth.open(&arguments.settings_file)?;
     let engine = engine_for(&settings, &groups.concat())?;
     for group in groups {
         for row in detect_group(&engine, &data_set, &group, &settings)? {

@@ -3,13 +3,17 @@
 use std::{fmt, time::Duration};
 
 use super::{
-    DataSet, EvaluatedImage, MatchingRule, NoPersons, PrecisionRecallCurve, ScoredBox, Summary,
+    DataSet, EvaluatedImage, MatchingRule, NoPersons, NoStrata, Outline, PrecisionRecallCurve,
+    ScoredBox, Stratification, Stratum, Summary,
 };
 use crate::{
     detection::{BBox, FramePixels, Refinement, RefinementParameters},
     geometry::OrientedBox,
     pipeline::{Person, Profile},
 };
+
+/// How detections are matched with the truth.
+const RULE: MatchingRule = MatchingRule::Coco;
 
 /// A person found in an image of a data set.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,10 +98,28 @@ impl DetectedRow {
     /// # Errors
     /// [`NoPersons`] when there is nobody to be found.
     pub fn evaluate(&self, data_set: &DataSet) -> Result<EvaluatedRow, NoPersons> {
-        let images: Vec<_> = data_set
-            .images
-            .iter()
-            .zip(&self.images)
+        let images = self.evaluated_images(data_set);
+        let curve = |min_iou| PrecisionRecallCurve::of_images(&images, RULE, min_iou);
+        Ok(EvaluatedRow {
+            summary: Summary::of_images(&images, RULE)?,
+            curve_at_50: curve(0.5).ok_or(NoPersons)?,
+            curve_at_75: curve(0.75).ok_or(NoPersons)?,
+        })
+    }
+
+    /// Scores the row against the persons of each stratum of its data set.
+    ///
+    /// # Errors
+    /// [`NoStrata`] when the data set does not say what persons are told apart by.
+    pub fn strata(&self, data_set: &DataSet, by: Stratification) -> Result<Vec<Stratum>, NoStrata> {
+        let images = self.evaluated_images(data_set);
+        let images: Vec<_> = data_set.images.iter().zip(&images).collect();
+        by.strata(&images, RULE)
+    }
+
+    fn evaluated_images(&self, data_set: &DataSet) -> Vec<EvaluatedImage<Outline>> {
+        let images = data_set.images.iter().zip(&self.images);
+        images
             .map(|(image, found)| EvaluatedImage {
                 truth: image.truth.clone(),
                 detections: found
@@ -108,13 +130,6 @@ impl DetectedRow {
                     })
                     .collect(),
             })
-            .collect();
-        let rule = MatchingRule::Coco;
-        let curve = |min_iou| PrecisionRecallCurve::of_images(&images, rule, min_iou);
-        Ok(EvaluatedRow {
-            summary: Summary::of_images(&images, rule)?,
-            curve_at_50: curve(0.5).ok_or(NoPersons)?,
-            curve_at_75: curve(0.75).ok_or(NoPersons)?,
-        })
+            .collect()
     }
 }

@@ -33,7 +33,10 @@ impl<'a> Output<'a> {
         data_set: &DataSet,
     ) -> anyhow::Result<()> {
         let evaluated = detected.evaluate(data_set)?;
-        let row = Row::new(detected, &evaluated);
+        let mut row = Row::new(detected, &evaluated);
+        for by in &self.arguments.truth.by {
+            row.add_strata(*by, &detected.strata(data_set, *by).context("--by")?);
+        }
         let line = if self.arguments.json {
             serde_json::to_string(&row)?
         } else {
@@ -59,7 +62,12 @@ impl<'a> Output<'a> {
         let summary = &first.summary;
         let (images, persons) = (summary.images, summary.persons);
         let rows = self.plotted.iter().map(|(name, row)| (name.clone(), row));
-        let data_set = self.arguments.data_set.file_name().unwrap_or_default();
+        let data_set = self
+            .arguments
+            .truth
+            .data_set
+            .file_name()
+            .unwrap_or_default();
         let data_set = data_set.to_string_lossy();
         let title = format!("{data_set}: {images} images, {persons} persons");
         file.write(&precision_recall_plot(title, rows))

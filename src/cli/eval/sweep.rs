@@ -29,7 +29,7 @@ type Cells = [(DetectedRow, EvaluatedRow)];
 pub(super) fn run(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     let base = variants::base_of_sweep(arguments)?;
     let settings = arguments.settings_file.load()?;
-    let data_set = DataSet::open(&arguments.data_set)?;
+    let data_set = arguments.truth.open(&arguments.settings_file)?;
     fs::create_dir_all(folder).with_context(|| unwritable(folder))?;
     let engine = engine_for(&settings, std::slice::from_ref(&base))?;
     let detected = detect_group(&engine, &data_set, &sweep::cells(&base), &settings)?;

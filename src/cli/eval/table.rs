@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{
     detection::Refinement,
-    evaluation::{DetectedRow, EvaluatedRow},
+    evaluation::{DetectedRow, EvaluatedRow, Stratification, Stratum},
     pipeline::Profile,
 };
 
@@ -29,6 +29,7 @@ pub(super) struct Row<'a> {
     ap75: f64,
     ap50_95: f64,
     ap50_eleven_point: f64,
+    /// Means at COCO's 101 recalls.
     ap50_coco: f64,
     ap75_coco: f64,
     ap50_95_coco: f64,
@@ -40,6 +41,18 @@ pub(super) struct Row<'a> {
     recall: f64,
     /// Working on an image, without waiting for others in flight.
     seconds_per_image: Option<f64>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    strata: Vec<StratumRow>,
+}
+
+/// The figures of one stratum; null, or a dash, where it has nobody to find.
+#[derive(Debug, Serialize)]
+struct StratumRow {
+    by: &'static str,
+    stratum: &'static str,
+    persons: usize,
+    ap50: Option<f64>,
+    recall: Option<f64>,
 }
 
 impl<'a> Row<'a> {
@@ -69,7 +82,19 @@ impl<'a> Row<'a> {
             f1_recall: summary.f1_recall,
             recall: summary.recall,
             seconds_per_image: cost.map(|cost| cost.time_per_image.as_secs_f64()),
+            strata: Vec::new(),
         }
+    }
+
+    /// Adds the figures of strata of one kind.
+    pub(super) fn add_strata(&mut self, by: Stratification, strata: &[Stratum]) {
+        self.strata.extend(strata.iter().map(|stratum| StratumRow {
+            by: by.name(),
+            stratum: stratum.name,
+            persons: stratum.persons,
+            ap50: stratum.figures.map(|figures| figures.ap50.all_point_area),
+            recall: stratum.figures.map(|figures| figures.recall),
+        }));
     }
 }
 
@@ -122,6 +147,17 @@ impl fmt::Display for Row<'_> {
             self.f1,
             self.recall,
             number(self.seconds_per_image, 3),
-        )
+        )?;
+        for stratum in &self.strata {
+            write!(
+                f,
+                "\n  {:<42} persons {:>5}  AP50 {:>5}  recall {:>5}",
+                stratum.stratum,
+                stratum.persons,
+                number(stratum.ap50, 3),
+                number(stratum.recall, 3),
+            )?;
+        }
+        Ok(())
     }
 }

@@ -1,0 +1,64 @@
+//! The data set: where it is, and how its truth is looked at.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use anyhow::Context;
+use clap::Args;
+
+use crate::{
+    app::open_calibrations,
+    calibration::{Calibration, CalibrationId},
+    cli::SettingsFile,
+    evaluation::{DataSet, Scoring, Stratification},
+};
+
+/// The flags that name a data set.
+#[derive(Debug, Args)]
+pub(super) struct TruthFlags {
+    /// Pictures with the persons in them: a folder with annotations.json (COCO with a `calibration`
+    /// per image), images/ and calibrations/; a COCO or CEPDOF file or a folder with such; a folder
+    /// with Pascal VOC XML files; a PIROPO folder with head points
+    pub(super) data_set: PathBuf,
+    /// A calibration file, or the ID of one in the calibration folder, for every picture [default:
+    /// each picture's own; without one an ideal lens is assumed]
+    #[arg(long, value_name = "FILE|ID")]
+    calibration: Option<String>,
+    /// Score rotated truth by the bounds of the ellipses in it, with axis-parallel detections
+    #[arg(long)]
+    axis_parallel: bool,
+    /// Also score the persons of each stratum: by distance (from the optical axis), size or
+    /// visibility; may be repeated
+    #[arg(long, value_name = "NAME", conflicts_with = "sweep")]
+    pub(super) by: Vec<Stratification>,
+}
+
+impl TruthFlags {
+    /// Opens the data set.
+    pub(super) fn open(&self, settings_file: &SettingsFile) -> anyhow::Result<DataSet> {
+        let mut data_set = DataSet::open(&self.data_set)?;
+        if let Some(named) = &self.calibration {
+            data_set = data_set.with_calibration(&calibration(named, settings_file)?);
+        }
+        if self.axis_parallel {
+            data_set = data_set
+                .scored_as(Scoring::AxisParallel)
+                .context("--axis-parallel")?;
+        }
+        Ok(data_set)
+    }
+}
+
+fn calibration(named: &str, settings_file: &SettingsFile) -> anyhow::Result<Arc<Calibration>> {
+    let path = Path::new(named);
+    if path.is_file() {
+        return Ok(Arc::new(Calibration::read(path)?));
+    }
+    let strange = || format!("--calibration: {named:?} is neither a file nor a calibration's ID");
+    let id: CalibrationId = named.parse().with_context(strange)?;
+    let folder = open_calibrations(&settings_file.load()?)?;
+    let found = folder.map(|folder| folder.get(&id)).transpose()?;
+    found.flatten().with_context(strange)
+}
