@@ -41,10 +41,10 @@ pub struct FrameSizeMismatch {
 }
 
 impl Calibration {
-    /// Reads a native calibration file (`.json`, `.yaml`, `.yml` or `.toml`).
+    /// Reads a calibration file with one camera, in any format of [`super::formats`].
     ///
     /// # Errors
-    /// [`CalibrationError`] when it cannot be read, is malformed, or describes no camera.
+    /// [`CalibrationError`] when it cannot be read, is malformed, describes no camera or several.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
         file::read(path)
     }
@@ -89,6 +89,12 @@ impl Calibration {
     #[must_use]
     pub fn lens(&self) -> &Lens {
         &self.lens
+    }
+
+    /// How the camera hangs.
+    #[must_use]
+    pub fn mount(&self) -> &Mount {
+        &self.mount
     }
 
     /// The camera for frames of `width` × `height` pixels.

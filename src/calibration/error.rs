@@ -1,6 +1,8 @@
 //! Why a calibration cannot be used.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use super::{CalibrationId, FormatError};
 
 /// A calibration that cannot be used. Every message is one sentence with the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -13,22 +15,30 @@ pub enum CalibrationError {
         /// What the operating system said.
         source: std::io::Error,
     },
-    /// The file is not what its ending promises.
-    #[error("{path}: not a calibration file: {detail}")]
-    Malformed {
+    /// Its content cannot be used.
+    #[error("{path}: {problem}")]
+    Unusable {
         /// Which file.
         path: PathBuf,
-        /// What the parser said, with the place.
-        detail: String,
+        /// The field, its value and what would be right.
+        problem: FormatError,
     },
-    /// A field's value makes no camera.
-    #[error("{path}: {field}: {problem}")]
-    Invalid {
+    /// A file does not hold the camera that was asked for.
+    #[error("{path}: it holds no camera {id}")]
+    NotInFile {
         /// Which file.
         path: PathBuf,
-        /// Which field.
-        field: &'static str,
-        /// The value and what would be right.
-        problem: String,
+        /// The camera.
+        id: CalibrationId,
     },
+}
+
+impl CalibrationError {
+    /// What is wrong with the content of a file.
+    pub(super) fn in_file(path: &Path, problem: FormatError) -> Self {
+        Self::Unusable {
+            path: path.to_owned(),
+            problem,
+        }
+    }
 }

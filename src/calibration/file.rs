@@ -1,99 +1,130 @@
-//! The native calibration file: JSON, or YAML and TOML of the same shape.
+//! Calibration files: from a path to checked cameras under their IDs.
 
-use std::path::Path;
+use std::{borrow::Cow, io::Read, path::Path};
 
 use nalgebra::{Unit, Vector3};
 
 use super::{
     Calibration, CalibrationError, CalibrationId,
-    native::{NativeCalibration, NativeImage, NativeMount},
+    formats::{CalibrationFile, Camera, FileCamera, Format, FormatError},
+    native::{NativeImage, NativeMount},
     plausibility,
 };
 use crate::geometry::Mount;
 
 /// File endings that are read, in the order in which they are looked for.
-pub(super) const ENDINGS: [&str; 4] = ["json", "yaml", "yml", "toml"];
-/// Largest file that is read: a real calibration has a few hundred bytes.
-const MAX_BYTES: u64 = 1024 * 1024;
+pub(super) const ENDINGS: [&str; 6] = ["json", "yaml", "yml", "toml", "xml", "txt"];
 /// Image sides accepted, pixels.
 const IMAGE_SIDE: std::ops::RangeInclusive<u32> = 16..=65_536;
 /// How far from unit length `world_up` may be.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Reads and checks one file.
-pub(super) fn read(path: &Path) -> Result<Calibration, CalibrationError> {
+/// The content of a calibration file, at most a byte more than [`CalibrationFile::parse`] accepts.
+///
+/// # Errors
+/// [`CalibrationError::Unreadable`].
+pub fn content(path: &Path) -> Result<Vec<u8>, CalibrationError> {
     let unreadable = |source| CalibrationError::Unreadable {
         path: path.to_owned(),
         source,
     };
-    let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    if size > MAX_BYTES {
-        return Err(malformed(
-            path,
-            format!("it has {size} bytes; at most {MAX_BYTES} are read"),
-        ));
-    }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    let text = std::str::from_utf8(&bytes).map_err(|error| malformed(path, error.to_string()))?;
-    let raw = parse(path, text)?;
-    check(path, raw, &bytes)
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    let mut content = Vec::new();
+    // One byte more than is accepted, so that a larger file is known for one.
+    file.take(CalibrationFile::MAX_BYTES as u64 + 1)
+        .read_to_end(&mut content)
+        .map_err(unreadable)?;
+    Ok(content)
 }
 
-fn malformed(path: &Path, detail: String) -> CalibrationError {
-    CalibrationError::Malformed {
-        path: path.to_owned(),
-        detail,
-    }
-}
-
-fn parse(path: &Path, text: &str) -> Result<NativeCalibration, CalibrationError> {
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    let parsed = match ending {
-        Some("json") => serde_json::from_str(text).map_err(|error| error.to_string()),
-        Some("yaml" | "yml") => serde_saphyr::from_str(text).map_err(|error| first_line(&error)),
-        Some("toml") => toml::from_str(text)
-            .map_err(|error| format!("{}: {}", first_line(&error), error.message())),
-        _ => Err(format!(
-            "its name must end in one of {}",
-            ENDINGS.join(", ")
-        )),
+/// Reads and checks the only camera of a file.
+pub(super) fn read(path: &Path) -> Result<Calibration, CalibrationError> {
+    let mut cameras = read_all(path)?;
+    let calibration = match &cameras[..] {
+        [_] => cameras.swap_remove(0).1,
+        several => {
+            let ids: Vec<_> = several.iter().map(|(id, _)| id.as_str()).collect();
+            Err(FormatError::invalid(
+                "cameras",
+                format!(
+                    "the file holds {}: name one of {}, or take one out with `lookdown calibration \
+                     convert --camera`",
+                    ids.len(),
+                    ids.join(", ")
+                ),
+            ))
+        }
     };
-    parsed.map_err(|detail| malformed(path, detail))
+    calibration.map_err(|problem| CalibrationError::in_file(path, problem))
 }
 
-/// What a parser says before it draws the place.
-fn first_line(error: &impl std::fmt::Display) -> String {
-    let text = error.to_string();
-    text.lines().next().unwrap_or_default().to_owned()
+/// Reads every camera of a file, under its ID.
+pub(super) fn read_all(path: &Path) -> Result<Vec<Checked>, CalibrationError> {
+    let content = content(path)?;
+    let file = CalibrationFile::parse(&content)
+        .map_err(|problem| CalibrationError::in_file(path, problem))?;
+    Ok(file.calibrations(&stem_of(path), &content))
 }
 
-fn check(
-    path: &Path,
-    raw: NativeCalibration,
-    bytes: &[u8],
-) -> Result<Calibration, CalibrationError> {
-    let invalid = |field, problem| CalibrationError::Invalid {
-        path: path.to_owned(),
-        field,
-        problem,
-    };
-    let id: CalibrationId = raw
-        .id
+fn stem_of(path: &Path) -> Cow<'_, str> {
+    path.file_stem().unwrap_or_default().to_string_lossy()
+}
+
+/// A camera of a file under its ID.
+type Checked = (String, Result<Calibration, FormatError>);
+
+impl CalibrationFile {
+    /// The file's cameras, checked, under the IDs they have when the file is called `stem`: a
+    /// native file tells its ID, a single camera has the name of its file, and one of several the
+    /// file's and its own, as in `lobby-cam0`.
+    #[must_use]
+    pub fn calibrations(&self, stem: &str, content: &[u8]) -> Vec<Checked> {
+        let several = self.cameras.len() > 1;
+        let checked = self.cameras.iter().enumerate().map(|(index, entry)| {
+            let id = self.id(stem, several.then_some(index), entry);
+            let calibration = entry
+                .camera
+                .clone()
+                .and_then(|camera| check(&id, &camera, content));
+            (id, calibration)
+        });
+        checked.collect()
+    }
+
+    fn id(&self, stem: &str, index: Option<usize>, entry: &FileCamera) -> String {
+        match (&entry.name, index) {
+            (Some(id), _) if self.format == Format::Native => id.clone(),
+            (_, None) => CalibrationId::from_names(stem, None),
+            (Some(name), Some(_)) => CalibrationId::from_names(stem, Some(name)),
+            (None, Some(index)) => CalibrationId::from_names(stem, Some(&index.to_string())),
+        }
+    }
+}
+
+/// Checks a camera's values.
+fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, FormatError> {
+    let invalid = |field: &str, problem: String| FormatError::invalid(field, problem);
+    let id: CalibrationId = id
         .parse()
         .map_err(|error| invalid("id", format!("{error}")))?;
-    let NativeImage { width, height } = raw.image;
+    let Some(NativeImage { width, height }) = camera.image else {
+        return Err(invalid(
+            "image",
+            "the file does not tell the frame size it was made for: convert it with `lookdown \
+             calibration convert --size WIDTHxHEIGHT`"
+                .to_owned(),
+        ));
+    };
     if !(IMAGE_SIDE.contains(&width) && IMAGE_SIDE.contains(&height)) {
         let (least, most) = IMAGE_SIDE.into_inner();
         let problem = format!("{width}×{height} pixels; each side must be {least} to {most}");
         return Err(invalid("image", problem));
     }
-    let ends_explicitly = raw.lens.max_theta().is_some();
-    let lens = raw
-        .lens
-        .into_lens()
-        .map_err(|error| invalid("lens", error.to_string()))?;
-    let mount = mount(&raw.mount).map_err(|problem| invalid("mount", problem))?;
-    let whole = Calibration::new(id, bytes, width, height, lens, mount);
+    let ends_explicitly = camera.lens.max_theta().is_some();
+    let lens = camera.lens.clone().into_lens();
+    let lens = lens.map_err(|error| invalid("lens", error.to_string()))?;
+    let mount = mount(&camera.mount).map_err(|problem| invalid("mount", problem))?;
+    let whole = Calibration::new(id, content, width, height, lens, mount);
     let within_frame = whole.clone().limited_to_image();
     plausibility::check(whole.lens(), width, height, within_frame.lens().max_theta())
         .map_err(|problem| invalid("lens", problem))?;

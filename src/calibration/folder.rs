@@ -1,4 +1,4 @@
-//! A folder of native calibration files, read when asked for and again when they change.
+//! A folder of calibration files, read when asked for and again when they change.
 
 use std::{
     collections::HashMap,
@@ -7,12 +7,13 @@ use std::{
     time::SystemTime,
 };
 
-use super::{Calibration, CalibrationError, CalibrationId, file};
+use super::{Calibration, CalibrationError, CalibrationId, FormatError, file};
 
 /// Calibrations kept parsed; more than this many and the oldest are simply read again.
 const MAX_PARSED: usize = 10_000;
 
-/// A folder with one file per calibration, named `<id>.json`, `.yaml`, `.yml` or `.toml`.
+/// A folder of calibration files in any format, named `<id>.json`, `.yaml`, `.yml`, `.toml`, `.xml` or
+/// `.txt`; the cameras of a file that holds several have its name and their own, `lobby-cam0`.
 #[derive(Debug)]
 pub struct CalibrationFolder {
     path: PathBuf,
@@ -48,9 +49,28 @@ impl CalibrationFolder {
     /// # Errors
     /// [`CalibrationError`] when the file cannot be used.
     pub fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, CalibrationError> {
-        let Some(version) = self.version(id) else {
-            return Ok(None);
-        };
+        if let Some(version) = self.version(id.as_str()) {
+            return self.cached(id, version, only_camera).map(Some);
+        }
+        // One of several cameras in a file: `lobby.yaml` holds `lobby-cam0`. A file that does not
+        // hold it says nothing about it, whatever else is wrong there.
+        let stems = id.as_str().match_indices('-').map(|(at, _)| at);
+        for version in stems.filter_map(|at| self.version(&id.as_str()[..at])) {
+            match self.cached(id, version, one_of_several) {
+                Err(CalibrationError::NotInFile { .. }) => {}
+                found => return found.map(Some),
+            }
+        }
+        Ok(None)
+    }
+
+    /// The calibration `id` from the file at `version`, read with `read` unless it is known.
+    fn cached(
+        &self,
+        id: &CalibrationId,
+        version: FileVersion,
+        read: impl Fn(&CalibrationId, &Path) -> Result<Calibration, CalibrationError>,
+    ) -> Result<Arc<Calibration>, CalibrationError> {
         // The map holds only whole entries, so a panic elsewhere cannot have broken it.
         let cached = {
             let parsed = self.parsed.lock().unwrap_or_else(PoisonError::into_inner);
@@ -59,31 +79,20 @@ impl CalibrationFolder {
         if let Some((known, calibration)) = cached
             && known == version
         {
-            return Ok(Some(calibration));
+            return Ok(calibration);
         }
-        let calibration = Calibration::read(&version.path)?;
-        if calibration.id() != id {
-            return Err(CalibrationError::Invalid {
-                path: version.path,
-                field: "id",
-                problem: format!(
-                    "it is {:?}, but the file's name says \"{id}\": make them equal",
-                    calibration.id().as_str()
-                ),
-            });
-        }
-        let calibration = Arc::new(calibration);
+        let calibration = Arc::new(read(id, &version.path)?);
         let mut parsed = self.parsed.lock().unwrap_or_else(PoisonError::into_inner);
         if parsed.len() >= MAX_PARSED {
             parsed.clear();
         }
         parsed.insert(id.clone(), (version, Arc::clone(&calibration)));
-        Ok(Some(calibration))
+        Ok(calibration)
     }
 
-    fn version(&self, id: &CalibrationId) -> Option<FileVersion> {
+    fn version(&self, stem: &str) -> Option<FileVersion> {
         file::ENDINGS.iter().find_map(|ending| {
-            let path = self.path.join(format!("{id}.{ending}"));
+            let path = self.path.join(format!("{stem}.{ending}"));
             let metadata = std::fs::metadata(&path).ok()?;
             metadata.is_file().then(|| FileVersion {
                 path,
@@ -92,6 +101,34 @@ impl CalibrationFolder {
             })
         })
     }
+}
+
+/// The camera of a file that has its name.
+fn only_camera(id: &CalibrationId, path: &Path) -> Result<Calibration, CalibrationError> {
+    let calibration = Calibration::read(path)?;
+    if calibration.id() == id {
+        return Ok(calibration);
+    }
+    let problem = format!(
+        "it is {:?}, but the file's name says \"{id}\": make them equal",
+        calibration.id().as_str()
+    );
+    Err(CalibrationError::in_file(
+        path,
+        FormatError::invalid("id", problem),
+    ))
+}
+
+/// The camera of that ID among those of a file.
+fn one_of_several(id: &CalibrationId, path: &Path) -> Result<Calibration, CalibrationError> {
+    let not_in_file = || CalibrationError::NotInFile {
+        path: path.to_owned(),
+        id: id.clone(),
+    };
+    let cameras = file::read_all(path).map_err(|_| not_in_file())?;
+    let camera = cameras.into_iter().find(|(known, _)| known == id.as_str());
+    let (_, calibration) = camera.ok_or_else(not_in_file)?;
+    calibration.map_err(|problem| CalibrationError::in_file(path, problem))
 }
 
 #[cfg(test)]

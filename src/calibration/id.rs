@@ -22,6 +22,28 @@ impl CalibrationId {
     pub fn as_str(&self) -> &str {
         &self.0
     }
+
+    /// A file's name, and that of a camera in it, with every letter that an ID may not have
+    /// replaced and the file's name cut to leave room; an ID unless nothing is left at its
+    /// beginning.
+    pub(super) fn from_names(file: &str, camera: Option<&str>) -> String {
+        let allowed = |name: &str, at_most: usize| -> String {
+            let letters = name
+                .chars()
+                .map(|letter| match letter.to_ascii_lowercase() {
+                    letter @ ('a'..='z' | '0'..='9' | '_' | '-') => letter,
+                    _ => '-',
+                });
+            letters.take(at_most).collect()
+        };
+        let camera = camera.map_or(String::new(), |name| {
+            format!("-{}", allowed(name, MAX_CHARS / 2))
+        });
+        let file = allowed(file, MAX_CHARS - camera.len());
+        format!("{file}{camera}")
+            .trim_start_matches(['-', '_'])
+            .to_owned()
+    }
 }
 
 impl FromStr for CalibrationId {
@@ -54,6 +76,20 @@ impl fmt::Display for CalibrationId {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_of_files_and_cameras_become_ids() {
+        for (file, camera, expected) in [
+            ("lobby", None, "lobby"),
+            ("lobby", Some("cam0"), "lobby-cam0"),
+            ("Camera 1 (old)", None, "camera-1--old-"),
+            ("-x", Some("Axis"), "x-axis"),
+        ] {
+            assert_eq!(CalibrationId::from_names(file, camera), expected);
+        }
+        let long = CalibrationId::from_names(&"x".repeat(99), Some("cam0"));
+        assert!(long.ends_with("x-cam0") && long.parse::<CalibrationId>().is_ok());
+    }
 
     #[test]
     fn an_id_cannot_leave_its_folder_or_hide() {

@@ -1,6 +1,10 @@
 //! View plans: which directions a camera is looked at from within.
 
+mod coverage;
+
 use std::f64::consts::TAU;
+
+pub use coverage::Coverage;
 
 use super::{Mount, VirtualView, virtual_view::ViewDirection};
 

@@ -107,6 +107,15 @@ impl VirtualView {
         })
     }
 
+    /// Whether a ray (camera frame) meets the view within its borders.
+    #[must_use]
+    pub fn holds(&self, ray_in_camera: &Ray) -> bool {
+        let (right, bottom) = (f64::from(self.width) - 0.5, f64::from(self.height) - 0.5);
+        self.project(ray_in_camera).is_some_and(|pixel| {
+            (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y)
+        })
+    }
+
     /// The direction (unit length, view pixels) in which a vertical pole seen at `pixel` (pixel
     /// centres) rises; `None` where the view looks along the vertical.
     #[must_use]

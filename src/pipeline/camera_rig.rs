@@ -9,7 +9,7 @@ use crate::{
     calibration::CameraGeometry,
     detection::{BBox, ViewPixels},
     geometry::{
-        BackProjection, Footprint, Pixel, ViewPlan, VirtualView,
+        BackProjection, Footprint, ViewPlan, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
     },
     imaging::{Frame, Letterbox, NetworkInput, RemapTable, ViewBatch},
@@ -141,18 +141,7 @@ impl CameraRig {
                 self.geometry.lens.unproject(&pixel)
             })
             .collect();
-        let holds = |view: &VirtualView| {
-            rays.iter().all(|ray| {
-                view.project(ray)
-                    .is_some_and(|pixel| is_within(&pixel, view.width(), view.height()))
-            })
-        };
+        let holds = |view: &VirtualView| rays.iter().all(|ray| view.holds(ray));
         views.iter().filter(|(view, _)| holds(view)).count()
     }
-}
-
-/// Whether a position (pixel centres) lies on the image.
-fn is_within(pixel: &Pixel, width: u32, height: u32) -> bool {
-    let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
-    (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y)
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::calibration::native::NativeCalibration;
 
 const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 1680, "height": 1680},
   "lens": {"model": "equidistant", "focal": 534.76, "cx": 839.5, "cy": 839.5, "max_theta": 1.5708},
@@ -247,7 +248,7 @@ fn what_makes_no_camera_is_refused_with_field_value_and_remedy() {
 fn a_file_too_large_to_be_a_calibration_is_not_read() {
     let error = read_text("lobby.json", &" ".repeat(1024 * 1024 + 1)).unwrap_err();
     assert!(
-        error.to_string().contains("at most 1048576 are read"),
+        error.to_string().contains("more than 1048576 bytes"),
         "{error}"
     );
 }
@@ -258,7 +259,7 @@ fn what_yaml_and_toml_parsers_say_is_one_line_with_the_place() {
         (
             "lobby.yaml",
             "id: lobby\nimage: {width: 16, height: .nan}\n",
-            "line 2 column 28",
+            "rejected by the configured policy at line 2, column 28",
         ),
         (
             "lobby.toml",

@@ -1,0 +1,115 @@
+//! What is odd about a calibration that can be used all the same.
+
+use super::Calibration;
+use crate::geometry::{Lens, Ray};
+
+/// A lens centre farther than this from the frame's, as a share of the side, is rare.
+const OFF_CENTRE: f64 = 0.1;
+/// Pixels are square to within this in nearly all cameras.
+const SQUARE_PIXELS: f64 = 0.05;
+/// A lens that sees no farther than this off its axis (radians) is no fisheye.
+const NARROW: f64 = 1.0;
+/// Far enough from the axis to measure the scale there, radians.
+const NEAR_AXIS: f64 = 0.01;
+
+impl Calibration {
+    /// What is odd, a sentence each: the field, its value, and what it usually means.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<String> {
+        let lens = self.lens();
+        let mut doubts = self.off_centre();
+        if let Some((across, down)) = scales_at_axis(lens)
+            && (across / down - 1.0).abs() > SQUARE_PIXELS
+        {
+            doubts.push(format!(
+                "the lens has {across:.1} pixels per radian across and {down:.1} down at its axis: \
+                 frames are rarely squeezed, check the focal lengths and the frame size"
+            ));
+        }
+        if lens.max_theta() < NARROW {
+            doubts.push(format!(
+                "the lens sees only {:.0}°: for a fisheye of a ceiling camera 160° to 220° are \
+                 usual, check the model and its coefficients",
+                2.0 * lens.max_theta().to_degrees()
+            ));
+        }
+        doubts
+    }
+
+    fn off_centre(&self) -> Vec<String> {
+        let centre = self.lens().principal_point();
+        let (width, height) = self.image_size();
+        let (middle_x, middle_y) = (f64::from(width - 1) / 2.0, f64::from(height - 1) / 2.0);
+        let is_near = |value: f64, middle: f64, side: u32| {
+            (value - middle).abs() <= OFF_CENTRE * f64::from(side)
+        };
+        if is_near(centre.x, middle_x, width) && is_near(centre.y, middle_y, height) {
+            return Vec::new();
+        }
+        let cause = if is_near(centre.y, middle_x, width) && is_near(centre.x, middle_y, height) {
+            "row and column are swapped"
+        } else {
+            "the frame size is not the one it was calibrated with, or the frame was cropped"
+        };
+        vec![format!(
+            "cx, cy is {:.1}, {:.1}, far from the middle of the frame ({middle_x:.1}, \
+             {middle_y:.1}): perhaps {cause}",
+            centre.x, centre.y
+        )]
+    }
+}
+
+/// Pixels per radian at the optical axis, across and down.
+fn scales_at_axis(lens: &Lens) -> Option<(f64, f64)> {
+    let centre = lens.principal_point();
+    let across = lens.project(&Ray::new(NEAR_AXIS.sin(), 0.0, NEAR_AXIS.cos()))?;
+    let down = lens.project(&Ray::new(0.0, NEAR_AXIS.sin(), NEAR_AXIS.cos()))?;
+    Some((
+        (across - centre).norm() / NEAR_AXIS,
+        (down - centre).norm() / NEAR_AXIS,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::calibration::CalibrationFile;
+
+    fn doubts(cx: f64, cy: f64, fx: f64, max_theta: f64) -> Vec<String> {
+        let content = format!(
+            r#"{{"id":"hall","image":{{"width":1000,"height":600}},"lens":{{"model":"equidistant",
+                "fx":{fx},"fy":300,"cx":{cx},"cy":{cy},"max_theta":{max_theta}}}}}"#
+        );
+        let file = CalibrationFile::parse(content.as_bytes()).expect("a whole file");
+        let mut cameras = file.calibrations("hall", content.as_bytes());
+        let (_, calibration) = cameras.remove(0);
+        calibration.expect("a plausible camera").doubts()
+    }
+
+    #[test]
+    fn an_ordinary_camera_raises_no_doubt() {
+        assert!(doubts(498.0, 303.0, 301.0, 1.6).is_empty());
+    }
+
+    #[test]
+    fn each_oddity_is_told_with_its_value() {
+        for (doubts, expected) in [
+            (
+                doubts(299.5, 499.5, 300.0, 1.6),
+                "cx, cy is 299.5, 499.5, far from the middle of the frame (499.5, 299.5): perhaps \
+                 row and column are swapped",
+            ),
+            (
+                doubts(299.5, 299.5, 300.0, 1.6),
+                "perhaps the frame size is not the one",
+            ),
+            (
+                doubts(499.5, 299.5, 400.0, 1.6),
+                "400.0 pixels per radian across and 300.0 down",
+            ),
+            (doubts(499.5, 299.5, 300.0, 0.5), "the lens sees only 57°"),
+        ] {
+            assert_eq!(doubts.len(), 1, "{doubts:?}");
+            assert!(doubts[0].contains(expected), "{doubts:?}");
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Writing calibrations: the native format, and those of other programs where they have the lens.
+
+mod colmap;
+mod decimal;
+mod equivalents;
+mod kalibr;
+mod opencv;
+mod ros;
+
+use super::native::{NativeCalibration, NativeLens, NativeMount};
+
+/// A format that is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the formats' own names")]
+pub enum Target {
+    Native,
+    OpenCv,
+    Kalibr,
+    Ros,
+    Colmap,
+}
+
+/// A written calibration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Exported {
+    /// The content of the file.
+    pub content: String,
+    /// What the format has no place for, a sentence each.
+    pub lost: Vec<String>,
+}
+
+/// A lens that a format does not have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{target} has no {model} lens: it holds {holds}, and the native format holds every lens")]
+pub struct NotExpressible {
+    target: &'static str,
+    model: &'static str,
+    holds: &'static str,
+}
+
+impl Target {
+    /// Every target, in the order in which they are listed to users.
+    pub const ALL: [Self; 5] = [
+        Self::Native,
+        Self::OpenCv,
+        Self::Kalibr,
+        Self::Ros,
+        Self::Colmap,
+    ];
+
+    /// The name, as on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Native => "native",
+            Self::OpenCv => "opencv",
+            Self::Kalibr => "kalibr",
+            Self::Ros => "ros",
+            Self::Colmap => "colmap",
+        }
+    }
+
+    /// The target of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|target| target.name() == name)
+    }
+
+    /// Writes a calibration in this format.
+    ///
+    /// # Errors
+    /// [`NotExpressible`] when the format does not have the lens.
+    pub fn write(self, calibration: &NativeCalibration) -> Result<Exported, NotExpressible> {
+        let content = match self {
+            Self::Native => Some(native(calibration)),
+            Self::OpenCv => opencv::write(calibration),
+            Self::Kalibr => kalibr::write(calibration),
+            Self::Ros => ros::write(calibration),
+            Self::Colmap => colmap::write(calibration),
+        };
+        let content = content.ok_or(NotExpressible {
+            target: self.name(),
+            model: calibration.lens.model(),
+            holds: self.holds(),
+        })?;
+        Ok(Exported {
+            content,
+            lost: self.lost(calibration),
+        })
+    }
+
+    /// The lenses that the format has.
+    fn holds(self) -> &'static str {
+        match self {
+            Self::Native => "every lens",
+            Self::OpenCv => "kannala_brandt, mei, ucm, equidistant, stereographic and rectilinear",
+            Self::Kalibr => {
+                "kannala_brandt and mei without skew, eucm, ucm, double_sphere, fov, equidistant, \
+                 stereographic and rectilinear"
+            }
+            Self::Ros => "kannala_brandt, equidistant and rectilinear",
+            Self::Colmap => {
+                "kannala_brandt without skew, eucm, ucm, fov, equidistant, stereographic and \
+                 rectilinear"
+            }
+        }
+    }
+
+    fn lost(self, calibration: &NativeCalibration) -> Vec<String> {
+        if self == Self::Native {
+            return Vec::new();
+        }
+        let mut lost = Vec::new();
+        if let Some(max_theta) = calibration.lens.max_theta() {
+            lost.push(format!(
+                "{} cannot tell where the lens image ends: max_theta {max_theta} is left out",
+                self.name()
+            ));
+        }
+        if calibration.mount != NativeMount::default() {
+            lost.push(format!(
+                "{} cannot tell how the camera hangs: mount is left out",
+                self.name()
+            ));
+        }
+        lost
+    }
+}
+
+fn native(calibration: &NativeCalibration) -> String {
+    // Numbers and texts in structs: nothing here can fail to be written.
+    let mut content = serde_json::to_string_pretty(calibration).unwrap_or_default();
+    content.push('\n');
+    content
+}
+
+impl NativeLens {
+    /// The name of the model, as in calibration files.
+    #[must_use]
+    pub fn model(&self) -> &'static str {
+        match self {
+            Self::Equidistant(_) => "equidistant",
+            Self::Equisolid(_) => "equisolid",
+            Self::Stereographic(_) => "stereographic",
+            Self::Orthographic(_) => "orthographic",
+            Self::Rectilinear(_) => "rectilinear",
+            Self::RadialPolynomial(_) => "radial_polynomial",
+            Self::KannalaBrandt(_) => "kannala_brandt",
+            Self::Ucm(_) => "ucm",
+            Self::Eucm(_) => "eucm",
+            Self::Mei(_) => "mei",
+            Self::DoubleSphere(_) => "double_sphere",
+            Self::Ocam(_) => "ocam",
+            Self::Fov(_) => "fov",
+            Self::FTheta(_) => "f_theta",
+        }
+    }
+}

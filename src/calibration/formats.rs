@@ -1,0 +1,164 @@
+//! Calibration files of every kind: the format is recognised from the content, each has one small
+//! reader that turns the file into cameras of the native shape, and some have a writer.
+//!
+//! What each format means, with its traps, is said at its reader; `docs/calibrate.md` has the table.
+
+mod basalt;
+mod camera_intrinsic_model;
+mod camera_matrix;
+mod camodocal;
+mod claimed_field;
+mod colmap;
+mod column_first;
+mod distortion;
+mod document;
+mod error;
+mod fields;
+mod fisheye_calib_adapter;
+mod kalibr;
+mod lenses;
+mod moil;
+mod multicol;
+mod named_parameters;
+mod native_file;
+mod nvidia;
+mod ocam;
+mod opencv;
+mod opencv_xml;
+mod py_ocamcalib;
+mod recognise;
+mod ros;
+mod woodscape;
+
+pub use error::FormatError;
+pub use recognise::Format;
+
+use self::{
+    document::Document,
+    fields::Fields,
+    recognise::{recognise_lines, recognise_tree},
+};
+use super::native::{NativeImage, NativeLens, NativeMount};
+
+/// Most cameras taken from one file.
+const MAX_CAMERAS: usize = 256;
+
+/// What a calibration file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationFile {
+    /// The format that was recognised.
+    pub format: Format,
+    /// Its cameras, in the file's order; at least one.
+    pub cameras: Vec<FileCamera>,
+}
+
+/// One camera of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileCamera {
+    /// Its name in the file, where it has one.
+    pub name: Option<String>,
+    /// The camera; one that cannot be used does not spoil the others.
+    pub camera: Result<Camera, FormatError>,
+}
+
+/// A camera as a file tells it, not checked yet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// The size of the frames it was calibrated with; some formats do not tell.
+    pub image: Option<NativeImage>,
+    /// The lens.
+    pub lens: NativeLens,
+    /// How it hangs; only native files tell, others mean straight down.
+    pub mount: NativeMount,
+    /// What had to be assumed, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Camera {
+    fn new(image: Option<NativeImage>, lens: NativeLens) -> Self {
+        Self {
+            image,
+            lens,
+            mount: NativeMount::default(),
+            notes: Vec::new(),
+        }
+    }
+}
+
+impl CalibrationFile {
+    /// Largest content that is read, bytes: a real calibration has a few hundred, one that carries
+    /// its corner points some ten thousand.
+    pub const MAX_BYTES: usize = 1024 * 1024;
+
+    /// Recognises and reads the content of a calibration file.
+    ///
+    /// # Errors
+    /// [`FormatError`] when the content is in no format that is read, or not whole.
+    pub fn parse(content: &[u8]) -> Result<Self, FormatError> {
+        let (text, syntax) = document::text_of(content)?;
+        let document = document::parse(text, syntax)?;
+        let file = match &document {
+            Document::Lines(text) => read_lines(text)?,
+            Document::Tree(tree) => {
+                let fields = Fields::of(tree)?;
+                match recognise_tree(&fields) {
+                    Some(Format::Native) => native_file::read(text, syntax)?,
+                    Some(format) => Self {
+                        format,
+                        cameras: read_tree(format, &fields)?,
+                    },
+                    None => return Err(unrecognised()),
+                }
+            }
+        };
+        match file.cameras.len() {
+            0 => Err(FormatError::invalid("cameras", "the file holds none")),
+            1..=MAX_CAMERAS => Ok(file),
+            count => Err(FormatError::invalid(
+                "cameras",
+                format!("the file holds {count}: at most {MAX_CAMERAS} are read"),
+            )),
+        }
+    }
+}
+
+fn unrecognised() -> FormatError {
+    FormatError::Malformed(
+        "its fields are those of no format that is read (the native one, Kalibr, OpenCV, ROS, \
+         OCamCalib, py-OCamCalib, COLMAP, camodocal, Basalt, WoodScape, NVIDIA f-theta, MOIL and a \
+         few more)"
+            .to_owned(),
+    )
+}
+
+fn read_lines(text: &str) -> Result<CalibrationFile, FormatError> {
+    let format = recognise_lines(text).ok_or_else(unrecognised)?;
+    let cameras = match format {
+        Format::OCamCalib => alone(ocam::read(text)),
+        Format::MultiCol => alone(multicol::read(text)),
+        _ => colmap::read(text),
+    };
+    Ok(CalibrationFile { format, cameras })
+}
+
+fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, FormatError> {
+    Ok(match format {
+        Format::Kalibr => kalibr::read(fields),
+        Format::OpenCv => alone(opencv::read(fields)),
+        Format::Ros => alone(ros::read(fields)),
+        Format::PyOCamCalib => alone(py_ocamcalib::read(fields)),
+        Format::Camodocal => alone(camodocal::read(fields)),
+        Format::Basalt => basalt::read(fields)?,
+        Format::WoodScape => alone(woodscape::read(fields)),
+        Format::NvidiaFTheta => alone(nvidia::read(fields)),
+        Format::Moil => moil::read(fields),
+        Format::FisheyeCalibAdapter => alone(fisheye_calib_adapter::read(fields)),
+        Format::CameraIntrinsicModel => alone(camera_intrinsic_model::read(fields)),
+        Format::Native | Format::OCamCalib | Format::MultiCol | Format::Colmap => Vec::new(),
+    })
+}
+
+/// The camera of a format that holds one to a file.
+fn alone(camera: Result<Camera, FormatError>) -> Vec<FileCamera> {
+    vec![FileCamera { name: None, camera }]
+}

@@ -1,0 +1,35 @@
+//! Fields of view that a file claims and its curve cannot keep.
+
+use super::Camera;
+use crate::{
+    calibration::{
+        LensFieldsError,
+        native::{NativeImage, NativeLens},
+    },
+    geometry::LensError,
+};
+
+/// A camera whose lens image is said to end at `max_theta` (radians); where the curve turns over
+/// before that, it ends there, and a note says so.
+pub(super) fn camera(
+    image: NativeImage,
+    max_theta: f64,
+    lens: impl Fn(f64) -> NativeLens,
+) -> Camera {
+    let claimed = lens(max_theta);
+    if let Err(LensFieldsError::Lens(
+        LensError::MaxThetaOutOfRange { limit, .. } | LensError::TurnsBack { limit, .. },
+    )) = claimed.clone().into_lens()
+        && max_theta > limit
+    {
+        let mut camera = Camera::new(Some(image), lens(limit));
+        camera.notes.push(format!(
+            "the file claims a field of view of {:.1}°, but its curve turns over at {:.1}°: the \
+             lens image ends there",
+            2.0 * max_theta.to_degrees(),
+            2.0 * limit.to_degrees()
+        ));
+        return camera;
+    }
+    Camera::new(Some(image), claimed)
+}

@@ -1,0 +1,31 @@
+//! The native format, in JSON, YAML or TOML: the only one that tells an ID and a mount.
+
+use super::{
+    CalibrationFile, Camera, FileCamera, Format, FormatError,
+    document::{Syntax, toml, yaml},
+};
+use crate::calibration::native::NativeCalibration;
+
+/// Reads the file once more from its text, so that a mistake is told with its place.
+pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, FormatError> {
+    let parsed: Result<NativeCalibration, String> = match syntax {
+        Syntax::Toml => toml(text),
+        Syntax::Yaml => yaml(text),
+        Syntax::Json | Syntax::Xml | Syntax::Lines => {
+            serde_json::from_str(text).map_err(|error| error.to_string())
+        }
+    };
+    let file = parsed.map_err(FormatError::Malformed)?;
+    Ok(CalibrationFile {
+        format: Format::Native,
+        cameras: vec![FileCamera {
+            name: Some(file.id),
+            camera: Ok(Camera {
+                image: Some(file.image),
+                lens: file.lens,
+                mount: file.mount,
+                notes: Vec::new(),
+            }),
+        }],
+    })
+}

@@ -1,0 +1,34 @@
+//! `WoodScape`: `intrinsic` with the radius in pixels as a polynomial of the angle
+//! (<https://github.com/valeoai/WoodScape>, `scripts/calibration`).
+//!
+//! The principal point is an offset from the centre of the image, which lies half a pixel before
+//! `width / 2` because pixel centres are whole numbers.
+
+use super::{Camera, FormatError, fields::Fields};
+use crate::calibration::native::{NativeLens, NativeRadialPolynomial};
+
+pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
+    let intrinsic = fields.child("intrinsic")?;
+    if intrinsic.has("model") && intrinsic.text("model")? != "radial_poly" {
+        return Err(intrinsic.invalid(
+            "model",
+            format!("it is {:?}: radial_poly is read", intrinsic.text("model")?),
+        ));
+    }
+    let image = intrinsic.image("width", "height")?;
+    let centre = |side: u32| f64::from(side) / 2.0 - 0.5;
+    let lens = NativeLens::RadialPolynomial(NativeRadialPolynomial {
+        coefficients: vec![
+            0.0,
+            intrinsic.number("k1")?,
+            intrinsic.number("k2")?,
+            intrinsic.number("k3")?,
+            intrinsic.number("k4")?,
+        ],
+        aspect: intrinsic.number_or("aspect_ratio", 1.0)?,
+        cx: intrinsic.number("cx_offset")? + centre(image.width),
+        cy: intrinsic.number("cy_offset")? + centre(image.height),
+        max_theta: None,
+    });
+    Ok(Camera::new(Some(image), lens))
+}

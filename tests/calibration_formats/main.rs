@@ -1,0 +1,57 @@
+//! Calibration files of other programs: each is recognised from its content and read as the lens
+//! that its program means.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod answers;
+mod damage;
+mod export;
+mod published;
+mod traps;
+
+use std::path::PathBuf;
+
+use lookdown::{
+    calibration::{CalibrationFile, formats::Camera},
+    geometry::{Lens, Ray},
+};
+use serde_json::Value;
+
+/// A file of `tests/fixtures`.
+fn fixture(path: &str) -> Vec<u8> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures")
+        .join(path);
+    std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn json(path: &str) -> Value {
+    serde_json::from_slice(&fixture(path)).unwrap()
+}
+
+/// The camera of that index in a file.
+fn camera(content: &[u8], index: usize) -> Camera {
+    CalibrationFile::parse(content).unwrap().cameras[index]
+        .camera
+        .clone()
+        .unwrap()
+}
+
+/// Why a file, or its first camera, is refused.
+fn refusal(content: &[u8]) -> String {
+    match CalibrationFile::parse(content) {
+        Err(error) => error.to_string(),
+        Ok(mut file) => file.cameras.remove(0).camera.unwrap_err().to_string(),
+    }
+}
+
+fn lens(camera: Camera) -> Lens {
+    camera.lens.into_lens().unwrap()
+}
+
+fn ray(value: &Value) -> Ray {
+    Ray::new(
+        value[0].as_f64().unwrap(),
+        value[1].as_f64().unwrap(),
+        value[2].as_f64().unwrap(),
+    )
+}
