@@ -1,6 +1,7 @@
 //! The command line.
 
 mod annotate;
+mod calibration;
 mod detect;
 mod eval;
 mod model;
@@ -39,6 +40,9 @@ enum Command {
     Detect(Box<detect::Arguments>),
     /// Measure how good detections are on a data set: average precision and speed
     Eval(Box<eval::Arguments>),
+    /// Look into calibrations and convert them
+    #[command(subcommand)]
+    Calibration(calibration::Command),
     /// Look into person models
     #[command(subcommand)]
     Model(model::Command),
@@ -70,6 +74,7 @@ pub fn run() -> ExitCode {
         Command::Serve(settings_file) => serve::run(&settings_file),
         Command::Detect(arguments) => detect::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
+        Command::Calibration(command) => calibration::run(&command),
         Command::Model(command) => model::run(&command),
         Command::Openapi => print_openapi(),
     };

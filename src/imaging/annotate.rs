@@ -5,11 +5,13 @@
 mod canvas;
 mod encode;
 mod label;
+mod lens_sketch;
 pub(super) mod text;
 
 use super::frame::Frame;
 use canvas::{Outline, Rgb};
 pub use encode::{EncodeError, encode_jpeg, encode_png};
+pub use lens_sketch::sketch_lens;
 
 /// One thing to draw. All coordinates are frame pixels, corner-origin: pixel i covers
 /// [i, i + 1).

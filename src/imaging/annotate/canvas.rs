@@ -92,6 +92,36 @@ impl Outline {
     }
 }
 
+/// A straight line with round ends.
+pub(super) struct Stroke {
+    edge: [[f64; 2]; 2],
+    half_width: f64,
+}
+
+impl Stroke {
+    /// A line of a width in pixels between two points.
+    pub(super) fn new(from: [f64; 2], to: [f64; 2], width: f64) -> Self {
+        Self {
+            edge: [from, to],
+            half_width: width / 2.0,
+        }
+    }
+
+    /// Paints it.
+    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb) {
+        let reach = self.half_width + 0.5;
+        let [[_, from], [_, to]] = self.edge;
+        for y in pixels(from.min(to) - reach, from.max(to) + reach, frame.height()) {
+            let row = f64::from(y) + 0.5;
+            let [left, right] = edge_span(self.edge, row, reach);
+            for x in pixels(left, right, frame.width()) {
+                let coverage = reach - edge_distance(self.edge, [f64::from(x) + 0.5, row]);
+                blend(frame, x, y, colour, coverage.clamp(0.0, 1.0));
+            }
+        }
+    }
+}
+
 /// Columns, from and to, outside of which a row has nothing within `reach` of an edge.
 fn edge_span([a, b]: [[f64; 2]; 2], row: f64, reach: f64) -> [f64; 2] {
     let [upper, lower] = if a[1] <= b[1] { [a, b] } else { [b, a] };

@@ -1,0 +1,26 @@
+//! `lookdown calibration`
+
+mod check;
+mod convert;
+mod source;
+
+use std::process::ExitCode;
+
+use clap::Subcommand;
+
+/// What to do with a calibration.
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Say what is understood of a calibration file of any format, and draw it into a frame
+    Check(check::Arguments),
+    /// Write a calibration in the native format, or in that of another program
+    Convert(convert::Arguments),
+}
+
+/// Does what the command asks for.
+pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
+    match command {
+        Command::Check(arguments) => check::run(arguments),
+        Command::Convert(arguments) => convert::run(arguments),
+    }
+}

@@ -1,0 +1,189 @@
+//! `lookdown calibration check`
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use anyhow::{Context, bail};
+use clap::Args;
+
+use super::source::{NamedCamera, Source};
+use crate::{
+    calibration::Calibration,
+    geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, view_plan::Coverage},
+    imaging::{
+        annotate::{encode_jpeg, sketch_lens},
+        decode::{DecodeLimits, decode},
+    },
+};
+
+/// The views of the plan are as fine as the default network's input, pixels.
+const VIEW_SIDE: u32 = 416;
+const JPEG_QUALITY: u8 = 92;
+
+/// Arguments of `lookdown calibration check`.
+#[derive(Debug, Args)]
+pub(in super::super) struct Arguments {
+    #[command(flatten)]
+    source: Source,
+    /// Draw the lens and the balanced view plan into this frame of the camera
+    #[arg(long, value_name = "FRAME", requires = "out")]
+    preview: Option<PathBuf>,
+    /// Where to write the drawing, a JPEG file
+    #[arg(long, value_name = "OUT.jpg", requires = "preview")]
+    out: Option<PathBuf>,
+}
+
+/// Reports on every camera of the file; one that cannot be used costs the exit code.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    if let (Some(frame), Some(out)) = (&arguments.preview, &arguments.out) {
+        let (_, camera) = arguments.source.read_one()?;
+        let calibration = camera
+            .checked
+            .with_context(|| arguments.source.file.display().to_string())?;
+        draw(&calibration, frame, out)?;
+    }
+    let found = arguments.source.read()?;
+    let mut out = io::stdout().lock();
+    let mut line = |label: &str, text: String| {
+        writeln!(out, "{label:<12} {text}").context("standard output cannot be written")
+    };
+    let count = match found.cameras.len() {
+        1 => "1 camera".to_owned(),
+        count => format!("{count} cameras"),
+    };
+    let path = arguments.source.file.display();
+    line("file", format!("{path}: {}, {count}", found.format.name()))?;
+    let mut code = ExitCode::SUCCESS;
+    for camera in &found.cameras {
+        line("calibration", camera.id.clone())?;
+        match &camera.checked {
+            Ok(calibration) => {
+                for (label, text) in report(camera, calibration) {
+                    line(label, text)?;
+                }
+            }
+            Err(error) => {
+                line("  refused", error.to_string())?;
+                code = ExitCode::FAILURE;
+            }
+        }
+    }
+    Ok(code)
+}
+
+fn views(calibration: &Calibration) -> Vec<VirtualView> {
+    ViewPlan::balanced().views(calibration.mount(), VIEW_SIDE, VIEW_SIDE)
+}
+
+/// The lines on one camera.
+fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str, String)> {
+    let lens = calibration.lens();
+    let (width, height) = calibration.image_size();
+    let told = camera.told.camera.as_ref().ok();
+    let end = match told.and_then(|told| told.lens.max_theta()) {
+        Some(_) => "",
+        None => ", to the farthest corner of the frame or where the curve ends",
+    };
+    let views = views(calibration);
+    let coverage = Coverage::of(lens, &views, width, height);
+    let mut lines = vec![
+        ("  lens", lens.model().to_owned()),
+        ("  frame", format!("{width}×{height} pixels")),
+        (
+            "  sees",
+            format!("{:.1}°{end}", 2.0 * lens.max_theta().to_degrees()),
+        ),
+        ("  circle", circle(lens, width, height)),
+        ("  mount", mount(calibration)),
+        (
+            "  plan",
+            format!(
+                "balanced, {} views: {:.1} % of the lens image is seen, a place of it in {:.1} views \
+                 on average",
+                views.len(),
+                100.0 * coverage.seen_share,
+                coverage.mean_views
+            ),
+        ),
+    ];
+    let notes = told.into_iter().flat_map(|told| told.notes.iter().cloned());
+    lines.extend(notes.map(|note| ("  note", note)));
+    lines.extend(
+        calibration
+            .doubts()
+            .into_iter()
+            .map(|doubt| ("  doubt", doubt)),
+    );
+    lines
+}
+
+/// Where the rim of the lens image lies, and whether the frame holds it.
+fn circle(lens: &Lens, width: u32, height: u32) -> String {
+    const AZIMUTHS: u32 = 72;
+    let centre = lens.principal_point();
+    let rim: Vec<Pixel> = (0..AZIMUTHS)
+        .filter_map(|step| {
+            let azimuth = std::f64::consts::TAU * f64::from(step) / f64::from(AZIMUTHS);
+            let (sin, cos) = lens.max_theta().sin_cos();
+            lens.project_to_rim(&Ray::new(sin * azimuth.cos(), sin * azimuth.sin(), cos))
+        })
+        .collect();
+    let radii = rim.iter().map(|pixel| (pixel - centre).norm());
+    let (least, most) = radii.fold((f64::INFINITY, 0.0_f64), |(least, most), radius| {
+        (least.min(radius), most.max(radius))
+    });
+    let radius = if most - least < 1.0 {
+        format!("{most:.1}")
+    } else {
+        format!("{least:.1} to {most:.1}")
+    };
+    let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
+    let is_inside =
+        |pixel: &Pixel| (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y);
+    let held = match rim.iter().filter(|pixel| is_inside(pixel)).count() {
+        0 => "beyond the frame on every side",
+        inside if inside == rim.len() => "whole in the frame",
+        _ => "cut off by the frame",
+    };
+    format!(
+        "centre {:.1}, {:.1}; radius {radius} pixels, {held}",
+        centre.x, centre.y
+    )
+}
+
+fn mount(calibration: &Calibration) -> String {
+    let mount = calibration.mount();
+    let tilt = mount.nadir().angle(&Ray::z()).to_degrees();
+    let looks = if tilt < 0.05 {
+        "looks straight down".to_owned()
+    } else {
+        format!("looks {tilt:.1}° away from straight down")
+    };
+    match mount.height_m() {
+        Some(height) => format!("{looks} from {height} m"),
+        None => format!("{looks}, height unknown: persons get no place on the floor"),
+    }
+}
+
+fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<()> {
+    let encoded = fs::read(frame)
+        .with_context(|| format!("--preview: {} cannot be read", frame.display()))?;
+    let mut picture = decode(&encoded, &DecodeLimits::default())
+        .with_context(|| format!("--preview: {}", frame.display()))?
+        .frame;
+    let (width, height) = (picture.width(), picture.height());
+    let Ok(geometry) = calibration.for_frame(width, height) else {
+        let (calibrated_width, calibrated_height) = calibration.image_size();
+        bail!(
+            "--preview: the frame has {width}×{height} pixels, another shape than the \
+             {calibrated_width}×{calibrated_height} of the calibration: give a frame of its camera"
+        );
+    };
+    sketch_lens(&mut picture, &geometry.lens, &views(calibration));
+    fs::write(out, encode_jpeg(&picture, JPEG_QUALITY)?)
+        .with_context(|| format!("--out: {} cannot be written", out.display()))
+}

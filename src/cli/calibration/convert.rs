@@ -1,0 +1,71 @@
+//! `lookdown calibration convert`
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::PathBuf,
+    process::ExitCode,
+};
+
+use anyhow::Context;
+use clap::Args;
+
+use super::source::Source;
+use crate::calibration::{
+    export::Target,
+    native::{NativeCalibration, NativeImage},
+};
+
+/// Arguments of `lookdown calibration convert`.
+#[derive(Debug, Args)]
+pub(in super::super) struct Arguments {
+    #[command(flatten)]
+    source: Source,
+    /// The format to write: native, opencv, kalibr, ros or colmap
+    #[arg(long, value_name = "FORMAT", default_value = "native", value_parser = target)]
+    to: Target,
+    /// The ID to write into a native file [default: the file's name, with the camera's]
+    #[arg(long, value_name = "ID")]
+    id: Option<String>,
+    /// Where to write it [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Writes one camera; what the target cannot hold is told on standard error.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let path = arguments.source.file.display();
+    let (_, camera) = arguments.source.read_one()?;
+    let calibration = camera.checked.with_context(|| path.to_string())?;
+    let told = camera.told.camera.with_context(|| path.to_string())?;
+    let (width, height) = calibration.image_size();
+    let id = match &arguments.id {
+        Some(id) => id
+            .parse::<crate::calibration::CalibrationId>()
+            .context("--id")?,
+        None => calibration.id().clone(),
+    };
+    let exported = arguments.to.write(&NativeCalibration {
+        id: id.to_string(),
+        image: NativeImage { width, height },
+        lens: told.lens,
+        mount: told.mount,
+    })?;
+    for note in told.notes.iter().chain(&exported.lost) {
+        eprintln!("lookdown: {path}: {note}");
+    }
+    match &arguments.out {
+        Some(out) => fs::write(out, exported.content)
+            .with_context(|| format!("--out: {} cannot be written", out.display()))?,
+        None => write!(io::stdout(), "{}", exported.content)
+            .context("standard output cannot be written")?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn target(name: &str) -> Result<Target, String> {
+    Target::from_name(name).ok_or_else(|| {
+        let names: Vec<_> = Target::ALL.iter().map(|target| target.name()).collect();
+        format!("give one of {}", names.join(", "))
+    })
+}

@@ -1,0 +1,128 @@
+//! The cameras of a file that a command is about.
+
+use std::{path::PathBuf, str::FromStr};
+
+use anyhow::{Context, bail};
+use clap::Args;
+
+use crate::calibration::{
+    Calibration, CalibrationFile, FormatError,
+    formats::{FileCamera, Format},
+    native::NativeImage,
+    read_content,
+};
+
+/// Which file, and which camera of it.
+#[derive(Debug, Args)]
+pub(super) struct Source {
+    /// A calibration file: its format is recognised from its content
+    #[arg(value_name = "FILE")]
+    pub(super) file: PathBuf,
+    /// Take this one of a file with several cameras
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// The frame size in pixels, for formats that do not tell it
+    #[arg(long, value_name = "WIDTHxHEIGHT")]
+    size: Option<FrameSize>,
+}
+
+/// The cameras of a file.
+pub(super) struct Cameras {
+    pub(super) format: Format,
+    pub(super) cameras: Vec<NamedCamera>,
+}
+
+/// A camera as the file tells it and as it was understood.
+pub(super) struct NamedCamera {
+    /// The ID it has in a calibration folder.
+    pub(super) id: String,
+    pub(super) told: FileCamera,
+    pub(super) checked: Result<Calibration, FormatError>,
+}
+
+impl Source {
+    /// Reads the file: the camera that was asked for, or all.
+    pub(super) fn read(&self) -> anyhow::Result<Cameras> {
+        let path = self.file.display();
+        let content = read_content(&self.file)?;
+        let mut file = CalibrationFile::parse(&content).with_context(|| path.to_string())?;
+        if let Some(size) = &self.size {
+            for camera in &mut file.cameras {
+                size.fill_in(camera)?;
+            }
+        }
+        let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
+        let checked = file.calibrations(&stem, &content);
+        let cameras = file.cameras.into_iter().zip(checked);
+        let mut cameras: Vec<_> = cameras
+            .map(|(told, (id, checked))| NamedCamera { id, told, checked })
+            .collect();
+        if let Some(wanted) = &self.camera {
+            let names: Vec<_> = cameras.iter().map(NamedCamera::name).collect();
+            let Some(index) = names.iter().position(|name| name == wanted) else {
+                bail!("--camera: {path} holds {}, not {wanted}", names.join(", "));
+            };
+            cameras = vec![cameras.swap_remove(index)];
+        }
+        Ok(Cameras {
+            format: file.format,
+            cameras,
+        })
+    }
+
+    /// Reads the file's only camera, or the one that was asked for.
+    pub(super) fn read_one(&self) -> anyhow::Result<(Format, NamedCamera)> {
+        let Cameras { format, cameras } = self.read()?;
+        match <[NamedCamera; 1]>::try_from(cameras) {
+            Ok([camera]) => Ok((format, camera)),
+            Err(several) => {
+                let names: Vec<_> = several.iter().map(NamedCamera::name).collect();
+                bail!(
+                    "{} holds {} cameras: choose one with --camera: {}",
+                    self.file.display(),
+                    names.len(),
+                    names.join(", ")
+                )
+            }
+        }
+    }
+}
+
+impl NamedCamera {
+    fn name(&self) -> String {
+        self.told.name.clone().unwrap_or_else(|| self.id.clone())
+    }
+}
+
+/// `640x480`
+#[derive(Debug, Clone)]
+struct FrameSize(NativeImage);
+
+impl FrameSize {
+    /// Gives the camera its frame size, unless the file tells another.
+    fn fill_in(&self, camera: &mut FileCamera) -> anyhow::Result<()> {
+        let Ok(camera) = &mut camera.camera else {
+            return Ok(());
+        };
+        let told = *camera.image.get_or_insert(self.0);
+        if told != self.0 {
+            let NativeImage { width, height } = told;
+            bail!("--size: the file itself says {width}x{height}: leave it out");
+        }
+        Ok(())
+    }
+}
+
+impl FromStr for FrameSize {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let sides = text.split_once('x');
+        sides
+            .and_then(|(width, height)| {
+                let (width, height) = (width.parse().ok()?, height.parse().ok()?);
+                Some(Self(NativeImage { width, height }))
+            })
+            .ok_or("give the width and height in pixels, such as 640x480")
+    }
+}

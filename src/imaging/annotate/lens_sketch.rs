@@ -1,0 +1,142 @@
+//! A lens drawn into its frame: the circle where its image ends, rings of equal angle, radial
+//! lines, and where virtual views look.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::{
+    canvas::{Rgb, Stroke},
+    line_width,
+};
+use crate::{
+    geometry::{
+        Lens, Pixel, Ray, VirtualView,
+        pixels::{PixelConvention, cross_half_pixel},
+    },
+    imaging::Frame,
+};
+
+const RIM: Rgb = [255, 90, 80];
+const RING: Rgb = [255, 220, 60];
+const RIGHT_ANGLE: Rgb = [255, 160, 40];
+const VIEW: Rgb = [0, 214, 255];
+/// Between two rings, radians.
+const RING_STEP: f64 = TAU / 24.0;
+/// Radial lines in a full turn.
+const RADIAL_LINES: u32 = 12;
+/// Points on a circle, and along each side of a view.
+const CIRCLE_POINTS: u32 = 180;
+const SIDE_POINTS: u32 = 32;
+
+/// Draws the outlines of `views` thinly, a ring every 15° off the axis, a line every 30° around
+/// it, and the rim of the lens image.
+pub fn sketch_lens(frame: &mut Frame, lens: &Lens, views: &[VirtualView]) {
+    let thin = line_width(frame) * 0.5;
+    for view in views {
+        draw(
+            frame,
+            view_outline(view).map(|ray| lens.project(&ray)),
+            VIEW,
+            thin,
+        );
+    }
+    for line in 0..RADIAL_LINES {
+        let azimuth = TAU * f64::from(line) / f64::from(RADIAL_LINES);
+        let points = (1..=CIRCLE_POINTS).map(|step| {
+            let theta = lens.max_theta() * f64::from(step) / f64::from(CIRCLE_POINTS);
+            lens.project(&ray(theta, azimuth))
+        });
+        draw(frame, points, RING, thin);
+    }
+    let rings = (1_u32..).map(|ring| RING_STEP * f64::from(ring));
+    for theta in rings.take_while(|&theta| theta < lens.max_theta()) {
+        let is_right_angle = (theta - FRAC_PI_2).abs() < 1e-9;
+        let (colour, width) = if is_right_angle {
+            (RIGHT_ANGLE, 2.0 * thin)
+        } else {
+            (RING, thin)
+        };
+        draw(
+            frame,
+            circle(theta).map(|ray| lens.project(&ray)),
+            colour,
+            width,
+        );
+    }
+    let rim = circle(lens.max_theta()).map(|ray| lens.project_to_rim(&ray));
+    draw(frame, rim, RIM, 3.0 * thin);
+}
+
+fn ray(theta: f64, azimuth: f64) -> Ray {
+    Ray::new(
+        theta.sin() * azimuth.cos(),
+        theta.sin() * azimuth.sin(),
+        theta.cos(),
+    )
+}
+
+/// Rays of equal angle from the axis, the first one twice.
+fn circle(theta: f64) -> impl Iterator<Item = Ray> {
+    (0..=CIRCLE_POINTS)
+        .map(move |step| ray(theta, TAU * f64::from(step) / f64::from(CIRCLE_POINTS)))
+}
+
+/// Rays along the border of a view, the first one twice.
+fn view_outline(view: &VirtualView) -> impl Iterator<Item = Ray> {
+    let (right, bottom) = (
+        f64::from(view.width()) - 0.5,
+        f64::from(view.height()) - 0.5,
+    );
+    let corners = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)];
+    (0..=4 * SIDE_POINTS).map(move |step| {
+        let (side, along) = (step / SIDE_POINTS, step % SIDE_POINTS);
+        let share = f64::from(along) / f64::from(SIDE_POINTS);
+        let [(x0, y0), (x1, y1)] = [side, side + 1].map(|corner| corners[corner as usize % 4]);
+        view.ray_in_camera(&Pixel::new(x0 + share * (x1 - x0), y0 + share * (y1 - y0)))
+    })
+}
+
+/// Draws a line through points (pixel centres); where the lens does not see one, it breaks.
+fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, colour: Rgb, width: f64) {
+    let mut previous = None;
+    for point in points {
+        let point = point.map(|point| {
+            let corner_origin = cross_half_pixel(point, PixelConvention::CornerOrigin);
+            [corner_origin.x, corner_origin.y]
+        });
+        if let (Some(from), Some(to)) = (previous, point) {
+            Stroke::new(from, to, width).draw(frame, colour);
+        }
+        previous = point;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame() -> Frame {
+        Frame::new(200, 200, vec![0; 3 * 200 * 200]).expect("the pixels fit the size")
+    }
+
+    fn colour_at(frame: &Frame, x: usize, y: usize) -> [u8; 3] {
+        let start = 3 * (y * 200 + x);
+        [0, 1, 2].map(|channel| frame.pixels()[start + channel])
+    }
+
+    #[test]
+    fn the_rim_is_drawn_where_the_lens_image_ends() {
+        let lens = Lens::equidistant_circle(99.5, 99.5, 80.0, 1.5).expect("a plausible lens");
+        let mut frame = frame();
+        sketch_lens(&mut frame, &lens, &[]);
+        // Corner-origin (180, 100) lies at pixel centre (179.5, 99.5).
+        let [red, ..] = colour_at(&frame, 179, 103);
+        assert!(red > 100, "{:?}", colour_at(&frame, 179, 103));
+        assert_eq!(colour_at(&frame, 190, 60), [0, 0, 0]);
+    }
+
+    #[test]
+    fn a_lens_far_larger_than_its_frame_is_drawn_in_bounded_time() {
+        let lens = Lens::equidistant_circle(1e9, -1e9, 1e12, 1.5).expect("a plausible lens");
+        sketch_lens(&mut frame(), &lens, &[]);
+    }
+}
