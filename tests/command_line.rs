@@ -311,6 +311,58 @@ fn a_termination_signal_ends_the_server_in_order() {
 }
 
 #[test]
+fn a_calibration_is_fitted_to_frames_and_says_what_it_assumes() {
+    let fitted = lookdown(
+        &[
+            "calibration",
+            "fit",
+            "samples/office.jpg",
+            "--id",
+            "office",
+            "--height",
+            "2.8",
+        ],
+        &[],
+    );
+    assert!(fitted.status.success(), "{fitted:?}");
+    let said = String::from_utf8_lossy(&fitted.stderr);
+    assert!(said.contains("not measured"), "{said}");
+    let found: serde_json::Value = serde_json::from_slice(&fitted.stdout).unwrap();
+    let truth = std::fs::read("samples/calibrations/office.json").unwrap();
+    let truth: serde_json::Value = serde_json::from_slice(&truth).unwrap();
+    assert_eq!(
+        (&found["id"], &found["mount"]["height_m"]),
+        (&"office".into(), &2.8.into())
+    );
+    let radius = |lens: &serde_json::Value| {
+        lens["focal"].as_f64().unwrap() * lens["max_theta"].as_f64().unwrap()
+    };
+    let allowed = 0.005 * radius(&truth["lens"]);
+    assert!(
+        (radius(&found["lens"]) - radius(&truth["lens"])).abs() < allowed,
+        "{found}"
+    );
+    for center in ["cx", "cy"] {
+        let off = found["lens"][center].as_f64().unwrap() - truth["lens"][center].as_f64().unwrap();
+        assert!(off.abs() < allowed, "{center}: {found}");
+    }
+}
+
+#[test]
+fn frames_without_a_lens_circle_are_not_fitted() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let bright = folder.path().join("bright.png");
+    image::RgbImage::from_pixel(64, 64, image::Rgb([200; 3]))
+        .save(&bright)
+        .unwrap();
+    let fitted = lookdown(&["calibration", "fit", bright.to_str().unwrap()], &[]);
+    assert_fails_with(
+        &fitted,
+        &["no frame shows a lens circle", "shows no lens circle"],
+    );
+}
+
+#[test]
 fn a_calibration_of_another_program_is_checked_and_converted() {
     let camchain = "tests/fixtures/calibrations/kalibr_camchain.yaml";
     let checked = lookdown(&["calibration", "check", camchain], &[]);

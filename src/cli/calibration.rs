@@ -2,6 +2,7 @@
 
 mod check;
 mod convert;
+mod fit;
 mod source;
 
 use std::process::ExitCode;
@@ -15,6 +16,8 @@ pub(super) enum Command {
     Check(check::Arguments),
     /// Write a calibration in the native format, or in that of another program
     Convert(convert::Arguments),
+    /// Make a calibration from frames: the lens circle is found, an ideal lens assumed
+    Fit(fit::Arguments),
 }
 
 /// Does what the command asks for.
@@ -22,5 +25,6 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Check(arguments) => check::run(arguments),
         Command::Convert(arguments) => convert::run(arguments),
+        Command::Fit(arguments) => fit::run(arguments),
     }
 }

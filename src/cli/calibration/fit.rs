@@ -1,0 +1,205 @@
+//! `lookdown calibration fit`
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+
+use crate::{
+    calibration::{
+        CalibrationId,
+        export::Target,
+        native::{NativeCalibration, NativeIdeal, NativeImage, NativeLens, NativeMount},
+    },
+    imaging::{
+        decode::{DecodeLimits, decode},
+        lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
+    },
+};
+
+/// Arguments of `lookdown calibration fit`.
+#[derive(Debug, Args)]
+pub(in super::super) struct Arguments {
+    /// Frames of one camera: JPEG, PNG or WebP, all of one size. Bright ones show the circle best
+    #[arg(required = true, value_name = "FRAME")]
+    frames: Vec<PathBuf>,
+    /// The calibration's ID
+    #[arg(long, value_name = "ID", default_value = "camera")]
+    id: CalibrationId,
+    /// How the radius grows with the angle; the data sheet may tell
+    #[arg(long, value_name = "MODEL", default_value = "equidistant")]
+    lens: IdealLens,
+    /// What the circle spans, degrees, as in the data sheet
+    #[arg(long, value_name = "DEGREES", default_value_t = 180.0, value_parser = field_of_view)]
+    field_of_view: f64,
+    /// How high the camera hangs above the floor: gives persons a place on it
+    #[arg(long, value_name = "METRES", value_parser = height)]
+    height: Option<f64>,
+    /// Where to write it [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Lenses that a circle and a field of view determine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum IdealLens {
+    /// `r = f theta`: most ceiling cameras
+    Equidistant,
+    /// `r = 2 f sin(theta / 2)`
+    Equisolid,
+    /// `r = 2 f tan(theta / 2)`
+    Stereographic,
+    /// `r = f sin(theta)`
+    Orthographic,
+}
+
+impl IdealLens {
+    /// The radius in focal lengths, `theta` radians off the axis.
+    fn radius(self, theta: f64) -> f64 {
+        match self {
+            Self::Equidistant => theta,
+            Self::Equisolid => 2.0 * (theta / 2.0).sin(),
+            Self::Stereographic => 2.0 * (theta / 2.0).tan(),
+            Self::Orthographic => theta.sin(),
+        }
+    }
+
+    fn with(self, parameters: NativeIdeal) -> NativeLens {
+        match self {
+            Self::Equidistant => NativeLens::Equidistant(parameters),
+            Self::Equisolid => NativeLens::Equisolid(parameters),
+            Self::Stereographic => NativeLens::Stereographic(parameters),
+            Self::Orthographic => NativeLens::Orthographic(parameters),
+        }
+    }
+}
+
+/// Finds the circle, writes the calibration, and says on standard error how sure it is.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let (image, agreed) = circle(&arguments.frames)?;
+    let calibration = calibration(arguments, image, &agreed)?;
+    let written = Target::Native.write(&calibration)?.content;
+    eprintln!("lookdown: {}", verdict(arguments, &agreed));
+    match &arguments.out {
+        Some(out) => fs::write(out, written)
+            .with_context(|| format!("--out: {} cannot be written", out.display()))?,
+        None => write!(io::stdout(), "{written}").context("standard output cannot be written")?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The frames' size and the circle that most of them agree on.
+fn circle(frames: &[PathBuf]) -> anyhow::Result<(NativeImage, AgreedCircle)> {
+    let mut size = None;
+    let mut circles = Vec::with_capacity(frames.len());
+    for path in frames {
+        let frame = read(path).with_context(|| path.display().to_string())?;
+        let (width, height) = (frame.width(), frame.height());
+        let NativeImage {
+            width: first_width,
+            height: first_height,
+        } = *size.get_or_insert(NativeImage { width, height });
+        if (width, height) != (first_width, first_height) {
+            bail!(
+                "{}: {width}x{height} pixels, but the first frame has {first_width}x{first_height}: \
+                 give frames of one camera at one size",
+                path.display()
+            );
+        }
+        match find_lens_circle(&frame) {
+            Some(circle) => circles.push(circle),
+            None => eprintln!("lookdown: {}: shows no lens circle", path.display()),
+        }
+    }
+    size.zip(agreed_circle(&circles)).context(
+        "no frame shows a lens circle: give brighter frames, in which black surrounds the picture",
+    )
+}
+
+fn read(path: &Path) -> anyhow::Result<crate::imaging::Frame> {
+    let encoded = fs::read(path).context("the file cannot be read")?;
+    Ok(decode(&encoded, &DecodeLimits::default())?.frame)
+}
+
+fn calibration(
+    arguments: &Arguments,
+    image: NativeImage,
+    agreed: &AgreedCircle,
+) -> anyhow::Result<NativeCalibration> {
+    let max_theta = arguments.field_of_view.to_radians() / 2.0;
+    let circle = agreed.circle;
+    let thousandths = |pixels: f64| (pixels * 1000.0).round() / 1000.0;
+    let lens = arguments.lens.with(NativeIdeal {
+        focal: Some(thousandths(
+            circle.radius / arguments.lens.radius(max_theta),
+        )),
+        fx: None,
+        fy: None,
+        cx: thousandths(circle.cx),
+        cy: thousandths(circle.cy),
+        max_theta: Some((max_theta * 1e6).floor() / 1e6),
+    });
+    lens.clone().into_lens().context(
+        "--field-of-view: no lens of this model sees so much; equidistant has no such limit",
+    )?;
+    Ok(NativeCalibration {
+        id: arguments.id.to_string(),
+        image,
+        lens,
+        mount: NativeMount {
+            height_m: arguments.height,
+            ..NativeMount::default()
+        },
+    })
+}
+
+/// What was measured, what was assumed, and how to tell.
+fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
+    let AgreedCircle {
+        circle,
+        agreeing,
+        spread,
+    } = agreed;
+    let frames = arguments.frames.len();
+    let how_sure = match (frames, *agreeing) {
+        (1, _) => "seen in one frame: a second one would show how sure that is".to_owned(),
+        (_, agreeing) if 2 * agreeing > frames => {
+            format!("{agreeing} of {frames} frames agree within {spread:.1} pixels")
+        }
+        (_, agreeing) => format!(
+            "unsure: only {agreeing} of {frames} frames agree; are they of one camera, and bright?"
+        ),
+    };
+    format!(
+        "circle: centre {:.1}, {:.1}, radius {:.1} pixels, {how_sure}; the lens ({}) and the field of \
+         view of {}° are what was given, not measured, and the camera is taken to look straight \
+         down; look at it with `lookdown calibration check FILE --preview FRAME --out P.jpg`",
+        circle.cx + 0.5,
+        circle.cy + 0.5,
+        circle.radius,
+        arguments
+            .lens
+            .to_possible_value()
+            .map_or_else(String::new, |value| value.get_name().to_owned()),
+        arguments.field_of_view,
+    )
+}
+
+fn field_of_view(text: &str) -> Result<f64, &'static str> {
+    let degrees = text.parse().ok();
+    degrees
+        .filter(|degrees| (60.0..=300.0).contains(degrees))
+        .ok_or("give 60 to 300 degrees")
+}
+
+fn height(text: &str) -> Result<f64, &'static str> {
+    let metres = text.parse().ok();
+    metres
+        .filter(|metres| *metres > 0.0 && *metres <= 100.0)
+        .ok_or("give metres above 0, at most 100")
+}
