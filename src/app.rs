@@ -68,10 +68,21 @@ pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
 pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow::Result<Engine> {
     let Assembly { engine, models } = assemble(settings)?;
     for request in requests {
-        let default = || engine.default_models().of(request.profile);
-        let name = request.model.as_deref().unwrap_or_else(default);
-        if models.registry().get(name).is_none() {
-            models.load(name)?;
+        let defaults = engine.default_models();
+        let needed = match &request.model {
+            Some(name) => vec![name.as_str()],
+            None => [
+                Some(defaults.of(request.profile)),
+                defaults.second_opinion(request.profile),
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
+        };
+        for name in needed {
+            if models.registry().get(name).is_none() {
+                models.load(name)?;
+            }
         }
     }
     Ok(engine)

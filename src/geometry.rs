@@ -15,6 +15,7 @@ pub mod pixels;
 pub mod stature;
 pub mod view_plan;
 pub mod virtual_view;
+pub mod zoom;
 
 pub use footprint::{BackProjection, Footprint};
 pub use lens::{Lens, LensError};

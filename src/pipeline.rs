@@ -5,6 +5,7 @@ mod default_models;
 mod engine;
 mod error;
 mod job;
+mod look;
 mod merge;
 mod parameters;
 mod plausibility;

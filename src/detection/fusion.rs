@@ -158,18 +158,28 @@ impl Cluster {
     }
 
     fn mean_witness_score(&self, candidates: &[Candidate]) -> f64 {
+        let mut words: Vec<(f64, usize)> = self
+            .members
+            .iter()
+            .map(|&index| {
+                let Candidate {
+                    bbox, view, score, ..
+                } = &candidates[index];
+                (score * bbox.iou(&self.bbox), *view)
+            })
+            .collect();
+        words.sort_by(|(a, _), (b, _)| b.total_cmp(a));
         let mut heard: Vec<usize> = Vec::with_capacity(WITNESSES);
         let mut sum = 0.0;
         let wanted = self.witnesses_wanted();
-        // Members are in descending order of score: a view's first word is its best.
-        for &index in &self.members {
+        // In descending order, a view's first word is its best.
+        for (word, view) in words {
             if heard.len() == wanted {
                 break;
             }
-            let Candidate { view, score, .. } = candidates[index];
             if !heard.contains(&view) {
                 heard.push(view);
-                sum += score;
+                sum += word;
             }
         }
         #[expect(clippy::cast_precision_loss, reason = "at most three witnesses")]

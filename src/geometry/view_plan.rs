@@ -100,36 +100,30 @@ impl ViewPlan {
         }
     }
 
-    /// One nadir view and a ring of twelve, all of 90°: nearly the recall of the paper's plan at
-    /// a tenth of its cost.
+    /// Four wide views, the least that sees everything from close to the nadir to the rim.
     #[must_use]
-    pub fn thirteen_wide() -> Self {
-        Self::rings(&[
-            Ring::of_degrees(0.0, 1, 90.0),
-            Ring::of_degrees(0.8, 12, 90.0),
-        ])
+    pub fn fast() -> Self {
+        Self::rings(&[Ring::of_degrees(0.9, 4, 95.0)])
     }
 
-    /// 24 views from wide near the nadir to narrow at the rim, where people are small: the best of
-    /// the plans of at most 24 views that were tried on real and on rendered frames.
+    /// 17 views from wide near the nadir to narrow at the rim, where people are small; closer looks
+    /// follow.
     #[must_use]
     pub fn balanced() -> Self {
         Self::rings(&[
-            Ring::of_degrees(0.05, 2, 75.0),
-            Ring::of_degrees(0.8, 12, 90.0),
+            Ring::of_degrees(0.0, 1, 90.0),
+            Ring::of_degrees(0.8, 6, 90.0),
             Ring::of_degrees(1.25, 10, 40.0),
         ])
     }
 
-    /// 56 views: more overlap at every distance, so that more views bear witness.
+    /// 24 views: more overlap between, so that more views bear witness; closer looks follow.
     #[must_use]
     pub fn quality() -> Self {
         Self::rings(&[
             Ring::of_degrees(0.05, 2, 75.0),
-            Ring::of_degrees(0.4, 4, 90.0),
-            Ring::of_degrees(0.7, 12, 75.0),
-            Ring::of_degrees(1.1, 18, 50.0),
-            Ring::of_degrees(1.25, 20, 40.0),
+            Ring::of_degrees(0.8, 12, 90.0),
+            Ring::of_degrees(1.25, 10, 40.0),
         ])
     }
 

@@ -1,6 +1,6 @@
 //! Virtual views: pinhole cameras that share the fisheye camera's centre.
 
-use nalgebra::{Rotation3, Vector2, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 
 use super::{Mount, Pixel, Ray};
 
@@ -45,6 +45,24 @@ impl VirtualView {
         Self {
             camera_from_view,
             focal: f64::from(width) / 2.0 / (direction.field_of_view / 2.0).tan(),
+            width,
+            height,
+        }
+    }
+
+    /// A view along a ray (camera frame), `focal` in pixels, with the projected `world_up` as image
+    /// up; along the vertical itself, image up is that of the frame.
+    #[must_use]
+    pub fn looking_along(axis: &Ray, focal: f64, mount: &Mount, width: u32, height: u32) -> Self {
+        let axis = axis.normalize();
+        let across = |up: Ray| (up - axis * axis.dot(&up)).try_normalize(UPRIGHT_MIN_SINE);
+        let up = across(mount.world_up()).or_else(|| across(-Ray::y()));
+        // One of two directions is always across the axis; a third could only be image right.
+        let down = -up.unwrap_or_else(Ray::x);
+        let columns = Matrix3::from_columns(&[down.cross(&axis), down, axis]);
+        Self {
+            camera_from_view: Rotation3::from_matrix_unchecked(columns),
+            focal,
             width,
             height,
         }

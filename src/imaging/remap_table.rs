@@ -7,6 +7,8 @@ use crate::geometry::{Lens, Pixel, VirtualView};
 const OUTSIDE: u32 = u32::MAX;
 /// Weights are fractions of this, so that 1 itself can be told.
 const WEIGHT_ONE: f32 = 32_768.0;
+/// Interpolated tables are exact at every so many pixels.
+const NODE_STEP: u32 = 8;
 /// What view pixels outside the lens image are filled with (0 to 255).
 const FILL: f32 = 0.0;
 
@@ -35,16 +37,69 @@ impl RemapTable {
         let samples = rows.flat_map(|y| (0..view.width()).map(move |x| (x, y)));
         let samples = samples.map(|(x, y)| {
             let ray = view.ray_in_camera(&Pixel::new(f64::from(x), f64::from(y)));
-            lens.project(&ray)
-                .and_then(|position| Sample::at(&position, frame_width, frame_height))
-                .unwrap_or(Sample {
-                    pixel_index: OUTSIDE,
-                    right_weight: 0,
-                    lower_weight: 0,
-                })
+            Sample::at_or_outside(lens.project(&ray), frame_width, frame_height)
         });
         Self {
             samples: samples.collect(),
+            frame_width,
+            frame_height,
+        }
+    }
+
+    /// As [`RemapTable::new`], but positions are exact only at every [`NODE_STEP`]th pixel and
+    /// interpolated bilinearly in between; blocks that the rim crosses stay exact. In a view of 90°
+    /// and 416 pixels into a frame of 1600 it is off by less than a tenth of a pixel, in narrower
+    /// ones by less.
+    #[must_use]
+    pub fn interpolated(
+        view: &VirtualView,
+        lens: &Lens,
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let exact = |x: u32, y: u32| {
+            lens.project(&view.ray_in_camera(&Pixel::new(f64::from(x), f64::from(y))))
+        };
+        let (blocks_across, blocks_down) = (
+            view.width().div_ceil(NODE_STEP),
+            view.height().div_ceil(NODE_STEP),
+        );
+        let nodes: Vec<Vec<Option<Pixel>>> = (0..=blocks_down)
+            .map(|row| {
+                let nodes = 0..=blocks_across;
+                nodes
+                    .map(|column| exact(column * NODE_STEP, row * NODE_STEP))
+                    .collect()
+            })
+            .collect();
+        let mut samples = Vec::with_capacity((view.width() * view.height()) as usize);
+        for y in 0..view.height() {
+            let (upper, lower) = (
+                &nodes[(y / NODE_STEP) as usize],
+                &nodes[(y / NODE_STEP) as usize + 1],
+            );
+            let down = f64::from(y % NODE_STEP) / f64::from(NODE_STEP);
+            for x in 0..view.width() {
+                let block = (x / NODE_STEP) as usize;
+                let across = f64::from(x % NODE_STEP) / f64::from(NODE_STEP);
+                let corners = (
+                    upper[block],
+                    upper[block + 1],
+                    lower[block],
+                    lower[block + 1],
+                );
+                let position = match corners {
+                    (Some(a), Some(b), Some(c), Some(d)) => {
+                        let (above, below) = (a + (b - a) * across, c + (d - c) * across);
+                        Some(above + (below - above) * down)
+                    }
+                    _ => exact(x, y),
+                };
+                samples.push(Sample::at_or_outside(position, frame_width, frame_height));
+            }
+        }
+        Self {
+            samples,
             frame_width,
             frame_height,
         }
@@ -110,6 +165,16 @@ impl RemapTable {
 }
 
 impl Sample {
+    /// The sample at `position`, or the mark of a pixel that sees nothing.
+    fn at_or_outside(position: Option<Pixel>, frame_width: u32, frame_height: u32) -> Self {
+        let sample = position.and_then(|at| Self::at(&at, frame_width, frame_height));
+        sample.unwrap_or(Self {
+            pixel_index: OUTSIDE,
+            right_weight: 0,
+            lower_weight: 0,
+        })
+    }
+
     /// The sample at `position` (pixel centres); `None` outside the frame. Within the outer half
     /// of a border pixel its centre is sampled.
     fn at(position: &Pixel, frame_width: u32, frame_height: u32) -> Option<Self> {

@@ -9,7 +9,7 @@ use crate::{
     calibration::CameraGeometry,
     detection::{BBox, ViewPixels},
     geometry::{
-        BackProjection, Footprint, ViewPlan, VirtualView,
+        BackProjection, Footprint, Ray, ViewPlan, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
     },
     imaging::{Frame, Letterbox, NetworkInput, RemapTable, ViewBatch},
@@ -22,14 +22,14 @@ const OUTLINE_STRIDE: usize = 4;
 #[derive(Debug)]
 pub(super) struct CameraRig {
     geometry: CameraGeometry,
-    looks: Looks,
+    views: Views,
 }
 
 /// How the frame reaches the network.
 #[derive(Debug)]
-enum Looks {
+enum Views {
     /// Through virtual views.
-    Views(Vec<(VirtualView, RemapTable)>),
+    Virtual(Vec<(VirtualView, RemapTable)>),
     /// As it is.
     Direct(Letterbox),
 }
@@ -44,22 +44,41 @@ impl CameraRig {
         plan: Option<&ViewPlan>,
         input: &NetworkInput,
     ) -> Self {
-        let looks = match plan {
-            None => Looks::Direct(Letterbox::new(frame_width, frame_height, input)),
+        let views = match plan {
+            None => Views::Direct(Letterbox::new(frame_width, frame_height, input)),
             Some(plan) => {
                 let views = plan.views(&geometry.mount, input.width, input.height);
                 let tabulated = views.into_par_iter().map(|view| {
                     let table = RemapTable::new(&view, &geometry.lens, frame_width, frame_height);
                     (view, table)
                 });
-                Looks::Views(
+                Views::Virtual(
                     tabulated
                         .filter(|(_, table)| table.inside_share() > 0.0)
                         .collect(),
                 )
             }
         };
-        Self { geometry, looks }
+        Self { geometry, views }
+    }
+
+    /// The same camera with other views, for one frame: tables are interpolated, which costs a
+    /// fraction of exact ones and moves no sample by a visible amount.
+    pub(super) fn with_views(
+        &self,
+        views: Vec<VirtualView>,
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let lens = &self.geometry.lens;
+        let tabulated = views.into_par_iter().map(|view| {
+            let table = RemapTable::interpolated(&view, lens, frame_width, frame_height);
+            (view, table)
+        });
+        Self {
+            views: Views::Virtual(tabulated.collect()),
+            geometry: self.geometry.clone(),
+        }
     }
 
     /// Lens and mount.
@@ -69,17 +88,17 @@ impl CameraRig {
 
     /// How many views the network has to see.
     pub(super) fn view_count(&self) -> usize {
-        match &self.looks {
-            Looks::Views(views) => views.len(),
-            Looks::Direct(_) => 1,
+        match &self.views {
+            Views::Virtual(views) => views.len(),
+            Views::Direct(_) => 1,
         }
     }
 
     /// Memory held by the tables, bytes.
     pub(super) fn bytes(&self) -> usize {
-        match &self.looks {
-            Looks::Views(views) => views.iter().map(|(_, table)| table.bytes()).sum(),
-            Looks::Direct(_) => 0,
+        match &self.views {
+            Views::Virtual(views) => views.iter().map(|(_, table)| table.bytes()).sum(),
+            Views::Direct(_) => 0,
         }
     }
 
@@ -92,13 +111,13 @@ impl CameraRig {
         batch: &mut ViewBatch,
     ) {
         let slots = batch.prepare(range.len(), input);
-        match &self.looks {
-            Looks::Direct(letterbox) => {
+        match &self.views {
+            Views::Direct(letterbox) => {
                 for slot in slots {
                     letterbox.render(frame, input, slot);
                 }
             }
-            Looks::Views(views) => {
+            Views::Virtual(views) => {
                 let jobs: Vec<_> = views[range].iter().zip(slots).collect();
                 jobs.into_par_iter()
                     .for_each(|((_, table), slot)| table.render(frame, input, slot));
@@ -113,35 +132,36 @@ impl CameraRig {
         bbox: &BBox<ViewPixels>,
         back_projection: BackProjection,
     ) -> Option<Footprint> {
-        match &self.looks {
-            Looks::Views(views) => Footprint::of_view_box(
+        match &self.views {
+            Views::Virtual(views) => Footprint::of_view_box(
                 bbox.corners(),
                 back_projection,
                 &views[view].0,
                 &self.geometry.lens,
                 &self.geometry.mount,
             ),
-            Looks::Direct(letterbox) => Some(Footprint::of_frame_box(
+            Views::Direct(letterbox) => Some(Footprint::of_frame_box(
                 bbox.corners().map(|side| letterbox.frame_from_input(side)),
             )),
         }
     }
 
-    /// In how many views a person with this footprint is wholly visible.
-    pub(super) fn views_holding(&self, footprint: &Footprint) -> usize {
-        let Looks::Views(views) = &self.looks else {
+    /// Some of a footprint's outline as rays; what lies beyond the lens image is left out.
+    pub(super) fn outline(&self, footprint: &Footprint) -> Vec<Ray> {
+        let points = footprint.outline().iter().step_by(OUTLINE_STRIDE);
+        let rays = points.filter_map(|point| {
+            let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
+            self.geometry.lens.unproject(&pixel)
+        });
+        rays.collect()
+    }
+
+    /// How many views show the whole outline (rays); the frame itself shows everything.
+    pub(super) fn views_holding(&self, outline: &[Ray]) -> usize {
+        let Views::Virtual(views) = &self.views else {
             return 1;
         };
-        let rays: Vec<_> = footprint
-            .outline()
-            .iter()
-            .step_by(OUTLINE_STRIDE)
-            .filter_map(|point| {
-                let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
-                self.geometry.lens.unproject(&pixel)
-            })
-            .collect();
-        let holds = |view: &VirtualView| rays.iter().all(|ray| view.holds(ray));
+        let holds = |view: &VirtualView| outline.iter().all(|ray| view.holds(ray));
         views.iter().filter(|(view, _)| holds(view)).count()
     }
 }

@@ -6,10 +6,15 @@ use crate::inference::Device;
 /// A profile's model: the one table of them.
 fn preferred(profile: Profile, device: Device) -> &'static str {
     match (profile, device) {
-        (Profile::Paper | Profile::Fast | Profile::Direct, Device::Cpu) => SSDLITE_INT8,
-        (Profile::Paper | Profile::Fast | Profile::Direct, _) => STAND_IN,
-        (Profile::Balanced | Profile::Quality, _) => "nanodet_g_416",
+        (Profile::Paper | Profile::Direct, Device::Cpu) => SSDLITE_INT8,
+        (Profile::Paper | Profile::Direct, _) => STAND_IN,
+        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => "nanodet_g_416",
     }
+}
+
+/// Whose model takes half of a profile's closer looks.
+fn second_opinion_of(profile: Profile) -> Option<Profile> {
+    (profile == Profile::Quality).then_some(Profile::Paper)
 }
 
 /// ONNX Runtime has integer kernels for it on processors alone.
@@ -62,6 +67,14 @@ impl DefaultModels {
         }
     }
 
+    /// The model that gives a second opinion in a profile's closer looks, if that profile has one
+    /// and it is another than its own.
+    #[must_use]
+    pub fn second_opinion(&self, profile: Profile) -> Option<&str> {
+        let name = self.of(second_opinion_of(profile)?);
+        (name != self.of(profile)).then_some(name)
+    }
+
     /// All of them, each once; that of the default profile comes first.
     #[must_use]
     pub fn names(&self) -> Vec<&str> {
@@ -85,7 +98,7 @@ mod tests {
         let all = DefaultModels::per_profile(Device::Cpu, |_| true);
         assert_eq!(
             all.names(),
-            [all.of(Profile::Balanced), all.of(Profile::Fast)]
+            [all.of(Profile::Balanced), all.of(Profile::Paper)]
         );
         let few = DefaultModels::per_profile(Device::Cpu, |_| false);
         assert_eq!(few.names(), [STAND_IN]);
@@ -94,10 +107,21 @@ mod tests {
     #[test]
     fn only_a_processor_gets_the_int8_form() {
         let gpu = DefaultModels::per_profile(Device::Cuda(0), |_| true);
-        assert_eq!(gpu.of(Profile::Fast), STAND_IN);
+        assert_eq!(gpu.of(Profile::Paper), STAND_IN);
         let cpu = DefaultModels::per_profile(Device::Cpu, |_| true);
-        assert_eq!(cpu.of(Profile::Fast), SSDLITE_INT8);
+        assert_eq!(cpu.of(Profile::Paper), SSDLITE_INT8);
         assert_eq!(cpu.of(Profile::Quality), gpu.of(Profile::Quality));
+    }
+
+    #[test]
+    fn a_second_opinion_is_another_model_s() {
+        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
+        assert_eq!(all.second_opinion(Profile::Quality), Some(SSDLITE_INT8));
+        assert_eq!(all.second_opinion(Profile::Balanced), None);
+        let few = DefaultModels::per_profile(Device::Cpu, |_| false);
+        assert_eq!(few.second_opinion(Profile::Quality), None);
+        let one = DefaultModels::One("mine".to_owned());
+        assert_eq!(one.second_opinion(Profile::Quality), None);
     }
 
     #[test]

@@ -13,17 +13,18 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use self::camera::FrameCamera;
 use super::{
     DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person, PipelineError,
-    Profile, StageTimings, error::internal, merge, report::ModelUsed, rig_cache::RigCache,
+    Profile, StageTimings, camera_rig::CameraRig, error::internal, look::Look, merge,
+    report::ModelUsed, rig_cache::RigCache,
 };
 use crate::{
     calibration::CalibrationFolder,
     detection::RefinementParameters,
-    geometry::FieldOfViewReading,
+    geometry::{FieldOfViewReading, zoom::zoomed_views},
     imaging::{
         Frame, ViewBatch,
         decode::{DecodeLimits, decode},
     },
-    inference::{Model, ModelRegistry, ViewDetection},
+    inference::{Model, ModelRegistry},
 };
 
 /// The smallest frame side that can hold a lens image, pixels.
@@ -65,7 +66,7 @@ pub struct Observation {
     camera: FrameCamera,
     model: Arc<Model>,
     profile: Profile,
-    per_view: Vec<Vec<ViewDetection>>,
+    looks: Vec<Look>,
     batch_count: usize,
     non_finite: usize,
     timings: StageTimings,
@@ -76,7 +77,7 @@ impl Observation {
     /// How many views the network saw.
     #[must_use]
     pub fn view_count(&self) -> usize {
-        self.camera.rig.view_count()
+        self.looks.iter().map(|look| look.rig.view_count()).sum()
     }
 
     /// Where the time went so far: `refine` and `total` are still to come.
@@ -131,6 +132,7 @@ impl Engine {
         let refining = Instant::now();
         let parameters = &job.parameters;
         let persons = self.persons(&observation, &parameters.refinement);
+        let view_count = observation.view_count();
         let calibration = observation.camera.used;
         let report = DetectionReport {
             request_id: job.request_id.clone(),
@@ -150,11 +152,11 @@ impl Engine {
             profile: parameters.profile,
             refinement: parameters.refinement,
             persons,
-            view_count: observation.camera.rig.view_count(),
+            view_count,
             batch_count: observation.batch_count,
             non_finite: observation.non_finite,
             timings: StageTimings {
-                refine: refining.elapsed(),
+                refine: observation.timings.refine + refining.elapsed(),
                 total: job.arrived.elapsed(),
                 ..observation.timings
             },
@@ -191,7 +193,7 @@ impl Engine {
 
         let mut observation = Observation {
             profile: job.parameters.profile,
-            per_view: Vec::with_capacity(camera.rig.view_count()),
+            looks: Vec::with_capacity(3),
             batch_count: 0,
             non_finite: 0,
             timings: StageTimings {
@@ -205,7 +207,14 @@ impl Engine {
             model,
             warnings,
         };
-        self.infer(&mut observation)?;
+        let (rig, model) = (
+            Arc::clone(&observation.camera.rig),
+            Arc::clone(&observation.model),
+        );
+        self.look(&mut observation, rig, model)?;
+        for (rig, model) in self.closer(job, &mut observation) {
+            self.look(&mut observation, Arc::new(rig), model)?;
+        }
         Ok(observation)
     }
 
@@ -216,13 +225,8 @@ impl Engine {
         observation: &Observation,
         refinement: &RefinementParameters,
     ) -> Vec<Person> {
-        merge::persons(
-            &observation.per_view,
-            &observation.camera.rig,
-            observation.model.input(),
-            observation.profile.back_projection(),
-            refinement,
-        )
+        let back_projection = observation.profile.back_projection();
+        merge::persons(&observation.looks, back_projection, refinement)
     }
 
     /// The model that a request named, or the one for its profile.
@@ -241,8 +245,50 @@ impl Engine {
         })
     }
 
-    /// Renders the views and runs the network on them, batch by batch.
-    fn infer(&self, observation: &mut Observation) -> Result<(), PipelineError> {
+    /// Closer looks at whatever may be a person, where the profile has them: by the model that looked
+    /// first, or half by it and half by another, if the request leaves the choice.
+    fn closer(
+        &self,
+        job: &DetectJob,
+        observation: &mut Observation,
+    ) -> Vec<(CameraRig, Arc<Model>)> {
+        let profile = observation.profile;
+        let Some(closer) = profile.closer_look() else {
+            return Vec::new();
+        };
+        let started = Instant::now();
+        let back_projection = profile.back_projection();
+        let outlines = merge::outlines(&observation.looks, back_projection, &closer.first_look);
+        let placed = Instant::now();
+        let mut models = vec![Arc::clone(&observation.model)];
+        if job.parameters.model.is_none() {
+            let second = self.options.default_models.second_opinion(profile);
+            models.extend(second.and_then(|name| self.models.get(name)));
+        }
+        let most_views = closer.most_views / models.len();
+        let rig = &observation.camera.rig;
+        let (width, height) = (observation.frame.width(), observation.frame.height());
+        let rigs = models.into_iter().filter_map(|model| {
+            let size = [model.input().width, model.input().height];
+            let mount = &rig.geometry().mount;
+            let views = zoomed_views(&outlines, most_views, closer.fill, mount, size);
+            let tabulate = || rig.with_views(views, width, height);
+            let rig = self.remappers.install(tabulate);
+            (rig.view_count() > 0).then_some((rig, model))
+        });
+        let rigs = rigs.collect();
+        observation.timings.refine += placed - started;
+        observation.timings.remap += placed.elapsed();
+        rigs
+    }
+
+    /// Renders the views of a rig and runs the network on them, batch by batch.
+    fn look(
+        &self,
+        observation: &mut Observation,
+        rig: Arc<CameraRig>,
+        model: Arc<Model>,
+    ) -> Result<(), PipelineError> {
         let waiting = Instant::now();
         // Guards nothing that a panic could leave half changed.
         let _turn = self
@@ -251,29 +297,30 @@ impl Engine {
             .unwrap_or_else(PoisonError::into_inner);
         observation.timings.queue += waiting.elapsed();
         let mut batch = ViewBatch::default();
-        let views = observation.view_count();
+        let views = rig.view_count();
+        let mut per_view = Vec::with_capacity(views);
         let step = self.options.max_batch_views.get();
         for start in (0..views).step_by(step) {
             let remapping = Instant::now();
             let range = start..views.min(start + step);
-            let Observation {
-                frame,
-                camera,
-                model,
-                ..
-            } = &*observation;
+            let frame = &observation.frame;
             self.remappers
-                .install(|| camera.rig.render(frame, range, model.input(), &mut batch));
+                .install(|| rig.render(frame, range, model.input(), &mut batch));
             let inferring = Instant::now();
             let found = model
                 .detect(&batch)
                 .map_err(|error| internal(anyhow::Error::new(error)))?;
             observation.timings.remap += inferring - remapping;
             observation.timings.inference += inferring.elapsed();
-            observation.per_view.extend(found.per_view);
+            per_view.extend(found.per_view);
             observation.non_finite += found.non_finite;
             observation.batch_count += 1;
         }
+        observation.looks.push(Look {
+            rig,
+            model,
+            per_view,
+        });
         Ok(())
     }
 }

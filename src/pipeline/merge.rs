@@ -1,17 +1,22 @@
 //! From boxes in views to persons in the frame.
 
-use super::{Person, camera_rig::CameraRig, plausibility::worth};
+use super::{
+    Person,
+    camera_rig::CameraRig,
+    look::{Find, Look, finds, views_holding},
+    plausibility::worth,
+};
 use crate::{
     detection::{
-        BBox, Candidate, FramePixels, Refinement, RefinementParameters, ViewPixels, refine,
+        BBox, Candidate, FramePixels, MergedDetection, Refinement, RefinementParameters,
+        ViewPixels, refine,
     },
     geometry::{
-        BackProjection, Footprint, OrientedBox,
+        BackProjection, Footprint, OrientedBox, Ray,
         floor::{bearing, floor_position},
         oriented_box::vertical_in_frame,
     },
     imaging::NetworkInput,
-    inference::ViewDetection,
 };
 
 /// A box this close to its view's border (share of the view's width) is probably cut off.
@@ -43,24 +48,15 @@ impl Mapped {
 
 /// Maps the boxes of every view to the frame and merges them into persons.
 pub(super) fn persons(
-    per_view: &[Vec<ViewDetection>],
-    rig: &CameraRig,
-    input: &NetworkInput,
+    looks: &[Look],
     back_projection: BackProjection,
     parameters: &RefinementParameters,
 ) -> Vec<Person> {
-    let mapped: Vec<Mapped> = per_view
-        .iter()
-        .enumerate()
-        .flat_map(|(view, detections)| detections.iter().map(move |found| (view, found)))
-        .filter_map(|(view, found)| map(view, found, rig, input, back_projection))
-        .collect();
-    // Suppression compares what the detector said; fusion weighs it.
-    let candidates: Vec<Candidate> = match parameters.refinement {
-        Refinement::Fusion => mapped.iter().map(|one| one.weighed(rig)).collect(),
-        _ => mapped.iter().map(|one| one.candidate).collect(),
+    let Some(Look { rig, .. }) = looks.first() else {
+        return Vec::new();
     };
-    refine(&candidates, parameters)
+    let (mapped, merged) = merged(looks, rig, back_projection, parameters);
+    merged
         .into_iter()
         .filter_map(|merged| {
             let members: Vec<&Mapped> = merged
@@ -73,22 +69,52 @@ pub(super) fn persons(
         .collect()
 }
 
-fn map(
-    view: usize,
-    found: &ViewDetection,
-    rig: &CameraRig,
-    input: &NetworkInput,
+/// The outlines (rays) of what may be persons, the likeliest first: each that of its best box.
+pub(super) fn outlines(
+    looks: &[Look],
     back_projection: BackProjection,
-) -> Option<Mapped> {
-    let footprint = rig.footprint(view, &found.bbox, back_projection)?;
+    parameters: &RefinementParameters,
+) -> Vec<Vec<Ray>> {
+    let Some(Look { rig, .. }) = looks.first() else {
+        return Vec::new();
+    };
+    let (mapped, merged) = merged(looks, rig, back_projection, parameters);
+    let best = merged.iter().filter_map(|merged| merged.members.first());
+    best.map(|&member| rig.outline(&mapped[member].footprint))
+        .collect()
+}
+
+fn merged(
+    looks: &[Look],
+    rig: &CameraRig,
+    back_projection: BackProjection,
+    parameters: &RefinementParameters,
+) -> (Vec<Mapped>, Vec<MergedDetection>) {
+    let mapped: Vec<Mapped> = finds(looks)
+        .filter_map(|find| map(&find, looks, back_projection))
+        .collect();
+    // Suppression compares what the detector said; fusion weighs it.
+    let candidates: Vec<Candidate> = match parameters.refinement {
+        Refinement::Fusion => mapped.iter().map(|one| one.weighed(rig)).collect(),
+        _ => mapped.iter().map(|one| one.candidate).collect(),
+    };
+    let merged = refine(&candidates, parameters);
+    (mapped, merged)
+}
+
+fn map(find: &Find<'_>, looks: &[Look], back_projection: BackProjection) -> Option<Mapped> {
+    let Look { rig, model, .. } = find.look;
+    let found = find.detection;
+    let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
     let bbox = BBox::new(footprint.bounds()).ok()?;
+    let holding = views_holding(looks, &rig.outline(&footprint));
     #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
-    let expected_views = rig.views_holding(&footprint).max(1) as f64;
-    let cut_off = touches_border(&found.bbox, input);
+    let expected_views = holding.max(1) as f64;
+    let cut_off = touches_border(&found.bbox, model.input());
     let candidate = Candidate {
         bbox,
         score: found.score,
-        view,
+        view: find.number,
         coordinate_weight: if cut_off { BORDER_WEIGHT } else { 1.0 },
         expected_views,
     };

@@ -1,7 +1,7 @@
 //! Profiles: named trade-offs between cost and accuracy.
 
 use crate::{
-    detection::Refinement,
+    detection::{Refinement, RefinementParameters},
     geometry::{BackProjection, FieldOfViewReading, ViewPlan},
 };
 
@@ -13,12 +13,12 @@ use crate::{
 pub enum Profile {
     /// The paper's 128 views with corner back-projection and Soft-NMS.
     Paper,
-    /// 13 wide views.
+    /// Four wide views.
     Fast,
-    /// 24 views, wide near the nadir and narrow at the rim.
+    /// 17 views, wide near the nadir and narrow at the rim, and up to 7 closer looks.
     #[default]
     Balanced,
-    /// 56 views with more overlap at every distance.
+    /// 24 views and up to 40 closer looks, half of them by a second model.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -58,11 +58,21 @@ impl Profile {
     pub fn view_plan(self, paper_reading: FieldOfViewReading) -> Option<ViewPlan> {
         match self {
             Self::Paper => Some(ViewPlan::paper(paper_reading)),
-            Self::Fast => Some(ViewPlan::thirteen_wide()),
+            Self::Fast => Some(ViewPlan::fast()),
             Self::Balanced => Some(ViewPlan::balanced()),
             Self::Quality => Some(ViewPlan::quality()),
             Self::Direct => None,
         }
+    }
+
+    /// The closer look that follows the plan's views, if any.
+    pub(super) fn closer_look(self) -> Option<CloserLook> {
+        let most_views = match self {
+            Self::Balanced => 7,
+            Self::Quality => 40,
+            Self::Paper | Self::Fast | Self::Direct => return None,
+        };
+        Some(CloserLook::of(most_views))
     }
 
     /// How boxes are taken back to the frame.
@@ -81,6 +91,33 @@ impl Profile {
             Self::Paper => Refinement::SoftNmsGaussian,
             Self::Direct => Refinement::Nms,
             Self::Fast | Self::Balanced | Self::Quality => Refinement::Fusion,
+        }
+    }
+}
+
+/// A closer look at whatever may be a person after the first one.
+pub(super) struct CloserLook {
+    /// Most views it may take.
+    pub(super) most_views: usize,
+    /// The share of a view's shorter side that a person fills in it. More confirms mistakes: seen
+    /// from close by, a half person or a poster looks like a whole one.
+    pub(super) fill: f64,
+    /// How the first look's boxes become what is looked at.
+    pub(super) first_look: RefinementParameters,
+}
+
+impl CloserLook {
+    fn of(most_views: usize) -> Self {
+        Self {
+            most_views,
+            fill: 1.0 / 3.0,
+            first_look: RefinementParameters {
+                refinement: Refinement::Fusion,
+                iou_threshold: 0.5,
+                sigma: 0.3,
+                score_threshold: 0.03,
+                max_detections: 500,
+            },
         }
     }
 }

@@ -49,7 +49,7 @@ async fn metrics_count_frames_views_persons_and_failures() {
         "lookdown_compute_input_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
         "lookdown_compute_infer_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
         "lookdown_compute_output_duration_seconds_count{model=\"eager\",profile=\"fast\"} 1",
-        "lookdown_views_total 13",
+        "lookdown_views_total 4",
         "lookdown_batches_total 1",
         "lookdown_pending_frames 0",
     ] {

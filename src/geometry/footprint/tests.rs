@@ -112,7 +112,7 @@ fn tilted_ellipses_are_tight_where_corner_hulls_are_not() {
 fn a_box_beyond_the_lens_image_has_no_footprint() {
     let lens = Lens::equidistant_circle(299.5, 299.5, 300.0, 0.6).expect("plausible");
     let mount = Mount::default();
-    let view = &ViewPlan::thirteen_wide().views(&mount, 300, 300)[1];
+    let view = &ViewPlan::balanced().views(&mount, 300, 300)[1];
     let top = [100.0, 0.0, 200.0, 60.0];
     for back_projection in [BackProjection::CornerHull, BackProjection::TiltedEllipse] {
         assert_eq!(
@@ -143,7 +143,7 @@ proptest! {
         x in 0.0..260.0, y in 0.0..260.0, width in 2.0..40.0, height in 2.0..40.0, view in 0_usize..13,
     ) {
         let (lens, mount) = (lens(), Mount::default());
-        let view = &ViewPlan::thirteen_wide().views(&mount, 300, 300)[view];
+        let view = &ViewPlan::balanced().views(&mount, 300, 300)[view];
         let view_box = [x, y, x + width, y + height];
         let footprint = Footprint::of_view_box(view_box, BackProjection::TiltedEllipse, view, &lens, &mount);
         if let Some(footprint) = footprint {

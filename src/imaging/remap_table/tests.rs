@@ -113,7 +113,7 @@ fn a_view_of_a_real_lens_matches_the_per_pixel_reference() {
     let frame = noise(200, 200);
     let lens = Lens::equidistant_circle(99.5, 99.5, 100.0, 1.5).unwrap();
     let input = NetworkInput::plain(64, 64);
-    for view in ViewPlan::thirteen_wide().views(&Mount::default(), 64, 64) {
+    for view in ViewPlan::balanced().views(&Mount::default(), 64, 64) {
         let table = RemapTable::new(&view, &lens, 200, 200);
         let mut slot = vec![-1.0; input.view_len()];
         table.render(&frame, &input, &mut slot);
@@ -136,6 +136,28 @@ fn a_view_of_a_real_lens_matches_the_per_pixel_reference() {
             }
         }
         assert!((table.inside_share() - f64::from(inside) / 4096.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn an_interpolated_table_samples_where_the_exact_one_does() {
+    let lens = Lens::equidistant_circle(799.5, 799.5, 800.0, 1.5).unwrap();
+    for view in ViewPlan::balanced().views(&Mount::default(), 416, 416) {
+        let exact = RemapTable::new(&view, &lens, 1600, 1600);
+        let interpolated = RemapTable::interpolated(&view, &lens, 1600, 1600);
+        for (exact, found) in exact.samples.iter().zip(&interpolated.samples) {
+            assert_eq!(exact.pixel_index == OUTSIDE, found.pixel_index == OUTSIDE);
+            let [exact, found] = [exact, found].map(|sample| {
+                let place = |pixels: u32, weight: u16| {
+                    f64::from(pixels) + f64::from(weight) / f64::from(WEIGHT_ONE)
+                };
+                Pixel::new(
+                    place(sample.pixel_index % 1600, sample.right_weight),
+                    place(sample.pixel_index / 1600, sample.lower_weight),
+                )
+            });
+            assert!((exact - found).norm() < 0.1, "{exact} {found}");
+        }
     }
 }
 

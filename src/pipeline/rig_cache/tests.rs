@@ -23,7 +23,7 @@ fn rig() -> CameraRig {
         lens: Lens::equidistant_circle(31.5, 31.5, 32.0, 1.5).unwrap(),
         mount: Mount::default(),
     };
-    let plan = ViewPlan::thirteen_wide();
+    let plan = ViewPlan::balanced();
     CameraRig::new(geometry, 64, 64, Some(&plan), &NetworkInput::plain(32, 32))
 }
 
