@@ -106,20 +106,10 @@ impl ViewPlan {
         Self::rings(&[Ring::of_degrees(0.9, 4, 95.0)])
     }
 
-    /// 17 views from wide near the nadir to narrow at the rim, where people are small; closer looks
-    /// follow.
+    /// 24 views from wide near the nadir to narrow at the rim, where people are small: the best of
+    /// the plans of at most 24 views that were tried on real and on rendered frames.
     #[must_use]
     pub fn balanced() -> Self {
-        Self::rings(&[
-            Ring::of_degrees(0.0, 1, 90.0),
-            Ring::of_degrees(0.8, 6, 90.0),
-            Ring::of_degrees(1.25, 10, 40.0),
-        ])
-    }
-
-    /// 24 views: more overlap between, so that more views bear witness; closer looks follow.
-    #[must_use]
-    pub fn quality() -> Self {
         Self::rings(&[
             Ring::of_degrees(0.05, 2, 75.0),
             Ring::of_degrees(0.8, 12, 90.0),

@@ -15,10 +15,10 @@ pub enum Profile {
     Paper,
     /// Four wide views.
     Fast,
-    /// 17 views, wide near the nadir and narrow at the rim, and up to 7 closer looks.
+    /// 24 views, wide near the nadir and narrow at the rim.
     #[default]
     Balanced,
-    /// 24 views and up to 40 closer looks, half of them by a second model.
+    /// The views of `balanced` and up to 40 closer looks, half of them by a second model.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -59,20 +59,24 @@ impl Profile {
         match self {
             Self::Paper => Some(ViewPlan::paper(paper_reading)),
             Self::Fast => Some(ViewPlan::fast()),
-            Self::Balanced => Some(ViewPlan::balanced()),
-            Self::Quality => Some(ViewPlan::quality()),
+            Self::Balanced | Self::Quality => Some(ViewPlan::balanced()),
             Self::Direct => None,
         }
     }
 
     /// The closer look that follows the plan's views, if any.
     pub(super) fn closer_look(self) -> Option<CloserLook> {
-        let most_views = match self {
-            Self::Balanced => 7,
-            Self::Quality => 40,
-            Self::Paper | Self::Fast | Self::Direct => return None,
-        };
-        Some(CloserLook::of(most_views))
+        (self == Self::Quality).then_some(CloserLook {
+            most_views: 40,
+            fill: 1.0 / 3.0,
+            first_look: RefinementParameters {
+                refinement: Refinement::Fusion,
+                iou_threshold: 0.5,
+                sigma: 0.3,
+                score_threshold: 0.03,
+                max_detections: 500,
+            },
+        })
     }
 
     /// How boxes are taken back to the frame.
@@ -104,20 +108,4 @@ pub(super) struct CloserLook {
     pub(super) fill: f64,
     /// How the first look's boxes become what is looked at.
     pub(super) first_look: RefinementParameters,
-}
-
-impl CloserLook {
-    fn of(most_views: usize) -> Self {
-        Self {
-            most_views,
-            fill: 1.0 / 3.0,
-            first_look: RefinementParameters {
-                refinement: Refinement::Fusion,
-                iou_threshold: 0.5,
-                sigma: 0.3,
-                score_threshold: 0.03,
-                max_detections: 500,
-            },
-        }
-    }
 }
