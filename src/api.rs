@@ -1,5 +1,7 @@
 //! The only place that knows HTTP. One page of routes; every failure leaves as one envelope.
 
+mod administrator;
+mod calibrations;
 mod detect;
 mod envelope;
 mod health;
@@ -27,6 +29,13 @@ fn routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(health::livez))
         .routes(routes!(health::readyz))
         .routes(routes!(health::metrics))
+        .routes(routes!(calibrations::list))
+        .routes(routes!(
+            calibrations::get,
+            calibrations::put,
+            calibrations::delete
+        ))
+        .routes(routes!(calibrations::views::get_views))
         .routes(routes!(openapi::openapi_json))
         .routes(routes!(repository::index))
         .routes(routes!(repository::load))

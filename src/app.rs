@@ -10,21 +10,24 @@ use tokio::{net::TcpListener, task::spawn_blocking, time::sleep};
 
 use crate::{
     api::{self, ApiOptions, ApiState, Phase, Readiness},
-    calibration::CalibrationFolder,
+    calibration::{Calibrations, FolderStore},
     imaging::decode::DecodeLimits,
-    inference::{ModelRepository, ModelWatcher},
+    inference::ModelRepository,
     metrics::Metrics,
     pipeline::{DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
+    poller::Poller,
     settings::{LimitSettings, Settings},
     shutdown::Shutdown,
 };
 
 pub(crate) use models::onnx_options;
 
-/// An engine and the models it looks with.
+/// An engine with the calibrations and the models it looks with.
 pub struct Assembly {
     /// The engine.
     pub engine: Engine,
+    /// Its calibrations.
+    pub calibrations: Arc<Calibrations>,
     /// Its models.
     pub models: Arc<ModelRepository>,
 }
@@ -43,11 +46,15 @@ pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
         paper_field_of_view: settings.paper.field_of_view,
         rig_cache_bytes: settings.calibrations.cache_bytes,
     };
-    let calibrations = open_calibrations(settings)?;
-    let engine = Engine::new(Arc::clone(models.registry()), calibrations, options)
+    let calibrations = Arc::new(open_calibrations(settings)?);
+    let known = Some(Arc::clone(&calibrations));
+    let engine = Engine::new(Arc::clone(models.registry()), known, options)
         .context("the operating system gives no threads")?;
-    let models = Arc::new(models);
-    Ok(Assembly { engine, models })
+    Ok(Assembly {
+        engine,
+        calibrations,
+        models: Arc::new(models),
+    })
 }
 
 /// What the settings let a picture cost.
@@ -66,7 +73,7 @@ pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
 /// # Errors
 /// One sentence that names the setting: a file that is missing or cannot be used.
 pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow::Result<Engine> {
-    let Assembly { engine, models } = assemble(settings)?;
+    let Assembly { engine, models, .. } = assemble(settings)?;
     for request in requests {
         let defaults = engine.default_models();
         let needed = match &request.model {
@@ -93,6 +100,7 @@ pub struct App {
     /// Names of the models to load, the one that readiness waits for first.
     to_load: Vec<String>,
     models: Arc<ModelRepository>,
+    calibrations: Arc<Calibrations>,
     workers: Arc<WorkerPool>,
     readiness: Readiness,
     state: ApiState,
@@ -105,7 +113,11 @@ impl App {
     /// # Errors
     /// When the operating system gives no thread.
     pub fn start(assembly: Assembly, settings: Settings) -> anyhow::Result<Self> {
-        let Assembly { engine, models } = assembly;
+        let Assembly {
+            engine,
+            calibrations,
+            models,
+        } = assembly;
         let to_load = models_to_load(engine.default_models(), &settings.model.also_load);
         let (workers, capacity) = (
             settings.threads.frame_workers,
@@ -130,6 +142,7 @@ impl App {
         let state = ApiState::new(
             Arc::clone(&workers),
             Arc::clone(&models),
+            Arc::clone(&calibrations),
             Arc::new(metrics),
             readiness.clone(),
             options,
@@ -137,6 +150,7 @@ impl App {
         Ok(Self {
             to_load,
             models,
+            calibrations,
             workers,
             readiness,
             state,
@@ -159,12 +173,7 @@ impl App {
     pub async fn serve(self, listener: TcpListener, shutdown: Shutdown) -> anyhow::Result<()> {
         let address = listener.local_addr()?;
         log_start(&self.settings, address);
-        let poll_seconds = self.settings.model.poll_seconds;
-        let watcher = poll_seconds.map(|seconds| {
-            ModelWatcher::start(Arc::clone(&self.models), seconds)
-                .context("the operating system gives no thread for the model watcher")
-        });
-        let _watcher = watcher.transpose()?;
+        let _pollers = self.start_pollers()?;
         let stop = shutdown.clone();
         let readiness = self.readiness.clone();
         let stopping = async move {
@@ -206,6 +215,22 @@ impl App {
         Ok(())
     }
 
+    /// The threads that look for changed models and calibrations.
+    fn start_pollers(&self) -> anyhow::Result<Vec<Poller>> {
+        let (models, calibrations) = (Arc::clone(&self.models), Arc::clone(&self.calibrations));
+        let model_poller =
+            self.settings.model.poll_seconds.map(|every| {
+                Poller::start("model-watcher", every, move || models.reload_changed())
+            });
+        let calibration_poller = self.settings.calibrations.poll_seconds.map(|every| {
+            Poller::start("calibration-watcher", every, move || calibrations.refresh())
+        });
+        let pollers = model_poller.into_iter().chain(calibration_poller);
+        pollers
+            .collect::<Result<_, _>>()
+            .context("the operating system gives no thread to watch files with")
+    }
+
     /// Loads the models. The server is ready when it has the first.
     async fn load_models(&self, address: SocketAddr) -> anyhow::Result<()> {
         for name in self.to_load.clone() {
@@ -237,10 +262,13 @@ fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
     names
 }
 
-pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Option<CalibrationFolder>> {
-    let folder = settings.calibrations.find()?;
-    let opened = folder.map(|folder| CalibrationFolder::open(&folder));
-    Ok(opened.transpose()?)
+pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrations> {
+    let settings = &settings.calibrations;
+    let store = match settings.find()? {
+        Some(folder) => FolderStore::new(&folder),
+        None => FolderStore::that_may_be_missing(&settings.path),
+    };
+    Calibrations::open(Box::new(store), settings.writable).context("calibrations.path")
 }
 
 /// Says what runs, and where.

@@ -1,21 +1,26 @@
-//! Calibrations: from a file to a checked camera.
+//! Calibrations: from a file to a checked camera, and the stores of such files.
 
 mod calibrated_camera;
+mod calibrations;
 mod doubts;
 mod error;
 pub mod export;
 mod file;
-mod folder;
 pub mod formats;
 mod id;
 mod lens_fields;
 pub mod native;
 mod plausibility;
+mod store;
 
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
+pub use calibrations::{
+    CalibrationEntry, CalibrationRow, Calibrations, CalibrationsHealth, ChangeError, Put,
+    WriteCondition,
+};
 pub use error::CalibrationError;
 pub use file::content as read_content;
-pub use folder::CalibrationFolder;
 pub use formats::{CalibrationFile, FormatError};
 pub use id::CalibrationId;
 pub use lens_fields::LensFieldsError;
+pub use store::{CalibrationStore, FolderStore, MAX_FILES, StoreError, StoredFile};

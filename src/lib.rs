@@ -16,6 +16,7 @@ pub mod imaging;
 pub mod inference;
 pub mod metrics;
 pub mod pipeline;
+pub mod poller;
 pub mod revision;
 pub mod settings;
 pub mod shutdown;

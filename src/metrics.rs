@@ -73,6 +73,14 @@ metrics! {
     model_info: IntGaugeVec = "model_info" ["model", "revision"];
     /// Models loaded, and models that were refused when they were to be.
     model_loads: IntCounterVec = "model_loads_total" ["result"];
+    /// Calibrations that serve.
+    calibrations: IntGauge = "calibrations" [];
+    /// Calibration files whose newest version, or a camera of it, cannot be used.
+    calibration_files_broken: IntGauge = "calibration_files_broken" [];
+    /// Calibration files read, by whether all of it could be used.
+    calibration_loads: IntCounterVec = "calibration_loads_total" ["result"];
+    /// 1 when the place of the calibrations could be looked at, else 0.
+    calibration_store_up: IntGauge = "calibration_store_up" [];
     /// Always 1; says which version runs.
     build_info: IntGaugeVec = "build_info" ["version"];
 }
@@ -97,11 +105,28 @@ impl Metrics {
             self.model_info.with_label_values(&[name, revision]).set(1);
             shown.insert(((*name).to_owned(), (*revision).to_owned()));
         }
-        for (result, count) in loads {
-            // Under the lock, as another scrape would add the same.
-            let counter = self.model_loads.with_label_values(&[result]);
-            counter.inc_by(count.saturating_sub(counter.get()));
-        }
+        // Under the lock, as another scrape would add the same.
+        raise(&self.model_loads, loads);
+    }
+
+    /// Shows how many calibrations serve, how many files are broken, whether their store can be
+    /// looked at, and how many loads came out how since the start.
+    pub fn show_calibrations(
+        &self,
+        serving: usize,
+        broken: usize,
+        up: bool,
+        loads: &[(&str, u64)],
+    ) {
+        let _one_scrape = self
+            .shown_models
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let count = |count: usize| i64::try_from(count).unwrap_or(i64::MAX);
+        self.calibrations.set(count(serving));
+        self.calibration_files_broken.set(count(broken));
+        self.calibration_store_up.set(i64::from(up));
+        raise(&self.calibration_loads, loads);
     }
 
     /// All metrics in the Prometheus text format.
@@ -112,6 +137,14 @@ impl Metrics {
         let mut text = Vec::new();
         TextEncoder::new().encode(&self.registry.gather(), &mut text)?;
         Ok(String::from_utf8_lossy(&text).into_owned())
+    }
+}
+
+/// Raises counters to these counts.
+fn raise(counters: &IntCounterVec, counts: &[(&str, u64)]) {
+    for (result, count) in counts {
+        let counter = counters.with_label_values(&[result]);
+        counter.inc_by(count.saturating_sub(counter.get()));
     }
 }
 

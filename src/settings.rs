@@ -63,6 +63,10 @@ pub struct ServerSettings {
 pub struct CalibrationSettings {
     /// Folder of calibration files. At its default place it may be missing.
     pub path: PathBuf,
+    /// How often the store is looked at, seconds; `None` for never.
+    pub poll_seconds: Option<NonZeroU64>,
+    /// Whether calibrations can be changed over HTTP.
+    pub writable: bool,
     /// Most memory that the tables of cameras may hold, bytes.
     pub cache_bytes: usize,
 }

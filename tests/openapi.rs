@@ -43,8 +43,9 @@ fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
         assert!(names.insert(name.to_owned()), "{name} is there twice");
         assert!(operation["summary"].is_string(), "{path} has no summary");
         assert!(operation["tags"][0].is_string(), "{path} has no tag");
+        let statuses = operation["responses"].as_object().unwrap();
         assert!(
-            operation["responses"]["200"].is_object(),
+            statuses.keys().any(|status| status.starts_with('2')),
             "{path} never succeeds"
         );
     }

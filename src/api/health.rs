@@ -1,5 +1,7 @@
 //! Probes: alive, ready, and what the metrics say.
 
+use std::collections::BTreeSet;
+
 use axum::{Json, extract::State, http::header::CONTENT_TYPE, response::IntoResponse};
 use tokio::sync::watch;
 use utoipa::ToSchema;
@@ -9,6 +11,10 @@ use super::{
     openapi::{FaultProblem, NotReadyProblems},
     problem::Problem,
 };
+use crate::calibration::CalibrationsHealth;
+
+/// Most broken files told.
+const MAX_PROBLEMS: usize = 100;
 
 /// Where the server is between its start and its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,9 +74,56 @@ impl Readiness {
 /// How the server is.
 #[derive(serde::Serialize, ToSchema)]
 pub(super) struct Health {
-    /// `alive` or `ready`.
+    /// `alive`.
+    #[schema(example = "alive")]
+    status: &'static str,
+}
+
+/// How a server is that takes frames.
+#[derive(serde::Serialize, ToSchema)]
+pub(super) struct Ready {
+    /// `ready`.
     #[schema(example = "ready")]
     status: &'static str,
+    /// How its calibrations are.
+    calibrations: CalibrationHealth,
+}
+
+/// How the calibrations are.
+#[derive(serde::Serialize, ToSchema)]
+#[schema(example = json!({ "serving": 12, "problems": [
+    { "file": "lobby.json", "problem": "image: 4×4 pixels; each side must be 16 to 65536" }
+] }))]
+struct CalibrationHealth {
+    /// How many serve.
+    serving: usize,
+    /// Files whose newest version cannot be used; at most 100 are told.
+    problems: Vec<FileProblem>,
+    /// Why their place cannot be looked at, if it cannot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    store_problem: Option<String>,
+}
+
+/// A file that cannot be used.
+#[derive(serde::Serialize, ToSchema)]
+struct FileProblem {
+    /// Its name.
+    file: String,
+    /// Why.
+    problem: String,
+}
+
+impl From<CalibrationsHealth> for CalibrationHealth {
+    fn from(health: CalibrationsHealth) -> Self {
+        let problems = health.problems.into_iter().take(MAX_PROBLEMS);
+        Self {
+            serving: health.serving,
+            problems: problems
+                .map(|(file, problem)| FileProblem { file, problem })
+                .collect(),
+            store_problem: health.store_problem,
+        }
+    }
 }
 
 /// Is the process alive?
@@ -86,17 +139,21 @@ pub(super) async fn livez() -> Json<Health> {
 
 /// Can frames be sent?
 ///
-/// Not before the network has run once, and no longer when the server was told to stop.
+/// Not before the network has run once, and no longer when the server was told to stop. Files of
+/// calibrations that cannot be used are told, but stop nothing: what was known of them goes on.
 #[utoipa::path(
     get, path = "/readyz", tag = "operation", operation_id = "get_readiness",
     responses(
-        (status = OK, description = "Frames can be sent.", body = Health),
+        (status = OK, description = "Frames can be sent.", body = Ready),
         NotReadyProblems
     )
 )]
-pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Health>, Problem> {
+pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>, Problem> {
     match state.readiness.phase() {
-        Phase::Ready => Ok(Json(Health { status: "ready" })),
+        Phase::Ready => Ok(Json(Ready {
+            status: "ready",
+            calibrations: CalibrationHealth::from(state.calibrations.health()),
+        })),
         Phase::WarmingUp => Err(Problem::warming_up()),
         Phase::Stopping => Err(Problem::shutting_down()),
     }
@@ -114,6 +171,7 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     let pending = i64::try_from(state.workers.pending()).unwrap_or(i64::MAX);
     state.metrics.pending_frames.set(pending);
     show_models(&state);
+    show_calibrations(&state);
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
@@ -128,4 +186,18 @@ fn show_models(state: &ApiState) {
     let counts = state.models.load_counts();
     let loads = [("success", counts.succeeded), ("failure", counts.failed)];
     state.metrics.show_models(&rows, &loads);
+}
+
+/// The calibrations as they are at this scrape.
+fn show_calibrations(state: &ApiState) {
+    let health = state.calibrations.health();
+    let files: BTreeSet<_> = health.problems.iter().map(|(file, _)| file).collect();
+    let loads = [
+        ("success", health.loads_succeeded),
+        ("failure", health.loads_failed),
+    ];
+    let up = health.store_problem.is_none();
+    state
+        .metrics
+        .show_calibrations(health.serving, files.len(), up, &loads);
 }

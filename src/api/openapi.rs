@@ -9,7 +9,8 @@ use utoipa::{OpenApi, openapi};
 
 pub(super) use parameters::{DetectForm, DetectQuery};
 pub(super) use problems::{
-    DetectProblems, FaultProblem, IndexProblems, LoadProblems, NotReadyProblems,
+    ChangeProblems, DeleteProblems, DetectProblems, FaultProblem, IndexProblems, LoadProblems,
+    NotReadyProblems, UnknownCalibrationProblem, ViewsProblems,
 };
 
 use super::problem::ProblemBody;
@@ -20,6 +21,7 @@ use super::problem::ProblemBody;
     servers((url = "/", description = "This server")),
     tags(
         (name = "detection", description = "Frames in, persons out."),
+        (name = "calibrations", description = "The cameras. Changes are for administrators."),
         (name = "models", description = "Which models answer. For administrators."),
         (name = "operation", description = "Probes, metrics and this document."),
     ),

@@ -6,8 +6,7 @@ mod body;
 use axum::{
     Json,
     body::Body,
-    extract::{FromRequestParts, Path, State},
-    http::request::Parts,
+    extract::{Path, State},
 };
 use serde::Serialize;
 use tokio::task::spawn_blocking;
@@ -15,27 +14,12 @@ use utoipa::ToSchema;
 
 use super::{
     ApiState,
+    administrator::Administrator,
     openapi::{IndexProblems, LoadProblems},
     problem::{Problem, ProblemKind},
 };
 use crate::inference::{Model, RepositoryError, RepositoryRow};
 use body::{IndexRequest, LoadRequest, UnloadRequest, read};
-
-/// Whoever sent the request may change which models the server has.
-pub(super) struct Administrator;
-
-impl FromRequestParts<ApiState> for Administrator {
-    type Rejection = Problem;
-
-    async fn from_request_parts(_parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
-        if state.options.administration {
-            return Ok(Self);
-        }
-        let detail = "models are changed on the server's own machine only: this server listens to \
-                      others, too (server.listen)";
-        Err(Problem::new(ProblemKind::Forbidden, detail))
-    }
-}
 
 /// A model of the repository.
 #[derive(Serialize, ToSchema)]

@@ -3,7 +3,9 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{Readiness, problem::ProblemKind, upload::UploadBudget};
-use crate::{inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool};
+use crate::{
+    calibration::Calibrations, inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool,
+};
 
 /// What a request may cost.
 #[derive(Debug, Clone, Copy)]
@@ -14,7 +16,7 @@ pub struct ApiOptions {
     pub max_upload_bytes: usize,
     /// Longest a request may take, from its first byte to its answer.
     pub request_timeout: Duration,
-    /// Whether whoever reaches the server may change which models it has.
+    /// Whether whoever reaches the server may change its models and calibrations.
     pub administration: bool,
 }
 
@@ -23,6 +25,7 @@ pub struct ApiOptions {
 pub struct ApiState {
     pub(super) workers: Arc<WorkerPool>,
     pub(super) models: Arc<ModelRepository>,
+    pub(super) calibrations: Arc<Calibrations>,
     pub(super) metrics: Arc<Metrics>,
     pub(super) readiness: Readiness,
     pub(super) uploads: UploadBudget,
@@ -35,6 +38,7 @@ impl ApiState {
     pub fn new(
         workers: Arc<WorkerPool>,
         models: Arc<ModelRepository>,
+        calibrations: Arc<Calibrations>,
         metrics: Arc<Metrics>,
         readiness: Readiness,
         options: ApiOptions,
@@ -46,6 +50,7 @@ impl ApiState {
         Self {
             workers,
             models,
+            calibrations,
             metrics,
             readiness,
             uploads: UploadBudget::new(options.max_upload_bytes),

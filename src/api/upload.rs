@@ -17,13 +17,12 @@ use bytes::Bytes;
 use jiff::Timestamp;
 use tokio::time::{Instant, timeout_at};
 
-pub(super) use body::UploadBudget;
+pub(super) use body::{BodyReader, UploadBudget};
 
 use super::{
     ApiState, Phase,
     problem::{Problem, ProblemKind},
 };
-use body::Reader;
 
 /// A frame in memory and what its sender wants of it.
 pub(super) struct Upload {
@@ -46,8 +45,9 @@ impl FromRequest<ApiState> for Upload {
         let received_at = Timestamp::now();
         let deadline = Instant::now() + state.options.request_timeout;
         let (parts, body) = request.into_parts();
-        let reader = Reader {
+        let reader = BodyReader {
             max_bytes: state.options.max_body_bytes,
+            remedy: "send a smaller picture or raise server.max_body_bytes",
             budget: &state.uploads,
         };
         let held = timeout_at(deadline, reader.read(&parts.headers, body))
@@ -91,6 +91,23 @@ fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Problem> {
                           UTF-8";
             Problem::new(ProblemKind::MalformedRequest, detail)
         })
+}
+
+/// The value of the only parameter that a query may have.
+pub(super) fn one_parameter(uri: &Uri, name: &str) -> Result<Option<String>, Problem> {
+    let mut value = None;
+    for (given, its) in query_parameters(uri)? {
+        if given != name {
+            let given: String = given.chars().take(64).collect();
+            let detail = format!("there is no parameter {given:?} here: there is {name}");
+            return Err(Problem::new(ProblemKind::UnknownParameter, detail));
+        }
+        if value.replace(its).is_some() {
+            let detail = format!("{name} is given twice: give it once");
+            return Err(Problem::new(ProblemKind::RepeatedParameter, detail));
+        }
+    }
+    Ok(value)
 }
 
 fn is_multipart(parts: &Parts) -> bool {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CalibrationId, FormatError};
+use super::{FormatError, StoreError};
 
 /// A calibration that cannot be used. Every message is one sentence with the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -23,14 +23,17 @@ pub enum CalibrationError {
         /// The field, its value and what would be right.
         problem: FormatError,
     },
-    /// A file does not hold the camera that was asked for.
-    #[error("{path}: it holds no camera {id}")]
-    NotInFile {
+    /// Its file in a store cannot be used.
+    #[error("{place}: {problem}")]
+    Stored {
         /// Which file.
-        path: PathBuf,
-        /// The camera.
-        id: CalibrationId,
+        place: String,
+        /// The field, its value and what would be right.
+        problem: String,
     },
+    /// The store cannot be looked at.
+    #[error(transparent)]
+    Store(#[from] StoreError),
 }
 
 impl CalibrationError {

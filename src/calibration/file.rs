@@ -1,6 +1,6 @@
 //! Calibration files: from a path to checked cameras under their IDs.
 
-use std::{borrow::Cow, io::Read, path::Path};
+use std::{io::Read, path::Path};
 
 use nalgebra::{Unit, Vector3};
 
@@ -12,8 +12,6 @@ use super::{
 };
 use crate::geometry::Mount;
 
-/// File endings that are read, in the order in which they are looked for.
-pub(super) const ENDINGS: [&str; 6] = ["json", "yaml", "yml", "toml", "xml", "txt"];
 /// Image sides accepted, pixels.
 const IMAGE_SIDE: std::ops::RangeInclusive<u32> = 16..=65_536;
 /// How far from unit length `world_up` may be.
@@ -39,7 +37,11 @@ pub fn content(path: &Path) -> Result<Vec<u8>, CalibrationError> {
 
 /// Reads and checks the only camera of a file.
 pub(super) fn read(path: &Path) -> Result<Calibration, CalibrationError> {
-    let mut cameras = read_all(path)?;
+    let content = content(path)?;
+    let file = CalibrationFile::parse(&content)
+        .map_err(|problem| CalibrationError::in_file(path, problem))?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let mut cameras = file.calibrations(&stem, &content);
     let calibration = match &cameras[..] {
         [_] => cameras.swap_remove(0).1,
         several => {
@@ -56,18 +58,6 @@ pub(super) fn read(path: &Path) -> Result<Calibration, CalibrationError> {
         }
     };
     calibration.map_err(|problem| CalibrationError::in_file(path, problem))
-}
-
-/// Reads every camera of a file, under its ID.
-pub(super) fn read_all(path: &Path) -> Result<Vec<Checked>, CalibrationError> {
-    let content = content(path)?;
-    let file = CalibrationFile::parse(&content)
-        .map_err(|problem| CalibrationError::in_file(path, problem))?;
-    Ok(file.calibrations(&stem_of(path), &content))
-}
-
-fn stem_of(path: &Path) -> Cow<'_, str> {
-    path.file_stem().unwrap_or_default().to_string_lossy()
 }
 
 /// A camera of a file under its ID.

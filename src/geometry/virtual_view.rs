@@ -92,6 +92,25 @@ impl VirtualView {
         self.height
     }
 
+    /// Full horizontal opening angle, radians.
+    #[must_use]
+    pub fn field_of_view(&self) -> f64 {
+        2.0 * (f64::from(self.width) / 2.0 / self.focal).atan()
+    }
+
+    /// Rays (camera frame) along the border, clockwise from the top left corner, that one first and
+    /// last; `per_side` steps along each side.
+    pub fn border_rays(&self, per_side: u32) -> impl Iterator<Item = Ray> {
+        let (right, bottom) = (f64::from(self.width) - 0.5, f64::from(self.height) - 0.5);
+        let corners = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)];
+        (0..=4 * per_side).map(move |step| {
+            let (side, along) = (step / per_side, step % per_side);
+            let share = f64::from(along) / f64::from(per_side);
+            let [(x0, y0), (x1, y1)] = [side, side + 1].map(|corner| corners[corner as usize % 4]);
+            self.ray_in_camera(&Pixel::new(x0 + share * (x1 - x0), y0 + share * (y1 - y0)))
+        })
+    }
+
     /// The ray (camera frame, not of unit length) through a view pixel (pixel centres).
     #[must_use]
     pub fn ray_in_camera(&self, pixel: &Pixel) -> Ray {
@@ -147,7 +166,9 @@ impl VirtualView {
         direction.try_normalize(f64::EPSILON)
     }
 
-    fn principal_point(&self) -> Pixel {
+    /// Where the axis meets the view: its middle, pixel centres.
+    #[must_use]
+    pub fn principal_point(&self) -> Pixel {
         Pixel::new(
             f64::from(self.width - 1) / 2.0,
             f64::from(self.height - 1) / 2.0,

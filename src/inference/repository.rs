@@ -7,7 +7,6 @@
 mod error;
 mod folder;
 mod stamp;
-mod watcher;
 
 use std::{
     collections::BTreeMap,
@@ -25,7 +24,6 @@ use super::{Detector, InferenceError, Model, ModelRegistry, model::ModelFiles};
 pub use error::RepositoryError;
 pub use folder::{ModelFolder, is_fetched};
 pub(super) use stamp::Stamp;
-pub use watcher::ModelWatcher;
 
 /// Makes a detector of a model's folder or ONNX file.
 pub type DetectorLoader =

@@ -17,7 +17,7 @@ use super::{
     report::ModelUsed, rig_cache::RigCache,
 };
 use crate::{
-    calibration::CalibrationFolder,
+    calibration::Calibrations,
     detection::RefinementParameters,
     geometry::{FieldOfViewReading, zoom::zoomed_views},
     imaging::{
@@ -53,7 +53,7 @@ pub struct Engine {
     /// One frame at a time is in a network, whichever: the networks share their cores.
     network_turn: Mutex<()>,
     remappers: ThreadPool,
-    calibrations: Option<CalibrationFolder>,
+    calibrations: Option<Arc<Calibrations>>,
     rigs: RigCache,
     options: EngineOptions,
 }
@@ -100,7 +100,7 @@ impl Engine {
     /// When the operating system gives no threads.
     pub fn new(
         models: Arc<ModelRegistry>,
-        calibrations: Option<CalibrationFolder>,
+        calibrations: Option<Arc<Calibrations>>,
         options: EngineOptions,
     ) -> Result<Self, ThreadPoolBuildError> {
         let remappers = ThreadPoolBuilder::new()
@@ -229,11 +229,20 @@ impl Engine {
         merge::persons(&observation.looks, back_projection, refinement)
     }
 
+    pub(super) fn options(&self) -> &EngineOptions {
+        &self.options
+    }
+
+    /// The model that answers requests which name none.
+    pub(super) fn default_model(&self, profile: Profile) -> Result<Arc<Model>, PipelineError> {
+        let name = self.options.default_models.of(profile);
+        self.models.get(name).ok_or(PipelineError::ModelStarting)
+    }
+
     /// The model that a request named, or the one for its profile.
     fn model(&self, parameters: &DetectParameters) -> Result<Arc<Model>, PipelineError> {
         let Some(name) = &parameters.model else {
-            let name = self.options.default_models.of(parameters.profile);
-            return self.models.get(name).ok_or(PipelineError::ModelStarting);
+            return self.default_model(parameters.profile);
         };
         self.models.get(name).ok_or_else(|| {
             let loaded = self.models.all();

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 
 use super::{DefaultModels, DetectJob, DetectParameters, Engine, EngineOptions};
 use crate::{
-    calibration::CalibrationFolder,
+    calibration::Calibrations,
     detection::{BBox, ViewPixels},
     geometry::FieldOfViewReading,
     imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png, decode::DecodeLimits},
@@ -90,7 +90,7 @@ impl BlobDetector {
     }
 }
 
-pub(super) fn engine(detector: BlobDetector, calibrations: Option<CalibrationFolder>) -> Engine {
+pub(super) fn engine(detector: BlobDetector, calibrations: Option<Arc<Calibrations>>) -> Engine {
     let options = EngineOptions {
         decode_limits: DecodeLimits::default(),
         default_models: DefaultModels::One("blob".to_owned()),

@@ -24,6 +24,7 @@ struct Ticket {
 
 /// Named threads that run the engine on a bounded number of frames.
 pub struct WorkerPool {
+    engine: Arc<Engine>,
     queue: Mutex<Option<mpsc::Sender<Ticket>>>,
     places: Arc<Semaphore>,
     capacity: NonZeroUsize,
@@ -49,11 +50,18 @@ impl WorkerPool {
                 .spawn(move || work(&engine, &tickets))
         });
         Ok(Self {
+            engine: Arc::clone(engine),
             threads: Mutex::new(threads.collect::<Result<_, _>>()?),
             queue: Mutex::new(Some(queue)),
             places: Arc::new(Semaphore::new(capacity.get())),
             capacity,
         })
+    }
+
+    /// The engine that works.
+    #[must_use]
+    pub fn engine(&self) -> &Engine {
+        &self.engine
     }
 
     /// Queues a frame and waits for its report. Dropping the future withdraws a frame that no

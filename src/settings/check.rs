@@ -42,6 +42,11 @@ impl TryFrom<RawSettings> for Settings {
             server,
             calibrations: CalibrationSettings {
                 path: path("calibrations.path", raw.calibrations.path)?,
+                poll_seconds: poll_seconds(
+                    "calibrations.poll_seconds",
+                    raw.calibrations.poll_seconds,
+                )?,
+                writable: raw.calibrations.writable,
                 cache_bytes: bytes(
                     "calibrations.cache_bytes",
                     raw.calibrations.cache_bytes,
@@ -91,7 +96,6 @@ fn server(raw: &raw::RawServer) -> Result<ServerSettings, SettingsError> {
 
 fn model(raw: raw::RawModel) -> Result<ModelSettings, SettingsError> {
     let names = raw.also_load.split(',').map(str::trim);
-    let poll_seconds = within("model.poll_seconds", raw.poll_seconds, 0..=MAX_POLL_SECONDS)?;
     Ok(ModelSettings {
         path: (!raw.path.is_empty()).then(|| raw.path.into()),
         repository: path("model.repository", raw.repository)?,
@@ -99,7 +103,7 @@ fn model(raw: raw::RawModel) -> Result<ModelSettings, SettingsError> {
             .filter(|name| !name.is_empty())
             .map(ToOwned::to_owned)
             .collect(),
-        poll_seconds: NonZeroU64::new(poll_seconds),
+        poll_seconds: poll_seconds("model.poll_seconds", raw.poll_seconds)?,
     })
 }
 
@@ -202,6 +206,11 @@ fn within(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<u64, Sett
             range.end()
         ),
     })
+}
+
+/// 0 means never.
+fn poll_seconds(key: &str, value: u64) -> Result<Option<NonZeroU64>, SettingsError> {
+    within(key, value, 0..=MAX_POLL_SECONDS).map(NonZeroU64::new)
 }
 
 fn count(key: &str, value: u64) -> Result<NonZeroUsize, SettingsError> {

@@ -43,6 +43,8 @@ impl Default for RawServer {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawCalibrations {
     pub(super) path: String,
+    pub(super) poll_seconds: u64,
+    pub(super) writable: bool,
     pub(super) cache_bytes: u64,
 }
 
@@ -50,6 +52,8 @@ impl Default for RawCalibrations {
     fn default() -> Self {
         Self {
             path: locate::DEFAULT_CALIBRATIONS.to_owned(),
+            poll_seconds: 2,
+            writable: true,
             cache_bytes: 1024 * MEBIBYTE,
         }
     }

@@ -11,7 +11,7 @@ use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
     app::Assembly,
-    calibration::CalibrationFolder,
+    calibration::{Calibrations, FolderStore},
     geometry::FieldOfViewReading,
     imaging::{Frame, NetworkInput, annotate::encode_png, decode::DecodeLimits},
     inference::{InferenceError, ModelFolder, ModelRepository, RepositoryOptions},
@@ -36,6 +36,7 @@ pub(crate) struct Service {
     pub(crate) router: Router,
     pub(crate) gate: Arc<Gate>,
     pub(crate) readiness: Readiness,
+    pub(crate) calibrations: Arc<Calibrations>,
     /// The calibration `lobby`, and models in `models/`. Goes when the test does.
     pub(crate) folder: TempDir,
 }
@@ -134,11 +135,17 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 28,
     };
-    let calibrations = CalibrationFolder::open(folder.path()).unwrap();
+    let store = Box::new(FolderStore::new(folder.path()));
+    let calibrations = Arc::new(Calibrations::open(store, true).unwrap());
     let registry = Arc::clone(models.registry());
-    let engine = Engine::new(registry, Some(calibrations), options).unwrap();
+    let engine = Engine::new(registry, Some(Arc::clone(&calibrations)), options).unwrap();
     let models = Arc::new(models);
-    (Assembly { engine, models }, folder)
+    let assembly = Assembly {
+        engine,
+        calibrations,
+        models,
+    };
+    (assembly, folder)
 }
 
 impl Service {
@@ -149,7 +156,22 @@ impl Service {
     /// A warm service with one worker.
     pub(crate) fn within(bounds: &Bounds) -> Self {
         let gate = Arc::new(Gate::default());
-        let (Assembly { engine, models }, folder) = assembly(&gate);
+        let (assembly, folder) = assembly(&gate);
+        Self::around(assembly, folder, gate, bounds)
+    }
+
+    /// A warm service with one worker, around what a test has put together.
+    pub(crate) fn around(
+        assembly: Assembly,
+        folder: TempDir,
+        gate: Arc<Gate>,
+        bounds: &Bounds,
+    ) -> Self {
+        let Assembly {
+            engine,
+            calibrations,
+            models,
+        } = assembly;
         models.load("eager").unwrap();
         gate.forget_runs();
         let capacity = NonZeroUsize::new(bounds.frames_in_flight).unwrap();
@@ -159,6 +181,7 @@ impl Service {
         let state = ApiState::new(
             Arc::new(workers),
             models,
+            Arc::clone(&calibrations),
             Arc::new(Metrics::new().unwrap()),
             readiness.clone(),
             ApiOptions {
@@ -172,6 +195,7 @@ impl Service {
             router: api::router(state),
             gate,
             readiness,
+            calibrations,
             folder,
         }
     }
@@ -189,6 +213,11 @@ impl Service {
     pub(crate) async fn get(&self, path: &str) -> Answer {
         self.send(Request::get(path).body(Body::empty()).unwrap())
             .await
+    }
+
+    pub(crate) async fn put(&self, path: &str, body: &str) -> Answer {
+        let body = Body::from(body.to_owned());
+        self.send(Request::put(path).body(body).unwrap()).await
     }
 
     pub(crate) async fn post(&self, path: &str, body: &str) -> Answer {

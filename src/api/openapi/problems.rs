@@ -22,6 +22,9 @@ impl IntoResponses for DetectProblems {
                 ProblemKind::NotFound
                     | ProblemKind::MethodNotAllowed
                     | ProblemKind::Forbidden
+                    | ProblemKind::InvalidCalibration
+                    | ProblemKind::CalibrationConflict
+                    | ProblemKind::Outdated
                     | ProblemKind::ModelConflict
                     | ProblemKind::ModelRefused
                     | ProblemKind::ModelBusy
@@ -70,6 +73,69 @@ impl IntoResponses for LoadProblems {
             ProblemKind::ModelBusy,
         ];
         responses(OF_ADMINISTRATION.into_iter().chain(of_models))
+    }
+}
+
+/// What can go wrong with reading a calibration.
+pub(in crate::api) struct UnknownCalibrationProblem;
+
+impl IntoResponses for UnknownCalibrationProblem {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses([
+            ProblemKind::MalformedRequest,
+            ProblemKind::UnknownCalibration,
+        ])
+    }
+}
+
+/// What can go wrong with creating or replacing a calibration.
+pub(in crate::api) struct ChangeProblems;
+
+impl IntoResponses for ChangeProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_changes = [
+            ProblemKind::UnknownParameter,
+            ProblemKind::RepeatedParameter,
+            ProblemKind::InvalidCalibration,
+            ProblemKind::CalibrationConflict,
+            ProblemKind::Outdated,
+            ProblemKind::BodyTooLarge,
+            ProblemKind::Overloaded,
+        ];
+        responses(OF_ADMINISTRATION.into_iter().chain(of_changes))
+    }
+}
+
+/// What can go wrong with deleting a calibration.
+pub(in crate::api) struct DeleteProblems;
+
+impl IntoResponses for DeleteProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses([
+            ProblemKind::MalformedRequest,
+            ProblemKind::Forbidden,
+            ProblemKind::UnknownCalibration,
+            ProblemKind::CalibrationConflict,
+            ProblemKind::Outdated,
+            ProblemKind::Internal,
+        ])
+    }
+}
+
+/// What can go wrong with a view plan.
+pub(in crate::api) struct ViewsProblems;
+
+impl IntoResponses for ViewsProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses([
+            ProblemKind::MalformedRequest,
+            ProblemKind::UnknownParameter,
+            ProblemKind::RepeatedParameter,
+            ProblemKind::UnknownCalibration,
+            ProblemKind::InvalidParameter,
+            ProblemKind::Internal,
+            ProblemKind::WarmingUp,
+        ])
     }
 }
 

@@ -19,6 +19,12 @@ pub(in crate::api) enum ProblemKind {
     NotFound,
     /// The calibration does not exist.
     UnknownCalibration,
+    /// The content makes no calibration.
+    InvalidCalibration,
+    /// The calibration's file does not allow it.
+    CalibrationConflict,
+    /// What the request is about has changed.
+    Outdated,
     /// The model is not loaded.
     UnknownModel,
     /// The models that are loaded do not allow it.
@@ -57,7 +63,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 24] = [
+    pub(in crate::api) const ALL: [Self; 27] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -65,6 +71,9 @@ impl ProblemKind {
         Self::Forbidden,
         Self::NotFound,
         Self::UnknownCalibration,
+        Self::InvalidCalibration,
+        Self::CalibrationConflict,
+        Self::Outdated,
         Self::UnknownModel,
         Self::ModelConflict,
         Self::ModelRefused,
@@ -94,6 +103,12 @@ impl ProblemKind {
             Self::Forbidden => ("forbidden", "That is not allowed"),
             Self::NotFound => ("not-found", "There is nothing here"),
             Self::UnknownCalibration => ("unknown-calibration", "There is no such calibration"),
+            Self::InvalidCalibration => ("invalid-calibration", "The calibration cannot be used"),
+            Self::CalibrationConflict => (
+                "calibration-conflict",
+                "The calibration shares its file with others",
+            ),
+            Self::Outdated => ("outdated", "What is there now is not what was meant"),
             Self::UnknownModel => ("unknown-model", "There is no such model"),
             Self::ModelConflict => (
                 "model-conflict",
@@ -139,10 +154,13 @@ impl ProblemKind {
             | Self::MissingImage => StatusCode::BAD_REQUEST,
             Self::Forbidden => StatusCode::FORBIDDEN,
             Self::NotFound | Self::UnknownCalibration | Self::UnknownModel => StatusCode::NOT_FOUND,
-            Self::ModelConflict => StatusCode::CONFLICT,
-            Self::ModelRefused | Self::InvalidParameter | Self::DamagedImage | Self::UnfitImage => {
-                StatusCode::UNPROCESSABLE_ENTITY
-            }
+            Self::ModelConflict | Self::CalibrationConflict => StatusCode::CONFLICT,
+            Self::Outdated => StatusCode::PRECONDITION_FAILED,
+            Self::InvalidCalibration
+            | Self::ModelRefused
+            | Self::InvalidParameter
+            | Self::DamagedImage
+            | Self::UnfitImage => StatusCode::UNPROCESSABLE_ENTITY,
             Self::ModelBusy | Self::Overloaded => StatusCode::TOO_MANY_REQUESTS,
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
             Self::SlowUpload => StatusCode::REQUEST_TIMEOUT,

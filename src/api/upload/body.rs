@@ -34,7 +34,7 @@ impl UploadBudget {
 }
 
 /// Bytes together with their share of the budget.
-pub(super) struct HeldBytes {
+pub(in crate::api) struct HeldBytes {
     bytes: Bytes,
     _share: OwnedSemaphorePermit,
 }
@@ -50,7 +50,7 @@ impl HeldBytes {
     }
 
     /// Plain bytes that give their share back when the last clone of them is gone.
-    pub(super) fn into_bytes(self) -> Bytes {
+    pub(in crate::api) fn into_bytes(self) -> Bytes {
         Bytes::from_owner(self)
     }
 }
@@ -62,14 +62,16 @@ impl AsRef<[u8]> for HeldBytes {
 }
 
 /// What a body may cost.
-pub(super) struct Reader<'a> {
-    pub(super) max_bytes: usize,
-    pub(super) budget: &'a UploadBudget,
+pub(in crate::api) struct BodyReader<'a> {
+    pub(in crate::api) max_bytes: usize,
+    /// What to do about a body that has more.
+    pub(in crate::api) remedy: &'static str,
+    pub(in crate::api) budget: &'a UploadBudget,
 }
 
-impl Reader<'_> {
+impl BodyReader<'_> {
     /// Reads a whole body.
-    pub(super) async fn read(
+    pub(in crate::api) async fn read(
         &self,
         headers: &HeaderMap,
         mut body: Body,
@@ -113,9 +115,8 @@ impl Reader<'_> {
 
     fn too_large(&self) -> Problem {
         let detail = format!(
-            "the body is larger than {} bytes: send a smaller picture or raise \
-             server.max_body_bytes",
-            self.max_bytes
+            "the body is larger than {} bytes: {}",
+            self.max_bytes, self.remedy
         );
         Problem::new(ProblemKind::BodyTooLarge, detail)
     }

@@ -58,7 +58,6 @@ fn calibration(named: &str, settings_file: &SettingsFile) -> anyhow::Result<Arc<
     }
     let strange = || format!("--calibration: {named:?} is neither a file nor a calibration's ID");
     let id: CalibrationId = named.parse().with_context(strange)?;
-    let folder = open_calibrations(&settings_file.load()?)?;
-    let found = folder.map(|folder| folder.get(&id)).transpose()?;
-    found.flatten().with_context(strange)
+    let calibrations = open_calibrations(&settings_file.load()?)?;
+    calibrations.get(&id)?.with_context(strange)
 }

@@ -14,7 +14,7 @@ use serde::Deserialize;
 
 use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
 use crate::{
-    calibration::{CalibrationFolder, CalibrationId},
+    calibration::{CalibrationError, CalibrationId, Calibrations, FolderStore},
     detection::BBox,
     evaluation::{AnnotatedPerson, Outline, RotatedBox, Scoring},
 };
@@ -57,7 +57,9 @@ struct CocoCategory {
 
 /// Reads the annotations of a folder with `images/` and `calibrations/`.
 pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, DataSetError> {
-    let calibrations = CalibrationFolder::open(&folder.join("calibrations"))?;
+    let calibrations = FolderStore::new(&folder.join("calibrations"));
+    let calibrations = Calibrations::open(Box::new(calibrations), false);
+    let calibrations = calibrations.map_err(CalibrationError::from)?;
     let pictures = folder.join("images");
     let mut reader = Reader::default();
     reader.read(file, Some(&calibrations), |name| Ok(pictures.join(name)))?;
@@ -88,7 +90,7 @@ impl Reader {
     fn read(
         &mut self,
         path: &Path,
-        calibrations: Option<&CalibrationFolder>,
+        calibrations: Option<&Calibrations>,
         picture: impl Fn(&Path) -> Result<PathBuf, String>,
     ) -> Result<(), DataSetError> {
         let wrong = |problem: String| DataSetError::Annotations {

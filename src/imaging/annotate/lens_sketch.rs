@@ -34,7 +34,7 @@ pub fn sketch_lens(frame: &mut Frame, lens: &Lens, views: &[VirtualView]) {
     for view in views {
         draw(
             frame,
-            view_outline(view).map(|ray| lens.project(&ray)),
+            view.border_rays(SIDE_POINTS).map(|ray| lens.project(&ray)),
             VIEW,
             thin,
         );
@@ -78,21 +78,6 @@ fn ray(theta: f64, azimuth: f64) -> Ray {
 fn circle(theta: f64) -> impl Iterator<Item = Ray> {
     (0..=CIRCLE_POINTS)
         .map(move |step| ray(theta, TAU * f64::from(step) / f64::from(CIRCLE_POINTS)))
-}
-
-/// Rays along the border of a view, the first one twice.
-fn view_outline(view: &VirtualView) -> impl Iterator<Item = Ray> {
-    let (right, bottom) = (
-        f64::from(view.width()) - 0.5,
-        f64::from(view.height()) - 0.5,
-    );
-    let corners = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)];
-    (0..=4 * SIDE_POINTS).map(move |step| {
-        let (side, along) = (step / SIDE_POINTS, step % SIDE_POINTS);
-        let share = f64::from(along) / f64::from(SIDE_POINTS);
-        let [(x0, y0), (x1, y1)] = [side, side + 1].map(|corner| corners[corner as usize % 4]);
-        view.ray_in_camera(&Pixel::new(x0 + share * (x1 - x0), y0 + share * (y1 - y0)))
-    })
 }
 
 /// Draws a line through points (pixel centres); where the lens does not see one, it breaks.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::calibration::FolderStore;
 use crate::inference::InferenceError;
 use crate::pipeline::test_support::{BlobDetector, engine, frame_with_disc, job};
 
@@ -9,7 +10,8 @@ const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 600, "height": 600},
 fn engine_with_lobby() -> (Engine, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("lobby.json"), LOBBY).unwrap();
-    let calibrations = CalibrationFolder::open(folder.path()).unwrap();
+    let store = Box::new(FolderStore::new(folder.path()));
+    let calibrations = Arc::new(Calibrations::open(store, false).unwrap());
     (engine(BlobDetector::default(), Some(calibrations)), folder)
 }
 

@@ -1,0 +1,166 @@
+//! Calibrations as resources: read by everyone, changed by administrators.
+
+mod address;
+mod conditions;
+mod row;
+mod upload;
+pub(super) mod views;
+
+use axum::{
+    Json,
+    extract::State,
+    http::{
+        HeaderMap, StatusCode,
+        header::{CONTENT_TYPE, ETAG, LOCATION},
+    },
+    response::{IntoResponse, Response},
+};
+use tokio::task::spawn_blocking;
+
+use self::{
+    address::{CalibrationAddress, NewCalibrationAddress},
+    conditions::{entity_tag, is_unmodified, write_condition},
+    row::CalibrationInfo,
+    upload::CalibrationUpload,
+};
+use super::{
+    ApiState,
+    administrator::Administrator,
+    openapi::{ChangeProblems, DeleteProblems, UnknownCalibrationProblem},
+    problem::{Problem, ProblemKind},
+};
+use crate::calibration::ChangeError;
+
+/// Which calibrations are there?
+///
+/// Also those whose file cannot be used, with the reason.
+#[utoipa::path(
+    get, path = "/calibrations", tag = "calibrations", operation_id = "list_calibrations",
+    responses((status = OK, description = "By ID.", body = Vec<CalibrationInfo>))
+)]
+pub(super) async fn list(State(state): State<ApiState>) -> Json<Vec<CalibrationInfo>> {
+    let rows = state.calibrations.rows();
+    Json(rows.into_iter().map(CalibrationInfo::from).collect())
+}
+
+/// Get a calibration.
+///
+/// Always in the native format, whatever its file is in. `If-None-Match` is answered 304 while the
+/// revision is the same.
+#[utoipa::path(
+    get, path = "/calibrations/{id}", tag = "calibrations", operation_id = "get_calibration",
+    params(("id" = String, Path, description = "The calibration's ID.")),
+    responses(
+        (status = OK, description = "The native file.", body = Object,
+         headers(("ETag" = String, description = "The revision, as in reports."))),
+        (status = NOT_MODIFIED, description = "The revision is the one asked with."),
+        UnknownCalibrationProblem,
+    )
+)]
+pub(super) async fn get(
+    State(state): State<ApiState>,
+    CalibrationAddress(id): CalibrationAddress,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let entry = state
+        .calibrations
+        .entry(&id)
+        .ok_or_else(|| unknown(&state, &id))?;
+    let tag = [(ETAG, entity_tag(entry.calibration.revision()))];
+    if is_unmodified(&headers, entry.calibration.revision())? {
+        return Ok((StatusCode::NOT_MODIFIED, tag).into_response());
+    }
+    let content_type = [(CONTENT_TYPE, "application/json")];
+    Ok((tag, content_type, entry.native_file()).into_response())
+}
+
+/// Create or replace a calibration.
+///
+/// Takes the native format as JSON, YAML or TOML, or the file of another program as it is; of
+/// several cameras in a file, `camera` chooses one. It is checked, stored in the native format and
+/// serves when this is answered. `If-Match` replaces only the revision it names, `If-None-Match: *`
+/// only creates.
+#[utoipa::path(
+    put, path = "/calibrations/{id}", tag = "calibrations", operation_id = "put_calibration",
+    params(
+        ("id" = String, Path, description = "The calibration's ID, 1 to 64 of a-z, 0-9, _ and -."),
+        ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
+        ("If-Match" = Option<String>, Header, description = "The revision to replace, or `*`."),
+        ("If-None-Match" = Option<String>, Header, description = "`*`: create only."),
+    ),
+    request_body(
+        description = "A calibration file, recognised from its content; at most 1 MiB.",
+        content(("application/json"), ("application/yaml"), ("application/octet-stream")),
+    ),
+    responses(
+        (status = OK, description = "Replaced.", body = CalibrationInfo,
+         headers(("ETag" = String, description = "The revision, as in reports."))),
+        (status = CREATED, description = "Created.", body = CalibrationInfo,
+         headers(("ETag" = String, description = "The revision, as in reports."))),
+        ChangeProblems,
+    )
+)]
+pub(super) async fn put(
+    State(state): State<ApiState>,
+    _administrator: Administrator,
+    NewCalibrationAddress(id): NewCalibrationAddress,
+    headers: HeaderMap,
+    upload: CalibrationUpload,
+) -> Result<Response, Problem> {
+    let condition = write_condition(&headers)?;
+    let location = format!("/calibrations/{id}");
+    let put = blocking(move || {
+        let camera = upload.camera.as_deref();
+        state
+            .calibrations
+            .put(&id, &upload.content, camera, &condition)
+    });
+    let put = put.await?;
+    let tag = [(ETAG, entity_tag(put.entry.calibration.revision()))];
+    let info = Json(CalibrationInfo::from(&*put.entry));
+    Ok(if put.created {
+        (StatusCode::CREATED, tag, [(LOCATION, location)], info).into_response()
+    } else {
+        (tag, info).into_response()
+    })
+}
+
+/// Delete a calibration.
+///
+/// Frames that began with it are finished. With `If-Match` only at the revision it names.
+#[utoipa::path(
+    delete, path = "/calibrations/{id}", tag = "calibrations", operation_id = "delete_calibration",
+    params(
+        ("id" = String, Path, description = "The calibration's ID."),
+        ("If-Match" = Option<String>, Header, description = "The revision to delete, or `*`."),
+    ),
+    responses((status = NO_CONTENT, description = "It is gone."), DeleteProblems)
+)]
+pub(super) async fn delete(
+    State(state): State<ApiState>,
+    _administrator: Administrator,
+    CalibrationAddress(id): CalibrationAddress,
+    headers: HeaderMap,
+) -> Result<StatusCode, Problem> {
+    let condition = write_condition(&headers)?;
+    blocking(move || state.calibrations.delete(&id, &condition)).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// No calibration of that ID serves.
+fn unknown(state: &ApiState, id: &crate::calibration::CalibrationId) -> Problem {
+    let rows = state.calibrations.rows();
+    let row = rows.into_iter().find(|row| row.id == *id);
+    let detail = match row.and_then(|row| Some((row.file, row.problem?))) {
+        Some((file, problem)) => format!("{file} cannot be used: {problem}"),
+        None => ChangeError::Unknown { id: id.clone() }.to_string(),
+    };
+    Problem::new(ProblemKind::UnknownCalibration, detail)
+}
+
+/// Stores are read and written off the async runtime.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, ChangeError> + Send + 'static,
+) -> Result<T, Problem> {
+    Ok(spawn_blocking(work).await.map_err(Problem::internal)??)
+}

@@ -1,0 +1,52 @@
+//! The ID in the address.
+
+use axum::{
+    extract::{FromRequestParts, Path},
+    http::request::Parts,
+};
+
+use crate::{
+    api::{
+        ApiState,
+        problem::{Problem, ProblemKind},
+    },
+    calibration::CalibrationId,
+};
+
+/// The ID of a calibration that may be there.
+pub(in crate::api) struct CalibrationAddress(pub(super) CalibrationId);
+
+/// The ID of a calibration that is to be there.
+pub(in crate::api) struct NewCalibrationAddress(pub(super) CalibrationId);
+
+impl FromRequestParts<ApiState> for CalibrationAddress {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        id(parts, state, ProblemKind::UnknownCalibration)
+            .await
+            .map(Self)
+    }
+}
+
+impl FromRequestParts<ApiState> for NewCalibrationAddress {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        id(parts, state, ProblemKind::InvalidCalibration)
+            .await
+            .map(Self)
+    }
+}
+
+async fn id(
+    parts: &mut Parts,
+    state: &ApiState,
+    kind: ProblemKind,
+) -> Result<CalibrationId, Problem> {
+    // Bytes that are no text are no ID either.
+    let id = Path::<String>::from_request_parts(parts, state).await;
+    let id = id.map(|Path(id)| id).unwrap_or_default();
+    id.parse()
+        .map_err(|error| Problem::new(kind, format!("{error}")))
+}

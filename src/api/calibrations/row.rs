@@ -1,0 +1,79 @@
+//! What is told of a calibration.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::calibration::{CalibrationEntry, CalibrationRow};
+
+/// A calibration.
+#[derive(Serialize, ToSchema)]
+#[schema(example = json!({
+    "id": "lobby", "revision": "6b2a0c51f7d3", "file": "lobby.json",
+    "image": { "width": 1680, "height": 1680 }, "lens": "equidistant"
+}))]
+pub(in crate::api) struct CalibrationInfo {
+    /// Its ID.
+    id: String,
+    /// The revision that serves, as in reports; absent when none does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    revision: Option<String>,
+    /// The name of its file.
+    file: String,
+    /// The size of the frames it was made for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    image: Option<ImageSize>,
+    /// The model of its lens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lens: Option<&'static str>,
+    /// Why the newest version of its file is not used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    problem: Option<String>,
+    /// What had to be assumed, and what is odd about it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    warnings: Vec<String>,
+}
+
+/// A frame size.
+#[derive(Serialize, ToSchema)]
+pub(in crate::api) struct ImageSize {
+    /// Pixels.
+    width: u32,
+    /// Pixels.
+    height: u32,
+}
+
+impl From<&CalibrationEntry> for CalibrationInfo {
+    fn from(entry: &CalibrationEntry) -> Self {
+        let calibration = &entry.calibration;
+        let (width, height) = calibration.image_size();
+        let mut warnings = entry.notes.clone();
+        warnings.extend(calibration.doubts());
+        Self {
+            id: calibration.id().to_string(),
+            revision: Some(calibration.revision().to_owned()),
+            file: entry.file.clone(),
+            image: Some(ImageSize { width, height }),
+            lens: Some(calibration.lens().model()),
+            problem: None,
+            warnings,
+        }
+    }
+}
+
+impl From<CalibrationRow> for CalibrationInfo {
+    fn from(row: CalibrationRow) -> Self {
+        let known = row.entry.as_deref().map(Self::from);
+        Self {
+            problem: row.problem,
+            ..known.unwrap_or(Self {
+                id: row.id.to_string(),
+                revision: None,
+                file: row.file,
+                image: None,
+                lens: None,
+                problem: None,
+                warnings: Vec::new(),
+            })
+        }
+    }
+}

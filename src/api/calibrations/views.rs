@@ -1,0 +1,161 @@
+//! The view plan of a calibration.
+
+use axum::{Json, extract::State, http::Uri};
+use serde::Serialize;
+use tokio::task::spawn_blocking;
+use utoipa::ToSchema;
+
+use super::{address::CalibrationAddress, unknown};
+use crate::{
+    api::{
+        ApiState,
+        openapi::ViewsProblems,
+        problem::{Problem, ProblemKind},
+        upload::one_parameter,
+    },
+    pipeline::{PlannedView, PlannedViews, Profile},
+};
+
+/// How a frame of a calibration is looked at.
+#[derive(Serialize, ToSchema)]
+pub(in crate::api) struct ViewPlanInfo {
+    /// The calibration's ID.
+    calibration: String,
+    /// Its revision, as in reports.
+    revision: String,
+    /// The profile.
+    #[schema(example = "balanced")]
+    profile: &'static str,
+    /// The model that the views are made for.
+    model: String,
+    /// The size of the frames that outlines are in, pixels.
+    image: [u32; 2],
+    /// Share of the lens image that lies in at least one view, 0 to 1.
+    #[schema(example = 0.998)]
+    coverage: f64,
+    /// In how many views a place of the lens image lies on average.
+    #[schema(example = 3.1)]
+    overlap: f64,
+    /// What a frame costs.
+    cost: PlanCost,
+    /// The views, in the order in which the network sees them; `direct` has none.
+    views: Vec<ViewInfo>,
+}
+
+/// What a frame costs.
+#[derive(Serialize, ToSchema)]
+pub(in crate::api) struct PlanCost {
+    /// How many pictures the network sees.
+    pictures: usize,
+    /// How many times the network is run.
+    batches: usize,
+    /// Pixels that the network sees.
+    pixels: u64,
+}
+
+/// A virtual view.
+#[derive(Serialize, ToSchema)]
+pub(in crate::api) struct ViewInfo {
+    /// Rotation from the view frame to the camera frame, row by row (x right, y down, z along the
+    /// axis in both).
+    camera_from_view: [[f64; 3]; 3],
+    /// Where it looks: from image right, clockwise, degrees.
+    azimuth_deg: f64,
+    /// Where it looks: from the optical axis, degrees.
+    off_axis_deg: f64,
+    /// Horizontal opening angle, degrees.
+    field_of_view_deg: f64,
+    /// Width and height, pixels.
+    size: [u32; 2],
+    /// Focal length, pixels.
+    focal: f64,
+    /// Principal point, pixel centres.
+    principal_point: [f64; 2],
+    /// Its border in the frame, clockwise from its top left corner, corner-origin pixels; what lies
+    /// beyond the lens image is pulled to its rim.
+    outline: Vec<[f64; 2]>,
+}
+
+/// How is a frame of this calibration looked at?
+///
+/// Each view with its pose, intrinsics and outline in the frame; how much of the lens image the
+/// plan sees, how often, and what that costs.
+#[utoipa::path(
+    get, path = "/calibrations/{id}/views", tag = "calibrations", operation_id = "get_views",
+    params(
+        ("id" = String, Path, description = "The calibration's ID."),
+        ("profile" = Option<String>, Query, description = "`balanced` by default."),
+    ),
+    responses((status = OK, description = "The view plan.", body = ViewPlanInfo), ViewsProblems)
+)]
+pub(in crate::api) async fn get_views(
+    State(state): State<ApiState>,
+    CalibrationAddress(id): CalibrationAddress,
+    uri: Uri,
+) -> Result<Json<ViewPlanInfo>, Problem> {
+    let profile = match one_parameter(&uri, "profile")? {
+        None => Profile::default(),
+        Some(name) => Profile::from_name(&name).ok_or_else(|| unknown_profile(&name))?,
+    };
+    let calibrations = &state.calibrations;
+    let entry = calibrations
+        .entry(&id)
+        .ok_or_else(|| unknown(&state, &id))?;
+    let plan = spawn_blocking(move || {
+        let calibration = &entry.calibration;
+        let planned = state.workers.engine().planned_views(calibration, profile)?;
+        Ok::<_, Problem>(ViewPlanInfo {
+            calibration: calibration.id().to_string(),
+            revision: calibration.revision().to_owned(),
+            ..ViewPlanInfo::from(planned)
+        })
+    });
+    Ok(Json(plan.await.map_err(Problem::internal)??))
+}
+
+fn unknown_profile(name: &str) -> Problem {
+    let names = Profile::ALL.map(Profile::name).join(", ");
+    let name: String = name.chars().take(64).collect();
+    let detail = format!("profile: there is no {name:?}: use one of {names}");
+    Problem::new(ProblemKind::InvalidParameter, detail)
+}
+
+impl From<PlannedViews> for ViewPlanInfo {
+    fn from(plan: PlannedViews) -> Self {
+        Self {
+            calibration: String::new(),
+            revision: String::new(),
+            profile: plan.profile.name(),
+            model: plan.model,
+            image: [plan.image_width, plan.image_height],
+            coverage: plan.seen_share,
+            overlap: plan.mean_views,
+            cost: PlanCost {
+                pictures: plan.pictures,
+                batches: plan.batches,
+                pixels: plan.pixels,
+            },
+            views: plan.views.iter().map(ViewInfo::from).collect(),
+        }
+    }
+}
+
+impl From<&PlannedView> for ViewInfo {
+    fn from(planned: &PlannedView) -> Self {
+        let view = &planned.view;
+        let rotation = view.camera_from_view().matrix();
+        let axis = rotation.column(2);
+        let principal = view.principal_point();
+        let azimuth = axis.y.atan2(axis.x).to_degrees().rem_euclid(360.0);
+        Self {
+            camera_from_view: [0, 1, 2].map(|row| [0, 1, 2].map(|column| rotation[(row, column)])),
+            azimuth_deg: azimuth,
+            off_axis_deg: axis.x.hypot(axis.y).atan2(axis.z).to_degrees(),
+            field_of_view_deg: view.field_of_view().to_degrees(),
+            size: [view.width(), view.height()],
+            focal: view.focal(),
+            principal_point: [principal.x, principal.y],
+            outline: planned.outline.iter().map(|at| [at.x, at.y]).collect(),
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! Refused changes of calibrations as problems: the only place that decides their status.
+
+use super::{Problem, ProblemKind};
+use crate::calibration::{ChangeError, StoreError};
+
+impl From<ChangeError> for Problem {
+    fn from(error: ChangeError) -> Self {
+        let kind = match error {
+            ChangeError::NotWritable => ProblemKind::Forbidden,
+            ChangeError::Unknown { .. } => ProblemKind::UnknownCalibration,
+            ChangeError::Content(_)
+            | ChangeError::SeveralCameras { .. }
+            | ChangeError::UnknownCamera { .. } => ProblemKind::InvalidCalibration,
+            ChangeError::Outdated { .. } => ProblemKind::Outdated,
+            ChangeError::Shared { .. } => ProblemKind::CalibrationConflict,
+            ChangeError::Store(StoreError::ReadOnly { .. }) => {
+                tracing::warn!("a calibration was not changed: {error}");
+                let detail = "calibrations cannot be changed here: their store is read only";
+                return Self::new(ProblemKind::Forbidden, detail);
+            }
+            ChangeError::Store(StoreError::Failed { .. }) => return Self::internal(error),
+        };
+        Self::new(kind, error.to_string())
+    }
+}

@@ -1,0 +1,150 @@
+//! Creating, replacing and deleting calibrations.
+
+use std::sync::Arc;
+
+use super::{
+    CalibrationEntry, Calibrations, ChangeError, content::import, load::LoadedFile,
+    named_file::written_name,
+};
+use crate::calibration::CalibrationId;
+
+/// When a calibration may be changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum WriteCondition {
+    /// Whatever there is.
+    Always,
+    /// When there is none yet.
+    IfAbsent,
+    /// When there is one.
+    IfPresent,
+    /// When there is one at one of these revisions.
+    IfRevision(Vec<String>),
+}
+
+/// A calibration that was written.
+#[derive(Debug, Clone)]
+pub struct Put {
+    /// What serves now.
+    pub entry: Arc<CalibrationEntry>,
+    /// Whether there was none before.
+    pub created: bool,
+}
+
+impl Calibrations {
+    /// Checks `content`, a calibration file in any format with one camera or with that called
+    /// `camera`, and stores it as the calibration `id`, in the native format. It serves when this
+    /// returns. Blocks.
+    ///
+    /// # Errors
+    /// [`ChangeError`]; then nothing has changed.
+    pub fn put(
+        &self,
+        id: &CalibrationId,
+        content: &[u8],
+        camera: Option<&str>,
+        condition: &WriteCondition,
+    ) -> Result<Put, ChangeError> {
+        if !self.writable {
+            return Err(ChangeError::NotWritable);
+        }
+        let name = written_name(id);
+        let (entry, written) = import(id, &name, content, camera)?;
+        let changing = self.lock();
+        // What others have stored since the last look counts, too.
+        self.look(&changing)?;
+        let before = self.now();
+        let replaced = before.entry(id);
+        condition.check(replaced.map(Arc::as_ref))?;
+        let file = before.files.get(id);
+        if let Some(shared) = file.filter(|file| file.holds_several) {
+            return Err(shared_file(shared));
+        }
+        self.store.write(&name, written.as_bytes())?;
+        // It hides the others, so that a kill in between does no harm.
+        for hidden in file.into_iter().flat_map(|file| file.names()) {
+            if hidden != name {
+                self.store.delete(hidden)?;
+            }
+        }
+        self.look(&changing)?;
+        Ok(Put {
+            entry: Arc::new(entry),
+            created: replaced.is_none(),
+        })
+    }
+
+    /// Deletes the calibration `id` with its file. Blocks.
+    ///
+    /// # Errors
+    /// [`ChangeError`].
+    pub fn delete(
+        &self,
+        id: &CalibrationId,
+        condition: &WriteCondition,
+    ) -> Result<(), ChangeError> {
+        if !self.writable {
+            return Err(ChangeError::NotWritable);
+        }
+        let changing = self.lock();
+        self.look(&changing)?;
+        let before = self.now();
+        let entry = before.entry(id);
+        let file = before.files.get(id);
+        if entry.is_none() && file.is_none() {
+            return Err(ChangeError::Unknown { id: id.clone() });
+        }
+        condition.check(entry.map(Arc::as_ref))?;
+        let holder = || {
+            before
+                .files
+                .values()
+                .find(|file| file.cameras.contains_key(id))
+        };
+        let Some(file) = file.or_else(holder).filter(|file| !file.holds_several) else {
+            let shared = file.or_else(holder).map(|file| shared_file(file));
+            return Err(shared.unwrap_or(ChangeError::Unknown { id: id.clone() }));
+        };
+        // The one that counts last: until then it hides the others.
+        for name in file.names().rev() {
+            self.store.delete(name)?;
+        }
+        self.look(&changing)?;
+        Ok(())
+    }
+}
+
+impl LoadedFile {
+    /// The names of the files of its ID, the one that counts first.
+    fn names(&self) -> impl DoubleEndedIterator<Item = &str> {
+        let hidden = self.named.hidden.iter().map(String::as_str);
+        std::iter::once(self.named.file.name.as_str()).chain(hidden)
+    }
+}
+
+fn shared_file(file: &LoadedFile) -> ChangeError {
+    ChangeError::Shared {
+        file: file.named.file.name.clone(),
+        ids: file.cameras.keys().map(ToString::to_string).collect(),
+    }
+}
+
+impl WriteCondition {
+    fn check(&self, now: Option<&CalibrationEntry>) -> Result<(), ChangeError> {
+        let revision = now.map(|entry| entry.calibration.revision());
+        let is_met = match self {
+            Self::Always => true,
+            Self::IfAbsent => revision.is_none(),
+            Self::IfPresent => revision.is_some(),
+            Self::IfRevision(wanted) => {
+                revision.is_some_and(|revision| wanted.iter().any(|wanted| wanted == revision))
+            }
+        };
+        if is_met {
+            return Ok(());
+        }
+        let now = revision.map_or("not there".to_owned(), |revision| {
+            format!("at revision {revision}")
+        });
+        Err(ChangeError::Outdated { now })
+    }
+}

@@ -1,0 +1,124 @@
+//! From the content of a stored or uploaded file to calibrations under their IDs.
+
+use std::sync::Arc;
+
+use super::ChangeError;
+use crate::calibration::{
+    Calibration, CalibrationFile, CalibrationId, FormatError,
+    export::Target,
+    formats::FileCamera,
+    native::{NativeCalibration, NativeImage},
+};
+
+/// A calibration that serves.
+#[derive(Debug, Clone)]
+pub struct CalibrationEntry {
+    /// The checked camera.
+    pub calibration: Arc<Calibration>,
+    /// The same in the native format, whatever format its file has.
+    pub native: NativeCalibration,
+    /// What had to be assumed to read it, a sentence each.
+    pub notes: Vec<String>,
+    /// The name of its file in the store.
+    pub file: String,
+}
+
+/// The cameras of a file, each under its ID.
+pub(super) type Cameras = Vec<(String, Result<CalibrationEntry, FormatError>)>;
+
+/// The cameras that the file called `name`, of the ID `stem`, holds.
+pub(super) fn cameras(
+    stem: &CalibrationId,
+    name: &str,
+    content: &[u8],
+) -> Result<Cameras, FormatError> {
+    let file = CalibrationFile::parse(content)?;
+    let checked = file.calibrations(stem.as_str(), content);
+    let is_alone = checked.len() == 1;
+    let cameras = file.cameras.into_iter().zip(checked);
+    let cameras = cameras.map(|(told, (id, checked))| {
+        let entry = if is_alone && id != stem.as_str() {
+            let problem =
+                format!("it is {id:?}, but the file's name says \"{stem}\": make them equal");
+            Err(FormatError::invalid("id", problem))
+        } else {
+            checked.and_then(|calibration| entry(calibration, told, name))
+        };
+        (id, entry)
+    });
+    Ok(cameras.collect())
+}
+
+fn entry(
+    calibration: Calibration,
+    told: FileCamera,
+    name: &str,
+) -> Result<CalibrationEntry, FormatError> {
+    let told = told.camera?;
+    let (width, height) = calibration.image_size();
+    Ok(CalibrationEntry {
+        native: NativeCalibration {
+            id: calibration.id().to_string(),
+            image: NativeImage { width, height },
+            lens: told.lens,
+            mount: told.mount,
+        },
+        notes: told.notes,
+        calibration: Arc::new(calibration),
+        file: name.to_owned(),
+    })
+}
+
+impl CalibrationEntry {
+    /// The content of its native file.
+    #[must_use]
+    pub fn native_file(&self) -> String {
+        // The native format has a place for everything.
+        let exported = Target::Native.write(&self.native);
+        exported.map_or_else(|_| String::new(), |exported| exported.content)
+    }
+}
+
+/// The calibration `id` that an upload means, as the native file called `name`: its only camera, or
+/// the one that `camera` names.
+pub(super) fn import(
+    id: &CalibrationId,
+    name: &str,
+    content: &[u8],
+    camera: Option<&str>,
+) -> Result<(CalibrationEntry, String), ChangeError> {
+    let mut file = CalibrationFile::parse(content)?;
+    let names: Vec<_> = file
+        .cameras
+        .iter()
+        .enumerate()
+        .map(|(index, camera)| camera.name.clone().unwrap_or_else(|| index.to_string()))
+        .collect();
+    let chosen = match camera {
+        Some(wanted) => names.iter().position(|name| name == wanted),
+        None if names.len() == 1 => Some(0),
+        None => return Err(ChangeError::SeveralCameras { names }),
+    };
+    let Some(chosen) = chosen else {
+        return Err(ChangeError::UnknownCamera {
+            camera: camera.unwrap_or_default().chars().take(64).collect(),
+            names,
+        });
+    };
+    let told = file.cameras.swap_remove(chosen);
+    file.cameras = vec![told];
+    let (found, checked) = file.calibrations(id.as_str(), content).swap_remove(0);
+    if found != id.as_str() {
+        let problem = format!("it is {found:?}, but the address says \"{id}\": make them equal");
+        return Err(FormatError::invalid("id", problem).into());
+    }
+    let imported = entry(checked?, file.cameras.swap_remove(0), name)?;
+    let written = imported.native_file();
+    // What is stored must read back: it will be read by others, and after the next start.
+    let (_, stored) = cameras(id, name, written.as_bytes())?.swap_remove(0);
+    let stored = CalibrationEntry {
+        notes: imported.notes,
+        ..stored?
+    };
+    Ok((stored, written))
+}

@@ -1,0 +1,59 @@
+//! Why a calibration was not changed.
+
+use crate::calibration::{CalibrationId, FormatError, StoreError};
+
+/// A calibration that was not changed. Every message is one sentence with the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum ChangeError {
+    /// The operator has switched changes off.
+    #[error(
+        "calibrations are not changed through this server (calibrations.writable is false): change \
+         them where they are stored"
+    )]
+    NotWritable,
+    /// There is no such calibration.
+    #[error("there is no calibration \"{id}\": GET /calibrations lists those there are")]
+    Unknown {
+        /// The ID.
+        id: CalibrationId,
+    },
+    /// The content makes no calibration.
+    #[error(transparent)]
+    Content(#[from] FormatError),
+    /// The content holds several cameras and none was chosen.
+    #[error(
+        "the file holds {} cameras: choose one with ?camera=NAME: {}", names.len(), names.join(", ")
+    )]
+    SeveralCameras {
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// The content does not hold the camera that was chosen.
+    #[error("camera: the file holds {}, not {camera:?}", names.join(", "))]
+    UnknownCamera {
+        /// The name asked for.
+        camera: String,
+        /// The names there are.
+        names: Vec<String>,
+    },
+    /// The calibration is not at the revision that the change was made for.
+    #[error(
+        "the calibration is {now}, which the condition of the request does not allow: get it, look \
+         at what has changed, and send your change again"
+    )]
+    Outdated {
+        /// What it is.
+        now: String,
+    },
+    /// The calibration shares its file with others.
+    #[error("{file} holds several cameras ({}): change that file itself", ids.join(", "))]
+    Shared {
+        /// The name of the file.
+        file: String,
+        /// The IDs of the cameras.
+        ids: Vec<String>,
+    },
+    /// The store did not do it.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}

@@ -1,0 +1,114 @@
+//! A file of the store as it was last read, with what it held before where it is broken now.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::{
+    content::{CalibrationEntry, cameras},
+    named_file::NamedFile,
+};
+use crate::calibration::{CalibrationId, StoreError};
+
+/// A file of the store.
+#[derive(Debug)]
+pub(super) struct LoadedFile {
+    /// Which version was read.
+    pub(super) named: NamedFile,
+    /// Its calibrations that serve, from this version or the last that could be used.
+    pub(super) cameras: BTreeMap<CalibrationId, Arc<CalibrationEntry>>,
+    /// Whether the last version that could be read holds several cameras.
+    pub(super) holds_several: bool,
+    /// Why this version, or cameras of it, cannot be used, a sentence each.
+    pub(super) problems: Vec<String>,
+}
+
+impl LoadedFile {
+    /// The file of the ID `stem`; what cannot be used stays as it is in `before`.
+    pub(super) fn new(
+        stem: &CalibrationId,
+        mut named: NamedFile,
+        content: Result<Vec<u8>, StoreError>,
+        before: Option<&Self>,
+    ) -> Self {
+        let name = &named.file.name;
+        let found = match content {
+            Ok(content) => cameras(stem, name, &content).map_err(|error| error.to_string()),
+            Err(error) => {
+                // So that it is tried again, although it may never change.
+                named.file.stamp.clear();
+                Err(error.to_string())
+            }
+        };
+        let found = match found {
+            Ok(found) => found,
+            Err(problem) => {
+                return Self {
+                    named,
+                    cameras: before.map(|file| file.cameras.clone()).unwrap_or_default(),
+                    holds_several: before.is_some_and(|file| file.holds_several),
+                    problems: vec![problem],
+                };
+            }
+        };
+        let holds_several = found.len() > 1;
+        let (mut cameras, mut problems) = (BTreeMap::new(), Vec::new());
+        for (name, outcome) in found {
+            // A lone camera is that of the file, whatever it calls itself.
+            let id = if holds_several {
+                name.parse().ok()
+            } else {
+                Some(stem.clone())
+            };
+            match (id, outcome) {
+                (Some(id), Ok(entry)) => {
+                    cameras.insert(id, Arc::new(entry));
+                }
+                (id, Err(problem)) => {
+                    let of_which = if holds_several {
+                        format!("{name}: ")
+                    } else {
+                        String::new()
+                    };
+                    problems.push(format!("{of_which}{problem}"));
+                    let last_good = id.and_then(|id| before?.cameras.get_key_value(&id));
+                    cameras.extend(last_good.map(|(id, entry)| (id.clone(), Arc::clone(entry))));
+                }
+                // Its ID was checked with the rest.
+                (None, Ok(_)) => {}
+            }
+        }
+        Self {
+            named,
+            cameras,
+            holds_several,
+            problems,
+        }
+    }
+
+    /// Whether this says something that `before` did not: the same failure to read is no news.
+    pub(super) fn is_news(&self, before: Option<&Self>) -> bool {
+        self.problems.is_empty()
+            || before
+                .is_none_or(|before| before.problems != self.problems || before.named != self.named)
+    }
+
+    /// Tells what this version changes.
+    pub(super) fn log(&self, before: Option<&Self>) {
+        let file = &self.named.file.name;
+        for problem in &self.problems {
+            let serving = if self.cameras.is_empty() {
+                "nothing serves in its place"
+            } else {
+                "what was known of it goes on"
+            };
+            tracing::error!(file, "calibration not used, {serving}: {problem}");
+        }
+        for (id, entry) in &self.cameras {
+            let replaced = before.and_then(|before| before.cameras.get(id));
+            let replaced = replaced.map(|entry| entry.calibration.revision());
+            let revision = entry.calibration.revision();
+            if replaced != Some(revision) {
+                tracing::info!(calibration = %id, revision, replaced, file, "calibration loaded");
+            }
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! All calibrations at one moment.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::Arc,
+};
+
+use super::{CalibrationEntry, load::LoadedFile};
+use crate::calibration::CalibrationId;
+
+/// All calibrations at one moment; never changed, only replaced.
+#[derive(Debug, Default)]
+pub(super) struct Snapshot {
+    /// The files, by the ID in their names.
+    pub(super) files: BTreeMap<CalibrationId, Arc<LoadedFile>>,
+    by_id: HashMap<CalibrationId, Arc<CalibrationEntry>>,
+    /// Why the store could not be looked at, if it could not.
+    pub(super) store_problem: Option<String>,
+}
+
+/// A calibration that serves or should.
+#[derive(Debug, Clone)]
+pub struct CalibrationRow {
+    /// Its ID.
+    pub id: CalibrationId,
+    /// The name of its file in the store.
+    pub file: String,
+    /// What serves; `None` when no version could be used so far.
+    pub entry: Option<Arc<CalibrationEntry>>,
+    /// Why the newest version of its file, or a camera of it, is not used.
+    pub problem: Option<String>,
+}
+
+/// How the calibrations of a store are.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CalibrationsHealth {
+    /// How many serve.
+    pub serving: usize,
+    /// Files whose newest version cannot be used, by name, and why.
+    pub problems: Vec<(String, String)>,
+    /// Why the store could not be looked at, if it could not.
+    pub store_problem: Option<String>,
+    /// Files read and used since the start.
+    pub loads_succeeded: u64,
+    /// Files of which something could not be used since the start.
+    pub loads_failed: u64,
+}
+
+impl Snapshot {
+    /// The calibrations of these files. A file that has an ID's name goes before one that has it
+    /// among others.
+    pub(super) fn of(files: BTreeMap<CalibrationId, Arc<LoadedFile>>) -> Self {
+        let mut by_id = HashMap::new();
+        for (id, file) in &files {
+            if let Some(entry) = file.cameras.get(id) {
+                by_id.insert(id.clone(), Arc::clone(entry));
+            }
+        }
+        for (id, entry) in files.values().flat_map(|file| &file.cameras) {
+            if !files.contains_key(id) {
+                by_id.entry(id.clone()).or_insert_with(|| Arc::clone(entry));
+            }
+        }
+        Self {
+            files,
+            by_id,
+            store_problem: None,
+        }
+    }
+
+    /// The same while the store cannot be looked at.
+    pub(super) fn with_store_problem(&self, problem: String) -> Self {
+        Self {
+            files: self.files.clone(),
+            by_id: self.by_id.clone(),
+            store_problem: Some(problem),
+        }
+    }
+
+    pub(super) fn entry(&self, id: &CalibrationId) -> Option<&Arc<CalibrationEntry>> {
+        self.by_id.get(id)
+    }
+
+    /// The file that has this ID's name, and why it gives no calibration of this ID.
+    pub(super) fn why_unusable(&self, id: &CalibrationId) -> Option<(String, String)> {
+        let file = self.files.get(id)?;
+        let problem = match file.problems.first() {
+            Some(problem) => problem.clone(),
+            None => {
+                let ids: Vec<_> = file.cameras.keys().map(CalibrationId::as_str).collect();
+                let count = ids.len();
+                format!("the file holds {count}: name one of {}", ids.join(", "))
+            }
+        };
+        Some((file.named.file.name.clone(), problem))
+    }
+
+    pub(super) fn rows(&self) -> Vec<CalibrationRow> {
+        let mut rows = BTreeMap::new();
+        for (id, file) in &self.files {
+            let problem = file.problems.first().cloned();
+            let row = |id: &CalibrationId, entry| CalibrationRow {
+                id: id.clone(),
+                file: file.named.file.name.clone(),
+                entry,
+                problem: problem.clone(),
+            };
+            if file.cameras.is_empty() {
+                rows.insert(id.clone(), row(id, None));
+            }
+            for (id, entry) in &file.cameras {
+                let serves = self
+                    .entry(id)
+                    .is_some_and(|known| Arc::ptr_eq(known, entry));
+                if serves {
+                    rows.insert(id.clone(), row(id, Some(Arc::clone(entry))));
+                }
+            }
+        }
+        rows.into_values().collect()
+    }
+
+    /// All but the counts of loads.
+    pub(super) fn health(&self) -> CalibrationsHealth {
+        let problems = self.files.values().flat_map(|file| {
+            let name = &file.named.file.name;
+            file.problems.iter().map(|why| (name.clone(), why.clone()))
+        });
+        CalibrationsHealth {
+            serving: self.by_id.len(),
+            problems: problems.collect(),
+            store_problem: self.store_problem.clone(),
+            ..CalibrationsHealth::default()
+        }
+    }
+}

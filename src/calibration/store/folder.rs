@@ -1,0 +1,174 @@
+//! A folder of calibration files. Links are followed, so that the folder may be a Kubernetes
+//! `ConfigMap`, whose files change when a link is turned to another folder.
+
+use std::{
+    fs::{self, File},
+    io::{self, ErrorKind, Read, Write},
+    os::unix::fs::MetadataExt,
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicU64, Ordering},
+    time::{Duration, SystemTime},
+};
+
+use super::{CalibrationStore, MAX_FILES, StoreError, StoredFile};
+
+/// Files with this ending were about to take another's place when their writer was killed.
+const UNFINISHED: &str = "lookdown-unfinished";
+/// No writer takes this long for a file: an older unfinished one is nobody's.
+const ABANDONED_AFTER: Duration = Duration::from_secs(600);
+
+/// A folder on this machine.
+#[derive(Debug)]
+pub struct FolderStore {
+    path: PathBuf,
+    /// The folder is made by the first write; until then it is empty.
+    may_be_missing: bool,
+    writes: AtomicU64,
+}
+
+impl FolderStore {
+    /// The folder at `path`, which must be there when it is listed.
+    #[must_use]
+    pub fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            may_be_missing: false,
+            writes: AtomicU64::new(0),
+        }
+    }
+
+    /// The folder at `path`; while there is none, it counts as empty.
+    #[must_use]
+    pub fn that_may_be_missing(path: &Path) -> Self {
+        Self {
+            may_be_missing: true,
+            ..Self::new(path)
+        }
+    }
+
+    fn failed(&self, error: &io::Error) -> StoreError {
+        let (place, problem) = (self.place(), error.to_string());
+        match error.kind() {
+            ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied => {
+                StoreError::ReadOnly { place, problem }
+            }
+            _ => StoreError::Failed { place, problem },
+        }
+    }
+
+    /// Write, sync, rename, sync the folder.
+    fn replace(&self, name: &str, content: &[u8]) -> io::Result<()> {
+        if self.may_be_missing {
+            fs::create_dir_all(&self.path)?;
+        }
+        self.remove_abandoned()?;
+        let count = self.writes.fetch_add(1, Ordering::Relaxed);
+        let process = std::process::id();
+        let unfinished = format!(".{name}.{process}-{count}.{UNFINISHED}");
+        let unfinished = self.path.join(unfinished);
+        let written = File::create(&unfinished).and_then(|mut file| {
+            file.write_all(content)?;
+            file.sync_all()
+        });
+        let replaced = written.and_then(|()| fs::rename(&unfinished, self.path.join(name)));
+        if replaced.is_err() {
+            // The first failure is the one to tell.
+            let _ = fs::remove_file(&unfinished);
+        }
+        replaced?;
+        self.sync()
+    }
+
+    /// A rename or removal lasts only once the folder itself is on the disk.
+    fn sync(&self) -> io::Result<()> {
+        File::open(&self.path)?.sync_all()
+    }
+
+    /// Removes what killed writers left.
+    fn remove_abandoned(&self) -> io::Result<()> {
+        for entry in fs::read_dir(&self.path)?.take(MAX_FILES) {
+            let path = entry?.path();
+            let is_unfinished = path.extension().is_some_and(|ending| ending == UNFINISHED);
+            if is_unfinished && is_abandoned(&path) {
+                fs::remove_file(&path)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl CalibrationStore for FolderStore {
+    fn place(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+        let entries = match fs::read_dir(&self.path) {
+            Err(error) if self.may_be_missing && error.kind() == ErrorKind::NotFound => {
+                return Ok(Vec::new());
+            }
+            entries => entries.map_err(|error| self.failed(&error))?,
+        };
+        let mut files = Vec::new();
+        for (index, entry) in entries.enumerate() {
+            if index == MAX_FILES {
+                let problem = io::Error::other(format!("there are more than {MAX_FILES} files"));
+                return Err(self.failed(&problem));
+            }
+            let entry = entry.map_err(|error| self.failed(&error))?;
+            // A link to nothing, as while files are being replaced, is no file.
+            if let (Ok(name), Some(stamp)) = (entry.file_name().into_string(), stamp(&entry.path()))
+            {
+                files.push(StoredFile { name, stamp });
+            }
+        }
+        Ok(files)
+    }
+
+    fn read(&self, name: &str, at_most: usize) -> Result<Vec<u8>, StoreError> {
+        let read = || {
+            let mut content = Vec::new();
+            let file = File::open(self.path.join(name))?;
+            file.take(at_most as u64).read_to_end(&mut content)?;
+            Ok(content)
+        };
+        read().map_err(|error: io::Error| self.failed(&error))
+    }
+
+    fn write(&self, name: &str, content: &[u8]) -> Result<(), StoreError> {
+        self.replace(name, content)
+            .map_err(|error| self.failed(&error))
+    }
+
+    fn delete(&self, name: &str) -> Result<(), StoreError> {
+        let removed = match fs::remove_file(self.path.join(name)) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            removed => removed.and_then(|()| self.sync()),
+        };
+        removed.map_err(|error| self.failed(&error))
+    }
+}
+
+/// What tells a file's content from another, links followed: which file it is, how long, from when.
+fn stamp(path: &Path) -> Option<String> {
+    let metadata = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
+    Some(format!(
+        "{}:{}:{}:{}.{:09}",
+        metadata.dev(),
+        metadata.ino(),
+        metadata.len(),
+        metadata.mtime(),
+        metadata.mtime_nsec()
+    ))
+}
+
+fn is_abandoned(path: &Path) -> bool {
+    let modified = path.metadata().and_then(|metadata| metadata.modified());
+    let age = modified
+        .ok()
+        .and_then(|modified| SystemTime::now().duration_since(modified).ok());
+    age.is_some_and(|age| age > ABANDONED_AFTER)
+}
+
+#[cfg(test)]
+mod tests;

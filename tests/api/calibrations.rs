@@ -1,0 +1,207 @@
+//! Reading calibrations over HTTP, and what becomes of files that change.
+
+use std::fs;
+
+use axum::{body::Body, http::Request};
+use serde_json::{Value, json};
+
+use crate::service::{Service, frame};
+
+const PATH: &str = "/calibrations/lobby";
+
+#[tokio::test]
+async fn the_list_and_the_resource_tell_the_same_revision_as_reports() {
+    let service = Service::start();
+    let report = service
+        .post_raw("calibration=lobby&profile=fast", frame())
+        .await
+        .json();
+    let revision = &report["calibration"]["revision"];
+    let list = service.get("/calibrations").await.json();
+    let image = json!({ "width": 200, "height": 200 });
+    let lobby = json!({
+        "id": "lobby", "revision": revision, "file": "lobby.json", "image": image,
+        "lens": "equidistant"
+    });
+    assert_eq!(list, json!([lobby]));
+    let answer = service.get(PATH).await;
+    assert_eq!(answer.header("etag"), revision.to_string());
+    assert_eq!(answer.header("content-type"), "application/json");
+    let native = answer.json();
+    assert_eq!((&native["id"], &native["image"]), (&json!("lobby"), &image));
+    assert_eq!(native["mount"]["height_m"], 3.0);
+}
+
+#[tokio::test]
+async fn a_reader_that_has_the_revision_is_told_so_without_a_body() {
+    let service = Service::start();
+    let tag = service.get(PATH).await.header("etag").to_owned();
+    for (asked, status) in [
+        (tag.as_str(), 304),
+        ("*", 304),
+        ("\"other\"", 200),
+        ("x", 400),
+    ] {
+        let request = Request::get(PATH).header("if-none-match", asked);
+        let answer = service.send(request.body(Body::empty()).unwrap()).await;
+        assert_eq!(answer.status, status, "{asked}");
+        if status == 304 {
+            assert_eq!((answer.header("etag"), answer.body.len()), (&*tag, 0));
+        }
+    }
+}
+
+#[tokio::test]
+async fn what_is_not_there_is_404_and_says_where_to_look() {
+    let service = Service::start();
+    for path in [
+        "/calibrations/hall",
+        "/calibrations/hall/views",
+        "/calibrations/NO",
+    ] {
+        let answer = service.get(path).await;
+        assert_eq!(answer.status, 404, "{path}");
+        let problem = answer.problem();
+        assert_eq!(problem["type"], "urn:lookdown:problem:unknown-calibration");
+    }
+}
+
+#[tokio::test]
+async fn a_broken_new_version_is_told_everywhere_and_the_old_one_serves() {
+    let service = Service::start();
+    let before = service.get(PATH).await;
+    fs::write(service.folder.path().join("lobby.json"), "{ broken").unwrap();
+    fs::write(service.folder.path().join("hall.json"), "{}").unwrap();
+    service.calibrations.refresh();
+    service.still_works().await;
+    assert_eq!(service.get(PATH).await.body, before.body);
+
+    let ready = service.get("/readyz").await;
+    assert_eq!(
+        (ready.status.as_u16(), &ready.json()["status"]),
+        (200, &json!("ready"))
+    );
+    let told = &ready.json()["calibrations"];
+    assert_eq!(told["serving"], 1);
+    let files: Vec<_> = told["problems"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| &p["file"])
+        .collect();
+    assert_eq!(files, ["hall.json", "lobby.json"]);
+    let list = service.get("/calibrations").await.json();
+    assert_eq!(
+        (&list[0]["id"], &list[0]["revision"]),
+        (&json!("hall"), &Value::Null)
+    );
+    assert!(
+        list[1]["revision"].is_string() && list[1]["problem"].is_string(),
+        "{list}"
+    );
+    let hall = service.get("/calibrations/hall").await;
+    let detail = hall.problem()["detail"].as_str().unwrap().to_owned();
+    assert!(
+        hall.status == 404 && detail.starts_with("hall.json cannot be used"),
+        "{detail}"
+    );
+
+    let metrics = service.get("/metrics").await.text();
+    for line in [
+        "lookdown_calibrations 1",
+        "lookdown_calibration_files_broken 2",
+        "lookdown_calibration_store_up 1",
+        "lookdown_calibration_loads_total{result=\"success\"} 1",
+        "lookdown_calibration_loads_total{result=\"failure\"} 2",
+    ] {
+        assert!(
+            metrics.lines().any(|told| told == line),
+            "{line} is not in\n{metrics}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn the_view_plan_has_every_view_that_the_network_sees() {
+    let service = Service::start();
+    for (query, views) in [("?profile=fast", 13), ("", 24), ("?profile=paper", 128)] {
+        let path = format!("{PATH}/views{query}");
+        let plan = service.get(&path).await.json();
+        let told = plan["views"].as_array().unwrap();
+        assert_eq!(
+            (told.len(), &plan["cost"]["pictures"]),
+            (views, &json!(views)),
+            "{query}"
+        );
+        assert_eq!(plan["cost"]["pixels"], views * 64 * 64);
+        assert_eq!(plan["cost"]["batches"], 1);
+        let share = plan["coverage"].as_f64().unwrap();
+        assert!((0.6..=1.0).contains(&share), "{query}: {share}");
+        assert!(plan["overlap"].as_f64().unwrap() > 1.0);
+        for view in told {
+            let outline = view["outline"].as_array().unwrap();
+            let inside = |value: &Value| (-1.0..=201.0).contains(&value.as_f64().unwrap());
+            assert!(!outline.is_empty(), "{view}");
+            assert!(
+                outline.iter().all(|at| inside(&at[0]) && inside(&at[1])),
+                "{view}"
+            );
+            assert_eq!(view["principal_point"], json!([31.5, 31.5]));
+        }
+    }
+    let report = service
+        .post_raw("calibration=lobby&profile=fast", frame())
+        .await;
+    assert_eq!(report.status, 200);
+    let metrics = service.get("/metrics").await.text();
+    assert!(metrics.contains("\nlookdown_views_total 13\n"), "{metrics}");
+}
+
+#[tokio::test]
+async fn a_view_looks_where_it_says() {
+    let service = Service::start();
+    let plan = service
+        .get("/calibrations/lobby/views?profile=fast")
+        .await
+        .json();
+    let nadir = &plan["views"][0];
+    assert!(nadir["off_axis_deg"].as_f64().unwrap() < 1e-6);
+    assert!((nadir["field_of_view_deg"].as_f64().unwrap() - 90.0).abs() < 1e-6);
+    let points = nadir["outline"].as_array().unwrap();
+    let mean = |axis: usize| {
+        let sum: f64 = points
+            .iter()
+            .skip(1)
+            .map(|at| at[axis].as_f64().unwrap())
+            .sum();
+        sum / (points.len() - 1) as f64
+    };
+    assert!((mean(0) - 100.0).abs() < 0.01 && (mean(1) - 100.0).abs() < 0.01);
+    for view in &plan["views"].as_array().unwrap()[1..] {
+        let off_axis = view["off_axis_deg"].as_f64().unwrap();
+        assert!((off_axis - 0.8_f64.to_degrees()).abs() < 1e-6, "{off_axis}");
+    }
+}
+
+#[tokio::test]
+async fn a_plan_for_the_frame_itself_has_no_views_and_odd_requests_are_refused() {
+    let service = Service::start();
+    let plan = service
+        .get("/calibrations/lobby/views?profile=direct")
+        .await
+        .json();
+    assert_eq!(
+        (&plan["views"], &plan["cost"]["pictures"]),
+        (&json!([]), &json!(1))
+    );
+    for (query, status, kind) in [
+        ("profile=best", 422, "invalid-parameter"),
+        ("profil=fast", 400, "unknown-parameter"),
+        ("profile=fast&profile=fast", 400, "repeated-parameter"),
+    ] {
+        let answer = service.get(&format!("{PATH}/views?{query}")).await;
+        assert_eq!(answer.status, status, "{query}");
+        let urn = format!("urn:lookdown:problem:{kind}");
+        assert_eq!(answer.problem()["type"], urn, "{query}");
+    }
+}
