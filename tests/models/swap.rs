@@ -20,6 +20,7 @@ use axum::{
 use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
+    calibration::{Calibrations, FolderStore},
     geometry::FieldOfViewReading,
     imaging::decode::DecodeLimits,
     inference::{ModelFolder, ModelRepository, OnnxDetector, RepositoryOptions},
@@ -68,11 +69,14 @@ fn service(folder: &Path) -> Router {
         request_timeout: Duration::from_mins(2),
         administration: true,
     };
+    let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
+    let calibrations = Calibrations::open(Box::new(store), false).unwrap();
     let metrics = Arc::new(Metrics::new().unwrap());
     let workers = Arc::new(workers.unwrap());
     api::router(ApiState::new(
         workers,
         Arc::new(models),
+        Arc::new(calibrations),
         metrics,
         readiness,
         options,

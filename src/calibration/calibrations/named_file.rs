@@ -65,8 +65,8 @@ mod tests {
             name: name.to_owned(),
             stamp: String::new(),
         });
-        let named = by_id(files.to_vec());
-        let found: Vec<_> = named
+        let files_by_id = by_id(files.to_vec());
+        let found: Vec<_> = files_by_id
             .iter()
             .map(|(id, named)| (id.as_str(), named.file.name.as_str(), named.hidden.clone()))
             .collect();

@@ -84,14 +84,15 @@ impl Snapshot {
     /// The file that has this ID's name, and why it gives no calibration of this ID.
     pub(super) fn why_unusable(&self, id: &CalibrationId) -> Option<(String, String)> {
         let file = self.files.get(id)?;
-        let problem = match file.problems.first() {
-            Some(problem) => problem.clone(),
-            None => {
-                let ids: Vec<_> = file.cameras.keys().map(CalibrationId::as_str).collect();
-                let count = ids.len();
-                format!("the file holds {count}: name one of {}", ids.join(", "))
-            }
+        let several = || {
+            let ids: Vec<_> = file.cameras.keys().map(CalibrationId::as_str).collect();
+            format!(
+                "the file holds {}: name one of {}",
+                ids.len(),
+                ids.join(", ")
+            )
         };
+        let problem = file.problems.first().cloned().unwrap_or_else(several);
         Some((file.named.file.name.clone(), problem))
     }
 

@@ -107,7 +107,7 @@ fn a_broken_camera_of_a_file_leaves_the_others_and_its_own_last_version() {
     fs::write(&file, TWO_CAMERAS).unwrap();
     let calibrations = open(folder.path());
     let first = ["lobby-cam0", "lobby-cam1"].map(|id| revision(&calibrations, id).unwrap());
-    fs::write(&file, TWO_CAMERAS.replace("[-0.2", "[-.inf")).unwrap();
+    fs::write(&file, TWO_CAMERAS.replace("0.6, 190", "70.6, 190")).unwrap();
     calibrations.refresh();
     assert_ne!(revision(&calibrations, "lobby-cam0").unwrap(), first[0]);
     assert_eq!(revision(&calibrations, "lobby-cam1").unwrap(), first[1]);

@@ -15,7 +15,7 @@ use super::{CalibrationStore, MAX_FILES, StoreError, StoredFile};
 /// Files with this ending were about to take another's place when their writer was killed.
 const UNFINISHED: &str = "lookdown-unfinished";
 /// No writer takes this long for a file: an older unfinished one is nobody's.
-const ABANDONED_AFTER: Duration = Duration::from_secs(600);
+const ABANDONED_AFTER: Duration = Duration::from_mins(10);
 
 /// A folder on this machine.
 #[derive(Debug)]

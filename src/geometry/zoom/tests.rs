@@ -37,8 +37,8 @@ fn a_person_stands_upright_in_the_middle_and_fills_the_share_asked_for() {
     // Outward of the camera is up in the picture: the far end of the person is the head.
     assert!(outer.y < inner.y);
     assert!((outer.x - middle).abs() < 1.0 && (inner.x - middle).abs() < 1.0);
-    assert!(((outer.y + inner.y) / 2.0 - middle).abs() < 1.0);
-    assert!(((right.x + left.x) / 2.0 - middle).abs() < 1.0);
+    assert!((f64::midpoint(outer.y, inner.y) - middle).abs() < 1.0);
+    assert!((f64::midpoint(right.x, left.x) - middle).abs() < 1.0);
     let height = (outer.y - inner.y).abs() / f64::from(SIZE);
     assert!((height - FILL).abs() < 0.01, "{height}");
 }
