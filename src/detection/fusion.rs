@@ -5,8 +5,8 @@
 //!
 //! * A coordinate's weight is score³ × the candidate's own weight: sharper than the score alone,
 //!   and boxes cut off by a view's border hardly pull.
-//! * The score of a person is what its witnesses say on average: the mean of the best score of each
-//!   distinct view, over the best `w` views, where `w` is 3 or the number of views that should have
+//! * The score of a person is what its witnesses say on average. A word is a box's score × its IoU
+//!   with the fused box; the score is the mean of the best word of each distinct view, over the best `w` views, where `w` is 3 or the number of views that should have
 //!   seen the person, whichever is less. A view that is missing counts as 0. That number is an
 //!   estimate of each member at its own box, averaged with the same weights as the coordinates.
 //! * A fused box that lies mostly within a better one (or the other way round) is probably a part
@@ -118,6 +118,11 @@ fn best_cluster(
     best
 }
 
+/// How much two boxes agree, 0 to 1: equal ones fully, also if they have no area.
+fn agreement(a: &BBox<FramePixels>, b: &BBox<FramePixels>) -> f64 {
+    if a == b { 1.0 } else { a.iou(b) }
+}
+
 /// Candidates taken for one person, with running weighted means.
 struct Cluster {
     bbox: BBox<FramePixels>,
@@ -165,7 +170,7 @@ impl Cluster {
                 let Candidate {
                     bbox, view, score, ..
                 } = &candidates[index];
-                (score * bbox.iou(&self.bbox), *view)
+                (score * agreement(bbox, &self.bbox), *view)
             })
             .collect();
         words.sort_by(|(a, _), (b, _)| b.total_cmp(a));

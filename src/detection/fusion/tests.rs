@@ -35,6 +35,11 @@ fn assert_close(actual: f64, expected: f64) {
     );
 }
 
+/// The IoU of a box of the person's width with itself, shifted sideways.
+fn iou_when_shifted(pixels: f64) -> f64 {
+    (50.0 - pixels) / (50.0 + pixels)
+}
+
 #[test]
 fn a_fused_box_is_the_mean_weighted_by_cubed_score() {
     let fused = fuse(
@@ -47,7 +52,7 @@ fn a_fused_box_is_the_mean_weighted_by_cubed_score() {
         (100.0 * 0.512 + 110.0 * 0.064) / 0.576,
     );
     assert_close(fused[0].bbox.y_max(), 200.0);
-    assert_close(fused[0].score, 0.8);
+    assert_close(fused[0].score, 0.8 * iou_when_shifted(10.0 * 0.064 / 0.576));
     assert_eq!(fused[0].members, [0, 1]);
 }
 
@@ -64,7 +69,9 @@ fn a_box_cut_off_by_its_view_hardly_moves_the_mean_but_counts_as_a_witness() {
     };
     let fused = fuse(&[whole, cut_off], 0.4);
     assert_close(fused[0].bbox.x_min(), (100.0 + 110.0 * 0.1) / 1.1);
-    assert_close(fused[0].score, 0.8);
+    let moved = 1.0 / 1.1;
+    let agreement = f64::midpoint(iou_when_shifted(moved), iou_when_shifted(10.0 - moved));
+    assert_close(fused[0].score, 0.8 * agreement);
 }
 
 #[test]
@@ -92,8 +99,13 @@ fn a_view_that_reports_a_person_twice_is_one_witness() {
         expecting_two(PERSON, 0.9, 3),
         expecting_two(SHIFTED, 0.8, 4),
     ];
-    assert_close(fuse(&same_view, 0.4)[0].score, 0.45);
-    assert_close(fuse(&two_views, 0.4)[0].score, 0.85);
+    let moved = 10.0 * 0.512 / (0.729 + 0.512);
+    let (first, second) = (
+        0.9 * iou_when_shifted(moved),
+        0.8 * iou_when_shifted(10.0 - moved),
+    );
+    assert_close(fuse(&same_view, 0.4)[0].score, first / 2.0);
+    assert_close(fuse(&two_views, 0.4)[0].score, f64::midpoint(first, second));
 }
 
 #[test]
@@ -202,7 +214,7 @@ fn disagreement_can_reorder_persons() {
 
 #[test]
 fn of_two_clusters_it_overlaps_equally_a_candidate_joins_the_older() {
-    let left = candidate([0.0, 0.0, 10.0, 10.0], 0.8, 0);
+    let left = candidate([0.0, 0.0, 10.0, 10.0], 0.71, 0);
     let right = candidate([4.0, 0.0, 14.0, 10.0], 0.9, 1);
     let between = candidate([2.0, 0.0, 12.0, 10.0], 0.7, 2);
     let fused = fuse(&[left, right, between], 0.45);

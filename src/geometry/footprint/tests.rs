@@ -112,7 +112,7 @@ fn tilted_ellipses_are_tight_where_corner_hulls_are_not() {
 fn a_box_beyond_the_lens_image_has_no_footprint() {
     let lens = Lens::equidistant_circle(299.5, 299.5, 300.0, 0.6).expect("plausible");
     let mount = Mount::default();
-    let view = &ViewPlan::balanced().views(&mount, 300, 300)[1];
+    let view = &ViewPlan::balanced().views(&mount, 300, 300)[2];
     let top = [100.0, 0.0, 200.0, 60.0];
     for back_projection in [BackProjection::CornerHull, BackProjection::TiltedEllipse] {
         assert_eq!(
