@@ -32,11 +32,13 @@ pub struct PlannedViews {
     pub seen_share: f64,
     /// In how many views a place of the lens image lies on average.
     pub mean_views: f64,
-    /// How many pictures the network sees of a frame.
+    /// How many pictures the network sees of every frame.
     pub pictures: usize,
-    /// How many times the network is run for a frame.
+    /// Most pictures it sees besides, of places that the views made interesting.
+    pub zoomed_pictures_at_most: usize,
+    /// How many times the network is run for the views.
     pub batches: usize,
-    /// Pixels that the network sees of a frame.
+    /// Pixels of the pictures of every frame.
     pub pixels: u64,
 }
 
@@ -81,6 +83,7 @@ impl Engine {
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
             pictures,
+            zoomed_pictures_at_most: profile.closer_look().map_or(0, |closer| closer.most_views),
             batches: pictures.div_ceil(options.max_batch_views.get()),
             pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),
             views: views

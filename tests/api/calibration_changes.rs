@@ -8,6 +8,7 @@ use lookdown::{
     calibration::{Calibrations, FolderStore},
 };
 use serde_json::json;
+use tokio::sync::watch;
 
 use crate::{
     detector::Gate,
@@ -259,44 +260,40 @@ async fn nothing_is_changed_from_afar_or_where_changes_are_switched_off() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn replacing_a_calibration_under_load_fails_no_request() {
-    const FRAMES: usize = 40;
+    const CHANGES: u32 = 20;
     let service = Arc::new(Service::start());
-    let first = service
-        .get("/calibrations/lobby")
-        .await
-        .header("etag")
-        .to_owned();
+    let first = service.get("/calibrations/lobby").await;
+    let (answered, mut answers) = watch::channel(0_u32);
     let frames = {
         let service = Arc::clone(&service);
         tokio::spawn(async move {
             let mut revisions = BTreeSet::new();
-            for _ in 0..FRAMES {
-                let answer = service
-                    .post_raw("calibration=lobby&profile=fast", frame())
-                    .await;
+            // Until nobody waits for answers any more.
+            while !answered.is_closed() {
+                let query = "calibration=lobby&profile=fast";
+                let answer = service.post_raw(query, frame()).await;
                 assert_eq!(answer.status, 200, "{}", answer.text());
                 revisions.insert(answer.json()["calibration"]["revision"].to_string());
+                answered.send_modify(|count| *count += 1);
             }
             revisions
         })
     };
-    let mut known = BTreeSet::from([first]);
-    let mut puts = 0_u32;
-    while !frames.is_finished() {
-        puts += 1;
-        let put = service
-            .put(
-                "/calibrations/lobby",
-                &native("lobby", 55.0 + f64::from(puts % 50) / 10.0),
-            )
-            .await;
-        assert_eq!(put.status, 200);
+    let mut known = BTreeSet::from([first.header("etag").to_owned()]);
+    for change in 0..CHANGES {
+        let content = native("lobby", 55.0 + f64::from(change) / 4.0);
+        let put = service.put("/calibrations/lobby", &content).await;
+        assert_eq!(put.status, 200, "{}", put.text());
         known.insert(put.header("etag").to_owned());
+        // The second answer from here is that of a frame that was sent after the change.
+        let seen = *answers.borrow();
+        answers.wait_for(|count| *count >= seen + 2).await.unwrap();
     }
+    drop(answers);
     let reported = frames.await.unwrap();
     assert!(
-        reported.len() > 1,
-        "no frame saw a new calibration in {puts} changes"
+        reported.len() >= CHANGES as usize,
+        "changes were not seen: {reported:?}"
     );
     assert!(
         reported.is_subset(&known),

@@ -3,6 +3,7 @@
 use std::fs;
 
 use axum::{body::Body, http::Request};
+use lookdown::geometry::{FieldOfViewReading, ViewPlan};
 use serde_json::{Value, json};
 
 use crate::service::{Service, frame};
@@ -124,7 +125,15 @@ async fn a_broken_new_version_is_told_everywhere_and_the_old_one_serves() {
 #[tokio::test]
 async fn the_view_plan_has_every_view_that_the_network_sees() {
     let service = Service::start();
-    for (query, views) in [("?profile=fast", 4), ("", 24), ("?profile=paper", 128)] {
+    for (query, plan) in [
+        ("?profile=fast", ViewPlan::fast()),
+        ("", ViewPlan::balanced()),
+        (
+            "?profile=paper",
+            ViewPlan::paper(FieldOfViewReading::Horizontal),
+        ),
+    ] {
+        let views = plan.directions().len();
         let path = format!("{PATH}/views{query}");
         let plan = service.get(&path).await.json();
         let told = plan["views"].as_array().unwrap();
@@ -154,21 +163,48 @@ async fn the_view_plan_has_every_view_that_the_network_sees() {
         .await;
     assert_eq!(report.status, 200);
     let metrics = service.get("/metrics").await.text();
-    assert!(metrics.contains("\nlookdown_views_total 4\n"), "{metrics}");
+    let seen = format!(
+        "\nlookdown_views_total {}\n",
+        ViewPlan::fast().directions().len()
+    );
+    assert!(metrics.contains(&seen), "{metrics}");
 }
 
 #[tokio::test]
 async fn a_view_looks_where_it_says() {
     let service = Service::start();
     let plan = service
-        .get("/calibrations/lobby/views?profile=fast")
+        .get("/calibrations/lobby/views?profile=paper")
         .await
         .json();
-    let views = plan["views"].as_array().unwrap();
-    for view in views {
-        let off_axis = view["off_axis_deg"].as_f64().unwrap();
-        assert!((off_axis - 0.9_f64.to_degrees()).abs() < 1e-6, "{off_axis}");
-        assert!((view["field_of_view_deg"].as_f64().unwrap() - 95.0).abs() < 1e-6);
+    // The paper's rings: 32 views each, 0, 0.3, 0.6 and 0.9 rad off the axis, 53.13° wide.
+    for (index, view) in plan["views"].as_array().unwrap().iter().enumerate() {
+        let number = |name: &str| view[name].as_f64().unwrap();
+        let ring = [0.0_f64, 0.3, 0.6, 0.9][index / 32];
+        assert!(
+            (number("off_axis_deg") - ring.to_degrees()).abs() < 1e-6,
+            "{view}"
+        );
+        assert!(
+            (number("field_of_view_deg") - 53.130_102).abs() < 1e-5,
+            "{view}"
+        );
+        // Its axis is the last column of its pose, and the lens maps it near the outline's middle.
+        let axis = [0, 1, 2].map(|row| view["camera_from_view"][row][2].as_f64().unwrap());
+        let off_axis = axis[0].hypot(axis[1]).atan2(axis[2]);
+        assert!((off_axis - ring).abs() < 1e-9, "{view}");
+        let outline = view["outline"].as_array().unwrap();
+        let middle = [0, 1].map(|side| {
+            let values = outline.iter().map(|at| at[side].as_f64().unwrap());
+            let (least, most) = values.fold((f64::MAX, f64::MIN), |(least, most), value| {
+                (least.min(value), most.max(value))
+            });
+            f64::midpoint(least, most)
+        });
+        let azimuth = axis[1].atan2(axis[0]);
+        let expected = [azimuth.cos(), azimuth.sin()].map(|part| 100.0 + 63.66 * ring * part);
+        let distance = (middle[0] - expected[0]).hypot(middle[1] - expected[1]);
+        assert!(distance < 6.0, "{middle:?} is not near {expected:?}");
     }
     // The first looks toward image up: its outline is as wide to the left as to the right.
     let points = views[0]["outline"].as_array().unwrap();

@@ -45,11 +45,13 @@ pub(in crate::api) struct ViewPlanInfo {
 /// What a frame costs.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct PlanCost {
-    /// How many pictures the network sees.
+    /// How many pictures the network sees of every frame.
     pictures: usize,
-    /// How many times the network is run.
+    /// Most pictures it sees besides, zoomed in on what may be a person.
+    zoomed_pictures_at_most: usize,
+    /// How many times the network is run for the pictures of every frame.
     batches: usize,
-    /// Pixels that the network sees.
+    /// Pixels of the pictures of every frame.
     pixels: u64,
 }
 
@@ -132,6 +134,7 @@ impl From<PlannedViews> for ViewPlanInfo {
             overlap: plan.mean_views,
             cost: PlanCost {
                 pictures: plan.pictures,
+                zoomed_pictures_at_most: plan.zoomed_pictures_at_most,
                 batches: plan.batches,
                 pixels: plan.pixels,
             },
