@@ -1,6 +1,7 @@
 //! The engine: everything between a frame's bytes and its report, on the calling thread.
 
 mod camera;
+mod closer;
 
 use std::{
     num::NonZeroUsize,
@@ -19,7 +20,7 @@ use super::{
 use crate::{
     calibration::Calibrations,
     detection::RefinementParameters,
-    geometry::{FieldOfViewReading, zoom::zoomed_views},
+    geometry::FieldOfViewReading,
     imaging::{
         Frame, ViewBatch,
         decode::{DecodeLimits, decode},
@@ -252,43 +253,6 @@ impl Engine {
                 loaded: loaded.join(", "),
             }
         })
-    }
-
-    /// Closer looks at whatever may be a person, where the profile has them: by the model that looked
-    /// first, or half by it and half by another, if the request leaves the choice.
-    fn closer(
-        &self,
-        job: &DetectJob,
-        observation: &mut Observation,
-    ) -> Vec<(CameraRig, Arc<Model>)> {
-        let profile = observation.profile;
-        let Some(closer) = profile.closer_look() else {
-            return Vec::new();
-        };
-        let started = Instant::now();
-        let back_projection = profile.back_projection();
-        let outlines = merge::outlines(&observation.looks, back_projection, &closer.first_look);
-        let placed = Instant::now();
-        let mut models = vec![Arc::clone(&observation.model)];
-        if job.parameters.model.is_none() {
-            let second = self.options.default_models.second_opinion(profile);
-            models.extend(second.and_then(|name| self.models.get(name)));
-        }
-        let most_views = closer.most_views / models.len();
-        let rig = &observation.camera.rig;
-        let (width, height) = (observation.frame.width(), observation.frame.height());
-        let rigs = models.into_iter().filter_map(|model| {
-            let size = [model.input().width, model.input().height];
-            let mount = &rig.geometry().mount;
-            let views = zoomed_views(&outlines, most_views, closer.fill, mount, size);
-            let tabulate = || rig.with_views(views, width, height);
-            let rig = self.remappers.install(tabulate);
-            (rig.view_count() > 0).then_some((rig, model))
-        });
-        let rigs = rigs.collect();
-        observation.timings.refine += placed - started;
-        observation.timings.remap += placed.elapsed();
-        rigs
     }
 
     /// Renders the views of a rig and runs the network on them, batch by batch.
