@@ -46,7 +46,7 @@ impl RemapTable {
         }
     }
 
-    /// As [`RemapTable::new`], but positions are exact only at every [`NODE_STEP`]th pixel and
+    /// As [`RemapTable::new`], but positions are exact only at every eighth pixel and
     /// interpolated bilinearly in between; blocks that the rim crosses stay exact. In a view of 90°
     /// and 416 pixels into a frame of 1600 it is off by 0.15 pixels at the most, in narrower ones
     /// by less.
