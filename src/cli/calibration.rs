@@ -5,9 +5,15 @@ mod convert;
 mod fit;
 mod source;
 
-use std::process::ExitCode;
+use std::{fs, path::Path, process::ExitCode};
 
+use anyhow::Context;
 use clap::Subcommand;
+
+use crate::imaging::{
+    Frame,
+    decode::{DecodeLimits, decode},
+};
 
 /// What to do with a calibration.
 #[derive(Debug, Subcommand)]
@@ -27,4 +33,10 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         Command::Convert(arguments) => convert::run(arguments),
         Command::Fit(arguments) => fit::run(arguments),
     }
+}
+
+/// A frame from a picture file.
+fn read_frame(path: &Path) -> anyhow::Result<Frame> {
+    let encoded = fs::read(path).context("the file cannot be read")?;
+    Ok(decode(&encoded, &DecodeLimits::default())?.frame)
 }

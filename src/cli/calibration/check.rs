@@ -10,14 +10,14 @@ use std::{
 use anyhow::{Context, bail};
 use clap::Args;
 
-use super::source::{NamedCamera, Source};
+use super::{
+    read_frame,
+    source::{NamedCamera, Source},
+};
 use crate::{
     calibration::Calibration,
     geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, view_plan::Coverage},
-    imaging::{
-        annotate::{encode_jpeg, sketch_lens},
-        decode::{DecodeLimits, decode},
-    },
+    imaging::annotate::{encode_jpeg, sketch_lens},
 };
 
 /// The views of the plan are as fine as the default network's input, pixels.
@@ -170,11 +170,8 @@ fn mount(calibration: &Calibration) -> String {
 }
 
 fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<()> {
-    let encoded = fs::read(frame)
-        .with_context(|| format!("--preview: {} cannot be read", frame.display()))?;
-    let mut picture = decode(&encoded, &DecodeLimits::default())
-        .with_context(|| format!("--preview: {}", frame.display()))?
-        .frame;
+    let mut picture =
+        read_frame(frame).with_context(|| format!("--preview: {}", frame.display()))?;
     let (width, height) = (picture.width(), picture.height());
     let Ok(geometry) = calibration.for_frame(width, height) else {
         let (calibrated_width, calibrated_height) = calibration.image_size();

@@ -3,23 +3,22 @@
 use std::{
     fs,
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitCode,
 };
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 
+use super::read_frame;
 use crate::{
     calibration::{
         CalibrationId,
         export::Target,
         native::{NativeCalibration, NativeIdeal, NativeImage, NativeLens, NativeMount},
     },
-    imaging::{
-        decode::{DecodeLimits, decode},
-        lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
-    },
+    geometry::Ray,
+    imaging::lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
 };
 
 /// Arguments of `lookdown calibration fit`.
@@ -59,16 +58,6 @@ enum IdealLens {
 }
 
 impl IdealLens {
-    /// The radius in focal lengths, `theta` radians off the axis.
-    fn radius(self, theta: f64) -> f64 {
-        match self {
-            Self::Equidistant => theta,
-            Self::Equisolid => 2.0 * (theta / 2.0).sin(),
-            Self::Stereographic => 2.0 * (theta / 2.0).tan(),
-            Self::Orthographic => theta.sin(),
-        }
-    }
-
     fn with(self, parameters: NativeIdeal) -> NativeLens {
         match self {
             Self::Equidistant => NativeLens::Equidistant(parameters),
@@ -98,7 +87,7 @@ fn circle(frames: &[PathBuf]) -> anyhow::Result<(NativeImage, AgreedCircle)> {
     let mut size = None;
     let mut circles = Vec::with_capacity(frames.len());
     for path in frames {
-        let frame = read(path).with_context(|| path.display().to_string())?;
+        let frame = read_frame(path).with_context(|| path.display().to_string())?;
         let (width, height) = (frame.width(), frame.height());
         let NativeImage {
             width: first_width,
@@ -121,32 +110,32 @@ fn circle(frames: &[PathBuf]) -> anyhow::Result<(NativeImage, AgreedCircle)> {
     )
 }
 
-fn read(path: &Path) -> anyhow::Result<crate::imaging::Frame> {
-    let encoded = fs::read(path).context("the file cannot be read")?;
-    Ok(decode(&encoded, &DecodeLimits::default())?.frame)
-}
-
 fn calibration(
     arguments: &Arguments,
     image: NativeImage,
     agreed: &AgreedCircle,
 ) -> anyhow::Result<NativeCalibration> {
-    let max_theta = arguments.field_of_view.to_radians() / 2.0;
+    let max_theta = (arguments.field_of_view.to_radians() / 2.0 * 1e6).floor() / 1e6;
     let circle = agreed.circle;
     let thousandths = |pixels: f64| (pixels * 1000.0).round() / 1000.0;
-    let lens = arguments.lens.with(NativeIdeal {
-        focal: Some(thousandths(
-            circle.radius / arguments.lens.radius(max_theta),
-        )),
-        fx: None,
-        fy: None,
-        cx: thousandths(circle.cx),
-        cy: thousandths(circle.cy),
-        max_theta: Some((max_theta * 1e6).floor() / 1e6),
-    });
-    lens.clone().into_lens().context(
+    let lens = |focal: f64| {
+        arguments.lens.with(NativeIdeal {
+            focal: Some(focal),
+            fx: None,
+            fy: None,
+            cx: thousandths(circle.cx),
+            cy: thousandths(circle.cy),
+            max_theta: Some(max_theta),
+        })
+    };
+    let of_one_pixel = lens(1.0).into_lens().context(
         "--field-of-view: no lens of this model sees so much; equidistant has no such limit",
     )?;
+    let rim = Ray::new(max_theta.sin(), 0.0, max_theta.cos());
+    let rim = of_one_pixel.project_to_rim(&rim);
+    let rim = rim.context("--field-of-view: the rim of this lens cannot be placed")?;
+    let radius_in_focal_lengths = rim.x - of_one_pixel.principal_point().x;
+    let lens = lens(thousandths(circle.radius / radius_in_focal_lengths));
     Ok(NativeCalibration {
         id: arguments.id.to_string(),
         image,
