@@ -14,7 +14,7 @@ use crate::{
     imaging::decode::DecodeLimits,
     inference::ModelRepository,
     metrics::Metrics,
-    pipeline::{DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
+    pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
     settings::{LimitSettings, Settings},
     shutdown::Shutdown,
@@ -41,7 +41,11 @@ pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
     let options = EngineOptions {
         decode_limits: decode_limits(&settings.limits),
         default_models,
-        max_batch_views: settings.inference.max_batch_views,
+        batches: BatchOptions {
+            max_views: settings.inference.max_batch_views,
+            max_delay: settings.inference.max_queue_delay,
+        },
+        sessions: settings.threads.sessions,
         remap_threads: settings.threads.remapping,
         paper_field_of_view: settings.paper.field_of_view,
         rig_cache_bytes: settings.calibrations.cache_bytes,
@@ -276,7 +280,8 @@ fn log_start(settings: &Settings, address: SocketAddr) {
     tracing::info!(
         version = env!("CARGO_PKG_VERSION"),
         device = %settings.inference.device,
-        network_threads = settings.threads.network,
+        sessions = settings.threads.sessions,
+        threads_per_session = settings.threads.per_session,
         remap_threads = settings.threads.remapping,
         calibrations = %settings.calibrations.path.display(),
         "listening on http://{address}, API page at http://{address}/docs"

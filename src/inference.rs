@@ -18,6 +18,6 @@ pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor};
 pub use registry::{ModelRegistry, RegistryFull};
 pub use repository::{
-    DetectorLoader, LoadCounts, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions,
+    LoadCounts, ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions,
     RepositoryRow, is_fetched,
 };

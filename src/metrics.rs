@@ -69,6 +69,8 @@ metrics! {
     failures: IntCounterVec = "request_failures_total" ["reason"];
     /// Frames that wait for a worker or are worked on.
     pending_frames: IntGauge = "pending_frames" [];
+    /// Frames given up because nobody waited for their report any more.
+    withdrawn_frames: IntCounter = "withdrawn_frames_total" [];
     /// Always 1; says which models answer.
     model_info: IntGaugeVec = "model_info" ["model", "revision"];
     /// Models loaded, and models that were refused when they were to be.

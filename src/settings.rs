@@ -93,6 +93,8 @@ pub struct InferenceSettings {
     pub device: Device,
     /// Most views in one run of the network.
     pub max_batch_views: NonZeroUsize,
+    /// How long a view may wait for others to fill its batch.
+    pub max_queue_delay: Duration,
     /// Candidates below this score are dropped before anything else looks at them, 0 to 1.
     pub score_floor: f64,
     /// Most candidates kept of one view, best first.

@@ -73,7 +73,7 @@ fn every_kind_of_value_can_be_given_in_the_environment() {
         ]),
     )
     .unwrap();
-    assert_eq!(settings.threads.network.get(), 3);
+    assert_eq!(settings.threads.per_session.get(), 3);
     assert!((settings.inference.score_floor - 0.25).abs() < f64::EPSILON);
     assert_eq!(settings.model.path.as_deref(), Some(Path::new("123")));
 }
@@ -95,9 +95,9 @@ fn a_variable_set_to_nothing_counts_as_not_set() {
 }
 
 #[test]
-fn without_a_number_of_threads_the_machine_decides() {
-    let threads = defaults().threads.network;
-    assert_eq!(threads, std::thread::available_parallelism().unwrap());
+fn without_a_number_of_sessions_the_machine_decides() {
+    let sessions = defaults().threads.sessions;
+    assert_eq!(sessions, std::thread::available_parallelism().unwrap());
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 17] = [
+const UNUSABLE: [(&str, &str, &str, &str); 19] = [
     (
         "SERVER__LISTEN",
         "localhost",
@@ -184,9 +184,16 @@ const UNUSABLE: [(&str, &str, &str, &str); 17] = [
     ),
     (
         "INFERENCE__MAX_BATCH_VIEWS",
-        "0",
+        "100000",
         "inference.max_batch_views",
-        "from 1",
+        "from 0 to",
+    ),
+    ("INFERENCE__SESSIONS", "-1", "inference.sessions", "integer"),
+    (
+        "INFERENCE__MAX_QUEUE_DELAY_MILLIS",
+        "1001",
+        "inference.max_queue_delay_millis",
+        "from 0 to 1000",
     ),
     (
         "LIMITS__MAX_IMAGE_SIDE",

@@ -1,5 +1,7 @@
 //! One frame in, its persons out.
 
+use std::time::Duration;
+
 use axum::{
     Extension, Json,
     extract::State,
@@ -18,7 +20,7 @@ use super::{
 };
 use crate::{
     metrics::Metrics,
-    pipeline::{DetectJob, DetectParameters, Detected, DetectionReport},
+    pipeline::{DetectJob, DetectParameters, Detected, DetectionReport, Ticket},
 };
 
 /// `C_t` of requests that name none.
@@ -55,11 +57,13 @@ pub(super) async fn detect_persons(
     Extension(request_id): Extension<RequestId>,
     upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
-    let deadline = upload.deadline;
+    let (began, server_limit) = (upload.began, state.options.request_timeout);
     let job = job(upload, &request_id)?;
+    let own_limit = job.parameters.timeout.filter(|own| *own < server_limit);
+    let deadline = began + own_limit.unwrap_or(server_limit);
     let Detected { report, .. } = timeout_at(deadline, state.workers.detect(job))
         .await
-        .map_err(|_| timed_out(&state))??;
+        .map_err(|_| timed_out(own_limit, server_limit))??;
     record(&state.metrics, &report);
     let report = Report::from(&report);
     let timing = server_timing(&report.timings_ms);
@@ -69,8 +73,10 @@ pub(super) async fn detect_persons(
 fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {
     let pairs = upload.parameters.iter();
     let pairs = pairs.map(|(name, value)| (name.as_str(), value.as_str()));
+    let parameters = DetectParameters::parse(pairs, DEFAULT_SCORE_THRESHOLD)?;
     Ok(DetectJob {
-        parameters: DetectParameters::parse(pairs, DEFAULT_SCORE_THRESHOLD)?,
+        ticket: Ticket::of(parameters.priority),
+        parameters,
         request_id: request_id.as_str().to_owned(),
         received_at: upload.received_at,
         arrived: upload.arrived,
@@ -79,11 +85,12 @@ fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {
     })
 }
 
-fn timed_out(state: &ApiState) -> Problem {
-    let seconds = state.options.request_timeout.as_secs_f64();
+fn timed_out(own_limit: Option<Duration>, server_limit: Duration) -> Problem {
+    let seconds = own_limit.unwrap_or(server_limit).as_secs_f64();
+    let whose = own_limit.map_or("server.request_timeout_millis", |_| "timeout_millis");
     let detail = format!(
         "the frame had no report within {seconds} s: use a faster profile, send fewer frames at \
-         a time, or raise server.request_timeout_millis"
+         a time, or raise {whose}"
     );
     Problem::new(ProblemKind::Timeout, detail)
 }

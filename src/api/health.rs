@@ -170,6 +170,9 @@ pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>,
 pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoResponse, Problem> {
     let pending = i64::try_from(state.workers.pending()).unwrap_or(i64::MAX);
     state.metrics.pending_frames.set(pending);
+    let withdrawn = state.workers.withdrawn();
+    let shown = &state.metrics.withdrawn_frames;
+    shown.inc_by(withdrawn.saturating_sub(shown.get()));
     show_models(&state);
     show_calibrations(&state);
     let text = state.metrics.render().map_err(Problem::internal)?;

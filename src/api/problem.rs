@@ -12,7 +12,7 @@ mod calibration;
 mod kind;
 mod pipeline;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use axum::{
     http::{HeaderValue, header::RETRY_AFTER},
@@ -23,11 +23,16 @@ use utoipa::ToSchema;
 
 pub(super) use kind::ProblemKind;
 
+/// Whoever is told to wait longer than this has been forgotten.
+const MAX_RETRY_AFTER_SECONDS: u64 = 60;
+
 /// A request that got no result.
 #[derive(Debug, Clone)]
 pub(super) struct Problem {
     kind: ProblemKind,
     detail: String,
+    /// When to come again, if that is known better than from the kind.
+    retry_after: Option<Duration>,
     /// What really happened; logged, never shown.
     cause: Option<Arc<anyhow::Error>>,
 }
@@ -38,6 +43,7 @@ impl Problem {
         Self {
             kind,
             detail: detail.into(),
+            retry_after: None,
             cause: None,
         }
     }
@@ -73,6 +79,14 @@ impl Problem {
         Self::new(ProblemKind::ShuttingDown, detail)
     }
 
+    /// The same, with the time after which another try is worth while.
+    pub(super) fn with_retry_after(self, retry_after: Duration) -> Self {
+        Self {
+            retry_after: Some(retry_after),
+            ..self
+        }
+    }
+
     pub(super) fn kind(&self) -> ProblemKind {
         self.kind
     }
@@ -99,8 +113,9 @@ impl Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let mut response = self.kind.status().into_response();
-        if let Some(seconds) = self.kind.retry_after_seconds() {
-            let seconds = HeaderValue::from(seconds);
+        if let Some(least) = self.kind.retry_after_seconds() {
+            let wanted = self.retry_after.map_or(0, |after| after.as_secs() + 1);
+            let seconds = HeaderValue::from(wanted.clamp(least, MAX_RETRY_AFTER_SECONDS));
             response.headers_mut().insert(RETRY_AFTER, seconds);
         }
         response.extensions_mut().insert(self);

@@ -30,8 +30,8 @@ pub(super) struct Upload {
     pub(super) image: Bytes,
     /// Parameters by name, not checked yet.
     pub(super) parameters: Vec<(String, String)>,
-    /// When the request must be answered.
-    pub(super) deadline: Instant,
+    /// When the request's head was read.
+    pub(super) began: Instant,
     /// When the request came.
     pub(super) received_at: Timestamp,
     /// When the whole body was in memory.
@@ -43,14 +43,23 @@ impl FromRequest<ApiState> for Upload {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let received_at = Timestamp::now();
-        let deadline = Instant::now() + state.options.request_timeout;
+        let began = Instant::now();
+        let deadline = began + state.options.request_timeout;
         let (parts, body) = request.into_parts();
         let reader = BodyReader {
             max_bytes: state.options.max_body_bytes,
             remedy: "send a smaller picture or raise server.max_body_bytes",
             budget: &state.uploads,
         };
-        let held = timeout_at(deadline, reader.read(&parts.headers, body))
+        let reading = async {
+            // A frame that has no place needs none in memory either.
+            if let Err(refusal) = state.workers.admits() {
+                reader.discard(body).await;
+                return Err(refusal.into());
+            }
+            reader.read(&parts.headers, body).await
+        };
+        let held = timeout_at(deadline, reading)
             .await
             .map_err(|_| slow_upload(state))??;
         let arrived = Arrival::now();
@@ -69,7 +78,7 @@ impl FromRequest<ApiState> for Upload {
         Ok(Self {
             image: image.into_bytes(),
             parameters,
-            deadline,
+            began,
             received_at,
             arrived,
         })

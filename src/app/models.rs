@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::{
     inference::{
-        DetectorLoader, Device, ModelFolder, ModelManifest, ModelRepository, OnnxDetector,
-        OnnxOptions, RepositoryOptions, is_fetched,
+        Detector, Device, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
+        OnnxDetector, OnnxOptions, RepositoryOptions, is_fetched,
     },
     pipeline::DefaultModels,
     settings::{Settings, SettingsError},
@@ -39,13 +39,17 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
     Ok((ModelRepository::new(options, loader), defaults))
 }
 
-/// Makes detectors as the settings say.
-fn loader(settings: &Settings) -> Result<DetectorLoader, SettingsError> {
+/// Makes models as the settings say.
+fn loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
     let library = settings.inference.find_library()?;
     let options = onnx_options(settings);
+    let sessions = settings.threads.sessions;
     Ok(Box::new(move |path| {
-        let detector = OnnxDetector::load(&library, path, options.clone())?;
-        Ok(Box::new(detector))
+        let (first, others) = OnnxDetector::load_sessions(&library, path, &options, sessions)?;
+        let others = others
+            .into_iter()
+            .map(|session| Box::new(session) as Box<dyn Detector>);
+        Ok(Model::of_sessions(Box::new(first), others.collect()))
     }))
 }
 
@@ -53,7 +57,7 @@ fn loader(settings: &Settings) -> Result<DetectorLoader, SettingsError> {
 pub(crate) fn onnx_options(settings: &Settings) -> OnnxOptions {
     OnnxOptions {
         device: settings.inference.device,
-        threads: settings.threads.network,
+        threads: settings.threads.per_session,
         score_floor: settings.inference.score_floor,
         max_detections_per_view: settings.inference.max_detections_per_view.get(),
     }

@@ -1,6 +1,6 @@
 //! `--annotate`: the persons of a report, drawn into their picture.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, sync::Arc};
 
 use anyhow::Context;
 
@@ -13,7 +13,8 @@ const JPEG_QUALITY: u8 = 90;
 
 /// Draws the persons and writes a JPEG file.
 pub(super) fn write(detected: Detected, path: &Path) -> anyhow::Result<()> {
-    let Detected { report, mut frame } = detected;
+    let Detected { report, frame } = detected;
+    let mut frame = Arc::unwrap_or_clone(frame);
     let marks: Vec<_> = report.persons.iter().map(mark).collect();
     annotate(&mut frame, &marks);
     let picture = encode_jpeg(&frame, JPEG_QUALITY)?;

@@ -26,7 +26,7 @@ use crate::{
     api::Report,
     app::engine_for,
     calibration::{Calibration, CalibrationId},
-    pipeline::{DetectJob, DetectParameters, Detected, Engine},
+    pipeline::{DetectJob, DetectParameters, Detected, Engine, Ticket},
 };
 
 /// `C_t` without `--score-threshold`.
@@ -161,6 +161,7 @@ fn detect(
         request_id: image.display().to_string(),
         received_at,
         arrived: Instant::now(),
+        ticket: Ticket::default(),
         image: encoded.into(),
         parameters: parameters.clone(),
         calibration,

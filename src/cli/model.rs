@@ -18,7 +18,7 @@ use crate::{
     app::{engine_for, onnx_options},
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
-    pipeline::{DetectJob, DetectParameters, Detected},
+    pipeline::{DetectJob, DetectParameters, Detected, Ticket},
     settings::{Settings, find_beside_executable},
 };
 
@@ -57,7 +57,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     let mut settings = arguments.settings_file.load()?;
     let library = settings.inference.find_library()?;
     let loading = Instant::now();
-    let mut detector = OnnxDetector::load(&library, &arguments.model, onnx_options(&settings))?;
+    let mut detector = OnnxDetector::load(&library, &arguments.model, &onnx_options(&settings))?;
     let loaded = loading.elapsed();
     let mut out = io::stdout().lock();
     write!(out, "{}", description::Lines(detector.description())).context(UNWRITABLE)?;
@@ -65,7 +65,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     let most = settings.inference.max_batch_views.get();
     let one_view = millis(time(&mut detector, 1)?);
     let most_views = millis(time(&mut detector, most)?);
-    let (device, threads) = (settings.inference.device, settings.threads.network);
+    let (device, threads) = (settings.inference.device, settings.threads.per_session);
     writeln!(
         out,
         "runs in      {one_view} with 1 view, {most_views} with {most} (on {device}, {})",
@@ -149,6 +149,7 @@ fn look(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Det
         request_id: sample.display().to_string(),
         received_at: Timestamp::now(),
         arrived: Instant::now(),
+        ticket: Ticket::default(),
         image: image.into(),
         parameters,
         calibration: None,

@@ -11,7 +11,7 @@ use jiff::Timestamp;
 use super::{
     DataSet, DataSetImage, DetectedRow, FoundPerson, RowCost, RowName, in_order::in_order,
 };
-use crate::pipeline::{DetectJob, DetectParameters, Engine, PipelineError};
+use crate::pipeline::{DetectJob, DetectParameters, Engine, PipelineError, Ticket};
 
 /// An image that got no detections.
 #[derive(Debug, thiserror::Error)]
@@ -104,6 +104,7 @@ fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob,
         request_id: String::new(),
         received_at: Timestamp::now(),
         arrived: Instant::now(),
+        ticket: Ticket::default(),
         image: bytes.into(),
         parameters: parameters.clone(),
         calibration: image.calibration.clone(),

@@ -1,6 +1,6 @@
 //! What every detector offers.
 
-use std::path::PathBuf;
+use std::{num::NonZeroUsize, path::PathBuf};
 
 use super::{Device, HeadOutput};
 use crate::{
@@ -27,6 +27,11 @@ pub trait Detector: Send {
 
     /// What the network wants to see.
     fn input(&self) -> &NetworkInput;
+
+    /// How many views the network takes at once, if that is fixed: fewer cost as much.
+    fn views_per_run(&self) -> Option<NonZeroUsize> {
+        None
+    }
 
     /// Finds persons in a batch rendered for [`Detector::input`]: one list per view, unsorted,
     /// overlaps left in, scores at least the detector's floor.

@@ -1,6 +1,7 @@
 //! A loaded model, shared by the frames that are looked at with it.
 
 use std::{
+    num::NonZeroUsize,
     path::PathBuf,
     sync::{Mutex, PoisonError},
 };
@@ -14,8 +15,9 @@ pub struct Model {
     name: String,
     revision: String,
     input: NetworkInput,
-    /// One batch at a time is in the network; the session itself uses several threads.
-    detector: Mutex<Box<dyn Detector>>,
+    views_per_run: Option<NonZeroUsize>,
+    /// Each runs one batch at a time, side by side with the others.
+    sessions: Vec<Mutex<Box<dyn Detector>>>,
     files: Option<ModelFiles>,
 }
 
@@ -28,14 +30,24 @@ pub(super) struct ModelFiles {
 }
 
 impl Model {
-    /// A model around its detector.
+    /// A model of one session.
     #[must_use]
-    pub fn new(detector: Box<dyn Detector>) -> Self {
+    pub fn new(session: Box<dyn Detector>) -> Self {
+        Self::of_sessions(session, Vec::new())
+    }
+
+    /// A model of several sessions of the same network.
+    #[must_use]
+    pub fn of_sessions(first: Box<dyn Detector>, others: Vec<Box<dyn Detector>>) -> Self {
         Self {
-            name: detector.name().to_owned(),
-            revision: detector.revision().to_owned(),
-            input: detector.input().clone(),
-            detector: Mutex::new(detector),
+            name: first.name().to_owned(),
+            revision: first.revision().to_owned(),
+            input: first.input().clone(),
+            views_per_run: first.views_per_run(),
+            sessions: std::iter::once(first)
+                .chain(others)
+                .map(Mutex::new)
+                .collect(),
             files: None,
         }
     }
@@ -69,25 +81,39 @@ impl Model {
         &self.input
     }
 
-    /// Finds persons in a batch rendered for [`Model::input`], after waiting for its turn.
-    ///
-    /// # Errors
-    /// [`InferenceError`] when the network cannot run.
-    pub fn detect(&self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
-        // A panic inside the run-time leaves no half-changed state of ours behind.
-        let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-        detector.detect(batch)
+    /// How many views make a good batch: at most `max_views`, but no less than the network takes at
+    /// once, and only whole runs of one that takes a fixed number.
+    #[must_use]
+    pub fn batch_of(&self, max_views: NonZeroUsize) -> NonZeroUsize {
+        let fixed = self.views_per_run.unwrap_or(NonZeroUsize::MIN);
+        let runs = (max_views.get() / fixed.get()).max(1);
+        fixed.saturating_mul(NonZeroUsize::new(runs).unwrap_or(NonZeroUsize::MIN))
     }
 
-    /// Runs the network once on blank views, so that the first frame finds it warm.
+    /// Finds persons in a batch rendered for [`Model::input`], in the session of that number (they
+    /// are counted round), after waiting for its turn.
     ///
     /// # Errors
     /// [`InferenceError`] when the network cannot run.
-    pub fn warm_up(&self, views: usize) -> Result<(), InferenceError> {
+    pub fn detect(&self, session: usize, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
+        let session = &self.sessions[session % self.sessions.len()];
+        // A panic inside the run-time leaves no half-changed state of ours behind.
+        let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
+        session.detect(batch)
+    }
+
+    /// Runs each session once on blank views, so that the first frame finds them warm.
+    ///
+    /// # Errors
+    /// [`InferenceError`] when the network cannot run.
+    pub fn warm_up(&self, max_views: NonZeroUsize) -> Result<(), InferenceError> {
         let mut batch = ViewBatch::default();
-        for slot in batch.prepare(views, &self.input) {
+        for slot in batch.prepare(self.batch_of(max_views).get(), &self.input) {
             slot.fill(0.0);
         }
-        self.detect(&batch).map(drop)
+        for session in 0..self.sessions.len() {
+            self.detect(session, &batch)?;
+        }
+        Ok(())
     }
 }

@@ -53,27 +53,51 @@ impl OnnxDetector {
     pub fn load(
         library: &Path,
         model: &Path,
-        options: OnnxOptions,
+        options: &OnnxOptions,
     ) -> Result<Self, InferenceError> {
+        Ok(Self::load_sessions(library, model, options, NonZeroUsize::MIN)?.0)
+    }
+
+    /// As [`OnnxDetector::load`], in `count` sessions that run side by side: the first, and the
+    /// others. The file is read and checked once, and the sessions are built at the same time.
+    ///
+    /// # Errors
+    /// [`InferenceError`] when the library, the device or the model cannot be used.
+    pub fn load_sessions(
+        library: &Path,
+        model: &Path,
+        options: &OnnxOptions,
+        count: NonZeroUsize,
+    ) -> Result<(Self, Vec<Self>), InferenceError> {
         let environment = environment::load(library)?;
         let manifest = ModelManifest::locate(model)?;
-        let path = manifest.onnx.as_path();
+        let path = manifest.onnx.clone();
         let unusable = |problem: String| InferenceError::Unusable {
-            path: path.to_owned(),
+            path: path.clone(),
             problem,
         };
-        let bytes = onnx_file::read(path).map_err(|detail| InferenceError::Unreadable {
-            path: path.to_owned(),
+        let bytes = onnx_file::read(&path).map_err(|detail| InferenceError::Unreadable {
+            path: path.clone(),
             detail,
         })?;
         let sha256 = sha256_of(&bytes);
         check_sum(&manifest, &sha256).map_err(unusable)?;
         onnx_file::check(&bytes).map_err(unusable)?;
 
-        let builder = provider::builder(environment, library, &options)?;
-        let session = builder
-            .commit(&bytes)
-            .map_err(|error| unusable(first_line(&error)))?;
+        let open = || {
+            let session = provider::builder(environment, library, options)?.commit(&bytes);
+            session.map_err(|error| unusable(first_line(&error)))
+        };
+        // One that fails must be told before its threads are all over the log.
+        let session = open()?;
+        let others = std::thread::scope(|scope| {
+            let opening: Vec<_> = (1..count.get()).map(|_| scope.spawn(open)).collect();
+            let opened = opening.into_iter().map(|thread| {
+                let panicked = |_| Err(unusable("it brings the run-time down".to_owned()));
+                thread.join().unwrap_or_else(panicked)
+            });
+            opened.collect::<Result<Vec<_>, _>>()
+        })?;
         let metadata = description::metadata(&session);
         let (inputs, outputs) = description::tensors(&session);
         let signature = Signature::of(&inputs, &manifest.input, &metadata).map_err(unusable)?;
@@ -90,23 +114,26 @@ impl OnnxDetector {
         };
         // The weights alone do not make a model: how it is fed and read counts, too.
         let used = format!("{sha256} {:?} {:?}", manifest.input, manifest.output);
-        Ok(Self {
-            staging: Staging::new(&signature),
-            description: ModelDescription {
-                revision: revision_of(used.as_bytes()),
-                bytes: bytes.len(),
-                sha256,
-                input,
-                inputs,
-                outputs,
-                layout: signature.layout,
-                views_per_run: signature.views_per_run,
-                licence: manifest.licence.clone().or(metadata.licence),
-                manifest,
-            },
+        let description = ModelDescription {
+            revision: revision_of(used.as_bytes()),
+            bytes: bytes.len(),
+            sha256,
+            input,
+            inputs,
+            outputs,
+            layout: signature.layout,
+            views_per_run: signature.views_per_run,
+            licence: manifest.licence.clone().or(metadata.licence),
+            manifest,
+        };
+        let detector = |session| Self {
             session,
-            options,
-        })
+            description: description.clone(),
+            staging: Staging::new(&signature),
+            options: options.clone(),
+        };
+        let others = others.into_iter().map(detector).collect();
+        Ok((detector(session), others))
     }
 
     /// What was understood of the model.
@@ -144,6 +171,10 @@ impl Detector for OnnxDetector {
 
     fn input(&self) -> &NetworkInput {
         &self.description.input
+    }
+
+    fn views_per_run(&self) -> Option<NonZeroUsize> {
+        self.description.views_per_run
     }
 
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {

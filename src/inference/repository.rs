@@ -19,15 +19,14 @@ use std::{
 };
 
 use self::stamp::{files_of, stamp};
-use super::{Detector, InferenceError, Model, ModelRegistry, model::ModelFiles};
+use super::{InferenceError, Model, ModelRegistry, model::ModelFiles};
 
 pub use error::RepositoryError;
 pub use folder::{ModelFolder, is_fetched};
 pub(super) use stamp::Stamp;
 
-/// Makes a detector of a model's folder or ONNX file.
-pub type DetectorLoader =
-    Box<dyn Fn(&Path) -> Result<Box<dyn Detector>, InferenceError> + Send + Sync>;
+/// Makes a model of its folder or ONNX file.
+pub type ModelLoader = Box<dyn Fn(&Path) -> Result<Model, InferenceError> + Send + Sync>;
 
 /// Which models there are, and how they are treated.
 #[derive(Debug, Clone)]
@@ -44,7 +43,7 @@ pub struct RepositoryOptions {
 pub struct ModelRepository {
     options: RepositoryOptions,
     registry: Arc<ModelRegistry>,
-    loader: DetectorLoader,
+    loader: ModelLoader,
     /// Held while a model is loaded: one at a time.
     memory: Mutex<Memory>,
     succeeded: AtomicU64,
@@ -85,7 +84,7 @@ pub struct LoadCounts {
 impl ModelRepository {
     /// The models that `options` describe, none of them loaded.
     #[must_use]
-    pub fn new(options: RepositoryOptions, loader: DetectorLoader) -> Self {
+    pub fn new(options: RepositoryOptions, loader: ModelLoader) -> Self {
         Self {
             options,
             registry: Arc::default(),
@@ -226,19 +225,19 @@ impl ModelRepository {
     }
 
     fn checked(&self, name: &str, path: &Path, stamp: &Stamp) -> Result<Model, RepositoryError> {
-        let detector = (self.loader)(path)?;
-        if detector.name() != name {
+        let model = (self.loader)(path)?;
+        if model.name() != name {
             return Err(RepositoryError::OtherName {
                 name: name.to_owned(),
-                found: detector.name().to_owned(),
+                found: model.name().to_owned(),
                 path: path.to_owned(),
             });
         }
-        let model = Model::new(detector).with_files(ModelFiles {
+        let model = model.with_files(ModelFiles {
             path: path.to_owned(),
             stamp: stamp.clone(),
         });
-        model.warm_up(self.options.warm_up_views.get())?;
+        model.warm_up(self.options.warm_up_views)?;
         Ok(model)
     }
 

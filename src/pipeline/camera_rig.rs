@@ -1,8 +1,6 @@
 //! Camera rigs: a camera's geometry with the views of a plan and their remap tables, immutable
 //! and shared by every frame of that camera.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::{
@@ -12,7 +10,7 @@ use crate::{
         BackProjection, Footprint, Ray, ViewPlan, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
     },
-    imaging::{Frame, Letterbox, NetworkInput, RemapTable, ViewBatch},
+    imaging::{Frame, Letterbox, NetworkInput, RemapTable},
 };
 
 /// Every so many outline points decide whether a view holds a whole person.
@@ -102,26 +100,18 @@ impl CameraRig {
         }
     }
 
-    /// Renders some views into `batch`, several at a time.
-    pub(super) fn render(
+    /// Renders one view into its slot `[3, height, width]` of the network's input, on the calling
+    /// thread.
+    pub(super) fn render_view(
         &self,
+        view: usize,
         frame: &Frame,
-        range: Range<usize>,
         input: &NetworkInput,
-        batch: &mut ViewBatch,
+        slot: &mut [f32],
     ) {
-        let slots = batch.prepare(range.len(), input);
         match &self.views {
-            Views::Direct(letterbox) => {
-                for slot in slots {
-                    letterbox.render(frame, input, slot);
-                }
-            }
-            Views::Virtual(views) => {
-                let jobs: Vec<_> = views[range].iter().zip(slots).collect();
-                jobs.into_par_iter()
-                    .for_each(|((_, table), slot)| table.render(frame, input, slot));
-            }
+            Views::Direct(letterbox) => letterbox.render(frame, input, slot),
+            Views::Virtual(views) => views[view].1.render(frame, input, slot),
         }
     }
 

@@ -1,28 +1,26 @@
-//! The engine: everything between a frame's bytes and its report, on the calling thread.
+//! The engine: everything between a frame's bytes and its report. The calling thread decodes and
+//! merges; the threads of the network render and infer.
 
 mod camera;
 mod closer;
+mod observation;
 
-use std::{
-    num::NonZeroUsize,
-    sync::{Arc, Mutex, PoisonError},
-    time::Instant,
-};
+use std::{num::NonZeroUsize, sync::Arc, time::Instant};
 
-use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use self::camera::FrameCamera;
+pub use self::observation::Observation;
 use super::{
-    DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person, PipelineError,
-    Profile, StageTimings, camera_rig::CameraRig, error::internal, look::Look, merge,
-    report::ModelUsed, rig_cache::RigCache,
+    BatchOptions, DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person,
+    PipelineError, Profile, StageTimings, merge, network::Network, report::ModelUsed,
+    rig_cache::RigCache,
 };
 use crate::{
     calibration::Calibrations,
     detection::RefinementParameters,
     geometry::FieldOfViewReading,
     imaging::{
-        Frame, ViewBatch,
+        Frame,
         decode::{DecodeLimits, decode},
     },
     inference::{Model, ModelRegistry},
@@ -38,9 +36,11 @@ pub struct EngineOptions {
     pub decode_limits: DecodeLimits,
     /// Which model answers requests that name none.
     pub default_models: DefaultModels,
-    /// Most views given to the network at once.
-    pub max_batch_views: NonZeroUsize,
-    /// Threads that render views.
+    /// How views become batches.
+    pub batches: BatchOptions,
+    /// Threads of the network: as many as models have sessions.
+    pub sessions: NonZeroUsize,
+    /// Threads that build tables, and render batches of several views.
     pub remap_threads: NonZeroUsize,
     /// How the paper's field of view is read.
     pub paper_field_of_view: FieldOfViewReading,
@@ -51,47 +51,11 @@ pub struct EngineOptions {
 /// Finds persons in frames.
 pub struct Engine {
     models: Arc<ModelRegistry>,
-    /// One frame at a time is in a network, whichever: the networks share their cores.
-    network_turn: Mutex<()>,
-    remappers: ThreadPool,
+    network: Network,
+    remappers: Arc<ThreadPool>,
     calibrations: Option<Arc<Calibrations>>,
     rigs: RigCache,
     options: EngineOptions,
-}
-
-/// A frame after the network has seen it: all that refinement needs, so that other refinements
-/// of the same frame cost no inference.
-pub struct Observation {
-    /// The decoded frame, EXIF orientation applied.
-    pub frame: Frame,
-    camera: FrameCamera,
-    model: Arc<Model>,
-    profile: Profile,
-    looks: Vec<Look>,
-    batch_count: usize,
-    non_finite: usize,
-    timings: StageTimings,
-    warnings: Vec<String>,
-}
-
-impl Observation {
-    /// How many views the network saw.
-    #[must_use]
-    pub fn view_count(&self) -> usize {
-        self.looks.iter().map(|look| look.rig.view_count()).sum()
-    }
-
-    /// Where the time went so far: `refine` and `total` are still to come.
-    #[must_use]
-    pub fn timings(&self) -> &StageTimings {
-        &self.timings
-    }
-
-    /// The model that looked.
-    #[must_use]
-    pub fn model(&self) -> &Model {
-        &self.model
-    }
 }
 
 impl Engine {
@@ -103,14 +67,16 @@ impl Engine {
         models: Arc<ModelRegistry>,
         calibrations: Option<Arc<Calibrations>>,
         options: EngineOptions,
-    ) -> Result<Self, ThreadPoolBuildError> {
+    ) -> std::io::Result<Self> {
         let remappers = ThreadPoolBuilder::new()
             .num_threads(options.remap_threads.get())
             .thread_name(|index| format!("remap-{index}"))
-            .build()?;
+            .build()
+            .map_err(std::io::Error::other)?;
+        let remappers = Arc::new(remappers);
         Ok(Self {
             models,
-            network_turn: Mutex::new(()),
+            network: Network::start(options.sessions, options.batches, &remappers)?,
             remappers,
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes),
@@ -177,7 +143,7 @@ impl Engine {
         let started = Instant::now();
         let model = self.model(&job.parameters)?;
         let decoded = decode(&job.image, &self.options.decode_limits)?;
-        let frame = decoded.frame;
+        let frame = Arc::new(decoded.frame);
         check_size(&frame)?;
         let decoded_at = Instant::now();
 
@@ -208,14 +174,15 @@ impl Engine {
             model,
             warnings,
         };
-        let (rig, model) = (
+        let first = self.network.look(
             Arc::clone(&observation.camera.rig),
             Arc::clone(&observation.model),
+            Arc::clone(&observation.frame),
+            job.ticket.clone(),
         );
-        self.look(&mut observation, rig, model)?;
-        for (rig, model) in self.closer(job, &mut observation) {
-            self.look(&mut observation, Arc::new(rig), model)?;
-        }
+        observation.take_in(&[first])?;
+        let closer = self.closer(job, &mut observation);
+        observation.take_in(&closer)?;
         Ok(observation)
     }
 
@@ -253,48 +220,6 @@ impl Engine {
                 loaded: loaded.join(", "),
             }
         })
-    }
-
-    /// Renders the views of a rig and runs the network on them, batch by batch.
-    fn look(
-        &self,
-        observation: &mut Observation,
-        rig: Arc<CameraRig>,
-        model: Arc<Model>,
-    ) -> Result<(), PipelineError> {
-        let waiting = Instant::now();
-        // Guards nothing that a panic could leave half changed.
-        let _turn = self
-            .network_turn
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        observation.timings.queue += waiting.elapsed();
-        let mut batch = ViewBatch::default();
-        let views = rig.view_count();
-        let mut per_view = Vec::with_capacity(views);
-        let step = self.options.max_batch_views.get();
-        for start in (0..views).step_by(step) {
-            let remapping = Instant::now();
-            let range = start..views.min(start + step);
-            let frame = &observation.frame;
-            self.remappers
-                .install(|| rig.render(frame, range, model.input(), &mut batch));
-            let inferring = Instant::now();
-            let found = model
-                .detect(&batch)
-                .map_err(|error| internal(anyhow::Error::new(error)))?;
-            observation.timings.remap += inferring - remapping;
-            observation.timings.inference += inferring.elapsed();
-            per_view.extend(found.per_view);
-            observation.non_finite += found.non_finite;
-            observation.batch_count += 1;
-        }
-        observation.looks.push(Look {
-            rig,
-            model,
-            per_view,
-        });
-        Ok(())
     }
 }
 

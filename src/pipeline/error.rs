@@ -1,5 +1,7 @@
 //! Why a frame got no report, by who is at fault.
 
+use std::time::Duration;
+
 use super::ParameterError;
 use crate::imaging::decode::DecodeError;
 
@@ -64,7 +66,13 @@ pub enum PipelineError {
     Overloaded {
         /// How many frames may wait or be worked on.
         capacity: usize,
+        /// When those that are there now will have been served, if frames are served as fast as
+        /// they have been.
+        retry_after: Duration,
     },
+    /// Nobody waits for the report any more, so the frame was not looked at.
+    #[error("the request was withdrawn before its frame had a report")]
+    Withdrawn,
     /// The server is about to stop.
     #[error("the server is shutting down: send the frame to another one")]
     ShuttingDown,

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Instant};
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{DetectParameters, DetectionReport};
+use super::{DetectParameters, DetectionReport, Ticket};
 use crate::{calibration::Calibration, imaging::Frame};
 
 /// One frame to be looked at.
@@ -19,6 +19,8 @@ pub struct DetectJob {
     pub arrived: Instant,
     /// The encoded frame.
     pub image: Bytes,
+    /// Its turn, and whether anybody still waits for it.
+    pub ticket: Ticket,
     /// The checked parameters.
     pub parameters: DetectParameters,
     /// A calibration at hand, used instead of looking up `parameters.calibration`.
@@ -31,5 +33,5 @@ pub struct Detected {
     /// The persons and how they were found.
     pub report: DetectionReport,
     /// The decoded frame, EXIF orientation applied.
-    pub frame: Frame,
+    pub frame: Arc<Frame>,
 }

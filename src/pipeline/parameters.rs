@@ -1,9 +1,11 @@
 //! Request parameters: the same names and rules in multipart fields, query strings and
 //! command-line flags, checked once.
 
+use std::{ops::RangeInclusive, time::Duration};
+
 use jiff::Timestamp;
 
-use super::Profile;
+use super::{Priority, Profile};
 use crate::{
     calibration::CalibrationId,
     detection::{Refinement, RefinementParameters},
@@ -14,8 +16,10 @@ const MAX_CAMERA_CHARS: usize = 128;
 /// Most characters of an unknown name that are repeated to its sender.
 const MAX_NAME_CHARS: usize = 64;
 /// Most persons a report may hold, and the default.
-const MAX_DETECTIONS: usize = 10_000;
+const MAX_DETECTIONS: u64 = 10_000;
 const DEFAULT_MAX_DETECTIONS: usize = 1_000;
+/// Ten minutes.
+const MAX_TIMEOUT_MILLIS: u64 = 600_000;
 /// N_t of hard NMS and linear Soft-NMS (Seidel et al., section IV: "IoU > 0.5").
 const DEFAULT_SUPPRESSION_IOU: f64 = 0.5;
 /// Boxes that overlap at least this much are fused.
@@ -61,11 +65,15 @@ pub struct DetectParameters {
     pub refinement: RefinementParameters,
     /// When the frame was taken.
     pub captured_at: Option<Timestamp>,
+    /// Its turn among the frames that wait.
+    pub priority: Priority,
+    /// How long the report is of use, from the arrival of the request.
+    pub timeout: Option<Duration>,
 }
 
 impl DetectParameters {
     /// The names every caller may use.
-    pub const NAMES: [&'static str; 10] = [
+    pub const NAMES: [&'static str; 12] = [
         "calibration",
         "camera",
         "profile",
@@ -76,6 +84,8 @@ impl DetectParameters {
         "sigma",
         "max_detections",
         "captured_at",
+        "priority",
+        "timeout_millis",
     ];
 
     /// Checks `(name, value)` pairs. `default_score_threshold` is C_t when the caller gives none.
@@ -113,6 +123,8 @@ impl DetectParameters {
             sigma,
             max_detections,
             captured_at,
+            priority,
+            timeout_millis,
         ] = given;
         let profile = profile.map_or(Ok(Profile::default()), parse_profile)?;
         let refinement = refine.map_or(Ok(profile.default_refinement()), parse_refinement)?;
@@ -142,6 +154,8 @@ impl DetectParameters {
                     .map_or(Ok(DEFAULT_MAX_DETECTIONS), parse_max_detections)?,
             },
             captured_at: captured_at.map(parse_timestamp).transpose()?,
+            priority: priority.map_or(Ok(Priority::default()), parse_priority)?,
+            timeout: timeout_millis.map(parse_timeout).transpose()?,
         })
     }
 }
@@ -236,18 +250,31 @@ fn parse_sigma(value: &str) -> Result<f64, ParameterError> {
     Ok(sigma)
 }
 
+fn whole_number(
+    name: &str,
+    value: &str,
+    range: RangeInclusive<u64>,
+) -> Result<u64, ParameterError> {
+    let number = value.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| {
+        let (least, most) = range.into_inner();
+        let rule = format!("a whole number from {least} to {most}");
+        problem(name, format!("{:?} is not {rule}", shown(value)))
+    })
+}
+
 fn parse_max_detections(value: &str) -> Result<usize, ParameterError> {
-    value
-        .parse()
-        .ok()
-        .filter(|count| (1..=MAX_DETECTIONS).contains(count))
-        .ok_or_else(|| {
-            let rule = format!("a whole number from 1 to {MAX_DETECTIONS}");
-            problem(
-                "max_detections",
-                format!("{:?} is not {rule}", shown(value)),
-            )
-        })
+    let count = whole_number("max_detections", value, 1..=MAX_DETECTIONS)?;
+    Ok(usize::try_from(count).unwrap_or(usize::MAX))
+}
+
+fn parse_priority(value: &str) -> Result<Priority, ParameterError> {
+    let level = whole_number("priority", value, Priority::FIRST..=Priority::LAST)?;
+    Ok(Priority::new(level).unwrap_or_default())
+}
+
+fn parse_timeout(value: &str) -> Result<Duration, ParameterError> {
+    whole_number("timeout_millis", value, 1..=MAX_TIMEOUT_MILLIS).map(Duration::from_millis)
 }
 
 fn parse_timestamp(value: &str) -> Result<Timestamp, ParameterError> {

@@ -84,7 +84,7 @@ impl Engine {
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
             pictures,
             zoomed_pictures_at_most: profile.closer_look().map_or(0, |closer| closer.most_views),
-            batches: pictures.div_ceil(options.max_batch_views.get()),
+            batches: pictures.div_ceil(options.batches.max_views.get()),
             pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),
             views: views
                 .into_iter()

@@ -1,12 +1,18 @@
 //! A small real detector for tests: it finds bright blobs instead of persons, so that geometry,
 //! merging and scheduling can be tested without weights.
 
-use std::{num::NonZeroUsize, sync::Arc, time::Instant};
+use std::{
+    num::NonZeroUsize,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{DefaultModels, DetectJob, DetectParameters, Engine, EngineOptions};
+use super::{
+    BatchOptions, DefaultModels, DetectJob, DetectParameters, Engine, EngineOptions, Ticket,
+};
 use crate::{
     calibration::Calibrations,
     detection::{BBox, ViewPixels},
@@ -94,7 +100,11 @@ pub(super) fn engine(detector: BlobDetector, calibrations: Option<Arc<Calibratio
     let options = EngineOptions {
         decode_limits: DecodeLimits::default(),
         default_models: DefaultModels::One("blob".to_owned()),
-        max_batch_views: NonZeroUsize::new(5).unwrap(),
+        batches: BatchOptions {
+            max_views: NonZeroUsize::new(5).unwrap(),
+            max_delay: Duration::ZERO,
+        },
+        sessions: NonZeroUsize::MIN,
         remap_threads: NonZeroUsize::new(2).unwrap(),
         paper_field_of_view: FieldOfViewReading::Horizontal,
         rig_cache_bytes: 1 << 26,
@@ -134,6 +144,7 @@ pub(super) fn job(image: Bytes, parameters: &[(&str, &str)]) -> DetectJob {
         request_id: "test".to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
         arrived: Instant::now(),
+        ticket: Ticket::default(),
         image,
         parameters: DetectParameters::parse(parameters.iter().copied(), 0.3).unwrap(),
         calibration: None,

@@ -3,18 +3,25 @@
 use std::{
     num::NonZeroUsize,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
     thread::JoinHandle,
+    time::Instant,
 };
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
-use super::{DetectJob, Detected, Engine, PipelineError, error::internal};
+use super::{
+    DetectJob, Detected, Engine, PipelineError, error::internal, frame_queue::FrameQueue,
+    service_rate::ServiceRate,
+};
 
 type Answer = Result<Detected, PipelineError>;
 
 /// A frame in the queue with the way back to whoever waits for it.
-struct Ticket {
+struct Entry {
     job: DetectJob,
     answer: oneshot::Sender<Answer>,
     /// Travels with the work: a place is free again when the work has ended, not when its client
@@ -24,11 +31,17 @@ struct Ticket {
 
 /// Named threads that run the engine on a bounded number of frames.
 pub struct WorkerPool {
+    shared: Arc<Shared>,
+    threads: Mutex<Vec<JoinHandle<()>>>,
+}
+
+struct Shared {
     engine: Arc<Engine>,
-    queue: Mutex<Option<mpsc::Sender<Ticket>>>,
+    queue: FrameQueue<Entry>,
     places: Arc<Semaphore>,
     capacity: NonZeroUsize,
-    threads: Mutex<Vec<JoinHandle<()>>>,
+    rate: Mutex<ServiceRate>,
+    withdrawn: AtomicU64,
 }
 
 impl WorkerPool {
@@ -41,63 +54,82 @@ impl WorkerPool {
         workers: NonZeroUsize,
         capacity: NonZeroUsize,
     ) -> std::io::Result<Self> {
-        let (queue, tickets) = mpsc::channel(capacity.get());
-        let tickets = Arc::new(Mutex::new(tickets));
-        let threads = (0..workers.get()).map(|index| {
-            let (engine, tickets) = (Arc::clone(engine), Arc::clone(&tickets));
-            std::thread::Builder::new()
-                .name(format!("frame-worker-{index}"))
-                .spawn(move || work(&engine, &tickets))
-        });
-        Ok(Self {
+        let shared = Arc::new(Shared {
             engine: Arc::clone(engine),
-            threads: Mutex::new(threads.collect::<Result<_, _>>()?),
-            queue: Mutex::new(Some(queue)),
+            queue: FrameQueue::new(),
             places: Arc::new(Semaphore::new(capacity.get())),
             capacity,
+            rate: Mutex::default(),
+            withdrawn: AtomicU64::new(0),
+        });
+        let threads = (0..workers.get()).map(|index| {
+            let shared = Arc::clone(&shared);
+            std::thread::Builder::new()
+                .name(format!("frame-worker-{index}"))
+                .spawn(move || shared.work())
+        });
+        Ok(Self {
+            threads: Mutex::new(threads.collect::<Result<_, _>>()?),
+            shared,
         })
     }
 
     /// The engine that works.
     #[must_use]
     pub fn engine(&self) -> &Engine {
-        &self.engine
+        &self.shared.engine
     }
 
-    /// Queues a frame and waits for its report. Dropping the future withdraws a frame that no
-    /// worker has begun.
+    /// Queues a frame and waits for its report. Dropping the future withdraws the frame: whatever
+    /// of it no thread has begun is never done.
     ///
     /// # Errors
     /// [`PipelineError::Overloaded`] at once when the queue is full,
     /// [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise what the engine
     /// says.
     pub async fn detect(&self, job: DetectJob) -> Result<Detected, PipelineError> {
-        let place = Arc::clone(&self.places).try_acquire_owned().map_err(|_| {
-            PipelineError::Overloaded {
-                capacity: self.capacity.get(),
-            }
-        })?;
+        let places = Arc::clone(&self.shared.places);
+        let Ok(place) = places.try_acquire_owned() else {
+            return Err(self.overloaded());
+        };
+        let _withdrawal = job.ticket.withdrawn.clone().drop_guard();
         let (answer, waiting) = oneshot::channel();
-        self.enqueue(Ticket { job, answer, place })?;
+        self.shared.rate().began(Instant::now());
+        let priority = job.ticket.priority;
+        let entry = Entry { job, answer, place };
+        let queued = self.shared.queue.push(priority, entry);
+        queued.map_err(|_| PipelineError::ShuttingDown)?;
         waiting
             .await
             .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker died on a frame"))))
     }
 
+    /// Why a frame would be refused now, if it would: known before its bytes are read.
+    ///
+    /// # Errors
+    /// [`PipelineError::Overloaded`] when the queue is full.
+    pub fn admits(&self) -> Result<(), PipelineError> {
+        if self.shared.places.available_permits() == 0 {
+            return Err(self.overloaded());
+        }
+        Ok(())
+    }
+
     /// How many frames wait or are worked on.
     #[must_use]
     pub fn pending(&self) -> usize {
-        self.capacity.get() - self.places.available_permits()
+        self.shared.pending()
+    }
+
+    /// How many frames were given up since the start because nobody waited for them any more.
+    #[must_use]
+    pub fn withdrawn(&self) -> u64 {
+        self.shared.withdrawn.load(Ordering::Relaxed)
     }
 
     /// Takes no more frames, finishes those in the queue and ends the threads. Blocks.
     pub fn shut_down(&self) {
-        drop(
-            self.queue
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .take(),
-        );
+        self.shared.queue.close();
         let mut threads = self.threads.lock().unwrap_or_else(PoisonError::into_inner);
         for thread in threads.drain(..) {
             // A worker that panicked outside a job has nothing left to tell.
@@ -105,35 +137,42 @@ impl WorkerPool {
         }
     }
 
-    fn enqueue(&self, ticket: Ticket) -> Result<(), PipelineError> {
-        let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
-        let queue = queue.as_ref().ok_or(PipelineError::ShuttingDown)?;
-        // The channel has as many places as there are permits, so it cannot be full.
-        queue
-            .try_send(ticket)
-            .map_err(|_| PipelineError::ShuttingDown)
+    fn overloaded(&self) -> PipelineError {
+        PipelineError::Overloaded {
+            capacity: self.shared.capacity.get(),
+            retry_after: self.shared.rate().time_for(self.pending()),
+        }
     }
 }
 
-fn work(engine: &Engine, tickets: &Mutex<mpsc::Receiver<Ticket>>) {
-    loop {
-        let next = tickets
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .blocking_recv();
-        let Some(Ticket { job, answer, place }) = next else {
-            return;
-        };
-        if answer.is_closed() {
-            // Its client has left: nobody would read the report.
-            continue;
+impl Shared {
+    /// What a worker does until the queue is closed and empty.
+    fn work(&self) {
+        while let Some(Entry { job, answer, place }) = self.queue.pop() {
+            if job.ticket.withdrawn.is_cancelled() {
+                self.withdrawn.fetch_add(1, Ordering::Relaxed);
+                continue;
+            }
+            let outcome = catch_unwind(AssertUnwindSafe(|| self.engine.detect(&job)))
+                .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker panicked on a frame"))));
+            if matches!(outcome, Err(PipelineError::Withdrawn)) {
+                self.withdrawn.fetch_add(1, Ordering::Relaxed);
+            }
+            // Whoever sends the next frame on this answer must find the place free.
+            drop((job, place));
+            self.rate().ended(Instant::now(), self.pending());
+            // The client may have left meanwhile.
+            let _ = answer.send(outcome);
         }
-        let outcome = catch_unwind(AssertUnwindSafe(|| engine.detect(&job)))
-            .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker panicked on a frame"))));
-        // Whoever sends the next frame on this answer must find the place free.
-        drop((job, place));
-        // The client may have left meanwhile.
-        let _ = answer.send(outcome);
+    }
+
+    fn pending(&self) -> usize {
+        self.capacity.get() - self.places.available_permits()
+    }
+
+    fn rate(&self) -> MutexGuard<'_, ServiceRate> {
+        // Numbers only: nothing can be left half changed.
+        self.rate.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

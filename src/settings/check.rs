@@ -9,7 +9,7 @@ use std::{
 
 use super::{
     CalibrationSettings, InferenceSettings, LimitSettings, LogFormat, LogSettings, ModelSettings,
-    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, ThreadPlan, raw,
+    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, ThreadPlan, raw, threads,
 };
 use crate::{
     geometry::FieldOfViewReading,
@@ -24,6 +24,8 @@ const MAX_BODY_BYTES: u64 = 2 << 30;
 const MAX_BYTES: u64 = 1 << 40;
 /// Ten minutes.
 const MAX_TIMEOUT_MILLIS: u64 = 600_000;
+/// A second: whoever waits longer for a batch to fill has no traffic to fill it.
+const MAX_QUEUE_DELAY_MILLIS: u64 = 1_000;
 /// A day.
 const MAX_POLL_SECONDS: u64 = 86_400;
 /// The longest side the JPEG format can state.
@@ -54,7 +56,7 @@ impl TryFrom<RawSettings> for Settings {
                 )?,
             },
             model: model(raw.model)?,
-            threads: threads(raw.inference.threads, inference.device)?,
+            threads: threads(&raw.inference, inference.device)?,
             inference,
             paper: PaperSettings {
                 field_of_view: choice(
@@ -115,17 +117,23 @@ fn inference(raw: &raw::RawInference) -> Result<InferenceSettings, SettingsError
             remedy: "give a number from 0 to 1".to_owned(),
         });
     }
+    let device = raw.device.parse();
+    let device = device.map_err(|error: UnknownDevice| SettingsError::Value {
+        key: "inference.device".to_owned(),
+        value: format!("{:?}", raw.device),
+        remedy: error.to_string(),
+    })?;
+    let delay = within(
+        "inference.max_queue_delay_millis",
+        raw.max_queue_delay_millis,
+        0..=MAX_QUEUE_DELAY_MILLIS,
+    )?;
+    let max_batch_views = wanted("inference.max_batch_views", raw.max_batch_views)?;
     Ok(InferenceSettings {
         library_path: path("inference.library_path", raw.library_path.clone())?,
-        device: raw
-            .device
-            .parse()
-            .map_err(|error: UnknownDevice| SettingsError::Value {
-                key: "inference.device".to_owned(),
-                value: format!("{:?}", raw.device),
-                remedy: error.to_string(),
-            })?,
-        max_batch_views: count("inference.max_batch_views", raw.max_batch_views)?,
+        device,
+        max_batch_views: max_batch_views.unwrap_or_else(|| threads::batch_views(device)),
+        max_queue_delay: Duration::from_millis(delay),
         score_floor: raw.score_floor,
         max_detections_per_view: count(
             "inference.max_detections_per_view",
@@ -134,10 +142,10 @@ fn inference(raw: &raw::RawInference) -> Result<InferenceSettings, SettingsError
     })
 }
 
-fn threads(network: u64, device: Device) -> Result<ThreadPlan, SettingsError> {
-    let network = within("inference.threads", network, 0..=MAX_COUNT)?;
-    let network = usize::try_from(network).ok().and_then(NonZeroUsize::new);
-    Ok(ThreadPlan::for_this_process(device, network))
+fn threads(raw: &raw::RawInference, device: Device) -> Result<ThreadPlan, SettingsError> {
+    let sessions = wanted("inference.sessions", raw.sessions)?;
+    let per_session = wanted("inference.threads", raw.threads)?;
+    Ok(ThreadPlan::for_this_process(device, sessions, per_session))
 }
 
 fn limits(raw: &raw::RawLimits, max_body_bytes: usize) -> Result<LimitSettings, SettingsError> {
@@ -211,6 +219,12 @@ fn within(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<u64, Sett
 /// 0 means never.
 fn poll_seconds(key: &str, value: u64) -> Result<Option<NonZeroU64>, SettingsError> {
     within(key, value, 0..=MAX_POLL_SECONDS).map(NonZeroU64::new)
+}
+
+/// 0 leaves the choice to us.
+fn wanted(key: &str, value: u64) -> Result<Option<NonZeroUsize>, SettingsError> {
+    let value = within(key, value, 0..=MAX_COUNT)?;
+    Ok(usize::try_from(value).ok().and_then(NonZeroUsize::new))
 }
 
 fn count(key: &str, value: u64) -> Result<NonZeroUsize, SettingsError> {

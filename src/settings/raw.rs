@@ -86,8 +86,10 @@ impl Default for RawModel {
 pub(super) struct RawInference {
     pub(super) library_path: String,
     pub(super) device: String,
+    pub(super) sessions: u64,
     pub(super) threads: u64,
     pub(super) max_batch_views: u64,
+    pub(super) max_queue_delay_millis: u64,
     pub(super) score_floor: f64,
     pub(super) max_detections_per_view: u64,
 }
@@ -97,8 +99,10 @@ impl Default for RawInference {
         Self {
             library_path: locate::DEFAULT_LIBRARY.to_owned(),
             device: "cpu".to_owned(),
+            sessions: 0,
             threads: 0,
-            max_batch_views: 8,
+            max_batch_views: 0,
+            max_queue_delay_millis: 0,
             score_floor: 0.01,
             max_detections_per_view: 300,
         }

@@ -1,6 +1,11 @@
 //! How the cores are shared between decoding, remapping and the network: the one place that
 //! decides.
 //!
+//! On a processor the network runs in as many sessions as there are cores, each on one thread and
+//! on one view at a time: sessions need not wait for each other, while the threads of one session
+//! do so at every layer, and a batch of views takes no less time than its views one by one.
+//! Measured in benches/NOTES.md; `lookdown tune` measures it on the machine at hand.
+//!
 //! Counts come from what this process may use, not from what the machine has:
 //! [`std::thread::available_parallelism`] knows the affinity mask and the CPU quota of the control
 //! group, versions 1 and 2, rounded down. None of the threads spins while it has nothing to do, so
@@ -10,40 +15,71 @@ use std::num::NonZeroUsize;
 
 use crate::inference::Device;
 
-/// Frames worked on at once: the next one is decoded and rendered while the network works on the
-/// current one. The network takes one frame at a time, so more would only wait.
-const FRAME_WORKERS: NonZeroUsize = NonZeroUsize::new(2).unwrap();
+/// On a GPU one session uploads and renders while the other one computes.
+const GPU_SESSIONS: NonZeroUsize = NonZeroUsize::new(2).unwrap();
+/// Views that a GPU looks at in one run.
+const GPU_BATCH_VIEWS: NonZeroUsize = NonZeroUsize::new(8).unwrap();
 
 /// How many threads each stage has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ThreadPlan {
-    /// Frames worked on at once; each is decoded and merged on one thread.
+    /// Frames worked on at once; each is decoded and merged on one thread. One more than there are
+    /// cores, so that the network always finds the next frame ready.
     pub frame_workers: NonZeroUsize,
-    /// Threads that render views, for all frames together.
+    /// Threads that build tables, and render batches of several views, for all frames together.
     pub remapping: NonZeroUsize,
+    /// Sessions of each model, which run side by side.
+    pub sessions: NonZeroUsize,
     /// Threads within one run of the network.
-    pub network: NonZeroUsize,
+    pub per_session: NonZeroUsize,
 }
 
 impl ThreadPlan {
-    /// The plan for this process. `network` is what the operator wants, if anything.
+    /// The plan for this process, with what the operator wants, if anything.
     #[must_use]
-    pub fn for_this_process(device: Device, network: Option<NonZeroUsize>) -> Self {
+    pub fn for_this_process(
+        device: Device,
+        sessions: Option<NonZeroUsize>,
+        per_session: Option<NonZeroUsize>,
+    ) -> Self {
         let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-        Self::of(cores, device, network)
+        Self::of(cores, device, sessions, per_session)
     }
 
-    fn of(cores: NonZeroUsize, device: Device, network: Option<NonZeroUsize>) -> Self {
-        let network = network.unwrap_or(match device {
-            Device::Cpu => cores,
+    fn of(
+        cores: NonZeroUsize,
+        device: Device,
+        sessions: Option<NonZeroUsize>,
+        per_session: Option<NonZeroUsize>,
+    ) -> Self {
+        let share = |count: NonZeroUsize| {
+            NonZeroUsize::new(cores.get() / count.get()).unwrap_or(NonZeroUsize::MIN)
+        };
+        let (sessions, per_session) = match device {
+            Device::Cpu => (
+                sessions.unwrap_or_else(|| per_session.map_or(cores, share)),
+                per_session.unwrap_or_else(|| sessions.map_or(NonZeroUsize::MIN, share)),
+            ),
             // The processor only hands over and takes back.
-            Device::Cuda(_) | Device::TensorRt(_) => NonZeroUsize::MIN,
-        });
+            Device::Cuda(_) | Device::TensorRt(_) => (
+                sessions.unwrap_or(GPU_SESSIONS),
+                per_session.unwrap_or(NonZeroUsize::MIN),
+            ),
+        };
         Self {
-            frame_workers: FRAME_WORKERS,
+            frame_workers: cores.saturating_add(1),
             remapping: cores,
-            network,
+            sessions,
+            per_session,
         }
+    }
+}
+
+/// Most views in one run of the network, where the operator leaves the choice.
+pub(super) fn batch_views(device: Device) -> NonZeroUsize {
+    match device {
+        Device::Cpu => NonZeroUsize::MIN,
+        Device::Cuda(_) | Device::TensorRt(_) => GPU_BATCH_VIEWS,
     }
 }
 
@@ -51,22 +87,32 @@ impl ThreadPlan {
 mod tests {
     use super::*;
 
-    fn count(count: usize) -> NonZeroUsize {
-        NonZeroUsize::new(count).unwrap()
+    /// Sessions, and threads in each, on eight cores.
+    fn plan(device: Device, sessions: usize, per_session: usize) -> (usize, usize) {
+        let (cores, wanted) = (NonZeroUsize::new(8).unwrap(), NonZeroUsize::new);
+        let plan = ThreadPlan::of(cores, device, wanted(sessions), wanted(per_session));
+        (plan.sessions.get(), plan.per_session.get())
     }
 
     #[test]
-    fn the_network_gets_the_cores_unless_somebody_says_otherwise_or_it_is_elsewhere() {
-        let network = |device, wanted| ThreadPlan::of(count(8), device, wanted).network.get();
-        assert_eq!(network(Device::Cpu, None), 8);
-        assert_eq!(network(Device::Cpu, Some(count(3))), 3);
-        assert_eq!(network(Device::Cuda(0), None), 1);
-        assert_eq!(network(Device::TensorRt(0), Some(count(2))), 2);
+    fn each_core_has_a_session_of_its_own_unless_somebody_says_otherwise() {
+        assert_eq!(plan(Device::Cpu, 0, 0), (8, 1));
+        assert_eq!(plan(Device::Cpu, 2, 0), (2, 4));
+        assert_eq!(plan(Device::Cpu, 0, 3), (2, 3));
+        assert_eq!(plan(Device::Cpu, 5, 4), (5, 4));
+        assert_eq!(plan(Device::Cpu, 16, 0), (16, 1));
+    }
+
+    #[test]
+    fn a_gpu_takes_turns_in_two_sessions() {
+        assert_eq!(plan(Device::Cuda(0), 0, 0), (2, 1));
+        assert_eq!(plan(Device::TensorRt(0), 1, 2), (1, 2));
     }
 
     #[test]
     fn one_core_is_enough() {
-        let plan = ThreadPlan::of(count(1), Device::Cpu, None);
-        assert_eq!((plan.network.get(), plan.remapping.get()), (1, 1));
+        let plan = ThreadPlan::of(NonZeroUsize::MIN, Device::Cpu, None, None);
+        assert_eq!((plan.sessions.get(), plan.per_session.get()), (1, 1));
+        assert_eq!((plan.remapping.get(), plan.frame_workers.get()), (1, 2));
     }
 }

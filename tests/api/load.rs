@@ -70,7 +70,7 @@ async fn a_frame_whose_client_left_is_not_worked_on() {
     let first = begin(&service, frame());
     service.gate.has_begun(1).await;
     let leaving = begin(&service, frame());
-    while pending(&service).await < 2 {
+    while metric(&service, "lookdown_pending_frames").await < 2 {
         tokio::task::yield_now().await;
     }
     leaving.abort();
@@ -83,6 +83,7 @@ async fn a_frame_whose_client_left_is_not_worked_on() {
         2,
         "the frame of the client that left cost a run"
     );
+    assert_eq!(metric(&service, "lookdown_withdrawn_frames_total").await, 1);
 }
 
 #[tokio::test]
@@ -99,6 +100,19 @@ async fn a_frame_that_takes_too_long_is_given_up() {
 }
 
 #[tokio::test]
+async fn a_request_may_ask_for_a_shorter_time() {
+    let service = Service::start();
+    service.gate.close();
+    let query = format!("{FAST}&timeout_millis=50");
+    let answer = service.post_raw(&query, frame()).await;
+    assert_eq!(answer.status, 504);
+    let problem = answer.problem();
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.contains("within 0.05 s") && detail.ends_with("or raise timeout_millis"));
+    service.gate.open();
+}
+
+#[tokio::test]
 async fn a_panic_in_the_detector_costs_one_answer_and_reveals_nothing() {
     let service = Service::start();
     service.gate.panic_once();
@@ -109,10 +123,9 @@ async fn a_panic_in_the_detector_costs_one_answer_and_reveals_nothing() {
     service.still_works().await;
 }
 
-async fn pending(service: &Service) -> usize {
+async fn metric(service: &Service, name: &str) -> usize {
     let metrics = service.get("/metrics").await.text();
-    let line = metrics
-        .lines()
-        .find(|line| line.starts_with("lookdown_pending_frames "));
+    let mut lines = metrics.lines();
+    let line = lines.find(|line| line.split(' ').next() == Some(name));
     line.unwrap().rsplit(' ').next().unwrap().parse().unwrap()
 }

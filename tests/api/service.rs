@@ -14,9 +14,9 @@ use lookdown::{
     calibration::{Calibrations, FolderStore},
     geometry::FieldOfViewReading,
     imaging::{Frame, NetworkInput, annotate::encode_png, decode::DecodeLimits},
-    inference::{InferenceError, ModelFolder, ModelRepository, RepositoryOptions},
+    inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -120,17 +120,22 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
                 });
             }
             let name = path.file_name().unwrap().to_str().unwrap();
-            Ok(Box::new(EagerDetector {
+            let detector = EagerDetector {
                 name: name.to_owned(),
                 input: NetworkInput::plain(64, 64),
                 gate: Arc::clone(&gate),
-            }))
+            };
+            Ok(Model::new(Box::new(detector)))
         }),
     );
     let options = EngineOptions {
         decode_limits: DecodeLimits::default(),
         default_models: DefaultModels::One("eager".to_owned()),
-        max_batch_views: NonZeroUsize::new(128).unwrap(),
+        batches: BatchOptions {
+            max_views: NonZeroUsize::new(128).unwrap(),
+            max_delay: Duration::ZERO,
+        },
+        sessions: NonZeroUsize::MIN,
         remap_threads: one_view,
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 28,

@@ -84,7 +84,7 @@ fn a_model_that_takes_any_size_gets_the_one_chosen_for_it() {
 
 #[test]
 fn what_the_onnx_file_says_about_itself_need_not_be_said_again() {
-    let detector = OnnxDetector::load(&library(), &fixture("with_metadata"), options()).unwrap();
+    let detector = OnnxDetector::load(&library(), &fixture("with_metadata"), &options()).unwrap();
     let description = detector.description();
     assert_eq!((detector.input().width, detector.input().height), (96, 64));
     assert_eq!(description.licence.as_deref(), Some("AGPL-3.0 License"));

@@ -47,7 +47,7 @@ fn yolov2_of_full_size_finds_what_the_reference_finds() {
         max_detections_per_view: 1000,
         ..options()
     };
-    let mut detector = OnnxDetector::load(&library(), &model, thresholds_off).unwrap();
+    let mut detector = OnnxDetector::load(&library(), &model, &thresholds_off).unwrap();
 
     let input = detector.input().clone();
     let mut batch = ViewBatch::default();

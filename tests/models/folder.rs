@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown::inference::{Device, InferenceError, OnnxDetector, OnnxOptions};
+use lookdown::inference::{Device, InferenceError, Model, OnnxDetector, OnnxOptions};
 use tempfile::TempDir;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -36,6 +36,14 @@ pub(crate) fn options() -> OnnxOptions {
     }
 }
 
+/// A model of two sessions.
+pub(crate) fn model_of_two_sessions(path: &Path) -> Result<Model, InferenceError> {
+    let two = NonZeroUsize::new(2).unwrap();
+    let (first, others) = OnnxDetector::load_sessions(&library(), path, &options(), two)?;
+    let others = others.into_iter().map(|session| Box::new(session) as _);
+    Ok(Model::of_sessions(Box::new(first), others.collect()))
+}
+
 /// Writes a model folder: a manifest called `name` that goes on with `more`, and an ONNX file.
 pub(crate) fn write(folder: &Path, name: &str, more: &str, onnx: &Path) {
     fs::create_dir_all(folder).unwrap();
@@ -50,7 +58,7 @@ pub(crate) fn write(folder: &Path, name: &str, more: &str, onnx: &Path) {
 pub(crate) fn load(onnx: &str, more: &str) -> Result<OnnxDetector, InferenceError> {
     let folder = TempDir::new().unwrap();
     write(folder.path(), "mine", more, &fixture(onnx));
-    OnnxDetector::load(&library(), folder.path(), options())
+    OnnxDetector::load(&library(), folder.path(), &options())
 }
 
 /// Why such a model is refused.

@@ -1,13 +1,13 @@
 //! Loading, reloading and unloading, and what failures leave behind.
 
-use std::{fs, num::NonZeroUsize, path::Path};
+use std::{fs, num::NonZeroUsize};
 
 use lookdown::inference::{
-    ModelFolder, ModelRepository, OnnxDetector, RepositoryError, RepositoryOptions, RepositoryRow,
+    ModelFolder, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
 };
 use tempfile::TempDir;
 
-use crate::folder::{fixture, library, options, write};
+use crate::folder::{fixture, model_of_two_sessions, write};
 
 const OTHER_ORDER: &str = "[input]\nchannel_order = \"bgr\"";
 
@@ -31,10 +31,11 @@ impl Models {
             warm_up_views: NonZeroUsize::new(3).unwrap(),
             kept: vec!["a".to_owned()],
         };
-        let loader =
-            |path: &Path| Ok(Box::new(OnnxDetector::load(&library(), path, options())?) as _);
         Self {
-            repository: ModelRepository::new(options_of_repository, Box::new(loader)),
+            repository: ModelRepository::new(
+                options_of_repository,
+                Box::new(model_of_two_sessions),
+            ),
             folder,
         }
     }

@@ -150,7 +150,7 @@ fn a_file_outside_the_model_s_folder_is_refused_however_it_is_reached() {
     ] {
         let manifest = format!("name = \"mine\"\nonnx = \"{onnx}\"\n");
         fs::write(inside.join("model.toml"), manifest).unwrap();
-        let error = OnnxDetector::load(&library(), &inside, options())
+        let error = OnnxDetector::load(&library(), &inside, &options())
             .err()
             .unwrap();
         assert_says(&error.to_string(), &[onnx, "the manifest's own folder"]);
@@ -170,7 +170,7 @@ fn what_is_no_onnx_file_is_refused() {
     ];
     for content in contents {
         fs::write(&file, content).unwrap();
-        let error = OnnxDetector::load(&library(), &file, options())
+        let error = OnnxDetector::load(&library(), &file, &options())
             .err()
             .unwrap();
         assert_says(&error.to_string(), &["model.onnx", "no ONNX model"]);
@@ -182,12 +182,12 @@ fn what_is_no_onnx_file_is_refused() {
         .unwrap()
         .set_len((1 << 30) + 1)
         .unwrap();
-    let error = OnnxDetector::load(&library(), &file, options())
+    let error = OnnxDetector::load(&library(), &file, &options())
         .err()
         .unwrap();
     assert_says(&error.to_string(), &["1073741824 bytes", "largest model"]);
     let missing = folder.path().join("none.onnx");
-    let error = OnnxDetector::load(&library(), &missing, options())
+    let error = OnnxDetector::load(&library(), &missing, &options())
         .err()
         .unwrap();
     assert_says(&error.to_string(), &["none.onnx", "make models"]);
@@ -200,7 +200,7 @@ fn a_gpu_is_refused_by_a_library_that_cannot_use_one() {
             device,
             ..options()
         };
-        let error = OnnxDetector::load(&library(), &fixture("any_batch"), options)
+        let error = OnnxDetector::load(&library(), &fixture("any_batch"), &options)
             .err()
             .unwrap();
         assert!(

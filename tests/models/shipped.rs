@@ -8,7 +8,7 @@ use lookdown::{
     calibration::Calibration,
     detection::{BBox, FramePixels},
     inference::is_fetched,
-    pipeline::{DetectJob, DetectParameters, DetectionReport},
+    pipeline::{DetectJob, DetectParameters, DetectionReport, Ticket},
     settings::{RawSettings, Settings},
 };
 use serde_json::Value;
@@ -26,6 +26,7 @@ fn detect(model: &str) -> DetectionReport {
         request_id: "test".to_owned(),
         received_at: Timestamp::UNIX_EPOCH,
         arrived: Instant::now(),
+        ticket: Ticket::default(),
         image: image.into(),
         parameters,
         calibration: Some(Arc::new(Calibration::read(&calibration).unwrap())),

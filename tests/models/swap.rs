@@ -23,15 +23,15 @@ use lookdown::{
     calibration::{Calibrations, FolderStore},
     geometry::FieldOfViewReading,
     imaging::decode::DecodeLimits,
-    inference::{ModelFolder, ModelRepository, OnnxDetector, RepositoryOptions},
+    inference::{ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
 use serde_json::Value;
 use tempfile::TempDir;
 use tower::ServiceExt;
 
-use crate::folder::{library, of_repository, options, write};
+use crate::folder::{model_of_two_sessions, of_repository, write};
 
 const CLIENTS: usize = 3;
 const SWAPS: usize = 6;
@@ -48,13 +48,17 @@ fn service(folder: &Path) -> Router {
             warm_up_views: two,
             kept: vec!["person".to_owned()],
         },
-        Box::new(|path| Ok(Box::new(OnnxDetector::load(&library(), path, options())?))),
+        Box::new(model_of_two_sessions),
     );
     models.load("person").unwrap();
     let engine = EngineOptions {
         decode_limits: DecodeLimits::default(),
         default_models: DefaultModels::One("person".to_owned()),
-        max_batch_views: NonZeroUsize::new(8).unwrap(),
+        batches: BatchOptions {
+            max_views: NonZeroUsize::new(8).unwrap(),
+            max_delay: Duration::ZERO,
+        },
+        sessions: two,
         remap_threads: two,
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 28,

@@ -51,6 +51,16 @@ pub(in crate::api) struct DetectQuery {
     #[param(value_type = Option<String>, format = DateTime, example = "2026-11-21T09:30:00Z")]
     #[schema(format = DateTime, example = "2026-11-21T09:30:00Z")]
     captured_at: Option<String>,
+    /// Whose turn comes first when frames wait: 1 before 9. Frames of one priority are served in
+    /// the order of their arrival.
+    #[param(minimum = 1, maximum = 9, default = 5)]
+    #[schema(minimum = 1, maximum = 9, default = 5)]
+    priority: Option<u32>,
+    /// How long the report is of use, counted from the arrival of the request: a frame that has
+    /// none by then is given up and answered 504. The server's own limit holds, too.
+    #[param(minimum = 1, maximum = 600_000, example = 2000)]
+    #[schema(minimum = 1, maximum = 600_000, example = 2000)]
+    timeout_millis: Option<u32>,
 }
 
 /// The frame and parameters in a form.

@@ -177,8 +177,8 @@ impl ProblemKind {
         self.texts().1
     }
 
-    /// How long to wait before trying again, where that helps, seconds.
-    pub(in crate::api) fn retry_after_seconds(self) -> Option<u32> {
+    /// How long to wait at least before trying again, where that helps, seconds.
+    pub(in crate::api) fn retry_after_seconds(self) -> Option<u64> {
         matches!(
             self,
             Self::Overloaded | Self::ModelBusy | Self::WarmingUp | Self::ShuttingDown

@@ -104,7 +104,8 @@ impl BodyReader<'_> {
         })
     }
 
-    async fn discard(&self, mut body: Body) {
+    /// Reads what the client is sending, within bounds, so that it can see the answer.
+    pub(in crate::api) async fn discard(&self, mut body: Body) {
         let mut left = self.max_bytes.saturating_mul(DISCARDED_LIMITS);
         while let Ok(Some(chunk)) = next_chunk(&mut body).await
             && chunk.len() < left

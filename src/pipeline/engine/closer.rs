@@ -5,18 +5,17 @@ use std::{sync::Arc, time::Instant};
 use super::{Engine, Observation};
 use crate::{
     geometry::zoom::zoomed_views,
-    inference::Model,
-    pipeline::{DetectJob, camera_rig::CameraRig, merge},
+    pipeline::{DetectJob, merge, network::LookTask},
 };
 
 impl Engine {
-    /// Closer looks at whatever may be a person, where the profile has them: by the model that looked
-    /// first, or half by it and half by another, if the request leaves the choice.
+    /// Queues closer looks at whatever may be a person, where the profile has them: by the model that
+    /// looked first, or half by it and half by another, if the request leaves the choice.
     pub(super) fn closer(
         &self,
         job: &DetectJob,
         observation: &mut Observation,
-    ) -> Vec<(CameraRig, Arc<Model>)> {
+    ) -> Vec<Arc<LookTask>> {
         let profile = observation.profile;
         let Some(closer) = profile.closer_look() else {
             return Vec::new();
@@ -41,9 +40,14 @@ impl Engine {
             let rig = self.remappers.install(tabulate);
             (rig.view_count() > 0).then_some((rig, model))
         });
-        let rigs = rigs.collect();
+        let tasks = rigs.map(|(rig, model)| {
+            let frame = Arc::clone(&observation.frame);
+            let ticket = job.ticket.clone();
+            self.network.look(Arc::new(rig), model, frame, ticket)
+        });
+        let tasks = tasks.collect();
         observation.timings.refine += placed - started;
         observation.timings.remap += placed.elapsed();
-        rigs
+        tasks
     }
 }

@@ -30,8 +30,12 @@ fn every_parameter_is_taken_over() {
         ("sigma", "0.7"),
         ("max_detections", "5"),
         ("captured_at", "2026-11-21T09:30:00+01:00"),
+        ("priority", "2"),
+        ("timeout_millis", "1500"),
     ])
     .unwrap();
+    assert_eq!(Some(parameters.priority), Priority::new(2));
+    assert_eq!(parameters.timeout, Some(Duration::from_millis(1500)));
     assert_eq!(parameters.calibration.unwrap().as_str(), "lobby");
     assert_eq!(parameters.camera.unwrap(), "Lobby, north");
     assert_eq!(parameters.refinement.refinement, Refinement::SoftNmsLinear);
@@ -74,6 +78,16 @@ fn bad_values_are_refused_with_name_value_and_rule() {
             "max_detections",
             "0",
             "max_detections: \"0\" is not a whole number from 1 to 10000",
+        ),
+        (
+            "priority",
+            "10",
+            "priority: \"10\" is not a whole number from 1 to 9",
+        ),
+        (
+            "timeout_millis",
+            "0",
+            "timeout_millis: \"0\" is not a whole number from 1 to 600000",
         ),
         (
             "profile",

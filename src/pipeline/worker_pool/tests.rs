@@ -50,7 +50,10 @@ async fn a_full_queue_refuses_at_once_and_serves_again_when_it_has_drained() {
     until_pending(&pool, 2).await;
     begins.recv().unwrap();
     let refused = pool.detect(direct_job()).await.unwrap_err();
-    assert!(matches!(refused, PipelineError::Overloaded { capacity: 2 }));
+    assert!(matches!(
+        refused,
+        PipelineError::Overloaded { capacity: 2, .. }
+    ));
 
     go.send(()).unwrap();
     go.send(()).unwrap();

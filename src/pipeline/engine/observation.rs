@@ -1,0 +1,74 @@
+//! What is known of a frame after the network has seen it.
+
+use std::sync::Arc;
+
+use super::camera::FrameCamera;
+use crate::{
+    imaging::Frame,
+    inference::Model,
+    pipeline::{
+        PipelineError, Profile, StageTimings,
+        look::Look,
+        network::{LookTask, Work},
+    },
+};
+
+/// A frame after the network has seen it: all that refinement needs, so that other refinements
+/// of the same frame cost no inference.
+pub struct Observation {
+    /// The decoded frame, EXIF orientation applied.
+    pub frame: Arc<Frame>,
+    pub(super) camera: FrameCamera,
+    pub(super) model: Arc<Model>,
+    pub(super) profile: Profile,
+    pub(super) looks: Vec<Look>,
+    pub(super) batch_count: usize,
+    pub(super) non_finite: usize,
+    pub(super) timings: StageTimings,
+    pub(super) warnings: Vec<String>,
+}
+
+impl Observation {
+    /// How many views the network saw.
+    #[must_use]
+    pub fn view_count(&self) -> usize {
+        self.looks.iter().map(|look| look.rig.view_count()).sum()
+    }
+
+    /// Where the time went so far: `refine` and `total` are still to come.
+    #[must_use]
+    pub fn timings(&self) -> &StageTimings {
+        &self.timings
+    }
+
+    /// The model that looked.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Waits for rounds that were queued together, and takes in what came of them. Views are
+    /// rendered and looked at side by side: the span from the first to the last is divided in the
+    /// proportion of the work.
+    pub(super) fn take_in(&mut self, tasks: &[Arc<LookTask>]) -> Result<(), PipelineError> {
+        let mut work: Option<Work> = None;
+        for task in tasks {
+            let looked = task.wait()?;
+            work = Some(work.map_or(looked.work, |others| others.and(looked.work)));
+            self.looks.push(Look {
+                rig: Arc::clone(&task.rig),
+                model: Arc::clone(&task.model),
+                per_view: looked.per_view,
+            });
+        }
+        let Some(work) = work else { return Ok(()) };
+        self.batch_count += work.runs;
+        self.non_finite += work.non_finite;
+        let span = work.ended.saturating_duration_since(work.began);
+        let remap = span.mul_f64(work.remap_share());
+        self.timings.queue += work.began.saturating_duration_since(work.queued);
+        self.timings.remap += remap;
+        self.timings.inference += span.saturating_sub(remap);
+        Ok(())
+    }
+}

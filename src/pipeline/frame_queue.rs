@@ -1,0 +1,96 @@
+//! The frames that wait for a worker, in their turn.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Condvar, Mutex, MutexGuard, PoisonError},
+};
+
+use super::{
+    Priority,
+    ticket::{Turn, Turns},
+};
+
+/// A queue by priority, then by arrival. Its length is bounded by whoever fills it.
+pub(super) struct FrameQueue<T> {
+    state: Mutex<State<T>>,
+    changed: Condvar,
+}
+
+struct State<T> {
+    waiting: BTreeMap<Turn, T>,
+    turns: Turns,
+    closed: bool,
+}
+
+impl<T> FrameQueue<T> {
+    pub(super) fn new() -> Self {
+        Self {
+            state: Mutex::new(State {
+                waiting: BTreeMap::new(),
+                turns: Turns::default(),
+                closed: false,
+            }),
+            changed: Condvar::new(),
+        }
+    }
+
+    /// Queues an entry; gives it back when the queue is closed.
+    pub(super) fn push(&self, priority: Priority, entry: T) -> Result<(), T> {
+        let mut state = self.lock();
+        if state.closed {
+            return Err(entry);
+        }
+        let turn = state.turns.next(priority);
+        state.waiting.insert(turn, entry);
+        drop(state);
+        self.changed.notify_one();
+        Ok(())
+    }
+
+    /// Waits for the next entry; `None` when the queue is closed and empty. Blocks.
+    pub(super) fn pop(&self) -> Option<T> {
+        let mut state = self
+            .changed
+            .wait_while(self.lock(), |state| {
+                state.waiting.is_empty() && !state.closed
+            })
+            .unwrap_or_else(PoisonError::into_inner);
+        state.waiting.pop_first().map(|(_, entry)| entry)
+    }
+
+    /// Takes in no more; what is waiting is still handed out.
+    pub(super) fn close(&self) {
+        self.lock().closed = true;
+        self.changed.notify_all();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        // No change can panic half-way.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_more_urgent_goes_first_and_equals_go_in_the_order_of_their_arrival() {
+        let queue = FrameQueue::new();
+        for (level, name) in [(5, "a"), (9, "b"), (5, "c"), (1, "d"), (9, "e")] {
+            let priority = Priority::new(level).unwrap();
+            queue.push(priority, name).unwrap();
+        }
+        queue.close();
+        let served: Vec<_> = std::iter::from_fn(|| queue.pop()).collect();
+        assert_eq!(served, ["d", "a", "c", "b", "e"]);
+    }
+
+    #[test]
+    fn a_closed_queue_gives_back_what_comes_late() {
+        let queue = FrameQueue::new();
+        queue.close();
+        assert_eq!(queue.push(Priority::default(), 7), Err(7));
+        assert_eq!(queue.pop(), None);
+    }
+}

@@ -1,0 +1,131 @@
+//! One round of looking at a frame, while its views are in the network.
+
+use std::{
+    ops::Range,
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    time::Instant,
+};
+
+use super::Work;
+use crate::{
+    imaging::Frame,
+    inference::{Model, ViewDetection},
+    pipeline::{PipelineError, Ticket, camera_rig::CameraRig},
+};
+
+/// One round of looking at a frame.
+pub(in crate::pipeline) struct LookTask {
+    pub(in crate::pipeline) rig: Arc<CameraRig>,
+    pub(in crate::pipeline) model: Arc<Model>,
+    pub(super) frame: Arc<Frame>,
+    pub(super) ticket: Ticket,
+    pub(super) queued: Instant,
+    progress: Mutex<Progress>,
+    over: Condvar,
+}
+
+/// What came of a round.
+#[derive(Debug)]
+pub(in crate::pipeline) struct Looked {
+    /// What was found in each view.
+    pub(in crate::pipeline) per_view: Vec<Vec<ViewDetection>>,
+    /// What it took.
+    pub(in crate::pipeline) work: Work,
+}
+
+struct Progress {
+    per_view: Vec<Vec<ViewDetection>>,
+    missing: usize,
+    work: Option<Work>,
+    failed: bool,
+    failure: Option<PipelineError>,
+}
+
+impl LookTask {
+    pub(super) fn new(
+        rig: Arc<CameraRig>,
+        model: Arc<Model>,
+        frame: Arc<Frame>,
+        ticket: Ticket,
+    ) -> Self {
+        let views = rig.view_count();
+        Self {
+            rig,
+            model,
+            frame,
+            ticket,
+            queued: Instant::now(),
+            progress: Mutex::new(Progress {
+                per_view: vec![Vec::new(); views],
+                missing: views,
+                work: None,
+                failed: false,
+                failure: None,
+            }),
+            over: Condvar::new(),
+        }
+    }
+
+    /// Waits until every view was looked at. Blocks.
+    pub(in crate::pipeline) fn wait(&self) -> Result<Looked, PipelineError> {
+        let progress = self.lock();
+        let mut progress = self
+            .over
+            .wait_while(progress, |progress| !progress.is_over())
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some(failure) = progress.failure.take() {
+            return Err(failure);
+        }
+        Ok(Looked {
+            per_view: std::mem::take(&mut progress.per_view),
+            work: progress.work.unwrap_or_else(|| Work::none(self.queued)),
+        })
+    }
+
+    /// Whether nobody needs its other views: it failed, or its client has left.
+    pub(super) fn is_pointless(&self) -> bool {
+        self.ticket.withdrawn.is_cancelled() || self.lock().failed
+    }
+
+    /// Ends the round; views that are in the network come to nothing.
+    pub(super) fn fail(&self, error: PipelineError) {
+        let mut progress = self.lock();
+        if !progress.failed {
+            progress.failed = true;
+            progress.failure = Some(error);
+        }
+        drop(progress);
+        self.over.notify_all();
+    }
+
+    /// Takes in what was found in some views.
+    pub(super) fn finish(
+        &self,
+        views: Range<usize>,
+        found: impl Iterator<Item = Vec<ViewDetection>>,
+        work: Work,
+    ) {
+        let mut progress = self.lock();
+        progress.missing -= views.len();
+        for (slot, found) in progress.per_view[views].iter_mut().zip(found) {
+            *slot = found;
+        }
+        progress.work = Some(progress.work.map_or(work, |before| before.and(work)));
+        let over = progress.is_over();
+        drop(progress);
+        if over {
+            self.over.notify_all();
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Progress> {
+        // Views are counted by the queue, so no change can panic half-way.
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Progress {
+    fn is_over(&self) -> bool {
+        self.missing == 0 || self.failed
+    }
+}

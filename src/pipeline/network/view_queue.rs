@@ -1,0 +1,154 @@
+//! The views that wait for the network: those of the first frame first, filled up with views of
+//! the next frames that the same model looks at.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    time::Instant,
+};
+
+use super::{BatchOptions, Claim, LookTask};
+use crate::{
+    inference::Model,
+    pipeline::{
+        PipelineError,
+        ticket::{Turn, Turns},
+    },
+};
+
+/// The views that wait for the network. It is bounded by the number of frames that are worked on.
+pub(super) struct ViewQueue {
+    options: BatchOptions,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    waiting: BTreeMap<Turn, Waiting>,
+    turns: Turns,
+    closed: bool,
+}
+
+struct Waiting {
+    task: Arc<LookTask>,
+    next_view: usize,
+}
+
+impl Waiting {
+    fn views_left(&self) -> usize {
+        self.task.rig.view_count() - self.next_view
+    }
+
+    fn is_for(&self, model: &Arc<Model>) -> bool {
+        Arc::ptr_eq(model, &self.task.model)
+    }
+}
+
+impl ViewQueue {
+    pub(super) fn new(options: BatchOptions) -> Self {
+        Self {
+            options,
+            state: Mutex::default(),
+            changed: Condvar::new(),
+        }
+    }
+
+    /// Queues all views of a task.
+    pub(super) fn submit(&self, task: Arc<LookTask>) {
+        if task.rig.view_count() == 0 {
+            return;
+        }
+        let mut state = self.lock();
+        let turn = state.turns.next(task.ticket.priority);
+        let waiting = Waiting { task, next_view: 0 };
+        state.waiting.insert(turn, waiting);
+        drop(state);
+        self.changed.notify_all();
+    }
+
+    /// Takes in no more; what is waiting is still handed out.
+    pub(super) fn close(&self) {
+        self.lock().closed = true;
+        self.changed.notify_all();
+    }
+
+    /// The views of one run, all for one model, in their turn; waits for them. `None` when the
+    /// queue is closed and empty.
+    pub(super) fn next_batch(&self) -> Option<Vec<Claim>> {
+        let mut state = self.lock();
+        loop {
+            state.drop_pointless();
+            let Some(first) = state.waiting.values().next() else {
+                if state.closed {
+                    return None;
+                }
+                state = self
+                    .changed
+                    .wait(state)
+                    .unwrap_or_else(PoisonError::into_inner);
+                continue;
+            };
+            let model = Arc::clone(&first.task.model);
+            let most = model.batch_of(self.options.max_views).get();
+            let due = first.task.queued + self.options.max_delay;
+            let to_wait = due.saturating_duration_since(Instant::now());
+            if to_wait.is_zero() || state.closed || state.views_for(&model) >= most {
+                return Some(state.claim(&model, most));
+            }
+            state = self
+                .changed
+                .wait_timeout(state, to_wait)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // No change can panic half-way.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    /// Forgets the views that nobody needs any more.
+    fn drop_pointless(&mut self) {
+        self.waiting.retain(|_, waiting| {
+            let pointless = waiting.task.is_pointless();
+            if pointless {
+                waiting.task.fail(PipelineError::Withdrawn);
+            }
+            !pointless
+        });
+    }
+
+    /// How many views wait for a model.
+    fn views_for(&self, model: &Arc<Model>) -> usize {
+        let alike = self
+            .waiting
+            .values()
+            .filter(|waiting| waiting.is_for(model));
+        alike.map(Waiting::views_left).sum()
+    }
+
+    /// Takes the next views for a model.
+    fn claim(&mut self, model: &Arc<Model>, most: usize) -> Vec<Claim> {
+        let mut room = most;
+        let mut claims = Vec::new();
+        let alike = self.waiting.values_mut();
+        for waiting in alike.filter(|waiting| waiting.is_for(model)) {
+            if room == 0 {
+                break;
+            }
+            let end = waiting.next_view + room.min(waiting.views_left());
+            claims.push(Claim {
+                task: Arc::clone(&waiting.task),
+                views: waiting.next_view..end,
+            });
+            room -= end - waiting.next_view;
+            waiting.next_view = end;
+        }
+        self.waiting.retain(|_, waiting| waiting.views_left() > 0);
+        claims
+    }
+}
