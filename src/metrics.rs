@@ -83,6 +83,14 @@ metrics! {
     calibration_loads: IntCounterVec = "calibration_loads_total" ["result"];
     /// 1 when the place of the calibrations could be looked at, else 0.
     calibration_store_up: IntGauge = "calibration_store_up" [];
+    /// Cameras whose remap tables are in memory, one per profile and frame size.
+    rig_cache_rigs: IntGauge = "rig_cache_rigs" [];
+    /// Memory that remap tables hold, bytes.
+    rig_cache_bytes: IntGauge = "rig_cache_bytes" [];
+    /// Times that remap tables were built.
+    rig_cache_builds: IntCounter = "rig_cache_builds_total" [];
+    /// Times that remap tables were dropped to make room for others.
+    rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
     /// Always 1; says which version runs.
     build_info: IntGaugeVec = "build_info" ["version"];
 }
@@ -124,11 +132,23 @@ impl Metrics {
             .shown_models
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        let count = |count: usize| i64::try_from(count).unwrap_or(i64::MAX);
         self.calibrations.set(count(serving));
         self.calibration_files_broken.set(count(broken));
         self.calibration_store_up.set(i64::from(up));
         raise(&self.calibration_loads, loads);
+    }
+
+    /// Shows how many rigs of how many bytes are in memory, and how many were built and evicted
+    /// since the start.
+    pub fn show_rig_cache(&self, rigs: usize, bytes: usize, builds: u64, evictions: u64) {
+        let _one_scrape = self
+            .shown_models
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        self.rig_cache_rigs.set(count(rigs));
+        self.rig_cache_bytes.set(count(bytes));
+        raise_to(&self.rig_cache_builds, builds);
+        raise_to(&self.rig_cache_evictions, evictions);
     }
 
     /// All metrics in the Prometheus text format.
@@ -145,9 +165,16 @@ impl Metrics {
 /// Raises counters to these counts.
 fn raise(counters: &IntCounterVec, counts: &[(&str, u64)]) {
     for (result, count) in counts {
-        let counter = counters.with_label_values(&[result]);
-        counter.inc_by(count.saturating_sub(counter.get()));
+        raise_to(&counters.with_label_values(&[result]), *count);
     }
+}
+
+fn raise_to(counter: &IntCounter, count: u64) {
+    counter.inc_by(count.saturating_sub(counter.get()));
+}
+
+fn count(count: usize) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]
@@ -172,6 +199,23 @@ mod tests {
             "lookdown_queue_duration_seconds_bucket{model=\"m\",profile=\"fast\",le=\"0.25\"} 1";
         assert!(text.contains(bucket), "{text}");
     }
+
+    #[test]
+    fn counts_of_the_rig_cache_rise_and_its_size_goes_up_and_down() {
+        let metrics = Metrics::new().unwrap();
+        metrics.show_rig_cache(2, 2000, 3, 1);
+        metrics.show_rig_cache(1, 1000, 4, 3);
+        let text = metrics.render().unwrap();
+        for line in [
+            "lookdown_rig_cache_rigs 1",
+            "lookdown_rig_cache_bytes 1000",
+            "lookdown_rig_cache_builds_total 4",
+            "lookdown_rig_cache_evictions_total 3",
+        ] {
+            assert!(text.contains(&format!("\n{line}\n")), "{text}");
+        }
+    }
+
     #[test]
     fn a_model_that_was_replaced_is_shown_no_more() {
         let metrics = Metrics::new().unwrap();

@@ -31,4 +31,5 @@ pub use planned_views::{PlannedView, PlannedViews};
 pub use profile::Profile;
 pub use report::{CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings};
 pub use ticket::{Priority, Ticket};
+pub use rig_cache::RigCacheUse;
 pub use worker_pool::WorkerPool;

@@ -175,6 +175,10 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     shown.inc_by(withdrawn.saturating_sub(shown.get()));
     show_models(&state);
     show_calibrations(&state);
+    let rigs = state.workers.engine().rig_cache_use();
+    state
+        .metrics
+        .show_rig_cache(rigs.rigs, rigs.bytes, rigs.builds, rigs.evictions);
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }

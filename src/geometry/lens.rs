@@ -8,6 +8,7 @@
 use std::f64::consts::PI;
 
 mod closed_curve;
+mod continuation;
 mod distortion;
 mod error;
 mod image_plane;
@@ -146,13 +147,16 @@ impl Lens {
 
     /// The pixel of the point `scale · (x, y)` in the plane before distortion.
     fn pixel_at(&self, ray: &Ray, scale: f64) -> Option<Pixel> {
-        let (x, y) = (ray.x * scale, ray.y * scale);
-        let (x, y) = match &self.distortion {
-            None => (x, y),
-            Some(distortion) => distortion.distort(x, y),
-        };
+        let (x, y) = self.distorted(ray.x * scale, ray.y * scale);
         let pixel = self.plane.pixel_from_normalised(x, y);
         (pixel.x.is_finite() && pixel.y.is_finite()).then_some(pixel)
+    }
+
+    fn distorted(&self, x: f64, y: f64) -> (f64, f64) {
+        match &self.distortion {
+            None => (x, y),
+            Some(distortion) => distortion.distort(x, y),
+        }
     }
 
     /// The unit ray in the camera frame that `pixel` (pixel centres) sees, or `None` outside the
@@ -176,6 +180,19 @@ impl Lens {
         let (sin, cos) = self.radial.angle(radius.min(self.max_radius)).sin_cos();
         sin.is_finite()
             .then(|| Ray::new(sin * x / radius, sin * y / radius, cos))
+    }
+
+    /// The affine map from the normalised plane to pixels.
+    #[must_use]
+    pub fn image_plane(&self) -> &ImagePlane {
+        &self.plane
+    }
+
+    /// Whether the lens is the same in every azimuth, but for its image plane.
+    #[must_use]
+    pub fn is_symmetric(&self) -> bool {
+        self.distortion
+            .is_none_or(|distortion| distortion.is_radial())
     }
 
     /// The same lens for a frame `scale_x`, `scale_y` times as large. Pixel centres move with

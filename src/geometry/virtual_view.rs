@@ -26,6 +26,8 @@ pub struct VirtualView {
 
 /// Up is undefined in a view whose axis is within this of it (sine of the angle).
 const UPRIGHT_MIN_SINE: f64 = 1e-3;
+/// A turn that leaves the optical axis by this (radians) is still about it: rounding.
+const TURN_TOLERANCE: f64 = 1e-12;
 
 impl VirtualView {
     /// Places a view. `camera_from_view = camera_from_plan · Rz(azimuth) · Rx(elevation)`, so that
@@ -151,6 +153,18 @@ impl VirtualView {
         self.project(ray_in_camera).is_some_and(|pixel| {
             (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y)
         })
+    }
+
+    /// The turn about the optical axis (radians, clockwise on the screen) that makes `other` this
+    /// view, if there is one.
+    #[must_use]
+    pub fn turned_from(&self, other: &Self) -> Option<f64> {
+        let is_alike =
+            (self.focal, self.width, self.height) == (other.focal, other.width, other.height);
+        let turn = self.camera_from_view * other.camera_from_view.inverse();
+        let off_axis = turn[(0, 2)].abs().max(turn[(1, 2)].abs());
+        let is_about_axis = off_axis <= TURN_TOLERANCE && turn[(2, 2)] > 0.0;
+        (is_alike && is_about_axis).then(|| turn[(1, 0)].atan2(turn[(0, 0)]))
     }
 
     /// The direction (unit length, view pixels) in which a vertical pole seen at `pixel` (pixel

@@ -1,209 +1,175 @@
-//! Remap tables: for every pixel of a view, where in the frame it is sampled.
+//! Remap tables: where a view samples the frame, and the sampling itself.
 
+mod frame_from_plane;
+mod node_grid;
+mod row;
+mod scalar;
+#[cfg(target_arch = "x86_64")]
+#[expect(unsafe_code, reason = "the one place for vector instructions")]
+mod vector;
+mod visibility;
+
+use std::{collections::HashSet, sync::Arc};
+
+use rayon::prelude::*;
+
+use self::{
+    frame_from_plane::FrameFromPlane,
+    node_grid::{NodeGrid, Places},
+    row::{LANES, Outputs, Row, Source},
+};
 use super::{Frame, NetworkInput};
 use crate::geometry::{Lens, Pixel, VirtualView};
 
-/// Marks a view pixel that sees nothing of the frame.
-const OUTSIDE: u32 = u32::MAX;
-/// Weights are fractions of this, so that 1 itself can be told.
-const WEIGHT_ONE: f32 = 32_768.0;
-/// Interpolated tables are exact at every so many pixels.
-const NODE_STEP: u32 = 8;
-/// What view pixels outside the lens image are filled with (0 to 255).
-const FILL: f32 = 0.0;
-
-/// One view's sampling positions, row by row.
-#[derive(Debug, Clone, PartialEq)]
+/// One view's sampling positions.
+///
+/// Exact at every eighth pixel across and down and interpolated bilinearly in between, so that a
+/// block of eight pixels is one vector. In the normalised plane of a lens that is the same in every
+/// azimuth, views that are turned from each other about the optical axis have one and the same
+/// grid; only an affine map to the frame is each view's own.
+///
+/// BOUND
+#[derive(Debug, Clone)]
 pub struct RemapTable {
-    samples: Vec<Sample>,
+    grid: Arc<NodeGrid>,
+    frame_from_plane: FrameFromPlane,
     frame_width: u32,
     frame_height: u32,
 }
 
-/// A bilinear sample: its top-left neighbour and the weights of the right and lower ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Sample {
-    pixel_index: u32,
-    right_weight: u16,
-    lower_weight: u16,
-}
-
 impl RemapTable {
-    /// Tabulates where `view` samples a frame of `frame_width` × `frame_height` pixels (both at
-    /// least 2) taken through `lens`.
+    /// The tables of `views` into frames of `frame_width` × `frame_height` pixels (both at least 2)
+    /// taken through `lens`, one per view. Tables with a common grid share its memory.
     #[must_use]
-    pub fn new(view: &VirtualView, lens: &Lens, frame_width: u32, frame_height: u32) -> Self {
-        let rows = 0..view.height();
-        let samples = rows.flat_map(|y| (0..view.width()).map(move |x| (x, y)));
-        let samples = samples.map(|(x, y)| {
-            let ray = view.ray_in_camera(&Pixel::new(f64::from(x), f64::from(y)));
-            Sample::at_or_outside(lens.project(&ray), frame_width, frame_height)
-        });
-        Self {
-            samples: samples.collect(),
-            frame_width,
-            frame_height,
-        }
-    }
-
-    /// As [`RemapTable::new`], but positions are exact only at every eighth pixel and
-    /// interpolated bilinearly in between; blocks that the rim crosses stay exact. In a view of 90°
-    /// and 416 pixels into a frame of 1600 it is off by 0.15 pixels at the most, in narrower ones
-    /// by less.
-    #[must_use]
-    pub fn interpolated(
-        view: &VirtualView,
+    pub fn of_views(
+        views: &[VirtualView],
         lens: &Lens,
         frame_width: u32,
         frame_height: u32,
-    ) -> Self {
-        let exact = |x: u32, y: u32| {
-            lens.project(&view.ray_in_camera(&Pixel::new(f64::from(x), f64::from(y))))
-        };
-        let (blocks_across, blocks_down) = (
-            view.width().div_ceil(NODE_STEP),
-            view.height().div_ceil(NODE_STEP),
-        );
-        let nodes: Vec<Vec<Option<Pixel>>> = (0..=blocks_down)
-            .map(|row| {
-                let nodes = 0..=blocks_across;
-                nodes
-                    .map(|column| exact(column * NODE_STEP, row * NODE_STEP))
-                    .collect()
+    ) -> Vec<Self> {
+        // Of each view, whose grid it takes: an index into the views with grids of their own.
+        let mut own: Vec<&VirtualView> = Vec::new();
+        let shared: Vec<(usize, f64)> = views
+            .iter()
+            .map(|view| {
+                let turns = own.iter().map(|first| view.turned_from(first)).enumerate();
+                let mut found = turns.filter_map(|(grid, turn)| turn.map(|turn| (grid, turn)));
+                let found = lens.is_symmetric().then(|| found.next()).flatten();
+                found.unwrap_or_else(|| {
+                    own.push(view);
+                    (own.len() - 1, 0.0)
+                })
             })
             .collect();
-        let mut samples = Vec::with_capacity((view.width() * view.height()) as usize);
-        for y in 0..view.height() {
-            let (upper, lower) = (
-                &nodes[(y / NODE_STEP) as usize],
-                &nodes[(y / NODE_STEP) as usize + 1],
-            );
-            let down = f64::from(y % NODE_STEP) / f64::from(NODE_STEP);
-            for x in 0..view.width() {
-                let block = (x / NODE_STEP) as usize;
-                let across = f64::from(x % NODE_STEP) / f64::from(NODE_STEP);
-                let corners = (
-                    upper[block],
-                    upper[block + 1],
-                    lower[block],
-                    lower[block + 1],
-                );
-                let position = match corners {
-                    (Some(a), Some(b), Some(c), Some(d)) => {
-                        let (above, below) = (a + (b - a) * across, c + (d - c) * across);
-                        Some(above + (below - above) * down)
-                    }
-                    _ => exact(x, y),
-                };
-                samples.push(Sample::at_or_outside(position, frame_width, frame_height));
-            }
-        }
-        Self {
-            samples,
+        let grids: Vec<_> = own
+            .into_par_iter()
+            .map(|view| Arc::new(NodeGrid::new(view, lens)))
+            .collect();
+        let table = |(grid, turn): (usize, f64)| Self {
+            grid: Arc::clone(&grids[grid]),
+            frame_from_plane: FrameFromPlane::new(lens.image_plane(), turn),
             frame_width,
             frame_height,
-        }
+        };
+        shared.into_iter().map(table).collect()
     }
 
-    /// The share of the view's pixels that see the lens image, 0 to 1.
+    /// Where in the frame the view's pixel (`x`, `y`) samples (pixel centres), also beyond the
+    /// frame's borders; `None` beyond the lens image.
+    ///
+    /// # Panics
+    /// When the pixel lies outside the view.
     #[must_use]
-    pub fn inside_share(&self) -> f64 {
-        let inside = self
-            .samples
-            .iter()
-            .filter(|sample| sample.pixel_index != OUTSIDE)
-            .count();
-        #[expect(clippy::cast_precision_loss, reason = "far below 2^52 pixels")]
-        let share = inside as f64 / self.samples.len() as f64;
-        share
+    pub fn position(&self, x: u32, y: u32) -> Option<Pixel> {
+        let mut nodes = Places::default();
+        let row = self.row(y as usize, &mut nodes);
+        let (block, lane) = (x as usize / LANES, x as usize % LANES);
+        let block = row.block(block);
+        let [x, y] = block.position(lane).map(f64::from);
+        (block.lanes >> lane & 1 == 1 && !x.is_nan()).then(|| Pixel::new(x, y))
     }
 
-    /// Memory held, bytes.
+    /// Whether any of the view's pixels sees some of the lens image in the frame.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.samples.len() * size_of::<Sample>()
+    pub fn sees_anything(&self) -> bool {
+        let (width, height) = (self.frame_width as usize, self.frame_height as usize);
+        let mut nodes = Places::default();
+        (0..self.grid.visibility().rows()).any(|y| {
+            let row = self.row(y, &mut nodes);
+            let mut blocks = (1..row.nodes.x.len()).map(|right_node| row.block(right_node - 1));
+            blocks.any(|block| block.samples(width, height).iter().any(Option::is_some))
+        })
+    }
+
+    /// Memory held by some tables, bytes; what several of them share counts once.
+    #[must_use]
+    pub fn bytes<'a>(tables: impl IntoIterator<Item = &'a Self>) -> usize {
+        let mut counted = HashSet::new();
+        let bytes = tables.into_iter().map(|table| {
+            let is_first = counted.insert(Arc::as_ptr(&table.grid));
+            size_of::<Self>() + if is_first { table.grid.bytes() } else { 0 }
+        });
+        bytes.sum()
     }
 
     /// Samples, scales and lays out in one pass: `frame` (of the size the table was made for)
-    /// into one view's slot `[3, height, width]` of the network's input.
+    /// into one view's slot `[3, height, width]` of the network's input (of the view's size).
+    /// Pixels that see nothing of the lens image become black.
     pub fn render(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx2) = vector::Avx2::detect()
+            && i32::try_from(frame.pixels().len()).is_ok()
+        {
+            self.render_rows(frame, input, slot, |source, row, planes| {
+                vector::render_row(avx2, source, row, planes);
+            });
+            return;
+        }
+        self.render_portably(frame, input, slot);
+    }
+
+    /// What [`RemapTable::render`] does where there are no vector instructions it knows: the same,
+    /// to the bit.
+    pub fn render_portably(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
+        self.render_rows(frame, input, slot, scalar::render_row);
+    }
+
+    fn render_rows(
+        &self,
+        frame: &Frame,
+        input: &NetworkInput,
+        slot: &mut [f32],
+        render_row: impl Fn(&Source, &Row, Outputs<[f32]>),
+    ) {
         debug_assert_eq!(
             (frame.width(), frame.height()),
             (self.frame_width, self.frame_height)
         );
-        let pixels = frame.pixels();
-        let row = self.frame_width as usize * 3;
-        let [first, second, third] = input.source_channels();
-        let (plane_0, rest) = slot.split_at_mut(self.samples.len());
-        let (plane_1, plane_2) = rest.split_at_mut(self.samples.len());
-        let fill: [f32; 3] =
-            std::array::from_fn(|plane| FILL * input.scale[plane] + input.offset[plane]);
-        let outputs = plane_0.iter_mut().zip(plane_1).zip(plane_2);
-        for (sample, ((out_0, out_1), out_2)) in self.samples.iter().zip(outputs) {
-            if sample.pixel_index == OUTSIDE {
-                (*out_0, *out_1, *out_2) = (fill[0], fill[1], fill[2]);
-                continue;
+        let source = Source::new(frame, input);
+        let width = input.width as usize;
+        let (first, rest) = slot.split_at_mut(input.plane_len());
+        let (second, third) = rest.split_at_mut(input.plane_len());
+        let planes = [first, second, third].map(|plane| plane.chunks_exact_mut(width));
+        let [first, second, third] = planes;
+        let mut nodes = Places::default();
+        for (y, ((first, second), third)) in first.zip(second).zip(third).enumerate() {
+            let mut planes = [first, second, third];
+            if input.source_channels()[0] != 0 {
+                planes.reverse();
             }
-            let top = sample.pixel_index as usize * 3;
-            let upper = &pixels[top..top + 6];
-            let lower = &pixels[top + row..top + row + 6];
-            let right_weight = f32::from(sample.right_weight) / WEIGHT_ONE;
-            let lower_weight = f32::from(sample.lower_weight) / WEIGHT_ONE;
-            let value = |channel: usize| {
-                let mix = |line: &[u8]| {
-                    let left = f32::from(line[channel]);
-                    left + (f32::from(line[channel + 3]) - left) * right_weight
-                };
-                let above = mix(upper);
-                above + (mix(lower) - above) * lower_weight
-            };
-            *out_0 = value(first) * input.scale[0] + input.offset[0];
-            *out_1 = value(second) * input.scale[1] + input.offset[1];
-            *out_2 = value(third) * input.scale[2] + input.offset[2];
+            render_row(&source, &self.row(y, &mut nodes), planes);
         }
     }
-}
 
-impl Sample {
-    /// The sample at `position`, or the mark of a pixel that sees nothing.
-    fn at_or_outside(position: Option<Pixel>, frame_width: u32, frame_height: u32) -> Self {
-        let sample = position.and_then(|at| Self::at(&at, frame_width, frame_height));
-        sample.unwrap_or(Self {
-            pixel_index: OUTSIDE,
-            right_weight: 0,
-            lower_weight: 0,
-        })
+    /// The view's row `y`; `nodes` is where its nodes are kept.
+    fn row<'a>(&self, y: usize, nodes: &'a mut Places) -> Row<'a> {
+        let to_frame = |place| self.frame_from_plane.pixel_at(place);
+        self.grid.along_row(y, to_frame, nodes);
+        Row {
+            nodes,
+            visibility: self.grid.visibility().row(y),
+        }
     }
-
-    /// The sample at `position` (pixel centres); `None` outside the frame. Within the outer half
-    /// of a border pixel its centre is sampled.
-    fn at(position: &Pixel, frame_width: u32, frame_height: u32) -> Option<Self> {
-        let (left, right_weight) = split(position.x, frame_width)?;
-        let (top, lower_weight) = split(position.y, frame_height)?;
-        Some(Self {
-            pixel_index: top * frame_width + left,
-            right_weight,
-            lower_weight,
-        })
-    }
-}
-
-/// The lower neighbour of `position` among `count` pixels and the weight of the upper one. The
-/// last pixel is reached with full weight from its neighbour, so both always exist.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the frame first"
-)]
-fn split(position: f64, count: u32) -> Option<(u32, u16)> {
-    let last = f64::from(count - 1);
-    if !(position >= -0.5 && position <= last + 0.5) {
-        return None;
-    }
-    let position = position.clamp(0.0, last);
-    let lower = position.floor().min(last - 1.0);
-    let weight = (position - lower) * f64::from(WEIGHT_ONE);
-    Some((lower as u32, weight.round() as u16))
 }
 
 #[cfg(test)]

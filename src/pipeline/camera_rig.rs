@@ -7,7 +7,7 @@ use crate::{
     calibration::CameraGeometry,
     detection::{BBox, ViewPixels},
     geometry::{
-        BackProjection, Footprint, Ray, ViewPlan, VirtualView,
+        BackProjection, Footprint, Lens, Ray, ViewPlan, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
     },
     imaging::{Frame, Letterbox, NetworkInput, RemapTable},
@@ -32,6 +32,23 @@ enum Views {
     Direct(Letterbox),
 }
 
+impl Views {
+    /// Views with their tables, without those that see nothing.
+    fn tabulated(
+        views: Vec<VirtualView>,
+        lens: &Lens,
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let tables = RemapTable::of_views(&views, lens, frame_width, frame_height);
+        let seeing = views
+            .into_iter()
+            .zip(tables)
+            .filter(|(_, table)| table.sees_anything());
+        Self::Virtual(seeing.collect())
+    }
+}
+
 impl CameraRig {
     /// Tabulates the views of `plan` (without one, the frame is seen as it is). Views that see
     /// nothing of the lens image are left out.
@@ -46,35 +63,21 @@ impl CameraRig {
             None => Views::Direct(Letterbox::new(frame_width, frame_height, input)),
             Some(plan) => {
                 let views = plan.views(&geometry.mount, input.width, input.height);
-                let tabulated = views.into_par_iter().map(|view| {
-                    let table = RemapTable::new(&view, &geometry.lens, frame_width, frame_height);
-                    (view, table)
-                });
-                Views::Virtual(
-                    tabulated
-                        .filter(|(_, table)| table.inside_share() > 0.0)
-                        .collect(),
-                )
+                Views::tabulated(views, &geometry.lens, frame_width, frame_height)
             }
         };
         Self { geometry, views }
     }
 
-    /// The same camera with other views, for one frame: tables are interpolated, which costs a
-    /// fraction of exact ones and moves no sample by a visible amount.
+    /// The same camera with other views.
     pub(super) fn with_views(
         &self,
         views: Vec<VirtualView>,
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
-        let lens = &self.geometry.lens;
-        let tabulated = views.into_par_iter().map(|view| {
-            let table = RemapTable::interpolated(&view, lens, frame_width, frame_height);
-            (view, table)
-        });
         Self {
-            views: Views::Virtual(tabulated.collect()),
+            views: Views::tabulated(views, &self.geometry.lens, frame_width, frame_height),
             geometry: self.geometry.clone(),
         }
     }
@@ -92,10 +95,10 @@ impl CameraRig {
         }
     }
 
-    /// Memory held by the tables, bytes.
+    /// Memory held by the tables, bytes; what several of them share counts once.
     pub(super) fn bytes(&self) -> usize {
         match &self.views {
-            Views::Virtual(views) => views.iter().map(|(_, table)| table.bytes()).sum(),
+            Views::Virtual(views) => RemapTable::bytes(views.iter().map(|(_, table)| table)),
             Views::Direct(_) => 0,
         }
     }

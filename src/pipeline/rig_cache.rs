@@ -36,6 +36,10 @@ pub(super) struct RigCache {
 struct Entries {
     by_key: HashMap<RigKey, Entry>,
     clock: u64,
+    /// Of the rigs that are built.
+    bytes: usize,
+    builds: u64,
+    evictions: u64,
 }
 
 #[derive(Debug, Default)]
@@ -43,12 +47,21 @@ struct Entry {
     /// Filled by whoever asks first; others with the same key wait for that one build.
     rig: Arc<OnceLock<Arc<CameraRig>>>,
     last_used: u64,
+    /// Of the rig, once it is built and counted.
+    bytes: Option<usize>,
 }
 
-impl Entry {
-    fn bytes(&self) -> usize {
-        self.rig.get().map_or(0, |rig| rig.bytes())
-    }
+/// How full a [`RigCache`] is, and what it has done so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RigCacheUse {
+    /// Rigs in memory.
+    pub rigs: usize,
+    /// Memory that their tables hold, bytes.
+    pub bytes: usize,
+    /// Rigs built since the start.
+    pub builds: u64,
+    /// Rigs dropped to make room since the start.
+    pub evictions: u64,
 }
 
 impl RigCache {
@@ -73,32 +86,66 @@ impl RigCache {
             entry.last_used = now;
             Arc::clone(&entry.rig)
         };
-        let rig = Arc::clone(slot.get_or_init(|| Arc::new(build())));
-        self.evict_beyond_budget(key);
+        let mut is_new = false;
+        let rig = Arc::clone(slot.get_or_init(|| {
+            is_new = true;
+            Arc::new(build())
+        }));
+        if is_new {
+            let mut entries = self.lock();
+            entries.count(key, rig.bytes());
+            entries.evict_beyond(self.budget_bytes, key);
+        }
         rig
     }
 
-    /// Drops the least recently used rigs until the rest fits; `newest` stays in any case.
-    fn evict_beyond_budget(&self, newest: &RigKey) {
-        let mut entries = self.lock();
-        let mut total: usize = entries.by_key.values().map(Entry::bytes).sum();
-        while total > self.budget_bytes {
-            let oldest = entries
-                .by_key
-                .iter()
-                .filter(|(key, entry)| *key != newest && entry.bytes() > 0)
-                .min_by_key(|(_, entry)| entry.last_used)
-                .map(|(key, _)| key.clone());
-            let Some(oldest) = oldest else { break };
-            if let Some(entry) = entries.by_key.remove(&oldest) {
-                total -= entry.bytes();
-            }
+    /// How full the cache is, and what it has done so far.
+    pub(super) fn usage(&self) -> RigCacheUse {
+        let entries = self.lock();
+        let built = entries
+            .by_key
+            .values()
+            .filter(|entry| entry.bytes.is_some());
+        RigCacheUse {
+            rigs: built.count(),
+            bytes: entries.bytes,
+            builds: entries.builds,
+            evictions: entries.evictions,
         }
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Entries> {
         // Every change to the entries is a single step, so a panic cannot leave them half changed.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Entries {
+    /// Counts the rig that was just built for `key`. Only counted ones are evicted, so its entry
+    /// is there.
+    fn count(&mut self, key: &RigKey, bytes: usize) {
+        self.builds += 1;
+        if let Some(entry) = self.by_key.get_mut(key) {
+            entry.bytes = Some(bytes);
+            self.bytes += bytes;
+        }
+    }
+
+    /// Drops the least recently used rigs until the rest fits; `newest` stays in any case.
+    fn evict_beyond(&mut self, budget_bytes: usize, newest: &RigKey) {
+        while self.bytes > budget_bytes {
+            let oldest = self
+                .by_key
+                .iter()
+                .filter(|(key, entry)| *key != newest && entry.bytes.is_some())
+                .min_by_key(|(_, entry)| entry.last_used)
+                .map(|(key, _)| key.clone());
+            let Some(oldest) = oldest else { break };
+            if let Some(entry) = self.by_key.remove(&oldest) {
+                self.bytes -= entry.bytes.unwrap_or(0);
+                self.evictions += 1;
+            }
+        }
     }
 }
 

@@ -32,6 +32,11 @@ impl RadialTangential {
         }
     }
 
+    /// Whether every azimuth is distorted alike.
+    pub(super) fn is_radial(&self) -> bool {
+        self.p1 == 0.0 && self.p2 == 0.0
+    }
+
     pub(super) fn distort(&self, x: f64, y: f64) -> (f64, f64) {
         let square = x * x + y * y;
         let radial = 1.0 + square * (self.k1 + square * self.k2);

@@ -66,3 +66,19 @@ fn a_wall_camera_keeps_the_plan_on_its_optical_axis() {
     let up = view.camera_from_view() * Vector3::new(0.0, -1.0, 0.0);
     assert!((up - mount.world_up()).norm() < 1e-12);
 }
+
+#[test]
+fn views_of_a_ring_around_the_optical_axis_are_turned_from_each_other() {
+    let down = Mount::default();
+    let first = VirtualView::new(&direction(0.8, 0.3), &down, 301, 201);
+    let turned = VirtualView::new(&direction(0.8, 1.5), &down, 301, 201);
+    let turn = turned.turned_from(&first).expect("about the axis");
+    assert!((turn - 1.2).abs() < 1e-12, "{turn}");
+    for other in [
+        VirtualView::new(&direction(0.81, 1.5), &down, 301, 201),
+        VirtualView::new(&direction(0.8, 1.5), &mount([0.1, 0.0, -1.0]), 301, 201),
+        VirtualView::new(&direction(0.8, 1.5), &down, 301, 200),
+    ] {
+        assert_eq!(other.turned_from(&first), None);
+    }
+}

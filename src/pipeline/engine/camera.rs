@@ -16,7 +16,7 @@ use crate::{
         camera_rig::CameraRig,
         error::internal,
         report::CalibrationUsed,
-        rig_cache::{RigCamera, RigKey},
+        rig_cache::{RigCacheUse, RigCamera, RigKey},
     },
 };
 
@@ -31,6 +31,12 @@ pub(super) struct FrameCamera {
 }
 
 impl Engine {
+    /// How full the memory for remap tables is, and how often they were built and dropped.
+    #[must_use]
+    pub fn rig_cache_use(&self) -> RigCacheUse {
+        self.rigs.usage()
+    }
+
     pub(super) fn camera(
         &self,
         job: &DetectJob,

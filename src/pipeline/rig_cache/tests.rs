@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
     calibration::CameraGeometry,
-    geometry::{Lens, Mount, ViewPlan},
+    geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
     imaging::NetworkInput,
 };
 
@@ -18,13 +18,22 @@ fn key(radius: i64) -> RigKey {
     }
 }
 
-fn rig() -> CameraRig {
-    let geometry = CameraGeometry {
+fn geometry() -> CameraGeometry {
+    CameraGeometry {
         lens: Lens::equidistant_circle(31.5, 31.5, 32.0, 1.5).unwrap(),
         mount: Mount::default(),
-    };
+    }
+}
+
+fn rig() -> CameraRig {
     let plan = ViewPlan::balanced();
-    CameraRig::new(geometry, 64, 64, Some(&plan), &NetworkInput::plain(32, 32))
+    CameraRig::new(
+        geometry(),
+        64,
+        64,
+        Some(&plan),
+        &NetworkInput::plain(32, 32),
+    )
 }
 
 #[test]
@@ -57,4 +66,64 @@ fn a_rig_larger_than_the_budget_still_serves_its_frame() {
     assert!(cache.get_or_build(&key(1), rig).bytes() > 1);
     let kept = cache.get_or_build(&key(1), || unreachable!("the newest stays"));
     assert_eq!(kept.view_count(), 24);
+}
+
+#[test]
+fn it_tells_what_it_holds_and_what_it_did() {
+    let bytes = rig().bytes();
+    let cache = RigCache::new(2 * bytes);
+    let [empty, full] = [0, 2].map(|rigs| RigCacheUse {
+        rigs,
+        bytes: rigs * bytes,
+        builds: rigs as u64,
+        evictions: 0,
+    });
+    assert_eq!(cache.usage(), empty);
+    for radius in [1, 2, 1] {
+        cache.get_or_build(&key(radius), rig);
+    }
+    assert_eq!(cache.usage(), full);
+    cache.get_or_build(&key(3), rig);
+    let turned_over = RigCacheUse {
+        builds: 3,
+        evictions: 1,
+        ..full
+    };
+    assert_eq!(cache.usage(), turned_over);
+}
+
+#[test]
+fn a_thousand_cameras_used_once_each_fit_the_default_budget() {
+    let cache = RigCache::new(1 << 30);
+    for radius in 0..1000 {
+        cache.get_or_build(&key(radius), rig);
+    }
+    let usage = cache.usage();
+    assert_eq!((usage.rigs, usage.builds, usage.evictions), (1000, 1000, 0));
+    // And so they would with views as large as those of the default model.
+    let plan = ViewPlan::balanced();
+    let input = NetworkInput::plain(416, 416);
+    let full_size = CameraRig::new(geometry(), 64, 64, Some(&plan), &input);
+    assert!(1000 * full_size.bytes() < 1 << 30, "{}", full_size.bytes());
+}
+
+#[test]
+fn no_profile_takes_more_than_two_mebibytes_per_camera() {
+    for profile in Profile::ALL {
+        let plan = profile.view_plan(FieldOfViewReading::default());
+        for (side, up) in [(416, [0.0, 0.0, -1.0]), (300, [0.0, 0.3, -1.0])] {
+            let geometry = CameraGeometry {
+                mount: Mount::new(nalgebra::Unit::new_normalize(up.into()), None),
+                ..geometry()
+            };
+            let input = NetworkInput::plain(side, side);
+            let rig = CameraRig::new(geometry, 1680, 1680, plan.as_ref(), &input);
+            assert!(
+                rig.bytes() <= 2 << 20,
+                "{}: {}",
+                profile.name(),
+                rig.bytes()
+            );
+        }
+    }
 }

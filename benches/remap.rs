@@ -1,0 +1,158 @@
+//! Remap tables: building those of a plan, and rendering a view, with vector instructions and
+//! without. `cargo bench --bench remap` prints milliseconds (median and least of many rounds).
+//!
+//! `cargo bench --bench remap -- rounds FOLDER` is the half of `against_opencv.py` that is ours: it
+//! writes what both sides need into the folder, then renders all views once for each line it reads
+//! and answers with the nanoseconds that took.
+
+use std::{
+    error::Error,
+    f64::consts::FRAC_PI_2,
+    fs,
+    hint::black_box,
+    io::{BufRead, stdin},
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use lookdown::{
+    geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
+    imaging::{Frame, NetworkInput, RemapTable},
+};
+
+const FRAME_SIDE: u32 = 1680;
+const ROUNDS: usize = 60;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+fn main() -> Outcome<()> {
+    let arguments: Vec<_> = std::env::args()
+        .skip(1)
+        .filter(|word| word != "--bench")
+        .collect();
+    match arguments.as_slice() {
+        [] => print_times(),
+        [word, folder, side] if word == "rounds" => answer_rounds(Path::new(folder), side.parse()?),
+        _ => Err("usage: remap [rounds FOLDER SIDE]".into()),
+    }
+}
+
+fn print_times() -> Outcome<()> {
+    let plans = [
+        ("fast", ViewPlan::fast()),
+        ("balanced", ViewPlan::balanced()),
+        ("paper", ViewPlan::paper(FieldOfViewReading::default())),
+    ];
+    for (name, plan) in &plans {
+        for (how, mount) in [("straight down", Mount::default()), ("10° off", tilted())] {
+            let views = plan.views(&mount, 416, 416);
+            let lens = lens()?;
+            let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
+            let time = times(|| {
+                black_box(RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE));
+            });
+            let bytes = RemapTable::bytes(&tables);
+            println!("tables of {name}, {how}: {time}, {} KiB", bytes / 1024);
+        }
+    }
+    let frame = frame()?;
+    for side in [300, 416] {
+        let (tables, input) = (tables(side)?, NetworkInput::plain(side, side));
+        let mut slot = vec![0.0; input.view_len()];
+        let vector = times(|| render_all(&tables, |table| table.render(&frame, &input, &mut slot)));
+        println!("24 views of {side}², vector: {vector}");
+        let scalar = times(|| {
+            render_all(&tables, |table| {
+                table.render_portably(&frame, &input, &mut slot);
+            });
+        });
+        println!("24 views of {side}², portable: {scalar}");
+    }
+    Ok(())
+}
+
+/// Writes the frame (`frame.rgb`) and the views' positions (`positions.f32`: x, y, pixel by pixel and
+/// view by view; −1000 where nothing is seen), then one round per line.
+fn answer_rounds(folder: &Path, side: u32) -> Outcome<()> {
+    let (frame, tables) = (frame()?, tables(side)?);
+    let input = NetworkInput::plain(side, side);
+    fs::write(folder.join("frame.rgb"), frame.pixels())?;
+    let mut positions = Vec::new();
+    for table in &tables {
+        for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
+            let position = table.position(x, y);
+            let position = position.map_or([-1000.0; 2], |at| [at.x, at.y]);
+            #[expect(clippy::cast_possible_truncation, reason = "as tables keep them")]
+            positions.extend(
+                position
+                    .into_iter()
+                    .flat_map(|value| (value as f32).to_le_bytes()),
+            );
+        }
+    }
+    fs::write(folder.join("positions.f32"), positions)?;
+    let mut batch = vec![0.0; tables.len() * input.view_len()];
+    println!("{} {}", tables.len(), FRAME_SIDE);
+    for line in stdin().lock().lines() {
+        line?;
+        let started = Instant::now();
+        for (table, slot) in tables.iter().zip(batch.chunks_exact_mut(input.view_len())) {
+            table.render(&frame, &input, slot);
+        }
+        println!("{}", started.elapsed().as_nanos());
+    }
+    let bytes: Vec<u8> = batch.iter().flat_map(|value| value.to_le_bytes()).collect();
+    fs::write(folder.join("views.f32"), bytes)?;
+    Ok(())
+}
+
+fn lens() -> Outcome<Lens> {
+    let middle = f64::from(FRAME_SIDE - 1) / 2.0;
+    Ok(Lens::equidistant_circle(
+        middle,
+        middle,
+        middle + 0.5,
+        FRAC_PI_2,
+    )?)
+}
+
+fn tilted() -> Mount {
+    let up = nalgebra::Unit::new_normalize(nalgebra::Vector3::new(0.176, 0.0, -1.0));
+    Mount::new(up, None)
+}
+
+fn tables(side: u32) -> Outcome<Vec<RemapTable>> {
+    let views = ViewPlan::balanced().views(&Mount::default(), side, side);
+    Ok(RemapTable::of_views(
+        &views,
+        &lens()?,
+        FRAME_SIDE,
+        FRAME_SIDE,
+    ))
+}
+
+/// Noise: nothing in it helps anybody's cache or branch predictor.
+fn frame() -> Outcome<Frame> {
+    let bytes = 0..FRAME_SIDE * FRAME_SIDE * 3;
+    let pixels = bytes.map(|index| index.wrapping_mul(2_654_435_761).to_le_bytes()[3]);
+    Ok(Frame::new(FRAME_SIDE, FRAME_SIDE, pixels.collect())?)
+}
+
+fn render_all(tables: &[RemapTable], mut render: impl FnMut(&RemapTable)) {
+    for table in tables {
+        render(table);
+    }
+}
+
+fn times(mut work: impl FnMut()) -> String {
+    let mut rounds: Vec<Duration> = (0..ROUNDS)
+        .map(|_| {
+            let started = Instant::now();
+            work();
+            started.elapsed()
+        })
+        .collect();
+    rounds.sort_unstable();
+    let [median, least] = [ROUNDS / 2, 0].map(|index| rounds[index].as_secs_f64() * 1e3);
+    format!("{median:.2} ms (least {least:.2})")
+}

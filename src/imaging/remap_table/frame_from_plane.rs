@@ -1,0 +1,33 @@
+//! From the plane that the views of a ring share to the frame of one of them.
+
+use crate::geometry::lens::ImagePlane;
+
+/// An affine map in the precision in which nodes are kept.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FrameFromPlane {
+    x: [f32; 3],
+    y: [f32; 3],
+}
+
+impl FrameFromPlane {
+    /// A turn by `turn` radians (clockwise on the screen), then `image_plane`.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "24 bits tell 1/1000 of a pixel in a frame of 8000"
+    )]
+    pub(super) fn new(image_plane: &ImagePlane, turn: f64) -> Self {
+        let (sin, cos) = turn.sin_cos();
+        let row = |x: f64, y: f64, offset: f64| {
+            [x * cos + y * sin, y * cos - x * sin, offset].map(|value| value as f32)
+        };
+        Self {
+            x: row(image_plane.fx, image_plane.skew, image_plane.cx),
+            y: row(image_plane.row_skew, image_plane.fy, image_plane.cy),
+        }
+    }
+
+    /// The frame's pixel (pixel centres) at a place of the plane.
+    pub(super) fn pixel_at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        [self.x, self.y].map(|[of_x, of_y, offset]| of_x * x + of_y * y + offset)
+    }
+}

@@ -1,0 +1,94 @@
+//! Sampling one pixel at a time, on every machine.
+
+use super::row::{Block, LANES, Outputs, Row, Source, WEIGHT_ONE};
+
+/// Four neighbours of a position in the frame and their weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sample {
+    /// The upper left neighbour's index, row by row.
+    first_pixel: usize,
+    /// Of the right neighbours, of [`WEIGHT_ONE`].
+    right_weight: i32,
+    /// Of the lower neighbours, 0 to 1.
+    lower_weight: f32,
+}
+
+pub(super) fn render_row(source: &Source, row: &Row, planes: Outputs<[f32]>) {
+    row.render(source, planes, sample_block);
+}
+
+impl Block {
+    /// The samples of its pixels, each `None` where nothing is seen.
+    pub(super) fn samples(&self, width: usize, height: usize) -> [Option<Sample>; LANES] {
+        std::array::from_fn(|lane| {
+            let is_visible = self.lanes >> lane & 1 == 1;
+            is_visible
+                .then(|| Sample::at(self.position(lane), width, height))
+                .flatten()
+        })
+    }
+
+    /// Where one of its pixels samples the frame (pixel centres).
+    pub(super) fn position(&self, lane: usize) -> [f32; 2] {
+        #[expect(clippy::cast_precision_loss, reason = "below 8")]
+        let lane = lane as f32;
+        [0, 1].map(|axis| self.start[axis] + self.step[axis] * lane)
+    }
+}
+
+fn sample_block(source: &Source, block: &Block, outputs: Outputs<[f32; LANES]>) {
+    let samples = block.samples(source.width, source.height);
+    for (channel, values) in outputs.into_iter().enumerate() {
+        for (value, sample) in values.iter_mut().zip(&samples) {
+            let sum = sample.map_or(0.0, |sample| sample.weighted_sum(source, channel));
+            *value = sum * source.scale[channel] + source.offset[channel];
+        }
+    }
+}
+
+impl Sample {
+    /// The sample at a position (pixel centres) in a frame of `width` × `height` pixels, both at
+    /// least 2; `None` outside. Within the outer half of a border pixel its centre is sampled.
+    fn at([x, y]: [f32; 2], width: usize, height: usize) -> Option<Self> {
+        let (left, right_weight) = split(x, width)?;
+        let (top, lower_weight) = split(y, height)?;
+        #[expect(clippy::cast_possible_truncation, reason = "at most WEIGHT_ONE")]
+        let right_weight = (right_weight * f32::from(WEIGHT_ONE)) as i32;
+        Some(Self {
+            first_pixel: top * width + left,
+            right_weight,
+            lower_weight,
+        })
+    }
+
+    /// One channel, in units of `1 / WEIGHT_ONE`.
+    fn weighted_sum(&self, source: &Source, channel: usize) -> f32 {
+        let mix = |pixel: usize| {
+            let [left, right] =
+                [0, 3].map(|next| i32::from(source.pixels[3 * pixel + channel + next]));
+            let sum =
+                left * (i32::from(WEIGHT_ONE) - self.right_weight) + right * self.right_weight;
+            #[expect(clippy::cast_precision_loss, reason = "below 2^24")]
+            let sum = sum as f32;
+            sum
+        };
+        let above = mix(self.first_pixel);
+        above + (mix(self.first_pixel + source.width) - above) * self.lower_weight
+    }
+}
+
+/// The lower neighbour of `position` among `count` pixels and the weight of the upper one. The
+/// last pixel is reached with full weight from its neighbour, so both always exist.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "clamped to the frame first; a frame's side is far below 2^24"
+)]
+fn split(position: f32, count: usize) -> Option<(usize, f32)> {
+    let within = position.clamp(0.0, (count - 1) as f32);
+    // Not so where it is no number either.
+    let is_inside = (position - within).abs() <= 0.5;
+    let lower = (within as usize).min(count - 2);
+    is_inside.then_some((lower, within - lower as f32))
+}

@@ -1,0 +1,216 @@
+//! Sampling eight pixels at a time with AVX2. To the bit what `scalar` does: the same operations in
+//! the same order, none of them fused.
+//!
+//! The only module with unsafe code. Pixels are read through slices; what is unsafe is to call
+//! functions that need AVX2, and to see a vector as an array.
+
+use std::arch::x86_64::{
+    __m256, __m256i, _CMP_LE_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
+    _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
+    _mm256_cvtepi32_ps, _mm256_cvttps_epi32, _mm256_madd_epi16, _mm256_max_ps, _mm256_min_epi32,
+    _mm256_min_ps, _mm256_mul_ps, _mm256_mullo_epi32, _mm256_or_si256, _mm256_set1_epi32,
+    _mm256_set1_ps, _mm256_setr_epi8, _mm256_setr_epi32, _mm256_setr_epi64x, _mm256_setr_ps,
+    _mm256_setzero_ps, _mm256_shuffle_epi8, _mm256_shuffle_ps, _mm256_slli_epi32,
+    _mm256_srli_epi32, _mm256_srli_epi64, _mm256_sub_epi32, _mm256_sub_ps,
+};
+
+use super::row::{Block, LANES, Outputs, Row, Source, WEIGHT_ONE};
+
+/// The bytes of two neighbouring pixels, and two more.
+const PAIR_BYTES: usize = 8;
+
+/// Exists only where the processor has AVX2.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Avx2(());
+
+impl Avx2 {
+    /// Proof of AVX2, if the processor has it.
+    pub(super) fn detect() -> Option<Self> {
+        is_x86_feature_detected!("avx2").then_some(Self(()))
+    }
+}
+
+/// As `scalar::render_row`, for frames of less than 2 GiB.
+pub(super) fn render_row(_proof: Avx2, source: &Source, row: &Row, planes: Outputs<[f32]>) {
+    // SAFETY: there is proof that the processor has AVX2.
+    unsafe { render_row_with_avx2(source, row, planes) }
+}
+
+#[target_feature(enable = "avx2")]
+fn render_row_with_avx2(source: &Source, row: &Row, planes: Outputs<[f32]>) {
+    let lines = Lines::of(source);
+    row.render(source, planes, |source, block, outputs| {
+        sample_block(source, &lines, block, outputs);
+    });
+}
+
+/// The frame seen from two places. Eight bytes from the first one's start are a pixel and its right
+/// neighbour and two more bytes; eight from the second one's are two bytes and then the pixels
+/// below these. So no read reaches beyond the frame: at its last pixels both end with a line.
+struct Lines<'a> {
+    upper: &'a [u8],
+    lower: &'a [u8],
+}
+
+impl<'a> Lines<'a> {
+    fn of(source: &Source<'a>) -> Self {
+        let line = 3 * source.width;
+        let lower = &source.pixels[line - 2..];
+        Self {
+            upper: &source.pixels[..lower.len()],
+            lower,
+        }
+    }
+}
+
+/// Where eight pixels sample.
+struct Samples {
+    /// Of each upper left neighbour, its first byte's index.
+    first_bytes: [u32; LANES],
+    /// As 16-bit numbers, the weights of left and right neighbours.
+    weights: __m256i,
+    lower_weight: __m256,
+    /// All bits set where something is seen.
+    is_visible: __m256,
+}
+
+#[target_feature(enable = "avx2")]
+fn sample_block(source: &Source, lines: &Lines, block: &Block, outputs: Outputs<[f32; LANES]>) {
+    let samples = samples(source, block);
+    let [low, high] = pixel_pairs(lines.upper, &samples.first_bytes);
+    let upper = weighted_sums(
+        low_halves(low, high),
+        low_halves(_mm256_srli_epi64::<16>(low), _mm256_srli_epi64::<16>(high)),
+        samples.weights,
+    );
+    let [low, high] = pixel_pairs(lines.lower, &samples.first_bytes);
+    let lower = weighted_sums(
+        low_halves(_mm256_srli_epi64::<16>(low), _mm256_srli_epi64::<16>(high)),
+        high_halves(low, high),
+        samples.weights,
+    );
+    for (channel, values) in outputs.into_iter().enumerate() {
+        let difference = _mm256_sub_ps(lower[channel], upper[channel]);
+        let sum = _mm256_add_ps(
+            upper[channel],
+            _mm256_mul_ps(difference, samples.lower_weight),
+        );
+        let sum = _mm256_and_ps(sum, samples.is_visible);
+        let scaled = _mm256_mul_ps(sum, _mm256_set1_ps(source.scale[channel]));
+        *values = singles(_mm256_add_ps(
+            scaled,
+            _mm256_set1_ps(source.offset[channel]),
+        ));
+    }
+}
+
+#[target_feature(enable = "avx2")]
+fn samples(source: &Source, block: &Block) -> Samples {
+    let (left, right_weight, is_within_width) = split(block.start[0], block.step[0], source.width);
+    let (top, lower_weight, is_within_height) = split(block.start[1], block.step[1], source.height);
+    let pixel = _mm256_add_epi32(_mm256_mullo_epi32(top, whole(source.width)), left);
+    let first_byte = _mm256_add_epi32(_mm256_slli_epi32::<1>(pixel), pixel);
+    let one = i32::from(WEIGHT_ONE);
+    let right = _mm256_mul_ps(right_weight, _mm256_set1_ps(f32::from(WEIGHT_ONE)));
+    let right = _mm256_cvttps_epi32(right);
+    let left = _mm256_sub_epi32(_mm256_set1_epi32(one), right);
+    let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    let lanes = _mm256_and_si256(_mm256_set1_epi32(i32::from(block.lanes)), bits);
+    let is_within = _mm256_and_ps(is_within_width, is_within_height);
+    Samples {
+        first_bytes: words(first_byte),
+        weights: _mm256_or_si256(_mm256_slli_epi32::<16>(right), left),
+        lower_weight,
+        is_visible: _mm256_and_ps(
+            is_within,
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(lanes, bits)),
+        ),
+    }
+}
+
+/// As `scalar::split`: lower neighbours, weights of the upper ones, and whether that is within.
+#[target_feature(enable = "avx2")]
+fn split(start: f32, step: f32, count: usize) -> (__m256i, __m256, __m256) {
+    let lane = _mm256_setr_ps(0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0);
+    let steps = _mm256_mul_ps(_mm256_set1_ps(step), lane);
+    let position = _mm256_add_ps(_mm256_set1_ps(start), steps);
+    let last = _mm256_cvtepi32_ps(whole(count - 1));
+    // In this order what is no number becomes 0, and is not within.
+    let within = _mm256_min_ps(_mm256_max_ps(position, _mm256_setzero_ps()), last);
+    let beyond = _mm256_andnot_ps(_mm256_set1_ps(-0.0), _mm256_sub_ps(position, within));
+    let is_within = _mm256_cmp_ps::<_CMP_LE_OQ>(beyond, _mm256_set1_ps(0.5));
+    let lower = _mm256_min_epi32(_mm256_cvttps_epi32(within), whole(count - 2));
+    let weight = _mm256_sub_ps(within, _mm256_cvtepi32_ps(lower));
+    (lower, weight, is_within)
+}
+
+/// Eight bytes from each of the given ones: of pixels 0, 1, 4 and 5, and of 2, 3, 6 and 7.
+#[target_feature(enable = "avx2")]
+fn pixel_pairs(lines: &[u8], first_bytes: &[u32; LANES]) -> [__m256i; 2] {
+    let last = lines.len() - PAIR_BYTES;
+    let pair = |lane: usize| {
+        // Never more than the last one; said so for the sake of the compiler.
+        let first = (first_bytes[lane] as usize).min(last);
+        let mut bytes = [0; PAIR_BYTES];
+        bytes.copy_from_slice(&lines[first..first + PAIR_BYTES]);
+        i64::from_le_bytes(bytes)
+    };
+    [
+        _mm256_setr_epi64x(pair(0), pair(1), pair(4), pair(5)),
+        _mm256_setr_epi64x(pair(2), pair(3), pair(6), pair(7)),
+    ]
+}
+
+/// The first four bytes of each of the eight, in the pixels' order.
+#[target_feature(enable = "avx2")]
+fn low_halves(low: __m256i, high: __m256i) -> __m256i {
+    let (low, high) = (_mm256_castsi256_ps(low), _mm256_castsi256_ps(high));
+    _mm256_castps_si256(_mm256_shuffle_ps::<0b10_00_10_00>(low, high))
+}
+
+/// The last four bytes of each of the eight, in the pixels' order.
+#[target_feature(enable = "avx2")]
+fn high_halves(low: __m256i, high: __m256i) -> __m256i {
+    let (low, high) = (_mm256_castsi256_ps(low), _mm256_castsi256_ps(high));
+    _mm256_castps_si256(_mm256_shuffle_ps::<0b11_01_11_01>(low, high))
+}
+
+/// Red, green and blue of eight pairs of pixels: the first four of each one's six bytes are
+/// R, G, B, R, the last four B, R, G, B.
+#[target_feature(enable = "avx2")]
+fn weighted_sums(first_four: __m256i, last_four: __m256i, weights: __m256i) -> [__m256; 3] {
+    #[rustfmt::skip]
+    let outer_bytes = _mm256_setr_epi8(
+        0, -1, 3, -1, 4, -1, 7, -1, 8, -1, 11, -1, 12, -1, 15, -1,
+        0, -1, 3, -1, 4, -1, 7, -1, 8, -1, 11, -1, 12, -1, 15, -1,
+    );
+    let left_green = _mm256_and_si256(_mm256_srli_epi32::<8>(first_four), _mm256_set1_epi32(0xff));
+    let right_green = _mm256_and_si256(last_four, _mm256_set1_epi32(0x00ff_0000));
+    [
+        _mm256_shuffle_epi8(first_four, outer_bytes),
+        _mm256_or_si256(left_green, right_green),
+        _mm256_shuffle_epi8(last_four, outer_bytes),
+    ]
+    .map(|pair| _mm256_cvtepi32_ps(_mm256_madd_epi16(pair, weights)))
+}
+
+/// A number of pixels in all lanes.
+#[target_feature(enable = "avx2")]
+fn whole(count: usize) -> __m256i {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "a frame of less than 2 GiB"
+    )]
+    _mm256_set1_epi32(count as i32)
+}
+
+fn words(vector: __m256i) -> [u32; LANES] {
+    // SAFETY: both are 32 bytes, and every value of them is one of the array.
+    unsafe { std::mem::transmute(vector) }
+}
+
+fn singles(vector: __m256) -> [f32; LANES] {
+    // SAFETY: both are 32 bytes, and every value of them is one of the array.
+    unsafe { std::mem::transmute(vector) }
+}
