@@ -2,12 +2,12 @@
 PYTHON ?= python3
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test ci bless
+.PHONY: help setup models serve test ci bless bench-remap
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
-		printf '  %-8s %s\n' "$$target" "$$text"; done
+		printf '  %-11s %s\n' "$$target" "$$text"; done
 
 setup: ## fetch ONNX Runtime and the default models, build target/release/lookdown
 	@$(PYTHON) scripts/setup.py
@@ -38,3 +38,9 @@ bless: ## regenerate the checked-in generated files: openapi/openapi.json and th
 	cargo run --release --locked -- openapi > openapi/openapi.json.new || { rm -f openapi/openapi.json.new; exit 1; }
 	mv openapi/openapi.json.new openapi/openapi.json
 	INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --locked
+
+bench-remap: ## time remap tables and the rendering of views, the latter beside OpenCV's
+	$(PYTHON) -m venv .setup/bench-venv
+	.setup/bench-venv/bin/python -m pip install --quiet --requirement benches/requirements.txt
+	cargo bench --locked --bench remap
+	.setup/bench-venv/bin/python benches/against_opencv.py

@@ -1,7 +1,7 @@
 //! Remap tables: building those of a plan, and rendering a view, with vector instructions and
 //! without. `cargo bench --bench remap` prints milliseconds (median and least of many rounds).
 //!
-//! `cargo bench --bench remap -- rounds FOLDER` is the half of `against_opencv.py` that is ours: it
+//! `cargo bench --bench remap -- rounds FOLDER SIDE` is the half of `against_opencv.py` that is ours: it
 //! writes what both sides need into the folder, then renders all views once for each line it reads
 //! and answers with the nanoseconds that took.
 
@@ -75,7 +75,11 @@ fn print_times() -> Outcome<()> {
 /// view by view; −1000 where nothing is seen), then one round per line.
 fn answer_rounds(folder: &Path, side: u32) -> Outcome<()> {
     let (frame, tables) = (frame()?, tables(side)?);
-    let input = NetworkInput::plain(side, side);
+    let input = NetworkInput {
+        scale: [1.0 / 57.0; 3],
+        offset: [103.5, 116.3, 123.7].map(|mean: f32| -mean / 57.0),
+        ..NetworkInput::plain(side, side)
+    };
     fs::write(folder.join("frame.rgb"), frame.pixels())?;
     let mut positions = Vec::new();
     for table in &tables {

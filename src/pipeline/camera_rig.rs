@@ -1,8 +1,6 @@
 //! Camera rigs: a camera's geometry with the views of a plan and their remap tables, immutable
 //! and shared by every frame of that camera.
 
-use rayon::prelude::*;
-
 use crate::{
     calibration::CameraGeometry,
     detection::{BBox, ViewPixels},

@@ -52,6 +52,9 @@ async fn metrics_count_frames_views_persons_and_failures() {
         "lookdown_views_total 4",
         "lookdown_batches_total 1",
         "lookdown_pending_frames 0",
+        "lookdown_rig_cache_rigs 1",
+        "lookdown_rig_cache_builds_total 1",
+        "lookdown_rig_cache_evictions_total 0",
     ] {
         assert!(
             metrics.lines().any(|told| told == line),
