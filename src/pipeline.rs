@@ -30,6 +30,6 @@ pub use parameters::{DetectParameters, ParameterError, ParameterFault};
 pub use planned_views::{PlannedView, PlannedViews};
 pub use profile::Profile;
 pub use report::{CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings};
-pub use ticket::{Priority, Ticket};
 pub use rig_cache::RigCacheUse;
+pub use ticket::{Priority, Ticket};
 pub use worker_pool::WorkerPool;
