@@ -9,9 +9,11 @@ mod network_input;
 pub mod picture_grid;
 mod remap_table;
 mod thumbnail;
+mod view_signature;
 
 pub use frame::{Frame, FrameError};
 pub use letterbox::Letterbox;
 pub use network_input::{ChannelOrder, NetworkInput, ViewBatch};
 pub use remap_table::RemapTable;
 pub use thumbnail::thumbnail;
+pub use view_signature::ViewSignature;

@@ -59,6 +59,8 @@ metrics! {
     compute_output_duration: HistogramVec = "compute_output_duration_seconds" ["model", "profile"];
     /// Views the network has seen of frames that got a report.
     views: IntCounter = "views_total" [];
+    /// Views not looked at because nothing had moved in them, of frames that got a report.
+    unchanged_views: IntCounter = "unchanged_views_total" [];
     /// Runs of the network for frames that got a report.
     batches: IntCounter = "batches_total" [];
     /// Candidates of the network dropped because a number of theirs was not finite.

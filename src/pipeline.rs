@@ -16,6 +16,7 @@ mod profile;
 mod report;
 mod rig_cache;
 mod service_rate;
+mod still_views;
 #[cfg(test)]
 mod test_support;
 mod ticket;
@@ -29,7 +30,7 @@ pub use network::BatchOptions;
 pub use parameters::{DetectParameters, ParameterError, ParameterFault};
 pub use planned_views::{PlannedView, PlannedViews};
 pub use profile::Profile;
-pub use report::{CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings};
+pub use report::{CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts};
 pub use rig_cache::RigCacheUse;
 pub use ticket::{Priority, Ticket};
 pub use worker_pool::WorkerPool;

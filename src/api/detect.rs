@@ -112,7 +112,10 @@ fn record(metrics: &Metrics, report: &DetectionReport) {
             .with_label_values(&labels)
             .observe(span.as_secs_f64());
     }
-    metrics.views.inc_by(report.view_count as u64);
+    metrics.views.inc_by(report.views.inferred as u64);
+    metrics
+        .unchanged_views
+        .inc_by(report.views.unchanged as u64);
     metrics.batches.inc_by(report.batch_count as u64);
     metrics.non_finite.inc_by(report.non_finite as u64);
     metrics.persons.inc_by(report.persons.len() as u64);

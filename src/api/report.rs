@@ -21,6 +21,7 @@ use utoipa::ToSchema;
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.4, "sigma": 0.3,
         "max_detections": 1000
     },
+    "views": {"inferred": 24, "unchanged": 0, "outside": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},
         "score": 0.8731,
@@ -58,6 +59,8 @@ pub struct Report {
     pub profile: &'static str,
     /// The refinement used, with all its parameters.
     pub refinement: ReportRefinement,
+    /// What became of the views.
+    pub views: ReportViews,
     /// Persons, highest score first.
     pub persons: Vec<ReportPerson>,
     /// Where the time went. The stages are disjoint; together they make the total but for
@@ -109,6 +112,17 @@ pub struct ReportRefinement {
     pub sigma: f64,
     /// Most persons in a report.
     pub max_detections: usize,
+}
+
+/// What became of the views.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct ReportViews {
+    /// The detector looked at these.
+    pub inferred: usize,
+    /// Nothing had moved in these since they were looked at: what was found in them stands.
+    pub unchanged: usize,
+    /// These lie outside the lens image.
+    pub outside: usize,
 }
 
 /// One person.

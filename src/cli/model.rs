@@ -85,7 +85,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     };
     let detected = look(&settings, &sample, profile)?;
     let persons = &detected.report.persons;
-    let views = detected.report.view_count;
+    let views = detected.report.views.inferred;
     writeln!(
         out,
         "sample       {}: {} in {}",

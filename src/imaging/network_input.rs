@@ -82,6 +82,19 @@ impl ViewBatch {
         self.values.chunks_exact_mut(input.view_len())
     }
 
+    /// Leaves out the views that `keep` (one entry per view) says no to; the others keep their order.
+    pub fn retain(&mut self, keep: &[bool]) {
+        let view_len = self.values.len() / self.views.max(1);
+        let mut kept = 0;
+        for (view, _) in keep.iter().enumerate().filter(|(_, keep)| **keep) {
+            let values = view * view_len..(view + 1) * view_len;
+            self.values.copy_within(values, kept * view_len);
+            kept += 1;
+        }
+        self.values.truncate(kept * view_len);
+        self.views = kept;
+    }
+
     /// How many views it holds.
     #[must_use]
     pub fn views(&self) -> usize {

@@ -5,7 +5,7 @@ use crate::{
     calibration::CameraGeometry,
     detection::{BBox, ViewPixels},
     geometry::{
-        BackProjection, Footprint, Lens, Ray, ViewPlan, VirtualView,
+        BackProjection, Footprint, Ray, ViewPlan, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
     },
     imaging::{Frame, Letterbox, NetworkInput, RemapTable},
@@ -19,6 +19,7 @@ const OUTLINE_STRIDE: usize = 4;
 pub(super) struct CameraRig {
     geometry: CameraGeometry,
     views: Views,
+    views_outside: usize,
 }
 
 /// How the frame reaches the network.
@@ -28,23 +29,6 @@ enum Views {
     Virtual(Vec<(VirtualView, RemapTable)>),
     /// As it is.
     Direct(Letterbox),
-}
-
-impl Views {
-    /// Views with their tables, without those that see nothing.
-    fn tabulated(
-        views: Vec<VirtualView>,
-        lens: &Lens,
-        frame_width: u32,
-        frame_height: u32,
-    ) -> Self {
-        let tables = RemapTable::of_views(&views, lens, frame_width, frame_height);
-        let seeing = views
-            .into_iter()
-            .zip(tables)
-            .filter(|(_, table)| table.sees_anything());
-        Self::Virtual(seeing.collect())
-    }
 }
 
 impl CameraRig {
@@ -57,14 +41,15 @@ impl CameraRig {
         plan: Option<&ViewPlan>,
         input: &NetworkInput,
     ) -> Self {
-        let views = match plan {
-            None => Views::Direct(Letterbox::new(frame_width, frame_height, input)),
-            Some(plan) => {
-                let views = plan.views(&geometry.mount, input.width, input.height);
-                Views::tabulated(views, &geometry.lens, frame_width, frame_height)
-            }
+        let Some(plan) = plan else {
+            return Self {
+                geometry,
+                views: Views::Direct(Letterbox::new(frame_width, frame_height, input)),
+                views_outside: 0,
+            };
         };
-        Self { geometry, views }
+        let views = plan.views(&geometry.mount, input.width, input.height);
+        Self::of_views(geometry, views, frame_width, frame_height)
     }
 
     /// The same camera with other views.
@@ -74,9 +59,25 @@ impl CameraRig {
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
+        Self::of_views(self.geometry.clone(), views, frame_width, frame_height)
+    }
+
+    /// Views with their tables, without those that see nothing.
+    fn of_views(
+        geometry: CameraGeometry,
+        views: Vec<VirtualView>,
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let planned = views.len();
+        let tables = RemapTable::of_views(&views, &geometry.lens, frame_width, frame_height);
+        let tabulated = views.into_iter().zip(tables);
+        let seeing = tabulated.filter(|(_, table)| table.sees_anything());
+        let seeing: Vec<_> = seeing.collect();
         Self {
-            views: Views::tabulated(views, &self.geometry.lens, frame_width, frame_height),
-            geometry: self.geometry.clone(),
+            geometry,
+            views_outside: planned - seeing.len(),
+            views: Views::Virtual(seeing),
         }
     }
 
@@ -91,6 +92,11 @@ impl CameraRig {
             Views::Virtual(views) => views.len(),
             Views::Direct(_) => 1,
         }
+    }
+
+    /// How many of the planned views see nothing of the lens image.
+    pub(super) fn views_outside(&self) -> usize {
+        self.views_outside
     }
 
     /// Memory held by the tables, bytes; what several of them share counts once.

@@ -12,8 +12,11 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub use self::observation::Observation;
 use super::{
     BatchOptions, DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person,
-    PipelineError, Profile, StageTimings, merge, network::Network, report::ModelUsed,
+    PipelineError, Profile, StageTimings, merge,
+    network::Network,
+    report::ModelUsed,
     rig_cache::RigCache,
+    still_views::{CameraViews, StillViews},
 };
 use crate::{
     calibration::Calibrations,
@@ -55,6 +58,7 @@ pub struct Engine {
     remappers: Arc<ThreadPool>,
     calibrations: Option<Arc<Calibrations>>,
     rigs: RigCache,
+    still_views: StillViews,
     options: EngineOptions,
 }
 
@@ -80,6 +84,7 @@ impl Engine {
             remappers,
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes),
+            still_views: StillViews::default(),
             options,
         })
     }
@@ -99,7 +104,7 @@ impl Engine {
         let refining = Instant::now();
         let parameters = &job.parameters;
         let persons = self.persons(&observation, &parameters.refinement);
-        let view_count = observation.view_count();
+        let views = observation.view_counts();
         let calibration = observation.camera.used;
         let report = DetectionReport {
             request_id: job.request_id.clone(),
@@ -119,7 +124,7 @@ impl Engine {
             profile: parameters.profile,
             refinement: parameters.refinement,
             persons,
-            view_count,
+            views,
             batch_count: observation.batch_count,
             non_finite: observation.non_finite,
             timings: StageTimings {
@@ -161,6 +166,7 @@ impl Engine {
         let mut observation = Observation {
             profile: job.parameters.profile,
             looks: Vec::with_capacity(3),
+            still_views: 0,
             batch_count: 0,
             non_finite: 0,
             timings: StageTimings {
@@ -179,6 +185,7 @@ impl Engine {
             Arc::clone(&observation.model),
             Arc::clone(&observation.frame),
             job.ticket.clone(),
+            self.seen_before(job, &observation),
         );
         observation.take_in(&[first])?;
         let closer = self.closer(job, &mut observation);
@@ -195,6 +202,13 @@ impl Engine {
     ) -> Vec<Person> {
         let back_projection = observation.profile.back_projection();
         merge::persons(&observation.looks, back_projection, refinement)
+    }
+
+    /// What the frame's camera saw before, if the request wants to rely on it.
+    fn seen_before(&self, job: &DetectJob, seen: &Observation) -> Option<Arc<CameraViews>> {
+        let parameters = &job.parameters;
+        let camera = parameters.camera_name().filter(|_| parameters.motion)?;
+        Some(self.still_views.of(camera, &seen.camera.rig, &seen.model))
     }
 
     pub(super) fn options(&self) -> &EngineOptions {

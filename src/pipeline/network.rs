@@ -6,6 +6,7 @@
 //! by the pool, side by side.
 
 mod look_task;
+mod run;
 mod view_queue;
 mod work;
 
@@ -14,20 +15,21 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::Arc,
     thread::JoinHandle,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-use rayon::{ThreadPool, prelude::*};
+use rayon::ThreadPool;
 
 use self::view_queue::ViewQueue;
 use super::{
     Ticket,
     camera_rig::CameraRig,
     error::{PipelineError, internal},
+    still_views::CameraViews,
 };
 use crate::{
     imaging::{Frame, ViewBatch},
-    inference::{HeadOutput, Model},
+    inference::Model,
 };
 
 pub(super) use look_task::LookTask;
@@ -76,15 +78,17 @@ impl Network {
         Ok(network)
     }
 
-    /// Queues the views of a rig; [`LookTask::wait`] gives what was found in them.
+    /// Queues the views of a rig; [`LookTask::wait`] gives what was found in them. Views that
+    /// `seen_before` says nothing has moved in are not looked at.
     pub(super) fn look(
         &self,
         rig: Arc<CameraRig>,
         model: Arc<Model>,
         frame: Arc<Frame>,
         ticket: Ticket,
+        seen_before: Option<Arc<CameraViews>>,
     ) -> Arc<LookTask> {
-        let task = Arc::new(LookTask::new(rig, model, frame, ticket));
+        let task = Arc::new(LookTask::new(rig, model, frame, ticket, seen_before));
         self.queue.submit(Arc::clone(&task));
         task
     }
@@ -104,10 +108,10 @@ impl Drop for Network {
 fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
     let mut batch = ViewBatch::default();
     while let Some(claims) = queue.next_batch() {
-        let run = || run(&claims, session, remappers, &mut batch);
-        match catch_unwind(AssertUnwindSafe(run)) {
+        let look = || run::look(&claims, session, remappers, &mut batch);
+        match catch_unwind(AssertUnwindSafe(look)) {
             Ok(Ok(run)) => run.hand_out(&claims),
-            Ok(Err(error)) => fail(&claims, || internal(anyhow::anyhow!("{error:#}"))),
+            Ok(Err(error)) => fail(&claims, || internal(anyhow::anyhow!("{error}"))),
             Err(_) => fail(&claims, || {
                 internal(anyhow::anyhow!("the network's thread panicked on a batch"))
             }),
@@ -118,72 +122,6 @@ fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
 fn fail(claims: &[Claim], error: impl Fn() -> PipelineError) {
     for claim in claims {
         claim.task.fail(error());
-    }
-}
-
-/// One run of the network.
-struct Run {
-    output: HeadOutput,
-    began: Instant,
-    rendered: Instant,
-    ended: Instant,
-}
-
-fn run(
-    claims: &[Claim],
-    session: usize,
-    remappers: &ThreadPool,
-    batch: &mut ViewBatch,
-) -> anyhow::Result<Run> {
-    let began = Instant::now();
-    let model = &claims[0].task.model;
-    let views: Vec<(&LookTask, usize)> = claims
-        .iter()
-        .flat_map(|claim| claim.views.clone().map(|view| (&*claim.task, view)))
-        .collect();
-    let slots = batch.prepare(views.len(), model.input());
-    let render = |((task, view), slot): ((&LookTask, usize), &mut [f32])| {
-        task.rig.render_view(view, &task.frame, model.input(), slot);
-    };
-    let mut jobs: Vec<_> = views.into_iter().zip(slots).collect();
-    match jobs.pop() {
-        Some(only) if jobs.is_empty() => render(only),
-        last => remappers.install(|| {
-            jobs.into_par_iter().chain(last).for_each(render);
-        }),
-    }
-    let rendered = Instant::now();
-    let output = model.detect(session, batch)?;
-    Ok(Run {
-        output,
-        began,
-        rendered,
-        ended: Instant::now(),
-    })
-}
-
-impl Run {
-    /// Gives each frame what was found in its views, and its share of the time.
-    fn hand_out(self, claims: &[Claim]) {
-        let total: usize = claims.iter().map(|claim| claim.views.len()).sum();
-        let mut found = self.output.per_view.into_iter();
-        let mut non_finite = self.output.non_finite;
-        for (index, claim) in claims.iter().enumerate() {
-            let views = claim.views.len();
-            #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
-            let share = views as f64 / total as f64;
-            let work = Work {
-                queued: claim.task.queued,
-                began: self.began,
-                ended: self.ended,
-                remap: (self.rendered - self.began).mul_f64(share),
-                inference: (self.ended - self.rendered).mul_f64(share),
-                runs: usize::from(index == 0),
-                non_finite: std::mem::take(&mut non_finite),
-            };
-            let found = found.by_ref().take(views);
-            claim.task.finish(claim.views.clone(), found, work);
-        }
     }
 }
 

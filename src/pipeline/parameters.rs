@@ -65,6 +65,9 @@ pub struct DetectParameters {
     pub refinement: RefinementParameters,
     /// When the frame was taken.
     pub captured_at: Option<Timestamp>,
+    /// Whether views in which nothing has moved since the camera's last frame need not be looked at
+    /// again.
+    pub motion: bool,
     /// Its turn among the frames that wait.
     pub priority: Priority,
     /// How long the report is of use, from the arrival of the request.
@@ -73,7 +76,7 @@ pub struct DetectParameters {
 
 impl DetectParameters {
     /// The names every caller may use.
-    pub const NAMES: [&'static str; 12] = [
+    pub const NAMES: [&'static str; 13] = [
         "calibration",
         "camera",
         "profile",
@@ -84,6 +87,7 @@ impl DetectParameters {
         "sigma",
         "max_detections",
         "captured_at",
+        "motion",
         "priority",
         "timeout_millis",
     ];
@@ -123,6 +127,7 @@ impl DetectParameters {
             sigma,
             max_detections,
             captured_at,
+            motion,
             priority,
             timeout_millis,
         ] = given;
@@ -132,6 +137,12 @@ impl DetectParameters {
             Refinement::Fusion => DEFAULT_FUSION_IOU,
             _ => DEFAULT_SUPPRESSION_IOU,
         };
+        let motion = motion.map_or(Ok(false), parse_motion)?;
+        if motion && camera.is_none() && calibration.is_none() {
+            let rule = "name the camera, or its calibration: without a name there is no last \
+                        frame to compare with";
+            return Err(problem("motion", rule.to_owned()));
+        }
         Ok(Self {
             calibration: calibration.map(parse_calibration).transpose()?,
             camera: camera.map(parse_camera).transpose()?,
@@ -154,9 +165,19 @@ impl DetectParameters {
                     .map_or(Ok(DEFAULT_MAX_DETECTIONS), parse_max_detections)?,
             },
             captured_at: captured_at.map(parse_timestamp).transpose()?,
+            motion,
             priority: priority.map_or(Ok(Priority::default()), parse_priority)?,
             timeout: timeout_millis.map(parse_timeout).transpose()?,
         })
+    }
+}
+
+impl DetectParameters {
+    /// The name of the camera, if the request gave it one.
+    #[must_use]
+    pub fn camera_name(&self) -> Option<&str> {
+        let calibration = self.calibration.as_ref().map(CalibrationId::as_str);
+        self.camera.as_deref().or(calibration)
     }
 }
 
@@ -271,6 +292,11 @@ fn parse_max_detections(value: &str) -> Result<usize, ParameterError> {
 fn parse_priority(value: &str) -> Result<Priority, ParameterError> {
     let level = whole_number("priority", value, Priority::FIRST..=Priority::LAST)?;
     Ok(Priority::new(level).unwrap_or_default())
+}
+
+fn parse_motion(value: &str) -> Result<bool, ParameterError> {
+    let wrong = |_| problem("motion", format!("{:?} is not true or false", shown(value)));
+    value.parse().map_err(wrong)
 }
 
 fn parse_timeout(value: &str) -> Result<Duration, ParameterError> {

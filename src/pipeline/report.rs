@@ -38,8 +38,8 @@ pub struct DetectionReport {
     pub refinement: RefinementParameters,
     /// Persons, highest score first.
     pub persons: Vec<Person>,
-    /// How many views the network saw.
-    pub view_count: usize,
+    /// What became of the views.
+    pub views: ViewCounts,
     /// In how many batches it saw them.
     pub batch_count: usize,
     /// Candidates of the network dropped because a number of theirs was not finite.
@@ -48,6 +48,17 @@ pub struct DetectionReport {
     pub timings: StageTimings,
     /// What the caller should know: one sentence each.
     pub warnings: Vec<String>,
+}
+
+/// What became of the views of one frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ViewCounts {
+    /// The network saw these.
+    pub inferred: usize,
+    /// Nothing had moved in these: what was found in them before stands.
+    pub unchanged: usize,
+    /// These lie outside the lens image, where nothing can be seen.
+    pub outside: usize,
 }
 
 /// Which calibration a report is based on.

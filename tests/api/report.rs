@@ -10,7 +10,9 @@ use lookdown::{
         OrientedBox, Pixel,
         floor::{Bearing, FloorPosition},
     },
-    pipeline::{CalibrationUsed, DetectionReport, ModelUsed, Person, Profile, StageTimings},
+    pipeline::{
+        CalibrationUsed, DetectionReport, ModelUsed, Person, Profile, StageTimings, ViewCounts,
+    },
 };
 
 fn person() -> Person {
@@ -68,7 +70,11 @@ fn report() -> DetectionReport {
             max_detections: 1000,
         },
         persons: vec![person(), unknown_place],
-        view_count: 24,
+        views: ViewCounts {
+            inferred: 20,
+            unchanged: 4,
+            outside: 1,
+        },
         batch_count: 3,
         non_finite: 0,
         timings: StageTimings {

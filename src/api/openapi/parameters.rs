@@ -51,6 +51,11 @@ pub(in crate::api) struct DetectQuery {
     #[param(value_type = Option<String>, format = DateTime, example = "2026-11-21T09:30:00Z")]
     #[schema(format = DateTime, example = "2026-11-21T09:30:00Z")]
     captured_at: Option<String>,
+    /// Do not look again at views in which nothing has moved since the last frame of this camera
+    /// that this server saw; the report counts them. Needs `camera` or `calibration`.
+    #[param(default = false)]
+    #[schema(default = false)]
+    motion: Option<bool>,
     /// Whose turn comes first when frames wait: 1 before 9. Frames of one priority are served in
     /// the order of their arrival.
     #[param(minimum = 1, maximum = 9, default = 5)]

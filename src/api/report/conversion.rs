@@ -2,7 +2,7 @@
 
 use super::{
     Report, ReportBearing, ReportBox, ReportCalibration, ReportFloor, ReportImage, ReportModel,
-    ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings,
+    ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews,
     rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
 };
 use crate::pipeline::{self, DetectionReport};
@@ -35,6 +35,11 @@ impl From<&DetectionReport> for Report {
                 iou_threshold: refinement.iou_threshold,
                 sigma: refinement.sigma,
                 max_detections: refinement.max_detections,
+            },
+            views: ReportViews {
+                inferred: report.views.inferred,
+                unchanged: report.views.unchanged,
+                outside: report.views.outside,
             },
             persons: report.persons.iter().map(ReportPerson::from).collect(),
             timings_ms: ReportTimings::from(&report.timings),

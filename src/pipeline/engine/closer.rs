@@ -43,7 +43,7 @@ impl Engine {
         let tasks = rigs.map(|(rig, model)| {
             let frame = Arc::clone(&observation.frame);
             let ticket = job.ticket.clone();
-            self.network.look(Arc::new(rig), model, frame, ticket)
+            self.network.look(Arc::new(rig), model, frame, ticket, None)
         });
         let tasks = tasks.collect();
         observation.timings.refine += placed - started;

@@ -7,7 +7,7 @@ use crate::{
     imaging::Frame,
     inference::Model,
     pipeline::{
-        PipelineError, Profile, StageTimings,
+        PipelineError, Profile, StageTimings, ViewCounts,
         look::Look,
         network::{LookTask, Work},
     },
@@ -22,6 +22,7 @@ pub struct Observation {
     pub(super) model: Arc<Model>,
     pub(super) profile: Profile,
     pub(super) looks: Vec<Look>,
+    pub(super) still_views: usize,
     pub(super) batch_count: usize,
     pub(super) non_finite: usize,
     pub(super) timings: StageTimings,
@@ -29,10 +30,19 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// How many views the network saw.
+    /// How many views were looked at, now or, where nothing has moved since, before.
     #[must_use]
     pub fn view_count(&self) -> usize {
         self.looks.iter().map(|look| look.rig.view_count()).sum()
+    }
+
+    /// What became of the views.
+    pub(super) fn view_counts(&self) -> ViewCounts {
+        ViewCounts {
+            inferred: self.view_count() - self.still_views,
+            unchanged: self.still_views,
+            outside: self.camera.rig.views_outside(),
+        }
     }
 
     /// Where the time went so far: `refine` and `total` are still to come.
@@ -63,6 +73,7 @@ impl Observation {
         }
         let Some(work) = work else { return Ok(()) };
         self.batch_count += work.runs;
+        self.still_views += work.still_views;
         self.non_finite += work.non_finite;
         let span = work.ended.saturating_duration_since(work.began);
         let remap = span.mul_f64(work.remap_share());

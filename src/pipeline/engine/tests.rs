@@ -66,7 +66,7 @@ fn a_report_says_what_it_is_based_on() {
     assert_eq!(named.camera, "north");
     assert_eq!(named.calibration.id, "lobby");
     assert!(!named.calibration.assumed && named.warnings.is_empty());
-    assert_eq!((named.view_count, named.batch_count), (24, 5));
+    assert_eq!((named.views.inferred, named.batch_count), (24, 5));
     assert_eq!(named.model.name, "blob");
 
     let assumed = engine.detect(&job(image, &[])).unwrap().report;
@@ -89,7 +89,7 @@ fn quality_looks_closer_at_what_it_found() {
         engine.detect(&job(image.clone(), &named)).unwrap().report
     };
     let (balanced, quality) = (report("balanced"), report("quality"));
-    assert_eq!((balanced.view_count, quality.view_count), (24, 25));
+    assert_eq!((balanced.views.inferred, quality.views.inferred), (24, 25));
     assert_eq!(quality.persons[0].views, balanced.persons[0].views + 1);
 }
 
@@ -101,12 +101,41 @@ fn an_empty_room_is_not_looked_at_more_closely() {
         let named = [("calibration", "lobby"), ("profile", profile)];
         let report = engine.detect(&job(image.clone(), &named)).unwrap().report;
         assert!(report.persons.is_empty());
-        report.view_count
+        report.views.inferred
     };
     assert_eq!(
         (views("fast"), views("balanced"), views("quality")),
         (4, 24, 24)
     );
+}
+
+#[test]
+fn where_nothing_has_moved_the_network_need_not_look_again() {
+    let (engine, _folder) = engine_with_lobby();
+    let report = |disc: [f64; 2], more: &[(&str, &str)]| {
+        let named = [("calibration", "lobby"), ("motion", "true")];
+        let named: Vec<_> = named.iter().chain(more).copied().collect();
+        let image = frame_with_disc(600, disc, 20.0);
+        engine.detect(&job(image, &named)).unwrap().report
+    };
+    let first = report([420.0, 300.0], &[]);
+    assert_eq!((first.views.inferred, first.views.unchanged), (24, 0));
+    let same = report([420.0, 300.0], &[]);
+    assert_eq!((same.views.inferred, same.views.unchanged), (0, 24));
+    assert_eq!(same.persons[0].bbox, first.persons[0].bbox);
+    assert_eq!(same.batch_count, 0);
+
+    let moved = report([420.0, 330.0], &[]);
+    assert!(moved.views.inferred > 0 && moved.views.unchanged > 6);
+    let [x, y] = moved.persons[0].bbox.center();
+    assert!((x - 420.0).abs() < 6.0 && (y - 330.0).abs() < 6.0);
+    assert_eq!(moved.persons.len(), 1);
+
+    // Another camera, or another profile's views, have been seen by nobody.
+    let other = report([420.0, 330.0], &[("camera", "north")]);
+    assert_eq!(other.views.unchanged, 0);
+    let other = report([420.0, 330.0], &[("profile", "fast")]);
+    assert_eq!(other.views.unchanged, 0);
 }
 
 #[test]

@@ -10,7 +10,7 @@ use super::Work;
 use crate::{
     imaging::Frame,
     inference::{Model, ViewDetection},
-    pipeline::{PipelineError, Ticket, camera_rig::CameraRig},
+    pipeline::{PipelineError, Ticket, camera_rig::CameraRig, still_views::CameraViews},
 };
 
 /// One round of looking at a frame.
@@ -19,6 +19,8 @@ pub(in crate::pipeline) struct LookTask {
     pub(in crate::pipeline) model: Arc<Model>,
     pub(super) frame: Arc<Frame>,
     pub(super) ticket: Ticket,
+    /// What the camera saw before, if that may stand in for views in which nothing has moved.
+    pub(super) seen_before: Option<Arc<CameraViews>>,
     pub(super) queued: Instant,
     progress: Mutex<Progress>,
     over: Condvar,
@@ -47,6 +49,7 @@ impl LookTask {
         model: Arc<Model>,
         frame: Arc<Frame>,
         ticket: Ticket,
+        seen_before: Option<Arc<CameraViews>>,
     ) -> Self {
         let views = rig.view_count();
         Self {
@@ -54,6 +57,7 @@ impl LookTask {
             model,
             frame,
             ticket,
+            seen_before,
             queued: Instant::now(),
             progress: Mutex::new(Progress {
                 per_view: vec![Vec::new(); views],

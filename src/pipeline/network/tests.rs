@@ -5,7 +5,7 @@ use crate::{
     calibration::CameraGeometry,
     geometry::{FieldOfViewReading, Lens, Mount},
     imaging::NetworkInput,
-    inference::{Detector, InferenceError},
+    inference::{Detector, HeadOutput, InferenceError},
     pipeline::{Priority, Profile},
 };
 
@@ -92,7 +92,7 @@ impl Bench {
     fn look(&self, brightness: u8, ticket: Ticket) -> Arc<LookTask> {
         let frame = Frame::new(64, 64, vec![brightness; 64 * 64 * 3]).unwrap();
         let (rig, model) = (Arc::clone(&self.rig), Arc::clone(&self.model));
-        self.network.look(rig, model, Arc::new(frame), ticket)
+        self.network.look(rig, model, Arc::new(frame), ticket, None)
     }
 
     /// The next run: how many views it has, and how bright the first one is.

@@ -17,6 +17,8 @@ pub(in crate::pipeline) struct Work {
     pub(in crate::pipeline) inference: Duration,
     /// Runs of the network. A run that several frames share belongs to the one that was next.
     pub(in crate::pipeline) runs: usize,
+    /// Views that were not looked at, as nothing had moved in them.
+    pub(in crate::pipeline) still_views: usize,
     /// Candidates dropped because a number of theirs was not finite.
     pub(in crate::pipeline) non_finite: usize,
 }
@@ -31,6 +33,7 @@ impl Work {
             remap: Duration::ZERO,
             inference: Duration::ZERO,
             runs: 0,
+            still_views: 0,
             non_finite: 0,
         }
     }
@@ -44,6 +47,7 @@ impl Work {
             remap: self.remap + other.remap,
             inference: self.inference + other.inference,
             runs: self.runs + other.runs,
+            still_views: self.still_views + other.still_views,
             non_finite: self.non_finite + other.non_finite,
         }
     }

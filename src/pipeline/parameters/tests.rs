@@ -30,10 +30,12 @@ fn every_parameter_is_taken_over() {
         ("sigma", "0.7"),
         ("max_detections", "5"),
         ("captured_at", "2026-11-21T09:30:00+01:00"),
+        ("motion", "true"),
         ("priority", "2"),
         ("timeout_millis", "1500"),
     ])
     .unwrap();
+    assert!(parameters.motion);
     assert_eq!(Some(parameters.priority), Priority::new(2));
     assert_eq!(parameters.timeout, Some(Duration::from_millis(1500)));
     assert_eq!(parameters.calibration.unwrap().as_str(), "lobby");
@@ -78,6 +80,13 @@ fn bad_values_are_refused_with_name_value_and_rule() {
             "max_detections",
             "0",
             "max_detections: \"0\" is not a whole number from 1 to 10000",
+        ),
+        ("motion", "yes", "motion: \"yes\" is not true or false"),
+        (
+            "motion",
+            "true",
+            "motion: name the camera, or its calibration: without a name there is no last frame to \
+             compare with",
         ),
         (
             "priority",

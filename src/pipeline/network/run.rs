@@ -1,0 +1,151 @@
+//! One batch: rendered, looked at where something has moved, and handed out.
+
+use std::time::Instant;
+
+use rayon::{ThreadPool, prelude::*};
+
+use super::{Claim, LookTask, Work};
+use crate::{
+    imaging::{NetworkInput, ViewBatch, ViewSignature},
+    inference::{InferenceError, ViewDetection},
+};
+
+/// What came of a batch.
+pub(super) struct Run {
+    /// In the order of the claims.
+    views: Vec<SeenView>,
+    non_finite: usize,
+    /// Whether the network ran at all.
+    ran: bool,
+    began: Instant,
+    rendered: Instant,
+    ended: Instant,
+}
+
+struct SeenView {
+    found: Vec<ViewDetection>,
+    is_still: bool,
+}
+
+/// A view on its way to the network.
+struct ViewJob<'a> {
+    task: &'a LookTask,
+    view: usize,
+    /// How it looks from afar, where the camera's views are remembered.
+    signature: Option<ViewSignature>,
+    /// What was found in it before, if nothing has moved since.
+    still: Option<Vec<ViewDetection>>,
+}
+
+impl ViewJob<'_> {
+    fn render(&mut self, input: &NetworkInput, slot: &mut [f32]) {
+        let (task, view) = (self.task, self.view);
+        task.rig.render_view(view, &task.frame, input, slot);
+        if let Some(seen_before) = &task.seen_before {
+            let signature = ViewSignature::of(slot, input);
+            self.still = seen_before.still(view, &signature);
+            self.signature = Some(signature);
+        }
+    }
+
+    /// The view as it was seen: now, unless it is still.
+    fn seen(self, mut now: impl FnMut() -> Vec<ViewDetection>) -> SeenView {
+        if let Some(found) = self.still {
+            return SeenView {
+                found,
+                is_still: true,
+            };
+        }
+        let found = now();
+        if let (Some(seen_before), Some(signature)) = (&self.task.seen_before, self.signature) {
+            seen_before.remember(self.view, signature, found.clone());
+        }
+        SeenView {
+            found,
+            is_still: false,
+        }
+    }
+}
+
+/// Renders the views and looks at those in which something has moved.
+pub(super) fn look(
+    claims: &[Claim],
+    session: usize,
+    remappers: &ThreadPool,
+    batch: &mut ViewBatch,
+) -> Result<Run, InferenceError> {
+    let began = Instant::now();
+    let model = &claims[0].task.model;
+    let input = model.input();
+    let mut jobs: Vec<_> = claims.iter().flat_map(Claim::jobs).collect();
+    let slots = batch.prepare(jobs.len(), input);
+    let mut pairs: Vec<_> = jobs.iter_mut().zip(slots).collect();
+    let render = |(job, slot): (&mut ViewJob, &mut [f32])| job.render(input, slot);
+    match pairs.pop() {
+        Some(only) if pairs.is_empty() => render(only),
+        last => remappers.install(|| pairs.into_par_iter().chain(last).for_each(render)),
+    }
+    if jobs.iter().any(|job| job.still.is_some()) {
+        let moved: Vec<_> = jobs.iter().map(|job| job.still.is_none()).collect();
+        batch.retain(&moved);
+    }
+    let rendered = Instant::now();
+    let ran = batch.views() > 0;
+    let (per_view, non_finite) = if ran {
+        let output = model.detect(session, batch)?;
+        (output.per_view, output.non_finite)
+    } else {
+        (Vec::new(), 0)
+    };
+    let ended = Instant::now();
+    let mut found = per_view.into_iter();
+    let seen = jobs.into_iter();
+    let views = seen.map(|job| job.seen(|| found.next().unwrap_or_default()));
+    Ok(Run {
+        views: views.collect(),
+        non_finite,
+        ran,
+        began,
+        rendered,
+        ended,
+    })
+}
+
+impl Claim {
+    fn jobs(&self) -> impl Iterator<Item = ViewJob<'_>> {
+        self.views.clone().map(|view| ViewJob {
+            task: &self.task,
+            view,
+            signature: None,
+            still: None,
+        })
+    }
+}
+
+impl Run {
+    /// Gives each frame what was found in its views, and its share of the time. What cannot be
+    /// divided belongs to the frame whose view was next.
+    pub(super) fn hand_out(self, claims: &[Claim]) {
+        let total = self.views.len();
+        let mut views = self.views.into_iter();
+        let mut undivided = (usize::from(self.ran), self.non_finite);
+        for claim in claims {
+            let seen: Vec<_> = views.by_ref().take(claim.views.len()).collect();
+            #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
+            let share = seen.len() as f64 / total as f64;
+            let (runs, non_finite) = std::mem::take(&mut undivided);
+            let work = Work {
+                queued: claim.task.queued,
+                began: self.began,
+                ended: self.ended,
+                remap: (self.rendered - self.began).mul_f64(share),
+                inference: (self.ended - self.rendered).mul_f64(share),
+                runs,
+                still_views: seen.iter().filter(|view| view.is_still).count(),
+                non_finite,
+            };
+            let found = seen.into_iter().map(|view| view.found);
+            claim.task.finish(claim.views.clone(), found, work);
+        }
+    }
+}
