@@ -23,4 +23,7 @@ pub use file::content as read_content;
 pub use formats::{CalibrationFile, FormatError};
 pub use id::CalibrationId;
 pub use lens_fields::LensFieldsError;
-pub use store::{CalibrationStore, FolderStore, MAX_FILES, StoreError, StoredFile};
+pub use store::{
+    CalibrationStore, FolderStore, MAX_FILES, READ_AT_ONCE, Replaces, StoreError,
+    StoredFile,
+};

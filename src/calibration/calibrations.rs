@@ -5,25 +5,17 @@ mod change;
 mod content;
 mod error;
 mod load;
+mod look;
 mod named_file;
 mod snapshot;
 
-use std::{
-    collections::BTreeMap,
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError, RwLock,
-        atomic::{AtomicU64, Ordering},
-    },
+use std::sync::{
+    Arc, Mutex, MutexGuard, PoisonError, RwLock,
+    atomic::{AtomicU64, Ordering},
 };
 
-use self::{
-    load::LoadedFile,
-    named_file::{NamedFile, by_id},
-    snapshot::Snapshot,
-};
-use super::{
-    Calibration, CalibrationError, CalibrationFile, CalibrationId, CalibrationStore, StoreError,
-};
+use self::snapshot::Snapshot;
+use super::{Calibration, CalibrationError, CalibrationId, CalibrationStore, StoreError};
 
 pub use change::{Put, WriteCondition};
 pub use content::CalibrationEntry;
@@ -99,75 +91,6 @@ impl Calibrations {
             loads_failed: self.failed.load(Ordering::Relaxed),
             ..self.now().health()
         }
-    }
-
-    /// Looks at the store and reads the files that have changed. What fails is logged, told by
-    /// [`Calibrations::health`], and leaves the calibrations it concerns as they are. Blocks.
-    pub fn refresh(&self) {
-        let changing = self.lock();
-        if let Err(error) = self.look(&changing) {
-            let problem = error.to_string();
-            let now = self.now();
-            if now.store_problem.as_ref() != Some(&problem) {
-                tracing::error!(
-                    "calibrations cannot be looked at, the known ones go on: {problem}"
-                );
-                self.replace(now.with_store_problem(problem));
-            }
-        }
-    }
-
-    /// Lists the store and reads what has changed.
-    fn look(&self, _changing: &MutexGuard<'_, ()>) -> Result<(), StoreError> {
-        let before = self.now();
-        let listed = by_id(self.store.list()?);
-        let is_news = before.store_problem.is_some()
-            || listed.len() != before.files.len()
-            || listed.iter().any(|(id, named)| {
-                let known = before.files.get(id);
-                known.is_none_or(|known| known.named != *named)
-            });
-        if !is_news {
-            return Ok(());
-        }
-        let mut files = BTreeMap::new();
-        for (id, named) in listed {
-            let known = before.files.get(&id);
-            let file = match known {
-                Some(known) if known.named == named => Arc::clone(known),
-                _ => Arc::new(self.load(&id, named, known)),
-            };
-            files.insert(id, file);
-        }
-        for gone in before.files.keys().filter(|id| !files.contains_key(id)) {
-            tracing::info!(calibration = %gone, "its file is gone");
-        }
-        self.replace(Snapshot::of(files));
-        Ok(())
-    }
-
-    fn load(
-        &self,
-        id: &CalibrationId,
-        named: NamedFile,
-        known: Option<&Arc<LoadedFile>>,
-    ) -> LoadedFile {
-        // One byte more than is accepted, so that a larger file is known for one.
-        let content = self
-            .store
-            .read(&named.file.name, CalibrationFile::MAX_BYTES + 1);
-        let known = known.map(Arc::as_ref);
-        let loaded = LoadedFile::new(id, named, content, known);
-        if loaded.is_news(known) {
-            let counter = if loaded.problems.is_empty() {
-                &self.succeeded
-            } else {
-                &self.failed
-            };
-            counter.fetch_add(1, Ordering::Relaxed);
-            loaded.log(known);
-        }
-        loaded
     }
 
     fn now(&self) -> Arc<Snapshot> {

@@ -17,18 +17,21 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
     /// [`StoreError`] when the place cannot be looked at, or has more than [`MAX_FILES`].
     fn list(&self) -> Result<Vec<StoredFile>, StoreError>;
 
-    /// The content of a file, cut after `at_most` bytes.
+    /// The contents of files, each cut after `at_most` bytes, in the order of `names`: several at
+    /// once, since a store that is far away reads them side by side. At most [`READ_AT_ONCE`].
     ///
     /// # Errors
-    /// [`StoreError`] when it cannot be read, for example because it has gone meanwhile.
-    fn read(&self, name: &str, at_most: usize) -> Result<Vec<u8>, StoreError>;
+    /// Per file: [`StoreError::Unreachable`] when the whole store does not answer, others when this
+    /// file cannot be read, for example because it has gone meanwhile.
+    fn read(&self, names: &[&str], at_most: usize) -> Vec<Result<Vec<u8>, StoreError>>;
 
     /// Creates or replaces a file at once: whoever reads, and whatever is left after a crash, sees
     /// the old file or the new one.
     ///
     /// # Errors
-    /// [`StoreError`] when it cannot be written; then the old one is there.
-    fn write(&self, name: &str, content: &[u8]) -> Result<(), StoreError>;
+    /// [`StoreError::Changed`] when there is something else to replace than `replaces` says, others
+    /// when it cannot be written; then the old one is there.
+    fn write(&self, name: &str, content: &[u8], replaces: Replaces<'_>) -> Result<(), StoreError>;
 
     /// Removes a file, unless it is gone already.
     ///
@@ -39,6 +42,19 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
 
 /// Most files looked at in one place.
 pub const MAX_FILES: usize = 50_000;
+/// Most files read at once: bounds the memory and the connections that reading takes.
+pub const READ_AT_ONCE: usize = 16;
+
+/// What a write may take the place of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Replaces<'a> {
+    /// Whatever there is.
+    Anything,
+    /// Nothing: there must be no such file yet.
+    Nothing,
+    /// The file with this stamp.
+    Stamp(&'a str),
+}
 
 /// A file in a store.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,5 +83,21 @@ pub enum StoreError {
         place: String,
         /// What the operating system or the service said.
         problem: String,
+    },
+    /// The place does not answer, for whatever file.
+    #[error("{place} cannot be reached: {problem}")]
+    Unreachable {
+        /// Where.
+        place: String,
+        /// What the operating system or the service said.
+        problem: String,
+    },
+    /// Somebody else has changed the file meanwhile.
+    #[error("{place}/{name} was changed by somebody else meanwhile")]
+    Changed {
+        /// Where.
+        place: String,
+        /// Which file.
+        name: String,
     },
 }

@@ -18,7 +18,7 @@ impl From<ChangeError> for Problem {
                 let detail = "calibrations cannot be changed here: their store is read only";
                 return Self::new(ProblemKind::Forbidden, detail);
             }
-            ChangeError::Store(StoreError::Failed { .. }) => return Self::internal(error),
+            ChangeError::Store(_) => return Self::internal(error),
         };
         Self::new(kind, error.to_string())
     }

@@ -6,7 +6,7 @@ use super::{
     CalibrationEntry, Calibrations, ChangeError, content::import, load::LoadedFile,
     named_file::written_name,
 };
-use crate::calibration::CalibrationId;
+use crate::calibration::{CalibrationId, Replaces, StoredFile};
 
 /// When a calibration may be changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -59,7 +59,8 @@ impl Calibrations {
         if let Some(shared) = file.filter(|file| file.holds_several) {
             return Err(shared_file(shared));
         }
-        self.store.write(&name, written.as_bytes())?;
+        let replaces = condition.replaces(file.map(|file| &file.named.file), &name);
+        self.store.write(&name, written.as_bytes(), replaces)?;
         // It hides the others, so that a kill in between does no harm.
         for hidden in file.into_iter().flat_map(|file| file.names()) {
             if hidden != name {
@@ -129,6 +130,16 @@ fn shared_file(file: &LoadedFile) -> ChangeError {
 }
 
 impl WriteCondition {
+    /// What the file called `name` may replace under this condition, when `known` is that of its
+    /// ID: nobody's change that was made after the condition was checked.
+    fn replaces<'a>(&self, known: Option<&'a StoredFile>, name: &str) -> Replaces<'a> {
+        match known {
+            _ if *self == Self::Always => Replaces::Anything,
+            Some(file) if file.name == name => Replaces::Stamp(&file.stamp),
+            _ => Replaces::Nothing,
+        }
+    }
+
     fn check(&self, now: Option<&CalibrationEntry>) -> Result<(), ChangeError> {
         let revision = now.map(|entry| entry.calibration.revision());
         let is_met = match self {

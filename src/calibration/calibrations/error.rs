@@ -55,5 +55,16 @@ pub enum ChangeError {
     },
     /// The store did not do it.
     #[error(transparent)]
-    Store(#[from] StoreError),
+    Store(StoreError),
+}
+
+impl From<StoreError> for ChangeError {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Changed { .. } => Self::Outdated {
+                now: "being changed by somebody else".to_owned(),
+            },
+            error => Self::Store(error),
+        }
+    }
 }

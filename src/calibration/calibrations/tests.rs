@@ -1,7 +1,7 @@
 use std::{fs, path::Path};
 
 use super::*;
-use crate::calibration::{FolderStore, StoredFile};
+use crate::calibration::{FolderStore, Replaces, StoredFile};
 
 fn content(id: &str, focal: f64) -> String {
     format!(
@@ -148,11 +148,11 @@ fn a_file_that_cannot_be_read_is_tried_again_and_told_once() {
             let (name, stamp) = ("lobby.json".to_owned(), "1".to_owned());
             Ok(vec![StoredFile { name, stamp }])
         }
-        fn read(&self, _: &str, _: usize) -> Result<Vec<u8>, StoreError> {
+        fn read(&self, _: &[&str], _: usize) -> Vec<Result<Vec<u8>, StoreError>> {
             let (place, problem) = (self.place(), "it is gone".to_owned());
-            Err(StoreError::Failed { place, problem })
+            vec![Err(StoreError::Failed { place, problem })]
         }
-        fn write(&self, _: &str, _: &[u8]) -> Result<(), StoreError> {
+        fn write(&self, _: &str, _: &[u8], _: Replaces<'_>) -> Result<(), StoreError> {
             Ok(())
         }
         fn delete(&self, _: &str) -> Result<(), StoreError> {

@@ -10,7 +10,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use super::{CalibrationStore, MAX_FILES, StoreError, StoredFile};
+use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
 
 /// Files with this ending were about to take another's place when their writer was killed.
 const UNFINISHED: &str = "lookdown-unfinished";
@@ -125,17 +125,31 @@ impl CalibrationStore for FolderStore {
         Ok(files)
     }
 
-    fn read(&self, name: &str, at_most: usize) -> Result<Vec<u8>, StoreError> {
-        let read = || {
+    fn read(&self, names: &[&str], at_most: usize) -> Vec<Result<Vec<u8>, StoreError>> {
+        let read = |name: &&str| {
             let mut content = Vec::new();
             let file = File::open(self.path.join(name))?;
             file.take(at_most as u64).read_to_end(&mut content)?;
             Ok(content)
         };
-        read().map_err(|error: io::Error| self.failed(&error))
+        let contents = names.iter().map(read);
+        contents
+            .map(|content| content.map_err(|error: io::Error| self.failed(&error)))
+            .collect()
     }
 
-    fn write(&self, name: &str, content: &[u8]) -> Result<(), StoreError> {
+    fn write(&self, name: &str, content: &[u8], replaces: Replaces<'_>) -> Result<(), StoreError> {
+        // File systems have no conditional rename: whoever comes between this and that wins.
+        let now = stamp(&self.path.join(name));
+        let is_as_expected = match replaces {
+            Replaces::Anything => true,
+            Replaces::Nothing => now.is_none(),
+            Replaces::Stamp(expected) => now.as_deref() == Some(expected),
+        };
+        if !is_as_expected {
+            let (place, name) = (self.place(), name.to_owned());
+            return Err(StoreError::Changed { place, name });
+        }
         self.replace(name, content)
             .map_err(|error| self.failed(&error))
     }

@@ -6,16 +6,24 @@ fn names(store: &FolderStore) -> Vec<String> {
     names
 }
 
+fn read(store: &FolderStore, name: &str, at_most: usize) -> Vec<u8> {
+    store.read(&[name], at_most).swap_remove(0).unwrap()
+}
+
 #[test]
 fn a_file_is_written_read_replaced_and_deleted() {
     let folder = tempfile::tempdir().unwrap();
     let store = FolderStore::new(folder.path());
-    store.write("lobby.json", b"one").unwrap();
+    store
+        .write("lobby.json", b"one", Replaces::Anything)
+        .unwrap();
     let first = store.list().unwrap();
-    store.write("lobby.json", b"two").unwrap();
+    store
+        .write("lobby.json", b"two", Replaces::Anything)
+        .unwrap();
     assert_ne!(store.list().unwrap(), first);
-    assert_eq!(store.read("lobby.json", 10).unwrap(), b"two");
-    assert_eq!(store.read("lobby.json", 2).unwrap(), b"tw");
+    assert_eq!(read(&store, "lobby.json", 10), b"two");
+    assert_eq!(read(&store, "lobby.json", 2), b"tw");
     assert_eq!(names(&store), ["lobby.json"], "something was left behind");
     store.delete("lobby.json").unwrap();
     store.delete("lobby.json").unwrap();
@@ -33,10 +41,30 @@ fn what_a_killed_writer_left_goes_with_a_later_write_and_a_writer_at_work_is_lef
     let old = File::options().write(true).open(unfinished("old.json"));
     old.unwrap().set_modified(long_ago).unwrap();
     let store = FolderStore::new(folder.path());
-    store.write("lobby.json", b"whole").unwrap();
+    store
+        .write("lobby.json", b"whole", Replaces::Anything)
+        .unwrap();
     assert!(!unfinished("old.json").exists());
     assert!(unfinished("young.json").exists());
-    assert_eq!(store.read("lobby.json", 10).unwrap(), b"whole");
+    assert_eq!(read(&store, "lobby.json", 10), b"whole");
+}
+
+#[test]
+fn a_write_replaces_only_what_it_was_told_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = FolderStore::new(folder.path());
+    store
+        .write("lobby.json", b"one", Replaces::Nothing)
+        .unwrap();
+    let seen = store.list().unwrap().swap_remove(0).stamp;
+    store
+        .write("lobby.json", b"two", Replaces::Stamp(&seen))
+        .unwrap();
+    for outdated in [Replaces::Stamp(&seen), Replaces::Nothing] {
+        let refused = store.write("lobby.json", b"three", outdated);
+        assert!(matches!(refused, Err(StoreError::Changed { .. })));
+    }
+    assert_eq!(read(&store, "lobby.json", 10), b"two");
 }
 
 #[test]
@@ -45,7 +73,11 @@ fn a_failed_write_leaves_the_old_file_and_nothing_else() {
     // A folder in the file's place: the rename fails.
     fs::create_dir_all(folder.path().join("lobby.json/inside")).unwrap();
     let store = FolderStore::new(folder.path());
-    assert!(store.write("lobby.json", b"new").is_err());
+    assert!(
+        store
+            .write("lobby.json", b"new", Replaces::Anything)
+            .is_err()
+    );
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
@@ -57,7 +89,9 @@ fn a_missing_folder_is_an_error_unless_it_may_be_missing() {
     assert!(error.contains("calibrations: "), "{error}");
     let store = FolderStore::that_may_be_missing(&missing);
     assert!(names(&store).is_empty());
-    store.write("lobby.json", b"new").unwrap();
+    store
+        .write("lobby.json", b"new", Replaces::Anything)
+        .unwrap();
     assert_eq!(names(&store), ["lobby.json"]);
 }
 
@@ -79,5 +113,5 @@ fn links_are_followed_and_folders_and_dead_links_are_no_files() {
     link("..new", "v2");
     fs::rename(path("..new"), path("..data")).unwrap();
     assert_ne!(store.list().unwrap(), before);
-    assert_eq!(store.read("lobby.json", 10).unwrap(), b"two");
+    assert_eq!(read(&store, "lobby.json", 10), b"two");
 }

@@ -1,0 +1,103 @@
+//! Looking at the store: which files have changed, and reading those.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, MutexGuard, atomic::Ordering},
+};
+
+use super::{
+    Calibrations,
+    load::LoadedFile,
+    named_file::{NamedFile, by_id},
+    snapshot::Snapshot,
+};
+use crate::calibration::{CalibrationFile, CalibrationId, READ_AT_ONCE, StoreError};
+
+/// The files of a store by the ID in their names.
+type Files = BTreeMap<CalibrationId, Arc<LoadedFile>>;
+
+impl Calibrations {
+    /// Looks at the store and reads the files that have changed. What fails is logged, told by
+    /// [`Calibrations::health`], and leaves the calibrations it concerns as they are. Blocks.
+    pub fn refresh(&self) {
+        let changing = self.lock();
+        if let Err(error) = self.look(&changing) {
+            let problem = error.to_string();
+            let now = self.now();
+            if now.store_problem.as_ref() != Some(&problem) {
+                tracing::error!(
+                    "calibrations cannot be looked at, the known ones go on: {problem}"
+                );
+                self.replace(now.with_store_problem(problem));
+            }
+        }
+    }
+
+    /// Lists the store and reads what has changed.
+    pub(super) fn look(&self, _changing: &MutexGuard<'_, ()>) -> Result<(), StoreError> {
+        let before = self.now();
+        let listed = by_id(self.store.list()?);
+        let gone = before.files.keys().filter(|id| !listed.contains_key(id));
+        let gone: Vec<_> = gone.cloned().collect();
+        let (mut files, mut changed) = (Files::new(), Vec::new());
+        for (id, named) in listed {
+            match before.files.get(&id) {
+                Some(known) if known.named == named => {
+                    files.insert(id, Arc::clone(known));
+                }
+                _ => changed.push((id, named)),
+            }
+        }
+        if before.store_problem.is_none() && gone.is_empty() && changed.is_empty() {
+            return Ok(());
+        }
+        self.load(changed, &before.files, &mut files)?;
+        for gone in gone {
+            tracing::info!(calibration = %gone, "its file is gone");
+        }
+        if before.store_problem.is_some() {
+            tracing::info!("calibrations can be looked at again");
+        }
+        self.replace(Snapshot::of(files));
+        Ok(())
+    }
+
+    /// Reads files, as they are listed, into `files`.
+    fn load(
+        &self,
+        mut listed: Vec<(CalibrationId, NamedFile)>,
+        before: &Files,
+        files: &mut Files,
+    ) -> Result<(), StoreError> {
+        while !listed.is_empty() {
+            let some = listed.split_off(listed.len().saturating_sub(READ_AT_ONCE));
+            let names: Vec<_> = some.iter().map(|(_, named)| &*named.file.name).collect();
+            // One byte more than is accepted, so that a larger file is known for one.
+            let contents = self.store.read(&names, CalibrationFile::MAX_BYTES + 1);
+            for ((id, named), content) in some.into_iter().zip(contents) {
+                if let Err(error @ StoreError::Unreachable { .. }) = content {
+                    return Err(error);
+                }
+                let known = before.get(&id).map(Arc::as_ref);
+                let loaded = LoadedFile::new(&id, named, content, known);
+                self.tell(&loaded, known);
+                files.insert(id, Arc::new(loaded));
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts and logs what a file changes.
+    fn tell(&self, loaded: &LoadedFile, known: Option<&LoadedFile>) {
+        if !loaded.is_news(known) {
+            return;
+        }
+        let counter = if loaded.problems.is_empty() {
+            &self.succeeded
+        } else {
+            &self.failed
+        };
+        counter.fetch_add(1, Ordering::Relaxed);
+        loaded.log(known);
+    }
+}
