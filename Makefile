@@ -21,7 +21,7 @@ serve: setup ## set up, then run the server
 	@MALLOC_MMAP_THRESHOLD_=131072 exec target/release/lookdown serve
 
 test: ## set up, then everything that needs nothing but this repository: formatting, lints, tests, documentation
-	@$(PYTHON) scripts/setup.py toolchain runtime model converters
+	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server
 	cargo fmt --check
 	cargo clippy --all-targets --locked -- -D warnings
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts

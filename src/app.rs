@@ -10,13 +10,13 @@ use tokio::{net::TcpListener, task::spawn_blocking, time::sleep};
 
 use crate::{
     api::{self, ApiOptions, ApiState, Phase, Readiness},
-    calibration::{Calibrations, FolderStore},
+    calibration::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     imaging::decode::DecodeLimits,
     inference::ModelRepository,
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
-    settings::{LimitSettings, Settings},
+    settings::{CalibrationPlace, LimitSettings, Settings, find_calibrations},
     shutdown::Shutdown,
 };
 
@@ -268,11 +268,21 @@ fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
 
 pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrations> {
     let settings = &settings.calibrations;
-    let store = match settings.find()? {
-        Some(folder) => FolderStore::new(&folder),
-        None => FolderStore::that_may_be_missing(&settings.path),
+    let store: Box<dyn CalibrationStore> = match &settings.path {
+        CalibrationPlace::Bucket(url) => {
+            // Names and values that are no text are meant for others.
+            let variables = std::env::vars_os();
+            let variables = variables.filter_map(|(name, value)| {
+                Some((name.into_string().ok()?, value.into_string().ok()?))
+            });
+            Box::new(BucketStore::new(url, variables).context("calibrations.path")?)
+        }
+        CalibrationPlace::Folder(folder) => Box::new(match find_calibrations(folder)? {
+            Some(folder) => FolderStore::new(&folder),
+            None => FolderStore::that_may_be_missing(folder),
+        }),
     };
-    Calibrations::open(Box::new(store), settings.writable).context("calibrations.path")
+    Calibrations::open(store, settings.writable).context("calibrations.path")
 }
 
 /// Says what runs, and where.
@@ -283,7 +293,7 @@ fn log_start(settings: &Settings, address: SocketAddr) {
         sessions = settings.threads.sessions,
         threads_per_session = settings.threads.per_session,
         remap_threads = settings.threads.remapping,
-        calibrations = %settings.calibrations.path.display(),
+        calibrations = %settings.calibrations.path,
         "listening on http://{address}, API page at http://{address}/docs"
     );
 }

@@ -24,6 +24,6 @@ pub use formats::{CalibrationFile, FormatError};
 pub use id::CalibrationId;
 pub use lens_fields::LensFieldsError;
 pub use store::{
-    CalibrationStore, FolderStore, MAX_FILES, READ_AT_ONCE, Replaces, StoreError,
+    BucketStore, CalibrationStore, FolderStore, MAX_FILES, READ_AT_ONCE, Replaces, StoreError,
     StoredFile,
 };

@@ -4,6 +4,7 @@
 //! `LOOKDOWN__SERVER__LISTEN` is the key `server.listen`. Variables of another shape, such as the
 //! `LOOKDOWN_PORT=tcp://…` that Kubernetes sets for a service called `lookdown`, are none of ours.
 
+mod calibration_place;
 mod check;
 mod error;
 mod locate;
@@ -18,8 +19,9 @@ use std::{
     time::Duration,
 };
 
+pub use calibration_place::CalibrationPlace;
 pub use error::SettingsError;
-pub use locate::find_beside_executable;
+pub use locate::{find_beside_executable, find_calibrations};
 pub use raw::RawSettings;
 pub use source::{environment, load};
 pub use threads::ThreadPlan;
@@ -61,8 +63,8 @@ pub struct ServerSettings {
 /// Where calibrations come from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationSettings {
-    /// Folder of calibration files. At its default place it may be missing.
-    pub path: PathBuf,
+    /// A folder or a bucket of calibration files.
+    pub path: CalibrationPlace,
     /// How often the store is looked at, seconds; `None` for never.
     pub poll_seconds: Option<NonZeroU64>,
     /// Whether calibrations can be changed over HTTP.

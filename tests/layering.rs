@@ -93,7 +93,7 @@ const MAY_USE: [(&str, &[&str]); 17] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 12] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 14] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api", "app"]),
@@ -114,6 +114,8 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 12] = [
     ("indicatif", &["cli"]),
     ("plotters", &["evaluation"]),
     ("config", &["settings"]),
+    ("object_store", &["calibration"]),
+    ("rustls", &["calibration"]),
     ("prometheus", &["metrics"]),
 ];
 

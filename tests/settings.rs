@@ -262,7 +262,7 @@ fn a_path_somebody_chose_must_exist() {
     let library = from_environment("LOOKDOWN__INFERENCE__LIBRARY_PATH", "no/such.so").unwrap();
     for (refused, parts) in [
         (
-            calibrations.calibrations.find().unwrap_err(),
+            find_calibrations(Path::new("no/such/folder")).unwrap_err(),
             [
                 "calibrations.path",
                 "no/such/folder",

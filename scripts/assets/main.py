@@ -18,14 +18,15 @@ ROOT = Path(__file__).resolve().parents[2]
 STEPS = ("toolchain", "runtime", "model")
 EVERY_MODEL = "models"
 CONVERTERS = "converters"
-MORE_STEPS = (EVERY_MODEL, CONVERTERS)
+S3_SERVER = "s3-server"
+MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER)
 
 
 def main(arguments: list[str]) -> int:
     """Runs the named steps, those of `STEPS` by default; the exit status is 0 only if everything is in place.
 
     `model` fetches the default models, `model NAME...` the named ones, `models` every one; `converters` installs
-    what the converters import, for their tests.
+    what the converters import, for their tests, and `s3-server` a server that the tests of buckets talk to.
     """
     signal.signal(signal.SIGTERM, _stop)
     try:
@@ -62,6 +63,9 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
             install_runtime(places, pins.runtime[cpu])
         if CONVERTERS in arguments:
             PrivatePython(places, CONVERTERS).install("converter", pins.converter)
+        if S3_SERVER in arguments:
+            listed = places.root / "tests" / "buckets" / "requirements.txt"
+            PrivatePython(places, S3_SERVER).install_listed("s3-server", "moto", listed.read_text(encoding="utf-8"))
         for model in chosen_models(pins.models + pins.quantised, arguments):
             install = install_quantised if isinstance(model, Quantised) else install_model
             install(places, model, pins)

@@ -41,12 +41,15 @@ class PrivatePython:
 
     def install(self, label: str, requirements: tuple[Requirement, ...]) -> None:
         """Installs exactly these packages, by their sums; nothing is done if they are there already."""
-        wanted = requirements_text(requirements)
+        names = ", ".join(dict.fromkeys(pin.package for pin in requirements))
+        self.install_listed(label, names, requirements_text(requirements))
+
+    def install_listed(self, label: str, names: str, wanted: str) -> None:
+        """The same for the content of a requirements file with sums, called `names` to the user."""
         record = self.folder / f"{label}-requirements.txt"
         command = self.pip("install", "--require-hashes", "--only-binary=:all:", "--no-deps", "--no-cache-dir")
         if record.is_file() and record.read_text(encoding="utf-8") == wanted:
             return
-        names = ", ".join(dict.fromkeys(pin.package for pin in requirements))
         say(self.step, f"installing into .setup/venv with pip: {names}")
         with self.places.temporary() as folder:
             listed = folder / record.name

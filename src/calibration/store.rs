@@ -1,9 +1,11 @@
 //! Where calibration files are kept: one trait, and the stores that have it.
 
+mod bucket;
 mod folder;
 
 use std::fmt;
 
+pub use bucket::BucketStore;
 pub use folder::FolderStore;
 
 /// A place with calibration files in one level, each by its name. Calls block.

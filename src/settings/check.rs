@@ -43,7 +43,7 @@ impl TryFrom<RawSettings> for Settings {
             limits: limits(&raw.limits, server.max_body_bytes)?,
             server,
             calibrations: CalibrationSettings {
-                path: path("calibrations.path", raw.calibrations.path)?,
+                path: raw.calibrations.path.parse()?,
                 poll_seconds: poll_seconds(
                     "calibrations.poll_seconds",
                     raw.calibrations.poll_seconds,

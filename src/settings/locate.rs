@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CalibrationSettings, InferenceSettings, ModelSettings, SettingsError};
+use super::{InferenceSettings, ModelSettings, SettingsError};
 
 /// Default folder of calibration files.
 pub(super) const DEFAULT_CALIBRATIONS: &str = "calibrations";
@@ -11,23 +11,21 @@ pub(super) const DEFAULT_REPOSITORY: &str = "models";
 /// Default ONNX Runtime library, where `make setup` puts it.
 pub(super) const DEFAULT_LIBRARY: &str = "runtime/libonnxruntime.so";
 
-impl CalibrationSettings {
-    /// The folder; `None` when nobody set one and there is none at the default place.
-    ///
-    /// # Errors
-    /// [`SettingsError::Missing`] when somebody set one that is not there.
-    pub fn find(&self) -> Result<Option<PathBuf>, SettingsError> {
-        let found = locate(&self.path, DEFAULT_CALIBRATIONS);
-        if found.is_none() && self.path != Path::new(DEFAULT_CALIBRATIONS) {
-            return Err(SettingsError::Missing {
-                key: "calibrations.path",
-                what: "folder",
-                path: self.path.clone(),
-                remedy: "create it, or set LOOKDOWN__CALIBRATIONS__PATH to another".to_owned(),
-            });
-        }
-        Ok(found)
+/// The folder of calibrations; `None` when nobody set one and there is none at the default place.
+///
+/// # Errors
+/// [`SettingsError::Missing`] when somebody set one that is not there.
+pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError> {
+    let found = locate(folder, DEFAULT_CALIBRATIONS);
+    if found.is_none() && folder != Path::new(DEFAULT_CALIBRATIONS) {
+        return Err(SettingsError::Missing {
+            key: "calibrations.path",
+            what: "folder",
+            path: folder.to_owned(),
+            remedy: "create it, or set LOOKDOWN__CALIBRATIONS__PATH to another".to_owned(),
+        });
     }
+    Ok(found)
 }
 
 impl ModelSettings {

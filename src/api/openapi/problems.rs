@@ -24,6 +24,7 @@ impl IntoResponses for DetectProblems {
                     | ProblemKind::Forbidden
                     | ProblemKind::InvalidCalibration
                     | ProblemKind::CalibrationConflict
+                    | ProblemKind::CalibrationsUnreachable
                     | ProblemKind::Outdated
                     | ProblemKind::ModelConflict
                     | ProblemKind::ModelRefused
@@ -98,6 +99,7 @@ impl IntoResponses for ChangeProblems {
             ProblemKind::RepeatedParameter,
             ProblemKind::InvalidCalibration,
             ProblemKind::CalibrationConflict,
+            ProblemKind::CalibrationsUnreachable,
             ProblemKind::Outdated,
             ProblemKind::BodyTooLarge,
             ProblemKind::Overloaded,
@@ -116,6 +118,7 @@ impl IntoResponses for DeleteProblems {
             ProblemKind::Forbidden,
             ProblemKind::UnknownCalibration,
             ProblemKind::CalibrationConflict,
+            ProblemKind::CalibrationsUnreachable,
             ProblemKind::Outdated,
             ProblemKind::Internal,
         ])

@@ -18,6 +18,11 @@ impl From<ChangeError> for Problem {
                 let detail = "calibrations cannot be changed here: their store is read only";
                 return Self::new(ProblemKind::Forbidden, detail);
             }
+            ChangeError::Store(StoreError::Unreachable { .. }) => {
+                tracing::warn!("a calibration was not changed: {error}");
+                let detail = "the place of the calibrations does not answer: try again";
+                return Self::new(ProblemKind::CalibrationsUnreachable, detail);
+            }
             ChangeError::Store(_) => return Self::internal(error),
         };
         Self::new(kind, error.to_string())

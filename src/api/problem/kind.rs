@@ -23,6 +23,8 @@ pub(in crate::api) enum ProblemKind {
     InvalidCalibration,
     /// The calibration's file does not allow it.
     CalibrationConflict,
+    /// The place of the calibrations does not answer.
+    CalibrationsUnreachable,
     /// What the request is about has changed.
     Outdated,
     /// The model is not loaded.
@@ -63,7 +65,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 27] = [
+    pub(in crate::api) const ALL: [Self; 28] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -73,6 +75,7 @@ impl ProblemKind {
         Self::UnknownCalibration,
         Self::InvalidCalibration,
         Self::CalibrationConflict,
+        Self::CalibrationsUnreachable,
         Self::Outdated,
         Self::UnknownModel,
         Self::ModelConflict,
@@ -107,6 +110,10 @@ impl ProblemKind {
             Self::CalibrationConflict => (
                 "calibration-conflict",
                 "The calibration shares its file with others",
+            ),
+            Self::CalibrationsUnreachable => (
+                "calibrations-unreachable",
+                "The place of the calibrations does not answer",
             ),
             Self::Outdated => ("outdated", "What is there now is not what was meant"),
             Self::UnknownModel => ("unknown-model", "There is no such model"),
@@ -167,7 +174,9 @@ impl ProblemKind {
             Self::BodyTooLarge | Self::ImageTooLarge => StatusCode::PAYLOAD_TOO_LARGE,
             Self::UnsupportedImage => StatusCode::UNSUPPORTED_MEDIA_TYPE,
             Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
-            Self::WarmingUp | Self::ShuttingDown => StatusCode::SERVICE_UNAVAILABLE,
+            Self::CalibrationsUnreachable | Self::WarmingUp | Self::ShuttingDown => {
+                StatusCode::SERVICE_UNAVAILABLE
+            }
             Self::Timeout => StatusCode::GATEWAY_TIMEOUT,
         }
     }
@@ -181,7 +190,11 @@ impl ProblemKind {
     pub(in crate::api) fn retry_after_seconds(self) -> Option<u64> {
         matches!(
             self,
-            Self::Overloaded | Self::ModelBusy | Self::WarmingUp | Self::ShuttingDown
+            Self::Overloaded
+                | Self::ModelBusy
+                | Self::CalibrationsUnreachable
+                | Self::WarmingUp
+                | Self::ShuttingDown
         )
         .then_some(1)
     }

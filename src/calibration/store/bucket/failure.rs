@@ -1,0 +1,87 @@
+//! What a provider's failures mean here, in words that hold no secrets and stay the same while the
+//! cause does: addresses with signatures, times and numbers of requests are left out.
+
+use std::error::Error as _;
+
+use object_store::{
+    Error,
+    client::{HttpError, HttpErrorKind},
+};
+
+use crate::calibration::StoreError;
+
+/// What comes before the status in the client's words.
+const STATUS: &str = "status code: ";
+/// Longest status or code that is told.
+const MAX_WORDS: usize = 64;
+
+/// The failure of a request to `place`.
+pub(super) fn of(place: &str, error: &Error) -> StoreError {
+    let place = place.to_owned();
+    let problem = match error {
+        Error::Unauthenticated { .. } | Error::PermissionDenied { .. } => {
+            return StoreError::Failed {
+                place,
+                problem: format!("access is denied{}", answer(error)),
+            };
+        }
+        Error::NotFound { .. } => {
+            return StoreError::Failed {
+                place,
+                problem: format!("it is not there{}", answer(error)),
+            };
+        }
+        _ => {
+            transport(error).unwrap_or_else(|| format!("it answers with an error{}", answer(error)))
+        }
+    };
+    StoreError::Unreachable { place, problem }
+}
+
+/// Every cause of an error, the innermost last.
+fn causes(error: &Error) -> Vec<&(dyn std::error::Error + 'static)> {
+    let mut causes = Vec::new();
+    let mut next = error.source();
+    while let Some(cause) = next {
+        causes.push(cause);
+        next = cause.source();
+    }
+    causes
+}
+
+/// Why no answer came, if none came.
+fn transport(error: &Error) -> Option<String> {
+    let causes = causes(error);
+    let failed = causes
+        .iter()
+        .find_map(|cause| cause.downcast_ref::<HttpError>())?;
+    if failed.kind() == HttpErrorKind::Timeout {
+        return Some("no answer in time".to_owned());
+    }
+    causes.last().map(ToString::to_string)
+}
+
+/// The status and the provider's code for the failure, as ` (403 Forbidden, SignatureDoesNotMatch)`.
+fn answer(error: &Error) -> String {
+    let text = causes(error).last().map(ToString::to_string);
+    let text = text.unwrap_or_default();
+    let status = text.split_once(STATUS).map(|(_, rest)| rest);
+    let status = status.and_then(|rest| rest.split(':').next());
+    let code = text.split_once("<Code>").map(|(_, rest)| rest);
+    let code = code.and_then(|rest| rest.split("</Code>").next());
+    let is_plain = |words: &&str| {
+        let mut letters = words.chars();
+        words.len() <= MAX_WORDS
+            && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == ' ')
+    };
+    let told: Vec<_> = [status, code]
+        .into_iter()
+        .flatten()
+        .filter(is_plain)
+        .collect();
+    if told.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", told.join(", "))
+    }
+}
