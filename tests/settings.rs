@@ -3,7 +3,9 @@
 
 use std::{collections::HashMap, fs, path::Path};
 
-use lookdown::settings::{RawSettings, Settings, SettingsError, load};
+use lookdown::settings::{
+    CalibrationPlace, RawSettings, Settings, SettingsError, find_calibrations, load,
+};
 
 fn environment(variables: &[(&str, &str)]) -> HashMap<String, String> {
     let owned = |&(name, value): &(&str, &str)| (name.to_owned(), value.to_owned());
@@ -256,7 +258,6 @@ fn a_file_that_is_not_there_is_refused_by_name() {
 
 #[test]
 fn a_path_somebody_chose_must_exist() {
-    let calibrations = from_environment("LOOKDOWN__CALIBRATIONS__PATH", "no/such/folder").unwrap();
     let model = from_environment("LOOKDOWN__MODEL__PATH", "no/such/model").unwrap();
     let repository = from_environment("LOOKDOWN__MODEL__REPOSITORY", "no/such/models").unwrap();
     let library = from_environment("LOOKDOWN__INFERENCE__LIBRARY_PATH", "no/such.so").unwrap();
@@ -291,11 +292,58 @@ fn a_path_somebody_chose_must_exist() {
     }
     let folder = tempfile::tempdir().unwrap();
     let chosen = folder.path().to_str().unwrap();
-    let settings = from_environment("LOOKDOWN__CALIBRATIONS__PATH", chosen).unwrap();
     assert_eq!(
-        settings.calibrations.find().unwrap().unwrap(),
-        folder.path()
+        place(chosen).unwrap(),
+        CalibrationPlace::Folder(chosen.into())
     );
+    let found = find_calibrations(folder.path()).unwrap();
+    assert_eq!(found.unwrap(), folder.path());
+}
+
+fn place(path: &str) -> Result<CalibrationPlace, SettingsError> {
+    let settings = from_environment("LOOKDOWN__CALIBRATIONS__PATH", path)?;
+    Ok(settings.calibrations.path)
+}
+
+#[test]
+fn calibrations_are_in_a_folder_or_in_the_bucket_of_a_url() {
+    let folder = CalibrationPlace::Folder("/srv/calibrations".into());
+    assert_eq!(place("file:///srv/calibrations").unwrap(), folder);
+    for url in [
+        "s3://bucket/prefix",
+        "abfs://container@account.dfs.core.windows.net/prefix",
+    ] {
+        let found = place(url).unwrap();
+        assert!(matches!(&found, CalibrationPlace::Bucket(_)), "{found:?}");
+        assert_eq!(found.to_string(), url);
+    }
+}
+
+#[test]
+fn a_url_that_holds_credentials_is_refused_without_repeating_them() {
+    for (path, part) in [
+        ("s3://key:hidden@bucket/prefix", "AWS_SECRET_ACCESS_KEY"),
+        ("s3://hidden@bucket/prefix", "AWS_SECRET_ACCESS_KEY"),
+        (
+            "abfs://container:hidden@account/prefix",
+            "AWS_SECRET_ACCESS_KEY",
+        ),
+        (
+            "https://account.blob.core.windows.net/c?sig=hidden",
+            "more than a host",
+        ),
+        ("s3://bucket/prefix#hidden", "more than a host"),
+        ("s3://key:hidden@bucket:port/prefix", "invalid port number"),
+        ("file://elsewhere/srv", "file:///srv/calibrations"),
+        ("", "calibrations.path is empty"),
+    ] {
+        let message = refusal(place(path));
+        assert!(
+            message.contains("calibrations.path") && message.contains(part),
+            "{message}"
+        );
+        assert!(!message.contains("hidden"), "{message}");
+    }
 }
 
 #[test]

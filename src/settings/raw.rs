@@ -160,7 +160,7 @@ impl Default for RawLog {
     fn default() -> Self {
         Self {
             format: "text".to_owned(),
-            filter: "info,ort=warn".to_owned(),
+            filter: "info,ort=warn,object_store=warn".to_owned(),
         }
     }
 }

@@ -83,11 +83,6 @@ impl S3Server {
         std::fs::read_to_string(self.folder.path().join("log")).unwrap()
     }
 
-    /// The variables of the provider that lead to it.
-    pub(crate) fn variables(&self) -> Vec<(String, String)> {
-        variables(self.address)
-    }
-
     /// The level `ceiling` of its bucket.
     pub(crate) fn store(&self) -> BucketStore {
         store("s3://cameras/ceiling", self.address)

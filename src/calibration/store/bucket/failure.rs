@@ -18,24 +18,21 @@ const MAX_WORDS: usize = 64;
 /// The failure of a request to `place`.
 pub(super) fn of(place: &str, error: &Error) -> StoreError {
     let place = place.to_owned();
-    let problem = match error {
-        Error::Unauthenticated { .. } | Error::PermissionDenied { .. } => {
-            return StoreError::Failed {
-                place,
-                problem: format!("access is denied{}", answer(error)),
-            };
-        }
-        Error::NotFound { .. } => {
-            return StoreError::Failed {
-                place,
-                problem: format!("it is not there{}", answer(error)),
-            };
-        }
-        _ => {
-            transport(error).unwrap_or_else(|| format!("it answers with an error{}", answer(error)))
-        }
-    };
-    StoreError::Unreachable { place, problem }
+    if matches!(error, Error::InvalidPath { .. }) {
+        let problem = "an object in it has a name with empty or relative parts".to_owned();
+        return StoreError::Failed { place, problem };
+    }
+    if let Some(problem) = transport(error) {
+        return StoreError::Unreachable { place, problem };
+    }
+    let answer = answer(error);
+    let problem = format!("it answers with an error{answer}");
+    // Its own faults, and too many requests, concern every object.
+    if answer.starts_with(" (5") || answer.starts_with(" (429") {
+        StoreError::Unreachable { place, problem }
+    } else {
+        StoreError::Failed { place, problem }
+    }
 }
 
 /// Every cause of an error, the innermost last.
