@@ -337,7 +337,7 @@ fn a_url_that_holds_credentials_is_refused_without_repeating_them() {
         ("file://elsewhere/srv", "file:///srv/calibrations"),
         ("", "calibrations.path is empty"),
     ] {
-        let message = refusal(place(path));
+        let message = place(path).unwrap_err().to_string();
         assert!(
             message.contains("calibrations.path") && message.contains(part),
             "{message}"

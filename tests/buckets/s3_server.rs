@@ -14,7 +14,7 @@ use tempfile::TempDir;
 
 /// Must never be told to anybody.
 pub(crate) const SECRET: &str = "kept-to-itself-7f3a";
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A server with the bucket `cameras`; what it was asked is in its log.
 pub(crate) struct S3Server {

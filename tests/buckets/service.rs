@@ -11,7 +11,7 @@ use std::{
 
 use crate::s3_server::variables;
 
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A server that looks at `s3://cameras/ceiling` every second.
 pub(crate) struct Service {

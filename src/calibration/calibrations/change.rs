@@ -59,8 +59,8 @@ impl Calibrations {
         if let Some(shared) = file.filter(|file| file.holds_several) {
             return Err(shared_file(shared));
         }
-        let replaces = condition.replaces(file.map(|file| &file.named.file), &name);
-        self.store.write(&name, written.as_bytes(), replaces)?;
+        let expected = condition.replaces(file.map(|file| &file.named.file), &name);
+        self.store.write(&name, written.as_bytes(), expected)?;
         // It hides the others, so that a kill in between does no harm.
         for hidden in file.into_iter().flat_map(|file| file.names()) {
             if hidden != name {

@@ -50,10 +50,10 @@ impl BucketStore {
         let background =
             Background::start("calibration-bucket").map_err(|error| failed(error.to_string()))?;
         Ok(Self {
+            place,
             objects,
             level,
             background,
-            place,
         })
     }
 
