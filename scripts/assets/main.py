@@ -11,7 +11,7 @@ from .machine import supported_cpu
 from .pins import Model, Pins, Quantised, read_pins
 from .places import Places
 from .private_python import PrivatePython
-from .steps import install_model, install_quantised, install_runtime
+from .steps import install_benches, install_model, install_quantised, install_runtime
 from .toolchain import check_toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -19,14 +19,16 @@ STEPS = ("toolchain", "runtime", "model")
 EVERY_MODEL = "models"
 CONVERTERS = "converters"
 S3_SERVER = "s3-server"
-MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER)
+BENCHES = "benches"
+MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, BENCHES)
 
 
 def main(arguments: list[str]) -> int:
     """Runs the named steps, those of `STEPS` by default; the exit status is 0 only if everything is in place.
 
     `model` fetches the default models, `model NAME...` the named ones, `models` every one; `converters` installs
-    what the converters import, for their tests, and `s3-server` a server that the tests of buckets talk to.
+    what the converters import, for their tests; `s3-server` a server that the tests of buckets talk to; `benches`
+    what the benchmarks and the servers they compare with import.
     """
     signal.signal(signal.SIGTERM, _stop)
     try:
@@ -65,7 +67,9 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
             PrivatePython(places, CONVERTERS).install("converter", pins.converter)
         if S3_SERVER in arguments:
             listed = places.root / "tests" / "buckets" / "requirements.txt"
-            PrivatePython(places, S3_SERVER).install_listed("s3-server", "moto", listed.read_text(encoding="utf-8"))
+            PrivatePython(places, S3_SERVER).install_file(listed, "--require-hashes")
+        if BENCHES in arguments:
+            install_benches(places)
         for model in chosen_models(pins.models + pins.quantised, arguments):
             install = install_quantised if isinstance(model, Quantised) else install_model
             install(places, model, pins)

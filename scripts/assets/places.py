@@ -33,6 +33,11 @@ class Places:
         """The private Python environment."""
         return self.own / "venv"
 
+    @property
+    def bench_pythons(self) -> Path:
+        """The Python environments of the benchmarks, a folder each."""
+        return self.own / "benches"
+
     @contextlib.contextmanager
     def temporary(self) -> Iterator[Path]:
         """A folder for unfinished work, on the same file system as the results, gone afterwards."""

@@ -1,9 +1,10 @@
-"""A Python environment of the set-up's own, so that nothing of the user's is touched."""
+"""Python environments of the set-up's own, so that nothing of the user's is touched."""
 
 import importlib.util
 import os
 import shutil
 import sys
+from pathlib import Path
 
 from .commands import run
 from .console import SetupError, say
@@ -24,12 +25,12 @@ NO_PIP = (
 
 
 class PrivatePython:
-    """The environment in `.setup/venv`, made when it is first asked for."""
+    """The environment in `.setup/venv` or another folder, made when it is first asked for."""
 
-    def __init__(self, places: Places, step: str):
+    def __init__(self, places: Places, step: str, folder: Path | None = None):
         self.places = places
         self.step = step
-        self.folder = places.python
+        self.folder = folder or places.python
         self.python = self.folder / "bin" / "python"
 
     def pip(self, *arguments: str) -> list[str]:
@@ -42,15 +43,19 @@ class PrivatePython:
     def install(self, label: str, requirements: tuple[Requirement, ...]) -> None:
         """Installs exactly these packages, by their sums; nothing is done if they are there already."""
         names = ", ".join(dict.fromkeys(pin.package for pin in requirements))
-        self.install_listed(label, names, requirements_text(requirements))
+        self._install(label, requirements_text(requirements), names, "--require-hashes")
 
-    def install_listed(self, label: str, names: str, wanted: str) -> None:
-        """The same for the content of a requirements file with sums, called `names` to the user."""
+    def install_file(self, file: Path, *flags: str) -> None:
+        """Installs the packages of a requirements file that names every one of them and its version."""
+        names = str(file.relative_to(self.places.root))
+        self._install(file.parent.name, file.read_text(encoding="utf-8"), names, *flags)
+
+    def _install(self, label: str, wanted: str, names: str, *flags: str) -> None:
         record = self.folder / f"{label}-requirements.txt"
-        command = self.pip("install", "--require-hashes", "--only-binary=:all:", "--no-deps", "--no-cache-dir")
+        command = self.pip("install", *flags, "--only-binary=:all:", "--no-deps", "--no-cache-dir")
         if record.is_file() and record.read_text(encoding="utf-8") == wanted:
             return
-        say(self.step, f"installing into .setup/venv with pip: {names}")
+        say(self.step, f"installing into {self._shown} with pip: {names}")
         with self.places.temporary() as folder:
             listed = folder / record.name
             listed.write_text(wanted, encoding="utf-8")
@@ -64,6 +69,10 @@ class PrivatePython:
             )
             os.replace(listed, record)
 
+    @property
+    def _shown(self) -> Path:
+        return self.folder.relative_to(self.places.root)
+
     def _make(self) -> None:
         flags = [] if has_module("ensurepip") else ["--without-pip"]
         identity = f"{sys.version}\n{os.path.realpath(sys.executable)} {flags}\n"
@@ -72,7 +81,7 @@ class PrivatePython:
             return
         if not has_module("venv") or not (has_module("ensurepip") or has_module("pip")):
             raise SetupError(NO_PIP)
-        say(self.step, "making a private Python environment in .setup/venv")
+        say(self.step, f"making a private Python environment in {self._shown}")
         shutil.rmtree(self.folder, ignore_errors=True)
         with self.places.temporary() as folder:
             run(

@@ -1,4 +1,4 @@
-"""The two steps that put files into the repository: ONNX Runtime, and the models."""
+"""The steps that put files into the repository: ONNX Runtime, the models, and what the benchmarks import."""
 
 import subprocess
 import sys
@@ -68,6 +68,15 @@ def install_quantised(places: Places, model: Quantised, pins: Pins) -> None:
             ranges = str(onnx_file.with_name("activation_ranges.json"))
             put_in_place(_convert(places, model, python, folder, source, "convert.quantise", ranges), onnx_file)
     say(step, f"{model.name} is in place ({megabytes(onnx_file.stat().st_size)})")
+
+
+def install_benches(places: Places) -> None:
+    """Makes a Python environment for the benchmarks and one for each server they compare with."""
+    step = "benches"
+    benches = places.root / "benches"
+    for file in sorted([benches / "requirements.txt", *benches.glob("peers/*/requirements.txt")]):
+        PrivatePython(places, step, places.bench_pythons / file.parent.name).install_file(file)
+    say(step, "the Python environments of the benchmarks are in place")
 
 
 def _convert(

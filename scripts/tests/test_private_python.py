@@ -58,6 +58,15 @@ class Making(InEmptyRepository):
             with self.assertRaisesRegex(SetupError, "apt-get install python3-venv"):
                 PrivatePython(self.places, "model").pip("list")
 
+    def test_a_requirements_file_is_installed_once_into_a_folder_of_its_own(self):
+        commands = self.with_modules("venv", "ensurepip")
+        file = self.write("benches/peers/other/requirements.txt", b"a==1\n")
+        python = PrivatePython(self.places, "benches", self.places.python)
+        python.install_file(file)
+        python.install_file(file)
+        self.assertEqual(["venv", "pip"], [command[2] for command in commands])
+        self.assertNotIn("--require-hashes", commands[1])
+
 
 class Environment(InEmptyRepository):
     def test_registry_settings_reach_pip_and_settings_of_the_users_own_environments_do_not(self):

@@ -1,0 +1,142 @@
+//! What became of the requests, in bounded memory.
+
+use std::{collections::BTreeMap, ops::Range, time::Duration};
+
+use serde_json::{Value, json};
+use tokio::time::Instant;
+
+use crate::client::Outcome;
+
+/// Latencies are told apart to this share of themselves.
+const RESOLUTION: f64 = 0.005;
+/// The shortest latency told from shorter ones, seconds.
+const SHORTEST: f64 = 1e-4;
+
+/// Counts what became of the requests of a time.
+pub struct Tally {
+    counted: Range<Instant>,
+    open: bool,
+    statuses: BTreeMap<u16, u64>,
+    in_time: u64,
+    broken: u64,
+    timed_out: u64,
+    succeeded: Latencies,
+    refused: Latencies,
+    sent: u64,
+    received: u64,
+    succeeded_in_all: u64,
+}
+
+impl Tally {
+    /// Counts the requests that are due (open loop) or end (closed loop) in the time `counted`.
+    pub fn new(counted: Range<Instant>, open: bool) -> Self {
+        Self {
+            counted,
+            open,
+            statuses: BTreeMap::new(),
+            in_time: 0,
+            broken: 0,
+            timed_out: 0,
+            succeeded: Latencies::default(),
+            refused: Latencies::default(),
+            sent: 0,
+            received: 0,
+            succeeded_in_all: 0,
+        }
+    }
+
+    /// Takes the outcome of a request with a body of `sent` bytes that has just ended.
+    pub fn note(&mut self, due: Instant, outcome: &Outcome, sent: usize) {
+        let now = Instant::now();
+        let succeeded = matches!(outcome, Outcome::Answered(status, _) if status.is_success());
+        self.succeeded_in_all += u64::from(succeeded);
+        self.in_time += u64::from(succeeded && self.counted.contains(&now));
+        if !self.counted.contains(if self.open { &due } else { &now }) {
+            return;
+        }
+        self.sent += sent as u64;
+        match outcome {
+            Outcome::Broken => self.broken += 1,
+            Outcome::TimedOut => self.timed_out += 1,
+            Outcome::Answered(status, bytes) => {
+                self.received += *bytes as u64;
+                *self.statuses.entry(status.as_u16()).or_default() += 1;
+                match status.as_u16() {
+                    200..=299 => self.succeeded.note(now - due),
+                    429 | 503 => self.refused.note(now - due),
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// All of it as JSON.
+    pub fn summary(&self) -> Value {
+        let seconds = (self.counted.end - self.counted.start).as_secs_f64();
+        #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+        let per_second = self.in_time as f64 / seconds;
+        json!({
+            "seconds": seconds,
+            "statuses": self.statuses,
+            "succeeded_per_second": per_second,
+            "succeeded_in_all": self.succeeded_in_all,
+            "succeeded": self.succeeded.summary(),
+            "refused": self.refused.summary(),
+            "broken": self.broken,
+            "timed_out": self.timed_out,
+            "bytes_sent": self.sent,
+            "bytes_received": self.received,
+        })
+    }
+}
+
+/// A histogram of latencies whose classes grow by [`RESOLUTION`].
+#[derive(Default)]
+struct Latencies {
+    counts: BTreeMap<u32, u64>,
+    count: u64,
+    longest: Duration,
+}
+
+impl Latencies {
+    fn note(&mut self, latency: Duration) {
+        let ratio = (latency.as_secs_f64() / SHORTEST).max(1.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "from 0 to a few thousand"
+        )]
+        let class = (ratio.ln() / RESOLUTION.ln_1p()) as u32;
+        *self.counts.entry(class).or_default() += 1;
+        self.count += 1;
+        self.longest = self.longest.max(latency);
+    }
+
+    /// The latency that this share of requests did not exceed, milliseconds.
+    fn quantile(&self, share: f64) -> f64 {
+        let longest = self.longest.as_secs_f64();
+        let mut seen = 0;
+        for (class, count) in &self.counts {
+            seen += count;
+            #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
+            if seen as f64 >= share * self.count as f64 {
+                let middle = SHORTEST * (1.0 + RESOLUTION).powf(f64::from(*class) + 0.5);
+                return middle.min(longest) * 1e3;
+            }
+        }
+        longest * 1e3
+    }
+
+    fn summary(&self) -> Value {
+        if self.count == 0 {
+            return json!({ "count": 0 });
+        }
+        json!({
+            "count": self.count,
+            "p50_ms": self.quantile(0.5),
+            "p95_ms": self.quantile(0.95),
+            "p99_ms": self.quantile(0.99),
+            "max_ms": self.longest.as_secs_f64() * 1e3,
+        })
+    }
+}
