@@ -74,15 +74,35 @@ impl Schedule {
         Duration::from_secs_f64(gaps / self.rate)
     }
 
-    /// From 0 to below 1, the same ones in every run: the generator SplitMix64 (Steele et al., "Fast
+    /// From 0 to below 1, the same ones in every run: the generator `SplitMix64` (Steele et al., "Fast
     /// splittable pseudorandom number generators", OOPSLA 2014).
     fn uniform(&mut self) -> f64 {
         self.random = self.random.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut mixed = self.random;
         mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        #[expect(clippy::cast_possible_truncation, reason = "the upper half fits")]
         let upper = ((mixed ^ (mixed >> 31)) >> 32) as u32;
         f64::from(upper) / (f64::from(u32::MAX) + 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_kinds_of_arrivals_keep_the_rate() {
+        for arrivals in [Arrivals::Poisson, Arrivals::Constant] {
+            let start = Instant::now();
+            let mut pace = Pace::open(100.0, arrivals, start, start + Duration::from_secs(100));
+            let count = std::iter::from_fn(|| pace.take()).count();
+            // The standard deviation of a Poisson process is 100 here.
+            assert!((9_600..=10_400).contains(&count), "{count}");
+        }
+    }
+
+    #[test]
+    fn a_closed_loop_ends() {
+        assert!(Pace::closed(Instant::now()).take().is_none());
     }
 }

@@ -140,3 +140,46 @@ impl Latencies {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use hyper::StatusCode;
+
+    use super::*;
+
+    fn latencies(milliseconds: impl IntoIterator<Item = u64>) -> Latencies {
+        let mut latencies = Latencies::default();
+        for latency in milliseconds {
+            latencies.note(Duration::from_millis(latency));
+        }
+        latencies
+    }
+
+    #[test]
+    fn quantiles_are_true_to_half_a_percent() {
+        let latencies = latencies(1..=1000);
+        for (share, truth) in [(0.5, 500.0), (0.95, 950.0), (0.99, 990.0)] {
+            let found = latencies.quantile(share);
+            assert!((found / truth - 1.0).abs() <= RESOLUTION, "{found}");
+        }
+    }
+
+    #[test]
+    fn no_quantile_exceeds_the_longest_latency() {
+        assert!(latencies([7]).quantile(0.99) <= 7.0);
+    }
+
+    #[test]
+    fn refusals_are_kept_apart_and_what_came_early_is_not_counted() {
+        let now = Instant::now();
+        let early = now.checked_sub(Duration::from_secs(1)).unwrap_or(now);
+        let mut tally = Tally::new(now..now + Duration::from_secs(10), true);
+        tally.note(now, &Outcome::Answered(StatusCode::OK, 5), 3);
+        tally.note(now, &Outcome::Answered(StatusCode::TOO_MANY_REQUESTS, 5), 3);
+        tally.note(early, &Outcome::Answered(StatusCode::OK, 5), 3);
+        let told = tally.summary();
+        assert_eq!(told["statuses"], json!({ "200": 1, "429": 1 }));
+        assert_eq!(told["refused"]["count"], 1);
+        assert_eq!(told["succeeded_in_all"], 2);
+    }
+}

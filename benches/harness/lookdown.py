@@ -1,0 +1,47 @@
+"""Our own server."""
+
+import contextlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from .pictures import calibration
+from .places import LOOKDOWN, SAMPLES
+from .processes import Server, free_ports, running
+
+MODEL = "nanodet_g_416"
+"""Of the profiles `fast` and `balanced`."""
+
+ROOMY = {
+    "LIMITS__MAX_FRAMES_IN_FLIGHT": "512",
+    "LIMITS__MAX_UPLOAD_BYTES": "2147483648",
+    "SERVER__REQUEST_TIMEOUT_MILLIS": "600000",
+}
+"""Settings under which no client of a closed loop is ever refused: it would only ask again."""
+
+
+@contextlib.contextmanager
+def lookdown(settings: dict[str, str] | None = None, calibrations: Path = SAMPLES / "calibrations") -> Iterator[Server]:
+    """The release binary, started as `make serve` does, with the samples' calibrations."""
+    (port,) = free_ports(1)
+    wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), "LOG__FILTER": "warn"}
+    wanted |= settings or {}
+    environment = {f"LOOKDOWN__{name}": value for name, value in wanted.items()}
+    environment["MALLOC_MMAP_THRESHOLD_"] = "131072"
+    with running("lookdown", [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
+        yield server
+
+
+def detect(profile: str, camera: str = "office", model: str | None = None) -> str:
+    """Path and query of a detection."""
+    return f"/detect?calibration={camera}&profile={profile}" + (f"&model={model}" if model else "")
+
+
+def report(server: Server, path: str, frame: Path) -> dict:
+    """The report on a frame."""
+    return json.loads(server.post(path, frame.read_bytes()))
+
+
+def view_plan(server: Server, profile: str) -> dict:
+    """How a frame of the office is looked at."""
+    return json.loads(server.get(f"/calibrations/{calibration().stem}/views?profile={profile}"))

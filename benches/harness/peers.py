@@ -1,0 +1,75 @@
+"""The servers that we compare with, each in its own Python environment."""
+
+import contextlib
+import itertools
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from .lookdown import MODEL
+from .pictures import calibration
+from .places import PEERS, WORK, model, python_of
+from .processes import Server, free_ports, running
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How a peer uses the cores."""
+
+    processes: int
+    frames: int
+    """Worked on at once by a process."""
+    threads: int
+    """Of one run of the network."""
+    batch: int
+    """Views in a run."""
+
+    def text(self) -> str:
+        """For a table."""
+        return (
+            f"processes: {self.processes}, frames at once: {self.frames}, threads: {self.threads}, batch: {self.batch}"
+        )
+
+    def environment(self) -> dict[str, str]:
+        """As the peers read it."""
+        return {name.upper(): str(value) for name, value in asdict(self).items()} | {"MODEL": str(model(MODEL))}
+
+
+def settings(parallel: bool) -> list[Setting]:
+    """Those among which the best is looked for; `parallel` if the peer can work on frames at once in one process."""
+    cores = len(os.sched_getaffinity(0))
+    shares = [(1, 1, cores), (cores, 1, 1)]
+    if parallel:
+        shares += [(1, cores, 1), (1, 2, cores)]
+    return [Setting(*share, batch) for share, batch in itertools.product(dict.fromkeys(shares), (1, 8))]
+
+
+@contextlib.contextmanager
+def plain_python(setting: Setting, plan: Path, refine: str) -> Iterator[Server]:
+    """FastAPI, OpenCV and ONNX Runtime."""
+    (port,) = free_ports(1)
+    command = [str(python_of("plain_python")), "-m", "uvicorn", "app:app", "--log-level", "warning"]
+    command += ["--port", str(port), "--workers", str(setting.processes)]
+    environment = setting.environment() | {"PLAN": str(plan), "CALIBRATION": str(calibration()), "REFINE": refine}
+    with running("plain_python", command, port, "/ready", environment, PEERS / "plain_python") as server:
+        yield server
+
+
+@contextlib.contextmanager
+def v2_server(setting: Setting) -> Iterator[Server]:
+    """MLServer with the model and nothing around it."""
+    http, grpc, metrics = free_ports(3)
+    folder = WORK / "detector"
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = {"host": "127.0.0.1", "http_port": http, "grpc_port": grpc, "metrics_port": metrics, "debug": False}
+    # One process: the model runs in the server's own; several: in workers beside it.
+    wanted["parallel_workers"] = 0 if setting.processes == 1 else setting.processes
+    (folder / "settings.json").write_text(json.dumps(wanted), encoding="utf-8")
+    described = {"name": "detector", "implementation": "model.Detector"}
+    (folder / "model-settings.json").write_text(json.dumps(described), encoding="utf-8")
+    command = [str(python_of("v2_server").with_name("mlserver")), "start", str(folder)]
+    environment = setting.environment() | {"PYTHONPATH": str(PEERS / "v2_server")}
+    with running("v2_server", command, http, "/v2/models/detector/ready", environment, folder) as server:
+        yield server

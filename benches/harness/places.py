@@ -1,0 +1,28 @@
+"""Where things are."""
+
+from pathlib import Path
+
+BENCHES = Path(__file__).resolve().parents[1]
+ROOT = BENCHES.parent
+RAW = BENCHES / "raw"
+CHARTS = BENCHES / "charts"
+RESULTS = BENCHES / "RESULTS.md"
+PEERS = BENCHES / "peers"
+SAMPLES = ROOT / "samples"
+PYTHONS = ROOT / ".setup" / "benches"
+"""The Python environments that `scripts/setup.py benches` makes."""
+WORK = PYTHONS / "work"
+"""What the benchmarks make for themselves: frames, plans, logs."""
+
+LOOKDOWN = ROOT / "target" / "release" / "lookdown"
+LOAD = ROOT / "target" / "release" / "examples" / "load"
+
+
+def model(name: str) -> Path:
+    """A model's ONNX file."""
+    return ROOT / "models" / name / "model.onnx"
+
+
+def python_of(peer: str) -> Path:
+    """The interpreter of a peer's own environment."""
+    return PYTHONS / peer / "bin" / "python"

@@ -1,0 +1,114 @@
+"""Starts servers, waits until they are ready, and stops them."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from .places import ROOT, WORK
+from .usage import Usage, usage_of
+
+LAST_WORDS = 15
+STOP_SECONDS = 20.0
+
+
+class BenchError(Exception):
+    """Something that keeps a benchmark from going on."""
+
+
+@dataclass(frozen=True)
+class Server:
+    """A server that answers."""
+
+    address: str
+    pid: int
+    seconds_to_ready: float
+
+    def usage(self) -> Usage:
+        """What it and its workers have used."""
+        return usage_of(self.pid)
+
+    def get(self, path: str) -> bytes:
+        """The body at a path."""
+        with urllib.request.urlopen(f"http://{self.address}{path}", timeout=60) as answer:
+            return answer.read()
+
+    def post(self, path: str, body: bytes, content_type: str = "image/jpeg") -> bytes:
+        """The answer to a body."""
+        headers = {"Content-Type": content_type}
+        request = urllib.request.Request(f"http://{self.address}{path}", body, headers)
+        try:
+            with urllib.request.urlopen(request, timeout=600) as answer:
+                return answer.read()
+        except urllib.error.HTTPError as error:
+            raise BenchError(f"{path} was answered {error.code}: {error.read(2000).decode(errors='replace')}") from None
+
+
+def free_ports(count: int) -> list[int]:
+    """Ports that nobody listens on."""
+    with contextlib.ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for opened in sockets:
+            opened.bind(("127.0.0.1", 0))
+        return [opened.getsockname()[1] for opened in sockets]
+
+
+@contextlib.contextmanager
+def running(
+    name: str, command: list[str], port: int, ready: str, environment: dict[str, str], folder: Path = ROOT
+) -> Iterator[Server]:
+    """A server that listens on `port` of this machine, from when it answers `ready` with 200 on."""
+    WORK.mkdir(parents=True, exist_ok=True)
+    log = WORK / f"{name}.log"
+    started = time.monotonic()
+    with open(log, "wb") as output:
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=os.environ | environment,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            address = f"127.0.0.1:{port}"
+            _wait(process, f"http://{address}{ready}", name, log)
+            yield Server(address, process.pid, time.monotonic() - started)
+        finally:
+            _stop(process)
+
+
+def _wait(process: subprocess.Popen, url: str, name: str, log: Path, seconds: float = 90.0) -> None:
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=5) as answer:
+            if answer.status == 200:
+                return
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            status = process.wait(timeout=0.005)
+            raise BenchError("\n".join([f"{name} ended with status {status}. It said:", *_last_words(log)]))
+    raise BenchError("\n".join([f"{name} did not get ready within {seconds:.0f} s. It said:", *_last_words(log)]))
+
+
+def _last_words(log: Path) -> list[str]:
+    return log.read_text(encoding="utf-8", errors="replace").splitlines()[-LAST_WORDS:]
+
+
+def _stop(process: subprocess.Popen) -> None:
+    """Ends the server with all it has started: its session is its own."""
+    for signal_number in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal_number)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=STOP_SECONDS)
+            break
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)

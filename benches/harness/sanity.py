@@ -1,0 +1,22 @@
+"""Whether a peer does the same work: it must find the same persons."""
+
+import json
+
+from .boxes import boxes, matched
+from .lookdown import MODEL, detect, report
+from .pictures import frame
+from .processes import Server
+
+
+def agreement(ours: Server, theirs: Server) -> list[dict]:
+    """Our boxes on the frame and theirs, with one plan and model, for two of our ways to merge boxes."""
+    other = boxes(json.loads(theirs.post("/detect", frame().read_bytes())))
+    rows = []
+    for refine in ("fusion", "nms"):
+        mine = boxes(report(ours, f"{detect('balanced', model=MODEL)}&refine={refine}", frame()))
+        overlaps = matched(mine, other)
+        mean = sum(overlaps) / max(len(overlaps), 1)
+        rows.append(
+            {"refine": refine, "ours": len(mine), "theirs": len(other), "same": len(overlaps), "mean_iou": mean}
+        )
+    return rows

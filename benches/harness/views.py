@@ -1,0 +1,42 @@
+"""What the networks of other servers see of our frame: the same views, rendered with OpenCV."""
+
+import base64
+import json
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from .pictures import SIDE, calibration, frame
+from .places import PEERS, WORK
+
+sys.path.insert(0, str(PEERS / "plain_python"))
+from views import Lens, View
+
+
+def plan_file(plan: dict) -> Path:
+    """A view plan as a file."""
+    file = WORK / f"plan-{plan['profile']}.json"
+    file.write_text(json.dumps(plan), encoding="utf-8")
+    return file
+
+
+def view_file(plan: dict, size: int) -> Path:
+    """The views of the frame as bytes `[views, 3, size, size]`."""
+    file = WORK / f"views-{plan['profile']}-{size}.npy"
+    lens = Lens(json.loads(calibration().read_text(encoding="utf-8")), SIDE)
+    picture = cv2.cvtColor(cv2.imread(str(frame())), cv2.COLOR_BGR2RGB)
+    np.save(file, np.stack([View(view, size, lens).render(picture).transpose(2, 0, 1) for view in plan["views"]]))
+    return file
+
+
+def v2_request(views: Path) -> Path:
+    """The views as a V2 request in JSON."""
+    tensor = np.load(views)
+    data = base64.b64encode(tensor.tobytes()).decode("ascii")
+    parameters = {"content_type": "base64"}
+    wanted = {"name": "images", "shape": [1, 1], "datatype": "BYTES", "parameters": parameters, "data": [data]}
+    file = views.with_suffix(".json")
+    file.write_text(json.dumps({"inputs": [wanted]}), encoding="utf-8")
+    return file

@@ -1,0 +1,131 @@
+"""How cost grows with views, the frame, cameras and clients."""
+
+import tempfile
+from pathlib import Path
+
+from harness.charts import lines
+from harness.effort import Effort
+from harness.load import load, steady
+from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
+from harness.pictures import cameras, frame
+from harness.tables import table
+
+from .whole import stages_of
+
+PLANS = ("direct", "fast", "balanced", "paper")
+CAMERA_PROFILE = "fast"
+
+
+def measure(effort: Effort) -> dict:
+    """One thing grows at a time; one model throughout."""
+    with lookdown(ROOMY) as server:
+        views = [with_views(effort, server, profile) for profile in PLANS]
+        sides = [with_side(effort, server, side) for side in effort.sides]
+        path = detect(CAMERA_PROFILE, model=MODEL)
+        alone = stages_of(server, path, effort.frames)["total"] / 1000
+        clients = [
+            steady(server, [path], frame(), clients=count, seconds=effort.seconds / 2, frame_seconds=alone)
+            for count in effort.many_clients
+        ]
+    return {
+        "views": views,
+        "sides": sides,
+        "clients": clients,
+        "cameras": [with_cameras(effort, count) for count in effort.cameras],
+    }
+
+
+def with_views(effort: Effort, server, profile: str) -> dict:
+    """A frame's stages under a plan."""
+    count = max(len(view_plan(server, profile)["views"]), 1)
+    stages = stages_of(server, detect(profile, model=MODEL), effort.frames)
+    return {"profile": profile, "views": count, "stages": stages}
+
+
+def with_side(effort: Effort, server, side: int) -> dict:
+    """The stages of frames of a size."""
+    path, picture = detect("balanced", model=MODEL), frame(side)
+    report(server, path, picture)
+    timings = [report(server, path, picture)["timings_ms"] for _ in range(effort.frames)]
+    middle = len(timings) // 2
+    stages = {stage: sorted(timing[stage] for timing in timings)[middle] for stage in timings[0]}
+    return {"side": side, "kilobytes": picture.stat().st_size / 1000, "stages": stages}
+
+
+def with_cameras(effort: Effort, count: int) -> dict:
+    """One camera's frames after all cameras were used once, and the memory they took."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        ids = cameras(folder, count)
+        with lookdown(ROOMY, folder) as server:
+            empty = server.usage().resident_bytes
+            for camera in ids:
+                report(server, detect(CAMERA_PROFILE, camera), frame())
+            used = server.usage().resident_bytes
+            told = load(server, [detect(CAMERA_PROFILE, ids[-1])], frame(), seconds=effort.seconds / 2)
+            everyone = [detect(CAMERA_PROFILE, camera) for camera in ids]
+            turns = load(server, everyone, frame(), seconds=effort.seconds / 2)
+    return {"cameras": count, "mib": (used - empty) / 2**20, "one": told["succeeded"], "all": turns["succeeded"]}
+
+
+def tell(raw: dict) -> str:
+    """The four tables as Markdown."""
+    return "\n".join(
+        [
+            f"With views (one client, {MODEL}, ms):\n",
+            table(
+                ("profile", "views", "total", "remap per view", "network per view"),
+                [views_row(row) for row in raw["views"]],
+            ),
+            "With the frame (one client, `balanced`, ms):\n",
+            table(
+                ("side, pixels", "JPEG, kB", "decode", "remap", "inference", "total"),
+                [sides_row(row) for row in raw["sides"]],
+            ),
+            f"With cameras loaded and used (one client, `{CAMERA_PROFILE}`; memory from before the first frame):\n",
+            table(
+                ("cameras", "memory, MiB", "one of them: p50, ms", "in turns: p50, ms", "in turns: p99, ms"),
+                [cameras_row(row) for row in raw["cameras"]],
+            ),
+            f"With clients (closed loop, `{CAMERA_PROFILE}`):\n",
+            table(
+                ("clients", "frames/s", "p50, ms", "p99, ms", "cores used", "memory, MiB"),
+                [clients_row(told) for told in raw["clients"]],
+            ),
+        ]
+    )
+
+
+def views_row(row: dict) -> tuple:
+    """One plan."""
+    stages, views = row["stages"], row["views"]
+    return row["profile"], views, stages["total"], stages["remap"] / views, stages["inference"] / views
+
+
+def sides_row(row: dict) -> tuple:
+    """One size of frame."""
+    return row["side"], row["kilobytes"], *(row["stages"][name] for name in ("decode", "remap", "inference", "total"))
+
+
+def cameras_row(row: dict) -> tuple:
+    """One number of cameras."""
+    one, everyone = row["one"], row["all"]
+    return row["cameras"], row["mib"], one.get("p50_ms"), everyone.get("p50_ms"), everyone.get("p99_ms")
+
+
+def clients_row(told: dict) -> tuple:
+    """One number of clients."""
+    late = told["succeeded"]
+    times = (late.get("p50_ms"), late.get("p99_ms"))
+    return told["clients"], told["succeeded_per_second"], *times, told["cores"], round(told["resident_mib"])
+
+
+def draw(raw: dict) -> str:
+    """Time with views, and with the frame, as charts."""
+    per_views = [(row["views"], row["stages"]["total"]) for row in raw["views"]]
+    per_side = [
+        (name, [(row["side"], row["stages"][name]) for row in raw["sides"]]) for name in ("decode", "remap", "total")
+    ]
+    return lines("growth-views", f"A frame's time with views, {MODEL}", ("views", "ms"), {"total": per_views}) + lines(
+        "growth-frame", "A frame's time with its size, balanced", ("side, pixels", "ms"), dict(per_side)
+    )

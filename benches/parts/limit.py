@@ -1,0 +1,80 @@
+"""The limit: the same views through bare ONNX Runtime on ready tensors, in turns with the server."""
+
+import os
+import subprocess
+
+from harness.charts import bars
+from harness.effort import Effort
+from harness.figures import ratios, spread
+from harness.load import load
+from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
+from harness.pictures import frame
+from harness.places import BENCHES, model, python_of
+from harness.processes import BenchError
+from harness.tables import spread_cell, table
+from harness.views import view_file
+
+PROFILE = "balanced"
+INPUT_SIDE = 416
+CLIENTS = 8
+BATCHES = (1, 4, 8, 24)
+
+
+def measure(effort: Effort) -> dict:
+    """Looks for the best bare settings, then alternates."""
+    path = detect(PROFILE, model=MODEL)
+    with lookdown(ROOMY) as server:
+        plan = view_plan(server, PROFILE)
+        views, count = view_file(plan, INPUT_SIDE), len(plan["views"])
+        report(server, path, frame())  # makes the camera's tables
+        tried = {
+            f"{sessions} × {threads} threads, batch {batch}": (sessions, threads, batch)
+            for sessions, threads in shares()
+            for batch in BATCHES
+        }
+        tuning = {name: bare(views, *setting, effort.tune_seconds) / count for name, setting in tried.items()}
+        best = max(tuning, key=tuning.__getitem__)
+        ours, theirs = [], []
+        for _ in range(effort.rounds):
+            theirs.append(bare(views, *tried[best], effort.seconds) / count)
+            told = load(server, [path], frame(), clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
+            ours.append(told["succeeded_per_second"])
+    return {"views": count, "tuning": tuning, "best": best, "ours": ours, "bare": theirs}
+
+
+def shares() -> list[tuple[int, int]]:
+    """Ways to share the cores: sessions and threads of each."""
+    cores = len(os.sched_getaffinity(0))
+    ways = [(1, cores), (cores, 1)] + ([(2, cores // 2)] if cores > 3 else [])
+    return list(dict.fromkeys(ways))
+
+
+def bare(views, sessions: int, threads: int, batch: int, seconds: float) -> float:
+    """Views per second in a process of its own."""
+    command = [python_of("benches"), BENCHES / "bare_onnx.py", model(MODEL), views, sessions, threads, batch, seconds]
+    answer = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    if answer.returncode != 0:
+        raise BenchError(f"bare_onnx.py failed: {answer.stderr.strip()}")
+    return float(answer.stdout)
+
+
+def tell(raw: dict) -> str:
+    """The ratio and the settings as Markdown."""
+    rows = [
+        ("`/detect`, frames/s", spread_cell(spread(raw["ours"]).as_json())),
+        (f"bare ONNX Runtime ({raw['best']}), frames/s", spread_cell(spread(raw["bare"]).as_json())),
+        ("**ratio, round by round**", spread_cell(ratios(raw["ours"], raw["bare"]).as_json())),
+    ]
+    tuning = sorted(raw["tuning"].items(), key=lambda item: -item[1])
+    return (
+        f"`{PROFILE}`, {MODEL}, {raw['views']} views per frame, {CLIENTS} clients, {len(raw['ours'])} rounds:\n\n"
+        + table(("", "median (range)"), rows)
+        + "\nBare settings tried (sessions × threads, views in a run):\n\n"
+        + table(("setting", "frames/s"), tuning)
+    )
+
+
+def draw(raw: dict) -> str:
+    """Server and bare settings as a chart."""
+    values = {"Lookdown /detect": spread(raw["ours"]).median, f"bare, {raw['best']}": spread(raw["bare"]).median}
+    return bars("limit", f"{PROFILE}: the server and the bare network", "frames per second", values)

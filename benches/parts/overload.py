@@ -1,0 +1,55 @@
+"""Far more frames than the server can work on: what it still does, and how fast it refuses the rest."""
+
+from harness.effort import Effort
+from harness.figures import spread
+from harness.load import load
+from harness.lookdown import detect, lookdown, report
+from harness.pictures import frame
+from harness.tables import spread_cell, table
+
+PROFILE = "balanced"
+CLIENTS = 8
+TIMES = 10
+
+
+def measure(effort: Effort) -> dict:
+    """Capacity and overload in turns, default settings."""
+    paths, picture, rounds = [detect(PROFILE)], frame(), []
+    with lookdown() as server:
+        report(server, paths[0], picture)  # makes the camera's tables
+        for _ in range(effort.rounds):
+            calm = load(server, paths, picture, clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
+            rate = TIMES * calm["succeeded_per_second"]
+            storm = load(server, paths, picture, rate=rate, warm_up=2.0, seconds=effort.seconds)
+            rounds.append({"capacity": calm, "overload": storm})
+    return {"rounds": rounds}
+
+
+def tell(raw: dict) -> str:
+    """Goodput and refusals as Markdown."""
+    rounds = raw["rounds"]
+    goodput = [turn["overload"]["succeeded_per_second"] / turn["capacity"]["succeeded_per_second"] for turn in rounds]
+    rows = [
+        ("capacity, frames/s", cell([turn["capacity"]["succeeded_per_second"] for turn in rounds])),
+        ("**goodput ÷ capacity**", cell(goodput)),
+        ("**p99 of refusals, ms**", cell([turn["overload"]["refused"].get("p99_ms", 0.0) for turn in rounds])),
+        ("p99 of answers, ms", cell([turn["overload"]["succeeded"].get("p99_ms", 0.0) for turn in rounds])),
+        ("refused", cell([float(turn["overload"]["refused"]["count"]) for turn in rounds])),
+        ("broken or timed out", cell([float(unanswered(turn["overload"])) for turn in rounds])),
+    ]
+    return f"`{PROFILE}`, {TIMES} times the capacity, {len(rounds)} rounds:\n\n" + table(("", "median (range)"), rows)
+
+
+def cell(values: list[float]) -> str:
+    """A median with its range."""
+    return spread_cell(spread(values).as_json())
+
+
+def unanswered(told: dict) -> int:
+    """Requests without an answer."""
+    return told["broken"] + told["timed_out"]
+
+
+def draw(_raw: dict) -> str:
+    """Nothing that the table does not show."""
+    return ""

@@ -1,0 +1,134 @@
+"""Other servers in the same run, in turns with ours.
+
+(a) plain Python as one writes it, with the paper's plan and with ours; (b) the views of our plan posted to a V2
+server, which decodes, renders and merges nothing.
+"""
+
+from contextlib import ExitStack
+from pathlib import Path
+
+from harness import peers
+from harness.charts import bars
+from harness.effort import Effort
+from harness.figures import ratios, spread
+from harness.load import load
+from harness.lookdown import MODEL, ROOMY, detect, lookdown, view_plan
+from harness.pictures import frame
+from harness.processes import Server
+from harness.sanity import agreement
+from harness.tables import spread_cell, table
+from harness.views import plan_file, v2_request, view_file
+
+CLIENTS = 16
+INPUT_SIDE = 416
+OURS, THEIRS = ("Lookdown, `balanced`", "Lookdown, `fast`"), "plain Python, "
+NAMES = {
+    "plain": f"{THEIRS}our `balanced` plan",
+    "paper": f"{THEIRS}the paper's plan",
+    "v2": "MLServer (V2), ready views of `balanced`",
+}
+# What is compared with what.
+PAIRS = ((OURS[0], NAMES["plain"]), (OURS[1], NAMES["paper"]), (OURS[0], NAMES["v2"]))
+
+
+def measure(effort: Effort) -> dict:
+    """Tunes each peer, then loads all of them in turns."""
+    with ExitStack() as stack:
+        ours = stack.enter_context(lookdown(ROOMY))
+        plan, paper_plan = view_plan(ours, "balanced"), view_plan(ours, "paper")
+        request = v2_request(view_file(plan, INPUT_SIDE))
+        starts = {
+            "plain": lambda setting: peers.plain_python(setting, plan_file(plan), "nms"),
+            "paper": lambda setting: peers.plain_python(setting, plan_file(paper_plan), "soft_nms"),
+            "v2": peers.v2_server,
+        }
+        asked = {"plain": plain_body(), "paper": plain_body(), "v2": v2_body(request)}
+        tuned = {name: tune(effort, starts[name], asked[name], name != "v2") for name in ("plain", "v2")}
+        tuned["paper"] = tuned["plain"]
+        setting = {name: peers.Setting(**best(rows)["setting"]) for name, rows in tuned.items()}
+        servers = {name: stack.enter_context(start(setting[name])) for name, start in starts.items()}
+        fast = {"paths": [detect("fast", model=MODEL)], "body": frame()}
+        turns = {
+            OURS[0]: (ours, {"paths": [detect("balanced", model=MODEL)], "body": frame()}),
+            OURS[1]: (ours, fast),
+        } | {NAMES[name]: (server, asked[name]) for name, server in servers.items()}
+        rounds = {name: [] for name in turns}
+        for _ in range(effort.rounds):
+            for name, (server, what) in turns.items():
+                rounds[name].append(window(server, what, effort.seconds))
+        return {
+            "settings": {NAMES[name]: chosen.text() for name, chosen in setting.items()},
+            "tuning": {NAMES[name]: tuned[name] for name in ("plain", "v2")},
+            "rounds": rounds,
+            "agreement": agreement(ours, servers["plain"]),
+        }
+
+
+def plain_body() -> dict:
+    """What a plain Python server is asked."""
+    return {"paths": ["/detect"], "body": frame()}
+
+
+def v2_body(request: Path) -> dict:
+    """What a V2 server is asked."""
+    return {"paths": ["/v2/models/detector/infer"], "body": request, "content_type": "application/json"}
+
+
+def window(server: Server, what: dict, seconds: float) -> dict:
+    """A closed loop in which each client is answered at least twice."""
+    first = load(server, clients=2, warm_up=0.5, seconds=min(seconds, 3.0), **what)
+    turn = CLIENTS / max(first["succeeded_per_second"], 0.2)
+    return load(server, clients=CLIENTS, warm_up=1.2 * turn, seconds=max(seconds, 2.0 * turn), **what)
+
+
+def tune(effort: Effort, start, what: dict, parallel: bool) -> list[dict]:
+    """Frames per second under each setting."""
+    rows = []
+    for setting in peers.settings(parallel)[:: 1 if effort.name == "full" else 3]:
+        with start(setting) as server:
+            told = load(server, clients=4, warm_up=2.0, seconds=2.0 * effort.tune_seconds, **what)
+        rows.append({"setting": vars(setting), "frames_per_second": told["succeeded_per_second"]})
+    return rows
+
+
+def best(rows: list[dict]) -> dict:
+    """The row with the most frames per second."""
+    return max(rows, key=lambda row: row["frames_per_second"])
+
+
+def tell(raw: dict) -> str:
+    """The comparison as Markdown."""
+    rows = []
+    for name, rounds in raw["rounds"].items():
+        p99 = spread([told["succeeded"].get("p99_ms", float("nan")) for told in rounds])
+        per_second = spread([told["succeeded_per_second"] for told in rounds])
+        cpu = spread([told["cpu_seconds_per_frame"] for told in rounds])
+        rows.append((name, per_second.median, p99.median, cpu.median, rounds[-1]["resident_mib"]))
+    compared = []
+    for ours, theirs in PAIRS:
+        mine, other = raw["rounds"][ours], raw["rounds"][theirs]
+        faster = ratios(*[[told["succeeded_per_second"] for told in rounds] for rounds in (mine, other)])
+        later = ratios(*[[told["succeeded"]["p99_ms"] for told in rounds] for rounds in (mine, other)])
+        compared.append((f"{ours} ÷ {theirs}", spread_cell(faster.as_json()), spread_cell(later.as_json())))
+    settings = "\n".join(f"* {name}: {setting}" for name, setting in raw["settings"].items())
+    head = (f"{CLIENTS} clients", "frames/s", "p99, ms", "CPU s per frame", "memory, MiB")
+    return (
+        f"{table(head, rows)}\n{table(('ratio, median (range)', 'frames/s', 'p99'), compared)}\n"
+        f"The best of the settings that were tried:\n\n{settings}\n\n{told_agreement(raw['agreement'])}"
+    )
+
+
+def told_agreement(rows: list[dict]) -> str:
+    """How far the plain server finds the same persons."""
+    head = ("our refinement", "boxes we find", "boxes it finds with NMS", "the same ones", "mean IoU of those")
+    found = [(row["refine"], row["ours"], row["theirs"], row["same"], row["mean_iou"]) for row in rows]
+    return f"Whether it does the same work, plan and model being the same:\n\n{table(head, found)}"
+
+
+def draw(raw: dict) -> str:
+    """The comparison as a chart."""
+    values = {
+        name.replace("`", ""): spread([told["succeeded_per_second"] for told in rounds]).median
+        for name, rounds in raw["rounds"].items()
+    }
+    return bars("peers", f"{CLIENTS} clients, 1680 × 1680 JPEG, {MODEL}", "frames per second", values)

@@ -1,0 +1,60 @@
+"""The detector: frame, views, network, boxes back in the frame, one box per person."""
+
+import threading
+
+import cv2
+import numpy as np
+import onnxruntime
+from suppression import nms, soft_nms
+from views import Lens, View
+
+SCORE = 0.3
+"""Of a person in the answer, at least. No box below it can become one, nor change one."""
+
+
+class Detector:
+    """Finds persons in the frames of one camera."""
+
+    def __init__(self, model: str, plan: dict, calibration: dict, refine: str, threads: int, batch: int):
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads
+        self.session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        self.size = self.session.get_inputs()[0].shape[2]
+        self.plan, self.calibration, self.batch = plan["views"], calibration, batch
+        self.refine = {"nms": nms, "soft_nms": soft_nms}[refine]
+        self.views: dict[int, list[View]] = {}
+        self.making = threading.Lock()
+
+    def detect(self, jpeg: bytes) -> list[dict]:
+        """The persons in a frame."""
+        frame = cv2.cvtColor(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+        views = self.views_for(frame.shape[1])
+        boxes, scores = [], []
+        for start in range(0, len(views), self.batch):
+            some = views[start : start + self.batch]
+            found = self.session.run(["boxes", "scores"], {"images": self.tensor(frame, some)})
+            for view, view_boxes, view_scores in zip(some, *found):
+                good = view_scores >= SCORE
+                boxes.append(view.boxes_in_frame(view_boxes[good]))
+                scores.append(view_scores[good])
+        boxes, scores = np.concatenate(boxes), np.concatenate(scores).astype(float)
+        usable = np.isfinite(boxes).all(axis=1)
+        return [
+            {"box": dict(zip(("x_min", "y_min", "x_max", "y_max"), box.tolist())), "score": score}
+            for box, score in self.refine(boxes[usable], scores[usable])
+        ]
+
+    def tensor(self, frame: np.ndarray, views: list[View]) -> np.ndarray:
+        """Some views as network input `[n, 3, size, size]`."""
+        tensor = np.empty((len(views), 3, self.size, self.size), np.float32)
+        for slot, view in zip(tensor, views):
+            slot[:] = view.render(frame).transpose(2, 0, 1)
+        return tensor
+
+    def views_for(self, width: int) -> list[View]:
+        """The views with their maps, made at the first frame of a size."""
+        with self.making:
+            if width not in self.views:
+                lens = Lens(self.calibration, width)
+                self.views[width] = [View(planned, self.size, lens) for planned in self.plan]
+            return self.views[width]

@@ -1,0 +1,59 @@
+"""Virtual views of a fisheye frame with OpenCV: maps made once, then one remap per view."""
+
+import cv2
+import numpy as np
+
+
+class Lens:
+    """An equidistant lens, r = f · theta, for frames of one size."""
+
+    def __init__(self, calibration: dict, width: int):
+        lens = calibration["lens"]
+        if lens["model"] != "equidistant":
+            raise ValueError("only equidistant lenses are known here")
+        scale = width / calibration["image"]["width"]
+        self.focal = lens["focal"] * scale
+        self.cx = (lens["cx"] + 0.5) * scale - 0.5
+        self.cy = (lens["cy"] + 0.5) * scale - 0.5
+        self.max_theta = lens["max_theta"]
+
+    def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frame pixels (pixel centres) of rays `[..., 3]` in the camera frame, and which of them the lens sees."""
+        across = np.hypot(rays[..., 0], rays[..., 1])
+        theta = np.arctan2(across, rays[..., 2])
+        scale = self.focal * theta / np.maximum(across, 1e-12)
+        pixels = rays[..., :2] * scale[..., None] + [self.cx, self.cy]
+        return pixels, theta <= self.max_theta
+
+
+class View:
+    """One pinhole view of `size` × `size` pixels."""
+
+    def __init__(self, planned: dict, size: int, lens: Lens):
+        self.rotation = np.array(planned["camera_from_view"])
+        self.focal = size / 2 / np.tan(np.radians(planned["field_of_view_deg"]) / 2)
+        self.middle = (size - 1) / 2
+        self.lens = lens
+        columns, rows = np.meshgrid(np.arange(size), np.arange(size))
+        pixels, seen = lens.project(self.rays(columns, rows))
+        pixels[~seen] = -1e4  # outside of the frame: black
+        # Fixed-point maps are what OpenCV remaps fastest with.
+        self.maps = cv2.convertMaps(pixels[..., 0].astype(np.float32), pixels[..., 1].astype(np.float32), cv2.CV_16SC2)
+
+    def rays(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Rays in the camera frame through view pixels (pixel centres)."""
+        rays = np.stack([(x - self.middle) / self.focal, (y - self.middle) / self.focal, np.ones(np.shape(x))], axis=-1)
+        return rays @ self.rotation.T
+
+    def render(self, frame: np.ndarray) -> np.ndarray:
+        """What the view sees of a frame `[height, width, 3]`."""
+        return cv2.remap(frame, *self.maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+
+    def boxes_in_frame(self, boxes: np.ndarray) -> np.ndarray:
+        """Axis-parallel hulls in the frame of the four corners of boxes `[n, 4]`; those mostly unseen are left out."""
+        x = boxes[:, [0, 2, 2, 0]] - 0.5
+        y = boxes[:, [1, 1, 3, 3]] - 0.5
+        pixels, seen = self.lens.project(self.rays(x, y))
+        hulls = np.concatenate([pixels.min(axis=1), pixels.max(axis=1)], axis=1) + 0.5
+        hulls[seen.sum(axis=1) < 2] = np.nan
+        return hulls
