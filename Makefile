@@ -2,7 +2,7 @@
 PYTHON ?= python3
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test ci bless bench-remap
+.PHONY: help setup models serve test bench bench-full bench-remap ci bless
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
@@ -26,8 +26,19 @@ test: ## set up, then everything that needs nothing but this repository: formatt
 	cargo clippy --all-targets --locked -- -D warnings
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
+	$(PYTHON) -m unittest discover -s benches/tests -t benches
 	cargo test --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --locked
+
+bench: ## the benchmarks beside other servers, a few minutes to see that everything works: benches/RESULTS.md
+bench-full: ## the benchmarks for figures to rely on: two hours on a machine that does nothing else
+bench: BENCH = short
+bench-full: BENCH = full
+bench bench-full:
+	@$(PYTHON) scripts/setup.py toolchain runtime model benches
+	cargo build --release --locked --target-dir target
+	cargo build --release --locked --example load --target-dir target
+	.setup/benches/benches/bin/python benches/run.py $(BENCH) $(PARTS)
 
 ci: ## all that the continuous integration runs
 	.ci/run

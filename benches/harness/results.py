@@ -9,9 +9,9 @@ from .places import RAW, RESULTS
 
 INTRODUCTION = """# Results
 
-Written by `make bench` (a few minutes, to see that everything works) or `make bench-full` (hours, for figures to
-rely on); how they measure is in [README.md](README.md). Ratios come from windows that alternate in one run; absolute
-figures hold for the machine they were measured on.
+Written by `make bench` (a few minutes, to see that everything works) or `make bench-full` (two hours, for figures
+to rely on); how they measure is in [README.md](README.md). Ratios come from windows that alternate in one run;
+absolute figures hold for the machine they were measured on.
 """
 
 
