@@ -4,6 +4,7 @@ Each part measures, keeps its figures in raw/, and RESULTS.md is written anew fr
 does the latter.
 """
 
+import signal
 import sys
 import time
 
@@ -26,6 +27,8 @@ EFFORTS = {effort.name: effort for effort in (SHORT, FULL)}
 def main(arguments: list[str]) -> int:
     """The exit status."""
     named = {part.__name__.rpartition(".")[2]: part for part in PARTS.values()}
+    # Servers that were started are stopped on the way out.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     wanted, *parts = arguments or [""]
     unknown = [name for name in parts if name not in named]
     if wanted not in (*EFFORTS, "tell") or unknown:

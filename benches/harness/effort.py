@@ -19,6 +19,8 @@ class Effort:
     """Clients of the closed loops."""
     loads: tuple[int, ...]
     """Rates of the open loops, percent of the capacity."""
+    peer_clients: int
+    """Clients when servers are compared."""
     many_clients: tuple[int, ...]
     """Growth with clients."""
     sides: tuple[int, ...]
@@ -41,6 +43,7 @@ FULL = Effort(
     tune_seconds=5.0,
     clients=(1, 4, 16, 64),
     loads=(50, 80, 120, 1000),
+    peer_clients=16,
     many_clients=(1, 2, 4, 8, 16, 32, 64, 128, 256),
     sides=(600, 960, 1280, 1680, 2240, 3000, 4000),
     cameras=(1, 10, 100, 1000),
@@ -52,11 +55,13 @@ FULL = Effort(
 SHORT = replace(
     FULL,
     name="short",
+    profiles=("fast", "balanced"),
     seconds=3.0,
-    rounds=2,
+    rounds=1,
     tune_seconds=1.5,
     clients=(1, 4),
     loads=(80, 1000),
+    peer_clients=4,
     many_clients=(1, 16),
     sides=(600, 1680, 4000),
     cameras=(1, 20),

@@ -45,10 +45,23 @@ def load(
     }
 
 
-def steady(server: Server, paths: list[str], body: Path, *, clients: int, seconds: float, frame_seconds: float) -> dict:
+def steady(
+    server: Server,
+    paths: list[str],
+    body: Path,
+    *,
+    clients: int,
+    seconds: float,
+    frame_seconds: float,
+    content_type: str = "image/jpeg",
+) -> dict:
     """A closed loop whose warm-up and window are long enough for every client, if a frame takes `frame_seconds`."""
     turn = clients * frame_seconds
-    return load(server, paths, body, clients=clients, warm_up=max(1.0, 1.2 * turn), seconds=max(seconds, 2.0 * turn))
+    warm_up, seconds = max(1.0, 1.2 * turn), max(seconds, 2.0 * turn)
+    told = load(server, paths, body, clients=clients, warm_up=warm_up, seconds=seconds, content_type=content_type)
+    if not told["succeeded"]["count"]:
+        raise BenchError(f"{paths[0]}: nothing was answered with success in {seconds:.0f} s: {told}")
+    return told
 
 
 def start_load(server: Server, paths: list[str], body: Path, *, seconds: float, rate: float) -> subprocess.Popen:

@@ -29,6 +29,9 @@ def lookdown(settings: dict[str, str] | None = None, calibrations: Path = SAMPLE
     environment = {f"LOOKDOWN__{name}": value for name, value in wanted.items()}
     environment["MALLOC_MMAP_THRESHOLD_"] = "131072"
     with running("lookdown", [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
+        # Ready is said when the default profile's model is loaded; other profiles' may still be loading.
+        camera = next(calibrations.glob("*.json")).stem
+        server.wait_for(f"/calibrations/{camera}/views?profile=paper")
         yield server
 
 

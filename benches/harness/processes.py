@@ -40,6 +40,18 @@ class Server:
         with urllib.request.urlopen(f"http://{self.address}{path}", timeout=60) as answer:
             return answer.read()
 
+    def wait_for(self, path: str, seconds: float = 60.0) -> None:
+        """Until a path is answered with success."""
+        deadline = time.monotonic() + seconds
+        while True:
+            try:
+                self.get(path)
+                return
+            except urllib.error.HTTPError as error:
+                if time.monotonic() > deadline:
+                    raise BenchError(f"{path} is still answered {error.code} after {seconds:.0f} s") from None
+            time.sleep(0.05)
+
     def post(self, path: str, body: bytes, content_type: str = "image/jpeg") -> bytes:
         """The answer to a body."""
         headers = {"Content-Type": content_type}

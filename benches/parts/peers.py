@@ -4,6 +4,7 @@
 server, which decodes, renders and merges nothing.
 """
 
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from harness import peers
 from harness.charts import bars
 from harness.effort import Effort
 from harness.figures import ratios, spread
-from harness.load import load
+from harness.load import load, steady
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, view_plan
 from harness.pictures import frame
 from harness.processes import Server
@@ -19,7 +20,6 @@ from harness.sanity import agreement
 from harness.tables import spread_cell, table
 from harness.views import plan_file, v2_request, view_file
 
-CLIENTS = 16
 INPUT_SIDE = 416
 OURS, THEIRS = ("Lookdown, `balanced`", "Lookdown, `fast`"), "plain Python, "
 NAMES = {
@@ -47,18 +47,18 @@ def measure(effort: Effort) -> dict:
         tuned["paper"] = tuned["plain"]
         setting = {name: peers.Setting(**best(rows)["setting"]) for name, rows in tuned.items()}
         servers = {name: stack.enter_context(start(setting[name])) for name, start in starts.items()}
-        fast = {"paths": [detect("fast", model=MODEL)], "body": frame()}
         turns = {
-            OURS[0]: (ours, {"paths": [detect("balanced", model=MODEL)], "body": frame()}),
-            OURS[1]: (ours, fast),
+            OURS[0]: (ours, plain_body() | {"paths": [detect("balanced", model=MODEL)]}),
+            OURS[1]: (ours, plain_body() | {"paths": [detect("fast", model=MODEL)]}),
         } | {NAMES[name]: (server, asked[name]) for name, server in servers.items()}
         rounds = {name: [] for name in turns}
         for _ in range(effort.rounds):
             for name, (server, what) in turns.items():
-                rounds[name].append(window(server, what, effort.seconds))
+                rounds[name].append(window(server, what, effort))
         return {
             "settings": {NAMES[name]: chosen.text() for name, chosen in setting.items()},
             "tuning": {NAMES[name]: tuned[name] for name in ("plain", "v2")},
+            "clients": effort.peer_clients,
             "rounds": rounds,
             "agreement": agreement(ours, servers["plain"]),
         }
@@ -66,7 +66,7 @@ def measure(effort: Effort) -> dict:
 
 def plain_body() -> dict:
     """What a plain Python server is asked."""
-    return {"paths": ["/detect"], "body": frame()}
+    return {"paths": ["/detect"], "body": frame(), "content_type": "image/jpeg"}
 
 
 def v2_body(request: Path) -> dict:
@@ -74,11 +74,12 @@ def v2_body(request: Path) -> dict:
     return {"paths": ["/v2/models/detector/infer"], "body": request, "content_type": "application/json"}
 
 
-def window(server: Server, what: dict, seconds: float) -> dict:
+def window(server: Server, what: dict, effort: Effort) -> dict:
     """A closed loop in which each client is answered at least twice."""
-    first = load(server, clients=2, warm_up=0.5, seconds=min(seconds, 3.0), **what)
-    turn = CLIENTS / max(first["succeeded_per_second"], 0.2)
-    return load(server, clients=CLIENTS, warm_up=1.2 * turn, seconds=max(seconds, 2.0 * turn), **what)
+    began = time.monotonic()
+    server.post(what["paths"][0], what["body"].read_bytes(), what["content_type"])
+    alone = time.monotonic() - began
+    return steady(server, clients=effort.peer_clients, seconds=effort.seconds, frame_seconds=alone, **what)
 
 
 def tune(effort: Effort, start, what: dict, parallel: bool) -> list[dict]:
@@ -111,7 +112,7 @@ def tell(raw: dict) -> str:
         later = ratios(*[[told["succeeded"]["p99_ms"] for told in rounds] for rounds in (mine, other)])
         compared.append((f"{ours} ÷ {theirs}", spread_cell(faster.as_json()), spread_cell(later.as_json())))
     settings = "\n".join(f"* {name}: {setting}" for name, setting in raw["settings"].items())
-    head = (f"{CLIENTS} clients", "frames/s", "p99, ms", "CPU s per frame", "memory, MiB")
+    head = (f"{raw['clients']} clients", "frames/s", "p99, ms", "CPU s per frame", "memory, MiB")
     return (
         f"{table(head, rows)}\n{table(('ratio, median (range)', 'frames/s', 'p99'), compared)}\n"
         f"The best of the settings that were tried:\n\n{settings}\n\n{told_agreement(raw['agreement'])}"
@@ -131,4 +132,4 @@ def draw(raw: dict) -> str:
         name.replace("`", ""): spread([told["succeeded_per_second"] for told in rounds]).median
         for name, rounds in raw["rounds"].items()
     }
-    return bars("peers", f"{CLIENTS} clients, 1680 × 1680 JPEG, {MODEL}", "frames per second", values)
+    return bars("peers", f"{raw['clients']} clients, 1680 × 1680 JPEG, {MODEL}", "frames per second", values)
