@@ -51,7 +51,6 @@ bless: ## regenerate the checked-in generated files: openapi/openapi.json and th
 	INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --locked
 
 bench-remap: ## time remap tables and the rendering of views, the latter beside OpenCV's
-	$(PYTHON) -m venv .setup/bench-venv
-	.setup/bench-venv/bin/python -m pip install --quiet --requirement benches/requirements.txt
+	@$(PYTHON) scripts/setup.py benches
 	cargo bench --locked --bench remap
-	.setup/bench-venv/bin/python benches/against_opencv.py
+	.setup/benches/benches/bin/python benches/against_opencv.py

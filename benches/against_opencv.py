@@ -1,6 +1,6 @@
 """Our rendering of views beside OpenCV's: remap (bilinear, fixed-point maps) and then blobFromImages.
 
-`against_opencv.py [ROUNDS]`, after `pip install -r requirements.txt`. Both sides render the same 24 views of the same
+`against_opencv.py [ROUNDS]`, after `scripts/setup.py benches`. Both sides render the same 24 views of the same
 frame at the same positions, on one thread each, in turns; a ratio is the median over the rounds of ours / theirs within
 one round, so that whatever else the machine does meets both. Prints JSON, one line per view size.
 """

@@ -11,13 +11,14 @@ import time
 from harness.effort import FULL, SHORT
 from harness.processes import BenchError
 from harness.results import measure, write
-from parts import growth, lifetime, limit, overload, peers, whole
+from parts import growth, lifetime, limit, overload, peers, remap, whole
 
 PARTS = {
     "The whole service": whole,
     "The limit: bare ONNX Runtime": limit,
     "Other servers": peers,
     "Overload": overload,
+    "Remap": remap,
     "Start and memory": lifetime,
     "Growth": growth,
 }
