@@ -2,8 +2,8 @@
 //! without. `cargo bench --bench remap` prints milliseconds (median and least of many rounds).
 //!
 //! `cargo bench --bench remap -- rounds FOLDER SIDE` is the half of `against_opencv.py` that is ours: it
-//! writes what both sides need into the folder, then renders all views once for each line it reads
-//! and answers with the nanoseconds that took.
+//! writes what both sides need into the folder, then renders the view whose index is on each line it
+//! reads and answers with the nanoseconds that took.
 
 use std::{
     error::Error,
@@ -21,7 +21,7 @@ use lookdown::{
 };
 
 const FRAME_SIDE: u32 = 1680;
-const ROUNDS: usize = 60;
+const ROUNDS: usize = 240;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -59,20 +59,21 @@ fn print_times() -> Outcome<()> {
     for side in [300, 416] {
         let (tables, input) = (tables(side)?, NetworkInput::plain(side, side));
         let mut slot = vec![0.0; input.view_len()];
-        let vector = times(|| render_all(&tables, |table| table.render(&frame, &input, &mut slot)));
-        println!("24 views of {side}², vector: {vector}");
-        let scalar = times(|| {
-            render_all(&tables, |table| {
-                table.render_portably(&frame, &input, &mut slot);
-            });
-        });
-        println!("24 views of {side}², portable: {scalar}");
+        let mut view = 0;
+        let mut next = || {
+            view = (view + 1) % tables.len();
+            &tables[view]
+        };
+        let vector = times(|| next().render(&frame, &input, &mut slot));
+        println!("a view of {side}², vector: {vector}");
+        let portable = times(|| next().render_portably(&frame, &input, &mut slot));
+        println!("a view of {side}², portable: {portable}");
     }
     Ok(())
 }
 
 /// Writes the frame (`frame.rgb`) and the views' positions (`positions.f32`: x, y, pixel by pixel and
-/// view by view; −1000 where nothing is seen), then one round per line.
+/// view by view; −1000 where nothing is seen), then renders one view per line.
 fn answer_rounds(folder: &Path, side: u32) -> Outcome<()> {
     let (frame, tables) = (frame()?, tables(side)?);
     let input = NetworkInput {
@@ -98,11 +99,10 @@ fn answer_rounds(folder: &Path, side: u32) -> Outcome<()> {
     let mut batch = vec![0.0; tables.len() * input.view_len()];
     println!("{} {}", tables.len(), FRAME_SIDE);
     for line in stdin().lock().lines() {
-        line?;
+        let view: usize = line?.parse()?;
+        let slot = &mut batch[view * input.view_len()..][..input.view_len()];
         let started = Instant::now();
-        for (table, slot) in tables.iter().zip(batch.chunks_exact_mut(input.view_len())) {
-            table.render(&frame, &input, slot);
-        }
+        tables[view].render(&frame, &input, slot);
         println!("{}", started.elapsed().as_nanos());
     }
     let bytes: Vec<u8> = batch.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -142,12 +142,6 @@ fn frame() -> Outcome<Frame> {
     Ok(Frame::new(FRAME_SIDE, FRAME_SIDE, pixels.collect())?)
 }
 
-fn render_all(tables: &[RemapTable], mut render: impl FnMut(&RemapTable)) {
-    for table in tables {
-        render(table);
-    }
-}
-
 fn times(mut work: impl FnMut()) -> String {
     let mut rounds: Vec<Duration> = (0..ROUNDS)
         .map(|_| {
@@ -158,5 +152,5 @@ fn times(mut work: impl FnMut()) -> String {
         .collect();
     rounds.sort_unstable();
     let [median, least] = [ROUNDS / 2, 0].map(|index| rounds[index].as_secs_f64() * 1e3);
-    format!("{median:.2} ms (least {least:.2})")
+    format!("{median:.3} ms (least {least:.3})")
 }

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use self::{
     frame_from_plane::FrameFromPlane,
     node_grid::{NodeGrid, Places},
-    row::{LANES, Outputs, Row, Source},
+    row::{LANES, Planes, Row, Source},
 };
 use super::{Frame, NetworkInput};
 use crate::geometry::{Lens, Pixel, VirtualView};
@@ -125,8 +125,8 @@ impl RemapTable {
         if let Some(avx2) = vector::Avx2::detect()
             && i32::try_from(frame.pixels().len()).is_ok()
         {
-            self.render_rows(frame, input, slot, |source, row, planes| {
-                vector::render_row(avx2, source, row, planes);
+            self.render_bands(frame, input, slot, |source, rows, planes| {
+                vector::render_rows(avx2, source, rows, planes);
             });
             return;
         }
@@ -136,33 +136,37 @@ impl RemapTable {
     /// What [`RemapTable::render`] does where there are no vector instructions it knows: the same,
     /// to the bit.
     pub fn render_portably(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
-        self.render_rows(frame, input, slot, scalar::render_row);
+        self.render_bands(frame, input, slot, scalar::render_rows);
     }
 
-    fn render_rows(
+    fn render_bands(
         &self,
         frame: &Frame,
         input: &NetworkInput,
         slot: &mut [f32],
-        render_row: impl Fn(&Source, &Row, Outputs<[f32]>),
+        render_rows: impl Fn(&Source, &[Row], Planes),
     ) {
         debug_assert_eq!(
             (frame.width(), frame.height()),
             (self.frame_width, self.frame_height)
         );
         let source = Source::new(frame, input);
-        let width = input.width as usize;
         let (first, rest) = slot.split_at_mut(input.plane_len());
         let (second, third) = rest.split_at_mut(input.plane_len());
-        let planes = [first, second, third].map(|plane| plane.chunks_exact_mut(width));
-        let [first, second, third] = planes;
-        let mut nodes = Places::default();
-        for (y, ((first, second), third)) in first.zip(second).zip(third).enumerate() {
+        let band_len = LANES * input.width as usize;
+        let [first, second, third] = [first, second, third].map(|plane| plane.chunks_mut(band_len));
+        let mut nodes: [Places; LANES] = std::array::from_fn(|_| Places::default());
+        for (band, ((first, second), third)) in first.zip(second).zip(third).enumerate() {
+            let rows = first.len() / input.width as usize;
+            let rows = nodes[..rows].iter_mut().enumerate();
+            let rows: Vec<_> = rows
+                .map(|(row, nodes)| self.row(band * LANES + row, nodes))
+                .collect();
             let mut planes = [first, second, third];
             if input.source_channels()[0] != 0 {
                 planes.reverse();
             }
-            render_row(&source, &self.row(y, &mut nodes), planes);
+            render_rows(&source, &rows, planes);
         }
     }
 

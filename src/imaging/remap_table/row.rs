@@ -1,4 +1,4 @@
-//! One row of a view while it is rendered, eight pixels at a time.
+//! Rows of a view while they are rendered, eight pixels at a time.
 
 use super::{
     node_grid::{NODE_STEP, Places},
@@ -43,8 +43,8 @@ pub(super) struct Block {
     pub(super) lanes: u8,
 }
 
-/// One output per channel.
-pub(super) type Outputs<'a, T> = [&'a mut T; 3];
+/// Where red, green and blue go to.
+pub(super) type Planes<'a> = [&'a mut [f32]; 3];
 
 impl<'a> Source<'a> {
     pub(super) fn new(frame: &'a Frame, input: &NetworkInput) -> Self {
@@ -80,44 +80,39 @@ impl Row<'_> {
             lanes: self.visibility.lanes(first_pixel),
         }
     }
+}
 
-    /// Renders the row into `planes`, each as long as the view is wide: `sample` makes the values of
-    /// one block, and is not asked where nothing is visible.
-    #[expect(
-        clippy::inline_always,
-        reason = "`sample` becomes vector code only within a function that may use it"
-    )]
-    #[inline(always)]
-    pub(super) fn render(
-        &self,
-        source: &Source,
-        planes: Outputs<[f32]>,
-        sample: impl Fn(&Source, &Block, Outputs<[f32; LANES]>),
-    ) {
-        let [red, green, blue] = planes.map(|plane| plane.as_chunks_mut::<LANES>());
-        let whole_blocks = red.0.len();
-        let render_block = |index: usize, [red, green, blue]: Outputs<[f32; LANES]>| {
-            let block = self.block(index);
-            if block.lanes == 0 {
-                let [of_red, of_green, of_blue] = source.offset;
-                red.fill(of_red);
-                green.fill(of_green);
-                blue.fill(of_blue);
+/// Renders some rows into `planes`, each of which holds as many rows: block by block, each in all
+/// rows, so that what they sample lies close together. `sample` makes the values of one block, and
+/// is not asked where nothing is visible.
+#[expect(
+    clippy::inline_always,
+    reason = "`sample` becomes vector code only within a function that may use it"
+)]
+#[inline(always)]
+pub(super) fn render_band(
+    source: &Source,
+    rows: &[Row],
+    mut planes: Planes,
+    sample: impl Fn(&Source, &Block) -> [[f32; LANES]; 3],
+) {
+    let width = planes[0].len() / rows.len();
+    for (index, first_pixel) in (0..width).step_by(LANES).enumerate() {
+        for (y, row) in rows.iter().enumerate() {
+            let block = row.block(index);
+            let values = if block.lanes == 0 {
+                source.offset.map(|offset| [offset; LANES])
             } else {
-                sample(source, &block, [red, green, blue]);
-            }
-        };
-        let outputs = red.0.iter_mut().zip(green.0).zip(blue.0);
-        for (index, ((red, green), blue)) in outputs.enumerate() {
-            render_block(index, [red, green, blue]);
-        }
-        let rest = [red.1, green.1, blue.1];
-        if !rest[0].is_empty() {
-            let mut values = [[0.0; LANES]; 3];
-            let [red, green, blue] = &mut values;
-            render_block(whole_blocks, [red, green, blue]);
-            for (plane, values) in rest.into_iter().zip(values) {
-                plane.copy_from_slice(&values[..plane.len()]);
+                sample(source, &block)
+            };
+            let start = y * width + first_pixel;
+            for (plane, values) in planes.iter_mut().zip(&values) {
+                if first_pixel + LANES <= width {
+                    plane[start..start + LANES].copy_from_slice(values);
+                } else {
+                    let rest = width - first_pixel;
+                    plane[start..start + rest].copy_from_slice(&values[..rest]);
+                }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Sampling one pixel at a time, on every machine.
 
-use super::row::{Block, LANES, Outputs, Row, Source, WEIGHT_ONE};
+use super::row::{Block, LANES, Planes, Row, Source, WEIGHT_ONE, render_band};
 
 /// Four neighbours of a position in the frame and their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,8 +13,8 @@ pub(super) struct Sample {
     lower_weight: f32,
 }
 
-pub(super) fn render_row(source: &Source, row: &Row, planes: Outputs<[f32]>) {
-    row.render(source, planes, sample_block);
+pub(super) fn render_rows(source: &Source, rows: &[Row], planes: Planes) {
+    render_band(source, rows, planes, sample_block);
 }
 
 impl Block {
@@ -36,14 +36,14 @@ impl Block {
     }
 }
 
-fn sample_block(source: &Source, block: &Block, outputs: Outputs<[f32; LANES]>) {
+fn sample_block(source: &Source, block: &Block) -> [[f32; LANES]; 3] {
     let samples = block.samples(source.width, source.height);
-    for (channel, values) in outputs.into_iter().enumerate() {
-        for (value, sample) in values.iter_mut().zip(&samples) {
+    std::array::from_fn(|channel| {
+        samples.map(|sample| {
             let sum = sample.map_or(0.0, |sample| sample.weighted_sum(source, channel));
-            *value = sum * source.scale[channel] + source.offset[channel];
-        }
-    }
+            sum * source.scale[channel] + source.offset[channel]
+        })
+    })
 }
 
 impl Sample {

@@ -14,7 +14,7 @@ use std::arch::x86_64::{
     _mm256_srli_epi32, _mm256_srli_epi64, _mm256_sub_epi32, _mm256_sub_ps,
 };
 
-use super::row::{Block, LANES, Outputs, Row, Source, WEIGHT_ONE};
+use super::row::{Block, LANES, Planes, Row, Source, WEIGHT_ONE, render_band};
 
 /// The bytes of two neighbouring pixels, and two more.
 const PAIR_BYTES: usize = 8;
@@ -30,17 +30,17 @@ impl Avx2 {
     }
 }
 
-/// As `scalar::render_row`, for frames of less than 2 GiB.
-pub(super) fn render_row(_proof: Avx2, source: &Source, row: &Row, planes: Outputs<[f32]>) {
+/// As `scalar::render_rows`, for frames of less than 2 GiB.
+pub(super) fn render_rows(_proof: Avx2, source: &Source, rows: &[Row], planes: Planes) {
     // SAFETY: there is proof that the processor has AVX2.
-    unsafe { render_row_with_avx2(source, row, planes) }
+    unsafe { render_rows_with_avx2(source, rows, planes) }
 }
 
 #[target_feature(enable = "avx2")]
-fn render_row_with_avx2(source: &Source, row: &Row, planes: Outputs<[f32]>) {
+fn render_rows_with_avx2(source: &Source, rows: &[Row], planes: Planes) {
     let lines = Lines::of(source);
-    row.render(source, planes, |source, block, outputs| {
-        sample_block(source, &lines, block, outputs);
+    render_band(source, rows, planes, |source, block| {
+        sample_block(source, &lines, block)
     });
 }
 
@@ -75,7 +75,7 @@ struct Samples {
 }
 
 #[target_feature(enable = "avx2")]
-fn sample_block(source: &Source, lines: &Lines, block: &Block, outputs: Outputs<[f32; LANES]>) {
+fn sample_block(source: &Source, lines: &Lines, block: &Block) -> [[f32; LANES]; 3] {
     let samples = samples(source, block);
     let [low, high] = pixel_pairs(lines.upper, &samples.first_bytes);
     let upper = weighted_sums(
@@ -89,19 +89,14 @@ fn sample_block(source: &Source, lines: &Lines, block: &Block, outputs: Outputs<
         high_halves(low, high),
         samples.weights,
     );
-    for (channel, values) in outputs.into_iter().enumerate() {
+    [0, 1, 2].map(|channel| {
         let difference = _mm256_sub_ps(lower[channel], upper[channel]);
-        let sum = _mm256_add_ps(
-            upper[channel],
-            _mm256_mul_ps(difference, samples.lower_weight),
-        );
-        let sum = _mm256_and_ps(sum, samples.is_visible);
+        let share = _mm256_mul_ps(difference, samples.lower_weight);
+        let sum = _mm256_and_ps(_mm256_add_ps(upper[channel], share), samples.is_visible);
         let scaled = _mm256_mul_ps(sum, _mm256_set1_ps(source.scale[channel]));
-        *values = singles(_mm256_add_ps(
-            scaled,
-            _mm256_set1_ps(source.offset[channel]),
-        ));
-    }
+        let offset = _mm256_set1_ps(source.offset[channel]);
+        singles(_mm256_add_ps(scaled, offset))
+    })
 }
 
 #[target_feature(enable = "avx2")]

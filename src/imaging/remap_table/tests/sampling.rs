@@ -33,12 +33,16 @@ fn rendered(
     row: &Row,
     frame: &Frame,
     input: &NetworkInput,
-    render_row: impl Fn(&Source, &Row, Outputs<[f32]>),
+    render_rows: impl Fn(&Source, &[Row], Planes),
 ) -> Vec<f32> {
     let mut values = vec![-1.0; input.view_len()];
     let mut planes = values.chunks_exact_mut(input.plane_len());
     let planes = std::array::from_fn(|_| planes.next().unwrap());
-    render_row(&Source::new(frame, input), row, planes);
+    render_rows(
+        &Source::new(frame, input),
+        std::slice::from_ref(row),
+        planes,
+    );
     values
 }
 
@@ -53,7 +57,7 @@ fn sampled(position: [f32; 2], frame: &Frame) -> Vec<f32> {
             is_hidden: false,
         },
     };
-    rendered(&row, frame, &NetworkInput::plain(1, 1), scalar::render_row)
+    rendered(&row, frame, &NetworkInput::plain(1, 1), scalar::render_rows)
 }
 
 fn precise([x, y]: [f32; 2]) -> Pixel {
@@ -142,9 +146,9 @@ proptest! {
             offset: [-1.0, -2.1, 0.0],
             ..NetworkInput::plain(view_width, 1)
         };
-        let with_vectors = rendered(&row, &frame, &input, |source, row, planes| {
-            vector::render_row(avx2, source, row, planes);
+        let with_vectors = rendered(&row, &frame, &input, |source, rows, planes| {
+            vector::render_rows(avx2, source, rows, planes);
         });
-        prop_assert_eq!(with_vectors, rendered(&row, &frame, &input, scalar::render_row));
+        prop_assert_eq!(with_vectors, rendered(&row, &frame, &input, scalar::render_rows));
     }
 }
