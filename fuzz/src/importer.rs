@@ -1,0 +1,104 @@
+//! Calibration files, one importer at a time, and all that the server does with their cameras.
+
+use lookdown::{
+    calibration::{
+        Calibration, CalibrationFile,
+        export::{Exported, Target},
+        formats::{Camera, Format},
+        native::{NativeCalibration, NativeImage},
+    },
+    geometry::Pixel,
+};
+
+/// The importers, under the names of their folders of seeds and finds.
+pub const IMPORTERS: [(&str, Format); 15] = [
+    ("native", Format::Native),
+    ("kalibr", Format::Kalibr),
+    ("opencv", Format::OpenCv),
+    ("ros", Format::Ros),
+    ("ocamcalib", Format::OCamCalib),
+    ("py_ocamcalib", Format::PyOCamCalib),
+    ("multicol", Format::MultiCol),
+    ("colmap", Format::Colmap),
+    ("camodocal", Format::Camodocal),
+    ("basalt", Format::Basalt),
+    ("woodscape", Format::WoodScape),
+    ("nvidia_ftheta", Format::NvidiaFTheta),
+    ("moil", Format::Moil),
+    ("fisheye_calib_adapter", Format::FisheyeCalibAdapter),
+    ("camera_intrinsic_model", Format::CameraIntrinsicModel),
+];
+
+/// Places of a frame where its lens is tried, as shares of its sides.
+const PLACES: [f64; 5] = [0.0, 0.3, 0.5, 0.9, 1.0];
+
+/// Reads `content` and uses its cameras; tells whether it was the importer of `format` that read it.
+pub fn read(format: Format, content: &[u8]) -> bool {
+    let Ok(file) = CalibrationFile::parse(content) else {
+        return false;
+    };
+    if file.format != format {
+        return false;
+    }
+    let checked = file.calibrations("fuzzed", content);
+    assert_eq!(checked.len(), file.cameras.len());
+    for (told, (_, checked)) in file.cameras.iter().zip(&checked) {
+        match (&told.camera, checked) {
+            (Ok(camera), Ok(calibration)) => {
+                look_through(calibration);
+                write(camera, calibration, content.len());
+            }
+            (Err(error), _) | (_, Err(error)) => assert!(!error.to_string().is_empty()),
+        }
+    }
+    true
+}
+
+/// Writes the camera in one format, chosen by the size of its file, and reads it back: all formats
+/// would take five times as long.
+fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
+    let target = Target::ALL[choice % Target::ALL.len()];
+    let (width, height) = calibration.image_size();
+    let written = target.write(&NativeCalibration {
+        id: calibration.id().to_string(),
+        image: NativeImage { width, height },
+        lens: camera.lens.clone(),
+        mount: camera.mount,
+    });
+    let Ok(Exported { content, .. }) = written else {
+        return;
+    };
+    let again = CalibrationFile::parse(content.as_bytes());
+    let again = again.unwrap_or_else(|error| panic!("{error} in {content}"));
+    let [(_, checked)] = &again.calibrations("fuzzed", content.as_bytes())[..] else {
+        panic!("one camera became several in {content}");
+    };
+    // Others have no place for the end of the lens image, without which it may be refused.
+    if target == Target::Native
+        && let Err(error) = checked
+    {
+        panic!("{error} in {content}");
+    }
+}
+
+/// Rays and pixels are finite wherever the lens has any.
+fn look_through(calibration: &Calibration) {
+    let (width, height) = calibration.image_size();
+    assert!(calibration.doubts().len() < 10);
+    // Half the size, as smaller frames of the same camera are.
+    let halved = calibration.for_frame(width.div_ceil(2), height.div_ceil(2));
+    let halved = halved.ok().map(|geometry| geometry.lens);
+    for lens in std::iter::once(calibration.lens()).chain(&halved) {
+        for (x, y) in PLACES.iter().flat_map(|x| PLACES.map(|y| (*x, y))) {
+            let pixel = Pixel::new(x * f64::from(width), y * f64::from(height));
+            let Some(ray) = lens.unproject(&pixel) else {
+                continue;
+            };
+            assert!((ray.norm() - 1.0).abs() < 1e-6, "{ray} at {pixel}");
+            let back = [lens.project(&ray), lens.project_to_rim(&ray)];
+            for pixel in back.into_iter().flatten() {
+                assert!(pixel.x.is_finite() && pixel.y.is_finite(), "{pixel}");
+            }
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Pictures: decoding within limits.
+
+use lookdown::imaging::decode::{DecodeLimits, decode};
+
+/// Small, so that a second holds thousands of pictures; what is checked against them is the same.
+const LIMITS: DecodeLimits = DecodeLimits {
+    max_width: 1024,
+    max_height: 1024,
+    max_pixels: 256 * 256,
+    max_alloc_bytes: 1024 * 1024,
+};
+
+/// Decodes `bytes`; tells whether they are of a format that is read.
+pub fn read(bytes: &[u8]) -> bool {
+    match decode(bytes, &LIMITS) {
+        Ok(decoded) => {
+            let (width, height) = (decoded.frame.width(), decoded.frame.height());
+            assert!(u64::from(width) * u64::from(height) <= LIMITS.max_pixels);
+            true
+        }
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            !matches!(
+                error,
+                lookdown::imaging::decode::DecodeError::Empty
+                    | lookdown::imaging::decode::DecodeError::UnsupportedFormat { .. }
+            )
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! HTTP requests to the whole service: query, headers, multipart, JSON and calibration bodies.
+//!
+//! The detector is a stand-in that finds nobody, and the store forgets what is written to it, so
+//! that every request meets the same service.
+
+use std::{
+    num::NonZeroUsize,
+    sync::{Arc, LazyLock},
+    time::Duration,
+};
+
+use axum::{
+    Router,
+    body::Body,
+    http::{HeaderName, HeaderValue, Method, Request, StatusCode, Uri, header::CONTENT_TYPE},
+};
+use http_body_util::BodyExt;
+use lookdown::{
+    api::{self, ApiOptions, ApiState, Readiness},
+    calibration::{CalibrationStore, Calibrations, StoreError, StoredFile},
+    geometry::FieldOfViewReading,
+    imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
+    inference::{
+        Detector, HeadOutput, InferenceError, ModelFolder, ModelRepository, RepositoryOptions,
+    },
+    metrics::Metrics,
+    pipeline::{DefaultModels, Engine, EngineOptions, WorkerPool},
+};
+use tokio::runtime::{self, Runtime};
+use tower::ServiceExt;
+
+const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
+  "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707} }"#;
+/// Larger pictures are refused once their size is known, which keeps requests fast.
+const MAX_IMAGE_SIDE: u32 = 32;
+
+static SERVICE: LazyLock<(Runtime, Router)> = LazyLock::new(|| {
+    let runtime = runtime::Builder::new_current_thread().enable_time().build();
+    (runtime.unwrap(), router())
+});
+
+/// Answers the request that `bytes` spell; tells whether they spell one.
+pub fn read(bytes: &[u8]) -> bool {
+    let Some(request) = request(bytes) else {
+        return false;
+    };
+    let (runtime, router) = &*SERVICE;
+    let path = request.uri().clone();
+    let (parts, body) = runtime.block_on(async {
+        let response = router.clone().oneshot(request).await;
+        let (parts, body) = response.unwrap().into_parts();
+        (parts, body.collect().await.unwrap().to_bytes())
+    });
+    assert_ne!(parts.status, StatusCode::INTERNAL_SERVER_ERROR, "{path}");
+    if parts.status.is_client_error() {
+        assert_eq!(
+            parts.headers[CONTENT_TYPE], "application/problem+json",
+            "{path}"
+        );
+        if !body.is_empty() {
+            let problem: serde_json::Value = serde_json::from_slice(&body).unwrap();
+            assert_eq!(problem["status"], parts.status.as_u16(), "{path}");
+        }
+    }
+    true
+}
+
+/// `METHOD /path?query`, headers `name: value`, an empty line and the body; lines end with `\n`.
+fn request(bytes: &[u8]) -> Option<Request<Body>> {
+    let (first, mut rest) = line(bytes)?;
+    let mut words = first.splitn(2, |byte| *byte == b' ');
+    let method = Method::from_bytes(words.next()?).ok()?;
+    let uri = Uri::try_from(words.next()?).ok()?;
+    let mut request = Request::new(Body::empty());
+    *request.method_mut() = method;
+    *request.uri_mut() = uri;
+    loop {
+        let (header, after) = line(rest)?;
+        rest = after;
+        if header.is_empty() {
+            break;
+        }
+        let colon = header.iter().position(|byte| *byte == b':')?;
+        let name = HeaderName::from_bytes(&header[..colon]).ok()?;
+        let value = HeaderValue::from_bytes(header[colon + 1..].trim_ascii()).ok()?;
+        request.headers_mut().append(name, value);
+    }
+    *request.body_mut() = Body::from(rest.to_vec());
+    Some(request)
+}
+
+fn line(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let end = bytes.iter().position(|byte| *byte == b'\n')?;
+    Some((&bytes[..end], &bytes[end + 1..]))
+}
+
+fn router() -> Router {
+    let one = NonZeroUsize::MIN;
+    let models = ModelRepository::new(
+        RepositoryOptions {
+            folder: ModelFolder {
+                path: "/nowhere".into(),
+                elsewhere: Some(("nobody".to_owned(), "nobody".into())),
+            },
+            warm_up_views: one,
+            kept: vec!["nobody".to_owned()],
+        },
+        Box::new(|_| Ok(Box::new(Nobody(NetworkInput::plain(32, 32))))),
+    );
+    models.load("nobody").unwrap();
+    let calibrations = Arc::new(Calibrations::open(Box::new(Forgetful), true).unwrap());
+    let options = EngineOptions {
+        decode_limits: DecodeLimits {
+            max_width: MAX_IMAGE_SIDE,
+            max_height: MAX_IMAGE_SIDE,
+            ..DecodeLimits::default()
+        },
+        default_models: DefaultModels::One("nobody".to_owned()),
+        max_batch_views: one,
+        remap_threads: one,
+        paper_field_of_view: FieldOfViewReading::default(),
+        rig_cache_bytes: 1 << 24,
+    };
+    let registry = Arc::clone(models.registry());
+    let engine = Engine::new(registry, Some(Arc::clone(&calibrations)), options).unwrap();
+    let workers = WorkerPool::start(&Arc::new(engine), one, one).unwrap();
+    let readiness = Readiness::default();
+    readiness.warmed_up();
+    api::router(ApiState::new(
+        Arc::new(workers),
+        Arc::new(models),
+        calibrations,
+        Arc::new(Metrics::new().unwrap()),
+        readiness,
+        ApiOptions {
+            max_body_bytes: 1 << 16,
+            max_upload_bytes: 1 << 20,
+            request_timeout: Duration::from_secs(20),
+            administration: true,
+        },
+    ))
+}
+
+/// Finds nobody.
+struct Nobody(NetworkInput);
+
+impl Detector for Nobody {
+    fn name(&self) -> &'static str {
+        "nobody"
+    }
+
+    fn revision(&self) -> &'static str {
+        "1"
+    }
+
+    fn input(&self) -> &NetworkInput {
+        &self.0
+    }
+
+    fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
+        Ok(HeadOutput {
+            per_view: vec![Vec::new(); batch.views()],
+            non_finite: 0,
+        })
+    }
+}
+
+/// Holds one calibration, whatever is written.
+#[derive(Debug)]
+struct Forgetful;
+
+impl CalibrationStore for Forgetful {
+    fn place(&self) -> String {
+        "memory".to_owned()
+    }
+
+    fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+        Ok(vec![StoredFile {
+            name: "lobby.json".to_owned(),
+            stamp: String::new(),
+        }])
+    }
+
+    fn read(&self, _name: &str, _at_most: usize) -> Result<Vec<u8>, StoreError> {
+        Ok(LOBBY.as_bytes().to_vec())
+    }
+
+    fn write(&self, _name: &str, _content: &[u8]) -> Result<(), StoreError> {
+        Ok(())
+    }
+
+    fn delete(&self, _name: &str) -> Result<(), StoreError> {
+        Ok(())
+    }
+}

@@ -1,0 +1,116 @@
+"""Runs the fuzzers one after another: `fuzz.py [--runs N] [--minimise] [TARGET...]`, all targets by default.
+
+A run of a target counts when its bytes reached what is fuzzed: a file that the importer in question read, and
+for the other targets every execution. A target stops at its first panic, input of more than a second or more
+than 256 MiB of memory, and the script then fails. Needs `cargo install cargo-fuzz` and a C++ compiler.
+"""
+
+import argparse
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+FUZZ = ROOT / "fuzz"
+IMPORTERS = re.findall(r'^    \("(\w+)", Format::', (FUZZ / "src/importer.rs").read_text(), re.MULTILINE)
+# Besides fuzz/seeds/TARGET.
+SEEDS = {"picture": ["tests/fixtures/images"]} | {
+    name: ["tests/fixtures/calibrations", "samples/calibrations"] for name in IMPORTERS
+}
+TARGETS = [*IMPORTERS, "picture", "request", "settings", "merge"]
+MAX_SECONDS = 1
+MAX_MEBIBYTES = 256
+# Longer inputs only take longer: a format's every field fits in this.
+MAX_BYTES = 2048
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"among {', '.join(TARGETS)}")
+    parser.add_argument("--runs", type=int, default=1_000_000, help="how many runs of each must count")
+    parser.add_argument("--minimise", action="store_true", help="keep the finds that matter in fuzz/corpus")
+    arguments = parser.parse_args()
+    for target in arguments.targets:
+        if target not in TARGETS:
+            parser.error(f"there is no target {target}: give some of {', '.join(TARGETS)}")
+    # The crate has no unsafe code of its own, and without a sanitizer the stable compiler will do.
+    subprocess.run(["cargo", "fuzz", "build", "--sanitizer", "none"], cwd=FUZZ, check=True)
+    print("| target | runs that count | executions | seconds | runs/s | peak MiB | slowest input, s | findings |")
+    print("|---|---|---|---|---|---|---|---|", flush=True)
+    failed = False
+    for target in arguments.targets or TARGETS:
+        failed |= not fuzz(target, arguments.runs)
+        if arguments.minimise:
+            minimise(target)
+    return int(failed)
+
+
+def fuzz(target: str, runs: int) -> bool:
+    """Fuzzes a target and prints its row; whether nothing was found."""
+    found = FUZZ / "found" / target
+    found.mkdir(parents=True, exist_ok=True)
+    count = executions = peak = slowest = seconds = 0
+    healthy = True
+    while count < runs and healthy:
+        began = time.monotonic()
+        options = [f"-runs={max(runs - count, 10_000)}", "-print_final_stats=1", f"-artifact_prefix={found}-"]
+        options += [f"-timeout={MAX_SECONDS}", f"-rss_limit_mb={MAX_MEBIBYTES}", f"-max_len={MAX_BYTES}"]
+        output, healthy = run(target, [*options, found, *seeds(target)])
+        seconds += time.monotonic() - began
+        done = statistic("number_of_executed_units", output)
+        reached = re.findall(r"^reached (\d+)$", output, re.MULTILINE)
+        executions += done
+        count += done if target not in IMPORTERS else int(reached[-1]) if reached else 0
+        peak = max(peak, statistic("peak_rss_mb", output))
+        slowest = max(slowest, statistic("slowest_unit_time_sec", output))
+        if peak > MAX_MEBIBYTES or slowest > MAX_SECONDS:
+            healthy = False
+        if not healthy:
+            print(output[-4000:], file=sys.stderr)
+    row = [target, count, executions, round(seconds), round(count / seconds), peak, slowest, int(not healthy)]
+    print(f"| {' | '.join(map(str, row))} |", flush=True)
+    return healthy
+
+
+def minimise(target: str) -> None:
+    """Keeps the smallest files that together reach all that the finds and the corpus reach."""
+    corpus, smaller = FUZZ / "corpus" / target, FUZZ / "found" / f"{target}.smaller"
+    smaller.mkdir()
+    run(target, ["-merge=1", smaller, *seeds(target), FUZZ / "found" / target])
+    corpus.mkdir(parents=True, exist_ok=True)
+    for old in corpus.iterdir():
+        old.unlink()
+    for file in smaller.iterdir():
+        file.rename(corpus / file.name)
+    smaller.rmdir()
+
+
+def seeds(target: str) -> list[Path]:
+    folders = [FUZZ / "seeds" / target, FUZZ / "corpus" / target, *(ROOT / path for path in SEEDS.get(target, []))]
+    return [folder for folder in folders if folder.is_dir()]
+
+
+def run(target: str, arguments: list) -> tuple[str, bool]:
+    """Runs the executable of a target; what it said, and whether it ended well."""
+    is_importer = target in IMPORTERS
+    executable = "importer" if is_importer else target
+    triple = subprocess.check_output(["rustc", "-vV"], text=True).split("host: ")[1].split()[0]
+    command = [FUZZ / "target" / triple / "release" / executable, *arguments]
+    if is_importer:
+        dictionary = FUZZ / "calibration.dict"
+        command.append(f"-dict={dictionary}")
+    done = subprocess.run(
+        command, env={"IMPORTER": target}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, errors="replace"
+    )
+    return done.stderr, done.returncode == 0
+
+
+def statistic(name: str, output: str) -> int:
+    values = re.findall(rf"^stat::{name}:\s+(\d+)", output, re.MULTILINE)
+    return int(values[-1]) if values else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
