@@ -22,7 +22,10 @@ fn replay(folder: &str, read: impl Fn(&[u8]) -> bool) -> usize {
 /// Replays the seeds and finds of one target, and those that `folders` hold besides.
 fn replay_all(name: &str, folders: &[&str], read: impl Fn(&[u8]) -> bool) {
     let own = [format!("fuzz/seeds/{name}"), format!("fuzz/corpus/{name}")];
-    let folders = own.iter().map(String::as_str).chain(folders.iter().copied());
+    let folders = own
+        .iter()
+        .map(String::as_str)
+        .chain(folders.iter().copied());
     let taken: usize = folders.map(|folder| replay(folder, &read)).sum();
     assert!(taken > 0, "{name}: nothing got as far as what is fuzzed");
 }

@@ -49,15 +49,15 @@ static FORMAT: LazyLock<Format> = LazyLock::new(|| {
     let known = IMPORTERS.iter().find(|(known, _)| *known == name);
     known.expect("IMPORTER names one of the importers").1
 });
-static REACHED: AtomicU64 = AtomicU64::new(0);
+static READ: AtomicU64 = AtomicU64::new(0);
 
 fuzz_target!(|content: &[u8]| -> Corpus {
     if !read(*FORMAT, content) {
         return Corpus::Reject;
     }
-    let reached = REACHED.fetch_add(1, Ordering::Relaxed) + 1;
-    if reached.is_multiple_of(TOLD_EVERY) {
-        eprintln!("reached {reached}");
+    let times = READ.fetch_add(1, Ordering::Relaxed) + 1;
+    if times.is_multiple_of(TOLD_EVERY) {
+        eprintln!("read {times}");
     }
     Corpus::Keep
 });

@@ -2,7 +2,7 @@
 
 use lookdown::{
     calibration::{
-        Calibration, CalibrationFile,
+        Calibration, CalibrationFile, FormatError,
         export::{Exported, Target},
         formats::{Camera, Format},
         native::{NativeCalibration, NativeImage},
@@ -34,8 +34,12 @@ const PLACES: [f64; 5] = [0.0, 0.3, 0.5, 0.9, 1.0];
 
 /// Reads `content` and uses its cameras; tells whether it was the importer of `format` that read it.
 pub fn read(format: Format, content: &[u8]) -> bool {
-    let Ok(file) = CalibrationFile::parse(content) else {
-        return false;
+    let file = match CalibrationFile::parse(content) {
+        Ok(file) => file,
+        Err(refusal) => {
+            check(&refusal);
+            return false;
+        }
     };
     if file.format != format {
         return false;
@@ -48,10 +52,15 @@ pub fn read(format: Format, content: &[u8]) -> bool {
                 look_through(calibration);
                 write(camera, calibration, content.len());
             }
-            (Err(error), _) | (_, Err(error)) => assert!(!error.to_string().is_empty()),
+            (Err(refusal), _) | (_, Err(refusal)) => check(refusal),
         }
     }
     true
+}
+
+/// A refusal says something, however much there is in the file that could be quoted.
+fn check(refusal: &FormatError) {
+    assert!((1..8_192).contains(&refusal.to_string().len()));
 }
 
 /// Writes the camera in one format, chosen by the size of its file, and reads it back: all formats

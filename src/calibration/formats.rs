@@ -123,11 +123,10 @@ impl CalibrationFile {
 }
 
 fn unrecognised() -> FormatError {
-    FormatError::Malformed(
+    FormatError::malformed(
         "its fields are those of no format that is read (the native one, Kalibr, OpenCV, ROS, \
          OCamCalib, py-OCamCalib, COLMAP, camodocal, Basalt, WoodScape, NVIDIA f-theta, MOIL and a \
-         few more)"
-            .to_owned(),
+         few more)",
     )
 }
 

@@ -3,6 +3,8 @@
 use lookdown::calibration::CalibrationFile;
 use proptest::prelude::*;
 
+use crate::refusal;
+
 /// Every calibration file of the fixtures.
 fn files() -> Vec<Vec<u8>> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/calibrations");
@@ -28,6 +30,44 @@ fn files_cut_short_anywhere_are_refused_or_read() {
             survives(&content[..length]);
         }
     }
+}
+
+#[test]
+fn a_file_of_too_many_values_is_refused_before_they_take_memory() {
+    // Half a gibibyte of tables when it was read.
+    let tables: String = (0..8_000)
+        .map(|line| format!("a{line}{}=1\n", ".b".repeat(60)))
+        .collect();
+    let maps = format!("{{\"a\":[{}0]}}", "{\"\":0},".repeat(100_000));
+    for content in [tables, maps] {
+        let refusal = refusal(content.as_bytes());
+        assert!(refusal.contains("more than 100000 values"), "{refusal}");
+    }
+}
+
+#[test]
+fn a_refusal_quotes_little_of_a_large_file() {
+    let long = "x".repeat(1_000_000);
+    let file = r#"{"id":"a","image":{"width":640,"height":640},"lens":{"model":"ucm"},"more":0}"#;
+    let camera = "camera_model: ds\n  intrinsics: []";
+    for content in [
+        file.replace("more", &long),
+        file.replace("ucm", &long),
+        format!("{long}:\n  {camera}\n"),
+    ] {
+        let refusal = refusal(content.as_bytes());
+        assert!(refusal.len() < 4_000, "{} bytes", refusal.len());
+    }
+    let content = file.replace(
+        r#""ucm""#,
+        r#""equidistant","focal":200,"cx":319.5,"cy":319.5"#,
+    );
+    let content = content
+        .replace(r#","more":0"#, "")
+        .replace(r#""a""#, &format!("{long:?}"));
+    let file = CalibrationFile::parse(content.as_bytes()).unwrap();
+    let (_, checked) = file.calibrations("x", content.as_bytes()).remove(0);
+    assert!(checked.unwrap_err().to_string().len() < 4_000);
 }
 
 proptest! {

@@ -10,6 +10,9 @@ use crate::calibration::{
     native::{NativeCalibration, NativeImage},
 };
 
+/// Most characters of a camera's name that are repeated to its sender.
+const MAX_NAME_CHARS: usize = 64;
+
 /// A calibration that serves.
 #[derive(Debug, Clone)]
 pub struct CalibrationEntry {
@@ -97,12 +100,16 @@ pub(super) fn import(
     let chosen = match camera {
         Some(wanted) => names.iter().position(|name| name == wanted),
         None if names.len() == 1 => Some(0),
-        None => return Err(ChangeError::SeveralCameras { names }),
+        None => {
+            return Err(ChangeError::SeveralCameras {
+                names: names.iter().map(|name| shown(name)).collect(),
+            });
+        }
     };
     let Some(chosen) = chosen else {
         return Err(ChangeError::UnknownCamera {
-            camera: camera.unwrap_or_default().chars().take(64).collect(),
-            names,
+            camera: shown(camera.unwrap_or_default()),
+            names: names.iter().map(|name| shown(name)).collect(),
         });
     };
     let told = file.cameras.swap_remove(chosen);
@@ -121,4 +128,9 @@ pub(super) fn import(
         ..stored?
     };
     Ok((stored, written))
+}
+
+/// As much of a camera's name as helps its sender.
+fn shown(name: &str) -> String {
+    name.chars().take(MAX_NAME_CHARS).collect()
 }

@@ -19,7 +19,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
         "FovCamera" => fov(pinhole(&parameters)?, parameters.number("w")?),
         "OpenCVModel5" => return Err(fields.invalid(model, not_a_fisheye(model))),
         other => {
-            return Err(FormatError::Malformed(format!(
+            return Err(FormatError::malformed(format!(
                 "its model is {other:?}: EUCM, UCM, KannalaBrandt4 and FovCamera are read"
             )));
         }

@@ -32,13 +32,13 @@ pub(super) enum Syntax {
 /// The text of a file and how it is written, judged by its content.
 pub(super) fn text_of(bytes: &[u8]) -> Result<(&str, Syntax), FormatError> {
     if bytes.len() > CalibrationFile::MAX_BYTES {
-        return Err(FormatError::Malformed(format!(
+        return Err(FormatError::malformed(format!(
             "it has more than {} bytes, and no calibration needs as many",
             CalibrationFile::MAX_BYTES
         )));
     }
     let text = std::str::from_utf8(bytes)
-        .map_err(|error| FormatError::Malformed(format!("it is no UTF-8 text: {error}")))?;
+        .map_err(|error| FormatError::malformed(format!("it is no UTF-8 text: {error}")))?;
     let text = text.trim_start_matches('\u{feff}');
     Ok((text, syntax_of(text)))
 }
@@ -65,6 +65,11 @@ fn syntax_of(text: &str) -> Syntax {
 
 /// Reads the tree, or hands out the lines.
 pub(super) fn parse(text: &str, syntax: Syntax) -> Result<Document<'_>, FormatError> {
+    if most_nodes(text, syntax) > MAX_NODES {
+        return Err(FormatError::malformed(format!(
+            "it has more than {MAX_NODES} values, and no calibration needs as many"
+        )));
+    }
     let tree = match syntax {
         // Its parser stops at 128 levels by itself.
         Syntax::Json => serde_json::from_str(text).map_err(|error| error.to_string()),
@@ -73,7 +78,18 @@ pub(super) fn parse(text: &str, syntax: Syntax) -> Result<Document<'_>, FormatEr
         Syntax::Xml => opencv_xml::parse(text, MAX_DEPTH, MAX_NODES),
         Syntax::Lines => return Ok(Document::Lines(text)),
     };
-    tree.map(Document::Tree).map_err(FormatError::Malformed)
+    tree.map(Document::Tree).map_err(FormatError::malformed)
+}
+
+/// At most as many values has a text whose parser does not count them itself. In TOML a table, which
+/// takes a kibibyte, is as short as `.a`.
+fn most_nodes(text: &str, syntax: Syntax) -> usize {
+    let begins: &[u8] = match syntax {
+        Syntax::Json => b"{[,",
+        Syntax::Toml => b"{[,.=",
+        Syntax::Yaml | Syntax::Xml | Syntax::Lines => return 0,
+    };
+    text.bytes().filter(|byte| begins.contains(byte)).count()
 }
 
 /// Reads YAML into any shape.

@@ -17,15 +17,32 @@ pub enum FormatError {
     },
 }
 
+/// Most characters of a part of a message: files of a mebibyte are quoted in it.
+const MAX_CHARS: usize = 600;
+
 impl FormatError {
+    /// Content that is in no format that is read, or broken.
+    pub(super) fn malformed(problem: impl Into<String>) -> Self {
+        Self::Malformed(shortened(problem.into()))
+    }
+
     /// A field that makes no camera.
     pub(in crate::calibration) fn invalid(
         field: impl Into<String>,
         problem: impl Into<String>,
     ) -> Self {
         Self::Invalid {
-            field: field.into(),
-            problem: problem.into(),
+            field: shortened(field.into()),
+            problem: shortened(problem.into()),
         }
     }
+}
+
+/// At most as many characters as a message may have.
+fn shortened(mut text: String) -> String {
+    if let Some((end, _)) = text.char_indices().nth(MAX_CHARS) {
+        text.truncate(end);
+        text.push('…');
+    }
+    text
 }

@@ -15,9 +15,9 @@ pub(super) struct Fields<'a> {
 impl<'a> Fields<'a> {
     /// The document itself.
     pub(super) fn of(tree: &'a Value) -> Result<Self, FormatError> {
-        let map = tree.as_object().ok_or_else(|| {
-            FormatError::Malformed("it has no named fields at its top".to_owned())
-        })?;
+        let map = tree
+            .as_object()
+            .ok_or_else(|| FormatError::malformed("it has no named fields at its top"))?;
         Ok(Self {
             name: String::new(),
             map,

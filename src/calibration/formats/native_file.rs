@@ -15,7 +15,7 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
             serde_json::from_str(text).map_err(|error| error.to_string())
         }
     };
-    let file = parsed.map_err(FormatError::Malformed)?;
+    let file = parsed.map_err(FormatError::malformed)?;
     Ok(CalibrationFile {
         format: Format::Native,
         cameras: vec![FileCamera {

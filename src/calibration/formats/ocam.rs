@@ -24,7 +24,7 @@ pub(super) fn read(text: &str) -> Result<Camera, FormatError> {
         .filter(|line| !(line.is_empty() || line.starts_with('#')));
     let blocks: Vec<&str> = blocks.collect();
     let [direct, _inverse, center, affine, image] = blocks[..] else {
-        return Err(FormatError::Malformed(format!(
+        return Err(FormatError::malformed(format!(
             "OCamCalib's text has {} lines of numbers: 5 are needed ({})",
             blocks.len(),
             BLOCKS.join(", ")
