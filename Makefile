@@ -1,8 +1,10 @@
 # The commands of README.md. Everything they fetch or build stays in this folder.
 PYTHON ?= python3
+# How often `make fuzz` runs each fuzzer.
+RUNS ?= 1000000
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test bench bench-full bench-remap ci bless
+.PHONY: help setup models serve test bench bench-full bench-remap ci fuzz bless
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
@@ -42,6 +44,9 @@ bench bench-full:
 
 ci: ## all that the continuous integration runs
 	.ci/run
+
+fuzz: ## run every fuzzer RUNS times, an hour or more; needs cargo-fuzz and a C++ compiler: docs/reliability.md
+	$(PYTHON) scripts/fuzz.py --runs $(RUNS)
 
 bless: ## regenerate the checked-in generated files: openapi/openapi.json and the snapshots
 	@$(PYTHON) scripts/setup.py

@@ -23,18 +23,21 @@ MAX_SECONDS = 1
 MAX_MEBIBYTES = 256
 # Longer inputs only take longer: a format's every field fits in this.
 MAX_BYTES = 2048
+# Files of a corpus that are checked in, beside those that failed once.
+MAX_KEPT = 32
+FAILED = "failed-"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"among {', '.join(TARGETS)}")
     parser.add_argument("--runs", type=int, default=1_000_000, help="how often each is run")
-    parser.add_argument("--minimise", action="store_true", help="keep the finds that matter in fuzz/corpus")
+    parser.add_argument("--minimise", action="store_true", help="keep the best finds in fuzz/corpus")
     arguments = parser.parse_args()
     for target in arguments.targets:
         if target not in TARGETS:
             parser.error(f"there is no target {target}: give some of {', '.join(TARGETS)}")
-    # The crate has no unsafe code of its own, and without a sanitizer the stable compiler will do.
+    # What reads a stranger's bytes has no unsafe code, and without a sanitizer the stable compiler will do.
     subprocess.run(["cargo", "fuzz", "build", "--sanitizer", "none"], cwd=FUZZ, check=True)
     print("| target | executions | of them read by the importer | seconds | per second | peak MiB | findings |")
     print("|---|---|---|---|---|---|---|", flush=True)
@@ -67,16 +70,21 @@ def fuzz(target: str, runs: int) -> bool:
 
 
 def minimise(target: str) -> None:
-    """Keeps the smallest files that together reach all that the finds and the corpus reach."""
-    corpus, smaller = FUZZ / "corpus" / target, FUZZ / "found" / f"{target}.smaller"
-    smaller.mkdir()
-    run(target, ["-merge=1", smaller, *seeds(target), FUZZ / "found" / target])
+    """Keeps those of the finds in the corpus that together reach the most; what failed once stays there, too."""
+    corpus, chosen = FUZZ / "corpus" / target, FUZZ / "found" / f"{target}.chosen"
     corpus.mkdir(parents=True, exist_ok=True)
+    chosen.mkdir()
+    run(target, ["-merge=1", "-set_cover_merge=1", "-use_counters=0", chosen, FUZZ / "found" / target])
     for old in corpus.iterdir():
-        old.unlink()
-    for file in smaller.iterdir():
+        if not old.name.startswith(FAILED):
+            old.unlink()
+    # They are written in the order of how much each adds.
+    best = sorted(chosen.iterdir(), key=lambda file: file.stat().st_mtime_ns)
+    for file in best[:MAX_KEPT]:
         file.rename(corpus / file.name)
-    smaller.rmdir()
+    for file in best[MAX_KEPT:]:
+        file.unlink()
+    chosen.rmdir()
 
 
 def seeds(target: str) -> list[Path]:

@@ -21,10 +21,11 @@ use lookdown::{
     geometry::FieldOfViewReading,
     imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
     inference::{
-        Detector, HeadOutput, InferenceError, ModelFolder, ModelRepository, RepositoryOptions,
+        Detector, HeadOutput, InferenceError, Model, ModelFolder, ModelRepository,
+        RepositoryOptions,
     },
     metrics::Metrics,
-    pipeline::{DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
 };
 use tokio::runtime::{self, Runtime};
 use tower::ServiceExt;
@@ -105,7 +106,7 @@ fn router() -> Router {
             warm_up_views: one,
             kept: vec!["nobody".to_owned()],
         },
-        Box::new(|_| Ok(Box::new(Nobody(NetworkInput::plain(32, 32))))),
+        Box::new(|_| Ok(Model::new(Box::new(Nobody(NetworkInput::plain(32, 32)))))),
     );
     models.load("nobody").unwrap();
     let calibrations = Arc::new(Calibrations::open(Box::new(Forgetful), true).unwrap());
@@ -116,7 +117,11 @@ fn router() -> Router {
             ..DecodeLimits::default()
         },
         default_models: DefaultModels::One("nobody".to_owned()),
-        max_batch_views: one,
+        batches: BatchOptions {
+            max_views: one,
+            max_delay: Duration::ZERO,
+        },
+        sessions: one,
         remap_threads: one,
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 24,
