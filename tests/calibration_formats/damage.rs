@@ -1,6 +1,6 @@
 //! Damaged files are refused or read, and never bring the program down.
 
-use lookdown::calibration::CalibrationFile;
+use lookdown::calibration::{CalibrationFile, Calibrations, FolderStore, WriteCondition};
 use proptest::prelude::*;
 
 use crate::refusal;
@@ -48,11 +48,11 @@ fn a_file_of_too_many_values_is_refused_before_they_take_memory() {
 fn a_refusal_quotes_little_of_a_large_file() {
     let long = "x".repeat(1_000_000);
     let file = r#"{"id":"a","image":{"width":640,"height":640},"lens":{"model":"ucm"},"more":0}"#;
-    let camera = "camera_model: ds\n  intrinsics: []";
+    let camera = r#"{"camera_model":"ds","intrinsics":[]}"#;
     for content in [
         file.replace("more", &long),
         file.replace("ucm", &long),
-        format!("{long}:\n  {camera}\n"),
+        format!(r#"{{"{long}":{camera}}}"#),
     ] {
         let refusal = refusal(content.as_bytes());
         assert!(refusal.len() < 4_000, "{} bytes", refusal.len());
@@ -67,6 +67,23 @@ fn a_refusal_quotes_little_of_a_large_file() {
     let file = CalibrationFile::parse(content.as_bytes()).unwrap();
     let (_, checked) = file.calibrations("x", content.as_bytes()).remove(0);
     assert!(checked.unwrap_err().to_string().len() < 4_000);
+}
+
+#[test]
+fn a_choice_between_cameras_tells_little_of_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Box::new(FolderStore::new(folder.path()));
+    let calibrations = Calibrations::open(store, true).unwrap();
+    let long = "x".repeat(400_000);
+    let camera = r#"{"camera_model":"ds","intrinsics":[]}"#;
+    let content = format!(r#"{{"a{long}":{camera},"b{long}":{camera}}}"#);
+    let id = "lobby".parse().unwrap();
+    for camera in [None, Some(long.as_str())] {
+        let put = calibrations.put(&id, content.as_bytes(), camera, &WriteCondition::Always);
+        let refusal = put.unwrap_err().to_string();
+        assert!(refusal.contains("bxxx"), "{refusal:.200}");
+        assert!(refusal.len() < 400, "{} bytes", refusal.len());
+    }
 }
 
 proptest! {
