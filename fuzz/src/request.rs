@@ -17,7 +17,7 @@ use axum::{
 use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
-    calibration::{CalibrationStore, Calibrations, StoreError, StoredFile},
+    calibration::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
     geometry::FieldOfViewReading,
     imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
     inference::{
@@ -186,11 +186,17 @@ impl CalibrationStore for Forgetful {
         }])
     }
 
-    fn read(&self, _name: &str, _at_most: usize) -> Result<Vec<u8>, StoreError> {
-        Ok(LOBBY.as_bytes().to_vec())
+    fn read(&self, names: &[&str], _at_most: usize) -> Vec<Result<Vec<u8>, StoreError>> {
+        let lobby = |_| Ok(LOBBY.as_bytes().to_vec());
+        names.iter().map(lobby).collect()
     }
 
-    fn write(&self, _name: &str, _content: &[u8]) -> Result<(), StoreError> {
+    fn write(
+        &self,
+        _name: &str,
+        _content: &[u8],
+        _replaces: Replaces<'_>,
+    ) -> Result<(), StoreError> {
         Ok(())
     }
 
