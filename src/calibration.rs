@@ -15,7 +15,7 @@ mod store;
 
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
 pub use calibrations::{
-    CalibrationEntry, CalibrationRow, Calibrations, CalibrationsHealth, ChangeError, Put,
+    CalibrationEntry, CalibrationRow, Calibrations, CalibrationsHealth, ChangeError, Put, Reading,
     WriteCondition,
 };
 pub use error::CalibrationError;

@@ -52,6 +52,20 @@ FULL = Effort(
     memory_minutes=30.0,
 )
 
+MEDIUM = replace(
+    FULL,
+    name="medium",
+    seconds=10.0,
+    rounds=3,
+    tune_seconds=3.0,
+    many_clients=(1, 4, 16, 64, 256),
+    sides=(600, 960, 1680, 2240, 4000),
+    cameras=(1, 100, 1000),
+    frames=15,
+    starts=5,
+    memory_minutes=5.0,
+)
+
 SHORT = replace(
     FULL,
     name="short",

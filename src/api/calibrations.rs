@@ -77,7 +77,7 @@ pub(super) async fn get(
 /// Create or replace a calibration.
 ///
 /// Takes the native format as JSON, YAML or TOML, or the file of another program as it is; of
-/// several cameras in a file, `camera` chooses one. It is checked, stored in the native format and
+/// several cameras in a file, `camera` chooses one, and `size` tells what a format does not. It is checked, stored in the native format and
 /// serves when this is answered. `If-Match` replaces only the revision it names, `If-None-Match: *`
 /// only creates.
 #[utoipa::path(
@@ -85,6 +85,8 @@ pub(super) async fn get(
     params(
         ("id" = String, Path, description = "The calibration's ID, 1 to 64 of a-z, 0-9, _ and -."),
         ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
+        ("size" = Option<String>, Query, description = "The size of the camera's frames in pixels, such as \
+            `1280x960`, for formats that do not tell it."),
         ("If-Match" = Option<String>, Header, description = "The revision to replace, or `*`."),
         ("If-None-Match" = Option<String>, Header, description = "`*`: create only."),
     ),
@@ -110,10 +112,8 @@ pub(super) async fn put(
     let condition = write_condition(&headers)?;
     let location = format!("/calibrations/{id}");
     let put = blocking(move || {
-        let camera = upload.camera.as_deref();
-        state
-            .calibrations
-            .put(&id, &upload.content, camera, &condition)
+        let CalibrationUpload { content, reading } = upload;
+        state.calibrations.put(&id, &content, &reading, &condition)
     });
     let put = put.await?;
     let tag = [(ETAG, entity_tag(put.entry.calibration.revision()))];

@@ -102,21 +102,25 @@ fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Problem> {
         })
 }
 
-/// The value of the only parameter that a query may have.
-pub(super) fn one_parameter(uri: &Uri, name: &str) -> Result<Option<String>, Problem> {
-    let mut value = None;
-    for (given, its) in query_parameters(uri)? {
-        if given != name {
+/// The values of the parameters that a query may have, each at most once.
+pub(super) fn parameters_named<const COUNT: usize>(
+    uri: &Uri,
+    names: [&str; COUNT],
+) -> Result<[Option<String>; COUNT], Problem> {
+    let mut values = [const { None }; COUNT];
+    for (given, value) in query_parameters(uri)? {
+        let Some(index) = names.iter().position(|name| *name == given) else {
             let given: String = given.chars().take(64).collect();
-            let detail = format!("there is no parameter {given:?} here: there is {name}");
+            let known = names.join(", ");
+            let detail = format!("there is no parameter {given:?} here: there is {known}");
             return Err(Problem::new(ProblemKind::UnknownParameter, detail));
-        }
-        if value.replace(its).is_some() {
-            let detail = format!("{name} is given twice: give it once");
+        };
+        if values[index].replace(value).is_some() {
+            let detail = format!("{given} is given twice: give it once");
             return Err(Problem::new(ProblemKind::RepeatedParameter, detail));
         }
     }
-    Ok(value)
+    Ok(values)
 }
 
 fn is_multipart(parts: &Parts) -> bool {

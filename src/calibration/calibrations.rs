@@ -18,7 +18,7 @@ use self::snapshot::Snapshot;
 use super::{Calibration, CalibrationError, CalibrationId, CalibrationStore, StoreError};
 
 pub use change::{Put, WriteCondition};
-pub use content::CalibrationEntry;
+pub use content::{CalibrationEntry, Reading};
 pub use error::ChangeError;
 pub use snapshot::{CalibrationRow, CalibrationsHealth};
 

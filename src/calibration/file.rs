@@ -101,7 +101,7 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
         return Err(invalid(
             "image",
             "the file does not tell the frame size it was made for: convert it with `lookdown \
-             calibration convert --size WIDTHxHEIGHT`"
+             calibration convert --size WIDTHxHEIGHT`, or PUT it with ?size=WIDTHxHEIGHT"
                 .to_owned(),
         ));
     };

@@ -120,6 +120,26 @@ impl CalibrationFile {
             )),
         }
     }
+
+    /// Gives every camera the size of its frames, where the file does not tell it.
+    ///
+    /// # Errors
+    /// [`FormatError`] when the file tells another one.
+    pub fn assume_size(&mut self, size: NativeImage) -> Result<(), FormatError> {
+        for camera in &mut self.cameras {
+            // A camera that cannot be used says so when it is asked for.
+            let Ok(camera) = &mut camera.camera else {
+                continue;
+            };
+            let told = *camera.image.get_or_insert(size);
+            if told != size {
+                let NativeImage { width, height } = told;
+                let problem = format!("the file itself says {width}x{height}: leave the size out");
+                return Err(FormatError::invalid("image", problem));
+            }
+        }
+        Ok(())
+    }
 }
 
 fn unrecognised() -> FormatError {

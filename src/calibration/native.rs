@@ -3,6 +3,8 @@
 
 mod read_lens;
 
+use std::str::FromStr;
+
 use serde::{Deserialize, Serialize};
 
 /// A whole calibration file.
@@ -29,6 +31,25 @@ pub struct NativeImage {
     /// Pixels.
     pub height: u32,
 }
+
+/// `640x480`
+impl FromStr for NativeImage {
+    type Err = NotAFrameSize;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let sides = text.split_once('x');
+        let sides = sides.and_then(|(width, height)| {
+            let (width, height) = (width.parse().ok()?, height.parse().ok()?);
+            Some(Self { width, height })
+        });
+        sides.ok_or(NotAFrameSize)
+    }
+}
+
+/// Text that is no frame size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("give the width and height in pixels, such as 640x480")]
+pub struct NotAFrameSize;
 
 /// How the camera hangs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -115,6 +115,34 @@ async fn a_revision_that_was_edited_in_the_folder_counts_at_once() {
     assert_eq!(fs::read_to_string(&file).unwrap(), native("lobby", 59.5));
 }
 
+/// py-OCamCalib's format does not tell the size of the frames.
+const WITHOUT_SIZE: &str = include_str!("../fixtures/calibrations/py_ocamcalib.json");
+
+#[tokio::test]
+async fn the_address_tells_the_frame_size_that_a_file_leaves_out() {
+    let service = Service::start();
+    let put = async |query: &str, content: &str| {
+        let path = format!("/calibrations/hall{query}");
+        service.put(&path, content).await
+    };
+    let refused = put("", WITHOUT_SIZE).await;
+    assert_eq!(refused.status, 422);
+    let detail = refused.problem()["detail"].as_str().unwrap().to_owned();
+    assert!(detail.contains("size"), "{detail}");
+    let wrong = put("?size=1600", WITHOUT_SIZE).await;
+    assert_eq!(wrong.status, 422);
+
+    let created = put("?size=1600x1600", WITHOUT_SIZE).await;
+    assert_eq!(created.status, 201, "{}", created.text());
+    let stored = service.get("/calibrations/hall").await.json();
+    assert_eq!(stored["image"], json!({"width": 1600, "height": 1600}));
+
+    let other = put("?size=640x480", &native("hall", 60.0)).await;
+    assert_eq!(other.status, 422);
+    let detail = other.problem()["detail"].as_str().unwrap().to_owned();
+    assert!(detail.contains("leave the size out"), "{detail}");
+}
+
 #[tokio::test]
 async fn files_of_other_programs_are_taken_and_one_of_several_cameras_is_chosen_by_name() {
     let service = Service::start();

@@ -1,6 +1,6 @@
 //! Damaged files are refused or read, and never bring the program down.
 
-use lookdown::calibration::{CalibrationFile, Calibrations, FolderStore, WriteCondition};
+use lookdown::calibration::{CalibrationFile, Calibrations, FolderStore, Reading, WriteCondition};
 use proptest::prelude::*;
 
 use crate::refusal;
@@ -78,8 +78,9 @@ fn a_choice_between_cameras_tells_little_of_their_names() {
     let camera = r#"{"camera_model":"ds","intrinsics":[]}"#;
     let content = format!(r#"{{"a{long}":{camera},"b{long}":{camera}}}"#);
     let id = "lobby".parse().unwrap();
-    for camera in [None, Some(long.as_str())] {
-        let put = calibrations.put(&id, content.as_bytes(), camera, &WriteCondition::Always);
+    for camera in [None, Some(long)] {
+        let reading = Reading { camera, size: None };
+        let put = calibrations.put(&id, content.as_bytes(), &reading, &WriteCondition::Always);
         let refusal = put.unwrap_err().to_string();
         assert!(refusal.contains("bxxx"), "{refusal:.200}");
         assert!(refusal.len() < 400, "{} bytes", refusal.len());

@@ -243,7 +243,7 @@ fn formats_that_do_not_tell_the_frame_size_say_so() {
     assert_eq!(
         calibration.unwrap_err().to_string(),
         "image: the file does not tell the frame size it was made for: convert it with `lookdown \
-         calibration convert --size WIDTHxHEIGHT`"
+         calibration convert --size WIDTHxHEIGHT`, or PUT it with ?size=WIDTHxHEIGHT"
     );
 }
 

@@ -8,17 +8,17 @@ use crate::{
     api::{
         ApiState,
         problem::{Problem, ProblemKind},
-        upload::{BodyReader, one_parameter},
+        upload::{BodyReader, parameters_named},
     },
-    calibration::CalibrationFile,
+    calibration::{CalibrationFile, Reading, native::NotAFrameSize},
 };
 
 /// An uploaded calibration file.
 pub(in crate::api) struct CalibrationUpload {
     /// The file.
     pub(super) content: Bytes,
-    /// The camera chosen of it.
-    pub(super) camera: Option<String>,
+    /// How to read it.
+    pub(super) reading: Reading,
 }
 
 impl FromRequest<ApiState> for CalibrationUpload {
@@ -39,9 +39,14 @@ impl FromRequest<ApiState> for CalibrationUpload {
             let detail = "the file did not arrive in time: send it again";
             Problem::new(ProblemKind::SlowUpload, detail)
         })??;
+        let [camera, size] = parameters_named(&parts.uri, ["camera", "size"])?;
+        let size = size.map(|text| text.parse()).transpose();
+        let size = size.map_err(|error: NotAFrameSize| {
+            Problem::new(ProblemKind::InvalidParameter, format!("size: {error}"))
+        })?;
         Ok(Self {
             content: content.into_bytes(),
-            camera: one_parameter(&parts.uri, "camera")?,
+            reading: Reading { camera, size },
         })
     }
 }

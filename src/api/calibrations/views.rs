@@ -11,7 +11,7 @@ use crate::{
         ApiState,
         openapi::ViewsProblems,
         problem::{Problem, ProblemKind},
-        upload::one_parameter,
+        upload::parameters_named,
     },
     pipeline::{PlannedView, PlannedViews, Profile},
 };
@@ -95,7 +95,8 @@ pub(in crate::api) async fn get_views(
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
 ) -> Result<Json<ViewPlanInfo>, Problem> {
-    let profile = match one_parameter(&uri, "profile")? {
+    let [profile] = parameters_named(&uri, ["profile"])?;
+    let profile = match profile {
         None => Profile::default(),
         Some(name) => Profile::from_name(&name).ok_or_else(|| unknown_profile(&name))?,
     };

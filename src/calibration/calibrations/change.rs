@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    CalibrationEntry, Calibrations, ChangeError, content::import, load::LoadedFile,
+    CalibrationEntry, Calibrations, ChangeError, Reading, content::import, load::LoadedFile,
     named_file::written_name,
 };
 use crate::calibration::{CalibrationId, Replaces, StoredFile};
@@ -41,14 +41,14 @@ impl Calibrations {
         &self,
         id: &CalibrationId,
         content: &[u8],
-        camera: Option<&str>,
+        reading: &Reading,
         condition: &WriteCondition,
     ) -> Result<Put, ChangeError> {
         if !self.writable {
             return Err(ChangeError::NotWritable);
         }
         let name = written_name(id);
-        let (entry, written) = import(id, &name, content, camera)?;
+        let (entry, written) = import(id, &name, content, reading)?;
         let changing = self.lock();
         // What others have stored since the last look counts, too.
         self.look(&changing)?;

@@ -82,15 +82,28 @@ impl CalibrationEntry {
     }
 }
 
+/// How an uploaded file is to be read.
+#[derive(Debug, Clone, Default)]
+pub struct Reading {
+    /// Which camera of the file is meant, by its name there, if there are several.
+    pub camera: Option<String>,
+    /// The size of the frames, for formats that do not tell it.
+    pub size: Option<NativeImage>,
+}
+
 /// The calibration `id` that an upload means, as the native file called `name`: its only camera, or
-/// the one that `camera` names.
+/// the one that `reading` names.
 pub(super) fn import(
     id: &CalibrationId,
     name: &str,
     content: &[u8],
-    camera: Option<&str>,
+    reading: &Reading,
 ) -> Result<(CalibrationEntry, String), ChangeError> {
     let mut file = CalibrationFile::parse(content)?;
+    if let Some(size) = reading.size {
+        file.assume_size(size)?;
+    }
+    let camera = reading.camera.as_deref();
     let names: Vec<_> = file
         .cameras
         .iter()

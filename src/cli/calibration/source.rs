@@ -1,6 +1,6 @@
 //! The cameras of a file that a command is about.
 
-use std::{path::PathBuf, str::FromStr};
+use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -23,7 +23,7 @@ pub(super) struct Source {
     camera: Option<String>,
     /// The frame size in pixels, for formats that do not tell it
     #[arg(long, value_name = "WIDTHxHEIGHT")]
-    size: Option<FrameSize>,
+    size: Option<NativeImage>,
 }
 
 /// The cameras of a file.
@@ -46,10 +46,8 @@ impl Source {
         let path = self.file.display();
         let content = read_content(&self.file)?;
         let mut file = CalibrationFile::parse(&content).with_context(|| path.to_string())?;
-        if let Some(size) = &self.size {
-            for camera in &mut file.cameras {
-                size.fill_in(camera)?;
-            }
+        if let Some(size) = self.size {
+            file.assume_size(size).context("--size")?;
         }
         let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
         let checked = file.calibrations(&stem, &content);
@@ -91,38 +89,5 @@ impl Source {
 impl NamedCamera {
     fn name(&self) -> String {
         self.told.name.clone().unwrap_or_else(|| self.id.clone())
-    }
-}
-
-/// `640x480`
-#[derive(Debug, Clone)]
-struct FrameSize(NativeImage);
-
-impl FrameSize {
-    /// Gives the camera its frame size, unless the file tells another.
-    fn fill_in(&self, camera: &mut FileCamera) -> anyhow::Result<()> {
-        let Ok(camera) = &mut camera.camera else {
-            return Ok(());
-        };
-        let told = *camera.image.get_or_insert(self.0);
-        if told != self.0 {
-            let NativeImage { width, height } = told;
-            bail!("--size: the file itself says {width}x{height}: leave it out");
-        }
-        Ok(())
-    }
-}
-
-impl FromStr for FrameSize {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let sides = text.split_once('x');
-        sides
-            .and_then(|(width, height)| {
-                let (width, height) = (width.parse().ok()?, height.parse().ok()?);
-                Some(Self(NativeImage { width, height }))
-            })
-            .ok_or("give the width and height in pixels, such as 640x480")
     }
 }
