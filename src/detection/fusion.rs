@@ -13,7 +13,8 @@
 //!   of the same person, such as the legs or a group ([`doubt_nested`]).
 
 use super::{
-    BBox, Candidate, FramePixels, MergedDetection, RefinementParameters, overlap_grid::OverlapGrid,
+    BBox, Candidate, FramePixels, MergedDetection, RefinementParameters,
+    overlap_grid::{Overlap, OverlapGrid},
 };
 
 /// Views whose word makes a score: more would outvote a person whom few see well.
@@ -39,26 +40,31 @@ pub(super) fn fuse(
     let mut order: Vec<usize> = (0..candidates.len())
         .filter(|index| candidates[*index].is_usable())
         .collect();
-    order.sort_by(|a, b| candidates[*b].score.total_cmp(&candidates[*a].score));
+    order.sort_unstable_by(|a, b| {
+        let by_score = candidates[*b].score.total_cmp(&candidates[*a].score);
+        by_score.then(a.cmp(b))
+    });
 
-    let mut grid = OverlapGrid::covering(order.iter().map(|index| &candidates[*index].bbox));
+    let boxes = order.iter().map(|index| &candidates[*index].bbox);
+    let mut grid = OverlapGrid::covering(boxes, parameters.iou_threshold);
     let mut clusters: Vec<Cluster> = Vec::new();
-    let mut near = Vec::new();
+    let mut overlaps = Vec::new();
     for index in order {
         let candidate = &candidates[index];
-        grid.near(&candidate.bbox, 0, &mut near);
-        let joined = best_cluster(&candidate.bbox, &near, &clusters, parameters.iou_threshold);
-        if let Some(number) = joined {
+        grid.overlaps(&candidate.bbox, 0, &mut overlaps);
+        if let Some(number) = best_of(&overlaps) {
             clusters[number].absorb(index, candidate);
-            grid.extend(number, &clusters[number].bbox);
+            grid.move_to(number, &clusters[number].bbox);
         } else {
             grid.insert(&candidate.bbox);
             clusters.push(Cluster::founded_by(index, candidate));
         }
     }
 
+    // Nothing that joins a cluster is worth more than its founder.
     let mut fused: Vec<MergedDetection> = clusters
         .into_iter()
+        .take_while(|cluster| cluster.best_score >= parameters.score_threshold)
         .map(|cluster| cluster.into_detection(candidates))
         .filter(|detection| detection.score >= parameters.score_threshold)
         .collect();
@@ -77,17 +83,17 @@ fn sort_by_score(detections: &mut [MergedDetection]) {
 /// Lowers the scores of boxes that share most of the smaller box's area with a better one: by up
 /// to [`NESTED_DOUBT`], in proportion to how much of the better box's own score is left.
 fn doubt_nested(descending: &mut [MergedDetection]) {
-    let mut grid = OverlapGrid::covering(descending.iter().map(|detection| &detection.bbox));
+    let mut grid = OverlapGrid::covering(descending.iter().map(|detection| &detection.bbox), 0.0);
     for detection in descending.iter() {
         grid.insert(&detection.bbox);
     }
     let original: Vec<f64> = descending.iter().map(|detection| detection.score).collect();
-    let mut near = Vec::new();
+    let mut overlaps = Vec::new();
     for better in 0..descending.len() {
         let bbox = descending[better].bbox;
         let standing = descending[better].score / original[better];
-        grid.near(&bbox, better + 1, &mut near);
-        for &worse in &near {
+        grid.overlaps(&bbox, better + 1, &mut overlaps);
+        for &Overlap { number: worse, .. } in &overlaps {
             let other = descending[worse].bbox;
             let smaller_area = bbox.area().min(other.area());
             if smaller_area > 0.0 {
@@ -100,22 +106,17 @@ fn doubt_nested(descending: &mut [MergedDetection]) {
     }
 }
 
-fn best_cluster(
-    bbox: &BBox<FramePixels>,
-    near: &[usize],
-    clusters: &[Cluster],
-    iou_threshold: f64,
-) -> Option<usize> {
-    let mut best = None;
-    let mut best_iou = 0.0;
-    for &number in near {
-        let iou = bbox.iou(&clusters[number].bbox);
-        if iou > best_iou && iou >= iou_threshold {
-            best = Some(number);
-            best_iou = iou;
+/// The number of the box that is overlapped most; of equal ones the lowest.
+fn best_of(overlaps: &[Overlap]) -> Option<usize> {
+    let first = overlaps.first()?;
+    let best = overlaps.iter().fold(first, |best, overlap| {
+        if overlap.iou > best.iou {
+            overlap
+        } else {
+            best
         }
-    }
-    best
+    });
+    Some(best.number)
 }
 
 /// How much two boxes agree, 0 to 1: equal ones fully, also if they have no area.

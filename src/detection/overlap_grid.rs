@@ -1,48 +1,82 @@
-//! Finds the boxes near a box without looking at all of them.
+//! Finds the boxes that a box overlaps without looking at all of them.
 //!
-//! A uniform grid in which every box is listed in each cell it reaches. Cells are at least as
-//! large as the mean box, so a box reaches few of them, and at most 64 × 64 in number.
+//! A uniform grid in which every box is listed in each cell it reaches. Who asks for an IoU of at
+//! least `t` needs not look everywhere a box reaches: of each side, the overlap covers at least the
+//! share `t` (the IoU is at most that share), so whatever its place, it meets the side's *core*:
+//! what is left when `t` is cut off at both ends, from `t` = ½ on its middle alone. One cell, then,
+//! tells all boxes that can be meant.
 
 use super::{BBox, FramePixels};
 
-const MAX_CELLS_PER_AXIS: usize = 64;
+/// Cells along a side of the mean box when whole boxes are asked for, and how many more when it is
+/// their middles alone: the finer the cells, the fewer boxes beside them are looked at.
+const CELLS_PER_BOX: [f64; 2] = [1.0, 4.0];
+const MAX_CELLS_PER_AXIS: usize = 128;
+/// Shares of sides are this much less exact than IoUs, so that rounding loses no box.
+const ROUNDING: f64 = 1e-9;
+
+/// A box of the grid that overlaps a box asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Overlap {
+    /// The number of the box in the grid.
+    pub(super) number: usize,
+    /// Above 0, at most 1.
+    pub(super) iou: f64,
+}
 
 /// Boxes, numbered in order of insertion, by the cells they reach.
 pub(super) struct OverlapGrid {
     columns: Axis,
     rows: Axis,
     cells: Vec<Vec<usize>>,
+    boxes: Vec<BBox<FramePixels>>,
     reach: Vec<Reach>,
+    least_iou: f64,
+    /// How much of each end of a side is not core.
+    cut: f64,
 }
 
 impl OverlapGrid {
-    /// An empty grid for boxes that lie where `boxes` lie. Others may be inserted and looked for:
-    /// the outermost cells go on for ever.
-    pub(super) fn covering<'a>(boxes: impl Iterator<Item = &'a BBox<FramePixels>> + Clone) -> Self {
-        let columns = Axis::covering(boxes.clone().map(|bbox| (bbox.x_min(), bbox.x_max())));
-        let rows = Axis::covering(boxes.map(|bbox| (bbox.y_min(), bbox.y_max())));
+    /// An empty grid for boxes that lie where `boxes` lie, of which those with an IoU of at least
+    /// `least_iou` will be looked for. Others may be inserted and asked for: the outermost cells go
+    /// on for ever.
+    pub(super) fn covering<'a>(
+        boxes: impl Iterator<Item = &'a BBox<FramePixels>> + Clone,
+        least_iou: f64,
+    ) -> Self {
+        let cut = least_iou.min(0.5) * (1.0 - ROUNDING);
+        let cells_per_box = CELLS_PER_BOX[0] + CELLS_PER_BOX[1] * 2.0 * cut;
+        let columns = boxes.clone().map(|bbox| (bbox.x_min(), bbox.x_max()));
+        let columns = Axis::covering(columns, cells_per_box);
+        let rows = boxes.map(|bbox| (bbox.y_min(), bbox.y_max()));
+        let rows = Axis::covering(rows, cells_per_box);
         Self {
             cells: vec![Vec::new(); columns.cells * rows.cells],
             columns,
             rows,
+            boxes: Vec::new(),
             reach: Vec::new(),
+            least_iou,
+            cut,
         }
     }
 
     /// Adds a box under the next number.
     pub(super) fn insert(&mut self, bbox: &BBox<FramePixels>) {
         let number = self.reach.len();
-        let reach = self.reach_of(bbox);
+        let reach = self.reach_of(bbox, 0.0);
         for (column, row) in reach.cells() {
             self.cells[row * self.columns.cells + column].push(number);
         }
+        self.boxes.push(*bbox);
         self.reach.push(reach);
     }
 
-    /// Tells the grid that box `number` has moved. It stays listed where it was.
-    pub(super) fn extend(&mut self, number: usize, bbox: &BBox<FramePixels>) {
+    /// Moves box `number`. It stays listed where it was, too.
+    pub(super) fn move_to(&mut self, number: usize, bbox: &BBox<FramePixels>) {
+        self.boxes[number] = *bbox;
         let before = self.reach[number];
-        let after = before.union(&self.reach_of(bbox));
+        let after = before.union(&self.reach_of(bbox, 0.0));
         if after == before {
             return;
         }
@@ -55,30 +89,45 @@ impl OverlapGrid {
     }
 
     /// Writes to `found`, ascending and each once, the numbers from `first` on of all boxes that
-    /// overlap `bbox`, and of some more that are near it. `first` above 0 needs a grid in which no
-    /// box was moved.
-    pub(super) fn near(&self, bbox: &BBox<FramePixels>, first: usize, found: &mut Vec<usize>) {
+    /// overlap `bbox` with at least the grid's IoU. `first` above 0 needs a grid in which no box
+    /// was moved.
+    pub(super) fn overlaps(
+        &self,
+        bbox: &BBox<FramePixels>,
+        first: usize,
+        found: &mut Vec<Overlap>,
+    ) {
         found.clear();
-        let reach = self.reach_of(bbox);
-        for (column, row) in reach.cells() {
+        let core = self.reach_of(bbox, self.cut);
+        for (column, row) in core.cells() {
             let listed = &self.cells[row * self.columns.cells + column];
             for &number in listed.iter().rev().take_while(|number| **number >= first) {
+                let iou = bbox.iou(&self.boxes[number]);
                 // Two boxes may share many cells; only the first of those counts.
-                if reach.first_shared(&self.reach[number]) == (column, row) {
-                    found.push(number);
+                if iou > 0.0
+                    && iou >= self.least_iou
+                    && core.first_shared(&self.reach[number]) == (column, row)
+                {
+                    found.push(Overlap { number, iou });
                 }
             }
         }
-        found.sort_unstable();
+        found.sort_unstable_by_key(|overlap| overlap.number);
     }
 
-    fn reach_of(&self, bbox: &BBox<FramePixels>) -> Reach {
+    /// The cells of what is left of a box when the share `cut` of each side is cut off at both of
+    /// its ends.
+    fn reach_of(&self, bbox: &BBox<FramePixels>, cut: f64) -> Reach {
+        let (x_cut, y_cut) = (cut * bbox.width(), cut * bbox.height());
         Reach {
             columns: (
-                self.columns.cell(bbox.x_min()),
-                self.columns.cell(bbox.x_max()),
+                self.columns.cell(bbox.x_min() + x_cut),
+                self.columns.cell(bbox.x_max() - x_cut),
             ),
-            rows: (self.rows.cell(bbox.y_min()), self.rows.cell(bbox.y_max())),
+            rows: (
+                self.rows.cell(bbox.y_min() + y_cut),
+                self.rows.cell(bbox.y_max() - y_cut),
+            ),
         }
     }
 }
@@ -125,7 +174,7 @@ struct Axis {
 }
 
 impl Axis {
-    fn covering(ranges: impl Iterator<Item = (f64, f64)>) -> Self {
+    fn covering(ranges: impl Iterator<Item = (f64, f64)>, cells_per_box: f64) -> Self {
         let (mut start, mut end) = (f64::INFINITY, f64::NEG_INFINITY);
         let (mut sides, mut count) = (0.0, 0.0);
         for (low, high) in ranges {
@@ -136,8 +185,8 @@ impl Axis {
         }
         let extent = end - start;
         // Without boxes, or without extent, the quotient is no number: one cell.
-        let cells = to_cell(extent * count / sides).clamp(1, MAX_CELLS_PER_AXIS);
-        #[expect(clippy::cast_precision_loss, reason = "at most 64 cells")]
+        let cells = to_cell(cells_per_box * extent * count / sides).clamp(1, MAX_CELLS_PER_AXIS);
+        #[expect(clippy::cast_precision_loss, reason = "at most 128 cells")]
         let cells_per_pixel = cells as f64 / extent;
         Self {
             origin: start,

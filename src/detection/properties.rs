@@ -209,6 +209,21 @@ proptest! {
     }
 
     #[test]
+    fn candidates_below_the_threshold_need_not_be_offered_to_the_nms_family(
+        candidates in candidates(),
+        parameters in parameters(nms_family()),
+    ) {
+        let (offered, numbers): (Vec<Candidate>, Vec<usize>) = (candidates.iter().copied())
+            .zip(0..)
+            .filter(|(candidate, _)| candidate.score >= parameters.score_threshold)
+            .unzip();
+        let found: Vec<_> = picks(&refine(&offered, &parameters)).into_iter()
+            .map(|(member, score)| (numbers[member], score))
+            .collect();
+        prop_assert_eq!(found, picks(&refine(&candidates, &parameters)));
+    }
+
+    #[test]
     fn fast_fusion_forms_the_same_clusters_as_the_plain_one(
         candidates in distinct_candidates(),
         // Off the values that IoUs of lattice boxes take, where rounding would decide.

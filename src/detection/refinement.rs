@@ -98,14 +98,20 @@ pub fn refine(candidates: &[Candidate], parameters: &RefinementParameters) -> Ve
         ..
     } = *parameters;
     match parameters.refinement {
-        Refinement::Nms => {
-            suppression::suppress(candidates, parameters, suppression::hard(iou_threshold))
-        }
-        Refinement::SoftNmsLinear => {
-            suppression::suppress(candidates, parameters, suppression::linear(iou_threshold))
-        }
+        Refinement::Nms => suppression::suppress(
+            candidates,
+            parameters,
+            iou_threshold,
+            suppression::hard(iou_threshold),
+        ),
+        Refinement::SoftNmsLinear => suppression::suppress(
+            candidates,
+            parameters,
+            iou_threshold,
+            suppression::linear(iou_threshold),
+        ),
         Refinement::SoftNmsGaussian => {
-            suppression::suppress(candidates, parameters, suppression::gaussian(sigma))
+            suppression::suppress(candidates, parameters, 0.0, suppression::gaussian(sigma))
         }
         Refinement::Fusion => fusion::fuse(candidates, parameters),
     }

@@ -38,6 +38,7 @@ pub(super) fn gaussian(sigma: f64) -> impl Fn(f64) -> f64 {
 pub(super) fn suppress(
     candidates: &[Candidate],
     parameters: &RefinementParameters,
+    least_iou: f64,
     factor: impl Fn(f64) -> f64,
 ) -> Vec<MergedDetection> {
     let mut waiting: BinaryHeap<Waiting> = candidates
@@ -53,9 +54,9 @@ pub(super) fn suppress(
     let boxes = waiting
         .iter()
         .map(|waiting| &candidates[waiting.index].bbox);
-    let mut grid = OverlapGrid::covering(boxes);
+    let mut grid = OverlapGrid::covering(boxes, least_iou);
     let mut picked: Vec<MergedDetection> = Vec::new();
-    let mut near = Vec::new();
+    let mut overlaps = Vec::new();
     // Boxes apart are never compared. It is only hard NMS at N_t = 0 that would suppress them.
     let at_most = if factor(0.0) <= 0.0 {
         parameters.max_detections.min(1)
@@ -67,9 +68,9 @@ pub(super) fn suppress(
         && let Some(mut top) = waiting.pop()
     {
         let bbox = candidates[top.index].bbox;
-        grid.near(&bbox, top.seen, &mut near);
-        for &number in &near {
-            top.score *= factor(bbox.iou(&picked[number].bbox));
+        grid.overlaps(&bbox, top.seen, &mut overlaps);
+        for overlap in &overlaps {
+            top.score *= factor(overlap.iou);
         }
         top.seen = picked.len();
         if !parameters.keeps(top.score) {

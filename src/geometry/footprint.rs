@@ -1,6 +1,9 @@
 //! Footprints: what a box found in a view covers in the fisheye frame.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::{
+    f64::consts::{FRAC_PI_2, PI, TAU},
+    sync::LazyLock,
+};
 
 use nalgebra::Vector2;
 
@@ -11,7 +14,15 @@ use super::{
 };
 
 /// Points on an inscribed ellipse: more change the hull by less than 0.2 % of its size.
-const ELLIPSE_POINTS: u32 = 32;
+const ELLIPSE_POINTS: usize = 32;
+/// Sine and cosine of the angles at which these points lie: thousands of ellipses have the same.
+static ELLIPSE_ANGLES: LazyLock<[(f64, f64); ELLIPSE_POINTS]> = LazyLock::new(|| {
+    std::array::from_fn(|index| {
+        #[expect(clippy::cast_precision_loss, reason = "at most 32")]
+        let share = TAU * index as f64 / ELLIPSE_POINTS as f64;
+        share.sin_cos()
+    })
+});
 /// The tilted ellipse is not determined near 45°: squared direction components at least this far
 /// apart keep the solution stable.
 const MIN_TILT_DETERMINANT: f64 = 0.18;
@@ -50,28 +61,36 @@ impl Footprint {
         lens: &Lens,
         mount: &Mount,
     ) -> Option<Self> {
-        let (outline_in_view, extremities) = match back_projection {
-            BackProjection::CornerHull => (corners(view_box).to_vec(), None),
+        match back_projection {
+            BackProjection::CornerHull => Self::of_outline(corners(view_box), None, view, lens),
             BackProjection::TiltedEllipse => {
                 let ellipse = Ellipse::inscribed(view_box, view, mount);
-                (
-                    ellipse.outline().collect::<Vec<_>>(),
-                    Some(ellipse.extremities(view)),
-                )
+                let extremities = Some(ellipse.extremities(view));
+                Self::of_outline(ellipse.outline(), extremities, view, lens)
             }
-        };
+        }
+    }
+
+    /// Maps an outline (corner-origin view pixels) to the frame.
+    fn of_outline<const POINTS: usize>(
+        outline_in_view: [Pixel; POINTS],
+        extremities: Option<Extremities>,
+        view: &VirtualView,
+        lens: &Lens,
+    ) -> Option<Self> {
         let mut inside = 0_usize;
-        let mut outline = Vec::with_capacity(outline_in_view.len());
-        for point in &outline_in_view {
-            let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
+        let mut outline = Vec::with_capacity(POINTS);
+        for point in outline_in_view {
+            let pixel = cross_half_pixel(point, PixelConvention::PixelCentre);
             let ray = view.ray_in_camera(&pixel);
-            inside += usize::from(lens.project(&ray).is_some());
-            if let Some(in_frame) = lens.project_to_rim(&ray) {
+            let seen = lens.project(&ray);
+            inside += usize::from(seen.is_some());
+            if let Some(in_frame) = seen.or_else(|| lens.project_to_rim(&ray)) {
                 outline.push(cross_half_pixel(in_frame, PixelConvention::CornerOrigin));
             }
         }
         #[expect(clippy::cast_precision_loss, reason = "at most 32 points")]
-        let inside_share = inside as f64 / outline_in_view.len() as f64;
+        let inside_share = inside as f64 / POINTS as f64;
         (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self {
             outline,
             extremities,
@@ -160,19 +179,19 @@ impl Ellipse {
         }
     }
 
-    /// The point at `angle` radians from the head, clockwise.
-    fn at(&self, angle: f64) -> Pixel {
+    /// The point at the angle with this sine and cosine from the head, clockwise.
+    fn at(&self, (sin, cos): (f64, f64)) -> Pixel {
         let right = Vector2::new(-self.up.y, self.up.x);
-        self.center + self.up * (self.along * angle.cos()) + right * (self.across * angle.sin())
+        self.center + self.up * (self.along * cos) + right * (self.across * sin)
     }
 
-    fn outline(&self) -> impl Iterator<Item = Pixel> {
-        (0..ELLIPSE_POINTS).map(|index| self.at(TAU * f64::from(index) / f64::from(ELLIPSE_POINTS)))
+    fn outline(&self) -> [Pixel; ELLIPSE_POINTS] {
+        ELLIPSE_ANGLES.map(|angle| self.at(angle))
     }
 
     fn extremities(&self, view: &VirtualView) -> Extremities {
-        let ray = |angle| {
-            let pixel = cross_half_pixel(self.at(angle), PixelConvention::PixelCentre);
+        let ray = |angle: f64| {
+            let pixel = cross_half_pixel(self.at(angle.sin_cos()), PixelConvention::PixelCentre);
             view.ray_in_camera(&pixel)
         };
         Extremities {

@@ -32,15 +32,20 @@ struct Mapped {
 }
 
 impl Mapped {
-    /// The candidate with its score weighed by how plausible a person it makes.
-    fn weighed(&self, rig: &CameraRig) -> Candidate {
+    /// The candidate with its score weighed by how plausible a person it makes, and the views that
+    /// should have seen that person counted.
+    fn weighed(&self, looks: &[Look], rig: &CameraRig) -> Candidate {
         let mount = &rig.geometry().mount;
         let stature = self
             .footprint
             .extremities()
             .and_then(|extremities| extremities.stature(mount));
+        let holding = views_holding(looks, &rig.outline(&self.footprint));
+        #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
+        let expected_views = holding.max(1) as f64;
         Candidate {
             score: self.candidate.score * worth(self.cut_off, stature, mount),
+            expected_views,
             ..self.candidate
         }
     }
@@ -90,33 +95,35 @@ fn merged(
     back_projection: BackProjection,
     parameters: &RefinementParameters,
 ) -> (Vec<Mapped>, Vec<MergedDetection>) {
+    let is_fusion = parameters.refinement == Refinement::Fusion;
+    // Suppression only lowers scores; in fusion, what lies below the threshold is a witness.
+    let matters = |score: f64| is_fusion || score >= parameters.score_threshold;
     let mapped: Vec<Mapped> = finds(looks)
-        .filter_map(|find| map(&find, looks, back_projection))
+        .filter(|find| matters(find.detection.score))
+        .filter_map(|find| map(&find, back_projection))
         .collect();
     // Suppression compares what the detector said; fusion weighs it.
-    let candidates: Vec<Candidate> = match parameters.refinement {
-        Refinement::Fusion => mapped.iter().map(|one| one.weighed(rig)).collect(),
-        _ => mapped.iter().map(|one| one.candidate).collect(),
+    let candidates: Vec<Candidate> = if is_fusion {
+        mapped.iter().map(|one| one.weighed(looks, rig)).collect()
+    } else {
+        mapped.iter().map(|one| one.candidate).collect()
     };
     let merged = refine(&candidates, parameters);
     (mapped, merged)
 }
 
-fn map(find: &Find<'_>, looks: &[Look], back_projection: BackProjection) -> Option<Mapped> {
+fn map(find: &Find<'_>, back_projection: BackProjection) -> Option<Mapped> {
     let Look { rig, model, .. } = find.look;
     let found = find.detection;
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
     let bbox = BBox::new(footprint.bounds()).ok()?;
-    let holding = views_holding(looks, &rig.outline(&footprint));
-    #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
-    let expected_views = holding.max(1) as f64;
     let cut_off = touches_border(&found.bbox, model.input());
     let candidate = Candidate {
         bbox,
         score: found.score,
         view: find.number,
         coordinate_weight: if cut_off { BORDER_WEIGHT } else { 1.0 },
-        expected_views,
+        expected_views: 1.0,
     };
     Some(Mapped {
         candidate,

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{BBox, FramePixels, OverlapGrid};
+use super::{BBox, FramePixels, Overlap, OverlapGrid};
 
 type FrameBox = BBox<FramePixels>;
 
@@ -15,40 +15,72 @@ fn boxes() -> impl Strategy<Value = Vec<FrameBox>> {
     prop::collection::vec(frame_box(), 0..40)
 }
 
+/// Any overlap, any that a refinement may ask for, or that of boxes which coincide.
+fn least_iou() -> impl Strategy<Value = f64> {
+    prop_oneof![Just(0.0), 0.0..1.0, Just(0.5), Just(1.0)]
+}
+
 /// Inserts one box after the other.
-fn grid_of(boxes: &[FrameBox]) -> OverlapGrid {
-    let mut grid = OverlapGrid::covering(boxes.iter());
+fn grid_of(boxes: &[FrameBox], least_iou: f64) -> OverlapGrid {
+    let mut grid = OverlapGrid::covering(boxes.iter(), least_iou);
     for bbox in boxes {
         grid.insert(bbox);
     }
     grid
 }
 
-fn near(grid: &OverlapGrid, bbox: &FrameBox, first: usize) -> Vec<usize> {
+fn found(grid: &OverlapGrid, bbox: &FrameBox, first: usize) -> Vec<Overlap> {
     let mut found = Vec::new();
-    grid.near(bbox, first, &mut found);
+    grid.overlaps(bbox, first, &mut found);
     found
 }
 
-fn overlapping(boxes: &[FrameBox], bbox: &FrameBox) -> Vec<usize> {
-    (0..boxes.len())
-        .filter(|number| boxes[*number].intersection_area(bbox) > 0.0)
+/// Every box compared.
+fn overlaps(boxes: &[FrameBox], bbox: &FrameBox, first: usize, least_iou: f64) -> Vec<Overlap> {
+    (first..boxes.len())
+        .map(|number| Overlap {
+            number,
+            iou: bbox.iou(&boxes[number]),
+        })
+        .filter(|overlap| overlap.iou > 0.0 && overlap.iou >= least_iou)
         .collect()
 }
 
 proptest! {
     #[test]
-    fn every_overlapping_box_is_found_once_and_in_order(
+    fn the_overlaps_are_those_that_comparing_every_box_finds(
         boxes in boxes(),
         wanted in frame_box(),
         first in 0..40_usize,
+        least_iou in least_iou(),
     ) {
-        let found = near(&grid_of(&boxes), &wanted, first);
-        prop_assert!(found.is_sorted_by(|a, b| a < b));
-        prop_assert!(found.iter().all(|number| *number >= first));
-        for number in overlapping(&boxes, &wanted) {
-            prop_assert!(number < first || found.contains(&number));
+        let grid = grid_of(&boxes, least_iou);
+        prop_assert_eq!(found(&grid, &wanted, first), overlaps(&boxes, &wanted, first, least_iou));
+        for bbox in &boxes {
+            prop_assert_eq!(found(&grid, bbox, 0), overlaps(&boxes, bbox, 0, least_iou));
         }
+    }
+
+    #[test]
+    fn a_box_whose_iou_is_just_enough_is_found(
+        wanted in frame_box(),
+        share in 0.01..1.0_f64,
+        at_the_end in any::<bool>(),
+        others in boxes(),
+    ) {
+        // The whole height and a share of the width, at either end: the IoU is that share.
+        let [x_min, y_min, x_max, y_max] = wanted.corners();
+        let part = if at_the_end {
+            [x_max - share * wanted.width(), y_min, x_max, y_max]
+        } else {
+            [x_min, y_min, x_min + share * wanted.width(), y_max]
+        };
+        let part = BBox::new(part).unwrap();
+        let least_iou = wanted.iou(&part);
+        let mut boxes = vec![part];
+        boxes.extend(others);
+        let found = found(&grid_of(&boxes, least_iou), &wanted, 0);
+        prop_assert_eq!(found, overlaps(&boxes, &wanted, 0, least_iou));
     }
 
     #[test]
@@ -56,26 +88,26 @@ proptest! {
         boxes in boxes(),
         moves in prop::collection::vec((any::<prop::sample::Index>(), frame_box()), 0..20),
         wanted in frame_box(),
+        least_iou in least_iou(),
     ) {
-        let mut grid = grid_of(&boxes);
+        let mut grid = grid_of(&boxes, least_iou);
         let mut moved = boxes;
         for (index, bbox) in moves {
             if !moved.is_empty() {
                 let number = index.index(moved.len());
-                grid.extend(number, &bbox);
+                grid.move_to(number, &bbox);
                 moved[number] = bbox;
             }
         }
-        let found = near(&grid, &wanted, 0);
-        prop_assert!(found.is_sorted_by(|a, b| a < b));
-        for number in overlapping(&moved, &wanted) {
-            prop_assert!(found.contains(&number));
+        prop_assert_eq!(found(&grid, &wanted, 0), overlaps(&moved, &wanted, 0, least_iou));
+        for bbox in &moved {
+            prop_assert_eq!(found(&grid, bbox, 0), overlaps(&moved, bbox, 0, least_iou));
         }
     }
 }
 
 #[test]
-fn few_of_many_scattered_boxes_are_looked_at() {
+fn few_of_many_scattered_boxes_are_listed_together() {
     let mut boxes = Vec::new();
     for row in 0..20 {
         for column in 0..20 {
@@ -83,5 +115,6 @@ fn few_of_many_scattered_boxes_are_looked_at() {
             boxes.push(BBox::new([x, y, x + 40.0, y + 40.0]).unwrap());
         }
     }
-    assert!(near(&grid_of(&boxes), &boxes[210], 0).len() <= 9);
+    let grid = grid_of(&boxes, 0.5);
+    assert!(grid.cells.iter().all(|listed| listed.len() <= 4));
 }
