@@ -15,7 +15,7 @@ use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, ref
 
 const CANDIDATES: usize = 100_000;
 const FRAME_SIDE: f64 = 1680.0;
-const VIEWS: usize = 24;
+const VIEWS: f64 = 24.0;
 const SCORE_FLOOR: f64 = 0.01;
 const SCORE_THRESHOLD: f64 = 0.3;
 const ROUNDS: usize = 15;
@@ -112,7 +112,7 @@ impl Noise {
             clippy::cast_sign_loss,
             reason = "below 24"
         )]
-        let view = (self.share() * VIEWS as f64) as usize;
+        let view = (self.share() * VIEWS) as usize;
         Ok(Candidate {
             bbox: BBox::new([x, y, x + width, y + height])?,
             score: SCORE_FLOOR + (1.0 - SCORE_FLOOR) * self.share().powf(exponent),

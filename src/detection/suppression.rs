@@ -5,7 +5,10 @@
 //! score: see [`hard`], [`linear`] and [`gaussian`]. All follow Seidel et al. (2019) in comparing
 //! `IoU >= N_t`.
 
-use std::{cmp::Ordering, collections::BinaryHeap};
+use std::{
+    cmp::Ordering,
+    collections::{BinaryHeap, binary_heap::PeekMut},
+};
 
 use super::{Candidate, MergedDetection, RefinementParameters, overlap_grid::OverlapGrid};
 
@@ -27,7 +30,7 @@ pub(super) fn gaussian(sigma: f64) -> impl Fn(f64) -> f64 {
 }
 
 /// Picks boxes by descending score; `factor` says, from the IoU with a picked box, what is left
-/// of a score. Of equal scores the lower index goes first.
+/// of a score, and leaves it as it is below `least_iou`. Of equal scores the lower index goes first.
 ///
 /// Scores only ever fall, hence three shortcuts that change no result:
 /// * A candidate below the threshold can never be picked, nor then lower another: it is left out
@@ -65,26 +68,27 @@ pub(super) fn suppress(
     };
 
     while picked.len() < at_most
-        && let Some(mut top) = waiting.pop()
+        && let Some(mut top) = waiting.peek_mut()
     {
         let bbox = candidates[top.index].bbox;
-        grid.overlaps(&bbox, top.seen, &mut overlaps);
-        for overlap in &overlaps {
-            top.score *= factor(overlap.iou);
-        }
-        top.seen = picked.len();
-        if !parameters.keeps(top.score) {
+        if top.seen < picked.len() {
+            grid.overlaps(&bbox, top.seen, &mut overlaps);
+            for overlap in &overlaps {
+                top.score *= factor(overlap.iou);
+            }
+            top.seen = picked.len();
+            if !parameters.keeps(top.score) {
+                PeekMut::pop(top);
+            }
+            // Otherwise it sinks to where it belongs now.
             continue;
         }
-        if waiting.peek().is_some_and(|next| *next > top) {
-            waiting.push(top);
-            continue;
-        }
+        let Waiting { score, index, .. } = PeekMut::pop(top);
         grid.insert(&bbox);
         picked.push(MergedDetection {
             bbox,
-            score: top.score,
-            members: vec![top.index],
+            score,
+            members: vec![index],
         });
     }
     picked
