@@ -1,7 +1,8 @@
 //! The only place that knows HTTP. One page of routes; every failure leaves as one envelope.
 
-mod administrator;
+mod access;
 mod calibrations;
+mod cors;
 mod detect;
 mod envelope;
 mod health;
@@ -17,6 +18,7 @@ use axum::{Router, extract::DefaultBodyLimit, response::Redirect, routing::get};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
+pub use access::Access;
 pub use health::{Phase, Readiness};
 pub use openapi::document as openapi_document;
 pub use report::Report;
@@ -45,6 +47,7 @@ fn routes() -> OpenApiRouter<ApiState> {
 /// The whole service.
 pub fn router(state: ApiState) -> Router {
     let metrics = state.metrics.clone();
+    let cors = cors::layer(&state.options.cors_origins);
     let (router, _document) = routes().split_for_parts();
     let router = router
         .with_state(state)
@@ -52,7 +55,7 @@ pub fn router(state: ApiState) -> Router {
         .merge(api_page())
         // Bodies are bounded where they are read.
         .layer(DefaultBodyLimit::disable());
-    envelope::around(router, metrics)
+    envelope::around(router, cors, metrics)
 }
 
 /// The API page, from files inside the executable; it asks for nothing beyond this server.

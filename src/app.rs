@@ -9,14 +9,15 @@ use axum::serve::ListenerExt;
 use tokio::{net::TcpListener, task::spawn_blocking, time::sleep};
 
 use crate::{
-    api::{self, ApiOptions, ApiState, Phase, Readiness},
+    access::AccessKeys,
+    api::{self, Access, ApiOptions, ApiState, Phase, Readiness},
     calibration::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     imaging::decode::DecodeLimits,
     inference::ModelRepository,
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
-    settings::{CalibrationPlace, LimitSettings, Settings, find_calibrations},
+    settings::{AccessSettings, CalibrationPlace, LimitSettings, Settings, find_calibrations},
     shutdown::Shutdown,
 };
 
@@ -107,6 +108,8 @@ pub struct App {
     calibrations: Arc<Calibrations>,
     workers: Arc<WorkerPool>,
     readiness: Readiness,
+    /// The keys, if there are some.
+    keys: Option<Arc<AccessKeys>>,
     state: ApiState,
     settings: Settings,
 }
@@ -115,7 +118,7 @@ impl App {
     /// Starts the workers. No model is loaded yet: [`App::serve`] does that.
     ///
     /// # Errors
-    /// When the operating system gives no thread.
+    /// When the operating system gives no thread, or the keys cannot be used.
     pub fn start(assembly: Assembly, settings: Settings) -> anyhow::Result<Self> {
         let Assembly {
             engine,
@@ -136,12 +139,19 @@ impl App {
             .with_label_values(&[env!("CARGO_PKG_VERSION")])
             .set(1);
         let readiness = Readiness::default();
+        let keys = open_keys(&settings.access)?;
+        let access = match &keys {
+            Some(keys) => Access::Keys(Arc::clone(keys)),
+            None => Access::Open {
+                own_machine_only: settings.server.listen.ip().is_loopback(),
+            },
+        };
         let options = ApiOptions {
             max_body_bytes: settings.server.max_body_bytes,
             max_upload_bytes: settings.limits.max_upload_bytes,
             request_timeout: settings.server.request_timeout,
-            // Nobody else reaches a server that listens to its own machine only.
-            administration: settings.server.listen.ip().is_loopback(),
+            access,
+            cors_origins: settings.access.cors_origins.clone(),
         };
         let state = ApiState::new(
             Arc::clone(&workers),
@@ -157,6 +167,7 @@ impl App {
             calibrations,
             workers,
             readiness,
+            keys,
             state,
             settings,
         })
@@ -177,6 +188,12 @@ impl App {
     pub async fn serve(self, listener: TcpListener, shutdown: Shutdown) -> anyhow::Result<()> {
         let address = listener.local_addr()?;
         log_start(&self.settings, address);
+        if self.keys.is_none() && !address.ip().is_loopback() {
+            tracing::warn!(
+                "others reach this server, and there are no keys: whoever does may send frames and \
+                 read calibrations; set access.keys_file, or listen on 127.0.0.1 (server.listen)"
+            );
+        }
         let _pollers = self.start_pollers()?;
         let stop = shutdown.clone();
         let readiness = self.readiness.clone();
@@ -219,7 +236,7 @@ impl App {
         Ok(())
     }
 
-    /// The threads that look for changed models and calibrations.
+    /// The threads that look for changed models, calibrations and keys.
     fn start_pollers(&self) -> anyhow::Result<Vec<Poller>> {
         let (models, calibrations) = (Arc::clone(&self.models), Arc::clone(&self.calibrations));
         let model_poller =
@@ -229,7 +246,13 @@ impl App {
         let calibration_poller = self.settings.calibrations.poll_seconds.map(|every| {
             Poller::start("calibration-watcher", every, move || calibrations.refresh())
         });
-        let pollers = model_poller.into_iter().chain(calibration_poller);
+        let keys = self.keys.clone().zip(self.settings.access.poll_seconds);
+        let key_poller =
+            keys.map(|(keys, every)| Poller::start("key-watcher", every, move || keys.refresh()));
+        let pollers = model_poller
+            .into_iter()
+            .chain(calibration_poller)
+            .chain(key_poller);
         pollers
             .collect::<Result<_, _>>()
             .context("the operating system gives no thread to watch files with")
@@ -283,6 +306,17 @@ pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrati
         }),
     };
     Calibrations::open(store, settings.writable).context("calibrations.path")
+}
+
+/// The keys that the settings describe; `None` when they describe none. A file without keys still
+/// shuts the server: somebody wants keys to be needed.
+fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>>> {
+    let file = settings.keys_file.as_deref();
+    if settings.keys.is_empty() && file.is_none() {
+        return Ok(None);
+    }
+    let keys = AccessKeys::open(settings.keys.clone(), file)?;
+    Ok(Some(Arc::new(keys)))
 }
 
 /// Says what runs, and where.

@@ -4,6 +4,7 @@ mod annotate;
 mod calibration;
 mod detect;
 mod eval;
+mod key;
 mod model;
 mod parameters;
 mod progress;
@@ -47,6 +48,9 @@ enum Command {
     /// Look into person models
     #[command(subcommand)]
     Model(model::Command),
+    /// Make API keys
+    #[command(subcommand)]
+    Key(key::Command),
     /// Measure which sessions, threads and batches are fastest on this machine
     Tune(tune::Arguments),
     /// Print the OpenAPI document
@@ -79,6 +83,7 @@ pub fn run() -> ExitCode {
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Calibration(command) => calibration::run(&command),
         Command::Model(command) => model::run(&command),
+        Command::Key(command) => key::run(&command),
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Openapi => print_openapi(),
     };

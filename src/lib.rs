@@ -4,6 +4,7 @@
 //! runs on them, and its boxes are mapped back to the frame and merged. `ARCHITECTURE.md` has the
 //! map and the walk of one frame; dependencies between the modules point one way.
 
+pub mod access;
 pub mod annotation_formats;
 pub mod api;
 pub mod app;

@@ -4,6 +4,7 @@
 //! `LOOKDOWN__SERVER__LISTEN` is the key `server.listen`. Variables of another shape, such as the
 //! `LOOKDOWN_PORT=tcp://…` that Kubernetes sets for a service called `lookdown`, are none of ours.
 
+mod access;
 mod calibration_place;
 mod check;
 mod error;
@@ -26,13 +27,15 @@ pub use raw::RawSettings;
 pub use source::{environment, load};
 pub use threads::ThreadPlan;
 
-use crate::{geometry::FieldOfViewReading, inference::Device};
+use crate::{access::KeyList, geometry::FieldOfViewReading, inference::Device};
 
 /// Everything the operator may choose, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// The HTTP server.
     pub server: ServerSettings,
+    /// Who may do what.
+    pub access: AccessSettings,
     /// Where calibrations come from.
     pub calibrations: CalibrationSettings,
     /// Which detectors answer.
@@ -58,6 +61,19 @@ pub struct ServerSettings {
     pub max_body_bytes: usize,
     /// Longest a request may take, from its first byte to its answer.
     pub request_timeout: Duration,
+}
+
+/// Who may do what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AccessSettings {
+    /// The keys that the settings state themselves.
+    pub keys: KeyList,
+    /// The file with further keys.
+    pub keys_file: Option<PathBuf>,
+    /// How often that file is looked at, seconds; `None` for never.
+    pub poll_seconds: Option<NonZeroU64>,
+    /// The origins of web pages that may call the server, such as `https://dashboard.example`.
+    pub cors_origins: Vec<String>,
 }
 
 /// Where calibrations come from.

@@ -8,7 +8,8 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 17] = [
+const MAY_USE: [(&str, &[&str]); 18] = [
+    ("access", &[]),
     ("revision", &[]),
     ("geometry", &[]),
     ("detection", &[]),
@@ -18,7 +19,7 @@ const MAY_USE: [(&str, &[&str]); 17] = [
     ("imaging", &["geometry"]),
     ("calibration", &["geometry", "revision"]),
     ("inference", &["detection", "imaging", "revision"]),
-    ("settings", &["geometry", "inference"]),
+    ("settings", &["access", "geometry", "inference"]),
     ("telemetry", &["settings"]),
     (
         "pipeline",
@@ -45,6 +46,7 @@ const MAY_USE: [(&str, &[&str]); 17] = [
     (
         "api",
         &[
+            "access",
             "annotation_formats",
             "geometry",
             "detection",
@@ -58,6 +60,7 @@ const MAY_USE: [(&str, &[&str]); 17] = [
     (
         "app",
         &[
+            "access",
             "geometry",
             "detection",
             "imaging",
@@ -75,6 +78,7 @@ const MAY_USE: [(&str, &[&str]); 17] = [
     (
         "cli",
         &[
+            "access",
             "annotation_formats",
             "geometry",
             "detection",

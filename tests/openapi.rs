@@ -76,7 +76,7 @@ fn detection_describes_every_status_and_every_parameter() {
     let detect = &document["paths"]["/detect"]["post"];
     let statuses: Vec<_> = detect["responses"].as_object().unwrap().keys().collect();
     let expected = [
-        "200", "400", "404", "408", "413", "415", "422", "429", "500", "503", "504",
+        "200", "400", "401", "403", "404", "408", "413", "415", "422", "429", "500", "503", "504",
     ];
     assert_eq!(statuses, expected);
 
@@ -112,4 +112,22 @@ fn the_example_report_has_the_fields_of_the_schema() {
     let fields: BTreeSet<_> = report["properties"].as_object().unwrap().keys().collect();
     let example: BTreeSet<_> = report["example"].as_object().unwrap().keys().collect();
     assert_eq!(fields, example);
+}
+
+#[test]
+fn what_a_key_opens_says_so_and_how_it_is_refused() {
+    let document = document();
+    let schemes = &document["components"]["securitySchemes"];
+    assert_eq!(schemes["bearer"]["scheme"], "bearer");
+    assert_eq!(schemes["api_key"]["name"], "X-API-Key");
+    for (path, operation) in operations(&document) {
+        let responses = &operation["responses"];
+        let open = operation["tags"][0] == "operation";
+        assert_eq!(operation["security"].is_null(), open, "{path}");
+        for status in ["401", "403"] {
+            assert_eq!(responses[status].is_null(), open, "{path} {status}");
+        }
+        let header = &responses["401"]["headers"]["WWW-Authenticate"];
+        assert_eq!(header.is_null(), open, "{path}");
+    }
 }

@@ -44,7 +44,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 27, "a key is missing from {example}");
+    assert_eq!(stated.count(), 31, "a key is missing from {example}");
 }
 
 #[test]
@@ -337,7 +337,7 @@ fn a_url_that_holds_credentials_is_refused_without_repeating_them() {
         ("file://elsewhere/srv", "file:///srv/calibrations"),
         ("", "calibrations.path is empty"),
     ] {
-        let message = place(path).unwrap_err().to_string();
+        let message = path.parse::<CalibrationPlace>().unwrap_err().to_string();
         assert!(
             message.contains("calibrations.path") && message.contains(part),
             "{message}"
@@ -352,4 +352,35 @@ fn what_belongs_to_the_executable_is_found_from_anywhere() {
     // The models' folder is checked in, and this test's executable lies below it.
     let found = defaults().model.find_repository().unwrap();
     assert_eq!(fs::canonicalize(found).unwrap(), folders.join("models"));
+}
+
+#[test]
+fn keys_and_origins_are_checked_and_a_key_in_the_wrong_place_is_not_repeated() {
+    let leak = "lookdown_do-not-show-me";
+    for (name, value, part) in [
+        ("LOOKDOWN__ACCESS__KEYS", leak, "access.keys: key 1"),
+        (
+            "LOOKDOWN__ACCESS__KEYS",
+            &format!("gate:detect:{leak}"),
+            "never the key itself",
+        ),
+        (
+            "LOOKDOWN__ACCESS__CORS_ORIGINS",
+            "*",
+            "access.cors_origins is \"*\"",
+        ),
+        (
+            "LOOKDOWN__ACCESS__CORS_ORIGINS",
+            "https://a.example, https://b.example/",
+            "https://dashboard.example",
+        ),
+    ] {
+        let message = refusal(from_environment(name, value));
+        assert!(message.contains(part), "{message}");
+        assert!(!message.contains("do-not-show-me"), "{message}");
+    }
+    let origins = "https://a.example, http://localhost:3000";
+    let settings = from_environment("LOOKDOWN__ACCESS__CORS_ORIGINS", origins).unwrap();
+    let expected = ["https://a.example", "http://localhost:3000"];
+    assert_eq!(settings.access.cors_origins, expected);
 }

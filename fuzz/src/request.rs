@@ -16,7 +16,7 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, ApiOptions, ApiState, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Readiness},
     calibration::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
     geometry::FieldOfViewReading,
     imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
@@ -141,7 +141,10 @@ fn router() -> Router {
             max_body_bytes: 1 << 16,
             max_upload_bytes: 1 << 20,
             request_timeout: Duration::from_secs(20),
-            administration: true,
+            access: Access::Open {
+                own_machine_only: true,
+            },
+            cors_origins: Vec::new(),
         },
     ))
 }

@@ -1,4 +1,4 @@
-//! Calibrations as resources: read by everyone, changed by administrators.
+//! Calibrations as resources: read by readers, changed by administrators.
 
 mod address;
 mod conditions;
@@ -25,8 +25,8 @@ use self::{
 };
 use super::{
     ApiState,
-    administrator::Administrator,
-    openapi::{ChangeProblems, DeleteProblems, UnknownCalibrationProblem},
+    access::{Administrator, Reader},
+    openapi::{ChangeProblems, DeleteProblems, ReadProblems, UnknownCalibrationProblem},
     problem::{Problem, ProblemKind},
 };
 use crate::calibration::ChangeError;
@@ -36,9 +36,16 @@ use crate::calibration::ChangeError;
 /// Also those whose file cannot be used, with the reason.
 #[utoipa::path(
     get, path = "/calibrations", tag = "calibrations", operation_id = "list_calibrations",
-    responses((status = OK, description = "By ID.", body = Vec<CalibrationInfo>))
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "By ID.", body = Vec<CalibrationInfo>),
+        ReadProblems,
+    )
 )]
-pub(super) async fn list(State(state): State<ApiState>) -> Json<Vec<CalibrationInfo>> {
+pub(super) async fn list(
+    State(state): State<ApiState>,
+    _reader: Reader,
+) -> Json<Vec<CalibrationInfo>> {
     let rows = state.calibrations.rows();
     Json(rows.into_iter().map(CalibrationInfo::from).collect())
 }
@@ -50,6 +57,7 @@ pub(super) async fn list(State(state): State<ApiState>) -> Json<Vec<CalibrationI
 #[utoipa::path(
     get, path = "/calibrations/{id}", tag = "calibrations", operation_id = "get_calibration",
     params(("id" = String, Path, description = "The calibration's ID.")),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "The native file.", body = Object,
          headers(("ETag" = String, description = "The revision, as in reports."))),
@@ -59,6 +67,7 @@ pub(super) async fn list(State(state): State<ApiState>) -> Json<Vec<CalibrationI
 )]
 pub(super) async fn get(
     State(state): State<ApiState>,
+    _reader: Reader,
     CalibrationAddress(id): CalibrationAddress,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
@@ -94,6 +103,7 @@ pub(super) async fn get(
         description = "A calibration file, recognised from its content; at most 1 MiB.",
         content(("application/json"), ("application/yaml"), ("application/octet-stream")),
     ),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(
         (status = OK, description = "Replaced.", body = CalibrationInfo,
          headers(("ETag" = String, description = "The revision, as in reports."))),
@@ -134,6 +144,7 @@ pub(super) async fn put(
         ("id" = String, Path, description = "The calibration's ID."),
         ("If-Match" = Option<String>, Header, description = "The revision to delete, or `*`."),
     ),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses((status = NO_CONTENT, description = "It is gone."), DeleteProblems)
 )]
 pub(super) async fn delete(

@@ -25,7 +25,7 @@ use crate::{
 
 /// `C_t` of requests that name none.
 const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
-const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 
 /// Find the persons in a frame.
 ///
@@ -43,6 +43,7 @@ const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
             ("image/jpeg"), ("image/png"), ("image/webp"), ("application/octet-stream"),
         )
     ),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "The persons found, possibly none.", body = Report,
          headers(

@@ -9,7 +9,7 @@ use axum::{
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
-use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::{catch_panic::CatchPanicLayer, cors::CorsLayer};
 use tracing::Instrument;
 
 use super::{
@@ -22,12 +22,15 @@ use crate::metrics::Metrics;
 const UNMATCHED: &str = "unmatched";
 
 /// The router inside the envelope. A handler that panics costs its own request only.
-pub(super) fn around(router: Router, metrics: Arc<Metrics>) -> Router {
-    router
-        .layer(CatchPanicLayer::custom(|_| {
-            Problem::fault().into_response()
-        }))
-        .layer(middleware::from_fn_with_state(metrics, wrap))
+pub(super) fn around(router: Router, cors: Option<CorsLayer>, metrics: Arc<Metrics>) -> Router {
+    let router = router.layer(CatchPanicLayer::custom(|_| {
+        Problem::fault().into_response()
+    }));
+    let router = match cors {
+        Some(cors) => router.layer(cors),
+        None => router,
+    };
+    router.layer(middleware::from_fn_with_state(metrics, wrap))
 }
 
 async fn wrap(State(metrics): State<Arc<Metrics>>, mut request: Request, next: Next) -> Response {
@@ -148,6 +151,7 @@ mod tests {
         let router = Router::new().route("/panics", get(panics));
         let router = around(
             router.route("/works", get(async || "fine")),
+            None,
             Arc::clone(&metrics),
         );
 

@@ -3,14 +3,17 @@
 
 mod parameters;
 mod problems;
+mod security;
 
 use axum::Json;
 use utoipa::{OpenApi, openapi};
 
+use security::Keys;
+
 pub(super) use parameters::{DetectForm, DetectQuery};
 pub(super) use problems::{
     ChangeProblems, DeleteProblems, DetectProblems, FaultProblem, IndexProblems, LoadProblems,
-    NotReadyProblems, UnknownCalibrationProblem, ViewsProblems,
+    NotReadyProblems, ReadProblems, UnknownCalibrationProblem, ViewsProblems,
 };
 
 use super::problem::ProblemBody;
@@ -22,10 +25,11 @@ use super::problem::ProblemBody;
     tags(
         (name = "detection", description = "Frames in, persons out."),
         (name = "calibrations", description = "The cameras. Changes are for administrators."),
-        (name = "models", description = "Which models answer. For administrators."),
+        (name = "models", description = "Which models answer. Changes are for administrators."),
         (name = "operation", description = "Probes, metrics and this document."),
     ),
-    components(schemas(ProblemBody))
+    components(schemas(ProblemBody)),
+    modifiers(&Keys)
 )]
 pub(super) struct Common;
 

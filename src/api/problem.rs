@@ -1,7 +1,8 @@
 //! The one error envelope: RFC 9457 problem details.
 //!
 //! A handler returns a [`Problem`]; the [envelope](super::envelope) writes it down with the path
-//! and the request ID, logs its cause and counts it. Statuses: 400 malformed, 403 not allowed, 404
+//! and the request ID, logs its cause and counts it. Statuses: 400 malformed, 401 no known key, 403 not
+//! allowed, 404
 //! unknown calibration or model, 408 slow upload, 409 not while the models or calibrations are as they are,
 //! 412 outdated, 413 too
 //! many bytes or pixels, 415 not a picture that can be read, 422 understood but unusable, 429 no
@@ -15,7 +16,10 @@ mod pipeline;
 use std::{sync::Arc, time::Duration};
 
 use axum::{
-    http::{HeaderValue, header::RETRY_AFTER},
+    http::{
+        HeaderValue,
+        header::{RETRY_AFTER, WWW_AUTHENTICATE},
+    },
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
@@ -117,6 +121,10 @@ impl IntoResponse for Problem {
             let wanted = self.retry_after.map_or(0, |after| after.as_secs() + 1);
             let seconds = HeaderValue::from(wanted.clamp(least, MAX_RETRY_AFTER_SECONDS));
             response.headers_mut().insert(RETRY_AFTER, seconds);
+        }
+        if self.kind == ProblemKind::KeyRequired {
+            let scheme = HeaderValue::from_static("Bearer");
+            response.headers_mut().insert(WWW_AUTHENTICATE, scheme);
         }
         response.extensions_mut().insert(self);
         response

@@ -1,5 +1,5 @@
 //! The models of the server: the model repository extension of the Open Inference Protocol, as
-//! Triton describes it. For administrators only.
+//! Triton describes it. Only administrators change anything.
 
 mod body;
 
@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 use super::{
     ApiState,
-    administrator::Administrator,
+    access::{Administrator, ModelReader},
     openapi::{IndexProblems, LoadProblems},
     problem::{Problem, ProblemKind},
 };
@@ -68,6 +68,7 @@ impl From<&Model> for RepositoryEntry {
 #[utoipa::path(
     post, path = "/v2/repository/index", tag = "models", operation_id = "list_models",
     request_body(content = Option<IndexRequest>, description = "May be left out."),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "The models, by name.", body = Vec<RepositoryEntry>),
         IndexProblems,
@@ -75,7 +76,7 @@ impl From<&Model> for RepositoryEntry {
 )]
 pub(super) async fn index(
     State(state): State<ApiState>,
-    _administrator: Administrator,
+    _reader: ModelReader,
     body: Body,
 ) -> Result<Json<Vec<RepositoryEntry>>, Problem> {
     let IndexRequest { ready } = read(&state, body).await?;
@@ -95,6 +96,7 @@ pub(super) async fn index(
     operation_id = "load_model",
     params(("name" = String, Path, description = "The model's name.")),
     request_body(content = Option<LoadRequest>, description = "May be left out."),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(
         (status = OK, description = "The model answers.", body = RepositoryEntry),
         LoadProblems,
@@ -119,6 +121,7 @@ pub(super) async fn load(
     operation_id = "unload_model",
     params(("name" = String, Path, description = "The model's name.")),
     request_body(content = Option<UnloadRequest>, description = "May be left out."),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(
         (status = OK, description = "The model answers no more.", body = RepositoryEntry),
         LoadProblems,

@@ -2,13 +2,13 @@
 
 use std::{sync::Arc, time::Duration};
 
-use super::{Readiness, problem::ProblemKind, upload::UploadBudget};
+use super::{Access, Readiness, problem::ProblemKind, upload::UploadBudget};
 use crate::{
     calibration::Calibrations, inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool,
 };
 
-/// What a request may cost.
-#[derive(Debug, Clone, Copy)]
+/// Who may do what, and what a request may cost.
+#[derive(Debug, Clone)]
 pub struct ApiOptions {
     /// Largest request body, bytes.
     pub max_body_bytes: usize,
@@ -16,8 +16,10 @@ pub struct ApiOptions {
     pub max_upload_bytes: usize,
     /// Longest a request may take, from its first byte to its answer.
     pub request_timeout: Duration,
-    /// Whether whoever reaches the server may change its models and calibrations.
-    pub administration: bool,
+    /// Who may do what.
+    pub access: Access,
+    /// Origins of web pages that may call the server from a browser.
+    pub cors_origins: Vec<String>,
 }
 
 /// What the handlers share. Clones are cheap.

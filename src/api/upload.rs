@@ -11,7 +11,11 @@ use std::time::Instant as Arrival;
 
 use axum::{
     extract::{FromRequest, Query, Request},
-    http::{Uri, header::CONTENT_TYPE, request::Parts},
+    http::{
+        Uri,
+        header::{CONTENT_TYPE, EXPECT},
+        request::Parts,
+    },
 };
 use bytes::Bytes;
 use jiff::Timestamp;
@@ -23,6 +27,7 @@ use super::{
     ApiState, Phase,
     problem::{Problem, ProblemKind},
 };
+use crate::access::Scope;
 
 /// A frame in memory and what its sender wants of it.
 pub(super) struct Upload {
@@ -51,7 +56,15 @@ impl FromRequest<ApiState> for Upload {
             remedy: "send a smaller picture or raise server.max_body_bytes",
             budget: &state.uploads,
         };
+        // A client that asked first has not begun to send, and need not.
+        let asked_first = parts.headers.contains_key(EXPECT);
         let reading = async {
+            if let Err(refusal) = state.options.access.check(&parts.headers, Scope::Detect) {
+                if !asked_first {
+                    reader.discard(body).await;
+                }
+                return Err(refusal);
+            }
             // A frame that has no place needs none in memory either.
             if let Err(refusal) = state.workers.admits() {
                 reader.discard(body).await;

@@ -42,6 +42,7 @@ impl TryFrom<RawSettings> for Settings {
         Ok(Self {
             limits: limits(&raw.limits, server.max_body_bytes)?,
             server,
+            access: raw.access.try_into()?,
             calibrations: CalibrationSettings {
                 path: raw.calibrations.path.parse()?,
                 poll_seconds: poll_seconds(
@@ -217,7 +218,7 @@ fn within(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<u64, Sett
 }
 
 /// 0 means never.
-fn poll_seconds(key: &str, value: u64) -> Result<Option<NonZeroU64>, SettingsError> {
+pub(super) fn poll_seconds(key: &str, value: u64) -> Result<Option<NonZeroU64>, SettingsError> {
     within(key, value, 0..=MAX_POLL_SECONDS).map(NonZeroU64::new)
 }
 

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::locate;
+use super::{access::RawAccess, locate};
 
 const MEBIBYTE: u64 = 1024 * 1024;
 
@@ -11,6 +11,7 @@ const MEBIBYTE: u64 = 1024 * 1024;
 #[serde(default, deny_unknown_fields)]
 pub struct RawSettings {
     pub(super) server: RawServer,
+    pub(super) access: RawAccess,
     pub(super) calibrations: RawCalibrations,
     pub(super) model: RawModel,
     pub(super) inference: RawInference,

@@ -4,6 +4,7 @@ use std::{collections::BTreeSet, fs, sync::Arc};
 
 use axum::{body::Body, http::Request};
 use lookdown::{
+    api::Access,
     app::Assembly,
     calibration::{Calibrations, FolderStore},
 };
@@ -257,7 +258,9 @@ async fn a_camera_that_shares_its_file_can_be_overruled_but_not_deleted() {
 #[tokio::test]
 async fn nothing_is_changed_from_afar_or_where_changes_are_switched_off() {
     let afar = Service::within(&Bounds {
-        administration: false,
+        access: Access::Open {
+            own_machine_only: false,
+        },
         ..Bounds::default()
     });
     let gate = Arc::new(Gate::default());

@@ -1,6 +1,7 @@
 //! The HTTP API around a real engine; only the network is a stand-in.
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+mod access;
 mod calibration_changes;
 mod calibrations;
 mod detect;

@@ -3,6 +3,7 @@
 use std::fs;
 
 use axum::http::StatusCode;
+use lookdown::api::Access;
 use serde_json::json;
 
 use crate::service::{Bounds, Service, frame};
@@ -168,7 +169,9 @@ async fn one_model_is_loaded_at_a_time() {
 #[tokio::test]
 async fn a_server_that_others_can_reach_changes_no_models() {
     let service = Service::within(&Bounds {
-        administration: false,
+        access: Access::Open {
+            own_machine_only: false,
+        },
         ..Bounds::default()
     });
     for path in [

@@ -9,7 +9,7 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, ApiOptions, ApiState, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Readiness},
     app::Assembly,
     calibration::{Calibrations, FolderStore},
     geometry::FieldOfViewReading,
@@ -47,7 +47,8 @@ pub(crate) struct Bounds {
     pub(crate) max_body_bytes: usize,
     pub(crate) max_upload_bytes: usize,
     pub(crate) request_timeout: Duration,
-    pub(crate) administration: bool,
+    pub(crate) access: Access,
+    pub(crate) cors_origins: Vec<String>,
 }
 
 impl Default for Bounds {
@@ -57,7 +58,10 @@ impl Default for Bounds {
             max_body_bytes: 1 << 20,
             max_upload_bytes: 1 << 24,
             request_timeout: Duration::from_secs(20),
-            administration: true,
+            access: Access::Open {
+                own_machine_only: true,
+            },
+            cors_origins: Vec::new(),
         }
     }
 }
@@ -193,7 +197,8 @@ impl Service {
                 max_body_bytes: bounds.max_body_bytes,
                 max_upload_bytes: bounds.max_upload_bytes,
                 request_timeout: bounds.request_timeout,
-                administration: bounds.administration,
+                access: bounds.access.clone(),
+                cors_origins: bounds.cors_origins.clone(),
             },
         );
         Self {

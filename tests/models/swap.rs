@@ -19,7 +19,7 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, ApiOptions, ApiState, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Readiness},
     calibration::{Calibrations, FolderStore},
     geometry::FieldOfViewReading,
     imaging::decode::DecodeLimits,
@@ -71,7 +71,10 @@ fn service(folder: &Path) -> Router {
         max_body_bytes: 1 << 24,
         max_upload_bytes: 1 << 27,
         request_timeout: Duration::from_mins(2),
-        administration: true,
+        access: Access::Open {
+            own_machine_only: true,
+        },
+        cors_origins: Vec::new(),
     };
     let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
     let calibrations = Calibrations::open(Box::new(store), false).unwrap();

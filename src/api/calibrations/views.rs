@@ -9,6 +9,7 @@ use super::{address::CalibrationAddress, unknown};
 use crate::{
     api::{
         ApiState,
+        access::Reader,
         openapi::ViewsProblems,
         problem::{Problem, ProblemKind},
         upload::parameters_named,
@@ -88,10 +89,12 @@ pub(in crate::api) struct ViewInfo {
         ("id" = String, Path, description = "The calibration's ID."),
         ("profile" = Option<String>, Query, description = "`balanced` by default."),
     ),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses((status = OK, description = "The view plan.", body = ViewPlanInfo), ViewsProblems)
 )]
 pub(in crate::api) async fn get_views(
     State(state): State<ApiState>,
+    _reader: Reader,
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
 ) -> Result<Json<ViewPlanInfo>, Problem> {

@@ -21,7 +21,6 @@ impl IntoResponses for DetectProblems {
                 kind,
                 ProblemKind::NotFound
                     | ProblemKind::MethodNotAllowed
-                    | ProblemKind::Forbidden
                     | ProblemKind::InvalidCalibration
                     | ProblemKind::CalibrationConflict
                     | ProblemKind::CalibrationsUnreachable
@@ -49,8 +48,9 @@ impl IntoResponses for NotReadyProblems {
 pub(in crate::api) struct IndexProblems;
 
 /// What can go wrong with every request of an administrator.
-const OF_ADMINISTRATION: [ProblemKind; 4] = [
+const OF_ADMINISTRATION: [ProblemKind; 5] = [
     ProblemKind::MalformedRequest,
+    ProblemKind::KeyRequired,
     ProblemKind::Forbidden,
     ProblemKind::SlowUpload,
     ProblemKind::Internal,
@@ -77,15 +77,32 @@ impl IntoResponses for LoadProblems {
     }
 }
 
+/// What can go wrong with every request of a reader.
+const OF_READING: [ProblemKind; 3] = [
+    ProblemKind::MalformedRequest,
+    ProblemKind::KeyRequired,
+    ProblemKind::Forbidden,
+];
+
+/// What can go wrong with listing calibrations.
+pub(in crate::api) struct ReadProblems;
+
+impl IntoResponses for ReadProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses([ProblemKind::KeyRequired, ProblemKind::Forbidden])
+    }
+}
+
 /// What can go wrong with reading a calibration.
 pub(in crate::api) struct UnknownCalibrationProblem;
 
 impl IntoResponses for UnknownCalibrationProblem {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses([
-            ProblemKind::MalformedRequest,
-            ProblemKind::UnknownCalibration,
-        ])
+        responses(
+            OF_READING
+                .into_iter()
+                .chain([ProblemKind::UnknownCalibration]),
+        )
     }
 }
 
@@ -115,6 +132,7 @@ impl IntoResponses for DeleteProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
         responses([
             ProblemKind::MalformedRequest,
+            ProblemKind::KeyRequired,
             ProblemKind::Forbidden,
             ProblemKind::UnknownCalibration,
             ProblemKind::CalibrationConflict,
@@ -130,15 +148,15 @@ pub(in crate::api) struct ViewsProblems;
 
 impl IntoResponses for ViewsProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses([
-            ProblemKind::MalformedRequest,
+        let of_views = [
             ProblemKind::UnknownParameter,
             ProblemKind::RepeatedParameter,
             ProblemKind::UnknownCalibration,
             ProblemKind::InvalidParameter,
             ProblemKind::Internal,
             ProblemKind::WarmingUp,
-        ])
+        ];
+        responses(OF_READING.into_iter().chain(of_views))
     }
 }
 
@@ -175,9 +193,16 @@ fn response(kinds: &[ProblemKind]) -> Response {
         .map(|kind| format!("{} (`{}`).", kind.title(), kind.urn()));
     let schema = Ref::from_schema_name(ProblemBody::name());
     let content = ContentBuilder::new().schema(Some(schema)).build();
-    let response = ResponseBuilder::new()
+    let mut response = ResponseBuilder::new()
         .description(lines.collect::<Vec<_>>().join(" "))
         .content("application/problem+json", content);
+    if kinds.contains(&ProblemKind::KeyRequired) {
+        let scheme = HeaderBuilder::new()
+            .schema(Some(String::schema()))
+            .description(Some("`Bearer`."))
+            .build();
+        response = response.header("WWW-Authenticate", scheme);
+    }
     if kinds
         .iter()
         .all(|kind| kind.retry_after_seconds().is_none())

@@ -13,6 +13,8 @@ pub(in crate::api) enum ProblemKind {
     RepeatedParameter,
     /// No frame was sent.
     MissingImage,
+    /// No key was sent, or one that nobody has.
+    KeyRequired,
     /// The sender may not do this.
     Forbidden,
     /// Nothing is at this path.
@@ -65,11 +67,12 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 28] = [
+    pub(in crate::api) const ALL: [Self; 29] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
         Self::MissingImage,
+        Self::KeyRequired,
         Self::Forbidden,
         Self::NotFound,
         Self::UnknownCalibration,
@@ -103,6 +106,7 @@ impl ProblemKind {
             Self::UnknownParameter => ("unknown-parameter", "There is no such parameter"),
             Self::RepeatedParameter => ("repeated-parameter", "A parameter is given twice"),
             Self::MissingImage => ("missing-image", "No frame was sent"),
+            Self::KeyRequired => ("key-required", "A key that is known here is needed"),
             Self::Forbidden => ("forbidden", "That is not allowed"),
             Self::NotFound => ("not-found", "There is nothing here"),
             Self::UnknownCalibration => ("unknown-calibration", "There is no such calibration"),
@@ -159,6 +163,7 @@ impl ProblemKind {
             | Self::UnknownParameter
             | Self::RepeatedParameter
             | Self::MissingImage => StatusCode::BAD_REQUEST,
+            Self::KeyRequired => StatusCode::UNAUTHORIZED,
             Self::Forbidden => StatusCode::FORBIDDEN,
             Self::NotFound | Self::UnknownCalibration | Self::UnknownModel => StatusCode::NOT_FOUND,
             Self::ModelConflict | Self::CalibrationConflict => StatusCode::CONFLICT,
@@ -197,5 +202,36 @@ impl ProblemKind {
                 | Self::ShuttingDown
         )
         .then_some(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn the_operators_table_has_every_kind_with_its_status_and_title_and_no_other() {
+        let text = include_str!("../../../docs/operations.md");
+        let (_, section) = text.split_once("\n## Problems\n").unwrap();
+        let rows = section.lines().filter(|line| line.starts_with("| `"));
+        let told: Vec<_> = rows
+            .map(|row| {
+                let cells: Vec<_> = row.trim_matches('|').split('|').map(str::trim).collect();
+                assert_eq!(cells.len(), 4, "{row}");
+                assert!(!cells[3].is_empty(), "{row} has no remedy");
+                [cells[0].trim_matches('`'), cells[1], cells[2]].map(ToOwned::to_owned)
+            })
+            .collect();
+        let kinds = ProblemKind::ALL.map(|kind| {
+            [
+                kind.name().to_owned(),
+                kind.status().as_u16().to_string(),
+                kind.title().to_owned(),
+            ]
+        });
+        assert_eq!(told.len(), kinds.len());
+        assert_eq!(BTreeSet::from_iter(told), BTreeSet::from(kinds));
     }
 }

@@ -1,0 +1,15 @@
+//! Who may do what: API keys with a name and scopes, of which only digests are kept.
+
+mod digest;
+mod error;
+mod key_list;
+mod key_name;
+mod keys;
+mod scope;
+
+pub use digest::{KeyDigest, new_key};
+pub use error::KeyError;
+pub use key_list::{Holder, KeyList};
+pub use key_name::{InvalidKeyName, KeyName};
+pub use keys::AccessKeys;
+pub use scope::{Scope, Scopes, UnknownScope};

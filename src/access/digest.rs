@@ -1,0 +1,122 @@
+//! Keys, and what is kept of them.
+//!
+//! A key is 256 random bits: nobody can try them all, so a plain SHA-256 keeps it safe in a stolen
+//! file, and checking it costs a microsecond (docs/adr/0004-api-keys.md).
+
+use std::fmt;
+
+use sha2::{Digest, Sha256};
+use subtle::{Choice, ConstantTimeEq};
+
+/// What keys begin with, so that programs that look for leaked secrets know them.
+const PREFIX: &str = "lookdown_";
+const BYTES: usize = 32;
+
+/// A new random key: `lookdown_` and 64 hexadecimal digits.
+///
+/// # Errors
+/// When the operating system gives no random numbers.
+pub fn new_key() -> Result<String, getrandom::Error> {
+    let mut bytes = [0; BYTES];
+    getrandom::fill(&mut bytes)?;
+    Ok(format!("{PREFIX}{}", hexadecimal(&bytes)))
+}
+
+/// The SHA-256 of a key. Its `Debug` shows nothing of it.
+#[derive(Clone)]
+pub struct KeyDigest([u8; BYTES]);
+
+impl KeyDigest {
+    /// The digest of a key as it is sent.
+    #[must_use]
+    pub fn of(key: &[u8]) -> Self {
+        Self(Sha256::digest(key).into())
+    }
+
+    /// The digest that 64 hexadecimal digits state.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let digits: Option<Vec<_>> = text.chars().map(|digit| digit.to_digit(16)).collect();
+        let bytes = digits?;
+        let bytes = bytes.chunks(2).map(|pair| match pair {
+            [high, low] => u8::try_from(high * 16 + low).ok(),
+            _ => None,
+        });
+        let bytes: Option<Vec<u8>> = bytes.collect();
+        Some(Self(bytes?.try_into().ok()?))
+    }
+
+    /// As 64 hexadecimal digits.
+    #[must_use]
+    pub fn hexadecimal(&self) -> String {
+        hexadecimal(&self.0)
+    }
+
+    /// Whether they are equal, in a time that does not tell how much of them is.
+    pub(super) fn equals(&self, other: &Self) -> Choice {
+        self.0.ct_eq(&other.0)
+    }
+}
+
+impl PartialEq for KeyDigest {
+    fn eq(&self, other: &Self) -> bool {
+        self.equals(other).into()
+    }
+}
+
+impl fmt::Debug for KeyDigest {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("KeyDigest(…)")
+    }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// FIPS 180-4's example.
+    const OF_ABC: &str = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+
+    #[test]
+    fn the_digest_is_sha_256() {
+        assert_eq!(KeyDigest::of(b"abc").hexadecimal(), OF_ABC);
+        let parsed = KeyDigest::parse(&OF_ABC.to_uppercase()).unwrap();
+        assert_eq!(parsed, KeyDigest::of(b"abc"));
+    }
+
+    #[test]
+    fn only_64_hexadecimal_digits_are_a_digest() {
+        for wrong in [
+            "",
+            "ab",
+            &OF_ABC[..62],
+            &format!("{OF_ABC}00"),
+            &OF_ABC[..63],
+        ] {
+            assert!(KeyDigest::parse(wrong).is_none(), "{wrong}");
+        }
+        assert!(KeyDigest::parse(&OF_ABC.replace('b', "g")).is_none());
+    }
+
+    #[test]
+    fn digests_that_agree_in_all_but_one_byte_differ() {
+        let whole = KeyDigest::of(b"abc");
+        for at in 0..BYTES {
+            let mut other = whole.clone();
+            other.0[at] ^= 1;
+            assert_ne!(whole, other);
+        }
+    }
+
+    #[test]
+    fn new_keys_are_long_differ_and_are_nowhere_in_debug_output() {
+        let (one, other) = (new_key().unwrap(), new_key().unwrap());
+        assert_ne!(one, other);
+        assert_eq!(one.len(), PREFIX.len() + 64);
+        assert_eq!(format!("{:?}", KeyDigest::of(b"abc")), "KeyDigest(…)");
+    }
+}

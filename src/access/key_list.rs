@@ -1,0 +1,134 @@
+//! The keys of a file or of the environment.
+
+use std::{collections::BTreeMap, str::FromStr};
+
+use serde::Deserialize;
+use subtle::{Choice, ConditionallySelectable};
+
+use super::{KeyDigest, KeyError, KeyName, Scope, Scopes};
+
+/// Every request is compared with all keys.
+const MAX_KEYS: usize = 1000;
+
+/// Whose a key is, and what it opens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Holder {
+    /// What people call the key.
+    pub name: KeyName,
+    /// What it opens.
+    pub scopes: Scopes,
+}
+
+/// Keys by their digests.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct KeyList(Vec<(KeyDigest, Holder)>);
+
+/// A key as a file writes it, under its name.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    scopes: Vec<String>,
+    sha256: String,
+}
+
+impl KeyList {
+    /// The keys of a file: TOML, a line `name = { scopes = ["detect"], sha256 = "…" }` each.
+    ///
+    /// # Errors
+    /// [`KeyError`] that says which line or key cannot be used.
+    pub fn from_toml(text: &str) -> Result<Self, KeyError> {
+        let rows: BTreeMap<String, Row> = toml::from_str(text).map_err(|error| {
+            // The library's own message would quote the line.
+            let before = error.span().and_then(|span| text.get(..span.start));
+            let line = 1 + before.map_or(0, |before| before.matches('\n').count());
+            KeyError::Shape { line }
+        })?;
+        let mut list = Self::default();
+        for (name, row) in rows {
+            let scopes: Vec<_> = row.scopes.iter().map(String::as_str).collect();
+            list.add(&name, &scopes, &row.sha256)?;
+        }
+        Ok(list)
+    }
+
+    /// Both lists as one.
+    ///
+    /// # Errors
+    /// When they share a name, or have too many keys together.
+    pub fn with(mut self, other: &Self) -> Result<Self, KeyError> {
+        for (digest, holder) in &other.0 {
+            self.push(digest.clone(), holder.clone())?;
+        }
+        Ok(self)
+    }
+
+    /// How many keys there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is no key.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whose this key is; `None` when it is nobody's. The time that takes depends on how many keys
+    /// there are alone: all are compared, and none until its first difference.
+    #[must_use]
+    pub fn holder_of(&self, key: &[u8]) -> Option<&Holder> {
+        let digest = KeyDigest::of(key);
+        let mut found = 0_u64;
+        for (position, (known, _)) in (1_u64..).zip(&self.0) {
+            let same: Choice = known.equals(&digest);
+            found.conditional_assign(&position, same);
+        }
+        let index = usize::try_from(found.checked_sub(1)?).ok()?;
+        self.0.get(index).map(|(_, holder)| holder)
+    }
+
+    fn add(&mut self, name: &str, scopes: &[&str], sha256: &str) -> Result<(), KeyError> {
+        let position = self.0.len() + 1;
+        let name = name.parse().map_err(|_| KeyError::Name { position })?;
+        let scopes: Result<Vec<Scope>, _> = scopes.iter().map(|scope| scope.parse()).collect();
+        let scopes = scopes.ok().and_then(|scopes| Scopes::new(&scopes));
+        let scopes = scopes.ok_or(KeyError::Scopes { position })?;
+        let digest = KeyDigest::parse(sha256).ok_or(KeyError::Digest { position })?;
+        self.push(digest, Holder { name, scopes })
+    }
+
+    fn push(&mut self, digest: KeyDigest, holder: Holder) -> Result<(), KeyError> {
+        if self.0.iter().any(|(_, known)| known.name == holder.name) {
+            let position = self.0.len() + 1;
+            return Err(KeyError::Repeated { position });
+        }
+        if self.0.len() == MAX_KEYS {
+            return Err(KeyError::TooMany { most: MAX_KEYS });
+        }
+        self.0.push((digest, holder));
+        Ok(())
+    }
+}
+
+/// `name:scope+scope:sha256`, separated by commas, as an environment variable has them.
+impl FromStr for KeyList {
+    type Err = KeyError;
+
+    fn from_str(text: &str) -> Result<Self, KeyError> {
+        let mut list = Self::default();
+        let entries = text.split(',').map(str::trim);
+        for entry in entries.filter(|entry| !entry.is_empty()) {
+            let position = list.0.len() + 1;
+            let parts: Vec<_> = entry.split(':').collect();
+            let [name, scopes, sha256] = parts[..] else {
+                return Err(KeyError::Entry { position });
+            };
+            list.add(name, &scopes.split('+').collect::<Vec<_>>(), sha256)?;
+        }
+        Ok(list)
+    }
+}
+
+#[cfg(test)]
+mod tests;

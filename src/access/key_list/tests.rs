@@ -1,0 +1,114 @@
+use super::*;
+
+fn digest_of(key: &str) -> String {
+    KeyDigest::of(key.as_bytes()).hexadecimal()
+}
+
+fn line(name: &str, scopes: &str, key: &str) -> String {
+    format!(
+        "{name} = {{ scopes = [{scopes}], sha256 = \"{}\" }}\n",
+        digest_of(key)
+    )
+}
+
+fn name_of(list: &KeyList, key: &str) -> Option<String> {
+    list.holder_of(key.as_bytes())
+        .map(|holder| holder.name.to_string())
+}
+
+#[test]
+fn a_file_and_a_variable_say_the_same() {
+    let text = line("gate", "\"detect\", \"read\"", "one") + &line("office", "\"admin\"", "two");
+    let file = KeyList::from_toml(&text).unwrap();
+    let (one, two) = (digest_of("one"), digest_of("two"));
+    let variable = format!("gate:read+detect:{one}, office:admin:{two},");
+    assert_eq!(file, variable.parse().unwrap());
+    assert_eq!(
+        (name_of(&file, "one"), name_of(&file, "two")),
+        (Some("gate".to_owned()), Some("office".to_owned()))
+    );
+    let gate = file.holder_of(b"one").unwrap();
+    assert_eq!(gate.scopes.joined("+"), "detect+read");
+}
+
+#[test]
+fn nothing_but_the_whole_key_is_the_key() {
+    let list = KeyList::from_toml(&line("gate", "\"detect\"", "secret")).unwrap();
+    let digest = digest_of("secret");
+    for wrong in [
+        "",
+        "s",
+        "secre",
+        "secrets",
+        "Secret",
+        " secret",
+        "secret\0",
+        digest.as_str(),
+    ] {
+        assert_eq!(name_of(&list, wrong), None, "{wrong:?}");
+    }
+    assert_eq!(KeyList::default().holder_of(b""), None);
+}
+
+#[test]
+fn every_mistake_is_told_with_its_place_and_without_what_was_written() {
+    let good = digest_of("one");
+    let leak = "lookdown_do-not-show-me";
+    for (text, told) in [
+        (format!("gate = \"{leak}\""), "line 1:"),
+        (
+            format!("\n\ngate = {{ scopes = \"{leak}\", sha256 = \"{good}\" }}"),
+            "line 3:",
+        ),
+        (format!("gate = {{ key = \"{leak}\" }}"), "line 1:"),
+        (format!("gate = {leak}"), "line 1:"),
+        (
+            format!("gate = {{ scopes = [\"detect\"], sha256 = \"{leak}\" }}"),
+            "never the key itself",
+        ),
+        (
+            format!("gate = {{ scopes = [\"{leak}\"], sha256 = \"{good}\" }}"),
+            "detect, read and admin",
+        ),
+        (
+            format!("gate = {{ scopes = [], sha256 = \"{good}\" }}"),
+            "detect, read and admin",
+        ),
+        (
+            format!("\"{leak}!\" = {{ scopes = [\"read\"], sha256 = \"{good}\" }}"),
+            "a name is",
+        ),
+        (
+            line("gate", "\"read\"", "one") + &line("gate", "\"read\"", "two"),
+            "line 2:",
+        ),
+    ] {
+        let message = KeyList::from_toml(&text).unwrap_err().to_string();
+        assert!(message.contains(told), "{message}");
+        assert!(!message.contains("do-not-show-me"), "{message}");
+    }
+    for (text, told) in [
+        (leak.to_owned(), "name:scope+scope:sha256"),
+        (format!("gate:detect:{leak}"), "never the key itself"),
+        (format!("gate:{leak}:{good}"), "detect, read and admin"),
+        (format!("a:read:{good},a:read:{good}"), "key 2: its name"),
+    ] {
+        let message = text.parse::<KeyList>().unwrap_err().to_string();
+        assert!(message.contains(told), "{message}");
+        assert!(!message.contains("do-not-show-me"), "{message}");
+    }
+}
+
+#[test]
+fn there_may_be_a_thousand_keys_and_no_more() {
+    let lines = |count: usize| -> String {
+        let line = |at| line(&format!("key-{at}"), "\"read\"", &format!("{at}"));
+        (0..count).map(line).collect()
+    };
+    assert_eq!(
+        KeyList::from_toml(&lines(MAX_KEYS)).unwrap().len(),
+        MAX_KEYS
+    );
+    let refusal = KeyList::from_toml(&lines(MAX_KEYS + 1)).unwrap_err();
+    assert!(refusal.to_string().contains("more than 1000"));
+}

@@ -1,0 +1,32 @@
+//! What people call a key.
+
+use std::{fmt, str::FromStr};
+
+const MAX_CHARS: usize = 64;
+
+/// What people call a key: 1 to 64 of a-z, 0-9, `_` and `-`, which TOML takes without quotes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeyName(String);
+
+/// No name of a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a name is 1 to 64 of a-z, 0-9, _ and -, and begins with a-z or 0-9")]
+pub struct InvalidKeyName;
+
+impl FromStr for KeyName {
+    type Err = InvalidKeyName;
+
+    fn from_str(name: &str) -> Result<Self, InvalidKeyName> {
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+        let is_name = (1..=MAX_CHARS).contains(&name.len())
+            && name.starts_with(is_plain)
+            && name.chars().all(|c| is_plain(c) || c == '_' || c == '-');
+        is_name.then(|| Self(name.to_owned())).ok_or(InvalidKeyName)
+    }
+}
+
+impl fmt::Display for KeyName {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.0)
+    }
+}

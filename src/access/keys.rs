@@ -1,0 +1,101 @@
+//! The keys that are known now: those of the environment, and those of a file that may change.
+
+use std::{
+    fs::File,
+    io::{self, Read},
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError, RwLock},
+};
+
+use super::{Holder, KeyError, KeyList};
+
+/// A thousand keys take a fifth of it.
+const MAX_FILE_BYTES: u64 = 1 << 20;
+
+/// The keys that are known now.
+#[derive(Debug)]
+pub struct AccessKeys {
+    /// Known whatever the file says.
+    lasting: KeyList,
+    file: Option<PathBuf>,
+    known: RwLock<Arc<KeyList>>,
+    /// Why the file's newest version is not used, as it was last told.
+    told: Mutex<Option<String>>,
+}
+
+impl AccessKeys {
+    /// The keys of `lasting` and of `file`, if there is one.
+    ///
+    /// # Errors
+    /// [`KeyError`] when the file cannot be used.
+    pub fn open(lasting: KeyList, file: Option<&Path>) -> Result<Self, KeyError> {
+        let known = match file {
+            Some(file) => read(file, &lasting)?,
+            None => lasting.clone(),
+        };
+        Ok(Self {
+            lasting,
+            file: file.map(Path::to_owned),
+            known: RwLock::new(Arc::new(known)),
+            told: Mutex::new(None),
+        })
+    }
+
+    /// Reads the file again. If it cannot be used, the keys stay what they were, and the log says
+    /// why, once for each reason.
+    pub fn refresh(&self) {
+        let Some(file) = &self.file else { return };
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        match read(file, &self.lasting) {
+            Ok(list) => {
+                *told = None;
+                if *self.known() != list {
+                    tracing::info!(keys = list.len(), "the keys have changed");
+                    let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
+                    *known = Arc::new(list);
+                }
+            }
+            Err(error) => {
+                let problem = error.to_string();
+                if told.as_ref() != Some(&problem) {
+                    tracing::error!("{problem}; the keys stay as they were");
+                    *told = Some(problem);
+                }
+            }
+        }
+    }
+
+    /// Whose this key is; `None` when it is nobody's.
+    #[must_use]
+    pub fn holder_of(&self, key: &[u8]) -> Option<Holder> {
+        self.known().holder_of(key).cloned()
+    }
+
+    fn known(&self) -> Arc<KeyList> {
+        let known = self.known.read().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(&known)
+    }
+}
+
+fn read(path: &Path, lasting: &KeyList) -> Result<KeyList, KeyError> {
+    let text = read_text(path).map_err(|cause| KeyError::Unreadable {
+        path: path.to_owned(),
+        cause,
+    })?;
+    let list = KeyList::from_toml(&text).and_then(|list| lasting.clone().with(&list));
+    list.map_err(|problem| KeyError::File {
+        path: path.to_owned(),
+        problem: Box::new(problem),
+    })
+}
+
+fn read_text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let read = File::open(path)?
+        .take(MAX_FILE_BYTES + 1)
+        .read_to_string(&mut text)?;
+    if read as u64 > MAX_FILE_BYTES {
+        return Err(io::Error::other("it has more than 1 MiB"));
+    }
+    Ok(text)
+}

@@ -1,0 +1,46 @@
+//! Which web pages of other origins may call the server from a browser.
+
+use axum::http::{
+    HeaderName, HeaderValue, Method,
+    header::{
+        AUTHORIZATION, CONTENT_TYPE, ETAG, IF_MATCH, IF_NONE_MATCH, LOCATION, RETRY_AFTER,
+        WWW_AUTHENTICATE,
+    },
+};
+use tower_http::cors::CorsLayer;
+
+use super::{access::API_KEY, detect::SERVER_TIMING, request_id};
+
+/// The layer that lets pages of these origins call; none when there are none.
+pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
+    let origins = origins.iter();
+    // The settings let only origins through, which are all header values.
+    let origins: Vec<_> = origins
+        .filter_map(|origin| HeaderValue::from_str(origin).ok())
+        .collect();
+    if origins.is_empty() {
+        return None;
+    }
+    let sent: [HeaderName; 6] = [
+        AUTHORIZATION,
+        API_KEY,
+        CONTENT_TYPE,
+        IF_MATCH,
+        IF_NONE_MATCH,
+        request_id::HEADER,
+    ];
+    let read: [HeaderName; 6] = [
+        ETAG,
+        LOCATION,
+        RETRY_AFTER,
+        SERVER_TIMING,
+        WWW_AUTHENTICATE,
+        request_id::HEADER,
+    ];
+    let layer = CorsLayer::new()
+        .allow_origin(origins)
+        .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
+        .allow_headers(sent)
+        .expose_headers(read);
+    Some(layer)
+}

@@ -1,0 +1,48 @@
+//! `lookdown key`
+
+use std::{
+    io::{self, Write},
+    process::ExitCode,
+};
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+
+use crate::access::{KeyDigest, KeyName, Scope, Scopes, new_key};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Make an API key, and the line for access.keys_file that makes it known
+    New(Arguments),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// What people call the key: 1 to 64 of a-z, 0-9, _ and -
+    #[arg(long)]
+    name: KeyName,
+    /// What it opens: detect, read or admin; may be given several times
+    #[arg(long = "scope", required = true, value_name = "SCOPE")]
+    scopes: Vec<Scope>,
+}
+
+/// Does what the command asks for.
+pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
+    let Command::New(Arguments { name, scopes }) = command;
+    let key = new_key().context("the operating system gives no random numbers")?;
+    let scopes = Scopes::new(scopes).context("--scope: give one")?;
+    let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
+    let quoted = scopes.joined("\", \"");
+    let written = writeln!(
+        io::stdout(),
+        "# The key. It is shown this once; who has it sends it as Authorization: Bearer KEY.\n\
+         {key}\n\
+         # The line for access.keys_file, which holds no key:\n\
+         {name} = {{ scopes = [\"{quoted}\"], sha256 = \"{digest}\" }}\n\
+         # The same for LOOKDOWN__ACCESS__KEYS:\n\
+         {name}:{}:{digest}",
+        scopes.joined("+"),
+    );
+    written.context("standard output cannot be written")?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,336 @@
+//! Who may do what.
+
+use std::{
+    collections::HashMap,
+    fs,
+    io::{self, Write},
+    path::Path,
+    sync::{Arc, Mutex},
+};
+
+use axum::{body::Body, http::Request};
+use lookdown::{
+    access::{AccessKeys, KeyDigest},
+    api::Access,
+    settings,
+};
+
+use crate::service::{Answer, Bounds, Service, frame};
+
+const FINDER: &str = "lookdown_finder";
+const READER: &str = "lookdown_reader";
+const ADMINISTRATOR: &str = "lookdown_administrator";
+const BOTH: &str = "lookdown_both";
+
+/// Every route that needs a scope.
+const GUARDED: [(&str, &str, &str); 9] = [
+    ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
+    ("GET", "/calibrations", "read"),
+    ("GET", "/calibrations/lobby", "read"),
+    ("GET", "/calibrations/lobby/views", "read"),
+    ("POST", "/v2/repository/index", "read"),
+    ("PUT", "/calibrations/lobby", "admin"),
+    ("DELETE", "/calibrations/nobody", "admin"),
+    ("POST", "/v2/repository/models/eager/load", "admin"),
+    ("POST", "/v2/repository/models/eager/unload", "admin"),
+];
+
+fn line(name: &str, scopes: &str, key: &str) -> String {
+    let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
+    format!("{name} = {{ scopes = [{scopes}], sha256 = \"{digest}\" }}\n")
+}
+
+fn write_keys(file: &Path) {
+    let lines = [
+        line("finder", "\"detect\"", FINDER),
+        line("reader", "\"read\"", READER),
+        line("administrator", "\"admin\"", ADMINISTRATOR),
+        line("both", "\"detect\", \"read\"", BOTH),
+    ];
+    fs::write(file, lines.concat()).unwrap();
+}
+
+fn service_with(keys: &Arc<AccessKeys>) -> Service {
+    Service::within(&Bounds {
+        access: Access::Keys(Arc::clone(keys)),
+        ..Bounds::default()
+    })
+}
+
+fn guarded() -> Service {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    write_keys(&file);
+    let keys = AccessKeys::open("".parse().unwrap(), Some(&file)).unwrap();
+    service_with(&Arc::new(keys))
+}
+
+/// Part of a log.
+struct Log(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn logged_by(work: impl FnOnce()) -> String {
+    let bytes = Arc::new(Mutex::new(Vec::new()));
+    let writer = Arc::clone(&bytes);
+    let logs = tracing_subscriber::fmt().with_writer(move || Log(Arc::clone(&writer)));
+    tracing::subscriber::with_default(logs.with_ansi(false).finish(), work);
+    let log = bytes.lock().unwrap();
+    String::from_utf8(log.clone()).unwrap()
+}
+
+async fn ask(service: &Service, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
+    let mut request = Request::builder().method(method).uri(path);
+    for (name, value) in headers {
+        request = request.header(*name, *value);
+    }
+    let body = if path.starts_with("/detect") {
+        Body::from(frame())
+    } else {
+        Body::empty()
+    };
+    service.send(request.body(body).unwrap()).await
+}
+
+async fn reads(service: &Service, headers: &[(&str, &str)]) -> u16 {
+    let answer = ask(service, "GET", "/calibrations", headers).await;
+    answer.status.as_u16()
+}
+
+async fn reads_with(service: &Service, key: &str) -> u16 {
+    reads(service, &[("x-api-key", key)]).await
+}
+
+#[tokio::test]
+async fn every_guarded_route_needs_a_key_of_its_scope_and_admin_opens_all() {
+    let service = guarded();
+    for (method, path, scope) in GUARDED {
+        let none = ask(&service, method, path, &[]).await;
+        assert_eq!(none.status, 401, "{method} {path}");
+        assert_eq!(none.header("www-authenticate"), "Bearer");
+        assert_eq!(none.problem()["type"], "urn:lookdown:problem:key-required");
+
+        for (key, scopes) in [
+            (FINDER, &["detect"][..]),
+            (READER, &["read"]),
+            (BOTH, &["detect", "read"]),
+            (ADMINISTRATOR, &["detect", "read", "admin"]),
+        ] {
+            let answer = ask(&service, method, path, &[("x-api-key", key)]).await;
+            let status = answer.status.as_u16();
+            if scopes.contains(&scope) {
+                assert!(
+                    ![401, 403].contains(&status),
+                    "{method} {path}: {}",
+                    answer.text()
+                );
+            } else {
+                assert_eq!(status, 403, "{method} {path}");
+                let problem = answer.problem();
+                assert_eq!(problem["type"], "urn:lookdown:problem:forbidden");
+                assert!(
+                    problem["detail"].as_str().unwrap().contains(scope),
+                    "{problem}"
+                );
+            }
+            assert!(!answer.text().contains(key), "the answer repeats the key");
+        }
+    }
+}
+
+#[tokio::test]
+async fn probes_metrics_and_pages_never_need_a_key() {
+    let service = guarded();
+    for path in [
+        "/livez",
+        "/readyz",
+        "/metrics",
+        "/openapi.json",
+        "/docs/",
+        "/",
+    ] {
+        let answer = service.get(path).await;
+        assert!(answer.status.as_u16() < 400, "{path}: {}", answer.status);
+    }
+    reads_with(&service, READER).await;
+    let metrics = service.get("/metrics").await.text();
+    for word in ["reader", "finder", READER] {
+        assert!(!metrics.contains(word), "a key's name became a label");
+    }
+}
+
+#[tokio::test]
+async fn a_key_is_sent_as_a_bearer_token_or_alone_and_only_once() {
+    let service = guarded();
+    let bearer = format!("Bearer {READER}");
+    let lower = format!("bearer  {READER}");
+    for header in [
+        ("authorization", bearer.as_str()),
+        ("authorization", lower.as_str()),
+        ("x-api-key", READER),
+    ] {
+        assert_eq!(reads(&service, &[header]).await, 200, "{header:?}");
+    }
+    // Basic is for a proxy on the way.
+    let headers = [("authorization", "Basic dTpw"), ("x-api-key", READER)];
+    assert_eq!(reads(&service, &headers).await, 200);
+
+    let token = format!("Token {READER}");
+    let unspaced = format!("Bearer{READER}");
+    for headers in [
+        &[("authorization", READER)][..],
+        &[("authorization", token.as_str())],
+        &[("authorization", unspaced.as_str())],
+        &[("authorization", "Bearer ")],
+        &[("x-api-key", "")],
+        &[("authorization", bearer.as_str()), ("x-api-key", READER)],
+        &[("x-api-key", READER), ("x-api-key", ADMINISTRATOR)],
+    ] {
+        assert_eq!(reads(&service, headers).await, 401, "{headers:?}");
+    }
+    let in_query = service.get(&format!("/calibrations?key={READER}")).await;
+    assert_eq!(in_query.status, 401);
+}
+
+#[tokio::test]
+async fn no_part_of_a_key_nor_its_digest_is_a_key() {
+    let service = guarded();
+    for end in 0..READER.len() {
+        assert_eq!(reads_with(&service, &READER[..end]).await, 401, "{end}");
+    }
+    let digest = KeyDigest::of(READER.as_bytes()).hexadecimal();
+    let longer = format!("{READER}0");
+    let upper = READER.to_uppercase();
+    for wrong in [digest.as_str(), &longer, &upper] {
+        assert_eq!(reads_with(&service, wrong).await, 401, "{wrong}");
+    }
+    assert_eq!(reads_with(&service, READER).await, 200);
+}
+
+#[tokio::test]
+async fn a_replaced_file_shuts_the_old_key_out_and_lets_the_new_one_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    write_keys(&file);
+    let lasting = format!("lasting:read:{}", KeyDigest::of(b"lasting").hexadecimal());
+    let keys = Arc::new(AccessKeys::open(lasting.parse().unwrap(), Some(&file)).unwrap());
+    let service = service_with(&keys);
+    assert_eq!(reads_with(&service, READER).await, 200);
+    assert_eq!(reads_with(&service, "new").await, 401);
+
+    fs::write(&file, line("reader", "\"read\"", "new")).unwrap();
+    keys.refresh();
+    assert_eq!(reads_with(&service, READER).await, 401);
+    assert_eq!(reads_with(&service, "new").await, 200);
+
+    fs::write(&file, "").unwrap();
+    keys.refresh();
+    assert_eq!(
+        reads_with(&service, "new").await,
+        401,
+        "an empty file opens nothing"
+    );
+    assert_eq!(reads_with(&service, "lasting").await, 200);
+}
+
+#[tokio::test]
+async fn a_broken_file_keeps_the_old_keys_and_shows_in_the_log_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    write_keys(&file);
+    let keys = Arc::new(AccessKeys::open("".parse().unwrap(), Some(&file)).unwrap());
+    let service = service_with(&keys);
+    let huge = "#".repeat(2 << 20);
+    for (broken, told) in [
+        (format!("reader = {{ {READER}"), "line 1:"),
+        ("\nreader = { scopes = [] }".to_owned(), "line 2:"),
+        (huge, "more than 1 MiB"),
+    ] {
+        fs::write(&file, broken).unwrap();
+        let log = logged_by(|| {
+            keys.refresh();
+            keys.refresh();
+        });
+        assert_eq!(log.matches(told).count(), 1, "{log}");
+        assert!(log.contains("keys.toml") && log.contains("ERROR"), "{log}");
+        assert!(!log.contains(READER), "{log}");
+        assert_eq!(reads_with(&service, READER).await, 200);
+    }
+    fs::remove_file(&file).unwrap();
+    keys.refresh();
+    assert_eq!(reads_with(&service, READER).await, 200);
+    assert!(AccessKeys::open("".parse().unwrap(), Some(&file)).is_err());
+}
+
+#[test]
+fn nothing_of_a_key_is_in_the_debug_output_of_keys_and_settings() {
+    let digest = KeyDigest::of(b"secret").hexadecimal();
+    let variable = "LOOKDOWN__ACCESS__KEYS".to_owned();
+    let environment = HashMap::from([(variable, format!("gate:detect:{digest}"))]);
+    let settings = settings::load(None, environment).unwrap();
+    let keys = AccessKeys::open(settings.access.keys.clone(), None).unwrap();
+    for shown in [format!("{settings:?}"), format!("{keys:?}")] {
+        assert!(shown.contains("gate"), "{shown}");
+        assert!(!shown.contains(&digest), "{shown}");
+    }
+}
+
+#[tokio::test]
+async fn without_keys_others_may_find_and_read_but_change_nothing() {
+    let service = Service::within(&Bounds {
+        access: Access::Open {
+            own_machine_only: false,
+        },
+        ..Bounds::default()
+    });
+    for (method, path, scope) in GUARDED {
+        let answer = ask(&service, method, path, &[]).await;
+        let open = scope == "detect" || path.starts_with("/calibrations") && scope == "read";
+        assert_eq!(answer.status == 403, !open, "{method} {path}");
+    }
+}
+
+#[tokio::test]
+async fn pages_of_the_origins_named_may_call_and_no_others() {
+    let service = Service::within(&Bounds {
+        cors_origins: vec!["https://dashboard.example".to_owned()],
+        ..Bounds::default()
+    });
+    let ask_first = [
+        ("origin", "https://dashboard.example"),
+        ("access-control-request-method", "PUT"),
+        ("access-control-request-headers", "authorization,x-api-key"),
+    ];
+    let answer = ask(&service, "OPTIONS", "/calibrations/lobby", &ask_first).await;
+    assert_eq!(answer.status, 200);
+    let header = |name: &str| answer.header(name).to_lowercase();
+    assert_eq!(
+        header("access-control-allow-origin"),
+        "https://dashboard.example"
+    );
+    for name in ["authorization", "x-api-key"] {
+        assert!(header("access-control-allow-headers").contains(name));
+    }
+    assert!(header("access-control-allow-methods").contains("put"));
+
+    let allowed = "access-control-allow-origin";
+    let page = [("origin", "https://dashboard.example")];
+    let refused = ask(&service, "GET", "/calibrations/nobody", &page).await;
+    assert_eq!(
+        (refused.status.as_u16(), refused.header(allowed)),
+        (404, page[0].1)
+    );
+    let stranger = [("origin", "https://dashboard.example.evil")];
+    let answer = ask(&service, "GET", "/calibrations", &stranger).await;
+    assert!(!answer.headers.contains_key(allowed));
+    let none = ask(&Service::start(), "GET", "/calibrations", &page).await;
+    assert!(!none.headers.contains_key(allowed));
+}
