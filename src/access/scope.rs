@@ -54,6 +54,7 @@ pub struct Scopes(Vec<Scope>);
 
 impl Scopes {
     /// These scopes; `None` when there is none.
+    #[must_use]
     pub fn new(given: &[Scope]) -> Option<Self> {
         let given = Scope::ALL.into_iter().filter(|scope| given.contains(scope));
         let given: Vec<_> = given.collect();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::{
     extract::FromRequestParts,
-    http::{HeaderMap, HeaderName, header::AUTHORIZATION, request::Parts},
+    http::{HeaderMap, HeaderName, HeaderValue, header::AUTHORIZATION, request::Parts},
 };
 
 use super::{
@@ -117,7 +117,7 @@ fn only_key(headers: &HeaderMap) -> Result<&[u8], Problem> {
             .then(|| key.trim_ascii())
     });
     let plain = headers.get_all(API_KEY).iter();
-    let mut keys = bearers.chain(plain.map(|value| value.as_bytes()));
+    let mut keys = bearers.chain(plain.map(HeaderValue::as_bytes));
     match (keys.next(), keys.next()) {
         (Some(key), None) => Ok(key),
         (None, _) => Err(Problem::new(

@@ -12,7 +12,7 @@ use crate::access::{KeyDigest, KeyName, Scope, Scopes, new_key};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Make an API key, and the line for access.keys_file that makes it known
+    /// Make an API key, and the line for `access.keys_file` that makes it known
     New(Arguments),
 }
 

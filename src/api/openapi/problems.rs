@@ -197,11 +197,11 @@ fn response(kinds: &[ProblemKind]) -> Response {
         .description(lines.collect::<Vec<_>>().join(" "))
         .content("application/problem+json", content);
     if kinds.contains(&ProblemKind::KeyRequired) {
-        let scheme = HeaderBuilder::new()
+        let bearer = HeaderBuilder::new()
             .schema(Some(String::schema()))
             .description(Some("`Bearer`."))
             .build();
-        response = response.header("WWW-Authenticate", scheme);
+        response = response.header("WWW-Authenticate", bearer);
     }
     if kinds
         .iter()
