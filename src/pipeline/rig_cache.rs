@@ -51,7 +51,7 @@ struct Entry {
     bytes: Option<usize>,
 }
 
-/// How full a [`RigCache`] is, and what it has done so far.
+/// How full a cache of camera rigs is, and what it has done so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RigCacheUse {
     /// Rigs in memory.
