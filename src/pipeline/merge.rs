@@ -24,6 +24,36 @@ const BORDER_SHARE: f64 = 0.0125;
 /// How much less the coordinates of a cut-off box count when boxes are averaged.
 const BORDER_WEIGHT: f64 = 0.1;
 
+/// From the score of a merge to the one that is reported.
+///
+/// In fusion a witness's word is its score × its IoU with the fused box, so that a person whom all
+/// see well scores less than each of them said. The reported score takes that back in the mean: with
+/// this power the default threshold of 0.3 lies where F1 is best (it was best at 0.24 to 0.30 of the
+/// merge's own scores, on photographs and in rendered rooms). The order of persons stays.
+#[derive(Debug, Clone, Copy)]
+struct ScoreScale {
+    power: f64,
+}
+
+impl ScoreScale {
+    fn of(refinement: Refinement) -> Self {
+        let power = match refinement {
+            Refinement::Fusion => 0.87,
+            // What is picked keeps what the detector said of it.
+            Refinement::Nms | Refinement::SoftNmsLinear | Refinement::SoftNmsGaussian => 1.0,
+        };
+        Self { power }
+    }
+
+    fn reported(self, merged: f64) -> f64 {
+        merged.powf(self.power)
+    }
+
+    fn merged(self, reported: f64) -> f64 {
+        reported.powf(self.power.recip())
+    }
+}
+
 /// A box of a view, with its footprint in the frame.
 struct Mapped {
     candidate: Candidate,
@@ -60,7 +90,12 @@ pub(super) fn persons(
     let Some(Look { rig, .. }) = looks.first() else {
         return Vec::new();
     };
-    let (mapped, merged) = merged(looks, rig, back_projection, parameters);
+    let scale = ScoreScale::of(parameters.refinement);
+    let parameters = RefinementParameters {
+        score_threshold: scale.merged(parameters.score_threshold),
+        ..*parameters
+    };
+    let (mapped, merged) = merged(looks, rig, back_projection, &parameters);
     merged
         .into_iter()
         .filter_map(|merged| {
@@ -69,7 +104,7 @@ pub(super) fn persons(
                 .iter()
                 .map(|&member| &mapped[member])
                 .collect();
-            person(merged.bbox, merged.score, &members, rig)
+            person(merged.bbox, scale.reported(merged.score), &members, rig)
         })
         .collect()
 }

@@ -104,7 +104,7 @@ impl Default for RawInference {
             threads: 0,
             max_batch_views: 0,
             max_queue_delay_millis: 0,
-            score_floor: 0.01,
+            score_floor: 0.05,
             max_detections_per_view: 300,
         }
     }

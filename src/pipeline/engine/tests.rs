@@ -139,6 +139,22 @@ fn where_nothing_has_moved_the_network_need_not_look_again() {
 }
 
 #[test]
+fn the_threshold_is_one_of_reported_scores() {
+    let (engine, _folder) = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let scores = |threshold: f64| {
+        let threshold = threshold.to_string();
+        let named = [("calibration", "lobby"), ("score_threshold", &*threshold)];
+        let report = engine.detect(&job(image.clone(), &named)).unwrap().report;
+        let scores: Vec<_> = report.persons.iter().map(|person| person.score).collect();
+        scores
+    };
+    let best = scores(0.1)[0];
+    assert_eq!(scores(best - 1e-9), [best]);
+    assert!(scores(best + 1e-9).is_empty());
+}
+
+#[test]
 fn an_assumed_lens_finds_what_the_true_calibration_finds() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [300.0, 180.0], 25.0);
