@@ -95,6 +95,19 @@ impl Service {
         }
     }
 
+    /// The log, once it holds this.
+    pub(crate) fn log_with(&self, expected: &str) -> String {
+        let begun = Instant::now();
+        loop {
+            let log = self.log();
+            if log.contains(expected) {
+                return log;
+            }
+            assert!(begun.elapsed() < PATIENCE, "no {expected:?} in {log}");
+            thread::yield_now();
+        }
+    }
+
     pub(crate) fn log(&self) -> String {
         self.log.lock().unwrap().clone()
     }
