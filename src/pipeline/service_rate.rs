@@ -31,6 +31,13 @@ impl ServiceRate {
         }
     }
 
+    /// A frame was given up; `pending` others are there.
+    pub(super) fn given_up(&mut self, pending: usize) {
+        if pending == 0 {
+            self.waiting_since = None;
+        }
+    }
+
     /// How long `frames` will take; zero as long as nothing was served.
     pub(super) fn time_for(&self, frames: usize) -> Duration {
         let count = u32::try_from(frames).unwrap_or(u32::MAX);
@@ -55,6 +62,17 @@ mod tests {
         rate.began(later);
         rate.ended(later + SECOND, 0);
         assert_eq!(rate.time_for(8), 8 * SECOND);
+    }
+
+    #[test]
+    fn a_frame_that_was_given_up_starts_no_clock() {
+        let (mut rate, start) = (ServiceRate::default(), Instant::now());
+        rate.began(start);
+        rate.given_up(0);
+        let later = start + SECOND * 3600;
+        rate.began(later);
+        rate.ended(later + SECOND, 0);
+        assert_eq!(rate.time_for(1), SECOND);
     }
 
     #[test]

@@ -151,6 +151,8 @@ impl Shared {
         while let Some(Entry { job, answer, place }) = self.queue.pop() {
             if job.ticket.withdrawn.is_cancelled() {
                 self.withdrawn.fetch_add(1, Ordering::Relaxed);
+                drop((job, place));
+                self.rate().given_up(self.pending());
                 continue;
             }
             let outcome = catch_unwind(AssertUnwindSafe(|| self.engine.detect(&job)))
