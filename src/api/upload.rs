@@ -11,11 +11,7 @@ use std::time::Instant as Arrival;
 
 use axum::{
     extract::{FromRequest, Query, Request},
-    http::{
-        Uri,
-        header::{CONTENT_TYPE, EXPECT},
-        request::Parts,
-    },
+    http::{Uri, header::CONTENT_TYPE, request::Parts},
 };
 use bytes::Bytes;
 use jiff::Timestamp;
@@ -56,19 +52,16 @@ impl FromRequest<ApiState> for Upload {
             remedy: "send a smaller picture or raise server.max_body_bytes",
             budget: &state.uploads,
         };
-        // A client that asked first has not begun to send, and need not.
-        let asked_first = parts.headers.contains_key(EXPECT);
-        let reading = async {
-            if let Err(refusal) = state.options.access.check(&parts.headers, Scope::Detect) {
-                if !asked_first {
-                    reader.discard(body).await;
-                }
-                return Err(refusal);
-            }
+        let admitted = state
+            .options
+            .access
+            .check(&parts.headers, Scope::Detect)
             // A frame that has no place needs none in memory either.
-            if let Err(refusal) = state.workers.admits() {
-                reader.discard(body).await;
-                return Err(refusal.into());
+            .and_then(|()| Ok(state.workers.admits()?));
+        let reading = async {
+            if let Err(refusal) = admitted {
+                reader.discard_unread(&parts.headers, body).await;
+                return Err(refusal);
             }
             reader.read(&parts.headers, body).await
         };

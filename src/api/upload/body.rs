@@ -77,10 +77,7 @@ impl BodyReader<'_> {
         mut body: Body,
     ) -> Result<HeldBytes, Problem> {
         if announced_bytes(headers).is_some_and(|bytes| bytes > self.max_bytes) {
-            // A client that asked first has not begun to send.
-            if !headers.contains_key(EXPECT) {
-                self.discard(body).await;
-            }
+            self.discard_unread(headers, body).await;
             return Err(self.too_large());
         }
         let mut bytes = BytesMut::new();
@@ -104,8 +101,16 @@ impl BodyReader<'_> {
         })
     }
 
+    /// Discards a body that is refused before any of it was read. A client that asked first has not
+    /// begun to send, and need not.
+    pub(in crate::api) async fn discard_unread(&self, headers: &HeaderMap, body: Body) {
+        if !headers.contains_key(EXPECT) {
+            self.discard(body).await;
+        }
+    }
+
     /// Reads what the client is sending, within bounds, so that it can see the answer.
-    pub(in crate::api) async fn discard(&self, mut body: Body) {
+    async fn discard(&self, mut body: Body) {
         let mut left = self.max_bytes.saturating_mul(DISCARDED_LIMITS);
         while let Ok(Some(chunk)) = next_chunk(&mut body).await
             && chunk.len() < left
