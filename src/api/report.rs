@@ -18,7 +18,7 @@ use utoipa::ToSchema;
     "model": {"name": "ssdlite_mobilenet_v2", "revision": "60303ae22b99"},
     "profile": "balanced",
     "refinement": {
-        "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.4, "sigma": 0.3,
+        "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,
         "max_detections": 1000
     },
     "views": {"inferred": 24, "unchanged": 0, "outside": 0},

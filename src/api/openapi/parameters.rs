@@ -34,10 +34,9 @@ pub(in crate::api) struct DetectQuery {
     #[param(minimum = 0, maximum = 1, default = 0.3)]
     #[schema(minimum = 0, maximum = 1, default = 0.3)]
     score_threshold: Option<f64>,
-    /// Boxes that overlap at least this much are the same person (`N_t`): 0.4 by default for
-    /// `fusion`, otherwise 0.5.
-    #[param(minimum = 0, maximum = 1)]
-    #[schema(minimum = 0, maximum = 1)]
+    /// Boxes that overlap at least this much are the same person (`N_t`).
+    #[param(minimum = 0, maximum = 1, default = 0.5)]
+    #[schema(minimum = 0, maximum = 1, default = 0.5)]
     iou_threshold: Option<f64>,
     /// σ of `soft_nms_gaussian`.
     #[param(exclusive_minimum = 0, default = 0.3)]
