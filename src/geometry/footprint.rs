@@ -1,14 +1,11 @@
 //! Footprints: what a box found in a view covers in the fisheye frame.
 
-use std::{
-    f64::consts::{FRAC_PI_2, PI, TAU},
-    sync::LazyLock,
-};
+use std::{f64::consts::TAU, sync::LazyLock};
 
 use nalgebra::Vector2;
 
 use super::{
-    Lens, Mount, Pixel, VirtualView,
+    Lens, Mount, Pixel, Ray, VirtualView,
     pixels::{PixelConvention, cross_half_pixel},
     stature::Extremities,
 };
@@ -28,6 +25,8 @@ static ELLIPSE_ANGLES: LazyLock<[(f64, f64); ELLIPSE_POINTS]> = LazyLock::new(||
 const MIN_TILT_DETERMINANT: f64 = 0.18;
 /// A tilted ellipse thinner than this (ratio of squared axes) is not a person.
 const MIN_SQUARED_AXIS_RATIO: f64 = 0.04;
+/// Of every so many outline points the ray is kept.
+const RAY_STRIDE: usize = 4;
 /// A box of which less than this share of the outline lies in the lens image is not mapped.
 const MIN_INSIDE_SHARE: f64 = 0.5;
 
@@ -46,6 +45,7 @@ pub enum BackProjection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
     outline: Vec<Pixel>,
+    rays: Vec<Ray>,
     extremities: Option<Extremities>,
 }
 
@@ -80,19 +80,29 @@ impl Footprint {
     ) -> Option<Self> {
         let mut inside = 0_usize;
         let mut outline = Vec::with_capacity(POINTS);
-        for point in outline_in_view {
+        let mut rays = Vec::with_capacity(POINTS.div_ceil(RAY_STRIDE));
+        for (index, point) in outline_in_view.into_iter().enumerate() {
             let pixel = cross_half_pixel(point, PixelConvention::PixelCentre);
             let ray = view.ray_in_camera(&pixel);
             let seen = lens.project(&ray);
             inside += usize::from(seen.is_some());
-            if let Some(in_frame) = seen.or_else(|| lens.project_to_rim(&ray)) {
-                outline.push(cross_half_pixel(in_frame, PixelConvention::CornerOrigin));
+            let Some(in_frame) = seen.or_else(|| lens.project_to_rim(&ray)) else {
+                continue;
+            };
+            outline.push(cross_half_pixel(in_frame, PixelConvention::CornerOrigin));
+            if index.is_multiple_of(RAY_STRIDE) {
+                // What was pulled to the rim is seen there.
+                rays.extend(match seen {
+                    Some(_) => Some(ray),
+                    None => lens.unproject(&in_frame),
+                });
             }
         }
         #[expect(clippy::cast_precision_loss, reason = "at most 32 points")]
         let inside_share = inside as f64 / POINTS as f64;
         (inside_share >= MIN_INSIDE_SHARE && !outline.is_empty()).then_some(Self {
             outline,
+            rays,
             extremities,
         })
     }
@@ -102,6 +112,7 @@ impl Footprint {
     pub fn of_frame_box(frame_box: [f64; 4]) -> Self {
         Self {
             outline: corners(frame_box).to_vec(),
+            rays: Vec::new(),
             extremities: None,
         }
     }
@@ -110,6 +121,13 @@ impl Footprint {
     #[must_use]
     pub fn outline(&self) -> &[Pixel] {
         &self.outline
+    }
+
+    /// Some of the outline's points as rays (camera frame, any length); none of a box found in the
+    /// frame itself.
+    #[must_use]
+    pub fn rays(&self) -> &[Ray] {
+        &self.rays
     }
 
     /// The ends of the outline along the vertical and across it; `None` for corner hulls, which
@@ -190,15 +208,15 @@ impl Ellipse {
     }
 
     fn extremities(&self, view: &VirtualView) -> Extremities {
-        let ray = |angle: f64| {
-            let pixel = cross_half_pixel(self.at(angle.sin_cos()), PixelConvention::PixelCentre);
+        let ray = |angle: (f64, f64)| {
+            let pixel = cross_half_pixel(self.at(angle), PixelConvention::PixelCentre);
             view.ray_in_camera(&pixel)
         };
         Extremities {
-            head: ray(0.0),
-            right: ray(FRAC_PI_2),
-            foot: ray(PI),
-            left: ray(-FRAC_PI_2),
+            head: ray((0.0, 1.0)),
+            right: ray((1.0, 0.0)),
+            foot: ray((0.0, -1.0)),
+            left: ray((-1.0, 0.0)),
         }
     }
 }

@@ -4,15 +4,9 @@
 use crate::{
     calibration::CameraGeometry,
     detection::{BBox, ViewPixels},
-    geometry::{
-        BackProjection, Footprint, Ray, ViewPlan, VirtualView,
-        pixels::{PixelConvention, cross_half_pixel},
-    },
+    geometry::{BackProjection, Footprint, Ray, ViewPlan, VirtualView},
     imaging::{Frame, Letterbox, NetworkInput, RemapTable},
 };
-
-/// Every so many outline points decide whether a view holds a whole person.
-const OUTLINE_STRIDE: usize = 4;
 
 /// A camera ready for frames of one size.
 #[derive(Debug)]
@@ -141,16 +135,6 @@ impl CameraRig {
                 bbox.corners().map(|side| letterbox.frame_from_input(side)),
             )),
         }
-    }
-
-    /// Some of a footprint's outline as rays; what lies beyond the lens image is left out.
-    pub(super) fn outline(&self, footprint: &Footprint) -> Vec<Ray> {
-        let points = footprint.outline().iter().step_by(OUTLINE_STRIDE);
-        let rays = points.filter_map(|point| {
-            let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
-            self.geometry.lens.unproject(&pixel)
-        });
-        rays.collect()
     }
 
     /// How many views show the whole outline (rays); the frame itself shows everything.

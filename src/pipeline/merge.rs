@@ -70,7 +70,7 @@ impl Mapped {
             .footprint
             .extremities()
             .and_then(|extremities| extremities.stature(mount));
-        let holding = views_holding(looks, &rig.outline(&self.footprint));
+        let holding = views_holding(looks, self.footprint.rays());
         #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
         let expected_views = holding.max(1) as f64;
         Candidate {
@@ -109,7 +109,7 @@ pub(super) fn persons(
         .collect()
 }
 
-/// The outlines (rays) of what may be persons, the likeliest first: each that of its best box.
+/// The outlines (unit rays) of what may be persons, the likeliest first: each that of its best box.
 pub(super) fn outlines(
     looks: &[Look],
     back_projection: BackProjection,
@@ -120,7 +120,8 @@ pub(super) fn outlines(
     };
     let (mapped, merged) = merged(looks, rig, back_projection, parameters);
     let best = merged.iter().filter_map(|merged| merged.members.first());
-    best.map(|&member| rig.outline(&mapped[member].footprint))
+    let unit = |rays: &[Ray]| rays.iter().map(Ray::normalize).collect();
+    best.map(|&member| unit(mapped[member].footprint.rays()))
         .collect()
 }
 
