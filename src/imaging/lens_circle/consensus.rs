@@ -35,12 +35,14 @@ pub(super) fn circle(points: &[[f64; 2]]) -> Option<LensCircle> {
 
 fn score(circle: &LensCircle, points: &[[f64; 2]]) -> i64 {
     let tolerance = circle.tolerance();
+    // Squares will do, and no root is as cheap as none: this runs for each trial and point.
+    let [nearest, farthest] =
+        [-tolerance, tolerance].map(|off| (circle.radius + off).max(0.0).powi(2));
     points
         .iter()
-        .map(|point| match circle.distance(*point) {
-            distance if distance.abs() <= tolerance => 1,
-            distance if distance > tolerance => -1,
-            _ => 0,
+        .map(|[x, y]| {
+            let squared = (x - circle.cx).powi(2) + (y - circle.cy).powi(2);
+            i64::from(squared >= nearest) - 2 * i64::from(squared > farthest)
         })
         .sum()
 }

@@ -128,10 +128,15 @@ fn brightness_at(frame: &Frame, [x, y]: [f64; 2]) -> Option<f64> {
         clippy::cast_sign_loss,
         reason = "checked to lie in the frame"
     )]
-    let (column, row) = (left as u32, top as u32);
-    let at = |x: u32, y: u32| f64::from(brightness(frame.pixel(x, y)));
-    let mix = |from: f64, to: f64, part: f64| from + part * (to - from);
-    let upper = mix(at(column, row), at(column + 1, row), x - left);
-    let lower = mix(at(column, row + 1), at(column + 1, row + 1), x - left);
-    Some(mix(upper, lower, y - top))
+    let (column, row) = (left as usize, top as usize);
+    let line = 3 * frame.width() as usize;
+    let upper = row * line + 3 * column;
+    let [upper, lower] = [upper, upper + line].map(|first| {
+        let pair = frame.pixels().get(first..first + 6)?;
+        let [from, to] =
+            [0, 3].map(|at| f64::from(brightness([pair[at], pair[at + 1], pair[at + 2]])));
+        Some(from + (x - left) * (to - from))
+    });
+    let (upper, lower) = (upper?, lower?);
+    Some(upper + (y - top) * (lower - upper))
 }
