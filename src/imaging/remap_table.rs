@@ -89,9 +89,9 @@ impl RemapTable {
         let mut nodes = Places::default();
         let row = self.row(y as usize, &mut nodes);
         let (block, lane) = (x as usize / LANES, x as usize % LANES);
-        let block = row.block(block);
-        let [x, y] = block.position(lane).map(f64::from);
-        (block.lanes >> lane & 1 == 1 && !x.is_nan()).then(|| Pixel::new(x, y))
+        let lanes = row.lanes(block);
+        let [x, y] = row.block(block).position(lane).map(f64::from);
+        (lanes >> lane & 1 == 1 && !x.is_nan()).then(|| Pixel::new(x, y))
     }
 
     /// Whether any of the view's pixels sees some of the lens image in the frame.
@@ -101,8 +101,10 @@ impl RemapTable {
         let mut nodes = Places::default();
         (0..self.grid.visibility().rows()).any(|y| {
             let row = self.row(y, &mut nodes);
-            let mut blocks = (1..row.nodes.x.len()).map(|right_node| row.block(right_node - 1));
-            blocks.any(|block| block.samples(width, height).iter().any(Option::is_some))
+            (0..row.nodes.x.len() - 1).any(|index| {
+                let samples = row.block(index).samples(row.lanes(index), width, height);
+                samples.iter().any(Option::is_some)
+            })
         })
     }
 

@@ -39,12 +39,20 @@ pub(super) struct Block {
     pub(super) start: [f32; 2],
     /// From one to the next.
     pub(super) step: [f32; 2],
-    /// Which of them see the lens image, the first one in the lowest bit.
-    pub(super) lanes: u8,
 }
+
+/// Which pixels of a block see the lens image, the first one in the lowest bit.
+pub(super) type Lanes = u8;
 
 /// Where red, green and blue go to.
 pub(super) type Planes<'a> = [&'a mut [f32]; 3];
+
+/// Where those of one block go to.
+pub(super) struct Values<'a> {
+    pub(super) red: &'a mut [f32; LANES],
+    pub(super) green: &'a mut [f32; LANES],
+    pub(super) blue: &'a mut [f32; LANES],
+}
 
 impl<'a> Source<'a> {
     pub(super) fn new(frame: &'a Frame, input: &NetworkInput) -> Self {
@@ -72,19 +80,24 @@ impl Row<'_> {
             let step = (nodes[index + 1] - nodes[index]) * (1.0 / LANES as f32);
             (nodes[index], step)
         });
-        #[expect(clippy::cast_possible_truncation, reason = "a view's width is a u32")]
-        let first_pixel = (index * LANES) as u32;
         Block {
             start: [x, y],
             step: [x_step, y_step],
-            lanes: self.visibility.lanes(first_pixel),
         }
+    }
+
+    /// Which pixels of that block see the lens image.
+    #[inline]
+    pub(super) fn lanes(&self, index: usize) -> Lanes {
+        #[expect(clippy::cast_possible_truncation, reason = "a view's width is a u32")]
+        let first_pixel = (index * LANES) as u32;
+        self.visibility.lanes(first_pixel)
     }
 }
 
 /// Renders some rows into `planes`, each of which holds as many rows: block by block, each in all
-/// rows, so that what they sample lies close together. `sample` makes the values of one block, and
-/// is not asked where nothing is visible.
+/// rows, so that what they sample lies close together. `sample` writes the values of one block to
+/// their places in the planes, and is not asked where nothing is visible.
 #[expect(
     clippy::inline_always,
     reason = "`sample` becomes vector code only within a function that may use it"
@@ -93,26 +106,42 @@ impl Row<'_> {
 pub(super) fn render_band(
     source: &Source,
     rows: &[Row],
-    mut planes: Planes,
-    sample: impl Fn(&Source, &Block) -> [[f32; LANES]; 3],
+    planes: Planes,
+    sample: impl Fn(&Source, &Block, Lanes, Values),
 ) {
-    let width = planes[0].len() / rows.len();
+    let [red, green, blue] = planes;
+    let width = red.len() / rows.len();
     for (index, first_pixel) in (0..width).step_by(LANES).enumerate() {
         for (y, row) in rows.iter().enumerate() {
-            let block = row.block(index);
-            let values = if block.lanes == 0 {
-                source.offset.map(|offset| [offset; LANES])
-            } else {
-                sample(source, &block)
-            };
+            let (block, lanes) = (row.block(index), row.lanes(index));
             let start = y * width + first_pixel;
-            for (plane, values) in planes.iter_mut().zip(&values) {
-                if first_pixel + LANES <= width {
-                    plane[start..start + LANES].copy_from_slice(values);
+            let render = |values: Values| {
+                if lanes == 0 {
+                    let [red, green, blue] = source.offset;
+                    *values.red = [red; LANES];
+                    *values.green = [green; LANES];
+                    *values.blue = [blue; LANES];
                 } else {
-                    let rest = width - first_pixel;
-                    plane[start..start + rest].copy_from_slice(&values[..rest]);
+                    sample(source, &block, lanes, values);
                 }
+            };
+            if first_pixel + LANES <= width {
+                let whole = [&mut *red, &mut *green, &mut *blue]
+                    .map(|plane| plane[start..].first_chunk_mut());
+                if let [Some(red), Some(green), Some(blue)] = whole {
+                    render(Values { red, green, blue });
+                }
+            } else {
+                let [mut red_end, mut green_end, mut blue_end] = [[0.0; LANES]; 3];
+                render(Values {
+                    red: &mut red_end,
+                    green: &mut green_end,
+                    blue: &mut blue_end,
+                });
+                let rest = width - first_pixel;
+                red[start..start + rest].copy_from_slice(&red_end[..rest]);
+                green[start..start + rest].copy_from_slice(&green_end[..rest]);
+                blue[start..start + rest].copy_from_slice(&blue_end[..rest]);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Sampling one pixel at a time, on every machine.
 
-use super::row::{Block, LANES, Planes, Row, Source, WEIGHT_ONE, render_band};
+use super::row::{Block, LANES, Lanes, Planes, Row, Source, Values, WEIGHT_ONE, render_band};
 
 /// Four neighbours of a position in the frame and their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,9 +19,14 @@ pub(super) fn render_rows(source: &Source, rows: &[Row], planes: Planes) {
 
 impl Block {
     /// The samples of its pixels, each `None` where nothing is seen.
-    pub(super) fn samples(&self, width: usize, height: usize) -> [Option<Sample>; LANES] {
+    pub(super) fn samples(
+        &self,
+        lanes: Lanes,
+        width: usize,
+        height: usize,
+    ) -> [Option<Sample>; LANES] {
         std::array::from_fn(|lane| {
-            let is_visible = self.lanes >> lane & 1 == 1;
+            let is_visible = lanes >> lane & 1 == 1;
             is_visible
                 .then(|| Sample::at(self.position(lane), width, height))
                 .flatten()
@@ -36,14 +41,15 @@ impl Block {
     }
 }
 
-fn sample_block(source: &Source, block: &Block) -> [[f32; LANES]; 3] {
-    let samples = block.samples(source.width, source.height);
-    std::array::from_fn(|channel| {
-        samples.map(|sample| {
+fn sample_block(source: &Source, block: &Block, lanes: Lanes, values: Values) {
+    let samples = block.samples(lanes, source.width, source.height);
+    let slots = [values.red, values.green, values.blue];
+    for (channel, slot) in slots.into_iter().enumerate() {
+        *slot = samples.map(|sample| {
             let sum = sample.map_or(0.0, |sample| sample.weighted_sum(source, channel));
             sum * source.scale[channel] + source.offset[channel]
-        })
-    })
+        });
+    }
 }
 
 impl Sample {

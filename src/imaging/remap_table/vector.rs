@@ -5,16 +5,16 @@
 //! functions that need AVX2, and to see a vector as an array.
 
 use std::arch::x86_64::{
-    __m256, __m256i, _CMP_LE_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
-    _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
-    _mm256_cvtepi32_ps, _mm256_cvttps_epi32, _mm256_madd_epi16, _mm256_max_ps, _mm256_min_epi32,
-    _mm256_min_ps, _mm256_mul_ps, _mm256_mullo_epi32, _mm256_or_si256, _mm256_set1_epi32,
-    _mm256_set1_ps, _mm256_setr_epi8, _mm256_setr_epi32, _mm256_setr_epi64x, _mm256_setr_ps,
-    _mm256_setzero_ps, _mm256_shuffle_epi8, _mm256_shuffle_ps, _mm256_slli_epi32,
-    _mm256_srli_epi32, _mm256_srli_epi64, _mm256_sub_epi32, _mm256_sub_ps,
+    __m256, __m256i, _CMP_LE_OQ, _MM_HINT_T0, _mm_prefetch, _mm256_add_epi32, _mm256_add_ps,
+    _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_ps,
+    _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps, _mm256_cvttps_epi32, _mm256_madd_epi16,
+    _mm256_max_ps, _mm256_min_epi32, _mm256_min_ps, _mm256_mul_ps, _mm256_mullo_epi32,
+    _mm256_or_si256, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi8, _mm256_setr_epi32,
+    _mm256_setr_epi64x, _mm256_setr_ps, _mm256_setzero_ps, _mm256_shuffle_epi8, _mm256_shuffle_ps,
+    _mm256_slli_epi32, _mm256_srli_epi32, _mm256_srli_epi64, _mm256_sub_epi32, _mm256_sub_ps,
 };
 
-use super::row::{Block, LANES, Planes, Row, Source, WEIGHT_ONE, render_band};
+use super::row::{Block, LANES, Lanes, Planes, Row, Source, Values, WEIGHT_ONE, render_band};
 
 /// The bytes of two neighbouring pixels, and two more.
 const PAIR_BYTES: usize = 8;
@@ -38,9 +38,9 @@ pub(super) fn render_rows(_proof: Avx2, source: &Source, rows: &[Row], planes: P
 
 #[target_feature(enable = "avx2")]
 fn render_rows_with_avx2(source: &Source, rows: &[Row], planes: Planes) {
-    let lines = Lines::of(source);
-    render_band(source, rows, planes, |source, block| {
-        sample_block(source, &lines, block)
+    let frame_lines = Lines::of(source);
+    render_band(source, rows, planes, |source, block, lanes, values| {
+        sample_block(source, &frame_lines, block, lanes, values);
     });
 }
 
@@ -75,32 +75,37 @@ struct Samples {
 }
 
 #[target_feature(enable = "avx2")]
-fn sample_block(source: &Source, lines: &Lines, block: &Block) -> [[f32; LANES]; 3] {
-    let samples = samples(source, block);
-    let [low, high] = pixel_pairs(lines.upper, &samples.first_bytes);
+fn sample_block(source: &Source, frame_lines: &Lines, block: &Block, lanes: Lanes, values: Values) {
+    let samples = samples(source, block, lanes);
+    announce(frame_lines, &samples.first_bytes);
+    let [low, high] = pixel_pairs(frame_lines.upper, &samples.first_bytes);
     let upper = weighted_sums(
         low_halves(low, high),
         low_halves(_mm256_srli_epi64::<16>(low), _mm256_srli_epi64::<16>(high)),
         samples.weights,
     );
-    let [low, high] = pixel_pairs(lines.lower, &samples.first_bytes);
+    let [low, high] = pixel_pairs(frame_lines.lower, &samples.first_bytes);
     let lower = weighted_sums(
         low_halves(_mm256_srli_epi64::<16>(low), _mm256_srli_epi64::<16>(high)),
         high_halves(low, high),
         samples.weights,
     );
-    [0, 1, 2].map(|channel| {
+    let value = |channel: usize| {
         let difference = _mm256_sub_ps(lower[channel], upper[channel]);
         let share = _mm256_mul_ps(difference, samples.lower_weight);
         let sum = _mm256_and_ps(_mm256_add_ps(upper[channel], share), samples.is_visible);
         let scaled = _mm256_mul_ps(sum, _mm256_set1_ps(source.scale[channel]));
         let offset = _mm256_set1_ps(source.offset[channel]);
         singles(_mm256_add_ps(scaled, offset))
-    })
+    };
+    let Values { red, green, blue } = values;
+    *red = value(0);
+    *green = value(1);
+    *blue = value(2);
 }
 
 #[target_feature(enable = "avx2")]
-fn samples(source: &Source, block: &Block) -> Samples {
+fn samples(source: &Source, block: &Block, lanes: Lanes) -> Samples {
     let (left, right_weight, is_within_width) = split(block.start[0], block.step[0], source.width);
     let (top, lower_weight, is_within_height) = split(block.start[1], block.step[1], source.height);
     let pixel = _mm256_add_epi32(_mm256_mullo_epi32(top, whole(source.width)), left);
@@ -110,7 +115,7 @@ fn samples(source: &Source, block: &Block) -> Samples {
     let right = _mm256_cvttps_epi32(right);
     let left = _mm256_sub_epi32(_mm256_set1_epi32(one), right);
     let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-    let lanes = _mm256_and_si256(_mm256_set1_epi32(i32::from(block.lanes)), bits);
+    let lanes = _mm256_and_si256(_mm256_set1_epi32(i32::from(lanes)), bits);
     let is_within = _mm256_and_ps(is_within_width, is_within_height);
     Samples {
         first_bytes: words(first_byte),
@@ -120,6 +125,22 @@ fn samples(source: &Source, block: &Block) -> Samples {
             is_within,
             _mm256_castsi256_ps(_mm256_cmpeq_epi32(lanes, bits)),
         ),
+    }
+}
+
+/// How much farther than the last pixel of a block, seen from its first one, lies what is to be
+/// fetched: the middle of the block after the next.
+const AHEAD: u32 = 3;
+
+/// Lets the processor fetch what lies farther along the row: it follows neither the curves nor the
+/// rows of a view by itself.
+#[target_feature(enable = "avx2")]
+fn announce(lines: &Lines, first_bytes: &[u32; LANES]) {
+    let [first, .., last] = *first_bytes;
+    // Beyond the frame, on either side, is its end.
+    let ahead = first.wrapping_add(AHEAD.wrapping_mul(last.wrapping_sub(first))) as usize;
+    for line in [lines.upper, lines.lower] {
+        _mm_prefetch::<_MM_HINT_T0>(line[ahead.min(line.len() - 1)..].as_ptr().cast());
     }
 }
 
