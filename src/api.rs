@@ -3,8 +3,10 @@
 mod access;
 mod calibrations;
 mod cors;
+mod crowd;
 mod detect;
 mod envelope;
+mod head;
 mod health;
 mod openapi;
 mod problem;
@@ -14,7 +16,10 @@ mod request_id;
 mod state;
 mod upload;
 
-use axum::{Router, extract::DefaultBodyLimit, response::Redirect, routing::get};
+use axum::{
+    Router, extract::DefaultBodyLimit, handler::Handler, middleware, response::Redirect,
+    routing::get,
+};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
@@ -26,11 +31,14 @@ pub use state::{ApiOptions, ApiState};
 
 /// Every route, with its entry in the OpenAPI document.
 fn routes() -> OpenApiRouter<ApiState> {
+    service_routes().routes(routes!(health::metrics))
+}
+
+/// The same without the metrics.
+fn service_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
         .routes(routes!(detect::detect_persons))
-        .routes(routes!(health::livez))
-        .routes(routes!(health::readyz))
-        .routes(routes!(health::metrics))
+        .merge(probes())
         .routes(routes!(calibrations::list))
         .routes(routes!(
             calibrations::get,
@@ -44,15 +52,52 @@ fn routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(repository::unload))
 }
 
+fn probes() -> OpenApiRouter<ApiState> {
+    OpenApiRouter::new()
+        .routes(routes!(health::livez))
+        .routes(routes!(health::readyz))
+}
+
 /// The whole service.
 pub fn router(state: ApiState) -> Router {
+    let routes = match state.options.metrics_elsewhere {
+        true => service_routes(),
+        false => routes(),
+    };
+    let (router, _document) = routes.split_for_parts();
+    let router = router
+        .with_state(state.clone())
+        .route("/", get(async || Redirect::temporary("docs/")))
+        .merge(api_page());
+    surrounded(router, state)
+}
+
+/// What is there for operators alone, on a port of its own: metrics and probes.
+pub fn operation_router(state: ApiState) -> Router {
+    let (router, _document) = probes().routes(routes!(health::metrics)).split_for_parts();
+    surrounded(router.with_state(state.clone()), state)
+}
+
+/// What answers a connection beyond the limit: probes as ever, and metrics where they are; everything
+/// else is refused.
+pub fn crowded_router(state: ApiState) -> Router {
+    let (router, _document) = match state.options.metrics_elsewhere {
+        true => probes(),
+        false => probes().routes(routes!(health::metrics)),
+    }
+    .split_for_parts();
+    let refuse = crowd::refuse.with_state(state.clone());
+    let router = router.with_state(state.clone());
+    surrounded(router.fallback_service(refuse), state)
+}
+
+/// What holds for every route.
+fn surrounded(router: Router, state: ApiState) -> Router {
     let metrics = state.metrics.clone();
     let cors = cors::layer(&state.options.cors_origins);
-    let (router, _document) = routes().split_for_parts();
+    let bounded_head = middleware::from_fn_with_state(state, head::within_bounds);
     let router = router
-        .with_state(state)
-        .route("/", get(async || Redirect::temporary("docs/")))
-        .merge(api_page())
+        .layer(bounded_head)
         // Bodies are bounded where they are read.
         .layer(DefaultBodyLimit::disable());
     envelope::around(router, cors, metrics)

@@ -1,16 +1,16 @@
 //! Where everything is put together: settings → engine → workers → service.
 
 mod models;
+mod serving;
+mod sockets;
 
-use std::{net::SocketAddr, sync::Arc};
+use std::sync::Arc;
 
 use anyhow::Context;
-use axum::serve::ListenerExt;
-use tokio::{net::TcpListener, task::spawn_blocking, time::sleep};
 
 use crate::{
     access::AccessKeys,
-    api::{self, Access, ApiOptions, ApiState, Phase, Readiness},
+    api::{Access, ApiOptions, ApiState, Readiness},
     calibration::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     imaging::decode::DecodeLimits,
     inference::ModelRepository,
@@ -18,8 +18,9 @@ use crate::{
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
     settings::{AccessSettings, CalibrationPlace, LimitSettings, Settings, find_calibrations},
-    shutdown::Shutdown,
 };
+
+pub use sockets::Sockets;
 
 pub(crate) use models::onnx_options;
 
@@ -108,6 +109,7 @@ pub struct App {
     calibrations: Arc<Calibrations>,
     workers: Arc<WorkerPool>,
     readiness: Readiness,
+    metrics: Arc<Metrics>,
     /// The keys, if there are some.
     keys: Option<Arc<AccessKeys>>,
     state: ApiState,
@@ -133,7 +135,7 @@ impl App {
         let workers = WorkerPool::start(&Arc::new(engine), workers, capacity)
             .context("the operating system gives no thread for a worker")?;
         let workers = Arc::new(workers);
-        let metrics = Metrics::new()?;
+        let metrics = Arc::new(Metrics::new()?);
         metrics
             .build_info
             .with_label_values(&[env!("CARGO_PKG_VERSION")])
@@ -149,6 +151,9 @@ impl App {
         let options = ApiOptions {
             max_body_bytes: settings.server.max_body_bytes,
             max_upload_bytes: settings.limits.max_upload_bytes,
+            max_header_bytes: settings.server.connections.max_header_bytes,
+            max_headers: settings.server.connections.max_headers,
+            metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
             access,
             cors_origins: settings.access.cors_origins.clone(),
@@ -157,7 +162,7 @@ impl App {
             Arc::clone(&workers),
             Arc::clone(&models),
             Arc::clone(&calibrations),
-            Arc::new(metrics),
+            Arc::clone(&metrics),
             readiness.clone(),
             options,
         );
@@ -167,6 +172,7 @@ impl App {
             calibrations,
             workers,
             readiness,
+            metrics,
             keys,
             state,
             settings,
@@ -179,61 +185,20 @@ impl App {
         self.readiness.clone()
     }
 
-    /// Serves until `shutdown` asks for an end. Then readiness goes, no more connections are
-    /// accepted, and what has arrived is answered, for as long as one request may take; a second
-    /// request to stop ends that, too.
+    /// Loads every model that is served, and says what is there. Blocks.
     ///
     /// # Errors
-    /// When a model cannot be loaded or the socket fails.
-    pub async fn serve(self, listener: TcpListener, shutdown: Shutdown) -> anyhow::Result<()> {
-        let address = listener.local_addr()?;
-        log_start(&self.settings, address);
-        if self.keys.is_none() && !address.ip().is_loopback() {
-            tracing::warn!(
-                "others reach this server, and there are no keys: whoever does may send frames and \
-                 read calibrations; set access.keys_file, or listen on 127.0.0.1 (server.listen)"
-            );
+    /// When a model cannot be loaded.
+    pub fn check(&self) -> anyhow::Result<String> {
+        for name in &self.to_load {
+            self.models.load(name)?;
         }
-        let _pollers = self.start_pollers()?;
-        let stop = shutdown.clone();
-        let readiness = self.readiness.clone();
-        let stopping = async move {
-            stop.requested().await;
-            readiness.stopping();
-            tracing::info!("told to stop: finishing what has arrived");
-        };
-        let listener = listener.tap_io(|connection| {
-            // Without it answers wait for the client's acknowledgement of earlier ones.
-            let _ = connection.set_nodelay(true);
-        });
-        let connections = axum::serve(listener, api::router(self.state.clone()));
-        let connections = connections.with_graceful_shutdown(stopping);
-        // Both must end: the process must not exit while a model is still being loaded.
-        let finished = async {
-            tokio::try_join!(self.load_models(address), async { Ok(connections.await?) })?;
-            anyhow::Ok(())
-        };
-        let patience = self.settings.server.request_timeout;
-        let out_of_patience = async {
-            shutdown.requested().await;
-            sleep(patience).await;
-        };
-        tokio::select! {
-            biased;
-            () = shutdown.requested_at_once() => {
-                tracing::warn!("stopped at once");
-                return Ok(());
-            }
-            outcome = finished => outcome?,
-            () = out_of_patience => {
-                tracing::warn!("stopped, although some requests had not ended");
-                return Ok(());
-            }
-        }
-        let workers = self.workers;
-        spawn_blocking(move || workers.shut_down()).await?;
-        tracing::info!("stopped");
-        Ok(())
+        let health = self.calibrations.health();
+        Ok(format!(
+            "the models {} and {} calibrations can be used",
+            self.to_load.join(", "),
+            health.serving
+        ))
     }
 
     /// The threads that look for changed models, calibrations and keys.
@@ -256,22 +221,6 @@ impl App {
         pollers
             .collect::<Result<_, _>>()
             .context("the operating system gives no thread to watch files with")
-    }
-
-    /// Loads the models. The server is ready when it has the first.
-    async fn load_models(&self, address: SocketAddr) -> anyhow::Result<()> {
-        for name in self.to_load.clone() {
-            let models = Arc::clone(&self.models);
-            spawn_blocking(move || models.load(&name)).await??;
-            if self.readiness.phase() == Phase::WarmingUp {
-                self.readiness.warmed_up();
-                let port = address.port();
-                tracing::info!(
-                    "ready: try curl -F img=@samples/office.jpg localhost:{port}/detect"
-                );
-            }
-        }
-        Ok(())
     }
 }
 
@@ -317,17 +266,4 @@ fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>
     }
     let keys = AccessKeys::open(settings.keys.clone(), file)?;
     Ok(Some(Arc::new(keys)))
-}
-
-/// Says what runs, and where.
-fn log_start(settings: &Settings, address: SocketAddr) {
-    tracing::info!(
-        version = env!("CARGO_PKG_VERSION"),
-        device = %settings.inference.device,
-        sessions = settings.threads.sessions,
-        threads_per_session = settings.threads.per_session,
-        remap_threads = settings.threads.remapping,
-        calibrations = %settings.calibrations.path,
-        "listening on http://{address}, API page at http://{address}/docs"
-    );
 }

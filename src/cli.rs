@@ -37,7 +37,7 @@ struct CommandLine {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Start the HTTP server
-    Serve(SettingsFile),
+    Serve(serve::Arguments),
     /// Find the persons in pictures: one JSON report per line on standard output
     Detect(Box<detect::Arguments>),
     /// Measure how good detections are on a data set: average precision and speed
@@ -78,7 +78,7 @@ impl SettingsFile {
 #[must_use]
 pub fn run() -> ExitCode {
     let outcome = match CommandLine::parse().command {
-        Command::Serve(settings_file) => serve::run(&settings_file),
+        Command::Serve(arguments) => serve::run(&arguments),
         Command::Detect(arguments) => detect::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Calibration(command) => calibration::run(&command),

@@ -19,6 +19,7 @@ pub mod metrics;
 pub mod pipeline;
 pub mod poller;
 pub mod revision;
+pub mod server;
 pub mod settings;
 pub mod shutdown;
 pub mod telemetry;

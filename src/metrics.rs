@@ -43,6 +43,8 @@ macro_rules! metrics {
 }
 
 metrics! {
+    /// Connections that are open, those of the metrics port included.
+    connections: IntGauge = "connections" [];
     /// HTTP requests answered.
     http_requests: IntCounterVec = "http_requests_total" ["route", "method", "status"];
     /// From the head of an HTTP request to the head of its answer.

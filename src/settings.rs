@@ -27,13 +27,17 @@ pub use raw::RawSettings;
 pub use source::{environment, load};
 pub use threads::ThreadPlan;
 
-use crate::{access::KeyList, geometry::FieldOfViewReading, inference::Device};
+use crate::{
+    access::KeyList, geometry::FieldOfViewReading, inference::Device, server::ConnectionLimits,
+};
 
 /// Everything the operator may choose, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// The HTTP server.
     pub server: ServerSettings,
+    /// How the server ends.
+    pub shutdown: ShutdownSettings,
     /// Who may do what.
     pub access: AccessSettings,
     /// Where calibrations come from.
@@ -57,10 +61,23 @@ pub struct Settings {
 pub struct ServerSettings {
     /// Address and port to listen on.
     pub listen: SocketAddr,
+    /// Address and port for metrics and probes alone; without it, metrics are where the rest is.
+    pub metrics_listen: Option<SocketAddr>,
     /// Largest request body, bytes.
     pub max_body_bytes: usize,
     /// Longest a request may take, from its first byte to its answer.
     pub request_timeout: Duration,
+    /// What connections may cost.
+    pub connections: ConnectionLimits,
+}
+
+/// How the server ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShutdownSettings {
+    /// How long everything is still served while probes say that the end is near.
+    pub grace: Duration,
+    /// How long after that what is in flight may take.
+    pub drain_timeout: Duration,
 }
 
 /// Who may do what.

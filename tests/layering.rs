@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 18] = [
+const MAY_USE: [(&str, &[&str]); 19] = [
     ("access", &[]),
     ("revision", &[]),
     ("geometry", &[]),
@@ -19,7 +19,8 @@ const MAY_USE: [(&str, &[&str]); 18] = [
     ("imaging", &["geometry"]),
     ("calibration", &["geometry", "revision"]),
     ("inference", &["detection", "imaging", "revision"]),
-    ("settings", &["access", "geometry", "inference"]),
+    ("server", &["metrics", "shutdown"]),
+    ("settings", &["access", "geometry", "inference", "server"]),
     ("telemetry", &["settings"]),
     (
         "pipeline",
@@ -69,6 +70,7 @@ const MAY_USE: [(&str, &[&str]); 18] = [
             "pipeline",
             "metrics",
             "poller",
+            "server",
             "settings",
             "shutdown",
             "telemetry",
@@ -97,10 +99,12 @@ const MAY_USE: [(&str, &[&str]); 18] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 14] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 16] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
-    ("axum", &["api", "app"]),
+    ("axum", &["api"]),
+    ("hyper", &["server"]),
+    ("hyper_util", &["server"]),
     ("tower_http", &["api"]),
     ("utoipa", &["api"]),
     ("utoipa_axum", &["api"]),

@@ -140,6 +140,9 @@ fn router() -> Router {
         ApiOptions {
             max_body_bytes: 1 << 16,
             max_upload_bytes: 1 << 20,
+            max_header_bytes: 1 << 14,
+            max_headers: 100,
+            metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),
             access: Access::Open {
                 own_machine_only: true,

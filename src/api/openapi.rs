@@ -20,7 +20,12 @@ use super::problem::ProblemBody;
 
 #[derive(OpenApi)]
 #[openapi(
-    info(title = "Lookdown"),
+    info(
+        title = "Lookdown",
+        description = "Finds people in the pictures of ceiling fisheye cameras. Any request may also \
+                       be answered 431 when its headers are too large, and 503 when too many \
+                       connections are open."
+    ),
     servers((url = "/", description = "This server")),
     tags(
         (name = "detection", description = "Frames in, persons out."),

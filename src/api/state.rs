@@ -14,6 +14,12 @@ pub struct ApiOptions {
     pub max_body_bytes: usize,
     /// Most bytes that all request bodies together may hold in memory.
     pub max_upload_bytes: usize,
+    /// Most bytes of a request's head.
+    pub max_header_bytes: usize,
+    /// Most headers of a request.
+    pub max_headers: usize,
+    /// Whether metrics are on a port of their own, and not among the other routes.
+    pub metrics_elsewhere: bool,
     /// Longest a request may take, from its first byte to its answer.
     pub request_timeout: Duration,
     /// Who may do what.

@@ -1,13 +1,17 @@
 //! `lookdown serve`
 
-use std::process::ExitCode;
+use std::{
+    io::{self, Write},
+    process::ExitCode,
+};
 
 use anyhow::Context;
-use tokio::{net::TcpListener, runtime, task::spawn_blocking};
+use clap::Args;
+use tokio::{runtime, task::spawn_blocking};
 
 use super::SettingsFile;
 use crate::{
-    app::{App, assemble},
+    app::{App, Sockets, assemble},
     settings::Settings,
     shutdown::Shutdown,
 };
@@ -15,15 +19,29 @@ use crate::{
 /// Threads for sockets and JSON; frames have threads of their own.
 const RUNTIME_THREADS: usize = 2;
 
-/// Runs the server until it is told to stop.
-pub(super) fn run(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
-    let settings = settings_file.load()?;
+/// Arguments of `lookdown serve`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Only check that the server could start: settings, library, models, calibrations, keys and
+    /// addresses
+    #[arg(long)]
+    check: bool,
+    #[command(flatten)]
+    settings_file: SettingsFile,
+}
+
+/// Runs the server until it is told to stop, or checks whether it could run.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let settings = arguments.settings_file.load()?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(RUNTIME_THREADS)
         .enable_all()
         .build()
         .context("the operating system gives no thread")?;
-    let outcome = runtime.block_on(serve(settings));
+    let outcome = match arguments.check {
+        true => runtime.block_on(check(settings)),
+        false => runtime.block_on(serve(settings)),
+    };
     // Whatever still runs was given up: nobody waits for it.
     runtime.shutdown_background();
     outcome.map(|()| ExitCode::SUCCESS)
@@ -31,10 +49,21 @@ pub(super) fn run(settings_file: &SettingsFile) -> anyhow::Result<ExitCode> {
 
 async fn serve(settings: Settings) -> anyhow::Result<()> {
     let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
+    let sockets = Sockets::bind(&settings.server).await?;
+    let app = start(settings).await?;
+    app.serve(sockets, shutdown).await
+}
+
+async fn check(settings: Settings) -> anyhow::Result<()> {
+    // Nobody is listened to: the addresses are free again in a moment.
+    drop(Sockets::bind(&settings.server).await?);
     let address = settings.server.listen;
-    let listener = TcpListener::bind(address).await.with_context(|| {
-        format!("server.listen: cannot listen on {address}: set LOOKDOWN__SERVER__LISTEN to a free address")
-    })?;
-    let app = spawn_blocking(move || App::start(assemble(&settings)?, settings)).await??;
-    app.serve(listener, shutdown).await
+    let app = start(settings).await?;
+    let found = spawn_blocking(move || app.check()).await??;
+    writeln!(io::stdout(), "ready to serve on {address}: {found}")
+        .context("standard output cannot be written")
+}
+
+async fn start(settings: Settings) -> anyhow::Result<App> {
+    spawn_blocking(move || App::start(assemble(&settings)?, settings)).await?
 }

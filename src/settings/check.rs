@@ -1,6 +1,7 @@
 //! Raw → checked settings, in one conversion.
 
 use std::{
+    net::SocketAddr,
     num::{NonZeroU64, NonZeroUsize},
     ops::RangeInclusive,
     path::PathBuf,
@@ -9,11 +10,13 @@ use std::{
 
 use super::{
     CalibrationSettings, InferenceSettings, LimitSettings, LogFormat, LogSettings, ModelSettings,
-    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, ThreadPlan, raw, threads,
+    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, ShutdownSettings,
+    ThreadPlan, raw, threads,
 };
 use crate::{
     geometry::FieldOfViewReading,
     inference::{Device, UnknownDevice},
+    server::ConnectionLimits,
 };
 
 /// A body smaller than this holds no picture.
@@ -24,6 +27,11 @@ const MAX_BODY_BYTES: u64 = 2 << 30;
 const MAX_BYTES: u64 = 1 << 40;
 /// Ten minutes.
 const MAX_TIMEOUT_MILLIS: u64 = 600_000;
+/// No client gets by with less than the least; with twice the most, a head still has its place in
+/// the buffer of a connection.
+const HEADER_BYTES: RangeInclusive<u64> = 1024..=128 * 1024;
+/// Browsers send some twenty.
+const HEADERS: RangeInclusive<u64> = 16..=1024;
 /// A second: whoever waits longer for a batch to fill has no traffic to fill it.
 const MAX_QUEUE_DELAY_MILLIS: u64 = 1_000;
 /// A day.
@@ -41,6 +49,7 @@ impl TryFrom<RawSettings> for Settings {
         let inference = inference(&raw.inference)?;
         Ok(Self {
             limits: limits(&raw.limits, server.max_body_bytes)?,
+            shutdown: shutdown(&raw.shutdown, server.request_timeout)?,
             server,
             access: raw.access.try_into()?,
             calibrations: CalibrationSettings {
@@ -50,7 +59,7 @@ impl TryFrom<RawSettings> for Settings {
                     raw.calibrations.poll_seconds,
                 )?,
                 writable: raw.calibrations.writable,
-                cache_bytes: bytes(
+                cache_bytes: size(
                     "calibrations.cache_bytes",
                     raw.calibrations.cache_bytes,
                     0..=MAX_BYTES,
@@ -76,24 +85,64 @@ impl TryFrom<RawSettings> for Settings {
 }
 
 fn server(raw: &raw::RawServer) -> Result<ServerSettings, SettingsError> {
-    let listen = raw.listen.parse().map_err(|_| SettingsError::Value {
-        key: "server.listen".to_owned(),
-        value: format!("{:?}", raw.listen),
-        remedy: "give an IP address and a port, such as 127.0.0.1:8080 or [::]:8080".to_owned(),
-    })?;
-    let millis = within(
-        "server.request_timeout_millis",
-        raw.request_timeout_millis,
-        1..=MAX_TIMEOUT_MILLIS,
-    )?;
+    let metrics_listen = (!raw.metrics_listen.is_empty())
+        .then(|| address("server.metrics_listen", &raw.metrics_listen));
     Ok(ServerSettings {
-        listen,
-        max_body_bytes: bytes(
+        listen: address("server.listen", &raw.listen)?,
+        metrics_listen: metrics_listen.transpose()?,
+        max_body_bytes: size(
             "server.max_body_bytes",
             raw.max_body_bytes,
             MIN_BODY_BYTES..=MAX_BODY_BYTES,
         )?,
-        request_timeout: Duration::from_millis(millis),
+        request_timeout: millis(
+            "server.request_timeout_millis",
+            raw.request_timeout_millis,
+            1..=MAX_TIMEOUT_MILLIS,
+        )?,
+        connections: connections(raw)?,
+    })
+}
+
+fn connections(raw: &raw::RawServer) -> Result<ConnectionLimits, SettingsError> {
+    let timeouts = 1..=MAX_TIMEOUT_MILLIS;
+    Ok(ConnectionLimits {
+        max_connections: count("server.max_connections", raw.max_connections)?,
+        header_timeout: millis(
+            "server.header_timeout_millis",
+            raw.header_timeout_millis,
+            timeouts.clone(),
+        )?,
+        idle_timeout: millis(
+            "server.idle_timeout_millis",
+            raw.idle_timeout_millis,
+            timeouts,
+        )?,
+        max_header_bytes: size(
+            "server.max_header_bytes",
+            raw.max_header_bytes,
+            HEADER_BYTES,
+        )?,
+        max_headers: size("server.max_headers", raw.max_headers, HEADERS)?,
+    })
+}
+
+fn shutdown(
+    raw: &raw::RawShutdown,
+    request_timeout: Duration,
+) -> Result<ShutdownSettings, SettingsError> {
+    let times = 0..=MAX_TIMEOUT_MILLIS;
+    let drain_timeout = millis(
+        "shutdown.drain_timeout_millis",
+        raw.drain_timeout_millis,
+        times.clone(),
+    )?;
+    Ok(ShutdownSettings {
+        grace: millis("shutdown.grace_millis", raw.grace_millis, times)?,
+        drain_timeout: match drain_timeout {
+            Duration::ZERO => request_timeout,
+            chosen => chosen,
+        },
     })
 }
 
@@ -168,7 +217,7 @@ fn limits(raw: &raw::RawLimits, max_body_bytes: usize) -> Result<LimitSettings, 
             1..=MAX_BYTES,
         )?,
         max_frames_in_flight: count("limits.max_frames_in_flight", raw.max_frames_in_flight)?,
-        max_upload_bytes: bytes(
+        max_upload_bytes: size(
             "limits.max_upload_bytes",
             raw.max_upload_bytes,
             max_body_bytes as u64..=MAX_BYTES,
@@ -200,6 +249,14 @@ fn path(key: &str, value: String) -> Result<PathBuf, SettingsError> {
         });
     }
     Ok(value.into())
+}
+
+fn address(key: &str, value: &str) -> Result<SocketAddr, SettingsError> {
+    value.parse().map_err(|_| SettingsError::Value {
+        key: key.to_owned(),
+        value: format!("{value:?}"),
+        remedy: "give an IP address and a port, such as 127.0.0.1:8080 or [::]:8080".to_owned(),
+    })
 }
 
 fn within(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<u64, SettingsError> {
@@ -234,7 +291,11 @@ fn count(key: &str, value: u64) -> Result<NonZeroUsize, SettingsError> {
     Ok(count.unwrap_or(NonZeroUsize::MIN))
 }
 
-fn bytes(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<usize, SettingsError> {
+fn millis(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<Duration, SettingsError> {
+    within(key, value, range).map(Duration::from_millis)
+}
+
+fn size(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<usize, SettingsError> {
     let value = within(key, value, range)?;
     Ok(usize::try_from(value).unwrap_or(usize::MAX))
 }

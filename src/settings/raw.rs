@@ -11,6 +11,7 @@ const MEBIBYTE: u64 = 1024 * 1024;
 #[serde(default, deny_unknown_fields)]
 pub struct RawSettings {
     pub(super) server: RawServer,
+    pub(super) shutdown: RawShutdown,
     pub(super) access: RawAccess,
     pub(super) calibrations: RawCalibrations,
     pub(super) model: RawModel,
@@ -25,16 +26,45 @@ pub struct RawSettings {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawServer {
     pub(super) listen: String,
+    pub(super) metrics_listen: String,
     pub(super) max_body_bytes: u64,
     pub(super) request_timeout_millis: u64,
+    pub(super) max_connections: u64,
+    pub(super) header_timeout_millis: u64,
+    pub(super) idle_timeout_millis: u64,
+    pub(super) max_header_bytes: u64,
+    pub(super) max_headers: u64,
 }
 
 impl Default for RawServer {
     fn default() -> Self {
         Self {
             listen: "127.0.0.1:8080".to_owned(),
+            metrics_listen: String::new(),
             max_body_bytes: 32 * MEBIBYTE,
             request_timeout_millis: 30_000,
+            max_connections: 512,
+            header_timeout_millis: 10_000,
+            idle_timeout_millis: 75_000,
+            max_header_bytes: 16 * 1024,
+            max_headers: 100,
+        }
+    }
+}
+
+/// Table `shutdown`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct RawShutdown {
+    pub(super) grace_millis: u64,
+    pub(super) drain_timeout_millis: u64,
+}
+
+impl Default for RawShutdown {
+    fn default() -> Self {
+        Self {
+            grace_millis: 5_000,
+            drain_timeout_millis: 0,
         }
     }
 }

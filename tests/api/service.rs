@@ -196,6 +196,9 @@ impl Service {
             ApiOptions {
                 max_body_bytes: bounds.max_body_bytes,
                 max_upload_bytes: bounds.max_upload_bytes,
+                max_header_bytes: 4096,
+                max_headers: 32,
+                metrics_elsewhere: false,
                 request_timeout: bounds.request_timeout,
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),

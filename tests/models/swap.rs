@@ -70,6 +70,9 @@ fn service(folder: &Path) -> Router {
     let options = ApiOptions {
         max_body_bytes: 1 << 24,
         max_upload_bytes: 1 << 27,
+        max_header_bytes: 1 << 14,
+        max_headers: 100,
+        metrics_elsewhere: false,
         request_timeout: Duration::from_mins(2),
         access: Access::Open {
             own_machine_only: true,

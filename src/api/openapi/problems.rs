@@ -16,10 +16,13 @@ pub(in crate::api) struct DetectProblems;
 
 impl IntoResponses for DetectProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
-        let of_other_routes = |kind: &ProblemKind| {
+        // Those of other routes, and those of connections, which are of no route.
+        let others = |kind: &ProblemKind| {
             matches!(
                 kind,
-                ProblemKind::NotFound
+                ProblemKind::HeadersTooLarge
+                    | ProblemKind::TooManyConnections
+                    | ProblemKind::NotFound
                     | ProblemKind::MethodNotAllowed
                     | ProblemKind::InvalidCalibration
                     | ProblemKind::CalibrationConflict
@@ -31,7 +34,7 @@ impl IntoResponses for DetectProblems {
             )
         };
         let kinds = ProblemKind::ALL.into_iter();
-        responses(kinds.filter(|kind| !of_other_routes(kind)))
+        responses(kinds.filter(|kind| !others(kind)))
     }
 }
 

@@ -39,6 +39,8 @@ pub(in crate::api) enum ProblemKind {
     ModelBusy,
     /// The path does not offer this method.
     MethodNotAllowed,
+    /// The request has too many headers, or too long ones.
+    HeadersTooLarge,
     /// The body took too long to arrive.
     SlowUpload,
     /// The body has too many bytes.
@@ -55,6 +57,8 @@ pub(in crate::api) enum ProblemKind {
     UnfitImage,
     /// No place in the queue.
     Overloaded,
+    /// No place for another connection.
+    TooManyConnections,
     /// A fault of ours.
     Internal,
     /// The network has not run yet.
@@ -67,7 +71,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 29] = [
+    pub(in crate::api) const ALL: [Self; 31] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -85,6 +89,7 @@ impl ProblemKind {
         Self::ModelRefused,
         Self::ModelBusy,
         Self::MethodNotAllowed,
+        Self::HeadersTooLarge,
         Self::SlowUpload,
         Self::BodyTooLarge,
         Self::ImageTooLarge,
@@ -93,6 +98,7 @@ impl ProblemKind {
         Self::DamagedImage,
         Self::UnfitImage,
         Self::Overloaded,
+        Self::TooManyConnections,
         Self::Internal,
         Self::WarmingUp,
         Self::ShuttingDown,
@@ -128,6 +134,7 @@ impl ProblemKind {
             Self::ModelRefused => ("model-refused", "The model cannot be used"),
             Self::ModelBusy => ("model-busy", "Another model is being loaded"),
             Self::MethodNotAllowed => ("method-not-allowed", "The method is not offered"),
+            Self::HeadersTooLarge => ("headers-too-large", "The headers are too large"),
             Self::SlowUpload => ("slow-upload", "The body took too long to arrive"),
             Self::BodyTooLarge => ("body-too-large", "The body is too large"),
             Self::ImageTooLarge => ("image-too-large", "The frame has too many pixels"),
@@ -139,6 +146,7 @@ impl ProblemKind {
             Self::DamagedImage => ("damaged-image", "The frame is damaged or cut off"),
             Self::UnfitImage => ("unfit-image", "The frame does not fit"),
             Self::Overloaded => ("overloaded", "Too many frames are waiting"),
+            Self::TooManyConnections => ("too-many-connections", "Too many connections are open"),
             Self::Internal => ("internal", "There is a fault in the server"),
             Self::WarmingUp => ("warming-up", "The server is warming up"),
             Self::ShuttingDown => ("shutting-down", "The server is shutting down"),
@@ -175,13 +183,15 @@ impl ProblemKind {
             | Self::UnfitImage => StatusCode::UNPROCESSABLE_ENTITY,
             Self::ModelBusy | Self::Overloaded => StatusCode::TOO_MANY_REQUESTS,
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
+            Self::HeadersTooLarge => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
             Self::SlowUpload => StatusCode::REQUEST_TIMEOUT,
             Self::BodyTooLarge | Self::ImageTooLarge => StatusCode::PAYLOAD_TOO_LARGE,
             Self::UnsupportedImage => StatusCode::UNSUPPORTED_MEDIA_TYPE,
             Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
-            Self::CalibrationsUnreachable | Self::WarmingUp | Self::ShuttingDown => {
-                StatusCode::SERVICE_UNAVAILABLE
-            }
+            Self::TooManyConnections
+            | Self::CalibrationsUnreachable
+            | Self::WarmingUp
+            | Self::ShuttingDown => StatusCode::SERVICE_UNAVAILABLE,
             Self::Timeout => StatusCode::GATEWAY_TIMEOUT,
         }
     }
@@ -197,6 +207,7 @@ impl ProblemKind {
             self,
             Self::Overloaded
                 | Self::ModelBusy
+                | Self::TooManyConnections
                 | Self::CalibrationsUnreachable
                 | Self::WarmingUp
                 | Self::ShuttingDown

@@ -1,0 +1,137 @@
+//! From the sockets to the last answer.
+
+use std::{future::pending, net::SocketAddr, sync::Arc};
+
+use tokio::{net::TcpListener, task::spawn_blocking, time::sleep};
+
+use super::{App, Sockets};
+use crate::{
+    api::{self, Phase},
+    server::{self, Services},
+    settings::{Settings, ShutdownSettings},
+    shutdown::Shutdown,
+};
+
+impl App {
+    /// Serves until `shutdown` asks for an end. Then readiness goes, and everything is served on for
+    /// the grace period; after that, no more connections are accepted, and what has arrived is
+    /// answered, for as long as draining may take. A second request to stop ends all that at once.
+    ///
+    /// # Errors
+    /// When a model cannot be loaded or a socket fails.
+    pub async fn serve(self, sockets: Sockets, shutdown: Shutdown) -> anyhow::Result<()> {
+        let address = sockets.main.local_addr()?;
+        log_start(&self.settings, address);
+        if self.keys.is_none() && !address.ip().is_loopback() {
+            tracing::warn!(
+                "others reach this server, and there are no keys: whoever does may send frames and \
+                 read calibrations; set access.keys_file, or listen on 127.0.0.1 (server.listen)"
+            );
+        }
+        let _pollers = self.start_pollers()?;
+        let services = Services {
+            regular: api::router(self.state.clone()),
+            beyond_limit: api::crowded_router(self.state.clone()),
+        };
+        let limits = &self.settings.server.connections;
+        let connections = server::serve(sockets.main, services, limits, &self.metrics, &shutdown);
+        // Both must end: the process must not exit while a model is still being loaded.
+        let finished = async {
+            let connections = async {
+                connections.await;
+                Ok(())
+            };
+            tokio::try_join!(self.load_models(address), connections)?;
+            anyhow::Ok(())
+        };
+        let operation = async {
+            if let Some(listener) = sockets.metrics {
+                self.serve_operation(listener).await;
+            }
+            pending().await
+        };
+        tokio::select! {
+            biased;
+            () = shutdown.requested_at_once() => {
+                tracing::warn!("stopped at once");
+                return Ok(());
+            }
+            outcome = finished => outcome?,
+            () = operation => {}
+            () = self.wind_up(&shutdown) => {
+                tracing::warn!("stopped, although some requests had not ended");
+                return Ok(());
+            }
+        }
+        let workers = self.workers;
+        spawn_blocking(move || workers.shut_down()).await?;
+        tracing::info!("stopped");
+        Ok(())
+    }
+
+    /// Serves metrics and probes on a port of their own, to the very end.
+    async fn serve_operation(&self, listener: TcpListener) {
+        let router = api::operation_router(self.state.clone());
+        let services = Services {
+            regular: router.clone(),
+            beyond_limit: router,
+        };
+        let limits = &self.settings.server.connections;
+        server::serve(
+            listener,
+            services,
+            limits,
+            &self.metrics,
+            &Shutdown::default(),
+        )
+        .await;
+    }
+
+    /// Waits to be told to stop, says so for the grace period, and ends when draining has taken too
+    /// long.
+    async fn wind_up(&self, shutdown: &Shutdown) {
+        let ShutdownSettings {
+            grace,
+            drain_timeout,
+        } = self.settings.shutdown;
+        shutdown.requested().await;
+        self.readiness.stopping();
+        tracing::info!("told to stop");
+        tokio::select! {
+            () = sleep(grace) => {}
+            () = shutdown.draining() => {}
+        }
+        tracing::info!("finishing what has arrived");
+        shutdown.drain();
+        sleep(drain_timeout).await;
+    }
+
+    /// Loads the models. The server is ready when it has the first.
+    async fn load_models(&self, address: SocketAddr) -> anyhow::Result<()> {
+        for name in self.to_load.clone() {
+            let models = Arc::clone(&self.models);
+            spawn_blocking(move || models.load(&name)).await??;
+            if self.readiness.phase() == Phase::WarmingUp {
+                self.readiness.warmed_up();
+                let port = address.port();
+                tracing::info!(
+                    "ready: try curl -F img=@samples/office.jpg localhost:{port}/detect"
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Says what runs, and where.
+fn log_start(settings: &Settings, address: SocketAddr) {
+    tracing::info!(
+        version = env!("CARGO_PKG_VERSION"),
+        device = %settings.inference.device,
+        sessions = settings.threads.sessions,
+        threads_per_session = settings.threads.per_session,
+        remap_threads = settings.threads.remapping,
+        calibrations = %settings.calibrations.path,
+        "listening on http://{address}, API page at http://{address}/docs"
+    );
+}

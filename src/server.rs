@@ -1,0 +1,108 @@
+//! Sockets: connections are accepted within limits, served over HTTP/1.1 and brought to an end in
+//! order. Knows nothing of what is asked and answered on them.
+
+mod accept;
+mod connection;
+mod pace;
+mod places;
+mod watched;
+
+use std::{convert::Infallible, num::NonZeroUsize, sync::Arc, time::Duration};
+
+use hyper::{
+    Request, Response,
+    body::{Body, Incoming},
+};
+use tokio::{net::TcpListener, task::JoinSet};
+use tower::{BoxError, Service};
+
+use self::{
+    accept::Acceptor,
+    connection::Rules,
+    places::{Place, Places},
+};
+use crate::{metrics::Metrics, shutdown::Shutdown};
+
+/// What connections may cost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConnectionLimits {
+    /// Most connections that are served at the same time.
+    pub max_connections: NonZeroUsize,
+    /// Longest that the head of a request may take: on a new connection from the start, on one
+    /// that has served requests from the head's first byte.
+    pub header_timeout: Duration,
+    /// Longest that a connection may stand still between two requests, or because its client does
+    /// not take what it is sent.
+    pub idle_timeout: Duration,
+    /// Most bytes of a request's head. More than this is the service's to refuse; a head of more
+    /// than twice as many never reaches it.
+    pub max_header_bytes: usize,
+    /// Most headers of a request, in the same way.
+    pub max_headers: usize,
+}
+
+/// What answers.
+#[derive(Debug, Clone)]
+pub struct Services<S> {
+    /// What answers within the limit of connections.
+    pub regular: S,
+    /// What answers the one request of a connection beyond it.
+    pub beyond_limit: S,
+}
+
+/// Serves until `shutdown` has come to draining. Then what has connected by then is accepted, idle
+/// connections are closed, and those with a request in flight when it is answered; when none is
+/// left, this ends. Dropped, it closes all of them at once.
+pub async fn serve<S, B>(
+    listener: TcpListener,
+    services: Services<S>,
+    limits: &ConnectionLimits,
+    metrics: &Arc<Metrics>,
+    shutdown: &Shutdown,
+) where
+    S: Service<Request<Incoming>, Response = Response<B>, Error = Infallible>,
+    S: Clone + Send + Sync + 'static,
+    S::Future: Send,
+    B: Body<Data: Send, Error: Into<BoxError>> + Send + Unpin + 'static,
+{
+    let mut acceptor = Acceptor::new(listener);
+    let places = Places::new(limits.max_connections, metrics);
+    let mut connections = JoinSet::new();
+    let serve_on = |stream, place: Place| {
+        let service = match place.is_regular {
+            true => services.regular.clone(),
+            false => services.beyond_limit.clone(),
+        };
+        let rules = Rules {
+            limits: limits.clone(),
+            one_request_only: !place.is_regular,
+            shutdown: shutdown.clone(),
+        };
+        async move {
+            // A stream that needs a handshake first has it here: in its own task, not between two
+            // accepts.
+            connection::serve(stream, service, rules).await;
+            drop(place);
+        }
+    };
+    loop {
+        let stream = tokio::select! {
+            () = shutdown.draining() => break,
+            Some(_ended) = connections.join_next() => continue,
+            stream = acceptor.accept() => stream,
+        };
+        let place = tokio::select! {
+            place = places.take() => Some(place),
+            () = shutdown.draining() => places.try_take(),
+        };
+        if let Some(place) = place {
+            connections.spawn(serve_on(stream, place));
+        }
+    }
+    for stream in acceptor.close() {
+        if let Some(place) = places.try_take() {
+            connections.spawn(serve_on(stream, place));
+        }
+    }
+    while connections.join_next().await.is_some() {}
+}

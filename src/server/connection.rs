@@ -1,0 +1,97 @@
+//! One connection, from its first byte to its last.
+
+use std::{convert::Infallible, pin::pin, sync::Arc, time::Duration};
+
+use hyper::{
+    Request, Response,
+    body::{Body, Incoming},
+    header::{CONNECTION, HeaderValue},
+    server::conn::http1,
+    service::service_fn,
+};
+use hyper_util::rt::TokioIo;
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    time::timeout,
+};
+use tower::{BoxError, Service, ServiceExt};
+
+use super::{
+    ConnectionLimits,
+    pace::Pace,
+    watched::{WatchedBody, WatchedStream},
+};
+use crate::shutdown::Shutdown;
+
+/// Heads of up to so many times the limit reach the service, so that it can tell what is wrong.
+const TOLD_LIMITS: usize = 2;
+/// How long a connection that was accepted just before the end may take to send its first request.
+const LAST_CALL: Duration = Duration::from_millis(500);
+
+/// What holds for a connection.
+pub(super) struct Rules {
+    pub(super) limits: ConnectionLimits,
+    pub(super) one_request_only: bool,
+    pub(super) shutdown: Shutdown,
+}
+
+/// Serves the requests of a client, one after the other, until it leaves, takes too long, or the
+/// server ends.
+pub(super) async fn serve<T, S, B>(stream: T, service: S, rules: Rules)
+where
+    T: AsyncRead + AsyncWrite + Unpin + Send,
+    S: Service<Request<Incoming>, Response = Response<B>, Error = Infallible> + Clone,
+    B: Body<Data: Send, Error: Into<BoxError>> + Unpin + 'static,
+{
+    let Rules {
+        limits,
+        one_request_only,
+        shutdown,
+    } = rules;
+    let pace = Arc::new(Pace::new(&limits));
+    let service = service_fn(|request| {
+        pace.request_begins();
+        let answer = service.clone().oneshot(request);
+        let (pace, shutdown) = (Arc::clone(&pace), &shutdown);
+        async move {
+            let mut response = answer.await?;
+            if one_request_only || shutdown.is_requested() {
+                let close = HeaderValue::from_static("close");
+                response.headers_mut().insert(CONNECTION, close);
+            }
+            Ok::<_, Infallible>(response.map(|body| WatchedBody { body, pace }))
+        }
+    });
+    let stream = WatchedStream {
+        stream,
+        pace: Arc::clone(&pace),
+    };
+    let connection = http1::Builder::new()
+        .max_headers(limits.max_headers * TOLD_LIMITS)
+        .max_header_size(limits.max_header_bytes * TOLD_LIMITS)
+        .serve_connection(TokioIo::new(stream), service);
+    let mut connection = pin!(connection);
+    let to_its_end = async {
+        tokio::select! {
+            // First: what has come before the server ends is served.
+            biased;
+            ended = connection.as_mut() => return ended,
+            () = shutdown.draining() => {}
+        }
+        if pace.awaits_first_request()
+            && let Ok(ended) = timeout(LAST_CALL, connection.as_mut()).await
+        {
+            return ended;
+        }
+        connection.as_mut().graceful_shutdown();
+        connection.await
+    };
+    tokio::select! {
+        ended = to_its_end => {
+            if let Err(error) = ended {
+                tracing::debug!("a connection has broken: {error}");
+            }
+        }
+        () = pace.overdue() => tracing::debug!("a connection took too long and was closed"),
+    }
+}
