@@ -1,11 +1,7 @@
 //! The executable: what it prints where, and how it ends.
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use std::{
-    io::{BufRead, BufReader},
-    net::TcpListener,
-    process::{Command, Output, Stdio},
-};
+use std::process::{Command, Output};
 
 use lookdown::access::KeyList;
 
@@ -36,36 +32,6 @@ fn the_api_description_goes_to_standard_output() {
     assert!(output.status.success());
     let document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(document["info"]["title"], "Lookdown");
-}
-
-#[test]
-fn a_settings_file_that_cannot_be_read_ends_the_start_with_a_sentence() {
-    let output = lookdown(&["serve", "--config", "/nowhere/lookdown.toml"], &[]);
-    assert_fails_with(&output, &["/nowhere/lookdown.toml", "--config"]);
-}
-
-#[test]
-fn a_port_in_use_ends_the_start_with_a_sentence() {
-    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap().to_string();
-    let output = lookdown(&["serve"], &[("LOOKDOWN__SERVER__LISTEN", &address)]);
-    assert_fails_with(&output, &["server.listen", &address, "in use"]);
-}
-
-#[test]
-fn a_missing_library_ends_the_start_with_a_sentence() {
-    let output = lookdown(
-        &["serve"],
-        &[
-            ("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0"),
-            (
-                "LOOKDOWN__INFERENCE__LIBRARY_PATH",
-                "/nowhere/libonnxruntime.so",
-            ),
-        ],
-    );
-    let key = "inference.library_path";
-    assert_fails_with(&output, &[key, "/nowhere/libonnxruntime.so", "make setup"]);
 }
 
 #[test]
@@ -290,26 +256,6 @@ fn a_sweep_takes_one_profile() {
     let flags = ["--sweep", "out", "--profile", "fast", "--profile", "paper"];
     let output = lookdown(&[&["eval", "somewhere"], &flags[..]].concat(), &[]);
     assert_fails_with(&output, &["--sweep", "one --profile"]);
-}
-
-#[test]
-fn a_termination_signal_ends_the_server_in_order() {
-    let mut server = Command::new(env!("CARGO_BIN_EXE_lookdown"))
-        .arg("serve")
-        .env("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0")
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut log = BufReader::new(server.stderr.take().unwrap()).lines();
-    let mut log_says = |part: &str| log.any(|line| line.unwrap().contains(part));
-    assert!(log_says("listening on http://127.0.0.1:"));
-    assert!(log_says("ready: try curl"));
-    let terminate = format!("kill -TERM {}", server.id());
-    let sent = Command::new("sh").args(["-c", &terminate]).status();
-    assert!(sent.unwrap().success());
-    assert!(log_says("told to stop"));
-    assert!(log_says("stopped"));
-    assert!(server.wait().unwrap().success());
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 31, "a key is missing from {example}");
+    assert_eq!(stated.count(), 39, "a key is missing from {example}");
 }
 
 #[test]
@@ -97,6 +97,18 @@ fn a_variable_set_to_nothing_counts_as_not_set() {
 }
 
 #[test]
+fn draining_takes_as_long_as_a_request_may_unless_somebody_says_otherwise() {
+    let request_timeout = ("LOOKDOWN__SERVER__REQUEST_TIMEOUT_MILLIS", "7000");
+    let own = ("LOOKDOWN__SHUTDOWN__DRAIN_TIMEOUT_MILLIS", "200");
+    let drain_millis = |variables: &[_]| {
+        let settings = load(None, environment(variables)).unwrap();
+        settings.shutdown.drain_timeout.as_millis()
+    };
+    assert_eq!(drain_millis(&[request_timeout]), 7000);
+    assert_eq!(drain_millis(&[request_timeout, own]), 200);
+}
+
+#[test]
 fn without_a_number_of_sessions_the_machine_decides() {
     let sessions = defaults().threads.sessions;
     assert_eq!(sessions, std::thread::available_parallelism().unwrap());
@@ -123,7 +135,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 19] = [
+const UNUSABLE: [(&str, &str, &str, &str); 28] = [
     (
         "SERVER__LISTEN",
         "localhost",
@@ -153,6 +165,60 @@ const UNUSABLE: [(&str, &str, &str, &str); 19] = [
         "0",
         "server.request_timeout_millis",
         "from 1",
+    ),
+    (
+        "SERVER__METRICS_LISTEN",
+        "9090",
+        "server.metrics_listen",
+        "127.0.0.1:8080",
+    ),
+    (
+        "SERVER__MAX_CONNECTIONS",
+        "0",
+        "server.max_connections",
+        "from 1 to",
+    ),
+    (
+        "SERVER__HEADER_TIMEOUT_MILLIS",
+        "0",
+        "server.header_timeout_millis",
+        "from 1 to 600000",
+    ),
+    (
+        "SERVER__IDLE_TIMEOUT_MILLIS",
+        "600001",
+        "server.idle_timeout_millis",
+        "from 1 to 600000",
+    ),
+    (
+        "SERVER__MAX_HEADER_BYTES",
+        "512",
+        "server.max_header_bytes",
+        "from 1024 to 131072",
+    ),
+    (
+        "SERVER__MAX_HEADERS",
+        "2000",
+        "server.max_headers",
+        "from 16 to 1024",
+    ),
+    (
+        "SHUTDOWN__GRACE_MILLIS",
+        "600001",
+        "shutdown.grace_millis",
+        "from 0 to 600000",
+    ),
+    (
+        "SHUTDOWN__GRACE_MILLIS",
+        "5s",
+        "shutdown.grace_millis",
+        "integer",
+    ),
+    (
+        "SHUTDOWN__DRAIN_TIMEOUT_MILLIS",
+        "-1",
+        "shutdown.drain_timeout_millis",
+        "integer",
     ),
     (
         "INFERENCE__THREADS",

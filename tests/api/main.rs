@@ -4,12 +4,15 @@
 mod access;
 mod calibration_changes;
 mod calibrations;
+mod connections;
 mod detect;
 mod detector;
+mod ending;
 mod load;
 mod operation;
 mod refusals;
 mod report;
 mod repository;
 mod serve;
+mod server;
 mod service;

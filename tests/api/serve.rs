@@ -1,95 +1,26 @@
-//! The service on a real socket, from start to stop.
+//! The service on a real socket: from its start on, and what it does to clients that take too long.
 
 use std::{
-    collections::HashMap,
-    io::{self, Read, Write},
-    net::{SocketAddr, TcpStream},
+    io::{Read, Write},
     sync::Arc,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
-use lookdown::{
-    api::{Phase, Readiness},
-    app::App,
-    settings,
-    shutdown::Shutdown,
-};
-use tempfile::TempDir;
-use tokio::{
-    net::TcpListener,
-    task::{JoinHandle, spawn_blocking},
-};
+use tokio::task::spawn_blocking;
 
 use crate::{
     detector::Gate,
-    service::{assembly, frame},
+    server::{Server, read_one_answer, rest_of},
 };
 
-struct Server {
-    address: SocketAddr,
-    gate: Arc<Gate>,
-    readiness: Readiness,
-    shutdown: Shutdown,
-    ended: JoinHandle<anyhow::Result<()>>,
-    _calibrations: TempDir,
-}
-
-impl Server {
-    async fn start(timeout_millis: &str, gate: Arc<Gate>) -> Self {
-        let variable = "LOOKDOWN__SERVER__REQUEST_TIMEOUT_MILLIS".to_owned();
-        let environment = HashMap::from([(variable, timeout_millis.to_owned())]);
-        let settings = settings::load(None, environment).unwrap();
-        let (assembly, calibrations) = assembly(&gate);
-        let app = App::start(assembly, settings).unwrap();
-        let readiness = app.readiness();
-        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let address = listener.local_addr().unwrap();
-        let shutdown = Shutdown::default();
-        Self {
-            address,
-            gate,
-            readiness,
-            ended: tokio::spawn(app.serve(listener, shutdown.clone())),
-            shutdown,
-            _calibrations: calibrations,
-        }
-    }
-
-    /// Sends `head` and `body` on a connection of their own and reads the answer to its end.
-    fn exchange(&self, head: &str, body: Vec<u8>) -> JoinHandle<io::Result<String>> {
-        let head = format!("{head}\r\nHost: lookdown\r\nConnection: close\r\n\r\n");
-        let address = self.address;
-        spawn_blocking(move || {
-            let mut connection = TcpStream::connect(address)?;
-            connection.write_all(head.as_bytes())?;
-            connection.write_all(&body)?;
-            let mut answer = String::new();
-            connection.read_to_string(&mut answer)?;
-            Ok(answer)
-        })
-    }
-
-    async fn get(&self, path: &str) -> String {
-        let answer = self.exchange(&format!("GET {path} HTTP/1.1"), Vec::new());
-        answer.await.unwrap().unwrap()
-    }
-
-    fn detect(&self) -> JoinHandle<io::Result<String>> {
-        let image = frame();
-        let length = image.len();
-        let path = "/detect?calibration=lobby&profile=fast";
-        self.exchange(
-            &format!("POST {path} HTTP/1.1\r\nContent-Length: {length}"),
-            image,
-        )
-    }
-}
+/// The beginning of a request.
+const PART_OF_A_HEAD: &[u8] = b"GET /livez HTTP/1.1\r\nHost: look";
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_server_is_ready_only_after_the_network_has_run() {
     let gate = Arc::new(Gate::default());
     gate.close();
-    let server = Server::start("20000", gate).await;
+    let server = Server::start_behind(gate, &[]).await;
     server.gate.has_begun(1).await;
     assert!(
         server
@@ -110,57 +41,8 @@ async fn the_server_is_ready_only_after_the_network_has_run() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_server_that_is_told_to_stop_finishes_what_has_arrived() {
-    let server = Server::start("20000", Arc::new(Gate::default())).await;
-    server.readiness.ready().await;
-    server.gate.close();
-    let in_flight = server.detect();
-    server.gate.has_begun(2).await;
-    server.shutdown.request();
-    while server.readiness.phase() != Phase::Stopping || TcpStream::connect(server.address).is_ok()
-    {
-        tokio::task::yield_now().await;
-    }
-    server.gate.open();
-    let answer = in_flight.await.unwrap().unwrap();
-    assert!(answer.contains("200 OK"), "{answer}");
-    server.ended.await.unwrap().unwrap();
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn the_second_request_to_stop_ends_at_once() {
-    let server = Server::start("20000", Arc::new(Gate::default())).await;
-    server.readiness.ready().await;
-    server.gate.close();
-    let _in_flight = server.detect();
-    server.gate.has_begun(2).await;
-    server.shutdown.request();
-    server.shutdown.request();
-    server.ended.await.unwrap().unwrap();
-    server.gate.open();
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn stopping_takes_no_longer_than_a_request_may() {
-    let server = Server::start("200", Arc::new(Gate::default())).await;
-    server.readiness.ready().await;
-    // A connection that asks for nothing and never leaves, in the middle of a request.
-    let mut stuck = TcpStream::connect(server.address).unwrap();
-    stuck.write_all(b"GET /livez HTTP/1.1\r\n").unwrap();
-    assert!(server.get("/livez").await.contains("200 OK"));
-    server.shutdown.request();
-    let ended = tokio::time::timeout(Duration::from_secs(10), server.ended);
-    ended
-        .await
-        .expect("the server does not stop")
-        .unwrap()
-        .unwrap();
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn a_body_that_does_not_arrive_is_given_up() {
-    let server = Server::start("100", Arc::new(Gate::default())).await;
-    server.readiness.ready().await;
+    let server = Server::start(&[("SERVER__REQUEST_TIMEOUT_MILLIS", "100")]).await;
     let slow = server.exchange("POST /detect HTTP/1.1\r\nContent-Length: 1000", vec![1; 10]);
     let answer = slow.await.unwrap().unwrap();
     assert!(answer.contains("408 Request Timeout"), "{answer}");
@@ -168,4 +50,110 @@ async fn a_body_that_does_not_arrive_is_given_up() {
         answer.contains("urn:lookdown:problem:slow-upload"),
         "{answer}"
     );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn heads_that_come_a_byte_at_a_time_are_cut_off_while_others_are_served() {
+    let server = Server::start(&[("SERVER__HEADER_TIMEOUT_MILLIS", "300")]).await;
+    let begun = Instant::now();
+    let tricklers: Vec<_> = (0..20)
+        .map(|_| {
+            let mut connection = server.connect(PART_OF_A_HEAD);
+            let pause = Duration::from_millis(20);
+            connection.set_read_timeout(Some(pause)).unwrap();
+            spawn_blocking(move || {
+                let mut byte = [0];
+                // The pause between two bytes is the wait for an answer; 0 is the end.
+                while !matches!(connection.read(&mut byte), Ok(0))
+                    && connection.write_all(b"d").is_ok()
+                {}
+            })
+        })
+        .collect();
+    assert!(server.get("/livez").await.contains("200 OK"));
+    assert!(server.detect().await.unwrap().unwrap().contains("200 OK"));
+    for trickler in tricklers {
+        trickler.await.unwrap();
+    }
+    assert!(begun.elapsed() >= Duration::from_millis(300));
+    assert!(begun.elapsed() < Duration::from_secs(20));
+    server.shows("connections", 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn whoever_connects_and_says_nothing_is_cut_off() {
+    let server = Server::start(&[("SERVER__HEADER_TIMEOUT_MILLIS", "100")]).await;
+    let silent = server.connect(b"");
+    assert_eq!(rest_of(silent).await, "");
+    server.shows("connections", 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn between_requests_a_connection_may_rest_for_longer_than_a_head_may_take() {
+    let chosen = [
+        ("SERVER__HEADER_TIMEOUT_MILLIS", "50"),
+        ("SERVER__IDLE_TIMEOUT_MILLIS", "400"),
+    ];
+    let server = Server::start(&chosen).await;
+    let connection = server.connect_and_ask();
+    let answered = Instant::now();
+    assert_eq!(rest_of(connection).await, "");
+    assert!(answered.elapsed() >= Duration::from_millis(300));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_head_of_a_later_request_may_take_no_longer_than_that_of_the_first() {
+    let server = Server::start(&[("SERVER__HEADER_TIMEOUT_MILLIS", "100")]).await;
+    let mut connection = server.connect_and_ask();
+    let answered = Instant::now();
+    connection.write_all(PART_OF_A_HEAD).unwrap();
+    assert_eq!(rest_of(connection).await, "");
+    // The connection itself might have stayed for 75 seconds.
+    assert!(answered.elapsed() < Duration::from_secs(20));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn several_requests_in_one_packet_are_answered_in_turn() {
+    let server = Server::start(&[]).await;
+    let one = b"GET /livez HTTP/1.1\r\nHost: lookdown\r\n\r\n";
+    let mut connection = server.connect(&one.repeat(3));
+    for _ in 0..3 {
+        assert!(read_one_answer(&mut connection).contains("200 OK"));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn whoever_does_not_take_its_answers_is_cut_off() {
+    let server = Server::start(&[("SERVER__IDLE_TIMEOUT_MILLIS", "200")]).await;
+    let one = b"GET /openapi.json HTTP/1.1\r\nHost: lookdown\r\n\r\n";
+    // More than the sockets of both sides can hold.
+    let hoarder = server.connect(&one.repeat(1000));
+    server.shows("connections", 1).await;
+    server.shows("connections", 0).await;
+    drop(hoarder);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn clients_that_vanish_leave_no_connection_and_no_frame_behind() {
+    let server = Server::start(&[]).await;
+    let upload = b"POST /detect HTTP/1.1\r\nHost: lookdown\r\nContent-Length: 1000\r\n\r\n012345";
+    let in_the_middle: Vec<_> = (0..20).map(|_| server.connect(upload)).collect();
+    server.shows("connections", 20).await;
+    drop(in_the_middle);
+    server.shows("connections", 0).await;
+
+    server.gate.close();
+    let image = crate::service::frame();
+    let head = format!(
+        "POST /detect?calibration=lobby HTTP/1.1\r\nHost: lookdown\r\nContent-Length: {}\r\n\r\n",
+        image.len()
+    );
+    let waiting: Vec<_> = (0..8)
+        .map(|_| server.connect(&[head.as_bytes(), &image].concat()))
+        .collect();
+    server.shows("pending_frames", 8).await;
+    drop(waiting);
+    server.shows("connections", 0).await;
+    server.gate.open();
+    server.shows("pending_frames", 0).await;
 }

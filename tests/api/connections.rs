@@ -1,0 +1,104 @@
+//! How many connections there may be, and how large the heads of their requests.
+
+use crate::server::{Server, rest_of};
+
+/// A request with so many headers of so many bytes each, beside `Host`.
+fn with_headers(count: usize, bytes: usize) -> String {
+    let headers: String = (0..count)
+        .map(|index| format!("X-{index:03}: {}\r\n", "v".repeat(bytes - 9)))
+        .collect();
+    format!("GET /livez HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n{headers}\r\n")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn heads_that_are_too_large_are_refused_with_a_problem_and_much_larger_ones_without() {
+    let server = Server::start(&[
+        ("SERVER__MAX_HEADERS", "100"),
+        ("SERVER__MAX_HEADER_BYTES", "4096"),
+    ])
+    .await;
+    let answer = async |count, bytes| {
+        let request = with_headers(count, bytes);
+        rest_of(server.connect(request.as_bytes())).await
+    };
+    for (count, bytes) in [(98, 20), (1, 3900)] {
+        let answer = answer(count, bytes).await;
+        assert!(answer.contains("200 OK"), "{answer}");
+    }
+    for (count, bytes) in [(99, 20), (197, 20), (1, 4100), (2, 4000)] {
+        let answer = answer(count, bytes).await;
+        let status = "431 Request Header Fields Too Large";
+        assert!(answer.contains(status), "{count} × {bytes}: {answer}");
+        assert!(
+            answer.contains("urn:lookdown:problem:headers-too-large"),
+            "{count} × {bytes}: {answer}"
+        );
+    }
+    for (count, bytes) in [(300, 12), (1, 10_000), (10, 100_000)] {
+        let answer = answer(count, bytes).await;
+        let status = "431 Request Header Fields Too Large";
+        assert!(answer.contains(status), "{count} × {bytes}: {answer}");
+    }
+    server.shows("connections", 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn beyond_the_limit_of_connections_probes_are_answered_and_everything_else_is_refused() {
+    let server = Server::start(&[("SERVER__MAX_CONNECTIONS", "2")]).await;
+    let held = [server.connect_and_ask(), server.connect_and_ask()];
+    for path in ["/livez", "/readyz", "/metrics"] {
+        let answer = server.get(path).await;
+        assert!(answer.contains("200 OK"), "{answer}");
+        assert!(answer.contains("\r\nconnection: close\r\n"), "{answer}");
+    }
+    let refused = server.detect().await.unwrap().unwrap();
+    for part in [
+        "503 Service Unavailable",
+        "urn:lookdown:problem:too-many-connections",
+        "\r\nretry-after: 1\r\n",
+        "\r\nconnection: close\r\n",
+    ] {
+        assert!(refused.contains(part), "{refused}");
+    }
+    // More than the sockets hold: it must be taken off the client for it to read the answer.
+    let large = vec![0; 16 << 20];
+    let head = format!("POST /detect HTTP/1.1\r\nContent-Length: {}", large.len());
+    let refused = server.exchange(&head, large).await.unwrap().unwrap();
+    assert!(refused.contains("too-many-connections"), "{refused}");
+
+    drop(held);
+    while !server.detect().await.unwrap().unwrap().contains("200 OK") {}
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_comes_when_nobody_more_can_be_refused_either_waits_for_a_place() {
+    let chosen = [
+        ("SERVER__MAX_CONNECTIONS", "1"),
+        ("SERVER__HEADER_TIMEOUT_MILLIS", "500"),
+    ];
+    let server = Server::start(&chosen).await;
+    let silent: Vec<_> = (0..100).map(|_| server.connect(b"")).collect();
+    assert!(server.get("/livez").await.contains("200 OK"));
+    for connection in silent {
+        assert_eq!(rest_of(connection).await, "");
+    }
+    server.shows("connections", 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn metrics_on_a_port_of_their_own_are_there_with_the_probes_and_nowhere_else() {
+    let server = Server::start(&[("SERVER__METRICS_LISTEN", "127.0.0.1:0")]).await;
+    let get = async |path| crate::server::get(server.metrics_address, path).await;
+    for path in ["/metrics", "/livez", "/readyz"] {
+        assert!(get(path).await.contains("200 OK"), "{path}");
+    }
+    for path in ["/detect", "/calibrations", "/openapi.json", "/docs/", "/"] {
+        let answer = get(path).await;
+        assert!(answer.contains("404 Not Found"), "{path}: {answer}");
+        assert!(answer.contains("urn:lookdown:problem:not-found"), "{path}");
+    }
+    assert!(server.get("/metrics").await.contains("404 Not Found"));
+    for path in ["/livez", "/readyz", "/calibrations", "/openapi.json"] {
+        assert!(server.get(path).await.contains("200 OK"), "{path}");
+    }
+}

@@ -1,0 +1,137 @@
+//! How the server ends, and that nothing is lost by it.
+
+use std::{net::TcpStream, time::Duration};
+
+use lookdown::api::Phase;
+use tokio::{task::yield_now, time::timeout};
+
+use crate::server::{Server, get, read_one_answer, rest_of};
+
+const LONG_GRACE: (&str, &str) = ("SHUTDOWN__GRACE_MILLIS", "600000");
+const LIVEZ: &[u8] = b"GET /livez HTTP/1.1\r\nHost: lookdown\r\n\r\n";
+
+impl Server {
+    /// Asks for an end and waits until that is known.
+    async fn is_told_to_stop(&self) {
+        self.shutdown.request();
+        while self.readiness.phase() != Phase::Stopping {
+            yield_now().await;
+        }
+    }
+}
+
+/// A test that would hang otherwise.
+async fn soon<T>(work: impl Future<Output = T>) -> T {
+    let waited = timeout(Duration::from_secs(30), work).await;
+    waited.expect("it takes forever")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn in_its_grace_period_the_server_is_not_ready_but_serves_everybody_once_more() {
+    let server = Server::start(&[LONG_GRACE]).await;
+    let mut known = server.connect_and_ask();
+    server.is_told_to_stop().await;
+    let probe = server.get("/readyz").await;
+    assert!(probe.contains("503 Service Unavailable"), "{probe}");
+    assert!(probe.contains("urn:lookdown:problem:shutting-down"));
+    assert!(server.get("/livez").await.contains("200 OK"));
+    assert!(server.detect().await.unwrap().unwrap().contains("200 OK"));
+
+    for connection in [&mut known, &mut server.connect(b"")] {
+        std::io::Write::write_all(connection, LIVEZ).unwrap();
+        let answer = rest_of(connection.try_clone().unwrap()).await;
+        assert!(answer.contains("200 OK"), "{answer}");
+        assert!(answer.contains("\r\nconnection: close\r\n"), "{answer}");
+    }
+    server.shutdown.drain();
+    soon(server.has_ended()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_is_told_to_stop_finishes_what_has_arrived_and_nothing_else() {
+    let server = Server::start(&[]).await;
+    let idle = server.connect_and_ask();
+    let silent = server.connect(b"");
+    server.gate.close();
+    let in_flight = server.detect();
+    server.gate.has_begun(2).await;
+    server.is_told_to_stop().await;
+    assert_eq!(soon(rest_of(idle)).await, "");
+    assert_eq!(soon(rest_of(silent)).await, "");
+    while TcpStream::connect(server.address).is_ok() {
+        yield_now().await;
+    }
+    server.gate.open();
+    let answer = in_flight.await.unwrap().unwrap();
+    assert!(answer.contains("200 OK"), "{answer}");
+    soon(server.has_ended()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn whoever_has_connected_before_the_end_is_served() {
+    for _ in 0..10 {
+        let server = Server::start(&[]).await;
+        let connections: Vec<_> = (0..50).map(|_| server.connect(LIVEZ)).collect();
+        server.shutdown.request_without_pause();
+        for mut connection in connections {
+            assert!(read_one_answer(&mut connection).contains("200 OK"));
+        }
+        soon(server.has_ended()).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_stops_the_server_by_hand_need_not_wait_for_the_grace_period() {
+    let server = Server::start(&[LONG_GRACE]).await;
+    server.shutdown.request_without_pause();
+    soon(server.has_ended()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_second_request_to_stop_ends_at_once() {
+    for grace in [LONG_GRACE, ("SHUTDOWN__GRACE_MILLIS", "0")] {
+        let server = Server::start(&[grace]).await;
+        server.gate.close();
+        let _in_flight = server.detect();
+        server.gate.has_begun(2).await;
+        server.is_told_to_stop().await;
+        server.shutdown.request();
+        let gate = std::sync::Arc::clone(&server.gate);
+        soon(server.has_ended()).await;
+        gate.open();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn draining_takes_no_longer_than_it_may() {
+    for patience in [
+        ("SHUTDOWN__DRAIN_TIMEOUT_MILLIS", "200"),
+        ("SERVER__REQUEST_TIMEOUT_MILLIS", "200"),
+    ] {
+        let server = Server::start(&[patience]).await;
+        // In the middle of a request, and never leaves.
+        let stuck = server.connect(b"GET /livez HTTP/1.1\r\n");
+        assert!(server.get("/livez").await.contains("200 OK"));
+        server.shutdown.request();
+        soon(server.has_ended()).await;
+        assert_eq!(soon(rest_of(stuck)).await, "");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_metrics_port_serves_until_the_last_request_has_ended() {
+    let server = Server::start(&[("SERVER__METRICS_LISTEN", "127.0.0.1:0")]).await;
+    server.gate.close();
+    let in_flight = server.detect();
+    server.gate.has_begun(2).await;
+    server.is_told_to_stop().await;
+    while TcpStream::connect(server.address).is_ok() {
+        yield_now().await;
+    }
+    let probe = get(server.metrics_address, "/readyz").await;
+    assert!(probe.contains("503 Service Unavailable"), "{probe}");
+    server.shows("pending_frames", 1).await;
+    server.gate.open();
+    assert!(in_flight.await.unwrap().unwrap().contains("200 OK"));
+    soon(server.has_ended()).await;
+}

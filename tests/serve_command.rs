@@ -1,0 +1,266 @@
+//! `lookdown serve` as a process: how it refuses to start, and how it ends.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Lines, Read, Write},
+    net::{TcpListener, TcpStream},
+    path::Path,
+    process::{Child, ChildStderr, Command, Output, Stdio},
+};
+
+const LOOKDOWN: &str = env!("CARGO_BIN_EXE_lookdown");
+const FREE_ADDRESS: (&str, &str) = ("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0");
+const NO_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "0");
+const LONG_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "600000");
+
+fn run(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
+    Command::new(LOOKDOWN)
+        .args(arguments)
+        .envs([FREE_ADDRESS, ("LOOKDOWN__LOG__FILTER", "error")])
+        .envs(environment.iter().copied())
+        .output()
+        .unwrap()
+}
+
+/// The sentence that the start was refused with; there must be nothing else.
+#[track_caller]
+fn refusal(output: &Output) -> String {
+    let message = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(output.stdout.is_empty(), "{output:?}");
+    assert_eq!(message.lines().count(), 1, "{message}");
+    message
+}
+
+#[test]
+fn every_setting_that_cannot_be_used_ends_the_start_with_a_sentence() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let taken = taken.local_addr().unwrap().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let text = path("notes.txt");
+    fs::write(&text, "nothing of use").unwrap();
+    let other_sum = path("other_sum");
+    fs::create_dir(&other_sum).unwrap();
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models/pairs.onnx");
+    fs::copy(fixture, Path::new(&other_sum).join("model.onnx")).unwrap();
+    let manifest = format!(
+        "name = \"other_sum\"\nonnx = \"model.onnx\"\nsha256 = \"{}\"\n",
+        "0".repeat(64)
+    );
+    fs::write(Path::new(&other_sum).join("model.toml"), manifest).unwrap();
+
+    let cases: [(&str, &str, &[&str]); 17] = [
+        ("SERVER__LISTN", "127.0.0.1:1", &["server", "`listn`"]),
+        (
+            "SERVER__LISTEN",
+            "localhost",
+            &["server.listen", "127.0.0.1:8080"],
+        ),
+        (
+            "SERVER__LISTEN",
+            &taken,
+            &["server.listen", &taken, "in use"],
+        ),
+        (
+            "SERVER__LISTEN",
+            "192.0.2.1:80",
+            &["server.listen", "192.0.2.1:80"],
+        ),
+        (
+            "SERVER__METRICS_LISTEN",
+            &taken,
+            &["server.metrics_listen", &taken, "in use"],
+        ),
+        (
+            "SERVER__MAX_CONNECTIONS",
+            "0",
+            &["server.max_connections", "from 1"],
+        ),
+        (
+            "CALIBRATIONS__PATH",
+            "/nowhere",
+            &["calibrations.path", "/nowhere"],
+        ),
+        ("CALIBRATIONS__PATH", &text, &["calibrations.path", &text]),
+        (
+            "ACCESS__KEYS_FILE",
+            "/nowhere",
+            &["access.keys_file", "/nowhere"],
+        ),
+        ("ACCESS__KEYS_FILE", &text, &["access.keys_file", &text]),
+        (
+            "INFERENCE__LIBRARY_PATH",
+            "/nowhere.so",
+            &["inference.library_path", "make setup"],
+        ),
+        (
+            "INFERENCE__LIBRARY_PATH",
+            &text,
+            &["inference.library_path", &text],
+        ),
+        ("MODEL__PATH", "/nowhere", &["model.path", "/nowhere"]),
+        ("MODEL__PATH", &text, &[&text]),
+        (
+            "MODEL__PATH",
+            &other_sum,
+            &["other_sum", "SHA-256", "fetch it again"],
+        ),
+        (
+            "MODEL__REPOSITORY",
+            "/nowhere",
+            &["model.repository", "make setup"],
+        ),
+        ("MODEL__ALSO_LOAD", "no_such_model", &["no_such_model"]),
+    ];
+    for (variable, value, parts) in cases {
+        let variable = format!("LOOKDOWN__{variable}");
+        for arguments in [&["serve"][..], &["serve", "--check"]] {
+            let message = refusal(&run(arguments, &[(&variable, value)]));
+            for part in parts {
+                assert!(
+                    message.contains(part),
+                    "{variable}: {message:?} lacks {part:?}"
+                );
+            }
+        }
+    }
+    let message = refusal(&run(&["serve", "--config", "/nowhere.toml"], &[]));
+    assert!(
+        message.contains("/nowhere.toml") && message.contains("--config"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_check_says_in_a_line_that_the_server_could_start_and_serves_nobody() {
+    let address = TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let listen = address.to_string();
+    let output = run(
+        &["serve", "--check"],
+        &[("LOOKDOWN__SERVER__LISTEN", &listen)],
+    );
+    assert!(output.status.success(), "{output:?}");
+    assert!(output.stderr.is_empty(), "{output:?}");
+    let line = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(line.lines().count(), 1, "{line}");
+    assert!(
+        line.starts_with(&format!("ready to serve on {listen}: ")),
+        "{line}"
+    );
+    assert!(line.contains("ssdlite_mobilenet_v2"), "{line}");
+}
+
+/// A running server.
+struct Server {
+    process: Child,
+    log: Lines<BufReader<ChildStderr>>,
+    port: String,
+}
+
+impl Server {
+    /// A server that is ready, started by a shell after `preparation`.
+    fn start(preparation: &str, environment: &[(&str, &str)]) -> Self {
+        let mut process = Command::new("sh")
+            .args(["-c", &format!("{preparation}\nexec {LOOKDOWN} serve")])
+            .envs([FREE_ADDRESS])
+            .envs(environment.iter().copied())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let log = BufReader::new(process.stderr.take().unwrap()).lines();
+        let mut server = Self {
+            process,
+            log,
+            port: String::new(),
+        };
+        let line = server.says("listening on http://127.0.0.1:");
+        let (_, rest) = line.split_once("listening on http://127.0.0.1:").unwrap();
+        rest.split_once(',').unwrap().0.clone_into(&mut server.port);
+        server.says("ready: try curl");
+        server
+    }
+
+    /// The next log line with this in it.
+    fn says(&mut self, part: &str) -> String {
+        let mut lines = self.log.by_ref().map(Result::unwrap);
+        let line = lines.find(|line| line.contains(part));
+        line.unwrap_or_else(|| panic!("the log does not say {part:?}"))
+    }
+
+    fn connect(&self) -> TcpStream {
+        TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap()
+    }
+
+    fn signal(&self, name: &str) {
+        let kill = format!("kill -{name} {}", self.process.id());
+        let sent = Command::new("sh").args(["-c", &kill]).status();
+        assert!(sent.unwrap().success());
+    }
+
+    /// Waits for the end, which is a good one, and gives the rest of the log.
+    fn has_ended(mut self) -> Vec<String> {
+        let rest = self.log.by_ref().map(Result::unwrap).collect();
+        assert!(self.process.wait().unwrap().success());
+        rest
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        // Only one that a failed test has left runs still.
+        let _ = self.process.kill();
+    }
+}
+
+#[test]
+fn a_termination_signal_ends_the_server_in_order() {
+    let mut server = Server::start("", &[NO_GRACE]);
+    server.signal("TERM");
+    server.says("told to stop");
+    let rest = server.has_ended();
+    assert!(rest.last().unwrap().contains("stopped"), "{rest:?}");
+}
+
+#[test]
+fn an_interruption_ends_the_server_without_a_pause() {
+    let server = Server::start("", &[LONG_GRACE]);
+    server.signal("INT");
+    server.has_ended();
+}
+
+#[test]
+fn a_second_signal_ends_the_server_at_once() {
+    let mut server = Server::start("", &[LONG_GRACE]);
+    server.signal("TERM");
+    server.says("told to stop");
+    server.signal("TERM");
+    server.says("stopped at once");
+    server.has_ended();
+}
+
+#[test]
+fn a_server_out_of_file_descriptors_says_so_once_and_serves_when_there_are_some() {
+    let mut server = Server::start("ulimit -n 64", &[NO_GRACE]);
+    let held: Vec<_> = (0..100).map(|_| server.connect()).collect();
+    let complaint = "connections cannot be accepted";
+    server.says(complaint);
+    drop(held);
+    let mut connection = server.connect();
+    connection
+        .write_all(b"GET /livez HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n\r\n")
+        .unwrap();
+    let mut answer = String::new();
+    connection.read_to_string(&mut answer).unwrap();
+    assert!(answer.contains("200 OK"), "{answer}");
+    server.signal("TERM");
+    let rest = server.has_ended();
+    assert!(
+        !rest.iter().any(|line| line.contains(complaint)),
+        "{rest:?}"
+    );
+}
