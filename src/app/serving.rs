@@ -42,6 +42,9 @@ impl App {
                 Ok(())
             };
             tokio::try_join!(self.load_models(address), connections)?;
+            let workers = Arc::clone(&self.workers);
+            spawn_blocking(move || workers.shut_down()).await?;
+            tracing::info!("stopped");
             anyhow::Ok(())
         };
         let operation = async {
@@ -54,19 +57,15 @@ impl App {
             biased;
             () = shutdown.requested_at_once() => {
                 tracing::warn!("stopped at once");
-                return Ok(());
+                Ok(())
             }
-            outcome = finished => outcome?,
-            () = operation => {}
+            outcome = finished => outcome,
+            () = operation => Ok(()),
             () = self.wind_up(&shutdown) => {
                 tracing::warn!("stopped, although some requests had not ended");
-                return Ok(());
+                Ok(())
             }
         }
-        let workers = self.workers;
-        spawn_blocking(move || workers.shut_down()).await?;
-        tracing::info!("stopped");
-        Ok(())
     }
 
     /// Serves metrics and probes on a port of their own, to the very end.
