@@ -60,11 +60,12 @@ fn probes() -> OpenApiRouter<ApiState> {
 
 /// The whole service.
 pub fn router(state: ApiState) -> Router {
-    let routes = match state.options.metrics_elsewhere {
-        true => service_routes(),
-        false => routes(),
+    let everything = if state.options.metrics_elsewhere {
+        service_routes()
+    } else {
+        routes()
     };
-    let (router, _document) = routes.split_for_parts();
+    let (router, _document) = everything.split_for_parts();
     let router = router
         .with_state(state.clone())
         .route("/", get(async || Redirect::temporary("docs/")))
@@ -81,11 +82,12 @@ pub fn operation_router(state: ApiState) -> Router {
 /// What answers a connection beyond the limit: probes as ever, and metrics where they are; everything
 /// else is refused.
 pub fn crowded_router(state: ApiState) -> Router {
-    let (router, _document) = match state.options.metrics_elsewhere {
-        true => probes(),
-        false => probes().routes(routes!(health::metrics)),
-    }
-    .split_for_parts();
+    let answered = if state.options.metrics_elsewhere {
+        probes()
+    } else {
+        probes().routes(routes!(health::metrics))
+    };
+    let (router, _document) = answered.split_for_parts();
     let refuse = crowd::refuse.with_state(state.clone());
     let router = router.with_state(state.clone());
     surrounded(router.fallback_service(refuse), state)

@@ -69,9 +69,10 @@ pub async fn serve<S, B>(
     let places = Places::new(limits.max_connections, metrics);
     let mut connections = JoinSet::new();
     let serve_on = |stream, place: Place| {
-        let service = match place.is_regular {
-            true => services.regular.clone(),
-            false => services.beyond_limit.clone(),
+        let service = if place.is_regular {
+            services.regular.clone()
+        } else {
+            services.beyond_limit.clone()
         };
         let rules = Rules {
             limits: limits.clone(),

@@ -41,7 +41,7 @@ impl App {
                 connections.await;
                 Ok(())
             };
-            tokio::try_join!(self.load_models(address), connections)?;
+            tokio::try_join!(self.load_models(address, &shutdown), connections)?;
             let workers = Arc::clone(&self.workers);
             spawn_blocking(move || workers.shut_down()).await?;
             tracing::info!("stopped");
@@ -51,7 +51,7 @@ impl App {
             if let Some(listener) = sockets.metrics {
                 self.serve_operation(listener).await;
             }
-            pending().await
+            pending::<()>().await;
         };
         tokio::select! {
             biased;
@@ -105,9 +105,12 @@ impl App {
         sleep(drain_timeout).await;
     }
 
-    /// Loads the models. The server is ready when it has the first.
-    async fn load_models(&self, address: SocketAddr) -> anyhow::Result<()> {
+    /// Loads the models, as long as the server is not told to stop. It is ready when it has the first.
+    async fn load_models(&self, address: SocketAddr, shutdown: &Shutdown) -> anyhow::Result<()> {
         for name in self.to_load.clone() {
+            if shutdown.is_requested() {
+                break;
+            }
             let models = Arc::clone(&self.models);
             spawn_blocking(move || models.load(&name)).await??;
             if self.readiness.phase() == Phase::WarmingUp {

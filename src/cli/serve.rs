@@ -3,6 +3,7 @@
 use std::{
     io::{self, Write},
     process::ExitCode,
+    time::Duration,
 };
 
 use anyhow::Context;
@@ -18,6 +19,8 @@ use crate::{
 
 /// Threads for sockets and JSON; frames have threads of their own.
 const RUNTIME_THREADS: usize = 2;
+/// How long the end waits for a model that is being loaded.
+const LONGEST_LOAD: Duration = Duration::from_secs(10);
 
 /// Arguments of `lookdown serve`.
 #[derive(Debug, Args)]
@@ -38,12 +41,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         .enable_all()
         .build()
         .context("the operating system gives no thread")?;
-    let outcome = match arguments.check {
-        true => runtime.block_on(check(settings)),
-        false => runtime.block_on(serve(settings)),
+    let outcome = if arguments.check {
+        runtime.block_on(check(settings))
+    } else {
+        runtime.block_on(serve(settings))
     };
-    // Whatever still runs was given up: nobody waits for it.
-    runtime.shutdown_background();
+    // Whatever still runs was given up, but ONNX Runtime brings a process down that ends while a model
+    // is being loaded.
+    runtime.shutdown_timeout(LONGEST_LOAD);
     outcome.map(|()| ExitCode::SUCCESS)
 }
 

@@ -10,7 +10,7 @@ use tokio::{
 /// How long nothing is accepted after the system has refused.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Refusals with less than this between them are one outage.
-const OUTAGE: Duration = Duration::from_secs(60);
+const OUTAGE: Duration = Duration::from_mins(1);
 
 /// Accepts connections.
 pub(super) struct Acceptor {
