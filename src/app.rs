@@ -18,6 +18,7 @@ use crate::{
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
     settings::{AccessSettings, CalibrationPlace, LimitSettings, Settings, find_calibrations},
+    tls::Tls,
 };
 
 pub use sockets::Sockets;
@@ -112,6 +113,8 @@ pub struct App {
     metrics: Arc<Metrics>,
     /// The keys, if there are some.
     keys: Option<Arc<AccessKeys>>,
+    /// The certificate, if there is one.
+    tls: Option<Arc<Tls>>,
     state: ApiState,
     settings: Settings,
 }
@@ -120,7 +123,7 @@ impl App {
     /// Starts the workers. No model is loaded yet: [`App::serve`] does that.
     ///
     /// # Errors
-    /// When the operating system gives no thread, or the keys cannot be used.
+    /// When the operating system gives no thread, or the keys or the certificate cannot be used.
     pub fn start(assembly: Assembly, settings: Settings) -> anyhow::Result<Self> {
         let Assembly {
             engine,
@@ -142,6 +145,10 @@ impl App {
             .set(1);
         let readiness = Readiness::default();
         let keys = open_keys(&settings.access)?;
+        let tls = match settings.server.tls.clone() {
+            Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
+            None => None,
+        };
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
             None => Access::Open {
@@ -174,6 +181,7 @@ impl App {
             readiness,
             metrics,
             keys,
+            tls,
             state,
             settings,
         })
@@ -201,7 +209,7 @@ impl App {
         ))
     }
 
-    /// The threads that look for changed models, calibrations and keys.
+    /// The threads that look for changed models, calibrations, keys and certificates.
     fn start_pollers(&self) -> anyhow::Result<Vec<Poller>> {
         let (models, calibrations) = (Arc::clone(&self.models), Arc::clone(&self.calibrations));
         let model_poller =
@@ -214,10 +222,15 @@ impl App {
         let keys = self.keys.clone().zip(self.settings.access.poll_seconds);
         let key_poller =
             keys.map(|(keys, every)| Poller::start("key-watcher", every, move || keys.refresh()));
+        let tls = self.tls.clone().and_then(|tls| {
+            let every = tls.poll_seconds()?;
+            Some(Poller::start("tls-watcher", every, move || tls.refresh()))
+        });
         let pollers = model_poller
             .into_iter()
             .chain(calibration_poller)
-            .chain(key_poller);
+            .chain(key_poller)
+            .chain(tls);
         pollers
             .collect::<Result<_, _>>()
             .context("the operating system gives no thread to watch files with")

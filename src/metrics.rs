@@ -95,6 +95,12 @@ metrics! {
     rig_cache_builds: IntCounter = "rig_cache_builds_total" [];
     /// Times that remap tables were dropped to make room for others.
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
+    /// When the server's TLS certificate ends, seconds since 1970; shown only with TLS.
+    tls_certificate_expiry: IntGaugeVec = "tls_certificate_expiry_timestamp_seconds" [];
+    /// Times that the files of TLS were found changed, by whether what they hold can be used.
+    tls_certificate_loads: IntCounterVec = "tls_certificate_loads_total" ["result"];
+    /// TLS handshakes that came to an end, by how.
+    tls_handshakes: IntCounterVec = "tls_handshakes_total" ["result"];
     /// Always 1; says which version runs.
     build_info: IntGaugeVec = "build_info" ["version"];
 }

@@ -21,7 +21,7 @@ use self::{
     connection::Rules,
     places::{Place, Places},
 };
-use crate::{metrics::Metrics, shutdown::Shutdown};
+use crate::{metrics::Metrics, shutdown::Shutdown, tls::Tls};
 
 /// What connections may cost.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,9 +52,11 @@ pub struct Services<S> {
 
 /// Serves until `shutdown` has come to draining. Then what has connected by then is accepted, idle
 /// connections are closed, and those with a request in flight when it is answered; when none is
-/// left, this ends. Dropped, it closes all of them at once.
+/// left, this ends. Dropped, it closes all of them at once. With `tls`, every connection begins with
+/// a handshake.
 pub async fn serve<S, B>(
     listener: TcpListener,
+    tls: Option<&Arc<Tls>>,
     services: Services<S>,
     limits: &ConnectionLimits,
     metrics: &Arc<Metrics>,
@@ -79,10 +81,16 @@ pub async fn serve<S, B>(
             one_request_only: !place.is_regular,
             shutdown: shutdown.clone(),
         };
+        let tls = tls.cloned();
         async move {
-            // A stream that needs a handshake first has it here: in its own task, not between two
-            // accepts.
-            connection::serve(stream, service, rules).await;
+            match tls {
+                None => connection::serve(stream, service, rules).await,
+                Some(tls) => {
+                    if let Some(stream) = tls.accept(stream).await {
+                        connection::serve(stream, service, rules).await;
+                    }
+                }
+            }
             drop(place);
         }
     };

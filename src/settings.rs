@@ -12,6 +12,7 @@ mod locate;
 mod raw;
 mod source;
 mod threads;
+mod tls;
 
 use std::{
     net::SocketAddr,
@@ -29,6 +30,7 @@ pub use threads::ThreadPlan;
 
 use crate::{
     access::KeyList, geometry::FieldOfViewReading, inference::Device, server::ConnectionLimits,
+    tls::TlsOptions,
 };
 
 /// Everything the operator may choose, checked.
@@ -69,6 +71,8 @@ pub struct ServerSettings {
     pub request_timeout: Duration,
     /// What connections may cost.
     pub connections: ConnectionLimits,
+    /// TLS; `None` for plain HTTP.
+    pub tls: Option<TlsOptions>,
 }
 
 /// How the server ends.

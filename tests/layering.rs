@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 19] = [
+const MAY_USE: [(&str, &[&str]); 20] = [
     ("access", &[]),
     ("revision", &[]),
     ("geometry", &[]),
@@ -19,8 +19,12 @@ const MAY_USE: [(&str, &[&str]); 19] = [
     ("imaging", &["geometry"]),
     ("calibration", &["geometry", "revision"]),
     ("inference", &["detection", "imaging", "revision"]),
-    ("server", &["metrics", "shutdown"]),
-    ("settings", &["access", "geometry", "inference", "server"]),
+    ("tls", &["metrics"]),
+    ("server", &["metrics", "shutdown", "tls"]),
+    (
+        "settings",
+        &["access", "geometry", "inference", "server", "tls"],
+    ),
     ("telemetry", &["settings"]),
     (
         "pipeline",
@@ -74,6 +78,7 @@ const MAY_USE: [(&str, &[&str]); 19] = [
             "settings",
             "shutdown",
             "telemetry",
+            "tls",
             "api",
         ],
     ),
@@ -99,7 +104,7 @@ const MAY_USE: [(&str, &[&str]); 19] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 16] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 18] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -123,7 +128,9 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 16] = [
     ("plotters", &["evaluation"]),
     ("config", &["settings"]),
     ("object_store", &["calibration"]),
-    ("rustls", &["calibration"]),
+    ("rustls", &["calibration", "tls"]),
+    ("tokio_rustls", &["tls"]),
+    ("x509_cert", &["tls"]),
     ("prometheus", &["metrics"]),
 ];
 

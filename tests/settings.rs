@@ -44,7 +44,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 39, "a key is missing from {example}");
+    assert_eq!(stated.count(), 44, "a key is missing from {example}");
 }
 
 #[test]
@@ -78,6 +78,47 @@ fn every_kind_of_value_can_be_given_in_the_environment() {
     assert_eq!(settings.threads.per_session.get(), 3);
     assert!((settings.inference.score_floor - 0.25).abs() < f64::EPSILON);
     assert_eq!(settings.model.path.as_deref(), Some(Path::new("123")));
+}
+
+#[test]
+fn tls_is_on_with_a_certificate_and_its_key_and_off_without() {
+    assert_eq!(defaults().server.tls, None);
+    let settings = load(
+        None,
+        environment(&[
+            ("LOOKDOWN__SERVER__TLS__CERTIFICATE", "/tls/server.pem"),
+            ("LOOKDOWN__SERVER__TLS__PRIVATE_KEY", "/tls/server.key"),
+        ]),
+    );
+    let tls = settings.unwrap().server.tls.unwrap();
+    assert_eq!(tls.certificate, Path::new("/tls/server.pem"));
+    assert_eq!(tls.private_key, Path::new("/tls/server.key"));
+    assert_eq!(tls.client_certificates, None);
+}
+
+#[test]
+fn half_of_what_tls_needs_is_refused_with_the_other_half() {
+    for (given, missing) in [
+        ("CERTIFICATE", "server.tls.private_key is empty"),
+        ("PRIVATE_KEY", "server.tls.certificate is empty"),
+        ("CLIENT_CERTIFICATES", "server.tls.certificate is empty"),
+    ] {
+        let variable = format!("LOOKDOWN__SERVER__TLS__{given}");
+        let message = refusal(from_environment(&variable, "/tls/file.pem"));
+        assert!(message.contains(missing), "{message}");
+        assert!(message.contains("give the "), "{message}");
+    }
+}
+
+#[test]
+fn a_private_key_where_its_path_belongs_is_refused_and_not_repeated() {
+    let key = "-----BEGIN PRIVATE KEY-----\nc2VjcmV0\n-----END PRIVATE KEY-----";
+    let message = refusal(from_environment("LOOKDOWN__SERVER__TLS__PRIVATE_KEY", key));
+    assert!(
+        message.contains("server.tls.private_key is PEM itself"),
+        "{message}"
+    );
+    assert!(!message.contains("c2VjcmV0"), "{message}");
 }
 
 #[test]
@@ -135,7 +176,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 28] = [
+const UNUSABLE: [(&str, &str, &str, &str); 30] = [
     (
         "SERVER__LISTEN",
         "localhost",
@@ -219,6 +260,18 @@ const UNUSABLE: [(&str, &str, &str, &str); 28] = [
         "-1",
         "shutdown.drain_timeout_millis",
         "integer",
+    ),
+    (
+        "SERVER__TLS__HANDSHAKE_TIMEOUT_MILLIS",
+        "0",
+        "server.tls.handshake_timeout_millis",
+        "from 1 to 60000",
+    ),
+    (
+        "SERVER__TLS__POLL_SECONDS",
+        "100000",
+        "server.tls.poll_seconds",
+        "from 0 to",
     ),
     (
         "INFERENCE__THREADS",

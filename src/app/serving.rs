@@ -21,7 +21,8 @@ impl App {
     /// When a model cannot be loaded or a socket fails.
     pub async fn serve(self, sockets: Sockets, shutdown: Shutdown) -> anyhow::Result<()> {
         let address = sockets.main.local_addr()?;
-        log_start(&self.settings, address);
+        let scheme = if self.tls.is_some() { "https" } else { "http" };
+        log_start(&self.settings, scheme, address);
         if self.keys.is_none() && !address.ip().is_loopback() {
             tracing::warn!(
                 "others reach this server, and there are no keys: whoever does may send frames and \
@@ -34,14 +35,22 @@ impl App {
             beyond_limit: api::crowded_router(self.state.clone()),
         };
         let limits = &self.settings.server.connections;
-        let connections = server::serve(sockets.main, services, limits, &self.metrics, &shutdown);
+        let tls = self.tls.as_ref();
+        let connections = server::serve(
+            sockets.main,
+            tls,
+            services,
+            limits,
+            &self.metrics,
+            &shutdown,
+        );
         // Both must end: the process must not exit while a model is still being loaded.
         let finished = async {
             let connections = async {
                 connections.await;
                 Ok(())
             };
-            tokio::try_join!(self.load_models(address, &shutdown), connections)?;
+            tokio::try_join!(self.load_models(scheme, address, &shutdown), connections)?;
             let workers = Arc::clone(&self.workers);
             spawn_blocking(move || workers.shut_down()).await?;
             tracing::info!("stopped");
@@ -78,6 +87,7 @@ impl App {
         let limits = &self.settings.server.connections;
         server::serve(
             listener,
+            None,
             services,
             limits,
             &self.metrics,
@@ -106,7 +116,12 @@ impl App {
     }
 
     /// Loads the models, as long as the server is not told to stop. It is ready when it has the first.
-    async fn load_models(&self, address: SocketAddr, shutdown: &Shutdown) -> anyhow::Result<()> {
+    async fn load_models(
+        &self,
+        scheme: &str,
+        address: SocketAddr,
+        shutdown: &Shutdown,
+    ) -> anyhow::Result<()> {
         for name in self.to_load.clone() {
             if shutdown.is_requested() {
                 break;
@@ -117,7 +132,7 @@ impl App {
                 self.readiness.warmed_up();
                 let port = address.port();
                 tracing::info!(
-                    "ready: try curl -F img=@samples/office.jpg localhost:{port}/detect"
+                    "ready: try curl -F img=@samples/office.jpg {scheme}://localhost:{port}/detect"
                 );
             }
         }
@@ -126,7 +141,7 @@ impl App {
 }
 
 /// Says what runs, and where.
-fn log_start(settings: &Settings, address: SocketAddr) {
+fn log_start(settings: &Settings, scheme: &str, address: SocketAddr) {
     tracing::info!(
         version = env!("CARGO_PKG_VERSION"),
         device = %settings.inference.device,
@@ -134,6 +149,6 @@ fn log_start(settings: &Settings, address: SocketAddr) {
         threads_per_session = settings.threads.per_session,
         remap_threads = settings.threads.remapping,
         calibrations = %settings.calibrations.path,
-        "listening on http://{address}, API page at http://{address}/docs"
+        "listening on {scheme}://{address}, API page at {scheme}://{address}/docs"
     );
 }

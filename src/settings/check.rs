@@ -101,6 +101,7 @@ fn server(raw: &raw::RawServer) -> Result<ServerSettings, SettingsError> {
             1..=MAX_TIMEOUT_MILLIS,
         )?,
         connections: connections(raw)?,
+        tls: raw.tls.checked()?,
     })
 }
 
@@ -291,7 +292,11 @@ fn count(key: &str, value: u64) -> Result<NonZeroUsize, SettingsError> {
     Ok(count.unwrap_or(NonZeroUsize::MIN))
 }
 
-fn millis(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<Duration, SettingsError> {
+pub(super) fn millis(
+    key: &str,
+    value: u64,
+    range: RangeInclusive<u64>,
+) -> Result<Duration, SettingsError> {
     within(key, value, range).map(Duration::from_millis)
 }
 

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{access::RawAccess, locate};
+use super::{access::RawAccess, locate, tls::RawTls};
 
 const MEBIBYTE: u64 = 1024 * 1024;
 
@@ -34,6 +34,7 @@ pub(super) struct RawServer {
     pub(super) idle_timeout_millis: u64,
     pub(super) max_header_bytes: u64,
     pub(super) max_headers: u64,
+    pub(super) tls: RawTls,
 }
 
 impl Default for RawServer {
@@ -48,6 +49,7 @@ impl Default for RawServer {
             idle_timeout_millis: 75_000,
             max_header_bytes: 16 * 1024,
             max_headers: 100,
+            tls: RawTls::default(),
         }
     }
 }

@@ -16,3 +16,4 @@ mod repository;
 mod serve;
 mod server;
 mod service;
+mod tls;

@@ -1,0 +1,138 @@
+//! TLS: the server's certificate and private key, read again when their files change, and the
+//! handshakes made with them.
+
+mod error;
+mod files;
+mod handshake;
+mod identity;
+mod options;
+mod validity;
+
+use std::{
+    num::NonZeroU64,
+    sync::{Arc, Mutex, PoisonError, RwLock},
+};
+
+use jiff::Timestamp;
+use tokio::{net::TcpStream, time::timeout};
+use tokio_rustls::server::TlsStream;
+
+pub use error::TlsError;
+pub use options::TlsOptions;
+
+use self::{files::TlsFiles, handshake::shake_hands, identity::Identity};
+use crate::metrics::Metrics;
+
+/// The certificate and the private key that serve now.
+pub struct Tls {
+    options: TlsOptions,
+    metrics: Arc<Metrics>,
+    serving: RwLock<Arc<Identity>>,
+    /// Why the newest files are not used, as it was last told.
+    told: Mutex<Option<String>>,
+}
+
+impl Tls {
+    /// Reads the files that `options` name.
+    ///
+    /// # Errors
+    /// [`TlsError`] when they cannot be used.
+    pub fn open(options: TlsOptions, metrics: Arc<Metrics>) -> Result<Self, TlsError> {
+        let files = TlsFiles::read(&options)?;
+        let identity = Identity::new(&files, &options)?;
+        show(&identity, &options, &metrics);
+        Ok(Self {
+            options,
+            metrics,
+            serving: RwLock::new(Arc::new(identity)),
+            told: Mutex::new(None),
+        })
+    }
+
+    /// How often the files are to be read again, seconds; `None` for never.
+    #[must_use]
+    pub fn poll_seconds(&self) -> Option<NonZeroU64> {
+        self.options.poll_seconds
+    }
+
+    /// Reads the files again. If they cannot be used, what serves stays what it was, and the log
+    /// says why, once for each reason. Connections that are there stay as they are.
+    pub fn refresh(&self) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        match self.newer() {
+            Ok(None) => *told = None,
+            Ok(Some(identity)) => {
+                *told = None;
+                tracing::info!("the TLS certificate has changed: new connections get the new one");
+                show(&identity, &self.options, &self.metrics);
+                let mut serving = self.serving.write().unwrap_or_else(PoisonError::into_inner);
+                *serving = Arc::new(identity);
+            }
+            Err(error) => {
+                let problem = error.to_string();
+                if told.as_ref() != Some(&problem) {
+                    tracing::error!("{problem}; the certificate that serves stays what it was");
+                    let loads = &self.metrics.tls_certificate_loads;
+                    loads.with_label_values(&["failure"]).inc();
+                    *told = Some(problem);
+                }
+            }
+        }
+    }
+
+    /// Makes an encrypted connection of a plain one; `None` when the other end cannot, will not or
+    /// must not, or takes too long.
+    pub async fn accept(&self, connection: TcpStream) -> Option<TlsStream<TcpStream>> {
+        let config = Arc::clone(&self.serving().config);
+        let handshake = shake_hands(connection, config);
+        let (result, encrypted) = match timeout(self.options.handshake_timeout, handshake).await {
+            Ok(Ok(encrypted)) => ("success", Some(encrypted)),
+            Ok(Err(error)) => {
+                tracing::debug!("no TLS handshake: {error}");
+                ("failure", None)
+            }
+            Err(_) => {
+                tracing::debug!("a TLS handshake took too long");
+                ("timeout", None)
+            }
+        };
+        let handshakes = &self.metrics.tls_handshakes;
+        handshakes.with_label_values(&[result]).inc();
+        encrypted
+    }
+
+    /// What the files hold now, if it is not what serves.
+    fn newer(&self) -> Result<Option<Identity>, TlsError> {
+        let files = TlsFiles::read(&self.options)?;
+        if files.digest() == self.serving().digest {
+            return Ok(None);
+        }
+        Identity::new(&files, &self.options).map(Some)
+    }
+
+    fn serving(&self) -> Arc<Identity> {
+        let serving = self.serving.read().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(&serving)
+    }
+}
+
+/// Shows what serves from now on in the metrics, and in the log what somebody should look at.
+fn show(identity: &Identity, options: &TlsOptions, metrics: &Metrics) {
+    identity.warn(Timestamp::now(), options);
+    metrics
+        .tls_certificate_loads
+        .with_label_values(&["success"])
+        .inc();
+    let expiry = &metrics.tls_certificate_expiry;
+    match identity.validity {
+        Some(validity) => {
+            let no_labels: &[&str] = &[];
+            let expiry = expiry.with_label_values(no_labels);
+            expiry.set(validity.not_after.as_second());
+        }
+        None => expiry.reset(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,141 @@
+//! The files of TLS as they are read: bounded, and with a digest that tells whether they changed.
+
+use std::{
+    fs::File,
+    io::{self, Read},
+    os::unix::fs::PermissionsExt,
+    path::Path,
+};
+
+use rustls::pki_types::{
+    CertificateDer, PrivateKeyDer,
+    pem::{Error, PemObject},
+};
+use sha2::{Digest, Sha256};
+
+use super::{TlsError, TlsOptions};
+const CERTIFICATE: &str = "server.tls.certificate";
+const PRIVATE_KEY: &str = "server.tls.private_key";
+const CLIENT_CERTIFICATES: &str = "server.tls.client_certificates";
+/// A hundred certificates take a tenth of it.
+const MAX_FILE_BYTES: u64 = 1 << 20;
+/// Whoever is neither owner nor group may read.
+const READABLE_BY_OTHERS: u32 = 0o004;
+
+/// What the files hold now.
+pub(super) struct TlsFiles {
+    certificate: Vec<u8>,
+    private_key: Vec<u8>,
+    client_certificates: Option<Vec<u8>>,
+}
+
+impl TlsFiles {
+    /// Reads all of them.
+    pub(super) fn read(options: &TlsOptions) -> Result<Self, TlsError> {
+        let authorities = options.client_certificates.as_deref();
+        Ok(Self {
+            certificate: read(CERTIFICATE, &options.certificate)?,
+            private_key: read(PRIVATE_KEY, &options.private_key)?,
+            client_certificates: authorities
+                .map(|path| read(CLIENT_CERTIFICATES, path))
+                .transpose()?,
+        })
+    }
+
+    /// Equal for equal files.
+    pub(super) fn digest(&self) -> [u8; 32] {
+        let mut digest = Sha256::new();
+        let optional = self.client_certificates.as_deref().unwrap_or_default();
+        for content in [&self.certificate, &self.private_key, optional] {
+            digest.update(Sha256::digest(content));
+        }
+        digest.finalize().into()
+    }
+
+    /// The server's certificate and those that lead from it to an authority.
+    pub(super) fn chain(
+        &self,
+        options: &TlsOptions,
+    ) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+        certificates(CERTIFICATE, &options.certificate, &self.certificate)
+    }
+
+    /// The server's private key.
+    pub(super) fn key(&self, options: &TlsOptions) -> Result<PrivateKeyDer<'static>, TlsError> {
+        PrivateKeyDer::from_pem_slice(&self.private_key).map_err(|error| {
+            let path = options.private_key.clone();
+            match error {
+                Error::NoItemsFound => TlsError::NoKey { path },
+                // The error itself quotes the file.
+                _ => TlsError::Damaged {
+                    setting: PRIVATE_KEY,
+                    path,
+                },
+            }
+        })
+    }
+
+    /// The authorities that clients must have a certificate of, if they need one.
+    pub(super) fn authorities(
+        &self,
+        options: &TlsOptions,
+    ) -> Result<Option<Vec<CertificateDer<'static>>>, TlsError> {
+        let path = options.client_certificates.as_deref();
+        let content = path.zip(self.client_certificates.as_deref());
+        content
+            .map(|(path, content)| certificates(CLIENT_CERTIFICATES, path, content))
+            .transpose()
+    }
+}
+
+/// The error about a certificate in one of the files.
+pub(super) fn invalid(options: &TlsOptions, of_clients: bool, position: usize) -> TlsError {
+    let (setting, path) = match &options.client_certificates {
+        Some(path) if of_clients => (CLIENT_CERTIFICATES, path),
+        _ => (CERTIFICATE, &options.certificate),
+    };
+    TlsError::InvalidCertificate {
+        setting,
+        path: path.clone(),
+        position,
+    }
+}
+
+/// Whether every user of the machine may read the file.
+pub(super) fn is_readable_by_others(path: &Path) -> bool {
+    path.metadata()
+        .is_ok_and(|metadata| metadata.permissions().mode() & READABLE_BY_OTHERS != 0)
+}
+
+fn certificates(
+    setting: &'static str,
+    path: &Path,
+    content: &[u8],
+) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+    let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(content).collect();
+    let path = path.to_owned();
+    match found {
+        Ok(found) if found.is_empty() => Err(TlsError::NoCertificate { setting, path }),
+        Ok(found) => Ok(found),
+        Err(_) => Err(TlsError::Damaged { setting, path }),
+    }
+}
+
+fn read(setting: &'static str, path: &Path) -> Result<Vec<u8>, TlsError> {
+    read_bytes(path).map_err(|cause| TlsError::Unreadable {
+        setting,
+        path: path.to_owned(),
+        cause,
+    })
+}
+
+fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut content = Vec::new();
+    let read = File::open(path)?
+        .take(MAX_FILE_BYTES + 1)
+        .read_to_end(&mut content)?;
+    if read as u64 > MAX_FILE_BYTES {
+        return Err(io::Error::other("it has more than 1 MiB"));
+    }
+    Ok(content)
+}

@@ -1,0 +1,65 @@
+//! From a connection to an encrypted one.
+
+use std::{io, sync::Arc};
+
+use rustls::ServerConfig;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::TcpStream,
+};
+use tokio_rustls::{TlsAcceptor, server::TlsStream};
+
+/// What a TLS record with a handshake begins with (RFC 8446, section 5.1).
+const HANDSHAKE_RECORD: u8 = 22;
+/// To who speaks plain HTTP.
+const ANSWER_TO_PLAIN_HTTP: &[u8] = b"HTTP/1.1 400 Bad Request\r\n\
+    Content-Type: text/plain; charset=utf-8\r\nContent-Length: 63\r\nConnection: close\r\n\r\n\
+    This server speaks TLS: ask with https:// instead of http://.\r\n";
+/// Most that is read of a plain request after the answer to it.
+const MAX_IGNORED_BYTES: u64 = 1 << 20;
+
+/// A connection that did not become an encrypted one.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum HandshakeError {
+    #[error("it began with something else than TLS")]
+    NotTls,
+    #[error("{0}")]
+    Failed(#[from] io::Error),
+}
+
+/// Shakes hands. Who speaks something else than TLS is told so, as HTTP.
+pub(super) async fn shake_hands(
+    mut connection: TcpStream,
+    config: Arc<ServerConfig>,
+) -> Result<TlsStream<TcpStream>, HandshakeError> {
+    let mut first = [0];
+    let read = connection.peek(&mut first).await?;
+    if read == 0 {
+        return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+    }
+    if first != [HANDSHAKE_RECORD] {
+        connection.write_all(ANSWER_TO_PLAIN_HTTP).await?;
+        connection.shutdown().await?;
+        // Closing with unread bytes would reset the connection, and the answer with it.
+        let mut rest = connection.take(MAX_IGNORED_BYTES);
+        tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
+        return Err(HandshakeError::NotTls);
+    }
+    Ok(TlsAcceptor::from(config).accept(connection).await?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_answer_to_plain_http_states_its_length() {
+        let answer = std::str::from_utf8(ANSWER_TO_PLAIN_HTTP).unwrap();
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        assert!(
+            head.contains(&format!("Content-Length: {}\r\n", body.len())),
+            "{}",
+            body.len()
+        );
+    }
+}

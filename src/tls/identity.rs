@@ -1,0 +1,123 @@
+//! What a server shows and asks for in handshakes, made of checked files.
+
+use std::{path::Path, sync::Arc};
+
+use jiff::Timestamp;
+use rustls::{
+    Error, RootCertStore, ServerConfig,
+    crypto::{CryptoProvider, ring},
+    pki_types::CertificateDer,
+    server::{WebPkiClientVerifier, danger::ClientCertVerifier},
+    sign::{CertifiedKey, SingleCertAndKey},
+    version::{TLS12, TLS13},
+};
+
+use super::{
+    TlsError, TlsOptions,
+    files::{TlsFiles, invalid, is_readable_by_others},
+    validity::Validity,
+};
+/// What is spoken over TLS, as handshakes call it (ALPN, RFC 7301).
+const PROTOCOL: &[u8] = b"http/1.1";
+
+/// What a server shows and asks for in handshakes.
+pub(super) struct Identity {
+    /// That of the files it is made of.
+    pub(super) digest: [u8; 32],
+    pub(super) config: Arc<ServerConfig>,
+    /// That of the server's own certificate, where it can be understood.
+    pub(super) validity: Option<Validity>,
+}
+
+impl Identity {
+    /// Checks what the files hold: the key is the certificate's, and all can be used.
+    pub(super) fn new(files: &TlsFiles, options: &TlsOptions) -> Result<Self, TlsError> {
+        let provider = Arc::new(ring::default_provider());
+        let certified = certified_key(files, options, &provider)?;
+        let validity = certified
+            .end_entity_cert()
+            .ok()
+            .and_then(|certificate| Validity::of(certificate));
+        let builder = ServerConfig::builder_with_provider(Arc::clone(&provider))
+            .with_protocol_versions(&[&TLS13, &TLS12])?;
+        let builder = match files.authorities(options)? {
+            Some(authorities) => {
+                builder.with_client_cert_verifier(verifier(authorities, options, provider)?)
+            }
+            None => builder.with_no_client_auth(),
+        };
+        let mut config = builder.with_cert_resolver(Arc::new(SingleCertAndKey::from(certified)));
+        config.alpn_protocols = vec![PROTOCOL.to_vec()];
+        Ok(Self {
+            digest: files.digest(),
+            config: Arc::new(config),
+            validity,
+        })
+    }
+
+    /// Logs what somebody should look at although it works.
+    pub(super) fn warn(&self, now: Timestamp, options: &TlsOptions) {
+        let certificate = options.certificate.display();
+        match self.validity {
+            Some(validity) if validity.not_after < now => tracing::warn!(
+                "server.tls.certificate: {certificate} has expired at {}, and clients refuse it: \
+                 replace it",
+                validity.not_after
+            ),
+            Some(validity) if now < validity.not_before => tracing::warn!(
+                "server.tls.certificate: {certificate} is valid from {} on, and clients refuse it \
+                 until then: replace it, or check the clock",
+                validity.not_before
+            ),
+            Some(_) => {}
+            None => tracing::warn!(
+                "server.tls.certificate: until when {certificate} is valid cannot be read, and no \
+                 metric shows it"
+            ),
+        }
+        warn_of_readers(&options.private_key);
+    }
+}
+
+fn warn_of_readers(private_key: &Path) {
+    if is_readable_by_others(private_key) {
+        tracing::warn!(
+            "server.tls.private_key: every user of this machine may read {}: take that right away \
+             (chmod o-r; defaultMode: 0440 for a Secret of Kubernetes)",
+            private_key.display()
+        );
+    }
+}
+
+fn certified_key(
+    files: &TlsFiles,
+    options: &TlsOptions,
+    provider: &CryptoProvider,
+) -> Result<CertifiedKey, TlsError> {
+    let chain = files.chain(options)?;
+    let key = files.key(options)?;
+    CertifiedKey::from_der(chain, key, provider).map_err(|error| match error {
+        Error::InconsistentKeys(_) => TlsError::Mismatch {
+            private_key: options.private_key.clone(),
+            certificate: options.certificate.clone(),
+        },
+        Error::InvalidCertificate(_) => invalid(options, false, 1),
+        _ => TlsError::UnknownKey {
+            path: options.private_key.clone(),
+        },
+    })
+}
+
+fn verifier(
+    authorities: Vec<CertificateDer<'static>>,
+    options: &TlsOptions,
+    provider: Arc<CryptoProvider>,
+) -> Result<Arc<dyn ClientCertVerifier>, TlsError> {
+    let mut roots = RootCertStore::empty();
+    for (position, certificate) in (1..).zip(authorities) {
+        let added = roots.add(certificate);
+        added.map_err(|_| invalid(options, true, position))?;
+    }
+    let verifier = WebPkiClientVerifier::builder_with_provider(Arc::new(roots), provider).build();
+    verifier.map_err(|error| TlsError::Refused(Error::General(error.to_string())))
+}
