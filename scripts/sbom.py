@@ -1,0 +1,166 @@
+"""Writes what a running Lookdown is made of, as CycloneDX 1.6 (JSON): `sbom.py [FILE]`, standard output by default.
+
+The crates that the binary is built from, from `cargo metadata` and Cargo.lock; ONNX Runtime and the models, from
+pins.toml and the models' manifests. The same sources give the same bytes.
+"""
+
+import json
+import subprocess
+import sys
+import tomllib
+import uuid
+from pathlib import Path
+from urllib.parse import quote
+
+from assets.machine import supported_cpu
+from assets.pins import Archive, Model, Pins, Quantised, read_pins
+
+ROOT = Path(__file__).resolve().parents[1]
+NOT_STATED = "NOASSERTION"
+# Only what it is derived from must never change: ours alone, and made up.
+NAMESPACE = uuid.UUID("6c1f4a52-3c0e-4b57-9f59-0f6b1f0f6d35")
+
+
+def main(arguments: list[str]) -> int:
+    """Writes the bill of materials of the machine's own kind of CPU."""
+    cpu = supported_cpu()
+    text = json.dumps(bill_of_materials(ROOT, cpu, cargo_metadata(ROOT, cpu)), indent=2, ensure_ascii=False) + "\n"
+    if arguments:
+        file = Path(arguments[0])
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+    else:
+        sys.stdout.write(text)
+    return 0
+
+
+def cargo_metadata(root: Path, cpu: str) -> dict:
+    """What cargo knows of the crates and what they need on this kind of CPU."""
+    command = ["cargo", "metadata", "--locked", "--format-version=1", f"--filter-platform={cpu}-unknown-linux-gnu"]
+    return json.loads(subprocess.run(command, cwd=root, check=True, capture_output=True).stdout)
+
+
+def bill_of_materials(root: Path, cpu: str, metadata: dict) -> dict:
+    """The document, without what would differ from one run to the next."""
+    pins = read_pins(root / "scripts" / "pins.toml")
+    needs = needed_crates(metadata)
+    sums = checksums((root / "Cargo.lock").read_text(encoding="utf-8"))
+    packages = {package["id"]: package for package in metadata["packages"]}
+    own = packages[metadata["resolve"]["root"]]
+    crates = [crate(package, sums) for package in packages.values() if package["id"] in needs and package is not own]
+    runtime = onnx_runtime(pins, cpu)
+    models = [model(root, pinned) for pinned in pins.models + pins.quantised]
+    application = identity("application", reference(own), own["name"], own["version"])
+    application["licenses"] = licences(own["license"])
+    dependencies = {
+        reference(packages[needing]): {reference(packages[needed]) for needed in needs[needing]} for needing in needs
+    }
+    dependencies[application["bom-ref"]] |= {part["bom-ref"] for part in [runtime, *models]}
+    document = {
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.6",
+        "version": 1,
+        "metadata": {"component": application, "lifecycles": [{"phase": "build"}]},
+        "components": sorted([*crates, runtime, *models], key=lambda part: part["bom-ref"]),
+        "dependencies": [{"ref": ref, "dependsOn": sorted(needed)} for ref, needed in sorted(dependencies.items())],
+    }
+    return {"serialNumber": f"urn:uuid:{uuid.uuid5(NAMESPACE, json.dumps(document, sort_keys=True))}"} | document
+
+
+def needed_crates(metadata: dict) -> dict[str, set[str]]:
+    """The crates that the binary is built from, its own among them, each with what it needs; none is for tests alone.
+
+    Those of build scripts belong to it: the web page of the API comes from one.
+    """
+    nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
+    needs: dict[str, set[str]] = {}
+    waiting = [metadata["resolve"]["root"]]
+    while waiting:
+        package = waiting.pop()
+        if package not in needs:
+            needs[package] = {
+                need["pkg"]
+                for need in nodes[package]["deps"]
+                if any(kind["kind"] != "dev" for kind in need["dep_kinds"])
+            }
+            waiting.extend(needs[package])
+    return needs
+
+
+def checksums(lock: str) -> dict[tuple[str, str], str]:
+    """The sha256 sums of Cargo.lock, by name and version."""
+    packages = tomllib.loads(lock)["package"]
+    return {(entry["name"], entry["version"]): entry["checksum"] for entry in packages if "checksum" in entry}
+
+
+def reference(package: dict) -> str:
+    """What a crate is called in the document."""
+    return purl("cargo", package["name"], package["version"])
+
+
+def crate(package: dict, sums: dict[tuple[str, str], str]) -> dict:
+    """The component for a crate of a registry."""
+    name, version = package["name"], package["version"]
+    return identity("library", reference(package), name, version) | {
+        "hashes": hashes(sums[name, version]),
+        # Cargo's old form of OR.
+        "licenses": licences((package["license"] or NOT_STATED).replace("/", " OR ")),
+        "purl": reference(package),
+    }
+
+
+def onnx_runtime(pins: Pins, cpu: str) -> dict:
+    """The component for the library that runs the networks."""
+    package = archive("pypi", pins.runtime[cpu].archive)
+    return package | {"bom-ref": package["purl"], "licenses": licences("MIT")}
+
+
+def model(root: Path, pinned: Model | Quantised) -> dict:
+    """The component for a model; its ancestor is the package its weights come from."""
+    manifest = tomllib.loads((root / "models" / pinned.name / "model.toml").read_text(encoding="utf-8"))
+    source = pinned.source if isinstance(pinned, Quantised) else pinned
+    version = pinned.onnx_sha256[:12]
+    return identity("machine-learning-model", f"model:{pinned.name}", pinned.name, version) | {
+        "description": manifest["source"],
+        "scope": "required" if pinned.default else "optional",
+        "hashes": hashes(pinned.onnx_sha256),
+        "licenses": licences(manifest["licence"]),
+        "pedigree": {"ancestors": [archive(source.registry, source.archive)]},
+    }
+
+
+def archive(registry: str, package: Archive) -> dict:
+    """The component for a package as a registry serves it, without a name in the document."""
+    return {
+        "type": "library",
+        "name": package.package,
+        "version": package.version,
+        "hashes": hashes(package.sha256),
+        "purl": purl(registry, package.package, package.version),
+    }
+
+
+def identity(kind: str, name_here: str, name: str, version: str) -> dict:
+    """What every component of the document says."""
+    return {"type": kind, "bom-ref": name_here, "name": name, "version": version}
+
+
+def purl(registry: str, name: str, version: str) -> str:
+    """What a package is called everywhere."""
+    return f"pkg:{registry}/{quote(name)}@{quote(version)}"
+
+
+def hashes(sha256: str) -> list[dict]:
+    """The one sum of a component."""
+    return [{"alg": "SHA-256", "content": sha256}]
+
+
+def licences(expression: str) -> list[dict]:
+    """An SPDX expression, or that nobody has said."""
+    if expression == NOT_STATED:
+        return [{"license": {"name": "not stated"}}]
+    return [{"expression": expression}]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
