@@ -1,6 +1,7 @@
 //! The only place that knows HTTP. One page of routes; every failure leaves as one envelope.
 
 mod access;
+mod blocking;
 mod calibrations;
 mod cors;
 mod crowd;
@@ -8,6 +9,7 @@ mod detect;
 mod envelope;
 mod head;
 mod health;
+mod incoming_trace;
 mod openapi;
 mod problem;
 mod report;
@@ -22,6 +24,8 @@ use axum::{
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
+
+use envelope::Surroundings;
 
 pub use access::Access;
 pub use health::{Phase, Readiness};
@@ -95,14 +99,17 @@ pub fn crowded_router(state: ApiState) -> Router {
 
 /// What holds for every route.
 fn surrounded(router: Router, state: ApiState) -> Router {
-    let metrics = state.metrics.clone();
+    let surroundings = Surroundings {
+        metrics: state.metrics.clone(),
+        tracer: state.options.tracer.clone(),
+    };
     let cors = cors::layer(&state.options.cors_origins);
     let bounded_head = middleware::from_fn_with_state(state, head::within_bounds);
     let router = router
         .layer(bounded_head)
         // Bodies are bounded where they are read.
         .layer(DefaultBodyLimit::disable());
-    envelope::around(router, cors, metrics)
+    envelope::around(router, cors, surroundings)
 }
 
 /// The API page, from files inside the executable; it asks for nothing beyond this server.

@@ -18,6 +18,7 @@ use crate::{
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
     settings::{AccessSettings, CalibrationPlace, LimitSettings, Settings, find_calibrations},
+    telemetry::Tracer,
     tls::Tls,
 };
 
@@ -115,15 +116,17 @@ pub struct App {
     keys: Option<Arc<AccessKeys>>,
     /// The certificate, if there is one.
     tls: Option<Arc<Tls>>,
+    tracer: Tracer,
     state: ApiState,
     settings: Settings,
 }
 
 impl App {
-    /// Starts the workers. No model is loaded yet: [`App::serve`] does that.
+    /// Starts the workers. No model is loaded yet: [`App::serve`] does that. Needs a tokio runtime.
     ///
     /// # Errors
-    /// When the operating system gives no thread, or the keys or the certificate cannot be used.
+    /// When the operating system gives no thread, or the keys, the certificate or the collector cannot
+    /// be used.
     pub fn start(assembly: Assembly, settings: Settings) -> anyhow::Result<Self> {
         let Assembly {
             engine,
@@ -139,10 +142,6 @@ impl App {
             .context("the operating system gives no thread for a worker")?;
         let workers = Arc::new(workers);
         let metrics = Arc::new(Metrics::new()?);
-        metrics
-            .build_info
-            .with_label_values(&[env!("CARGO_PKG_VERSION")])
-            .set(1);
         let readiness = Readiness::default();
         let keys = open_keys(&settings.access)?;
         let tls = match settings.server.tls.clone() {
@@ -155,6 +154,7 @@ impl App {
                 own_machine_only: settings.server.listen.ip().is_loopback(),
             },
         };
+        let tracer = Tracer::start(&settings.traces)?;
         let options = ApiOptions {
             max_body_bytes: settings.server.max_body_bytes,
             max_upload_bytes: settings.limits.max_upload_bytes,
@@ -164,6 +164,7 @@ impl App {
             request_timeout: settings.server.request_timeout,
             access,
             cors_origins: settings.access.cors_origins.clone(),
+            tracer: tracer.clone(),
         };
         let state = ApiState::new(
             Arc::clone(&workers),
@@ -182,6 +183,7 @@ impl App {
             metrics,
             keys,
             tls,
+            tracer,
             state,
             settings,
         })
@@ -191,6 +193,12 @@ impl App {
     #[must_use]
     pub fn readiness(&self) -> Readiness {
         self.readiness.clone()
+    }
+
+    /// What the requests' spans are made with; whoever ends the process shuts it down.
+    #[must_use]
+    pub fn tracer(&self) -> Tracer {
+        self.tracer.clone()
     }
 
     /// Loads every model that is served, and says what is there. Blocks.

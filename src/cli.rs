@@ -69,7 +69,7 @@ impl SettingsFile {
     /// The checked settings, with logging started as they say.
     fn load(&self) -> anyhow::Result<Settings> {
         let settings = settings::load(self.config.as_deref(), settings::environment())?;
-        telemetry::start(&settings.log)?;
+        telemetry::start_logs(&settings.log)?;
         Ok(settings)
     }
 }

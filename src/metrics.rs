@@ -2,10 +2,11 @@
 //! is its help text. Labels come from short fixed lists, never from what a client sends.
 
 mod kind;
+mod process;
 
 use std::{
     collections::BTreeSet,
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use prometheus::{
@@ -13,6 +14,7 @@ use prometheus::{
 };
 
 use kind::Kind;
+use process::Process;
 
 /// Declares the struct, and registers each field under `lookdown_` and its name.
 macro_rules! metrics {
@@ -20,23 +22,22 @@ macro_rules! metrics {
         /// The metrics of one server.
         pub struct Metrics {
             registry: Registry,
-            shown_models: Mutex<BTreeSet<(String, String)>>,
+            /// Apart, as its names have no prefix.
+            process: Registry,
+            shown: Mutex<Shown>,
             $($(#[doc = $help])+ pub $field: $kind,)+
         }
 
         impl Metrics {
-            /// Fresh metrics, all zero.
-            ///
-            /// # Errors
-            /// When a name or a label is not one that Prometheus accepts.
-            pub fn new() -> Result<Self, prometheus::Error> {
+            fn registered() -> Result<Self, prometheus::Error> {
                 let registry = Registry::new_custom(Some("lookdown".to_owned()), None)?;
                 $(
                     let help = concat!($($help),+).trim_start();
                     let $field = <$kind as Kind>::create($name, help, &[$($label),*])?;
                     registry.register(Box::new($field.clone()))?;
                 )+
-                Ok(Self { registry, shown_models: Mutex::default(), $($field,)+ })
+                let (process, shown) = (Registry::new(), Mutex::default());
+                Ok(Self { registry, process, shown, $($field,)+ })
             }
         }
     };
@@ -81,6 +82,8 @@ metrics! {
     model_loads: IntCounterVec = "model_loads_total" ["result"];
     /// Calibrations that serve.
     calibrations: IntGauge = "calibrations" [];
+    /// Always 1; says which calibrations serve, all of them together: equal where equal ones do.
+    calibrations_info: IntGaugeVec = "calibrations_info" ["revision"];
     /// Calibration files whose newest version, or a camera of it, cannot be used.
     calibration_files_broken: IntGauge = "calibration_files_broken" [];
     /// Calibration files read, by whether all of it could be used.
@@ -105,15 +108,33 @@ metrics! {
     build_info: IntGaugeVec = "build_info" ["version"];
 }
 
+/// Rows of info metrics, which go when they are true no more. Its lock is held for as long as one
+/// scrape shows something: another one would add the same.
+#[derive(Default)]
+struct Shown {
+    /// Name and revision.
+    models: BTreeSet<(String, String)>,
+    calibrations: String,
+}
+
 impl Metrics {
+    /// Fresh metrics, all zero.
+    ///
+    /// # Errors
+    /// When a name or a label is not one that Prometheus accepts.
+    pub fn new() -> Result<Self, prometheus::Error> {
+        let metrics = Self::registered()?;
+        let version = [env!("CARGO_PKG_VERSION")];
+        metrics.build_info.with_label_values(&version).set(1);
+        metrics.process.register(Box::new(Process::new()?))?;
+        Ok(metrics)
+    }
+
     /// Shows these models, each by name and revision, and no others, and how many loads came out
     /// how since the start.
     pub fn show_models(&self, models: &[(&str, &str)], loads: &[(&str, u64)]) {
-        let mut shown = self
-            .shown_models
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        shown.retain(|(name, revision)| {
+        let mut shown = self.one_scrape();
+        shown.models.retain(|(name, revision)| {
             let stays = models.contains(&(name, revision));
             if !stays {
                 // It was there, so it can be removed.
@@ -123,25 +144,32 @@ impl Metrics {
         });
         for (name, revision) in models {
             self.model_info.with_label_values(&[name, revision]).set(1);
-            shown.insert(((*name).to_owned(), (*revision).to_owned()));
+            shown
+                .models
+                .insert(((*name).to_owned(), (*revision).to_owned()));
         }
-        // Under the lock, as another scrape would add the same.
         raise(&self.model_loads, loads);
     }
 
-    /// Shows how many calibrations serve, how many files are broken, whether their store can be
-    /// looked at, and how many loads came out how since the start.
+    /// Shows how many calibrations serve and the revision of all of them, how many files are broken,
+    /// whether their store can be looked at, and how many loads came out how since the start.
     pub fn show_calibrations(
         &self,
         serving: usize,
+        revision: &str,
         broken: usize,
         up: bool,
         loads: &[(&str, u64)],
     ) {
-        let _one_scrape = self
-            .shown_models
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut shown = self.one_scrape();
+        if shown.calibrations != revision {
+            // Nothing is shown before the first scrape.
+            let _ = self
+                .calibrations_info
+                .remove_label_values(&[&shown.calibrations]);
+            revision.clone_into(&mut shown.calibrations);
+        }
+        self.calibrations_info.with_label_values(&[revision]).set(1);
         self.calibrations.set(count(serving));
         self.calibration_files_broken.set(count(broken));
         self.calibration_store_up.set(i64::from(up));
@@ -151,10 +179,7 @@ impl Metrics {
     /// Shows how many rigs of how many bytes are in memory, and how many were built and evicted
     /// since the start.
     pub fn show_rig_cache(&self, rigs: usize, bytes: usize, builds: u64, evictions: u64) {
-        let _one_scrape = self
-            .shown_models
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let _one_scrape = self.one_scrape();
         self.rig_cache_rigs.set(count(rigs));
         self.rig_cache_bytes.set(count(bytes));
         raise_to(&self.rig_cache_builds, builds);
@@ -167,8 +192,15 @@ impl Metrics {
     /// When a metric cannot be written.
     pub fn render(&self) -> Result<String, prometheus::Error> {
         let mut text = Vec::new();
-        TextEncoder::new().encode(&self.registry.gather(), &mut text)?;
+        for registry in [&self.registry, &self.process] {
+            TextEncoder::new().encode(&registry.gather(), &mut text)?;
+        }
         Ok(String::from_utf8_lossy(&text).into_owned())
+    }
+
+    fn one_scrape(&self) -> MutexGuard<'_, Shown> {
+        // What is shown is put right by the next scrape.
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -243,6 +275,22 @@ mod tests {
                 "lookdown_model_info{model=\"a\",revision=\"2\"} 1",
                 "lookdown_model_info{model=\"b\",revision=\"1\"} 1",
             ]
+        );
+    }
+
+    #[test]
+    fn of_all_calibrations_together_only_the_revision_of_now_is_shown() {
+        let metrics = Metrics::new().unwrap();
+        for revision in ["a", "a", "b"] {
+            metrics.show_calibrations(2, revision, 0, true, &[("success", 2)]);
+        }
+        let text = metrics.render().unwrap();
+        let shown = text
+            .lines()
+            .filter(|line| line.starts_with("lookdown_calibrations_info"));
+        assert_eq!(
+            shown.collect::<Vec<_>>(),
+            ["lookdown_calibrations_info{revision=\"b\"} 1"]
         );
     }
 }

@@ -20,6 +20,7 @@ mod still_views;
 #[cfg(test)]
 mod test_support;
 mod ticket;
+mod timeline;
 mod worker_pool;
 
 pub use default_models::DefaultModels;
@@ -33,4 +34,5 @@ pub use profile::Profile;
 pub use report::{CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts};
 pub use rig_cache::RigCacheUse;
 pub use ticket::{Priority, Ticket};
+pub use timeline::{Stage, StageSpan, Timeline};
 pub use worker_pool::WorkerPool;

@@ -13,6 +13,7 @@ mod raw;
 mod source;
 mod threads;
 mod tls;
+mod traces;
 
 use std::{
     net::SocketAddr,
@@ -27,6 +28,8 @@ pub use locate::{find_beside_executable, find_calibrations};
 pub use raw::RawSettings;
 pub use source::{environment, load};
 pub use threads::ThreadPlan;
+
+use url::Url;
 
 use crate::{
     access::KeyList, geometry::FieldOfViewReading, inference::Device, server::ConnectionLimits,
@@ -56,6 +59,8 @@ pub struct Settings {
     pub paper: PaperSettings,
     /// What is logged.
     pub log: LogSettings,
+    /// Where traces go.
+    pub traces: TraceSettings,
 }
 
 /// The HTTP server.
@@ -178,4 +183,15 @@ pub enum LogFormat {
     Text,
     /// One JSON object per line.
     Json,
+}
+
+/// Where traces go.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TraceSettings {
+    /// The collector's address for OTLP over HTTP, without `/v1/traces`; `None` for no traces.
+    pub otlp_endpoint: Option<Url>,
+    /// Which share of the requests is traced, 0 to 1, where the caller has not chosen.
+    pub sample_ratio: f64,
+    /// The name under which the traces appear.
+    pub service_name: String,
 }

@@ -1,29 +1,12 @@
-//! Logs, on standard error: standard output belongs to reports.
+//! What operators get to see of a running server beside its metrics: logs and traces.
 
-use std::io::IsTerminal;
+mod collector;
+mod incoming;
+mod logs;
+mod request_trace;
+mod tracer;
 
-use tracing_subscriber::{EnvFilter, fmt, util::TryInitError};
-
-use crate::settings::{LogFormat, LogSettings};
-
-/// Starts logging, and has panics logged like everything else.
-///
-/// # Errors
-/// When logging was already started in this process.
-pub fn start(settings: &LogSettings) -> Result<(), TryInitError> {
-    use tracing_subscriber::util::SubscriberInitExt;
-
-    let logs = fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_env_filter(EnvFilter::new(&settings.filter));
-    match settings.format {
-        LogFormat::Text => logs.finish().try_init()?,
-        LogFormat::Json => logs.json().flatten_event(true).finish().try_init()?,
-    }
-    std::panic::set_hook(Box::new(|panic| {
-        let thread = std::thread::current();
-        tracing::error!(thread = thread.name().unwrap_or("unnamed"), "{panic}");
-    }));
-    Ok(())
-}
+pub use incoming::IncomingTrace;
+pub use logs::{log_subscriber, start_logs};
+pub use request_trace::RequestTrace;
+pub use tracer::{Tracer, TracerError};

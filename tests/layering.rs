@@ -60,6 +60,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
             "inference",
             "pipeline",
             "metrics",
+            "telemetry",
         ],
     ),
     (
@@ -104,7 +105,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 18] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 22] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -128,9 +129,13 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 18] = [
     ("plotters", &["evaluation"]),
     ("config", &["settings"]),
     ("object_store", &["calibration"]),
-    ("rustls", &["calibration", "tls"]),
+    ("rustls", &["calibration", "telemetry", "tls"]),
     ("tokio_rustls", &["tls"]),
     ("x509_cert", &["tls"]),
+    ("reqwest", &["telemetry"]),
+    ("opentelemetry", &["telemetry"]),
+    ("opentelemetry_sdk", &["telemetry"]),
+    ("opentelemetry_otlp", &["telemetry"]),
     ("prometheus", &["metrics"]),
 ];
 

@@ -44,7 +44,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 44, "a key is missing from {example}");
+    assert_eq!(stated.count(), 47, "a key is missing from {example}");
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 30] = [
+const UNUSABLE: [(&str, &str, &str, &str); 34] = [
     (
         "SERVER__LISTEN",
         "localhost",
@@ -347,6 +347,30 @@ const UNUSABLE: [(&str, &str, &str, &str); 30] = [
         "log.filter",
         "lookdown=debug",
     ),
+    (
+        "TELEMETRY__OTLP_ENDPOINT",
+        "127.0.0.1:4318",
+        "telemetry.otlp_endpoint",
+        "http://127.0.0.1:4318",
+    ),
+    (
+        "TELEMETRY__OTLP_ENDPOINT",
+        "grpc://collector:4317",
+        "telemetry.otlp_endpoint",
+        "http://127.0.0.1:4318",
+    ),
+    (
+        "TELEMETRY__SAMPLE_RATIO",
+        "1.5",
+        "telemetry.sample_ratio",
+        "from 0 to 1",
+    ),
+    (
+        "TELEMETRY__SERVICE_NAME",
+        " ",
+        "telemetry.service_name",
+        "give a name",
+    ),
 ];
 
 #[test]
@@ -502,4 +526,19 @@ fn keys_and_origins_are_checked_and_a_key_in_the_wrong_place_is_not_repeated() {
     let settings = from_environment("LOOKDOWN__ACCESS__CORS_ORIGINS", origins).unwrap();
     let expected = ["https://a.example", "http://localhost:3000"];
     assert_eq!(settings.access.cors_origins, expected);
+}
+
+#[test]
+fn a_collector_s_address_with_credentials_is_refused_without_repeating_them() {
+    let endpoint = "LOOKDOWN__TELEMETRY__OTLP_ENDPOINT";
+    let message = refusal(from_environment(
+        endpoint,
+        "https://us:hidden@collector.example",
+    ));
+    assert!(message.contains("OTEL_EXPORTER_OTLP_HEADERS"), "{message}");
+    assert!(!message.contains("hidden"), "{message}");
+    let settings = from_environment(endpoint, "https://collector.example/otlp").unwrap();
+    let told = settings.traces.otlp_endpoint.unwrap();
+    assert_eq!(told.as_str(), "https://collector.example/otlp");
+    assert_eq!(defaults().traces.otlp_endpoint, None);
 }

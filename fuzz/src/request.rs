@@ -26,6 +26,7 @@ use lookdown::{
     },
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    telemetry::Tracer,
 };
 use tokio::runtime::{self, Runtime};
 use tower::ServiceExt;
@@ -148,6 +149,7 @@ fn router() -> Router {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
+            tracer: Tracer::default(),
         },
     ))
 }

@@ -15,7 +15,6 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use tokio::task::spawn_blocking;
 
 use self::{
     address::{CalibrationAddress, NewCalibrationAddress},
@@ -26,6 +25,7 @@ use self::{
 use super::{
     ApiState,
     access::{Administrator, Reader},
+    blocking::blocking,
     openapi::{ChangeProblems, DeleteProblems, ReadProblems, UnknownCalibrationProblem},
     problem::{Problem, ProblemKind},
 };
@@ -167,11 +167,4 @@ fn unknown(state: &ApiState, id: &crate::calibration::CalibrationId) -> Problem 
         None => ChangeError::Unknown { id: id.clone() }.to_string(),
     };
     Problem::new(ProblemKind::UnknownCalibration, detail)
-}
-
-/// Stores are read and written off the async runtime.
-async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, ChangeError> + Send + 'static,
-) -> Result<T, Problem> {
-    Ok(spawn_blocking(work).await.map_err(Problem::internal)??)
 }

@@ -1,6 +1,6 @@
 //! One frame in, its persons out.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::{
     Extension, Json,
@@ -21,6 +21,7 @@ use super::{
 use crate::{
     metrics::Metrics,
     pipeline::{DetectJob, DetectParameters, Detected, DetectionReport, Ticket},
+    telemetry::RequestTrace,
 };
 
 /// `C_t` of requests that name none.
@@ -56,15 +57,21 @@ pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-tim
 pub(super) async fn detect_persons(
     State(state): State<ApiState>,
     Extension(request_id): Extension<RequestId>,
+    Extension(trace): Extension<RequestTrace>,
     upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
     let (began, server_limit) = (upload.began, state.options.request_timeout);
+    trace.stage("upload", began.into_std(), upload.arrived);
     let job = job(upload, &request_id)?;
     let own_limit = job.parameters.timeout.filter(|own| *own < server_limit);
     let deadline = began + own_limit.unwrap_or(server_limit);
-    let Detected { report, .. } = timeout_at(deadline, state.workers.detect(job))
-        .await
-        .map_err(|_| timed_out(own_limit, server_limit))??;
+    let timeline = job.ticket.timeline.clone();
+    let outcome = timeout_at(deadline, state.workers.detect(job)).await;
+    for span in timeline.spans(Instant::now()) {
+        trace.stage(span.stage.name(), span.began, span.ended);
+    }
+    let Detected { report, .. } = outcome.map_err(|_| timed_out(own_limit, server_limit))??;
+    describe(&trace, &report);
     record(&state.metrics, &report);
     let report = Report::from(&report);
     let timing = server_timing(&report.timings_ms);
@@ -94,6 +101,21 @@ fn timed_out(own_limit: Option<Duration>, server_limit: Duration) -> Problem {
          a time, or raise {whose}"
     );
     Problem::new(ProblemKind::Timeout, detail)
+}
+
+/// What may explain how long a frame took.
+fn describe(trace: &RequestTrace, report: &DetectionReport) {
+    trace.note("lookdown.camera", report.camera.clone());
+    trace.note("lookdown.calibration", report.calibration.id.clone());
+    trace.note("lookdown.model", report.model.name.clone());
+    trace.note("lookdown.profile", report.profile.name());
+    for (key, count) in [
+        ("lookdown.views", report.views.inferred),
+        ("lookdown.batches", report.batch_count),
+        ("lookdown.persons", report.persons.len()),
+    ] {
+        trace.note(key, i64::try_from(count).unwrap_or(i64::MAX));
+    }
 }
 
 fn record(metrics: &Metrics, report: &DetectionReport) {

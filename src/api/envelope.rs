@@ -13,16 +13,33 @@ use tower_http::{catch_panic::CatchPanicLayer, cors::CorsLayer};
 use tracing::Instrument;
 
 use super::{
+    incoming_trace,
     problem::{Problem, ProblemKind},
     request_id::{self, RequestId},
 };
-use crate::metrics::Metrics;
+use crate::{
+    metrics::Metrics,
+    telemetry::{RequestTrace, Tracer},
+};
 
 /// The route of requests that no route matches.
 const UNMATCHED: &str = "unmatched";
+/// The name under which `log.filter` knows the line that each request gets.
+const ACCESS_LOG: &str = "lookdown::access";
+
+/// Where requests leave their marks.
+#[derive(Clone)]
+pub(super) struct Surroundings {
+    pub(super) metrics: Arc<Metrics>,
+    pub(super) tracer: Tracer,
+}
 
 /// The router inside the envelope. A handler that panics costs its own request only.
-pub(super) fn around(router: Router, cors: Option<CorsLayer>, metrics: Arc<Metrics>) -> Router {
+pub(super) fn around(
+    router: Router,
+    cors: Option<CorsLayer>,
+    surroundings: Surroundings,
+) -> Router {
     let router = router.layer(CatchPanicLayer::custom(|_| {
         Problem::fault().into_response()
     }));
@@ -30,10 +47,14 @@ pub(super) fn around(router: Router, cors: Option<CorsLayer>, metrics: Arc<Metri
         Some(cors) => router.layer(cors),
         None => router,
     };
-    router.layer(middleware::from_fn_with_state(metrics, wrap))
+    router.layer(middleware::from_fn_with_state(surroundings, wrap))
 }
 
-async fn wrap(State(metrics): State<Arc<Metrics>>, mut request: Request, next: Next) -> Response {
+async fn wrap(
+    State(Surroundings { metrics, tracer }): State<Surroundings>,
+    mut request: Request,
+    next: Next,
+) -> Response {
     let started = Instant::now();
     let request_id = RequestId::of(request.headers());
     let method = method_label(request.method());
@@ -41,13 +62,24 @@ async fn wrap(State(metrics): State<Arc<Metrics>>, mut request: Request, next: N
     let route = request.extensions().get::<MatchedPath>().cloned();
     let route = route.as_ref().map_or(UNMATCHED, MatchedPath::as_str);
     request.extensions_mut().insert(request_id.clone());
+    let trace = incoming_trace::begin(&tracer, format!("{method} {route}"), request.headers());
+    request.extensions_mut().insert(trace.clone());
 
-    let span = tracing::info_span!("request", id = request_id.as_str(), method, route);
+    // Of the highest level, so that no filter which shows a line hides whose it is.
+    let span = tracing::error_span!(
+        "request",
+        request_id = request_id.as_str(),
+        trace_id = trace.id().map(tracing::field::display),
+        method,
+        route
+    );
     let mut response = next.run(request).instrument(span.clone()).await;
     let _in_request = span.enter();
+    let mut reason = None;
     if let Some(problem) = problem_in(&mut response, method, &path) {
-        let reason = problem.kind().name();
-        metrics.failures.with_label_values(&[reason]).inc();
+        let name = problem.kind().name();
+        reason = Some(name);
+        metrics.failures.with_label_values(&[name]).inc();
         if let Some(cause) = problem.cause() {
             tracing::error!("{cause:#}");
         }
@@ -64,10 +96,35 @@ async fn wrap(State(metrics): State<Arc<Metrics>>, mut request: Request, next: N
         .http_request_duration
         .with_label_values(&[route, method])
         .observe(elapsed);
-    tracing::debug!(status = status.as_u16(), seconds = elapsed, "answered");
+    log_answer(status, elapsed, reason);
+    trace.note("http.request.method", method);
+    trace.note("http.route", route.to_owned());
+    trace.note("http.response.status_code", i64::from(status.as_u16()));
+    trace.note("url.path", path);
+    trace.note("lookdown.request_id", request_id.as_str().to_owned());
+    end(&trace, status, reason);
     let headers = response.headers_mut();
     headers.insert(request_id::HEADER, request_id.header_value());
     response
+}
+
+/// The line that each request gets: on our failures wherever anything is logged, else for who asks.
+fn log_answer(status: StatusCode, seconds: f64, reason: Option<&str>) {
+    let code = status.as_u16();
+    if status.is_server_error() {
+        tracing::info!(target: ACCESS_LOG, status = code, seconds, reason, "answered");
+    } else {
+        tracing::debug!(target: ACCESS_LOG, status = code, seconds, reason, "answered");
+    }
+}
+
+/// Ends the request's span, in which only our own failures are errors.
+fn end(trace: &RequestTrace, status: StatusCode, reason: Option<&'static str>) {
+    if let Some(reason) = reason {
+        trace.note("error.type", reason);
+    }
+    let fault = reason.filter(|_| status.is_server_error());
+    trace.end(fault);
 }
 
 /// The problem a response stands for; failures that the framework answered by itself get one, too.
@@ -152,7 +209,10 @@ mod tests {
         let router = around(
             router.route("/works", get(async || "fine")),
             None,
-            Arc::clone(&metrics),
+            Surroundings {
+                metrics: Arc::clone(&metrics),
+                tracer: Tracer::default(),
+            },
         );
 
         let get = |path| Request::get(path).body(Body::empty()).unwrap();

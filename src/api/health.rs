@@ -206,5 +206,5 @@ fn show_calibrations(state: &ApiState) {
     let up = health.store_problem.is_none();
     state
         .metrics
-        .show_calibrations(health.serving, files.len(), up, &loads);
+        .show_calibrations(health.serving, &health.revision, files.len(), up, &loads);
 }

@@ -9,12 +9,12 @@ use axum::{
     extract::{Path, State},
 };
 use serde::Serialize;
-use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
 
 use super::{
     ApiState,
     access::{Administrator, ModelReader},
+    blocking::blocking,
     openapi::{IndexProblems, LoadProblems},
     problem::{Problem, ProblemKind},
 };
@@ -80,7 +80,7 @@ pub(super) async fn index(
     body: Body,
 ) -> Result<Json<Vec<RepositoryEntry>>, Problem> {
     let IndexRequest { ready } = read(&state, body).await?;
-    let rows = blocking(move || Ok(state.models.rows())).await?;
+    let rows = blocking(move || Ok::<_, Problem>(state.models.rows())).await?;
     let rows = rows
         .into_iter()
         .filter(|row| !ready || row.revision.is_some());
@@ -141,13 +141,6 @@ pub(super) async fn unload(
         revision: None,
         reason: None,
     })))
-}
-
-/// Files are read and networks run off the async runtime.
-async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, RepositoryError> + Send + 'static,
-) -> Result<T, Problem> {
-    Ok(spawn_blocking(work).await.map_err(Problem::internal)??)
 }
 
 impl From<RepositoryError> for Problem {

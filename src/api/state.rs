@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use super::{Access, Readiness, problem::ProblemKind, upload::UploadBudget};
 use crate::{
     calibration::Calibrations, inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool,
+    telemetry::Tracer,
 };
 
 /// Who may do what, and what a request may cost.
@@ -26,6 +27,8 @@ pub struct ApiOptions {
     pub access: Access,
     /// Origins of web pages that may call the server from a browser.
     pub cors_origins: Vec<String>,
+    /// Makes the spans of requests.
+    pub tracer: Tracer,
 }
 
 /// What the handlers share. Clones are cheap.

@@ -56,7 +56,15 @@ async fn serve(settings: Settings) -> anyhow::Result<()> {
     let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
     let sockets = Sockets::bind(&settings.server).await?;
     let app = start(settings).await?;
-    app.serve(sockets, shutdown).await
+    let (tracer, at_once) = (app.tracer(), shutdown.clone());
+    let outcome = app.serve(sockets, shutdown).await;
+    let last_spans = spawn_blocking(move || tracer.shut_down());
+    tokio::select! {
+        biased;
+        () = at_once.requested_at_once() => {}
+        _ = last_spans => {}
+    }
+    outcome
 }
 
 async fn check(settings: Settings) -> anyhow::Result<()> {

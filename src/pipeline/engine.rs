@@ -12,7 +12,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub use self::observation::Observation;
 use super::{
     BatchOptions, DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person,
-    PipelineError, Profile, StageTimings, merge,
+    PipelineError, Profile, Stage, StageTimings, merge,
     network::Network,
     report::ModelUsed,
     rig_cache::RigCache,
@@ -101,9 +101,11 @@ impl Engine {
     /// [`PipelineError`], by who is at fault.
     pub fn detect(&self, job: &DetectJob) -> Result<Detected, PipelineError> {
         let observation = self.observe(job)?;
-        let refining = Instant::now();
+        let timeline = &job.ticket.timeline;
         let parameters = &job.parameters;
+        timeline.enter(Stage::Refine, Instant::now());
         let persons = self.persons(&observation, &parameters.refinement);
+        timeline.leave(Instant::now());
         let views = observation.view_counts();
         let calibration = observation.camera.used;
         let report = DetectionReport {
@@ -128,9 +130,8 @@ impl Engine {
             batch_count: observation.batch_count,
             non_finite: observation.non_finite,
             timings: StageTimings {
-                refine: observation.timings.refine + refining.elapsed(),
                 total: job.arrived.elapsed(),
-                ..observation.timings
+                ..timeline.timings()
             },
             warnings: observation.warnings,
         };
@@ -145,12 +146,14 @@ impl Engine {
     /// # Errors
     /// [`PipelineError`], by who is at fault.
     pub fn observe(&self, job: &DetectJob) -> Result<Observation, PipelineError> {
-        let started = Instant::now();
+        let timeline = &job.ticket.timeline;
+        timeline.enter(Stage::Queue, job.arrived);
+        timeline.enter(Stage::Decode, Instant::now());
         let model = self.model(&job.parameters)?;
         let decoded = decode(&job.image, &self.options.decode_limits)?;
         let frame = Arc::new(decoded.frame);
         check_size(&frame)?;
-        let decoded_at = Instant::now();
+        timeline.enter(Stage::Calibrate, Instant::now());
 
         let mut warnings = Vec::new();
         if decoded.orientation_applied {
@@ -161,7 +164,7 @@ impl Engine {
             );
         }
         let camera = self.camera(job, &frame, &model, &mut warnings)?;
-        let calibrated_at = Instant::now();
+        timeline.enter(Stage::Queue, Instant::now());
 
         let mut observation = Observation {
             profile: job.parameters.profile,
@@ -169,12 +172,7 @@ impl Engine {
             still_views: 0,
             batch_count: 0,
             non_finite: 0,
-            timings: StageTimings {
-                decode: decoded_at - started,
-                calibrate: calibrated_at - decoded_at,
-                queue: started.saturating_duration_since(job.arrived),
-                ..StageTimings::default()
-            },
+            timeline: timeline.clone(),
             frame,
             camera,
             model,
@@ -188,7 +186,7 @@ impl Engine {
             self.seen_before(job, &observation),
         );
         observation.take_in(&[first])?;
-        let closer = self.closer(job, &mut observation);
+        let closer = self.closer(job, &observation);
         observation.take_in(&closer)?;
         Ok(observation)
     }

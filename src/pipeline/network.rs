@@ -108,6 +108,8 @@ impl Drop for Network {
 fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
     let mut batch = ViewBatch::default();
     while let Some(claims) = queue.next_batch() {
+        // As with all that cannot be divided: it belongs to the frame whose view was next.
+        let _in_request = claims[0].task.request.enter();
         let look = || run::look(&claims, session, remappers, &mut batch);
         match catch_unwind(AssertUnwindSafe(look)) {
             Ok(Ok(run)) => run.hand_out(&claims),

@@ -1,6 +1,9 @@
-//! What a frame brings to every queue: its turn, and whether anybody still waits for it.
+//! What a frame brings to every queue: its turn, whether anybody still waits for it, and when it was
+//! where.
 
 use tokio_util::sync::CancellationToken;
+
+use super::Timeline;
 
 /// Who goes first: 1 before 9. Frames of one priority are served in the order of their arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -34,6 +37,8 @@ pub struct Ticket {
     pub priority: Priority,
     /// Cancelled as soon as nobody waits for the report: what has not begun never will.
     pub withdrawn: CancellationToken,
+    /// When it was in which stage.
+    pub timeline: Timeline,
 }
 
 impl Ticket {

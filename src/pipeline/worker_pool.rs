@@ -14,7 +14,7 @@ use std::{
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 use super::{
-    DetectJob, Detected, Engine, PipelineError, error::internal, frame_queue::FrameQueue,
+    DetectJob, Detected, Engine, PipelineError, Stage, error::internal, frame_queue::FrameQueue,
     service_rate::ServiceRate,
 };
 
@@ -24,6 +24,8 @@ type Answer = Result<Detected, PipelineError>;
 struct Entry {
     job: DetectJob,
     answer: oneshot::Sender<Answer>,
+    /// Whose log lines are those of the work.
+    request: tracing::Span,
     /// Travels with the work: a place is free again when the work has ended, not when its client
     /// has left.
     place: OwnedSemaphorePermit,
@@ -96,7 +98,13 @@ impl WorkerPool {
         let (answer, waiting) = oneshot::channel();
         self.shared.rate().began(Instant::now());
         let priority = job.ticket.priority;
-        let entry = Entry { job, answer, place };
+        job.ticket.timeline.enter(Stage::Queue, job.arrived);
+        let entry = Entry {
+            job,
+            answer,
+            request: tracing::Span::current(),
+            place,
+        };
         let queued = self.shared.queue.push(priority, entry);
         queued.map_err(|_| PipelineError::ShuttingDown)?;
         waiting
@@ -148,7 +156,14 @@ impl WorkerPool {
 impl Shared {
     /// What a worker does until the queue is closed and empty.
     fn work(&self) {
-        while let Some(Entry { job, answer, place }) = self.queue.pop() {
+        while let Some(entry) = self.queue.pop() {
+            let Entry {
+                job,
+                answer,
+                request,
+                place,
+            } = entry;
+            let _in_request = request.enter();
             if job.ticket.withdrawn.is_cancelled() {
                 self.withdrawn.fetch_add(1, Ordering::Relaxed);
                 drop((job, place));

@@ -80,6 +80,7 @@ impl TryFrom<RawSettings> for Settings {
                 )?,
             },
             log: log(raw.log)?,
+            traces: raw.telemetry.try_into()?,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{access::RawAccess, locate, tls::RawTls};
+use super::{access::RawAccess, locate, tls::RawTls, traces::RawTelemetry};
 
 const MEBIBYTE: u64 = 1024 * 1024;
 
@@ -19,6 +19,7 @@ pub struct RawSettings {
     pub(super) limits: RawLimits,
     pub(super) paper: RawPaper,
     pub(super) log: RawLog,
+    pub(super) telemetry: RawTelemetry,
 }
 
 /// Table `server`.

@@ -17,6 +17,7 @@ use lookdown::{
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    telemetry::Tracer,
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -49,6 +50,7 @@ pub(crate) struct Bounds {
     pub(crate) request_timeout: Duration,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
+    pub(crate) tracer: Tracer,
 }
 
 impl Default for Bounds {
@@ -62,6 +64,7 @@ impl Default for Bounds {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
+            tracer: Tracer::default(),
         }
     }
 }
@@ -202,6 +205,7 @@ impl Service {
                 request_timeout: bounds.request_timeout,
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),
+                tracer: bounds.tracer.clone(),
             },
         );
         Self {

@@ -26,6 +26,7 @@ use lookdown::{
     inference::{ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    telemetry::Tracer,
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -78,6 +79,7 @@ fn service(folder: &Path) -> Router {
             own_machine_only: true,
         },
         cors_origins: Vec::new(),
+        tracer: Tracer::default(),
     };
     let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
     let calibrations = Calibrations::open(Box::new(store), false).unwrap();

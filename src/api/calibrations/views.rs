@@ -2,7 +2,6 @@
 
 use axum::{Json, extract::State, http::Uri};
 use serde::Serialize;
-use tokio::task::spawn_blocking;
 use utoipa::ToSchema;
 
 use super::{address::CalibrationAddress, unknown};
@@ -10,6 +9,7 @@ use crate::{
     api::{
         ApiState,
         access::Reader,
+        blocking::blocking,
         openapi::ViewsProblems,
         problem::{Problem, ProblemKind},
         upload::parameters_named,
@@ -107,7 +107,7 @@ pub(in crate::api) async fn get_views(
     let entry = calibrations
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
-    let plan = spawn_blocking(move || {
+    let plan = blocking(move || {
         let calibration = &entry.calibration;
         let planned = state.workers.engine().planned_views(calibration, profile)?;
         Ok::<_, Problem>(ViewPlanInfo {
@@ -116,7 +116,7 @@ pub(in crate::api) async fn get_views(
             ..ViewPlanInfo::from(planned)
         })
     });
-    Ok(Json(plan.await.map_err(Problem::internal)??))
+    Ok(Json(plan.await?))
 }
 
 fn unknown_profile(name: &str) -> Problem {

@@ -226,6 +226,7 @@ mod tests {
     fn the_operators_table_has_every_kind_with_its_status_and_title_and_no_other() {
         let text = include_str!("../../../docs/operations.md");
         let (_, section) = text.split_once("\n## Problems\n").unwrap();
+        let (section, _) = section.split_once("\n## ").unwrap();
         let rows = section.lines().filter(|line| line.starts_with("| `"));
         let told: Vec<_> = rows
             .map(|row| {

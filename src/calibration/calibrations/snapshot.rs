@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{CalibrationEntry, load::LoadedFile};
-use crate::calibration::CalibrationId;
+use crate::{calibration::CalibrationId, revision::revision_of};
 
 /// All calibrations at one moment; never changed, only replaced.
 #[derive(Debug, Default)]
@@ -14,6 +14,7 @@ pub(super) struct Snapshot {
     /// The files, by the ID in their names.
     pub(super) files: BTreeMap<CalibrationId, Arc<LoadedFile>>,
     by_id: HashMap<CalibrationId, Arc<CalibrationEntry>>,
+    revision: String,
     /// Why the store could not be looked at, if it could not.
     pub(super) store_problem: Option<String>,
 }
@@ -36,6 +37,8 @@ pub struct CalibrationRow {
 pub struct CalibrationsHealth {
     /// How many serve.
     pub serving: usize,
+    /// Changes whenever any of those that serve does; equal where equal ones serve.
+    pub revision: String,
     /// Files whose newest version cannot be used, by name, and why.
     pub problems: Vec<(String, String)>,
     /// Why the store could not be looked at, if it could not.
@@ -62,6 +65,7 @@ impl Snapshot {
             }
         }
         Self {
+            revision: revision_of_all(&by_id),
             files,
             by_id,
             store_problem: None,
@@ -73,6 +77,7 @@ impl Snapshot {
         Self {
             files: self.files.clone(),
             by_id: self.by_id.clone(),
+            revision: self.revision.clone(),
             store_problem: Some(problem),
         }
     }
@@ -129,9 +134,20 @@ impl Snapshot {
         });
         CalibrationsHealth {
             serving: self.by_id.len(),
+            revision: self.revision.clone(),
             problems: problems.collect(),
             store_problem: self.store_problem.clone(),
             ..CalibrationsHealth::default()
         }
     }
+}
+
+/// One revision for all calibrations, whatever order they are in.
+fn revision_of_all(by_id: &HashMap<CalibrationId, Arc<CalibrationEntry>>) -> String {
+    let mut all: Vec<_> = by_id
+        .iter()
+        .map(|(id, entry)| format!("{id} {}\n", entry.calibration.revision()))
+        .collect();
+    all.sort_unstable();
+    revision_of(all.concat().as_bytes())
 }

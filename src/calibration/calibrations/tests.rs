@@ -83,12 +83,14 @@ fn a_broken_new_version_leaves_the_old_one_serving_until_it_is_mended() {
     fs::write(&file, content("lobby", 190.0)).unwrap();
     let calibrations = open(folder.path());
     let good = revision(&calibrations, "lobby");
+    let all_good = calibrations.health().revision;
     for broken in ["{", &content("lobby", -1.0), &content("yard", 190.0)] {
         fs::write(&file, broken).unwrap();
         calibrations.refresh();
         assert_eq!(revision(&calibrations, "lobby"), good, "{broken}");
         let health = calibrations.health();
         assert_eq!((health.serving, health.problems.len()), (1, 1), "{broken}");
+        assert_eq!(health.revision, all_good, "{broken}");
         assert_eq!(health.problems[0].0, "lobby.json");
     }
     let failed = calibrations.health().loads_failed;
@@ -97,6 +99,7 @@ fn a_broken_new_version_leaves_the_old_one_serving_until_it_is_mended() {
     fs::write(&file, content("lobby", 201.125)).unwrap();
     calibrations.refresh();
     assert_ne!(revision(&calibrations, "lobby"), good);
+    assert_ne!(calibrations.health().revision, all_good);
     assert_eq!(calibrations.health().problems, []);
 }
 

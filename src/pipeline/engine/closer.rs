@@ -5,25 +5,22 @@ use std::{sync::Arc, time::Instant};
 use super::{Engine, Observation};
 use crate::{
     geometry::zoom::zoomed_views,
-    pipeline::{DetectJob, merge, network::LookTask},
+    pipeline::{DetectJob, Stage, merge, network::LookTask},
 };
 
 impl Engine {
     /// Queues closer looks at whatever may be a person, where the profile has them: by the model that
     /// looked first, or half by it and half by another, if the request leaves the choice.
-    pub(super) fn closer(
-        &self,
-        job: &DetectJob,
-        observation: &mut Observation,
-    ) -> Vec<Arc<LookTask>> {
+    pub(super) fn closer(&self, job: &DetectJob, observation: &Observation) -> Vec<Arc<LookTask>> {
         let profile = observation.profile;
         let Some(closer) = profile.closer_look() else {
             return Vec::new();
         };
-        let started = Instant::now();
+        let timeline = &job.ticket.timeline;
+        timeline.enter(Stage::Refine, Instant::now());
         let back_projection = profile.back_projection();
         let outlines = merge::outlines(&observation.looks, back_projection, &closer.first_look);
-        let placed = Instant::now();
+        timeline.enter(Stage::Remap, Instant::now());
         let mut models = vec![Arc::clone(&observation.model)];
         if job.parameters.model.is_none() {
             let second = self.options.default_models.second_opinion(profile);
@@ -45,9 +42,12 @@ impl Engine {
             let ticket = job.ticket.clone();
             self.network.look(Arc::new(rig), model, frame, ticket, None)
         });
-        let tasks = tasks.collect();
-        observation.timings.refine += placed - started;
-        observation.timings.remap += placed.elapsed();
+        let tasks: Vec<_> = tasks.collect();
+        if tasks.is_empty() {
+            timeline.leave(Instant::now());
+        } else {
+            timeline.enter(Stage::Queue, Instant::now());
+        }
         tasks
     }
 }

@@ -7,7 +7,7 @@ use crate::{
     imaging::Frame,
     inference::Model,
     pipeline::{
-        PipelineError, Profile, StageTimings, ViewCounts,
+        PipelineError, Profile, Stage, StageTimings, Timeline, ViewCounts,
         look::Look,
         network::{LookTask, Work},
     },
@@ -25,7 +25,7 @@ pub struct Observation {
     pub(super) still_views: usize,
     pub(super) batch_count: usize,
     pub(super) non_finite: usize,
-    pub(super) timings: StageTimings,
+    pub(super) timeline: Timeline,
     pub(super) warnings: Vec<String>,
 }
 
@@ -47,8 +47,8 @@ impl Observation {
 
     /// Where the time went so far: `refine` and `total` are still to come.
     #[must_use]
-    pub fn timings(&self) -> &StageTimings {
-        &self.timings
+    pub fn timings(&self) -> StageTimings {
+        self.timeline.timings()
     }
 
     /// The model that looked.
@@ -77,9 +77,9 @@ impl Observation {
         self.non_finite += work.non_finite;
         let span = work.ended.saturating_duration_since(work.began);
         let remap = span.mul_f64(work.remap_share());
-        self.timings.queue += work.began.saturating_duration_since(work.queued);
-        self.timings.remap += remap;
-        self.timings.inference += span.saturating_sub(remap);
+        self.timeline.enter(Stage::Remap, work.began);
+        self.timeline.enter(Stage::Inference, work.began + remap);
+        self.timeline.leave(work.ended);
         Ok(())
     }
 }

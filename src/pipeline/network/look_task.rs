@@ -21,6 +21,8 @@ pub(in crate::pipeline) struct LookTask {
     pub(super) ticket: Ticket,
     /// What the camera saw before, if that may stand in for views in which nothing has moved.
     pub(super) seen_before: Option<Arc<CameraViews>>,
+    /// Whose log lines are those of the work.
+    pub(super) request: tracing::Span,
     pub(super) queued: Instant,
     progress: Mutex<Progress>,
     over: Condvar,
@@ -58,6 +60,7 @@ impl LookTask {
             frame,
             ticket,
             seen_before,
+            request: tracing::Span::current(),
             queued: Instant::now(),
             progress: Mutex::new(Progress {
                 per_view: vec![Vec::new(); views],

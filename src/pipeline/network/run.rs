@@ -135,7 +135,6 @@ impl Run {
             let share = seen.len() as f64 / total as f64;
             let (runs, non_finite) = std::mem::take(&mut undivided);
             let work = Work {
-                queued: claim.task.queued,
                 began: self.began,
                 ended: self.ended,
                 remap: (self.rendered - self.began).mul_f64(share),

@@ -5,8 +5,6 @@ use std::time::{Duration, Instant};
 /// What the network did for a frame, and when.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::pipeline) struct Work {
-    /// When its views were queued.
-    pub(in crate::pipeline) queued: Instant,
     /// When the first of them was begun.
     pub(in crate::pipeline) began: Instant,
     /// When the last of them was done.
@@ -27,7 +25,6 @@ impl Work {
     /// No work at all, as for a rig without views.
     pub(super) fn none(queued: Instant) -> Self {
         Self {
-            queued,
             began: queued,
             ended: queued,
             remap: Duration::ZERO,
@@ -41,7 +38,6 @@ impl Work {
     /// Both together.
     pub(in crate::pipeline) fn and(self, other: Self) -> Self {
         Self {
-            queued: self.queued.min(other.queued),
             began: self.began.min(other.began),
             ended: self.ended.max(other.ended),
             remap: self.remap + other.remap,

@@ -1,0 +1,100 @@
+//! The way to the collector: HTTP, bounded in time, silent but for the first failure of an outage.
+
+use std::{
+    error::Error,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Duration,
+};
+
+use async_trait::async_trait;
+use opentelemetry_http::{Bytes, HttpClient, HttpError, Request, Response};
+use reqwest::{Client, redirect};
+use tokio::runtime::Handle;
+
+/// Longest that one delivery may take.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Most bytes of an answer that are read: collectors have little to say.
+const MAX_ANSWER_BYTES: usize = 64 * 1024;
+
+/// Delivers what the exporter has written.
+#[derive(Debug)]
+pub(super) struct Collector {
+    client: Client,
+    /// The exporter's thread has no runtime of its own.
+    runtime: Handle,
+    is_down: AtomicBool,
+}
+
+impl Collector {
+    /// Sends nothing yet. Needs a tokio runtime.
+    ///
+    /// # Errors
+    /// When the system's certificates cannot be used.
+    pub(super) fn new() -> reqwest::Result<Self> {
+        // Fails when there is one already, which is as good.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+        let client = Client::builder()
+            .timeout(PATIENCE)
+            .redirect(redirect::Policy::none())
+            .build()?;
+        Ok(Self {
+            client,
+            runtime: Handle::current(),
+            is_down: AtomicBool::new(false),
+        })
+    }
+
+    /// Says when an outage begins and ends, once each.
+    fn tell(&self, problem: Option<String>) {
+        let was_down = self.is_down.swap(problem.is_some(), Ordering::Relaxed);
+        match problem {
+            Some(problem) if !was_down => tracing::warn!(
+                "traces cannot be sent, and are lost until they can (telemetry.otlp_endpoint): \
+                 {problem}"
+            ),
+            None if was_down => tracing::info!("traces can be sent again"),
+            _ => {}
+        }
+    }
+}
+
+#[async_trait]
+impl HttpClient for Collector {
+    async fn send_bytes(&self, request: Request<Bytes>) -> Result<Response<Bytes>, HttpError> {
+        let client = self.client.clone();
+        let delivery = self.runtime.spawn(deliver(client, request));
+        // A runtime that has ended cancels it.
+        let delivered = delivery.await.unwrap_or_else(|error| Err(error.into()));
+        self.tell(match &delivered {
+            Ok(answer) if answer.status().is_success() => None,
+            Ok(answer) => Some(format!("the collector answered {}", answer.status())),
+            Err(error) => Some(with_causes(error.as_ref())),
+        });
+        delivered
+    }
+}
+
+async fn deliver(client: Client, request: Request<Bytes>) -> Result<Response<Bytes>, HttpError> {
+    let mut answer = client
+        .execute(request.try_into()?)
+        .await
+        .map_err(reqwest::Error::without_url)?;
+    let mut body = Vec::new();
+    // To the end, so that the connection can be used again.
+    while let Some(chunk) = answer.chunk().await? {
+        if body.len() + chunk.len() > MAX_ANSWER_BYTES {
+            break;
+        }
+        body.extend_from_slice(&chunk);
+    }
+    let mut response = Response::new(body.into());
+    *response.status_mut() = answer.status();
+    Ok(response)
+}
+
+/// The error and why it came to it, in one line.
+fn with_causes(error: &(dyn Error + 'static)) -> String {
+    let causes = std::iter::successors(Some(error), |error| (*error).source());
+    let causes: Vec<_> = causes.map(ToString::to_string).collect();
+    causes.join(": ")
+}

@@ -1,0 +1,47 @@
+//! Logs, on standard error: standard output belongs to reports.
+
+use std::io::IsTerminal;
+
+use tracing::Subscriber;
+use tracing_subscriber::{
+    EnvFilter, fmt,
+    fmt::MakeWriter,
+    util::{SubscriberInitExt, TryInitError},
+};
+
+use crate::settings::{LogFormat, LogSettings};
+
+/// Starts logging, and has panics logged like everything else.
+///
+/// # Errors
+/// When logging was already started in this process.
+pub fn start_logs(settings: &LogSettings) -> Result<(), TryInitError> {
+    let in_colour = std::io::stderr().is_terminal();
+    log_subscriber(settings, std::io::stderr, in_colour).try_init()?;
+    std::panic::set_hook(Box::new(|panic| {
+        let thread = std::thread::current();
+        tracing::error!(thread = thread.name().unwrap_or("unnamed"), "{panic}");
+    }));
+    Ok(())
+}
+
+/// What writes log lines as the settings say. Lines of a request carry what is known of it: in text
+/// before the message, in JSON in the object `span`.
+#[must_use]
+pub fn log_subscriber(
+    settings: &LogSettings,
+    writer: impl for<'writer> MakeWriter<'writer> + Send + Sync + 'static,
+    in_colour: bool,
+) -> Box<dyn Subscriber + Send + Sync> {
+    let logs = fmt()
+        .with_writer(writer)
+        .with_ansi(in_colour)
+        .with_env_filter(EnvFilter::new(&settings.filter));
+    match settings.format {
+        LogFormat::Text => Box::new(logs.finish()),
+        LogFormat::Json => {
+            let logs = logs.json().flatten_event(true).with_span_list(false);
+            Box::new(logs.finish())
+        }
+    }
+}

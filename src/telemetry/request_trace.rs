@@ -1,0 +1,96 @@
+//! One request's place in its trace.
+
+use std::{
+    fmt,
+    time::{Instant, SystemTime},
+};
+
+use opentelemetry::{
+    Context, KeyValue, Value,
+    trace::{Span, SpanBuilder, Status, TraceContextExt, TraceId, Tracer},
+};
+use opentelemetry_sdk::trace::SdkTracer;
+
+/// One request's place in its trace. Clones share it.
+#[derive(Debug, Clone)]
+pub struct RequestTrace {
+    id: Option<TraceId>,
+    recording: Option<Recording>,
+}
+
+#[derive(Debug, Clone)]
+struct Recording {
+    /// Holds the request's span.
+    context: Context,
+    tracer: SdkTracer,
+    /// One moment on both clocks: spans keep their lengths when somebody sets the calendar.
+    moment: (Instant, SystemTime),
+}
+
+impl RequestTrace {
+    /// A request whose spans nobody collects, though its trace may be known.
+    pub(super) fn not_recorded(context: &Context) -> Self {
+        let span = context.span();
+        let told = span.span_context();
+        Self {
+            id: told.is_valid().then(|| told.trace_id()),
+            recording: None,
+        }
+    }
+
+    /// A request whose span is in `context`.
+    pub(super) fn recorded(context: &Context, tracer: &SdkTracer) -> Self {
+        let trace = Self::not_recorded(context);
+        let moment = (Instant::now(), SystemTime::now());
+        let recording = context.span().is_recording().then(|| Recording {
+            context: context.clone(),
+            tracer: tracer.clone(),
+            moment,
+        });
+        Self { recording, ..trace }
+    }
+
+    /// The trace's ID, 32 hexadecimal digits; `None` when the request belongs to no trace.
+    #[must_use]
+    pub fn id(&self) -> Option<impl fmt::Display + use<>> {
+        self.id
+    }
+
+    /// Says something about the request.
+    pub fn note(&self, key: &'static str, value: impl Into<Value>) {
+        if let Some(Recording { context, .. }) = &self.recording {
+            context.span().set_attribute(KeyValue::new(key, value));
+        }
+    }
+
+    /// Tells of a stretch of time within the request.
+    pub fn stage(&self, name: &'static str, began: Instant, ended: Instant) {
+        if let Some(recording) = &self.recording {
+            let span = SpanBuilder::from_name(name).with_start_time(recording.by_calendar(began));
+            let mut span = recording
+                .tracer
+                .build_with_context(span, &recording.context);
+            span.end_with_timestamp(recording.by_calendar(ended));
+        }
+    }
+
+    /// Ends the request's span; `fault` says what went wrong on our side.
+    pub fn end(&self, fault: Option<&'static str>) {
+        if let Some(Recording { context, .. }) = &self.recording {
+            if let Some(fault) = fault {
+                context.span().set_status(Status::error(fault));
+            }
+            context.span().end();
+        }
+    }
+}
+
+impl Recording {
+    fn by_calendar(&self, at: Instant) -> SystemTime {
+        let (moment, by_calendar) = self.moment;
+        match at.checked_duration_since(moment) {
+            Some(later) => by_calendar + later,
+            None => by_calendar - (moment - at),
+        }
+    }
+}

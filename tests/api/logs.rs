@@ -1,0 +1,132 @@
+//! Whatever is logged within a request says whose it is, on whichever thread.
+
+use std::{
+    io::{self, Write},
+    sync::{Mutex, OnceLock},
+};
+
+use axum::{body::Body, http::Request};
+use lookdown::{
+    settings::{LogFormat, LogSettings},
+    telemetry::log_subscriber,
+};
+use serde_json::Value;
+
+use crate::service::{FRAME_SIDE, Service, frame};
+
+const TRACE: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
+
+/// What all tests of this process log.
+#[derive(Clone, Copy)]
+struct Log(&'static Mutex<Vec<u8>>);
+
+impl Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Log {
+    fn start() -> Self {
+        static LOG: OnceLock<Log> = OnceLock::new();
+        *LOG.get_or_init(|| {
+            let log = Self(Box::leak(Box::default()));
+            let settings = LogSettings {
+                format: LogFormat::Json,
+                filter: "info,lookdown::access=debug".to_owned(),
+            };
+            let subscriber = log_subscriber(&settings, move || log, false);
+            tracing::subscriber::set_global_default(subscriber).unwrap();
+            let usual = std::panic::take_hook();
+            std::panic::set_hook(Box::new(move |panic| {
+                tracing::error!("{panic}");
+                usual(panic);
+            }));
+            log
+        })
+    }
+
+    /// The lines of a request; those of others must be JSON, too.
+    fn of(self, request_id: &str) -> Vec<Value> {
+        let text = String::from_utf8(self.0.lock().unwrap().clone()).unwrap();
+        let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
+        lines
+            .filter(|line: &Value| line["span"]["request_id"] == request_id)
+            .collect()
+    }
+}
+
+fn request(method: &str, path: &str, id: &str, body: Vec<u8>) -> Request<Body> {
+    Request::builder()
+        .method(method)
+        .uri(path)
+        .header("x-request-id", id)
+        .header("traceparent", format!("00-{TRACE}-00f067aa0ba902b7-00"))
+        .body(body.into())
+        .unwrap()
+}
+
+fn levels(lines: &[Value]) -> Vec<&str> {
+    lines
+        .iter()
+        .map(|line| line["level"].as_str().unwrap())
+        .collect()
+}
+
+#[tokio::test]
+async fn a_panic_far_from_the_request_is_logged_with_its_ids_and_once_more_as_its_answer() {
+    let log = Log::start();
+    let service = Service::start();
+    service.gate.panic_once();
+    let path = "/detect?calibration=lobby&profile=fast";
+    let answer = service.send(request("POST", path, "panics", frame())).await;
+    assert_eq!(answer.status, 500);
+    let lines = log.of("panics");
+    assert_eq!(levels(&lines), ["ERROR", "ERROR", "INFO"], "{lines:#?}");
+    for line in &lines {
+        assert_eq!(line["span"]["trace_id"], TRACE, "{line}");
+        assert_eq!(line["span"]["route"], "/detect", "{line}");
+    }
+    let panic = lines[0]["message"].as_str().unwrap();
+    assert!(panic.contains("the secret cause"), "{panic}");
+    assert_eq!(lines[2]["target"], "lookdown::access");
+    assert_eq!(lines[2]["status"], 500);
+    assert_eq!(lines[2]["reason"], "internal");
+    assert!(lines[2]["seconds"].as_f64().unwrap() > 0.0);
+}
+
+#[tokio::test]
+async fn what_a_change_of_a_calibration_logs_belongs_to_its_request() {
+    let log = Log::start();
+    let service = Service::start();
+    let calibration = format!(
+        r#"{{"id": "yard", "image": {{"width": {FRAME_SIDE}, "height": {FRAME_SIDE}}},
+        "lens": {{"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5}},
+        "mount": {{"world_up": [0, 0, -1]}}}}"#
+    );
+    let put = request("PUT", "/calibrations/yard", "puts", calibration.into());
+    let answer = service.send(put).await;
+    assert_eq!(answer.status, 201, "{}", answer.text());
+    let lines = log.of("puts");
+    assert_eq!(levels(&lines), ["INFO", "DEBUG"], "{lines:#?}");
+    assert_eq!(lines[0]["calibration"], "yard");
+    assert_eq!(lines[1]["message"], "answered");
+}
+
+#[tokio::test]
+async fn a_request_of_no_trace_has_no_trace_id() {
+    let log = Log::start();
+    let service = Service::start();
+    let request = Request::get("/livez").header("x-request-id", "no-trace");
+    service.send(request.body(Body::empty()).unwrap()).await;
+    let lines = log.of("no-trace");
+    assert_eq!(levels(&lines), ["DEBUG"], "{lines:#?}");
+    assert_eq!(lines[0]["span"].get("trace_id"), None);
+    assert_eq!(lines[0]["status"], 200);
+    assert_eq!(lines[0].get("reason"), None);
+}
