@@ -4,9 +4,11 @@ use crate::server::{Server, rest_of};
 
 /// A request with so many headers of so many bytes each, beside `Host`.
 fn with_headers(count: usize, bytes: usize) -> String {
-    let headers: String = (0..count)
-        .map(|index| format!("X-{index:03}: {}\r\n", "v".repeat(bytes - 9)))
+    let value = "v".repeat(bytes - 9);
+    let headers: Vec<_> = (0..count)
+        .map(|index| format!("X-{index:03}: {value}\r\n"))
         .collect();
+    let headers = headers.concat();
     format!("GET /livez HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n{headers}\r\n")
 }
 
@@ -62,8 +64,8 @@ async fn beyond_the_limit_of_connections_probes_are_answered_and_everything_else
     }
     // More than the sockets hold: it must be taken off the client for it to read the answer.
     let large = vec![0; 16 << 20];
-    let head = format!("POST /detect HTTP/1.1\r\nContent-Length: {}", large.len());
-    let refused = server.exchange(&head, large).await.unwrap().unwrap();
+    let post = format!("POST /detect HTTP/1.1\r\nContent-Length: {}", large.len());
+    let refused = server.exchange(&post, large).await.unwrap().unwrap();
     assert!(refused.contains("too-many-connections"), "{refused}");
 
     drop(held);
