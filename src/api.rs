@@ -1,25 +1,32 @@
 //! The only place that knows HTTP. One page of routes; every failure leaves as one envelope.
 
 mod access;
-mod blocking;
 mod calibrations;
 mod cors;
 mod crowd;
+mod deadline;
 mod detect;
 mod envelope;
+mod foreign_pages;
 mod head;
 mod health;
 mod incoming_trace;
 mod openapi;
+mod page_headers;
 mod problem;
+mod rate_limit;
 mod report;
 mod repository;
 mod request_id;
 mod state;
+mod unread;
 mod upload;
 
 use axum::{
-    Router, extract::DefaultBodyLimit, handler::Handler, middleware, response::Redirect,
+    Router,
+    extract::DefaultBodyLimit,
+    middleware::{from_fn_with_state, map_response},
+    response::Redirect,
     routing::get,
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -30,19 +37,22 @@ use envelope::Surroundings;
 pub use access::Access;
 pub use health::{Phase, Readiness};
 pub use openapi::document as openapi_document;
+pub use rate_limit::RequestRate;
 pub use report::Report;
 pub use state::{ApiOptions, ApiState};
 
 /// Every route, with its entry in the OpenAPI document.
 fn routes() -> OpenApiRouter<ApiState> {
-    service_routes().routes(routes!(health::metrics))
+    client_routes()
+        .merge(description())
+        .merge(probes())
+        .merge(metrics())
 }
 
-/// The same without the metrics.
-fn service_routes() -> OpenApiRouter<ApiState> {
+/// The routes that serve clients.
+fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
         .routes(routes!(detect::detect_persons))
-        .merge(probes())
         .routes(routes!(calibrations::list))
         .routes(routes!(
             calibrations::get,
@@ -50,10 +60,13 @@ fn service_routes() -> OpenApiRouter<ApiState> {
             calibrations::delete
         ))
         .routes(routes!(calibrations::views::get_views))
-        .routes(routes!(openapi::openapi_json))
         .routes(routes!(repository::index))
         .routes(routes!(repository::load))
         .routes(routes!(repository::unload))
+}
+
+fn description() -> OpenApiRouter<ApiState> {
+    OpenApiRouter::new().routes(routes!(openapi::openapi_json))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {
@@ -62,39 +75,47 @@ fn probes() -> OpenApiRouter<ApiState> {
         .routes(routes!(health::readyz))
 }
 
+fn metrics() -> OpenApiRouter<ApiState> {
+    OpenApiRouter::new().routes(routes!(health::metrics))
+}
+
 /// The whole service.
 pub fn router(state: ApiState) -> Router {
-    let everything = if state.options.metrics_elsewhere {
-        service_routes()
-    } else {
-        routes()
-    };
-    let (router, _document) = everything.split_for_parts();
-    let router = router
-        .with_state(state.clone())
-        .route("/", get(async || Redirect::temporary("docs/")))
-        .merge(api_page());
-    surrounded(router, state)
+    let clients = Router::from(client_routes())
+        .route_layer(from_fn_with_state(state.clone(), rate_limit::apply))
+        .route_layer(from_fn_with_state(state.clone(), foreign_pages::refuse));
+    let router = clients
+        .merge(Router::from(description()))
+        .merge(operation(state.options.metrics_elsewhere));
+    surrounded(router.with_state(state.clone()).merge(pages()), state)
 }
 
 /// What is there for operators alone, on a port of its own: metrics and probes.
 pub fn operation_router(state: ApiState) -> Router {
-    let (router, _document) = probes().routes(routes!(health::metrics)).split_for_parts();
-    surrounded(router.with_state(state.clone()), state)
+    surrounded(operation(false).with_state(state.clone()), state)
 }
 
 /// What answers a connection beyond the limit: probes as ever, and metrics where they are; everything
 /// else is refused.
 pub fn crowded_router(state: ApiState) -> Router {
-    let answered = if state.options.metrics_elsewhere {
-        probes()
+    let router = operation(state.options.metrics_elsewhere).with_state(state.clone());
+    surrounded(router.fallback(crowd::refuse), state)
+}
+
+fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
+    if metrics_elsewhere {
+        probes().into()
     } else {
-        probes().routes(routes!(health::metrics))
-    };
-    let (router, _document) = answered.split_for_parts();
-    let refuse = crowd::refuse.with_state(state.clone());
-    let router = router.with_state(state.clone());
-    surrounded(router.fallback_service(refuse), state)
+        probes().merge(metrics()).into()
+    }
+}
+
+/// What people look at.
+fn pages() -> Router {
+    Router::new()
+        .route("/", get(async || Redirect::temporary("docs/")))
+        .merge(api_page())
+        .route_layer(map_response(page_headers::of_page))
 }
 
 /// What holds for every route.
@@ -104,12 +125,12 @@ fn surrounded(router: Router, state: ApiState) -> Router {
         tracer: state.options.tracer.clone(),
     };
     let cors = cors::layer(&state.options.cors_origins);
-    let bounded_head = middleware::from_fn_with_state(state, head::within_bounds);
     let router = router
-        .layer(bounded_head)
+        .layer(from_fn_with_state(state.clone(), head::within_bounds))
         // Bodies are bounded where they are read.
-        .layer(DefaultBodyLimit::disable());
-    envelope::around(router, cors, surroundings)
+        .layer(DefaultBodyLimit::disable())
+        .layer(from_fn_with_state(state, unread::discard));
+    envelope::around(router, cors, surroundings).layer(map_response(page_headers::of_answer))
 }
 
 /// The API page, from files inside the executable; it asks for nothing beyond this server.

@@ -10,7 +10,7 @@ use anyhow::Context;
 
 use crate::{
     access::AccessKeys,
-    api::{Access, ApiOptions, ApiState, Readiness},
+    api::{Access, ApiOptions, ApiState, Readiness, RequestRate},
     calibration::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     imaging::decode::DecodeLimits,
     inference::ModelRepository,
@@ -162,6 +162,11 @@ impl App {
             max_headers: settings.server.connections.max_headers,
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
+            min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
+            request_rate: settings.limits.request_rate.map(|rate| RequestRate {
+                per_second: rate.per_second,
+                burst: rate.burst,
+            }),
             access,
             cors_origins: settings.access.cors_origins.clone(),
             tracer: tracer.clone(),

@@ -13,7 +13,10 @@ use hyper::{
     Request, Response,
     body::{Body, Incoming},
 };
-use tokio::{net::TcpListener, task::JoinSet};
+use tokio::{
+    net::{TcpListener, TcpStream},
+    task::JoinSet,
+};
 use tower::{BoxError, Service};
 
 use self::{
@@ -41,7 +44,8 @@ pub struct ConnectionLimits {
     pub max_headers: usize,
 }
 
-/// What answers.
+/// What answers. Each request carries the address of its client, a [`std::net::SocketAddr`], among its
+/// extensions.
 #[derive(Debug, Clone)]
 pub struct Services<S> {
     /// What answers within the limit of connections.
@@ -70,7 +74,7 @@ pub async fn serve<S, B>(
     let mut acceptor = Acceptor::new(listener);
     let places = Places::new(limits.max_connections, metrics);
     let mut connections = JoinSet::new();
-    let serve_on = |stream, place: Place| {
+    let serve_on = |stream: TcpStream, place: Place| {
         let service = if place.is_regular {
             services.regular.clone()
         } else {
@@ -79,6 +83,7 @@ pub async fn serve<S, B>(
         let rules = Rules {
             limits: limits.clone(),
             one_request_only: !place.is_regular,
+            client: stream.peer_addr().ok(),
             shutdown: shutdown.clone(),
         };
         let tls = tls.cloned();

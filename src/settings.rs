@@ -17,7 +17,7 @@ mod traces;
 
 use std::{
     net::SocketAddr,
-    num::{NonZeroU64, NonZeroUsize},
+    num::{NonZeroU32, NonZeroU64, NonZeroUsize},
     path::PathBuf,
     time::Duration,
 };
@@ -158,6 +158,19 @@ pub struct LimitSettings {
     pub max_frames_in_flight: NonZeroUsize,
     /// Most bytes that all request bodies together may hold in memory.
     pub max_upload_bytes: usize,
+    /// A body that comes more slowly is given up; `None` for none.
+    pub min_upload_bytes_per_second: Option<NonZeroU64>,
+    /// How often a client may ask; `None` for as often as it wants.
+    pub request_rate: Option<RequestRateSettings>,
+}
+
+/// How often a client may ask.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RequestRateSettings {
+    /// Requests a second in the long run.
+    pub per_second: f64,
+    /// Requests at once after a pause.
+    pub burst: NonZeroU32,
 }
 
 /// How the paper is read where it can be read in several ways.

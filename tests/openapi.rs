@@ -1,7 +1,10 @@
 //! The checked-in API description, and what it promises.
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use std::{collections::BTreeSet, fs};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+};
 
 use lookdown::{api::openapi_document, pipeline::DetectParameters};
 use serde_json::Value;
@@ -103,6 +106,47 @@ fn detection_describes_every_status_and_every_parameter() {
     ] {
         assert!(bodies.contains_key(media_type), "{media_type} is missing");
     }
+}
+
+#[test]
+fn every_operation_says_how_it_can_fail() {
+    let told: BTreeMap<_, _> = operations(&document())
+        .into_iter()
+        .map(|(_, operation)| {
+            let statuses = operation["responses"].as_object().unwrap().keys();
+            let failures = statuses.filter(|status| *status >= &"400".to_owned());
+            let failures: Vec<_> = failures.cloned().collect();
+            let name = operation["operationId"].as_str().unwrap().to_owned();
+            (name, failures.join(" "))
+        })
+        .collect();
+    let loading = "400 401 403 404 408 409 413 422 429 500 504";
+    let expected = [
+        (
+            "detect_persons",
+            "400 401 403 404 408 413 415 422 429 500 503 504",
+        ),
+        ("list_calibrations", "401 403 429"),
+        ("get_calibration", "400 401 403 404 429"),
+        (
+            "put_calibration",
+            "400 401 403 408 409 412 413 422 429 500 503 504",
+        ),
+        (
+            "delete_calibration",
+            "400 401 403 404 409 412 429 500 503 504",
+        ),
+        ("get_views", "400 401 403 404 422 429 500 503 504"),
+        ("list_models", "400 401 403 408 413 429 500 504"),
+        ("load_model", loading),
+        ("unload_model", loading),
+        ("get_liveness", ""),
+        ("get_readiness", "503"),
+        ("get_metrics", "500"),
+        ("get_openapi", ""),
+    ];
+    let expected = expected.map(|(name, failures)| (name.to_owned(), failures.to_owned()));
+    assert_eq!(told, BTreeMap::from(expected));
 }
 
 #[test]

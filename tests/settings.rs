@@ -44,7 +44,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 47, "a key is missing from {example}");
+    assert_eq!(stated.count(), 50, "a key is missing from {example}");
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 34] = [
+const UNUSABLE: [(&str, &str, &str, &str); 38] = [
     (
         "SERVER__LISTEN",
         "localhost",
@@ -333,6 +333,30 @@ const UNUSABLE: [(&str, &str, &str, &str); 34] = [
         "1024",
         "limits.max_upload_bytes",
         "33554432",
+    ),
+    (
+        "LIMITS__MIN_UPLOAD_BYTES_PER_SECOND",
+        "-1",
+        "limits.min_upload_bytes_per_second",
+        "integer",
+    ),
+    (
+        "LIMITS__REQUESTS_PER_SECOND",
+        "0.01",
+        "limits.requests_per_second",
+        "0.02 to 100000",
+    ),
+    (
+        "LIMITS__REQUESTS_PER_SECOND",
+        "NaN",
+        "limits.requests_per_second",
+        "0.02 to 100000",
+    ),
+    (
+        "LIMITS__REQUEST_BURST",
+        "0",
+        "limits.request_burst",
+        "from 1",
     ),
     (
         "PAPER__FIELD_OF_VIEW",

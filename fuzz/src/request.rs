@@ -145,6 +145,8 @@ fn router() -> Router {
             max_headers: 100,
             metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),
+            min_upload_bytes_per_second: None,
+            request_rate: None,
             access: Access::Open {
                 own_machine_only: true,
             },

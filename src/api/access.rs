@@ -12,7 +12,7 @@ use super::{
     ApiState,
     problem::{Problem, ProblemKind},
 };
-use crate::access::{AccessKeys, Scope};
+use crate::access::{AccessKeys, Holder, Scope};
 
 /// The header of a key alone.
 pub(super) const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
@@ -91,6 +91,14 @@ impl Access {
             holder.scopes.joined(" and "),
         );
         Err(Problem::new(ProblemKind::Forbidden, detail))
+    }
+
+    /// Whose key the request with these headers shows, if it shows one that is known.
+    pub(super) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
+        match self {
+            Self::Open { .. } => None,
+            Self::Keys(keys) => keys.holder_of(only_key(headers).ok()?),
+        }
     }
 
     fn refuse_others_without_keys(&self) -> Result<(), Problem> {

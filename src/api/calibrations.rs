@@ -25,7 +25,7 @@ use self::{
 use super::{
     ApiState,
     access::{Administrator, Reader},
-    blocking::blocking,
+    deadline::Deadline,
     openapi::{ChangeProblems, DeleteProblems, ReadProblems, UnknownCalibrationProblem},
     problem::{Problem, ProblemKind},
 };
@@ -115,13 +115,14 @@ pub(super) async fn get(
 pub(super) async fn put(
     State(state): State<ApiState>,
     _administrator: Administrator,
+    deadline: Deadline,
     NewCalibrationAddress(id): NewCalibrationAddress,
     headers: HeaderMap,
     upload: CalibrationUpload,
 ) -> Result<Response, Problem> {
     let condition = write_condition(&headers)?;
     let location = format!("/calibrations/{id}");
-    let put = blocking(move || {
+    let put = deadline.blocking(move || {
         let CalibrationUpload { content, reading } = upload;
         state.calibrations.put(&id, &content, &reading, &condition)
     });
@@ -150,11 +151,13 @@ pub(super) async fn put(
 pub(super) async fn delete(
     State(state): State<ApiState>,
     _administrator: Administrator,
+    deadline: Deadline,
     CalibrationAddress(id): CalibrationAddress,
     headers: HeaderMap,
 ) -> Result<StatusCode, Problem> {
     let condition = write_condition(&headers)?;
-    blocking(move || state.calibrations.delete(&id, &condition)).await?;
+    let delete = deadline.blocking(move || state.calibrations.delete(&id, &condition));
+    delete.await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

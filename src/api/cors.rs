@@ -9,7 +9,12 @@ use axum::http::{
 };
 use tower_http::cors::CorsLayer;
 
-use super::{access::API_KEY, detect::SERVER_TIMING, request_id};
+use super::{
+    access::API_KEY,
+    detect::{INFERENCE_TIME, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
+    rate_limit::{RATE_LIMIT, RATE_LIMIT_POLICY},
+    request_id,
+};
 
 /// The layer that lets pages of these origins call; none when there are none.
 pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
@@ -29,12 +34,17 @@ pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
         IF_NONE_MATCH,
         request_id::HEADER,
     ];
-    let read: [HeaderName; 6] = [
+    let read: [HeaderName; 11] = [
         ETAG,
         LOCATION,
+        RATE_LIMIT,
+        RATE_LIMIT_POLICY,
         RETRY_AFTER,
         SERVER_TIMING,
         WWW_AUTHENTICATE,
+        INFERENCE_TIME,
+        QUEUE_TIME,
+        TOTAL_TIME,
         request_id::HEADER,
     ];
     let layer = CorsLayer::new()

@@ -1,17 +1,18 @@
 //! One frame in, its persons out.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use axum::{
     Extension, Json,
     extract::State,
     http::{HeaderName, HeaderValue},
-    response::IntoResponse,
+    response::{AppendHeaders, IntoResponse},
 };
 use tokio::time::timeout_at;
 
 use super::{
     ApiState,
+    deadline::Deadline,
     openapi::{DetectForm, DetectProblems, DetectQuery},
     problem::{Problem, ProblemKind},
     report::{Report, ReportTimings},
@@ -27,6 +28,9 @@ use crate::{
 /// `C_t` of requests that name none.
 const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
 pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
+pub(super) const QUEUE_TIME: HeaderName = HeaderName::from_static("x-queue-time");
+pub(super) const INFERENCE_TIME: HeaderName = HeaderName::from_static("x-inference-time");
+pub(super) const TOTAL_TIME: HeaderName = HeaderName::from_static("x-total-time");
 
 /// Find the persons in a frame.
 ///
@@ -50,6 +54,9 @@ pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-tim
          headers(
             ("X-Request-Id" = String, description = "The request's own, or a new one."),
             ("Server-Timing" = String, description = "The stages, milliseconds."),
+            ("X-Queue-Time" = f64, description = "How long views waited for the network, milliseconds."),
+            ("X-Inference-Time" = f64, description = "How long the network ran, milliseconds."),
+            ("X-Total-Time" = f64, description = "From the frame's arrival to its report, milliseconds."),
          )),
         DetectProblems,
     )
@@ -60,22 +67,23 @@ pub(super) async fn detect_persons(
     Extension(trace): Extension<RequestTrace>,
     upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
-    let (began, server_limit) = (upload.began, state.options.request_timeout);
-    trace.stage("upload", began.into_std(), upload.arrived);
+    let server_limit = upload.deadline;
+    trace.stage("upload", server_limit.began().into_std(), upload.arrived);
     let job = job(upload, &request_id)?;
-    let own_limit = job.parameters.timeout.filter(|own| *own < server_limit);
-    let deadline = began + own_limit.unwrap_or(server_limit);
+    let own_limit = job.parameters.timeout;
+    let limit = own_limit.map_or(server_limit, |own| server_limit.within(own));
     let timeline = job.ticket.timeline.clone();
-    let outcome = timeout_at(deadline, state.workers.detect(job)).await;
+    let outcome = timeout_at(limit.at(), state.workers.detect(job)).await;
     for span in timeline.spans(Instant::now()) {
         trace.stage(span.stage.name(), span.began, span.ended);
     }
-    let Detected { report, .. } = outcome.map_err(|_| timed_out(own_limit, server_limit))??;
+    let Detected { report, .. } =
+        outcome.map_err(|_| timed_out(limit, limit.at() < server_limit.at()))??;
     describe(&trace, &report);
     record(&state.metrics, &report);
     let report = Report::from(&report);
-    let timing = server_timing(&report.timings_ms);
-    Ok(([(SERVER_TIMING, timing)], Json(report)))
+    let timings = timing_headers(&report.timings_ms);
+    Ok((AppendHeaders(timings), Json(report)))
 }
 
 fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {
@@ -93,9 +101,13 @@ fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {
     })
 }
 
-fn timed_out(own_limit: Option<Duration>, server_limit: Duration) -> Problem {
-    let seconds = own_limit.unwrap_or(server_limit).as_secs_f64();
-    let whose = own_limit.map_or("server.request_timeout_millis", |_| "timeout_millis");
+fn timed_out(limit: Deadline, is_its_own: bool) -> Problem {
+    let seconds = limit.limit_seconds();
+    let whose = if is_its_own {
+        "timeout_millis"
+    } else {
+        "server.request_timeout_millis"
+    };
     let detail = format!(
         "the frame had no report within {seconds} s: use a faster profile, send fewer frames at \
          a time, or raise {whose}"
@@ -144,11 +156,18 @@ fn record(metrics: &Metrics, report: &DetectionReport) {
     metrics.persons.inc_by(report.persons.len() as u64);
 }
 
-/// `decode;dur=3.1, …, total;dur=412.0`
-fn server_timing(timings: &ReportTimings) -> HeaderValue {
+/// The stages as `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), and those that say how
+/// busy the server is as plain numbers; all in milliseconds.
+fn timing_headers(timings: &ReportTimings) -> [(HeaderName, HeaderValue); 4] {
     let stages = timings
         .stages()
         .map(|(stage, millis)| format!("{stage};dur={millis}"));
+    [
+        (SERVER_TIMING, stages.join(", ")),
+        (QUEUE_TIME, timings.queue.to_string()),
+        (INFERENCE_TIME, timings.inference.to_string()),
+        (TOTAL_TIME, timings.total.to_string()),
+    ]
     // Names and numbers are visible ASCII.
-    HeaderValue::from_str(&stages.join(", ")).unwrap_or(HeaderValue::from_static(""))
+    .map(|(name, text)| (name, text.parse().unwrap_or(HeaderValue::from_static(""))))
 }

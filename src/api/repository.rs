@@ -5,7 +5,6 @@ mod body;
 
 use axum::{
     Json,
-    body::Body,
     extract::{Path, State},
 };
 use serde::Serialize;
@@ -14,12 +13,12 @@ use utoipa::ToSchema;
 use super::{
     ApiState,
     access::{Administrator, ModelReader},
-    blocking::blocking,
+    deadline::Deadline,
     openapi::{IndexProblems, LoadProblems},
     problem::{Problem, ProblemKind},
 };
 use crate::inference::{Model, RepositoryError, RepositoryRow};
-use body::{IndexRequest, LoadRequest, UnloadRequest, read};
+use body::{IndexRequest, LoadRequest, SmallBody, UnloadRequest};
 
 /// A model of the repository.
 #[derive(Serialize, ToSchema)]
@@ -77,10 +76,11 @@ impl From<&Model> for RepositoryEntry {
 pub(super) async fn index(
     State(state): State<ApiState>,
     _reader: ModelReader,
-    body: Body,
+    deadline: Deadline,
+    SmallBody(IndexRequest { ready }): SmallBody<IndexRequest>,
 ) -> Result<Json<Vec<RepositoryEntry>>, Problem> {
-    let IndexRequest { ready } = read(&state, body).await?;
-    let rows = blocking(move || Ok::<_, Problem>(state.models.rows())).await?;
+    let rows = deadline.blocking(move || Ok::<_, Problem>(state.models.rows()));
+    let rows = rows.await?;
     let rows = rows
         .into_iter()
         .filter(|row| !ready || row.revision.is_some());
@@ -105,11 +105,11 @@ pub(super) async fn index(
 pub(super) async fn load(
     State(state): State<ApiState>,
     _administrator: Administrator,
+    deadline: Deadline,
     Path(name): Path<String>,
-    body: Body,
+    _: SmallBody<LoadRequest>,
 ) -> Result<Json<RepositoryEntry>, Problem> {
-    let LoadRequest {} = read(&state, body).await?;
-    let model = blocking(move || state.models.load(&name)).await?;
+    let model = deadline.blocking(move || state.models.load(&name)).await?;
     Ok(Json(RepositoryEntry::from(&*model)))
 }
 
@@ -130,12 +130,13 @@ pub(super) async fn load(
 pub(super) async fn unload(
     State(state): State<ApiState>,
     _administrator: Administrator,
+    deadline: Deadline,
     Path(name): Path<String>,
-    body: Body,
+    _: SmallBody<UnloadRequest>,
 ) -> Result<Json<RepositoryEntry>, Problem> {
-    let UnloadRequest { .. } = read(&state, body).await?;
     let unloaded = name.clone();
-    blocking(move || state.models.unload(&unloaded)).await?;
+    let unload = deadline.blocking(move || state.models.unload(&unloaded));
+    unload.await?;
     Ok(Json(RepositoryEntry::from(RepositoryRow {
         name,
         revision: None,

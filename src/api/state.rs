@@ -1,8 +1,14 @@
 //! What the handlers share.
 
-use std::{sync::Arc, time::Duration};
+use std::{num::NonZeroU64, sync::Arc, time::Duration};
 
-use super::{Access, Readiness, problem::ProblemKind, upload::UploadBudget};
+use super::{
+    Access, Readiness, RequestRate,
+    deadline::Deadline,
+    problem::ProblemKind,
+    rate_limit::RateLimiter,
+    upload::{BodyReader, UploadBudget},
+};
 use crate::{
     calibration::Calibrations, inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool,
     telemetry::Tracer,
@@ -23,6 +29,10 @@ pub struct ApiOptions {
     pub metrics_elsewhere: bool,
     /// Longest a request may take, from its first byte to its answer.
     pub request_timeout: Duration,
+    /// A body that comes more slowly is given up; `None` for none.
+    pub min_upload_bytes_per_second: Option<NonZeroU64>,
+    /// How often a client may ask; `None` for as often as it wants.
+    pub request_rate: Option<RequestRate>,
     /// Who may do what.
     pub access: Access,
     /// Origins of web pages that may call the server from a browser.
@@ -40,6 +50,7 @@ pub struct ApiState {
     pub(super) metrics: Arc<Metrics>,
     pub(super) readiness: Readiness,
     pub(super) uploads: UploadBudget,
+    pub(super) rate_limiter: Option<RateLimiter>,
     pub(super) options: ApiOptions,
 }
 
@@ -65,7 +76,24 @@ impl ApiState {
             metrics,
             readiness,
             uploads: UploadBudget::new(options.max_upload_bytes),
+            rate_limiter: options.request_rate.map(RateLimiter::new),
             options,
+        }
+    }
+
+    /// Reads bodies of up to `max_bytes`; `remedy` says what to do about larger ones.
+    pub(super) fn body_reader(
+        &self,
+        max_bytes: usize,
+        remedy: &'static str,
+        deadline: Deadline,
+    ) -> BodyReader<'_> {
+        BodyReader {
+            max_bytes,
+            remedy,
+            budget: &self.uploads,
+            least_bytes_per_second: self.options.min_upload_bytes_per_second,
+            deadline,
         }
     }
 }

@@ -1,11 +1,12 @@
 //! A frame and its parameters, however they were sent: `multipart/form-data`, or the frame as the
 //! body with the parameters in the query.
 //!
-//! The whole body is read first, within three bounds: its size, the deadline of the request, and
-//! the memory that all bodies together may hold.
+//! The whole body is read first, within bounds: its size, the rate at which it comes, the deadline of
+//! the request, and the memory that all bodies together may hold.
 
 mod body;
 mod form;
+mod pace;
 
 use std::time::Instant as Arrival;
 
@@ -15,12 +16,13 @@ use axum::{
 };
 use bytes::Bytes;
 use jiff::Timestamp;
-use tokio::time::{Instant, timeout_at};
 
-pub(super) use body::{BodyReader, UploadBudget};
+pub(super) use body::{BodyReader, UploadBudget, next_chunk};
+pub(super) use pace::Pace;
 
 use super::{
     ApiState, Phase,
+    deadline::Deadline,
     problem::{Problem, ProblemKind},
 };
 use crate::access::Scope;
@@ -31,8 +33,8 @@ pub(super) struct Upload {
     pub(super) image: Bytes,
     /// Parameters by name, not checked yet.
     pub(super) parameters: Vec<(String, String)>,
-    /// When the request's head was read.
-    pub(super) began: Instant,
+    /// When its report must be there.
+    pub(super) deadline: Deadline,
     /// When the request came.
     pub(super) received_at: Timestamp,
     /// When the whole body was in memory.
@@ -44,35 +46,19 @@ impl FromRequest<ApiState> for Upload {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let received_at = Timestamp::now();
-        let began = Instant::now();
-        let deadline = began + state.options.request_timeout;
         let (parts, body) = request.into_parts();
-        let reader = BodyReader {
-            max_bytes: state.options.max_body_bytes,
-            remedy: "send a smaller picture or raise server.max_body_bytes",
-            budget: &state.uploads,
-        };
-        let admitted = state
-            .options
-            .access
-            .check(&parts.headers, Scope::Detect)
-            // A frame that has no place needs none in memory either.
-            .and_then(|()| Ok(state.workers.admits()?));
-        let reading = async {
-            if let Err(refusal) = admitted {
-                reader.discard_unread(&parts.headers, body).await;
-                return Err(refusal);
-            }
-            reader.read(&parts.headers, body).await
-        };
-        let held = timeout_at(deadline, reading)
-            .await
-            .map_err(|_| slow_upload(state))??;
-        let arrived = Arrival::now();
-        // Refused only now: a client in the middle of sending would not see why.
+        let access = &state.options.access;
+        access.check(&parts.headers, Scope::Detect)?;
         if state.readiness.phase() == Phase::WarmingUp {
             return Err(Problem::warming_up());
         }
+        // A frame that has no place needs none in memory either.
+        state.workers.admits()?;
+        let deadline = Deadline::of(&parts, state);
+        let remedy = "send a smaller picture or raise server.max_body_bytes";
+        let reader = state.body_reader(state.options.max_body_bytes, remedy, deadline);
+        let held = reader.read(&parts.headers, body).await?;
+        let arrived = Arrival::now();
         let mut parameters = query_parameters(&parts.uri)?;
         let image = if is_multipart(&parts) {
             let form = form::parse(parts, held.bytes()).await?;
@@ -84,7 +70,7 @@ impl FromRequest<ApiState> for Upload {
         Ok(Self {
             image: image.into_bytes(),
             parameters,
-            began,
+            deadline,
             received_at,
             arrived,
         })
@@ -135,10 +121,4 @@ fn is_multipart(parts: &Parts) -> bool {
         let value = value.as_bytes();
         value.len() >= 10 && value[..10].eq_ignore_ascii_case(b"multipart/")
     })
-}
-
-fn slow_upload(state: &ApiState) -> Problem {
-    let seconds = state.options.request_timeout.as_secs_f64();
-    let detail = format!("the body did not arrive within {seconds} s: send a smaller picture");
-    Problem::new(ProblemKind::SlowUpload, detail)
 }

@@ -1,6 +1,6 @@
 //! One connection, from its first byte to its last.
 
-use std::{convert::Infallible, pin::pin, sync::Arc, time::Duration};
+use std::{convert::Infallible, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
 use hyper::{
     Request, Response,
@@ -32,6 +32,8 @@ const LAST_CALL: Duration = Duration::from_millis(500);
 pub(super) struct Rules {
     pub(super) limits: ConnectionLimits,
     pub(super) one_request_only: bool,
+    /// Who has connected, unless it has gone already.
+    pub(super) client: Option<SocketAddr>,
     pub(super) shutdown: Shutdown,
 }
 
@@ -46,10 +48,14 @@ where
     let Rules {
         limits,
         one_request_only,
+        client,
         shutdown,
     } = rules;
     let pace = Arc::new(Pace::new(&limits));
-    let service = service_fn(|request| {
+    let service = service_fn(|mut request: Request<Incoming>| {
+        if let Some(client) = client {
+            request.extensions_mut().insert(client);
+        }
         pace.request_begins();
         let answer = service.clone().oneshot(request);
         let (pace, shutdown) = (Arc::clone(&pace), &shutdown);

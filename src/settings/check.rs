@@ -2,7 +2,7 @@
 
 use std::{
     net::SocketAddr,
-    num::{NonZeroU64, NonZeroUsize},
+    num::{NonZeroU32, NonZeroU64, NonZeroUsize},
     ops::RangeInclusive,
     path::PathBuf,
     time::Duration,
@@ -10,8 +10,8 @@ use std::{
 
 use super::{
     CalibrationSettings, InferenceSettings, LimitSettings, LogFormat, LogSettings, ModelSettings,
-    PaperSettings, RawSettings, ServerSettings, Settings, SettingsError, ShutdownSettings,
-    ThreadPlan, raw, threads,
+    PaperSettings, RawSettings, RequestRateSettings, ServerSettings, Settings, SettingsError,
+    ShutdownSettings, ThreadPlan, raw, threads,
 };
 use crate::{
     geometry::FieldOfViewReading,
@@ -38,6 +38,9 @@ const MAX_QUEUE_DELAY_MILLIS: u64 = 1_000;
 const MAX_POLL_SECONDS: u64 = 86_400;
 /// The longest side the JPEG format can state.
 const MAX_IMAGE_SIDE: u64 = 65_535;
+/// A client that may ask less often than once in 50 seconds would be told to wait for longer than
+/// anybody remembers it.
+const REQUEST_RATES: RangeInclusive<f64> = 0.02..=100_000.0;
 /// Beyond this only a mistake is possible.
 const MAX_COUNT: u64 = 65_536;
 
@@ -224,7 +227,37 @@ fn limits(raw: &raw::RawLimits, max_body_bytes: usize) -> Result<LimitSettings, 
             raw.max_upload_bytes,
             max_body_bytes as u64..=MAX_BYTES,
         )?,
+        min_upload_bytes_per_second: NonZeroU64::new(within(
+            "limits.min_upload_bytes_per_second",
+            raw.min_upload_bytes_per_second,
+            0..=MAX_BODY_BYTES,
+        )?),
+        request_rate: request_rate(raw)?,
     })
+}
+
+fn request_rate(raw: &raw::RawLimits) -> Result<Option<RequestRateSettings>, SettingsError> {
+    let burst = within("limits.request_burst", raw.request_burst, 1..=MAX_COUNT)?;
+    let burst = u32::try_from(burst).ok().and_then(NonZeroU32::new);
+    let per_second = raw.requests_per_second;
+    if per_second == 0.0 {
+        return Ok(None);
+    }
+    if !REQUEST_RATES.contains(&per_second) {
+        return Err(SettingsError::Value {
+            key: "limits.requests_per_second".to_owned(),
+            value: per_second.to_string(),
+            remedy: format!(
+                "give 0 for no limit, or a number from {} to {}",
+                REQUEST_RATES.start(),
+                REQUEST_RATES.end()
+            ),
+        });
+    }
+    Ok(Some(RequestRateSettings {
+        per_second,
+        burst: burst.unwrap_or(NonZeroU32::MIN),
+    }))
 }
 
 fn log(raw: raw::RawLog) -> Result<LogSettings, SettingsError> {

@@ -146,13 +146,15 @@ impl Default for RawInference {
 /// Table `limits`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[expect(clippy::struct_field_names, reason = "the keys say what the limit is")]
 pub(super) struct RawLimits {
     pub(super) max_image_side: u64,
     pub(super) max_image_pixels: u64,
     pub(super) max_decode_bytes: u64,
     pub(super) max_frames_in_flight: u64,
     pub(super) max_upload_bytes: u64,
+    pub(super) min_upload_bytes_per_second: u64,
+    pub(super) requests_per_second: f64,
+    pub(super) request_burst: u64,
 }
 
 impl Default for RawLimits {
@@ -163,6 +165,9 @@ impl Default for RawLimits {
             max_decode_bytes: 512 * MEBIBYTE,
             max_frames_in_flight: 16,
             max_upload_bytes: 256 * MEBIBYTE,
+            min_upload_bytes_per_second: 1024,
+            requests_per_second: 0.0,
+            request_burst: 20,
         }
     }
 }

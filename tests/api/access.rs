@@ -1,12 +1,6 @@
 //! Who may do what.
 
-use std::{
-    collections::HashMap,
-    fs,
-    io::{self, Write},
-    path::Path,
-    sync::{Arc, Mutex},
-};
+use std::{collections::HashMap, fs, path::Path, sync::Arc};
 
 use axum::{body::Body, http::Request};
 use lookdown::{
@@ -15,7 +9,10 @@ use lookdown::{
     settings,
 };
 
-use crate::service::{Answer, Bounds, Service, frame};
+use crate::{
+    log::Log,
+    service::{Answer, Bounds, Service, frame},
+};
 
 const FINDER: &str = "lookdown_finder";
 const READER: &str = "lookdown_reader";
@@ -63,28 +60,6 @@ fn guarded() -> Service {
     write_keys(&file);
     let keys = AccessKeys::open("".parse().unwrap(), Some(&file)).unwrap();
     service_with(&Arc::new(keys))
-}
-
-/// Part of a log.
-struct Log(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Log {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().unwrap().write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-fn logged_by(work: impl FnOnce()) -> String {
-    let bytes = Arc::new(Mutex::new(Vec::new()));
-    let writer = Arc::clone(&bytes);
-    let logs = tracing_subscriber::fmt().with_writer(move || Log(Arc::clone(&writer)));
-    tracing::subscriber::with_default(logs.with_ansi(false).finish(), work);
-    let log = bytes.lock().unwrap();
-    String::from_utf8(log.clone()).unwrap()
 }
 
 async fn ask(service: &Service, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
@@ -255,10 +230,10 @@ async fn a_broken_file_keeps_the_old_keys_and_shows_in_the_log_once() {
         (huge, "more than 1 MiB"),
     ] {
         fs::write(&file, broken).unwrap();
-        let log = logged_by(|| {
-            keys.refresh();
-            keys.refresh();
-        });
+        let log = Log::begin();
+        keys.refresh();
+        keys.refresh();
+        let log = log.text();
         assert_eq!(log.matches(told).count(), 1, "{log}");
         assert!(log.contains("keys.toml") && log.contains("ERROR"), "{log}");
         assert!(!log.contains(READER), "{log}");

@@ -97,7 +97,7 @@ async fn the_request_id_is_echoed_in_header_and_report() {
 }
 
 #[tokio::test]
-async fn the_stages_are_told_in_the_server_timing_header() {
+async fn the_stages_are_told_in_headers() {
     let service = Service::start();
     let answer = service
         .post_raw("calibration=lobby&profile=fast", frame())
@@ -121,6 +121,14 @@ async fn the_stages_are_told_in_the_server_timing_header() {
             .parse()
             .unwrap();
         assert_eq!(report["timings_ms"][stage], millis);
+    }
+    for (name, stage) in [
+        ("x-queue-time", "queue"),
+        ("x-inference-time", "inference"),
+        ("x-total-time", "total"),
+    ] {
+        let millis: f64 = answer.header(name).parse().unwrap();
+        assert_eq!(report["timings_ms"][stage], millis, "{name}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! A detector that sees a person in the middle of every view, and does so when it is told.
+//! A detector that sees a person in the middle of every view, or a crowd, and does so when it is told.
 
 use std::{
     sync::{Arc, Condvar, Mutex},
@@ -33,6 +33,8 @@ struct GateState {
     closed: bool,
     panics: bool,
     runs: usize,
+    /// How many persons every view has besides the one in the middle.
+    crowd: u32,
 }
 
 impl Gate {
@@ -47,6 +49,11 @@ impl Gate {
     /// Makes the next run panic.
     pub(crate) fn panic_once(&self) {
         self.change(|state| state.panics = true);
+    }
+
+    /// Makes the next runs see as many persons more in every view.
+    pub(crate) fn crowd(&self, persons: u32) {
+        self.change(|state| state.crowd = persons);
     }
 
     /// Counts from here.
@@ -108,9 +115,24 @@ impl Detector for EagerDetector {
             bbox: BBox::new([24.0, 16.0, 40.0, 48.0]).unwrap(),
             score: 0.9,
         };
+        let crowd = self.gate.state.lock().unwrap().crowd;
+        let view: Vec<_> = std::iter::once(person)
+            .chain((0..crowd).map(passer_by))
+            .collect();
         Ok(HeadOutput {
-            per_view: vec![vec![person]; batch.views()],
+            per_view: vec![view; batch.views()],
             non_finite: 0,
         })
+    }
+}
+
+/// One of many persons: no two have the same box or score.
+fn passer_by(number: u32) -> ViewDetection {
+    let [x, y, side] = [7, 11, 13].map(|step| f64::from(number * step % 97) / 97.0);
+    let (x_min, y_min) = (50.0 * x, 50.0 * y);
+    let side = 2.0 + 12.0 * side;
+    ViewDetection {
+        bbox: BBox::new([x_min, y_min, x_min + side, y_min + side]).unwrap(),
+        score: 0.05 + 0.8 * f64::from(number % 89) / 89.0,
     }
 }

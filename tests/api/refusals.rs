@@ -192,6 +192,8 @@ async fn what_the_framework_refuses_is_a_problem_too() {
     assert_eq!(wrong_method.header("allow"), "POST");
     let no_such_page = service.get("/docs/nothing.js").await;
     assert_refused(&no_such_page, 404, "not-found", "/docs/nothing.js");
+    let no_text = service.post("/v2/repository/models/%FF/load", "").await;
+    assert_refused(&no_text, 400, "malformed-request", "");
 }
 
 #[tokio::test]

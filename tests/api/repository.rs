@@ -139,7 +139,12 @@ async fn what_cannot_be_done_is_refused_with_the_reason() {
         assert_eq!(answer.problem()["type"], urn, "{path} {body}");
     }
     let long = " ".repeat(100_000);
-    assert_eq!(service.post(INDEX, &long).await.status, 400);
+    let answer = service.post(INDEX, &long).await;
+    assert_eq!(answer.status, 413);
+    assert_eq!(
+        answer.problem()["type"],
+        "urn:lookdown:problem:body-too-large"
+    );
 }
 
 #[tokio::test]

@@ -1,6 +1,10 @@
 //! The service under test, and how to talk to it.
 
-use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{
+    num::{NonZeroU64, NonZeroUsize},
+    sync::Arc,
+    time::Duration,
+};
 
 use axum::{
     Router,
@@ -9,7 +13,7 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, Access, ApiOptions, ApiState, Readiness},
+    api::{self, Access, ApiOptions, ApiState, Readiness, RequestRate},
     app::Assembly,
     calibration::{Calibrations, FolderStore},
     geometry::FieldOfViewReading,
@@ -48,6 +52,8 @@ pub(crate) struct Bounds {
     pub(crate) max_body_bytes: usize,
     pub(crate) max_upload_bytes: usize,
     pub(crate) request_timeout: Duration,
+    pub(crate) min_upload_bytes_per_second: Option<NonZeroU64>,
+    pub(crate) request_rate: Option<RequestRate>,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
     pub(crate) tracer: Tracer,
@@ -60,6 +66,8 @@ impl Default for Bounds {
             max_body_bytes: 1 << 20,
             max_upload_bytes: 1 << 24,
             request_timeout: Duration::from_secs(20),
+            min_upload_bytes_per_second: NonZeroU64::new(1024),
+            request_rate: None,
             access: Access::Open {
                 own_machine_only: true,
             },
@@ -203,6 +211,8 @@ impl Service {
                 max_headers: 32,
                 metrics_elsewhere: false,
                 request_timeout: bounds.request_timeout,
+                min_upload_bytes_per_second: bounds.min_upload_bytes_per_second,
+                request_rate: bounds.request_rate,
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),
                 tracer: bounds.tracer.clone(),

@@ -75,6 +75,8 @@ fn service(folder: &Path) -> Router {
         max_headers: 100,
         metrics_elsewhere: false,
         request_timeout: Duration::from_mins(2),
+        min_upload_bytes_per_second: None,
+        request_rate: None,
         access: Access::Open {
             own_machine_only: true,
         },

@@ -2,13 +2,13 @@
 
 use axum::extract::{FromRequest, Request};
 use bytes::Bytes;
-use tokio::time::timeout;
 
 use crate::{
     api::{
         ApiState,
+        deadline::Deadline,
         problem::{Problem, ProblemKind},
-        upload::{BodyReader, parameters_named},
+        upload::parameters_named,
     },
     calibration::{CalibrationFile, Reading, native::NotAFrameSize},
 };
@@ -26,19 +26,10 @@ impl FromRequest<ApiState> for CalibrationUpload {
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
-        let reader = BodyReader {
-            max_bytes: CalibrationFile::MAX_BYTES,
-            remedy: "a calibration file is far smaller",
-            budget: &state.uploads,
-        };
-        let reading = timeout(
-            state.options.request_timeout,
-            reader.read(&parts.headers, body),
-        );
-        let content = reading.await.map_err(|_| {
-            let detail = "the file did not arrive in time: send it again";
-            Problem::new(ProblemKind::SlowUpload, detail)
-        })??;
+        let deadline = Deadline::of(&parts, state);
+        let remedy = "a calibration file is far smaller";
+        let reader = state.body_reader(CalibrationFile::MAX_BYTES, remedy, deadline);
+        let content = reader.read(&parts.headers, body).await?;
         let [camera, size] = parameters_named(&parts.uri, ["camera", "size"])?;
         let size = size.map(|text| text.parse()).transpose();
         let size = size.map_err(|error: NotAFrameSize| {

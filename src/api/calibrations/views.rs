@@ -9,7 +9,7 @@ use crate::{
     api::{
         ApiState,
         access::Reader,
-        blocking::blocking,
+        deadline::Deadline,
         openapi::ViewsProblems,
         problem::{Problem, ProblemKind},
         upload::parameters_named,
@@ -95,6 +95,7 @@ pub(in crate::api) struct ViewInfo {
 pub(in crate::api) async fn get_views(
     State(state): State<ApiState>,
     _reader: Reader,
+    deadline: Deadline,
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
 ) -> Result<Json<ViewPlanInfo>, Problem> {
@@ -107,7 +108,7 @@ pub(in crate::api) async fn get_views(
     let entry = calibrations
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
-    let plan = blocking(move || {
+    let plan = deadline.blocking(move || {
         let calibration = &entry.calibration;
         let planned = state.workers.engine().planned_views(calibration, profile)?;
         Ok::<_, Problem>(ViewPlanInfo {

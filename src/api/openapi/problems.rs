@@ -51,12 +51,16 @@ impl IntoResponses for NotReadyProblems {
 pub(in crate::api) struct IndexProblems;
 
 /// What can go wrong with every request of an administrator.
-const OF_ADMINISTRATION: [ProblemKind; 5] = [
+const OF_ADMINISTRATION: [ProblemKind; 9] = [
     ProblemKind::MalformedRequest,
     ProblemKind::KeyRequired,
     ProblemKind::Forbidden,
     ProblemKind::SlowUpload,
+    ProblemKind::BodyTooLarge,
+    ProblemKind::Overloaded,
+    ProblemKind::RateLimited,
     ProblemKind::Internal,
+    ProblemKind::Timeout,
 ];
 
 impl IntoResponses for IndexProblems {
@@ -81,10 +85,11 @@ impl IntoResponses for LoadProblems {
 }
 
 /// What can go wrong with every request of a reader.
-const OF_READING: [ProblemKind; 3] = [
+const OF_READING: [ProblemKind; 4] = [
     ProblemKind::MalformedRequest,
     ProblemKind::KeyRequired,
     ProblemKind::Forbidden,
+    ProblemKind::RateLimited,
 ];
 
 /// What can go wrong with listing calibrations.
@@ -92,7 +97,11 @@ pub(in crate::api) struct ReadProblems;
 
 impl IntoResponses for ReadProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses([ProblemKind::KeyRequired, ProblemKind::Forbidden])
+        responses([
+            ProblemKind::KeyRequired,
+            ProblemKind::Forbidden,
+            ProblemKind::RateLimited,
+        ])
     }
 }
 
@@ -121,8 +130,7 @@ impl IntoResponses for ChangeProblems {
             ProblemKind::CalibrationConflict,
             ProblemKind::CalibrationsUnreachable,
             ProblemKind::Outdated,
-            ProblemKind::BodyTooLarge,
-            ProblemKind::Overloaded,
+            ProblemKind::InvalidParameter,
         ];
         responses(OF_ADMINISTRATION.into_iter().chain(of_changes))
     }
@@ -141,7 +149,9 @@ impl IntoResponses for DeleteProblems {
             ProblemKind::CalibrationConflict,
             ProblemKind::CalibrationsUnreachable,
             ProblemKind::Outdated,
+            ProblemKind::RateLimited,
             ProblemKind::Internal,
+            ProblemKind::Timeout,
         ])
     }
 }
@@ -158,6 +168,7 @@ impl IntoResponses for ViewsProblems {
             ProblemKind::InvalidParameter,
             ProblemKind::Internal,
             ProblemKind::WarmingUp,
+            ProblemKind::Timeout,
         ];
         responses(OF_READING.into_iter().chain(of_views))
     }
@@ -205,6 +216,18 @@ fn response(kinds: &[ProblemKind]) -> Response {
             .description(Some("`Bearer`."))
             .build();
         response = response.header("WWW-Authenticate", bearer);
+    }
+    if kinds.contains(&ProblemKind::RateLimited) {
+        for (name, description) in [
+            ("RateLimit-Policy", "How often a client may ask."),
+            ("RateLimit", "How often it may now, if there is a limit."),
+        ] {
+            let header = HeaderBuilder::new()
+                .schema(Some(String::schema()))
+                .description(Some(description))
+                .build();
+            response = response.header(name, header);
+        }
     }
     if kinds
         .iter()

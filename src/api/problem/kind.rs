@@ -59,6 +59,8 @@ pub(in crate::api) enum ProblemKind {
     Overloaded,
     /// No place for another connection.
     TooManyConnections,
+    /// The client sends more often than it may.
+    RateLimited,
     /// A fault of ours.
     Internal,
     /// The network has not run yet.
@@ -71,7 +73,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 31] = [
+    pub(in crate::api) const ALL: [Self; 32] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -99,6 +101,7 @@ impl ProblemKind {
         Self::UnfitImage,
         Self::Overloaded,
         Self::TooManyConnections,
+        Self::RateLimited,
         Self::Internal,
         Self::WarmingUp,
         Self::ShuttingDown,
@@ -147,6 +150,7 @@ impl ProblemKind {
             Self::UnfitImage => ("unfit-image", "The frame does not fit"),
             Self::Overloaded => ("overloaded", "Too many frames are waiting"),
             Self::TooManyConnections => ("too-many-connections", "Too many connections are open"),
+            Self::RateLimited => ("rate-limited", "The requests come too fast"),
             Self::Internal => ("internal", "There is a fault in the server"),
             Self::WarmingUp => ("warming-up", "The server is warming up"),
             Self::ShuttingDown => ("shutting-down", "The server is shutting down"),
@@ -181,7 +185,7 @@ impl ProblemKind {
             | Self::InvalidParameter
             | Self::DamagedImage
             | Self::UnfitImage => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::ModelBusy | Self::Overloaded => StatusCode::TOO_MANY_REQUESTS,
+            Self::ModelBusy | Self::Overloaded | Self::RateLimited => StatusCode::TOO_MANY_REQUESTS,
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
             Self::HeadersTooLarge => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
             Self::SlowUpload => StatusCode::REQUEST_TIMEOUT,
@@ -206,6 +210,7 @@ impl ProblemKind {
         matches!(
             self,
             Self::Overloaded
+                | Self::RateLimited
                 | Self::ModelBusy
                 | Self::TooManyConnections
                 | Self::CalibrationsUnreachable

@@ -1,12 +1,12 @@
 //! The small JSON bodies of these requests.
 
-use axum::body::{Body, to_bytes};
+use axum::extract::{FromRequest, Request};
 use serde::{Deserialize, de::DeserializeOwned};
-use tokio::time::timeout;
 use utoipa::ToSchema;
 
 use crate::api::{
     ApiState,
+    deadline::Deadline,
     problem::{Problem, ProblemKind},
 };
 
@@ -43,29 +43,25 @@ struct UnloadParameters {
     unload_dependents: Option<bool>,
 }
 
-/// Reads a body; an empty one stands for the default.
-pub(super) async fn read<T: DeserializeOwned + Default>(
-    state: &ApiState,
-    body: Body,
-) -> Result<T, Problem> {
-    let bytes = timeout(state.options.request_timeout, to_bytes(body, MAX_BYTES)).await;
-    let bytes = bytes.map_err(|_| {
-        Problem::new(
-            ProblemKind::SlowUpload,
-            "the body did not arrive: send it, or none",
-        )
-    })?;
-    let bytes = bytes.map_err(|_| {
-        let detail = format!("the body has more than {MAX_BYTES} bytes or was cut off");
-        Problem::new(ProblemKind::MalformedRequest, detail)
-    })?;
-    if bytes.is_empty() {
-        return Ok(T::default());
+/// A body; an empty one stands for the default.
+pub(in crate::api) struct SmallBody<T>(pub(super) T);
+
+impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let (parts, body) = request.into_parts();
+        let deadline = Deadline::of(&parts, state);
+        let reader = state.body_reader(MAX_BYTES, "a few words are enough", deadline);
+        let bytes = reader.read(&parts.headers, body).await?.into_bytes();
+        if bytes.is_empty() {
+            return Ok(Self(T::default()));
+        }
+        serde_json::from_slice(&bytes).map(Self).map_err(|error| {
+            Problem::new(
+                ProblemKind::MalformedRequest,
+                format!("the body cannot be used: {error}"),
+            )
+        })
     }
-    serde_json::from_slice(&bytes).map_err(|error| {
-        Problem::new(
-            ProblemKind::MalformedRequest,
-            format!("the body cannot be used: {error}"),
-        )
-    })
 }

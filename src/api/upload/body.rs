@@ -1,22 +1,22 @@
 //! Reading a body within bounds.
 
-use std::{future::poll_fn, pin::Pin, sync::Arc};
+use std::{future::poll_fn, num::NonZeroU64, pin::Pin, sync::Arc};
 
 use axum::{
     body::{Body, HttpBody},
-    http::{
-        HeaderMap,
-        header::{CONTENT_LENGTH, EXPECT},
-    },
+    http::{HeaderMap, header::CONTENT_LENGTH},
 };
 use bytes::{Bytes, BytesMut};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    time::timeout_at,
+};
 
-use crate::api::problem::{Problem, ProblemKind};
-
-/// A client that is in the middle of sending sees a refusal only once it has sent everything. So
-/// this many times the limit is read and thrown away before a body is refused.
-const DISCARDED_LIMITS: usize = 4;
+use super::Pace;
+use crate::api::{
+    deadline::Deadline,
+    problem::{Problem, ProblemKind},
+};
 
 /// The memory that all bodies together may hold, counted in bytes. Clones share it.
 #[derive(Clone)]
@@ -67,6 +67,9 @@ pub(in crate::api) struct BodyReader<'a> {
     /// What to do about a body that has more.
     pub(in crate::api) remedy: &'static str,
     pub(in crate::api) budget: &'a UploadBudget,
+    /// `None`: any rate will do.
+    pub(in crate::api) least_bytes_per_second: Option<NonZeroU64>,
+    pub(in crate::api) deadline: Deadline,
 }
 
 impl BodyReader<'_> {
@@ -77,23 +80,19 @@ impl BodyReader<'_> {
         mut body: Body,
     ) -> Result<HeldBytes, Problem> {
         if announced_bytes(headers).is_some_and(|bytes| bytes > self.max_bytes) {
-            self.discard_unread(headers, body).await;
             return Err(self.too_large());
         }
         let mut bytes = BytesMut::new();
         let mut share = self.budget.take(0).ok_or_else(no_memory)?;
-        while let Some(chunk) = next_chunk(&mut body).await? {
+        let mut pace = Pace::begin(self.least_bytes_per_second);
+        while let Some(chunk) = self.next_in_time(&mut body, &pace).await? {
             if bytes.len() + chunk.len() > self.max_bytes {
-                self.discard(body).await;
                 return Err(self.too_large());
             }
-            let Some(more) = self.budget.take(chunk.len()) else {
-                drop((bytes, share));
-                self.discard(body).await;
-                return Err(no_memory());
-            };
+            let more = self.budget.take(chunk.len()).ok_or_else(no_memory)?;
             share.merge(more);
             bytes.extend_from_slice(&chunk);
+            pace.came(chunk.len());
         }
         Ok(HeldBytes {
             bytes: bytes.freeze(),
@@ -101,21 +100,25 @@ impl BodyReader<'_> {
         })
     }
 
-    /// Discards a body that is refused before any of it was read. A client that asked first has not
-    /// begun to send, and need not.
-    pub(in crate::api) async fn discard_unread(&self, headers: &HeaderMap, body: Body) {
-        if !headers.contains_key(EXPECT) {
-            self.discard(body).await;
-        }
-    }
-
-    /// Reads what the client is sending, within bounds, so that it can see the answer.
-    async fn discard(&self, mut body: Body) {
-        let mut left = self.max_bytes.saturating_mul(DISCARDED_LIMITS);
-        while let Ok(Some(chunk)) = next_chunk(&mut body).await
-            && chunk.len() < left
-        {
-            left -= chunk.len();
+    async fn next_in_time(&self, body: &mut Body, pace: &Pace) -> Result<Option<Bytes>, Problem> {
+        let deadline = self.deadline.at();
+        let late_at = pace.late_at(deadline);
+        match timeout_at(late_at, next_chunk(body)).await {
+            Ok(chunk) => chunk,
+            Err(_) if late_at < deadline => {
+                let least = self.least_bytes_per_second.map_or(0, NonZeroU64::get);
+                let detail = format!(
+                    "the body comes more slowly than {least} bytes a second: send it over a \
+                     faster line, or lower limits.min_upload_bytes_per_second"
+                );
+                Err(Problem::new(ProblemKind::SlowUpload, detail))
+            }
+            Err(_) => {
+                let seconds = self.deadline.limit_seconds();
+                let detail =
+                    format!("the body did not arrive within {seconds} s: send a smaller one");
+                Err(Problem::new(ProblemKind::SlowUpload, detail))
+            }
         }
     }
 
@@ -132,7 +135,8 @@ fn announced_bytes(headers: &HeaderMap) -> Option<usize> {
     headers.get(CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
 }
 
-async fn next_chunk(body: &mut Body) -> Result<Option<Bytes>, Problem> {
+/// The next bytes of a body; `None` at its end.
+pub(in crate::api) async fn next_chunk(body: &mut Body) -> Result<Option<Bytes>, Problem> {
     loop {
         match poll_fn(|context| Pin::new(&mut *body).poll_frame(context)).await {
             None => return Ok(None),

@@ -1,0 +1,157 @@
+//! Web pages of other origins, where there are no keys. A browser on the server's machine reaches a
+//! server that only listens there, and runs the pages of strangers. It does not let them read the
+//! answers (CORS), but it does send their requests; and a stranger who lets the name of his own host
+//! lead to this machine (DNS rebinding) is no other origin for it.
+//!
+//! So a request that may change anything is refused when its `Origin` is neither the server itself
+//! nor in `access.cors_origins`; and a server that only its own machine reaches answers no request
+//! for a public host name. Keys make both unnecessary: no browser adds them by itself.
+
+use std::net::IpAddr;
+
+use axum::{
+    extract::{Request, State},
+    http::{
+        HeaderMap, Uri,
+        header::{HOST, ORIGIN},
+        uri::Authority,
+    },
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+
+use super::{
+    Access, ApiState,
+    problem::{Problem, ProblemKind},
+};
+
+/// Most characters of a header that are repeated to its sender.
+const MAX_SHOWN_CHARS: usize = 128;
+
+/// Lets no request of a foreign page through.
+pub(super) async fn refuse(
+    State(state): State<ApiState>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let options = &state.options;
+    let Access::Open { own_machine_only } = options.access else {
+        return next.run(request).await;
+    };
+    match check(&request, own_machine_only, &options.cors_origins) {
+        Ok(()) => next.run(request).await,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+fn check(request: &Request, own_machine_only: bool, allowed: &[String]) -> Result<(), Problem> {
+    // Every browser names the host; what names none is no browser.
+    let host = host_of(request.uri(), request.headers());
+    if let Some(host) = &host
+        && own_machine_only
+        && !is_private(host.host())
+        && !allowed.iter().any(|origin| names(origin, host))
+    {
+        let host = shown(host.as_str());
+        let detail = format!(
+            "without keys (access.keys_file), this server answers on its own machine only, and \
+             {host} may be the name of another: ask localhost, or add the origin to \
+             access.cors_origins"
+        );
+        return Err(Problem::new(ProblemKind::Forbidden, detail));
+    }
+    let Some(origin) = request.headers().get(ORIGIN) else {
+        return Ok(());
+    };
+    let origin = origin.to_str().unwrap_or("null");
+    let is_own = host.is_some_and(|host| names(origin, &host));
+    if request.method().is_safe() || is_own || allowed.iter().any(|allowed| allowed == origin) {
+        return Ok(());
+    }
+    let origin = shown(origin);
+    let detail = format!(
+        "without keys (access.keys_file), web pages of other origins may only read, and this \
+         request is from a page of {origin}: add it to access.cors_origins if it is yours"
+    );
+    Err(Problem::new(ProblemKind::Forbidden, detail))
+}
+
+/// Whom the request is meant for.
+fn host_of(uri: &Uri, headers: &HeaderMap) -> Option<Authority> {
+    let in_header = || headers.get(HOST)?.to_str().ok()?.parse().ok();
+    uri.authority().cloned().or_else(in_header)
+}
+
+/// Whether an origin is that of a host.
+fn names(origin: &str, host: &Authority) -> bool {
+    let Ok(origin) = origin.parse::<Uri>() else {
+        return false;
+    };
+    let usual_port = match origin.scheme_str() {
+        Some("http") => 80,
+        Some("https") => 443,
+        _ => return false,
+    };
+    let port = |authority: &Authority| authority.port_u16().unwrap_or(usual_port);
+    origin.authority().is_some_and(|authority| {
+        authority.host().eq_ignore_ascii_case(host.host()) && port(authority) == port(host)
+    })
+}
+
+/// Whether no stranger can own a name: it is an address, has no dot, or ends as RFC 6761 (section
+/// 6.3) reserves for one's own machine.
+fn is_private(host: &str) -> bool {
+    let name = host.trim_end_matches('.').to_ascii_lowercase();
+    let address = name.trim_start_matches('[').trim_end_matches(']');
+    address.parse::<IpAddr>().is_ok() || !name.contains('.') || name.ends_with(".localhost")
+}
+
+fn shown(text: &str) -> String {
+    text.chars().take(MAX_SHOWN_CHARS).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_and_names_without_a_dot_are_private_and_others_may_be_anybodys() {
+        for host in [
+            "localhost",
+            "LOCALHOST",
+            "app.localhost",
+            "127.0.0.1",
+            "[::1]",
+            "camera-pc",
+        ] {
+            assert!(is_private(host), "{host}");
+        }
+        for host in [
+            "evil.example",
+            "localhost.evil.example",
+            "127.0.0.1.evil.example",
+            "a.b.",
+        ] {
+            assert!(!is_private(host), "{host}");
+        }
+    }
+
+    #[test]
+    fn an_origin_is_that_of_a_host_with_the_same_name_and_port() {
+        let names = |origin: &str, host: &str| names(origin, &host.parse().unwrap());
+        assert!(names("http://localhost:8080", "localhost:8080"));
+        assert!(names("http://LocalHost", "localhost:80"));
+        assert!(names("https://camera.example", "camera.example"));
+        assert!(names("http://[::1]:8080", "[::1]:8080"));
+        for (origin, host) in [
+            ("http://localhost:8081", "localhost:8080"),
+            ("http://localhost", "localhost:8080"),
+            ("http://evil.example:8080", "localhost:8080"),
+            ("null", "localhost:8080"),
+            ("file://", "localhost:8080"),
+            ("", "localhost"),
+        ] {
+            assert!(!names(origin, host), "{origin} {host}");
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! How often a client may ask: a token bucket for each API key, and for each address that shows no
+//! key that is known here.
+//!
+//! Answers say how it stands in the fields `RateLimit-Policy` and `RateLimit` of
+//! draft-ietf-httpapi-ratelimit-headers-11 (23 May 2026).
+
+mod buckets;
+
+use std::{
+    net::SocketAddr,
+    num::NonZeroU32,
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+use axum::{
+    extract::{Request, State},
+    http::{HeaderName, HeaderValue},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+
+use self::buckets::{Buckets, Client, Standing};
+use super::{
+    ApiState,
+    problem::{Problem, ProblemKind},
+};
+
+pub(super) const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
+pub(super) const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+
+/// How often a client may ask.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RequestRate {
+    /// Requests a second in the long run, more than 0.
+    pub per_second: f64,
+    /// Requests at once after a pause.
+    pub burst: NonZeroU32,
+}
+
+impl RequestRate {
+    /// The time that a request costs.
+    fn interval(&self) -> Duration {
+        let seconds = Duration::try_from_secs_f64(self.per_second.recip());
+        seconds
+            .unwrap_or(Duration::MAX)
+            .clamp(Duration::from_nanos(1), Duration::from_hours(1))
+    }
+}
+
+/// The buckets of all clients. Clones share them.
+#[derive(Clone)]
+pub(super) struct RateLimiter {
+    buckets: Arc<Mutex<Buckets>>,
+    policy: HeaderValue,
+}
+
+impl RateLimiter {
+    pub(super) fn new(rate: RequestRate) -> Self {
+        let (interval, burst) = (rate.interval(), rate.burst.get());
+        let window = whole_seconds(interval * burst);
+        // Digits are visible ASCII.
+        let policy = format!("\"default\";q={burst};w={window}").parse();
+        Self {
+            buckets: Arc::new(Mutex::new(Buckets::new(interval, burst))),
+            policy: policy.unwrap_or(HeaderValue::from_static("\"default\"")),
+        }
+    }
+
+    fn take(&self, client: Client) -> Standing {
+        // No change can panic half-way.
+        let mut buckets = self.buckets.lock().unwrap_or_else(PoisonError::into_inner);
+        buckets.take(client, Instant::now())
+    }
+}
+
+/// Lets through who may ask, and says on every answer how often that is.
+pub(super) async fn apply(State(state): State<ApiState>, request: Request, next: Next) -> Response {
+    let Some(limiter) = &state.rate_limiter else {
+        return next.run(request).await;
+    };
+    let standing = limiter.take(client_of(&state, &request));
+    let mut response = if standing.admitted {
+        next.run(request).await
+    } else {
+        too_fast(standing.next_in).into_response()
+    };
+    let remaining = format!(
+        "\"default\";r={};t={}",
+        standing.remaining,
+        whole_seconds(standing.next_in)
+    );
+    let headers = response.headers_mut();
+    headers.insert(RATE_LIMIT_POLICY, limiter.policy.clone());
+    if let Ok(remaining) = remaining.parse() {
+        headers.insert(RATE_LIMIT, remaining);
+    }
+    response
+}
+
+/// Whose bucket a request is taken from.
+fn client_of(state: &ApiState, request: &Request) -> Client {
+    let holder = state.options.access.holder(request.headers());
+    let address = || {
+        let address = request.extensions().get::<SocketAddr>();
+        address.map(SocketAddr::ip)
+    };
+    match holder {
+        Some(holder) => Client::Key(holder.name.to_string()),
+        None => address().map_or(Client::Others, Client::at),
+    }
+}
+
+fn too_fast(next_in: Duration) -> Problem {
+    let seconds = whole_seconds(next_in);
+    let detail = format!(
+        "more requests came than this client may send: the next is welcome in {seconds} s (limits.\
+         requests_per_second, limits.request_burst)"
+    );
+    Problem::new(ProblemKind::RateLimited, detail).with_retry_after(next_in)
+}
+
+/// Rounded up, at least one: shorter times cannot be said in these fields.
+fn whole_seconds(time: Duration) -> u64 {
+    let begun = u64::from(time.subsec_nanos() > 0);
+    (time.as_secs() + begun).max(1)
+}

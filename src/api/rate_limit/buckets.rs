@@ -1,0 +1,219 @@
+//! Token buckets, each of which is one moment: when it will be full again. (The virtual scheduling
+//! form of the generic cell rate algorithm, ITU-T I.371.)
+
+use std::{
+    collections::HashMap,
+    net::{IpAddr, Ipv6Addr},
+    time::{Duration, Instant},
+};
+
+/// Most buckets before addresses that have none must share one.
+const MAX_BUCKETS: usize = 10_000;
+/// How often full buckets are looked for at most when there are that many.
+const PURGE_EVERY: Duration = Duration::from_secs(1);
+
+/// Whose a bucket is.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum Client {
+    /// Whoever shows the key of this name.
+    Key(String),
+    /// Whoever sends from here.
+    Address(IpAddr),
+    /// All who send from addresses that got no bucket.
+    Others,
+}
+
+impl Client {
+    /// Whoever sends from an address. A host has at least a /64 of IPv6 addresses to choose from, so
+    /// they are one client.
+    pub(super) fn at(address: IpAddr) -> Self {
+        Self::Address(match address.to_canonical() {
+            IpAddr::V6(address) => {
+                let prefix = address.to_bits() & !u128::from(u64::MAX);
+                Ipv6Addr::from_bits(prefix).into()
+            }
+            address @ IpAddr::V4(_) => address,
+        })
+    }
+}
+
+/// How a client stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Standing {
+    /// Whether this request is let through.
+    pub(super) admitted: bool,
+    /// How many more would be, now.
+    pub(super) remaining: u32,
+    /// When it will be one more.
+    pub(super) next_in: Duration,
+}
+
+/// A bucket for each client.
+pub(super) struct Buckets {
+    /// In which a token comes back.
+    interval: Duration,
+    /// Tokens of a full bucket.
+    burst: u32,
+    /// Buckets that are not known to be full.
+    full_at: HashMap<Client, Instant>,
+    purged_at: Option<Instant>,
+}
+
+impl Buckets {
+    /// Full buckets of `burst` tokens, one of which comes back in each `interval`.
+    pub(super) fn new(interval: Duration, burst: u32) -> Self {
+        Self {
+            interval,
+            burst,
+            full_at: HashMap::new(),
+            purged_at: None,
+        }
+    }
+
+    /// Takes a token, if there is one.
+    pub(super) fn take(&mut self, client: Client, now: Instant) -> Standing {
+        let client = self.placed(client, now);
+        let full_at = self.full_at.entry(client).or_insert(now);
+        let missing = full_at.saturating_duration_since(now);
+        let admitted = missing + self.interval <= self.interval * self.burst;
+        let missing = if admitted {
+            missing + self.interval
+        } else {
+            missing
+        };
+        *full_at = now + missing;
+        let tokens = missing.as_nanos().div_ceil(self.interval.as_nanos());
+        let tokens = u32::try_from(tokens).unwrap_or(u32::MAX).max(1);
+        Standing {
+            admitted,
+            remaining: self.burst.saturating_sub(tokens),
+            next_in: missing.saturating_sub(self.interval * (tokens - 1)),
+        }
+    }
+
+    /// The client whose bucket is used. There are few keys, but anybody may have many addresses.
+    fn placed(&mut self, client: Client, now: Instant) -> Client {
+        let is_new_address =
+            matches!(client, Client::Address(_)) && !self.full_at.contains_key(&client);
+        if !is_new_address || self.full_at.len() < MAX_BUCKETS {
+            return client;
+        }
+        let is_due = |at: Instant| now.saturating_duration_since(at) >= PURGE_EVERY;
+        if self.purged_at.is_none_or(is_due) {
+            self.purged_at = Some(now);
+            // A full bucket is like none.
+            self.full_at.retain(|_, full_at| *full_at > now);
+        }
+        if self.full_at.len() < MAX_BUCKETS {
+            client
+        } else {
+            Client::Others
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn key(name: &str) -> Client {
+        Client::Key(name.to_owned())
+    }
+
+    fn address(number: u32) -> Client {
+        Client::at(IpAddr::from(number.to_be_bytes()))
+    }
+
+    #[test]
+    fn a_burst_is_let_through_and_then_one_request_in_each_interval() {
+        let second = Duration::from_secs(1);
+        let mut buckets = Buckets::new(second, 3);
+        let start = Instant::now();
+        let standings = [0, 0, 0, 0].map(|_| buckets.take(key("gate"), start));
+        assert_eq!(
+            standings.map(|standing| standing.admitted),
+            [true, true, true, false]
+        );
+        assert_eq!(standings.map(|standing| standing.remaining), [2, 1, 0, 0]);
+        assert_eq!(standings.map(|standing| standing.next_in), [second; 4]);
+
+        let almost = buckets.take(key("gate"), start + second * 9 / 10);
+        assert!(!almost.admitted);
+        assert_eq!(almost.next_in, second / 10);
+        assert!(buckets.take(key("gate"), start + second).admitted);
+        assert!(!buckets.take(key("gate"), start + second).admitted);
+        // A long pause fills the bucket, and no more than that.
+        let rested = buckets.take(key("gate"), start + second * 100);
+        assert_eq!((rested.admitted, rested.remaining), (true, 2));
+    }
+
+    #[test]
+    fn clients_have_buckets_of_their_own() {
+        let mut buckets = Buckets::new(Duration::from_secs(1), 1);
+        let now = Instant::now();
+        for client in [key("gate"), key("office"), address(1), address(2)] {
+            assert!(buckets.take(client.clone(), now).admitted, "{client:?}");
+            assert!(!buckets.take(client.clone(), now).admitted, "{client:?}");
+        }
+    }
+
+    #[test]
+    fn the_addresses_of_a_host_are_one_client() {
+        let at = |text: &str| Client::at(text.parse().unwrap());
+        assert_eq!(at("2001:db8:1:2::1"), at("2001:db8:1:2:ffff::9"));
+        assert_ne!(at("2001:db8:1:2::1"), at("2001:db8:1:3::1"));
+        assert_eq!(at("::ffff:192.0.2.1"), at("192.0.2.1"));
+        assert_ne!(at("192.0.2.1"), at("192.0.2.2"));
+    }
+
+    #[test]
+    fn a_flood_of_addresses_takes_bounded_memory_and_costs_no_key_its_bucket() {
+        let second = Duration::from_secs(1);
+        let mut buckets = Buckets::new(second, 1);
+        let start = Instant::now();
+        let admitted = |buckets: &mut Buckets, numbers: std::ops::Range<u32>, now| {
+            let taken = numbers.map(|number| buckets.take(address(number), now));
+            taken.filter(|standing| standing.admitted).count()
+        };
+        // All who came too late share one token.
+        let flood = admitted(&mut buckets, 0..50_000, start);
+        assert_eq!(flood, MAX_BUCKETS + 1);
+        assert!(buckets.full_at.len() <= MAX_BUCKETS + 1);
+        assert!(buckets.take(key("gate"), start).admitted);
+        // When the buckets are full again, they make room for others.
+        let later = admitted(&mut buckets, 60_000..60_100, start + second);
+        assert_eq!(later, 100);
+        assert!(buckets.full_at.len() <= 101);
+    }
+
+    proptest! {
+        #[test]
+        fn no_stretch_of_time_lets_more_through_than_the_burst_and_the_rate(
+            pauses in prop::collection::vec(0_u64..3_000, 1..200),
+            interval_millis in 1_u64..2_000,
+            burst in 1_u32..20,
+        ) {
+            let interval = Duration::from_millis(interval_millis);
+            let mut buckets = Buckets::new(interval, burst);
+            let mut now = Instant::now();
+            let mut admitted = Vec::new();
+            for pause in pauses {
+                now += Duration::from_millis(pause);
+                let standing = buckets.take(Client::Others, now);
+                prop_assert!(standing.remaining < burst);
+                prop_assert!(standing.next_in <= interval && !standing.next_in.is_zero());
+                if standing.admitted {
+                    admitted.push(now);
+                }
+            }
+            for (first, from) in admitted.iter().enumerate() {
+                for (last, to) in admitted.iter().enumerate().skip(first) {
+                    let refilled = (*to - *from).as_millis() / u128::from(interval_millis);
+                    prop_assert!((last - first + 1) as u128 <= u128::from(burst) + refilled);
+                }
+            }
+        }
+    }
+}

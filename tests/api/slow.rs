@@ -1,0 +1,128 @@
+//! Bodies that come slowly, and work that takes long. The clock of most tests stands still until all
+//! tasks wait.
+
+use std::{
+    num::NonZeroU64,
+    time::{Duration, Instant},
+};
+
+use axum::{
+    body::{Body, Bytes},
+    http::Request,
+};
+use http_body_util::channel::{Channel, Sender};
+use tokio::time::sleep;
+
+use crate::service::{Answer, Bounds, Service};
+
+/// Every route that reads a body.
+const WITH_BODY: [(&str, &str); 5] = [
+    ("POST", "/detect?profile=fast"),
+    ("PUT", "/calibrations/lobby"),
+    ("POST", "/v2/repository/index"),
+    ("POST", "/v2/repository/models/eager/load"),
+    ("POST", "/v2/repository/models/eager/unload"),
+];
+const CALIBRATION: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
+  "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707} }"#;
+
+fn request(method: &str, path: &str) -> (Request<Body>, Sender<Bytes, axum::Error>) {
+    let (sender, channel) = Channel::new(1);
+    let request = Request::builder().method(method).uri(path);
+    (request.body(Body::new(channel)).unwrap(), sender)
+}
+
+#[track_caller]
+fn assert_too_slow(answer: &Answer, part: &str) {
+    assert_eq!(answer.status, 408);
+    let problem = answer.problem();
+    assert_eq!(problem["type"], "urn:lookdown:problem:slow-upload");
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.contains(part), "{detail}");
+    assert_eq!(answer.header("connection"), "close");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_body_that_stands_still_is_given_up_after_seconds_on_every_route() {
+    let service = Service::start();
+    for (method, path) in WITH_BODY {
+        let (request, mut sender) = request(method, path);
+        sender.send_data(Bytes::from_static(b"{")).await.unwrap();
+        let began = tokio::time::Instant::now();
+        let answer = service.send(request).await;
+        assert_too_slow(&answer, "1024 bytes a second");
+        let waited = began.elapsed();
+        let patience = Duration::from_secs(5);
+        assert!(
+            (patience..patience * 2).contains(&waited),
+            "{path}: {waited:?}"
+        );
+    }
+    service.get("/livez").await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn without_a_least_rate_the_deadline_ends_the_wait_on_every_route() {
+    let limit = Duration::from_mins(1);
+    let service = Service::within(&Bounds {
+        min_upload_bytes_per_second: None,
+        request_timeout: limit,
+        ..Bounds::default()
+    });
+    for (method, path) in WITH_BODY {
+        let (request, _sender) = request(method, path);
+        let began = tokio::time::Instant::now();
+        let answer = service.send(request).await;
+        assert_too_slow(&answer, "within 60 s");
+        assert!(began.elapsed() >= limit, "{path}");
+    }
+}
+
+/// Sends a calibration, some bytes a second.
+async fn upload_at(bytes_per_second: usize) -> Answer {
+    let service = Service::within(&Bounds {
+        min_upload_bytes_per_second: NonZeroU64::new(10),
+        request_timeout: Duration::from_mins(10),
+        ..Bounds::default()
+    });
+    let (request, mut sender) = request("PUT", "/calibrations/lobby");
+    let sending = tokio::spawn(async move {
+        for part in CALIBRATION.as_bytes().chunks(bytes_per_second) {
+            sleep(Duration::from_secs(1)).await;
+            if sender.send_data(Bytes::from_static(part)).await.is_err() {
+                return;
+            }
+        }
+    });
+    let answer = service.send(request).await;
+    sending.await.unwrap();
+    answer
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_steady_body_is_waited_for_as_long_as_it_keeps_the_rate() {
+    let fast_enough = upload_at(10).await;
+    assert_eq!(fast_enough.status, 200, "{}", fast_enough.text());
+    assert_too_slow(&upload_at(5).await, "10 bytes a second");
+}
+
+#[tokio::test]
+async fn work_that_takes_too_long_is_given_up_on_every_route_that_waits() {
+    let service = Service::within(&Bounds {
+        request_timeout: Duration::from_millis(50),
+        ..Bounds::default()
+    });
+    service.gate.close();
+    let began = Instant::now();
+    let answer = service.post("/v2/repository/models/eager/load", "").await;
+    assert_eq!(answer.status, 504);
+    assert!(began.elapsed() < Duration::from_secs(10));
+    let problem = answer.problem();
+    assert_eq!(problem["type"], "urn:lookdown:problem:timeout");
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(
+        detail.contains("0.05 s") && detail.contains("goes on"),
+        "{detail}"
+    );
+    service.gate.open();
+}

@@ -1,0 +1,220 @@
+//! Refusals while the client is still sending.
+
+use std::{
+    io::{Read, Write},
+    net::{SocketAddr, TcpStream},
+    num::NonZeroU32,
+    sync::Arc,
+};
+
+use axum::{
+    body::{Body, Bytes},
+    http::{Request, Version},
+};
+use http_body_util::channel::Channel;
+use lookdown::{
+    access::AccessKeys,
+    api::{Access, RequestRate},
+};
+use tokio::{net::TcpListener, task::spawn_blocking};
+
+use crate::service::{Answer, Bounds, Service, frame};
+
+const MAX_BODY_BYTES: usize = 10_000;
+
+fn tight() -> Bounds {
+    Bounds {
+        max_body_bytes: MAX_BODY_BYTES,
+        ..Bounds::default()
+    }
+}
+
+fn with_keys() -> Service {
+    let keys = AccessKeys::open("".parse().unwrap(), None).unwrap();
+    Service::within(&Bounds {
+        access: Access::Keys(Arc::new(keys)),
+        ..tight()
+    })
+}
+
+/// Sends a body in parts of 100 bytes; tells how many were taken.
+async fn send(
+    service: &Service,
+    request: axum::http::request::Builder,
+    parts: usize,
+) -> (Answer, usize) {
+    let (mut sender, channel) = Channel::<Bytes, axum::Error>::new(1);
+    let sending = tokio::spawn(async move {
+        for part in 0..parts {
+            if sender
+                .send_data(Bytes::from_static(&[b'x'; 100]))
+                .await
+                .is_err()
+            {
+                return part;
+            }
+        }
+        parts
+    });
+    let answer = service
+        .send(request.body(Body::new(channel)).unwrap())
+        .await;
+    (answer, sending.await.unwrap())
+}
+
+#[tokio::test]
+async fn what_a_refused_client_is_sending_is_read_on_every_route() {
+    let no_key = with_keys();
+    let open = Service::within(&tight());
+    let rare = Service::within(&Bounds {
+        request_rate: Some(RequestRate {
+            per_second: 0.02,
+            burst: NonZeroU32::MIN,
+        }),
+        ..tight()
+    });
+    rare.get("/calibrations").await;
+    for (service, method, path, status) in [
+        (&no_key, "POST", "/detect", 401),
+        (&no_key, "PUT", "/calibrations/lobby", 401),
+        (&no_key, "POST", "/v2/repository/index", 401),
+        (&no_key, "POST", "/v2/repository/models/eager/load", 401),
+        (&open, "POST", "/nowhere", 404),
+        (&open, "POST", "/calibrations", 405),
+        (&open, "POST", "/detect", 413),
+        (&open, "PUT", "/calibrations/Not-An-Id", 422),
+        (&rare, "PUT", "/calibrations/lobby", 429),
+    ] {
+        let request = Request::builder().method(method).uri(path);
+        let (answer, taken) = send(service, request, 300).await;
+        assert_eq!(answer.status, status, "{method} {path}: {}", answer.text());
+        answer.problem();
+        assert_eq!(taken, 300, "{method} {path}");
+    }
+}
+
+#[tokio::test]
+async fn no_more_than_a_few_times_the_limit_is_read() {
+    let service = Service::within(&tight());
+    for path in ["/detect", "/nowhere"] {
+        let (_, taken) = send(&service, Request::post(path), 1_000_000).await;
+        let bytes = taken * 100;
+        assert!(
+            (3 * MAX_BODY_BYTES..6 * MAX_BODY_BYTES).contains(&bytes),
+            "{path}: {bytes}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn clients_that_ask_first_and_those_of_http_2_are_answered_at_once() {
+    let service = with_keys();
+    let asking = Request::post("/detect").header("expect", "100-continue");
+    let streaming = Request::post("/detect").version(Version::HTTP_2);
+    for request in [asking, streaming] {
+        let (answer, taken) = send(&service, request, 300).await;
+        assert_eq!(answer.status, 401);
+        assert!(taken < 5, "{taken}");
+    }
+    // It was told to go on, and is sending therefore.
+    let service = Service::within(&tight());
+    let asking = Request::post("/detect").header("expect", "100-continue");
+    let (answer, taken) = send(&service, asking, 300).await;
+    assert_eq!((answer.status.as_u16(), taken), (413, 300));
+}
+
+async fn listen(service: &Service) -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    let router = service.router.clone();
+    tokio::spawn(async move { axum::serve(listener, router).await });
+    address
+}
+
+fn rest(connection: &mut TcpStream) -> String {
+    let mut answer = String::new();
+    connection.read_to_string(&mut answer).unwrap();
+    answer
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_that_sends_everything_before_it_looks_reads_why_it_was_refused() {
+    let max_body_bytes = 1 << 20;
+    let service = Service::within(&Bounds {
+        max_body_bytes,
+        ..Bounds::default()
+    });
+    let address = listen(&service).await;
+    for (line, status) in [
+        (
+            "POST /detect HTTP/1.1\r\nContent-Type: multipart/form-data; boundary=b",
+            413,
+        ),
+        ("POST /detect HTTP/1.1", 413),
+        ("PUT /calibrations/lobby HTTP/1.1", 413),
+        ("PUT /calibrations/Not-An-Id HTTP/1.1", 422),
+        ("POST /v2/repository/index HTTP/1.1", 413),
+        ("PUT /nowhere HTTP/1.1", 404),
+    ] {
+        let sent = spawn_blocking(move || {
+            let mut connection = TcpStream::connect(address).unwrap();
+            let length = 3 * max_body_bytes;
+            write!(
+                connection,
+                "{line}\r\nHost: localhost\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n"
+            )
+            .unwrap();
+            connection.write_all(&vec![0; length]).unwrap();
+            rest(&mut connection)
+        });
+        let answer = sent.await.unwrap();
+        assert!(
+            answer.starts_with(&format!("HTTP/1.1 {status}")),
+            "{line}: {answer}"
+        );
+        assert!(answer.contains("urn:lookdown:problem:"), "{answer}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_hangs_when_the_client_asks_before_it_sends() {
+    let service = Service::start();
+    let address = listen(&service).await;
+    let accepted = spawn_blocking(move || {
+        let mut connection = TcpStream::connect(address).unwrap();
+        let image = frame();
+        let length = image.len();
+        write!(
+            connection,
+            "POST /detect?calibration=lobby&profile=fast HTTP/1.1\r\nHost: localhost\r\n\
+             Connection: close\r\nExpect: 100-continue\r\nContent-Length: {length}\r\n\r\n"
+        )
+        .unwrap();
+        let mut go_on = [0; 25];
+        connection.read_exact(&mut go_on).unwrap();
+        assert_eq!(&go_on, b"HTTP/1.1 100 Continue\r\n\r\n");
+        connection.write_all(&image).unwrap();
+        rest(&mut connection)
+    });
+    let answer = accepted.await.unwrap();
+    assert!(answer.starts_with("HTTP/1.1 200 OK"), "{answer}");
+
+    for path in [
+        "/nowhere",
+        "/calibrations",
+        "/v2/repository/models/nobody/load?",
+    ] {
+        let refused = spawn_blocking(move || {
+            let mut connection = TcpStream::connect(address).unwrap();
+            write!(
+                connection,
+                "DELETE {path} HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\n\
+                 Content-Length: 1000\r\n\r\n"
+            )
+            .unwrap();
+            rest(&mut connection)
+        });
+        let answer = refused.await.unwrap();
+        assert!(answer.starts_with("HTTP/1.1 40"), "{answer}");
+    }
+}

@@ -1,0 +1,175 @@
+//! Browsers: pages of strangers, and what a page of ours may do.
+
+use axum::{body::Body, http::Request};
+use lookdown::api::Access;
+
+use crate::service::{Answer, Bounds, Service, frame};
+
+const CHANGING: [(&str, &str); 6] = [
+    ("POST", "/detect?calibration=lobby&profile=fast"),
+    ("PUT", "/calibrations/lobby"),
+    ("DELETE", "/calibrations/nobody"),
+    ("POST", "/v2/repository/index"),
+    ("POST", "/v2/repository/models/eager/load"),
+    ("POST", "/v2/repository/models/eager/unload"),
+];
+
+async fn ask(service: &Service, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
+    let mut request = Request::builder().method(method).uri(path);
+    for (name, value) in headers {
+        request = request.header(*name, *value);
+    }
+    let body = if path.starts_with("/detect") {
+        Body::from(frame())
+    } else {
+        Body::empty()
+    };
+    service.send(request.body(body).unwrap()).await
+}
+
+fn open(own_machine_only: bool) -> Service {
+    Service::within(&Bounds {
+        access: Access::Open { own_machine_only },
+        cors_origins: vec!["https://dashboard.example".to_owned()],
+        ..Bounds::default()
+    })
+}
+
+#[track_caller]
+fn assert_refused(answer: &Answer, part: &str) {
+    assert_eq!(answer.status, 403, "{}", answer.text());
+    let problem = answer.problem();
+    assert_eq!(problem["type"], "urn:lookdown:problem:forbidden");
+    assert!(problem["detail"].as_str().unwrap().contains(part));
+}
+
+#[tokio::test]
+async fn a_page_of_a_stranger_changes_nothing_and_finds_nobody_where_there_are_no_keys() {
+    let service = open(true);
+    for (method, path) in CHANGING {
+        for origin in ["https://evil.example", "http://localhost:9090", "null"] {
+            let headers = [("host", "localhost:8080"), ("origin", origin)];
+            let answer = ask(&service, method, path, &headers).await;
+            assert_refused(&answer, "access.cors_origins");
+        }
+        for origin in ["http://localhost:8080", "https://dashboard.example"] {
+            let headers = [("host", "localhost:8080"), ("origin", origin)];
+            let answer = ask(&service, method, path, &headers).await;
+            assert_ne!(answer.status, 403, "{method} {path} {origin}");
+        }
+    }
+    let stranger = [
+        ("host", "localhost:8080"),
+        ("origin", "https://evil.example"),
+    ];
+    // What a page cannot read does no harm.
+    assert_eq!(
+        ask(&service, "GET", "/calibrations", &stranger)
+            .await
+            .status,
+        200
+    );
+    let elsewhere = open(false);
+    let (method, path) = CHANGING[0];
+    assert_refused(
+        &ask(&elsewhere, method, path, &stranger).await,
+        "evil.example",
+    );
+}
+
+#[tokio::test]
+async fn a_name_that_a_stranger_lets_lead_here_is_not_answered_on_the_own_machine() {
+    let service = open(true);
+    let rebound = [
+        ("host", "evil.example:8080"),
+        ("origin", "http://evil.example:8080"),
+    ];
+    for (method, path) in [("GET", "/calibrations"), CHANGING[0], CHANGING[1]] {
+        assert_refused(
+            &ask(&service, method, path, &rebound).await,
+            "evil.example:8080",
+        );
+    }
+    for host in [
+        "127.0.0.1:8080",
+        "[::1]:8080",
+        "localhost",
+        "dashboard.example",
+    ] {
+        let answer = ask(&service, "GET", "/calibrations", &[("host", host)]).await;
+        assert_eq!(answer.status, 200, "{host}");
+    }
+    for path in ["/livez", "/readyz", "/metrics"] {
+        assert_eq!(
+            ask(&service, "GET", path, &rebound).await.status,
+            200,
+            "{path}"
+        );
+    }
+    // Whoever lets others reach a server gives it a name.
+    assert_eq!(
+        ask(&open(false), "GET", "/calibrations", &rebound)
+            .await
+            .status,
+        200
+    );
+}
+
+#[tokio::test]
+async fn pages_load_nothing_from_elsewhere_and_nobody_frames_or_sniffs_an_answer() {
+    let service = Service::start();
+    for path in [
+        "/",
+        "/docs/",
+        "/docs/swagger-ui.css",
+        "/livez",
+        "/nowhere",
+        "/calibrations",
+    ] {
+        let answer = service.get(path).await;
+        assert_eq!(answer.header("x-content-type-options"), "nosniff", "{path}");
+        assert_eq!(answer.header("referrer-policy"), "no-referrer", "{path}");
+        assert_eq!(answer.header("x-frame-options"), "DENY", "{path}");
+        let policy = answer.header("content-security-policy");
+        for part in ["default-src 'none'", "frame-ancestors 'none'"] {
+            assert!(policy.contains(part), "{path}: {policy}");
+        }
+        let is_page = path == "/" || path.starts_with("/docs");
+        assert_eq!(policy.contains("script-src 'self'"), is_page, "{path}");
+        assert!(!policy.contains("script-src 'self' 'unsafe"), "{path}");
+    }
+    let page = service.get("/docs/").await.text();
+    assert!(
+        !page.contains("<script>"),
+        "a script that the policy stops: {page}"
+    );
+}
+
+#[tokio::test]
+async fn pages_that_may_call_may_read_every_header_of_ours() {
+    let service = open(true);
+    let page = [
+        ("host", "localhost"),
+        ("origin", "https://dashboard.example"),
+    ];
+    let answer = ask(&service, CHANGING[0].0, CHANGING[0].1, &page).await;
+    assert_eq!(answer.status, 200);
+    let exposed = answer
+        .header("access-control-expose-headers")
+        .to_lowercase();
+    for name in [
+        "etag",
+        "location",
+        "ratelimit",
+        "ratelimit-policy",
+        "retry-after",
+        "server-timing",
+        "www-authenticate",
+        "x-inference-time",
+        "x-queue-time",
+        "x-request-id",
+        "x-total-time",
+    ] {
+        assert!(exposed.split(',').any(|told| told.trim() == name), "{name}");
+    }
+}
