@@ -28,8 +28,13 @@ class Server:
     """A server that answers."""
 
     address: str
-    pid: int
+    process: subprocess.Popen
     seconds_to_ready: float
+
+    @property
+    def pid(self) -> int:
+        """Of its first process."""
+        return self.process.pid
 
     def usage(self) -> Usage:
         """What it and its workers have used."""
@@ -93,7 +98,7 @@ def running(
         try:
             address = f"127.0.0.1:{port}"
             _wait(process, f"http://{address}{ready}", name, log)
-            yield Server(address, process.pid, time.monotonic() - started)
+            yield Server(address, process, time.monotonic() - started)
         finally:
             _stop(process)
 

@@ -1,0 +1,41 @@
+"""The release binary, as the proofs start it."""
+
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from harness.places import LOOKDOWN
+from harness.processes import Server, free_ports, running
+
+from .places import SAMPLES, TINY_MODEL
+
+DETECT = "/detect?calibration=office&profile=fast"
+TINY = {"MODEL__PATH": str(TINY_MODEL)}
+"""Settings of a server whose network takes no time."""
+
+
+@contextlib.contextmanager
+def lookdown(
+    settings: dict[str, str],
+    *,
+    calibrations: Path = SAMPLES / "calibrations",
+    inside: Sequence[str] = (),
+    environment: dict[str, str] | None = None,
+) -> Iterator[Server]:
+    """A server that is ready, until it is killed or no longer needed.
+
+    `inside` is a command that runs it in its own place, such as `prlimit`.
+    """
+    (port,) = free_ports(1)
+    wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), **settings}
+    variables = {f"LOOKDOWN__{name}": value for name, value in wanted.items()} | (environment or {})
+    # As `make serve` starts it.
+    variables["MALLOC_MMAP_THRESHOLD_"] = "131072"
+    with running("lookdown", [*inside, str(LOOKDOWN), "serve"], port, "/readyz", variables) as server:
+        yield server
+
+
+def is_root() -> bool:
+    """Whether mounts and control groups can be asked for."""
+    return os.geteuid() == 0
