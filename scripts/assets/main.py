@@ -19,17 +19,19 @@ STEPS = ("toolchain", "runtime", "model")
 EVERY_MODEL = "models"
 CONVERTERS = "converters"
 S3_SERVER = "s3-server"
+RELIABILITY = "reliability"
 BENCHES = "benches"
 AUDITOR = "auditor"
-MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, BENCHES, AUDITOR)
+MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, RELIABILITY, BENCHES, AUDITOR)
 
 
 def main(arguments: list[str]) -> int:
     """Runs the named steps, those of `STEPS` by default; the exit status is 0 only if everything is in place.
 
     `model` fetches the default models, `model NAME...` the named ones, `models` every one; `converters` installs
-    what the converters import, for their tests; `s3-server` a server that the tests of buckets talk to; `benches`
-    what the benchmarks and the servers they compare with import; `auditor` cargo-deny.
+    what the converters import, for their tests; `s3-server` a server that the tests of buckets talk to;
+    `reliability` what the proofs of reliability run; `benches` what the benchmarks and the servers they compare with
+    import; `auditor` cargo-deny.
     """
     signal.signal(signal.SIGTERM, _stop)
     try:
@@ -71,6 +73,9 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
             PrivatePython(places, S3_SERVER).install_file(listed, "--require-hashes")
         if AUDITOR in arguments:
             PrivatePython(places, AUDITOR).install(AUDITOR, pins.auditor)
+        if RELIABILITY in arguments:
+            listed = places.root / "tests" / "reliability" / "requirements.txt"
+            PrivatePython(places, RELIABILITY, places.own / "reliability").install_file(listed, "--require-hashes")
         if BENCHES in arguments:
             install_benches(places)
         for model in chosen_models(pins.models + pins.quantised, arguments):

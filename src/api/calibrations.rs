@@ -56,7 +56,7 @@ pub(super) async fn list(
 /// revision is the same.
 #[utoipa::path(
     get, path = "/calibrations/{id}", tag = "calibrations", operation_id = "get_calibration",
-    params(("id" = String, Path, description = "The calibration's ID.")),
+    params(("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID.")),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "The native file.", body = Object,
@@ -92,12 +92,14 @@ pub(super) async fn get(
 #[utoipa::path(
     put, path = "/calibrations/{id}", tag = "calibrations", operation_id = "put_calibration",
     params(
-        ("id" = String, Path, description = "The calibration's ID, 1 to 64 of a-z, 0-9, _ and -."),
+        ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
         ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
         ("size" = Option<String>, Query, description = "The size of the camera's frames in pixels, such as \
-            `1280x960`, for formats that do not tell it."),
-        ("If-Match" = Option<String>, Header, description = "The revision to replace, or `*`."),
-        ("If-None-Match" = Option<String>, Header, description = "`*`: create only."),
+            `1280x960`, for formats that do not tell it.", pattern = "^[0-9]+x[0-9]+$"),
+        ("If-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[^"]*")$"#,
+            description = "The revision to replace, or `*`. Not together with `If-None-Match`."),
+        ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r"^\*$",
+            description = "`*`: create only."),
     ),
     request_body(
         description = "A calibration file, recognised from its content; at most 1 MiB.",
@@ -142,8 +144,9 @@ pub(super) async fn put(
 #[utoipa::path(
     delete, path = "/calibrations/{id}", tag = "calibrations", operation_id = "delete_calibration",
     params(
-        ("id" = String, Path, description = "The calibration's ID."),
-        ("If-Match" = Option<String>, Header, description = "The revision to delete, or `*`."),
+        ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
+        ("If-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[^"]*")$"#,
+            description = "The revision to delete, or `*`."),
     ),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses((status = NO_CONTENT, description = "It is gone."), DeleteProblems)

@@ -86,7 +86,7 @@ pub(in crate::api) struct ViewInfo {
 #[utoipa::path(
     get, path = "/calibrations/{id}/views", tag = "calibrations", operation_id = "get_views",
     params(
-        ("id" = String, Path, description = "The calibration's ID."),
+        ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
         ("profile" = Option<String>, Query, description = "`balanced` by default."),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),

@@ -43,7 +43,7 @@ struct UnloadParameters {
     unload_dependents: Option<bool>,
 }
 
-/// A body; an empty one stands for the default.
+/// A body; an empty one and `null` stand for the default.
 pub(in crate::api) struct SmallBody<T>(pub(super) T);
 
 impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
@@ -57,7 +57,8 @@ impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
         if bytes.is_empty() {
             return Ok(Self(T::default()));
         }
-        serde_json::from_slice(&bytes).map(Self).map_err(|error| {
+        let read: Result<Option<T>, _> = serde_json::from_slice(&bytes);
+        read.map(|read| Self(read.unwrap_or_default())).map_err(|error| {
             Problem::new(
                 ProblemKind::MalformedRequest,
                 format!("the body cannot be used: {error}"),

@@ -40,7 +40,7 @@ class Writer:
         """Until the server is gone."""
         template = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
         while True:
-            focal = FOCAL + next(versions) / 1000
+            focal = round(FOCAL + next(versions) / 1000, 3)
             template |= {"id": self.camera, "lens": template["lens"] | {"focal": focal}}
             self.sent = focal
             try:

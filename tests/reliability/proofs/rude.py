@@ -1,1 +1,114 @@
-"""todo"""
+"""Clients that mean no good, many at a time: they hold no place for long, and others are served beside them.
+
+Slow ones send a byte now and then, of the head or of the body; silent ones connect and say nothing; others vanish in
+the middle of an upload, or while they wait for their answer.
+"""
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Callable
+
+from harness.processes import Server
+from support.effort import Effort
+from support.exchange import Lost, ask, connect, read_answer, request, vanish
+from support.holdings import holdings
+from support.lookdown import DETECT, TINY, lookdown
+from support.places import OFFICE
+from support.row import Row
+
+REQUEST_SECONDS = 3.0
+SETTINGS = TINY | {"SERVER__REQUEST_TIMEOUT_MILLIS": str(int(REQUEST_SECONDS * 1000)), "LOG__FILTER": "error"}
+PATIENCE_SECONDS = 2 * REQUEST_SECONDS + 4.0
+"""After this much time no rude client may hold anything."""
+GOOD_SECONDS = 1.0
+"""Longest that a good client may wait beside them."""
+BYTE_EVERY_SECONDS = 0.4
+
+
+def prove(effort: Effort) -> list[Row]:
+    """A row for each kind of client."""
+    picture = OFFICE.read_bytes()
+    whole = request("POST", DETECT, picture, {"Content-Type": "image/jpeg"})
+    head = len(whole) - len(picture)
+    kinds = {
+        "heads, a byte now and then": lambda link: _drip(link, whole[: head - 4], start=20),
+        "bodies, a byte now and then": lambda link: _drip(link, whole[: head + 1000], start=head),
+        "silent connections": lambda link: _wait_for_end(link),
+        "silence after an answer": lambda link: _silent_after(link),
+        "gone in the middle of an upload": lambda link: _send_and_vanish(link, whole[: head + len(picture) // 2]),
+        "gone while they wait": lambda link: _send_and_vanish(link, whole),
+    }
+    with lookdown(SETTINGS) as server:
+        ask(server.address, "POST", DETECT, picture)
+        return [_beside(server, name, client, effort.rude_clients, picture) for name, client in kinds.items()]
+
+
+def _beside(server: Server, name: str, client: Callable, count: int, picture: bytes) -> Row:
+    row = Row(name, f"{count} at a time, and a good client beside them")
+    before, began, held = holdings(server.pid), time.monotonic(), []
+    threads = [threading.Thread(target=_be, args=(server.address, client, held)) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    waits, statuses = [], {}
+    while any(thread.is_alive() for thread in threads) and time.monotonic() - began < PATIENCE_SECONDS + 5.0:
+        asked = time.monotonic()
+        try:
+            status = ask(server.address, "POST", DETECT, picture).status
+        except (Lost, OSError) as error:
+            status = f"none ({error})"
+        waits.append(time.monotonic() - asked)
+        statuses[status] = statuses.get(status, 0) + 1
+        time.sleep(0.05)
+    for thread in threads:
+        thread.join()
+    time.sleep(0.2)
+    after = holdings(server.pid)
+    row.seen = (
+        f"all gone after {max(held):.1f} s; the good client: {statuses}, slowest {max(waits):.2f} s; descriptors "
+        f"{before.descriptors} → {after.descriptors}, {before.resident_mib:.0f} → {after.resident_mib:.0f} MiB"
+    )
+    row.require(max(held) <= PATIENCE_SECONDS, f"held their places for {max(held):.1f} s")
+    # Uploads that are thrown away may fill the frames' places for a moment: 429 says so.
+    row.require(set(statuses) <= {200, 429} and statuses.get(200, 0) > 0, f"the good client was answered {statuses}")
+    row.require(max(waits) <= GOOD_SECONDS, f"the good client waited {max(waits):.2f} s")
+    row.require(after.descriptors <= before.descriptors + 2, "descriptors were not given back")
+    return row
+
+
+def _be(address: str, client: Callable[[socket.socket], None], held: list[float]) -> None:
+    """Notes how long the server let the client be."""
+    began = time.monotonic()
+    with contextlib.suppress(OSError, Lost), contextlib.closing(connect(address, PATIENCE_SECONDS + 2.0)) as connection:
+        client(connection)
+    held.append(time.monotonic() - began)
+
+
+def _drip(connection: socket.socket, sent: bytes, *, start: int) -> None:
+    """Sends the start at once and the rest byte by byte until the server has had enough."""
+    connection.sendall(sent[:start])
+    connection.settimeout(BYTE_EVERY_SECONDS)
+    deadline = time.monotonic() + PATIENCE_SECONDS + 2.0
+    for byte in sent[start:]:
+        connection.sendall(bytes([byte]))
+        try:
+            if not connection.recv(4096) or time.monotonic() > deadline:
+                return
+        except TimeoutError:
+            continue
+
+
+def _wait_for_end(connection: socket.socket) -> None:
+    connection.recv(1)
+
+
+def _silent_after(connection: socket.socket) -> None:
+    connection.sendall(request("GET", "/livez"))
+    read_answer(connection)
+    _wait_for_end(connection)
+
+
+def _send_and_vanish(connection: socket.socket, sent: bytes) -> None:
+    connection.sendall(sent)
+    vanish(connection)

@@ -1,1 +1,86 @@
-"""todo"""
+"""A long steady load, good and bad input mixed: memory, threads and descriptors do not grow."""
+
+import json
+import statistics
+import tempfile
+from pathlib import Path
+
+from harness.load import load, start_load
+from support.effort import Effort
+from support.holdings import Holdings, Watch, growth
+from support.lookdown import DETECT, lookdown
+from support.places import OFFICE
+from support.row import Row
+
+LOAD = 0.8
+"""Of the capacity."""
+BAD_PER_SECOND = 4.0
+"""Of each kind of bad input."""
+WARM_UP = 0.25
+"""Share of the time that is not counted: caches fill, the allocator finds its size."""
+MOST_GROWTH = 0.05
+"""Of memory, over the time that is counted."""
+MOST_MORE = 3.0
+"""Threads and descriptors, over the same time: connections come and go."""
+
+
+def prove(effort: Effort) -> list[Row]:
+    """With the default settings and a real model."""
+    minutes = effort.soak_seconds / 60
+    row = Row("soak", f"{minutes:.1f} min at {LOAD:.0%} of the capacity, profile `fast`, and four kinds of bad input")
+    picture = OFFICE.read_bytes()
+    with tempfile.TemporaryDirectory() as name, lookdown({"LOG__FILTER": "error"}) as server:
+        folder = Path(name)
+        capacity = load(server, [DETECT], OFFICE, clients=4, seconds=3.0)["succeeded_per_second"]
+        streams = [
+            ("200", DETECT, picture, LOAD * capacity),
+            ("415", DETECT, b"no picture at all", BAD_PER_SECOND),
+            ("422", DETECT, picture[: len(picture) // 2], BAD_PER_SECOND),
+            ("422", "/detect?score_threshold=2", picture, BAD_PER_SECOND),
+            ("404", "/detect?calibration=nobody", picture, BAD_PER_SECOND),
+        ]
+        with Watch(server.pid, effort.soak_seconds / 200) as watch:
+            statuses = [
+                _ended(status, running)
+                for status, running in [
+                    _start(server, folder / str(index), stream, effort.soak_seconds)
+                    for index, stream in enumerate(streams)
+                ]
+            ]
+    answered = sum(sum(told["statuses"].values()) for _, told in statuses)
+    # Under random arrivals a queue may be full for a moment.
+    unexpected = {status: told["statuses"] for status, told in statuses if set(told["statuses"]) - {status, "429"}}
+    cut_off = sum(told["broken"] + told["timed_out"] for _, told in statuses)
+    grown, mean = _grown(watch.samples), statistics.mean(seen.resident_mib for _, seen in watch.samples)
+    row.seen = (
+        f"{answered} answers; memory {mean:.0f} MiB, {grown.resident_mib:+.1f}; threads {grown.threads:+.1f}; "
+        f"descriptors {grown.descriptors:+.1f}; {cut_off} cut off"
+    )
+    row.require(not unexpected, f"unexpected statuses: {unexpected}")
+    row.require(not cut_off, f"{cut_off} were cut off")
+    row.require(grown.resident_mib <= MOST_GROWTH * mean, f"memory grew by {grown.resident_mib:.1f} of {mean:.0f} MiB")
+    row.require(grown.threads <= MOST_MORE, f"threads grew by {grown.threads:.1f}")
+    row.require(grown.descriptors <= MOST_MORE, f"descriptors grew by {grown.descriptors:.1f}")
+    return [row]
+
+
+def _start(server, body: Path, stream: tuple, seconds: float) -> tuple:
+    status, path, content, rate = stream
+    body.write_bytes(content)
+    return status, start_load(server, [path], body, seconds=seconds, rate=rate)
+
+
+def _ended(status: str, running) -> tuple[str, dict]:
+    told, _ = running.communicate()
+    return status, json.loads(told)
+
+
+def _grown(samples: list[tuple[float, Holdings]]) -> Holdings:
+    """What a straight line through the samples gains, once warm and before the load ends."""
+    counted = samples[int(len(samples) * WARM_UP) : -1]
+    return Holdings(
+        *(
+            growth([(seconds, getattr(seen, field)) for seconds, seen in counted])
+            for field in ("resident_mib", "threads", "descriptors")
+        )
+    )

@@ -2,7 +2,7 @@
 
 from harness.places import ROOT, SAMPLES
 
-__all__ = ["FIXTURES", "OFFICE", "ROOT", "SAMPLES", "SCHEMATHESIS", "TINY_MODEL", "WORK"]
+__all__ = ["FIXTURES", "OFFICE", "OWN", "ROOT", "SAMPLES", "SCHEMATHESIS", "TINY_MODEL", "WORK"]
 
 OWN = ROOT / ".setup" / "reliability"
 """What `scripts/setup.py reliability` makes."""
