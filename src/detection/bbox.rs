@@ -38,6 +38,14 @@ pub struct BBox<S> {
     space: PhantomData<S>,
 }
 
+impl BBox<FramePixels> {
+    /// The whole of a frame.
+    #[must_use]
+    pub fn of_frame(width: u32, height: u32) -> Self {
+        Self::from_ordered([0.0, 0.0, f64::from(width), f64::from(height)])
+    }
+}
+
 impl<S> BBox<S> {
     /// The box `[x_min, y_min, x_max, y_max]`, pixels.
     ///

@@ -3,7 +3,7 @@
 
 use crate::{
     calibration::CameraGeometry,
-    detection::{BBox, ViewPixels},
+    detection::{BBox, FramePixels, ViewPixels},
     geometry::{BackProjection, Footprint, Ray, ViewPlan, VirtualView},
     imaging::{Frame, Letterbox, NetworkInput, RemapTable},
 };
@@ -12,6 +12,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct CameraRig {
     geometry: CameraGeometry,
+    frame: BBox<FramePixels>,
     views: Views,
     views_outside: usize,
 }
@@ -38,6 +39,7 @@ impl CameraRig {
         let Some(plan) = plan else {
             return Self {
                 geometry,
+                frame: BBox::of_frame(frame_width, frame_height),
                 views: Views::Direct(Letterbox::new(frame_width, frame_height, input)),
                 views_outside: 0,
             };
@@ -70,6 +72,7 @@ impl CameraRig {
         let seeing: Vec<_> = seeing.collect();
         Self {
             geometry,
+            frame: BBox::of_frame(frame_width, frame_height),
             views_outside: planned - seeing.len(),
             views: Views::Virtual(seeing),
         }
@@ -78,6 +81,11 @@ impl CameraRig {
     /// Lens and mount.
     pub(super) fn geometry(&self) -> &CameraGeometry {
         &self.geometry
+    }
+
+    /// The whole frame.
+    pub(super) fn frame(&self) -> &BBox<FramePixels> {
+        &self.frame
     }
 
     /// How many views the network has to see.

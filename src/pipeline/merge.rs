@@ -177,6 +177,7 @@ fn touches_border(bbox: &BBox<ViewPixels>, input: &NetworkInput) -> bool {
         || bbox.y_max() > height - margin
 }
 
+/// `None` for one of whom the frame shows nothing: lens images may be larger than frames.
 fn person(
     bbox: BBox<FramePixels>,
     score: f64,
@@ -184,6 +185,7 @@ fn person(
     rig: &CameraRig,
 ) -> Option<Person> {
     let geometry = rig.geometry();
+    let bbox = bbox.clipped_to(rig.frame())?;
     let center = nalgebra::Point2::from(bbox.center());
     let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
     let outlines = members.iter().map(|member| {
@@ -204,3 +206,6 @@ fn person(
         views: views.len(),
     })
 }
+
+#[cfg(test)]
+mod properties;
