@@ -1,7 +1,13 @@
 //! The request parameters as they are described. `pipeline::DetectParameters` reads and checks
 //! them; a test holds the two together.
 
-use utoipa::{IntoParams, ToSchema};
+use utoipa::{
+    IntoParams, PartialSchema, ToSchema,
+    openapi::{
+        KnownFormat, ObjectBuilder, RefOr, Schema, SchemaFormat,
+        schema::{AdditionalProperties, Type},
+    },
+};
 
 /// Parameters in the query.
 #[derive(ToSchema, IntoParams)]
@@ -67,16 +73,32 @@ pub(in crate::api) struct DetectQuery {
     timeout_millis: Option<u32>,
 }
 
-/// The frame and parameters in a form.
-#[derive(ToSchema)]
-#[expect(dead_code, reason = "describes what upload::form reads")]
-pub(in crate::api) struct DetectForm {
-    /// The frame: a JPEG, PNG or WebP file. `image` is accepted as another name of this field.
-    #[schema(format = Binary, content_media_type = "application/octet-stream")]
-    img: String,
-    /// Any parameter of the query can be a field instead.
-    #[serde(flatten)]
-    parameters: DetectQuery,
+/// The frame and parameters in a form: what `upload::form` reads.
+pub(in crate::api) struct DetectForm;
+
+impl ToSchema for DetectForm {
+    fn schemas(_: &mut Vec<(String, RefOr<Schema>)>) {}
+}
+
+impl PartialSchema for DetectForm {
+    /// The parameters of the query and the frame, and no other field.
+    fn schema() -> RefOr<Schema> {
+        let query = DetectQuery::schema();
+        let RefOr::T(Schema::Object(mut form)) = query else {
+            return query;
+        };
+        let frame = "The frame: a JPEG, PNG or WebP file. `image` is accepted as another name of this field.";
+        let frame = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+            .content_media_type("application/octet-stream")
+            .description(Some(frame));
+        form.description = Some("The frame, and any parameter of the query.".to_owned());
+        form.properties.insert("img".to_owned(), frame.into());
+        form.required.push("img".to_owned());
+        form.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
+        form.into()
+    }
 }
 
 /// A profile.
