@@ -33,6 +33,7 @@ test: ## set up, then everything that needs nothing but this repository: formatt
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
 	$(PYTHON) -m unittest discover -s benches/tests -t benches
+	$(PYTHON) -m unittest discover -s tests/reliability/tests -t tests/reliability
 	cargo test --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --locked
 

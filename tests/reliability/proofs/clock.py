@@ -6,7 +6,6 @@ set.
 
 import contextlib
 import json
-import subprocess
 import tempfile
 import time
 from pathlib import Path
@@ -51,7 +50,9 @@ def prove(effort: Effort) -> list[Row]:
         with lookdown(settings, calibrations=calibrations, environment=environment) as server:
             years = {_jump(row, server.address, clock, jump) for jump in JUMPS}
             row.require(server.process.poll() is None, "the server ended")
-    row.seen = f"reports dated {', '.join(sorted(years))}; uploads were limited after {LIMIT_SECONDS:.0f} s all the same"
+    row.seen = (
+        f"reports dated {', '.join(sorted(years))}; uploads were limited after {LIMIT_SECONDS:.0f} s all the same"
+    )
     return [row]
 
 

@@ -1,4 +1,4 @@
-"""The service is what its OpenAPI document says: schemathesis makes up requests, good and bad, and follows the links."""
+"""The service is what its OpenAPI document says: schemathesis makes up requests, good and bad, and follows links."""
 
 import os
 import re
@@ -21,7 +21,9 @@ ENDS = {0: "held", 1: "failures"}
 
 def prove(effort: Effort) -> list[Row]:
     """One run with all checks and in all phases."""
-    row = Row("the OpenAPI document", f"schemathesis, all checks, up to {effort.examples} examples per operation and phase")
+    row = Row(
+        "the OpenAPI document", f"schemathesis, all checks, up to {effort.examples} examples per operation and phase"
+    )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "calibrations"
         shutil.copytree(SAMPLES / "calibrations", folder)

@@ -21,7 +21,9 @@ RECOVERY_SECONDS = 5.0
 def prove(effort: Effort) -> list[Row]:
     """Twice in a row, so that nothing is lost on the way."""
     del effort
-    row = Row("descriptors exhausted", f"{CLIENTS} connections to a server that may have {DESCRIPTORS} descriptors, twice")
+    row = Row(
+        "descriptors exhausted", f"{CLIENTS} connections to a server that may have {DESCRIPTORS} descriptors, twice"
+    )
     inside = ("prlimit", f"--nofile={DESCRIPTORS}:{DESCRIPTORS}")
     with lookdown(TINY | {"LOG__FILTER": "off", "INFERENCE__SESSIONS": "1"}, inside=inside) as server:
         figures = [_exhaust(server, row) for _ in range(2)]

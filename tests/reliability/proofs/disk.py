@@ -55,12 +55,15 @@ def _try(row: Row, address: str, folder: Path, spoil) -> None:
         row.require(refused.status in REFUSALS, f"a replacement was answered {refused.status}")
         row.require(created.status in REFUSALS, f"a creation was answered {created.status}")
         row.require(
-            refused.headers["content-type"] == "application/problem+json", f"not a problem document: {refused.body[:200]!r}"
+            refused.headers["content-type"] == "application/problem+json",
+            f"not a problem document: {refused.body[:200]!r}",
         )
         row.require((folder / "office.json").read_bytes() == old, "the file has changed")
         row.require(served == tag, "another revision is served")
         row.require((detected, ready) == (200, 200), f"/detect answered {detected}, /readyz {ready}")
-        row.require(sorted(file.name for file in folder.iterdir() if file.suffix != ".fill") == ["office.json"], "files left")
+        row.require(
+            sorted(file.name for file in folder.iterdir() if file.suffix != ".fill") == ["office.json"], "files left"
+        )
     accepted = ask(address, "PUT", "/calibrations/office", new).status
     row.require(accepted == 200, f"a write afterwards was answered {accepted}")
     kind = refused.json().get("type", "").rpartition(":")[2]

@@ -120,7 +120,9 @@ def _check(folder: Path, writer: Writer, row: Row) -> bool:
     with contextlib.suppress(ValueError):
         stored = _stored(folder, writer)
     if stored not in (writer.answered, writer.sent):
-        row.faults.append(f"{writer.camera}: {stored} is stored, {writer.answered} was answered, {writer.sent} was sent")
+        row.faults.append(
+            f"{writer.camera}: {stored} is stored, {writer.answered} was answered, {writer.sent} was sent"
+        )
     ahead = stored == writer.sent != writer.answered
     writer.answered = stored if isinstance(stored, float) else None
     return ahead

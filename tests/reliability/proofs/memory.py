@@ -36,7 +36,9 @@ def frames() -> dict[str, tuple[bytes, set[int]]]:
 def prove(effort: Effort) -> list[Row]:
     """All kinds, many at a time."""
     made = frames()
-    row = Row("memory limit", f"{LIMIT_MIB} MiB; {len(made)} kinds of huge frames, {effort.huge_frames} × {AT_ONCE} of each")
+    row = Row(
+        "memory limit", f"{LIMIT_MIB} MiB; {len(made)} kinds of huge frames, {effort.huge_frames} × {AT_ONCE} of each"
+    )
     with memory_group(LIMIT_MIB) as group:
         if group is None:
             row.skipped = "needs root and a control group for memory"

@@ -1,4 +1,4 @@
-"""Ten times the requests that can be served: as many as before are, the others are refused quickly, nobody is cut off."""
+"""Ten times the requests that can be served: as many as before are, others are refused quickly, nobody is cut off."""
 
 from harness.load import load
 from support.effort import Effort

@@ -68,13 +68,17 @@ def _calibration(address: str, file: Path) -> Row:
 def _model(address: str, folder: Path) -> Row:
     onnx, manifest = folder / "model.onnx", folder / "model.toml"
     whole = onnx.read_bytes()
-    row = Row("model damaged while serving", f"{len(damages(whole))} kinds of damage, and of its manifest, and a good one")
+    row = Row(
+        "model damaged while serving", f"{len(damages(whole))} kinds of damage, and of its manifest, and a good one"
+    )
     revision = _model_revision(address)
     for file, good in ((onnx, whole), (manifest, manifest.read_bytes())):
         for kind, damage in damages(good).items():
             failures = _failed_loads(address)
             file.write_bytes(damage)
-            row.require(_comes(lambda before=failures: _failed_loads(address) > before), f"{file.name} {kind}: not noticed")
+            row.require(
+                _comes(lambda before=failures: _failed_loads(address) > before), f"{file.name} {kind}: not noticed"
+            )
             row.require(_model_revision(address) == revision, f"{file.name} {kind}: another model answers")
             file.write_bytes(good)
     manifest.write_text(MANIFEST + "[input]\nscale = [0.5, 0.5, 0.5]\n", encoding="utf-8")

@@ -20,7 +20,13 @@ from support.places import OFFICE
 from support.row import Row
 
 REQUEST_SECONDS = 3.0
-SETTINGS = TINY | {"SERVER__REQUEST_TIMEOUT_MILLIS": str(int(REQUEST_SECONDS * 1000)), "LOG__FILTER": "error"}
+MILLIS = str(int(REQUEST_SECONDS * 1000))
+SETTINGS = TINY | {
+    "LOG__FILTER": "error",
+    "SERVER__REQUEST_TIMEOUT_MILLIS": MILLIS,
+    "SERVER__HEADER_TIMEOUT_MILLIS": MILLIS,
+    "SERVER__IDLE_TIMEOUT_MILLIS": MILLIS,
+}
 PATIENCE_SECONDS = 2 * REQUEST_SECONDS + 4.0
 """After this much time no rude client may hold anything."""
 LONGEST_SECONDS = PATIENCE_SECONDS + 2.0

@@ -14,7 +14,7 @@ import time
 
 from harness.processes import Server
 from support.effort import Effort
-from support.exchange import request
+from support.exchange import Lost, ask, request
 from support.lookdown import DETECT, TINY, lookdown
 from support.places import OFFICE
 from support.rounds import Client, Tally
@@ -24,32 +24,44 @@ CLIENTS = 12
 REQUEST_SECONDS = 5
 GRACE_SECONDS = 1
 BOUND_SECONDS = GRACE_SECONDS + REQUEST_SECONDS + 1.0
-SETTINGS = TINY | {"SERVER__REQUEST_TIMEOUT_MILLIS": str(REQUEST_SECONDS * 1000)}
+SETTINGS = TINY | {
+    "LOG__FILTER": "error",
+    "SERVER__REQUEST_TIMEOUT_MILLIS": str(REQUEST_SECONDS * 1000),
+    "SHUTDOWN__GRACE_MILLIS": str(GRACE_SECONDS * 1000),
+}
+NOTICE_SECONDS = 0.5
+"""By then `/readyz` says that the end is near."""
 WELCOME = {200, 429, 503}
 """Answers; the latter two are refusals that say so."""
 
 
 def prove(effort: Effort) -> list[Row]:
     """So many servers are stopped."""
-    row = Row("SIGTERM under load", f"{effort.stops} times, {CLIENTS} clients that never pause")
-    tally, seconds, codes = Tally(), [], []
+    row = Row(
+        "SIGTERM under load", f"{effort.stops} times, {CLIENTS} clients that never pause, {GRACE_SECONDS} s of grace"
+    )
+    tally, seconds, codes, notices = Tally(), [], [], []
     for _ in range(effort.stops):
         with lookdown(SETTINGS) as server:
             clients = start_clients(server, tally)
             time.sleep(random.uniform(0.2, 0.6))
-            taken, code = stop(server)
-            seconds.append(taken)
-            codes.append(code)
+            began = time.monotonic()
+            server.process.send_signal(signal.SIGTERM)
+            notices.append(seconds_to_notice(server))
+            codes.append(exit_status(server))
+            seconds.append(time.monotonic() - began)
         for client in clients:
             client.join()
-    others = {status: count for status, count in tally.statuses.items() if status not in WELCOME}
+    answers, lost = dict(sorted(tally.statuses.items())), tally.lost
     row.seen = (
-        f"{tally.asked()} requests, of them answered {dict(sorted(tally.statuses.items()))}, {len(tally.lost)} lost; "
-        f"gone after {statistics.median(seconds):.2f} s (at most {max(seconds):.2f})"
+        f"{tally.asked()} requests, answered {answers}, {len(lost)} lost; `/readyz` 503 within "
+        f"{1000 * max(notices):.0f} ms; gone after {statistics.median(seconds):.2f} s (at most {max(seconds):.2f})"
     )
-    row.require(not tally.lost, f"lost: {sorted(set(tally.lost))} ({len(tally.lost)} of {tally.asked()})")
+    others = set(answers) - WELCOME
+    row.require(not lost, f"lost: {sorted(set(lost))} ({len(lost)} of {tally.asked()})")
     row.require(not others, f"unexpected statuses: {others}")
     row.require(set(codes) == {0}, f"exit statuses {sorted(map(str, set(codes)))}")
+    row.require(max(notices) <= NOTICE_SECONDS, f"/readyz was not 503 for {max(notices):.2f} s")
     row.require(max(seconds) <= BOUND_SECONDS, f"took {max(seconds):.1f} s; the bound is {BOUND_SECONDS:.0f} s")
     return [row]
 
@@ -70,14 +82,23 @@ def start_clients(server: Server, tally: Tally) -> list[Client]:
     return clients
 
 
-def stop(server: Server) -> tuple[float, int | None]:
-    """Seconds until the server was gone, and its exit status; `None` when it had to be killed."""
+def seconds_to_notice(server: Server) -> float:
+    """Until `/readyz` says 503."""
     began = time.monotonic()
-    server.process.send_signal(signal.SIGTERM)
+    while time.monotonic() - began <= NOTICE_SECONDS:
+        try:
+            if ask(server.address, "GET", "/readyz").status == 503:
+                return time.monotonic() - began
+        except (Lost, OSError):
+            break
+    return float("inf")
+
+
+def exit_status(server: Server) -> int | None:
+    """When the server is gone; `None` when it had to be killed."""
     try:
-        code = server.process.wait(timeout=2 * BOUND_SECONDS)
+        return server.process.wait(timeout=2 * BOUND_SECONDS)
     except subprocess.TimeoutExpired:
         server.process.kill()
         server.process.wait()
-        code = None
-    return time.monotonic() - began, code
+        return None

@@ -57,7 +57,12 @@ def exchange(connection: socket.socket, sent: bytes) -> Answer:
 
 
 def ask(
-    address: str, method: str, path: str, body: bytes = b"", headers: dict[str, str] | None = None, timeout: float = 30.0
+    address: str,
+    method: str,
+    path: str,
+    body: bytes = b"",
+    headers: dict[str, str] | None = None,
+    timeout: float = 30.0,
 ) -> Answer:
     """The answer to one request on a connection of its own."""
     fields = {"Connection": "close", **(headers or {})}

@@ -1,0 +1,6 @@
+"""Tests of what the proofs share."""
+
+import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[3] / "benches"))

@@ -1,0 +1,77 @@
+"""Whoever watches a server must see right: growth, lost answers, and what is told of a run."""
+
+import contextlib
+import json
+import socket
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+from support.exchange import Lost, ask, connect
+from support.frames import png
+from support.holdings import growth
+from support.row import Row
+from support.tell import told
+
+
+def answering(sent: bytes):
+    """The address of a server that answers one connection with these bytes and closes it."""
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def serve() -> None:
+        with contextlib.closing(listener), contextlib.closing(listener.accept()[0]) as connection:
+            connection.recv(65536)
+            connection.sendall(sent)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    return f"127.0.0.1:{listener.getsockname()[1]}", thread
+
+
+class Growth(unittest.TestCase):
+    def test_a_line_grows_by_what_it_rises(self):
+        self.assertAlmostEqual(growth([(second, 5.0 + 2.0 * second) for second in range(11)]), 20.0)
+
+    def test_what_goes_up_and_down_does_not_grow(self):
+        self.assertAlmostEqual(growth([(0, 1), (1, 2), (2, 1), (3, 2), (4, 1)]), 0.0)
+
+
+class Exchange(unittest.TestCase):
+    def test_an_answer_that_ends_early_is_lost(self):
+        for sent in (b"", b"HTTP/1.1 200 OK\r\nContent-Length: 5\r\n\r\nhal"):
+            address, thread = answering(sent)
+            with self.assertRaises(Lost):
+                ask(address, "GET", "/")
+            thread.join()
+
+    def test_a_whole_answer_is_read(self):
+        address, thread = answering(b"HTTP/1.1 404 Not Found\r\nETag: x\r\nContent-Length: 2\r\n\r\n{}")
+        answer = ask(address, "GET", "/")
+        thread.join()
+        self.assertEqual((answer.status, answer.headers["etag"], answer.json()), (404, "x", {}))
+
+    def test_a_server_that_is_gone_refuses(self):
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            port = listener.getsockname()[1]
+        with self.assertRaises(ConnectionRefusedError):
+            connect(f"127.0.0.1:{port}")
+
+
+class Frames(unittest.TestCase):
+    def test_a_picture_of_many_pixels_is_short(self):
+        self.assertLess(len(png(2000, 2000)), 20_000)
+
+
+class Told(unittest.TestCase):
+    def test_the_long_form_of_a_part_is_told_rather_than_the_short_one(self):
+        made = dict.fromkeys(("commit", "cpu", "system", "onnx_runtime", "rust"), "x") | {"date": "2026-11-21 10:00"}
+        made |= {"cores": 2, "memory_gib": 24.0}
+        with tempfile.TemporaryDirectory() as name:
+            for effort in ("short", "long"):
+                row = Row("kill", effort, "all|well")
+                kept = {"made": made | {"effort": effort}, "seconds": 1.0, "rows": [row.as_json()]}
+                (Path(name) / f"{effort}-kill.json").write_text(json.dumps(kept), encoding="utf-8")
+            table = told(Path(name), ["kill", "stop"])
+        self.assertIn("| kill | long | all\\|well | 0 |", table)
+        self.assertNotIn("short", table)
