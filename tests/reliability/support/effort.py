@@ -38,7 +38,7 @@ SHORT = Effort(
 
 LONG = Effort(
     name="long",
-    examples=2000,
+    examples=1000,
     deterministic=False,
     kills=1000,
     stops=100,
