@@ -126,6 +126,7 @@ async fn what_cannot_be_done_is_refused_with_the_reason() {
             "malformed-request",
         ),
         (INDEX.to_owned(), "not JSON", 400, "malformed-request"),
+        (INDEX.to_owned(), "[]", 400, "malformed-request"),
         (
             INDEX.to_owned(),
             r#"{"redy": true}"#,
@@ -137,6 +138,9 @@ async fn what_cannot_be_done_is_refused_with_the_reason() {
         assert_eq!(answer.status, status, "{path} {body}");
         let urn = format!("urn:lookdown:problem:{kind}");
         assert_eq!(answer.problem()["type"], urn, "{path} {body}");
+    }
+    for nothing in ["", "null", "{}"] {
+        assert_eq!(service.post(INDEX, nothing).await.status, 200, "{nothing}");
     }
     let long = " ".repeat(100_000);
     let answer = service.post(INDEX, &long).await;

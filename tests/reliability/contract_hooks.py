@@ -30,12 +30,22 @@ schemathesis.openapi.format("binary", ANY_PICTURE)
 
 
 @schemathesis.hook
+def filter_case(context, case):
+    """In a form, an array is nothing but its items, so one in the place of a string violates nothing."""
+    fields = case.body if case.media_type == "multipart/form-data" and isinstance(case.body, dict) else {}
+    return not any(isinstance(value, list) for value in fields.values())
+
+
+@schemathesis.hook
 def before_call(context, case, kwargs):
     """Who means well gives a parameter in the form or in the query, and one condition at a time."""
     if case.meta is None or not case.meta.generation.mode.is_positive:
         return
     if case.media_type == "multipart/form-data" and isinstance(case.body, dict):
         case.query = {name: value for name, value in (case.query or {}).items() if name not in case.body}
+    if case.method == "PUT":
+        # No file has a camera of a made-up name, and most tell their size.
+        case.query = {}
     conditions = [name for name in ("If-Match", "If-None-Match") if name in (case.headers or {})]
     for name in conditions:
         # schemathesis 4.32 does not know patterns of headers.

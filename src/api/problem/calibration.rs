@@ -23,6 +23,12 @@ impl From<ChangeError> for Problem {
                 let detail = "the place of the calibrations does not answer: try again";
                 return Self::new(ProblemKind::CalibrationsUnreachable, detail);
             }
+            // A full disk, for one: no fault of the server's.
+            ChangeError::Store(StoreError::Failed { .. }) => {
+                tracing::error!("a calibration was not changed: {error}");
+                let detail = "the calibrations cannot be changed now: the server's log says why";
+                return Self::new(ProblemKind::CalibrationsUnreachable, detail);
+            }
             ChangeError::Store(_) => return Self::internal(error),
         };
         Self::new(kind, error.to_string())

@@ -2,6 +2,7 @@
 
 use axum::extract::{FromRequest, Request};
 use serde::{Deserialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
 use crate::api::{
@@ -57,8 +58,11 @@ impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
         if bytes.is_empty() {
             return Ok(Self(T::default()));
         }
-        let read: Result<Option<T>, _> = serde_json::from_slice(&bytes);
-        read.map(|read| Self(read.unwrap_or_default())).map_err(|error| {
+        // Structs would be read from arrays as well.
+        let fields: Result<Option<Map<String, Value>>, _> = serde_json::from_slice(&bytes);
+        let read =
+            fields.and_then(|fields| T::deserialize(Value::Object(fields.unwrap_or_default())));
+        read.map(Self).map_err(|error| {
             Problem::new(
                 ProblemKind::MalformedRequest,
                 format!("the body cannot be used: {error}"),

@@ -38,7 +38,7 @@ SHORT = Effort(
 
 LONG = Effort(
     name="long",
-    examples=1000,
+    examples=2000,
     deterministic=False,
     kills=1000,
     stops=100,

@@ -11,6 +11,8 @@ from harness.processes import Server, free_ports, running
 from .places import SAMPLES, TINY_MODEL
 
 DETECT = "/detect?calibration=office&profile=fast"
+AT_ONCE = {"SHUTDOWN__GRACE_MILLIS": "0"}
+"""Who stops a server here waits for nobody."""
 TINY = {"MODEL__PATH": str(TINY_MODEL)}
 """Settings of a server whose network takes no time."""
 
@@ -28,7 +30,7 @@ def lookdown(
     `inside` is a command that runs it in its own place, such as `prlimit`.
     """
     (port,) = free_ports(1)
-    wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), **settings}
+    wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), **AT_ONCE, **settings}
     variables = {f"LOOKDOWN__{name}": value for name, value in wanted.items()} | (environment or {})
     # As `make serve` starts it.
     variables["MALLOC_MMAP_THRESHOLD_"] = "131072"
