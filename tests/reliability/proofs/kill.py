@@ -71,7 +71,10 @@ def prove(effort: Effort) -> list[Row]:
             _age(folder)
         left = sorted(file.name for file in folder.iterdir() if file.stem not in CAMERAS)
     written = next(versions)
-    row.seen = f"{written} writes, {in_between} of them stored but not yet answered; {len(left)} unfinished files left"
+    row.seen = (
+        f"{written} writes, {len(row.faults)} lost or damaged; {in_between} times the one under way was stored; "
+        f"{len(left)} unfinished files left"
+    )
     row.require(len(left) <= len(CAMERAS), f"unfinished files are never cleared away: {len(left)}, such as {left[:2]}")
     return [row]
 

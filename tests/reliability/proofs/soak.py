@@ -51,7 +51,10 @@ def prove(effort: Effort) -> list[Row]:
     # Under random arrivals a queue may be full for a moment.
     unexpected = {status: told["statuses"] for status, told in statuses if set(told["statuses"]) - {status, "429"}}
     cut_off = sum(told["broken"] + told["timed_out"] for _, told in statuses)
-    grown, mean = _grown(watch.samples), statistics.mean(seen.resident_mib for _, seen in watch.samples)
+    grown, mean = (
+        _grown(watch.samples, effort.soak_seconds),
+        statistics.mean(seen.resident_mib for _, seen in watch.samples),
+    )
     row.seen = (
         f"{answered} answers; memory {mean:.0f} MiB, {grown.resident_mib:+.1f}; threads {grown.threads:+.1f}; "
         f"descriptors {grown.descriptors:+.1f}; {cut_off} cut off"
@@ -75,12 +78,8 @@ def _ended(status: str, running) -> tuple[str, dict]:
     return status, json.loads(told)
 
 
-def _grown(samples: list[tuple[float, Holdings]]) -> Holdings:
+def _grown(samples: list[tuple[float, Holdings]], seconds: float) -> Holdings:
     """What a straight line through the samples gains, once warm and before the load ends."""
-    counted = samples[int(len(samples) * WARM_UP) : -1]
-    return Holdings(
-        *(
-            growth([(seconds, getattr(seen, field)) for seconds, seen in counted])
-            for field in ("resident_mib", "threads", "descriptors")
-        )
-    )
+    counted = [(at, seen) for at, seen in samples if WARM_UP * seconds <= at <= seconds]
+    fields = ("resident_mib", "threads", "descriptors")
+    return Holdings(*(growth([(at, getattr(seen, field)) for at, seen in counted]) for field in fields))
