@@ -96,7 +96,7 @@ pub(super) async fn get(
         ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
         ("size" = Option<String>, Query, description = "The size of the camera's frames in pixels, such as \
             `1280x960`, for formats that do not tell it.", pattern = "^[0-9]+x[0-9]+$"),
-        ("If-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[^"]*")$"#,
+        ("If-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
             description = "The revision to replace, or `*`. Not together with `If-None-Match`."),
         ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r"^\*$",
             description = "`*`: create only."),
@@ -145,7 +145,7 @@ pub(super) async fn put(
     delete, path = "/calibrations/{id}", tag = "calibrations", operation_id = "delete_calibration",
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
-        ("If-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[^"]*")$"#,
+        ("If-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
             description = "The revision to delete, or `*`."),
     ),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),

@@ -88,6 +88,7 @@ async fn a_change_made_for_another_revision_is_refused() {
         ("PUT", ("if-match", &*format!("W/{new}")), 412),
         ("PUT", ("if-none-match", "*"), 412),
         ("PUT", ("if-match", "no-quotes"), 400),
+        ("PUT", ("if-match", "\"one, tag\""), 412),
         ("PUT", ("if-match", &*format!("{old}, {new}")), 200),
         ("DELETE", ("if-match", "*"), 204),
         ("PUT", ("if-match", "*"), 412),

@@ -53,7 +53,13 @@ fn named(headers: &HeaderMap, header: &HeaderName, weak: bool) -> Result<Option<
     let mut tags = Vec::new();
     let mut any = false;
     for value in headers.get_all(header) {
-        for tag in value.as_bytes().split(|byte| *byte == b',') {
+        // A comma may also be a character of a tag.
+        let mut in_tag = false;
+        let is_between = |byte: &u8| {
+            in_tag ^= *byte == b'"';
+            *byte == b',' && !in_tag
+        };
+        for tag in value.as_bytes().split(is_between) {
             let tag = std::str::from_utf8(tag).map_or("", str::trim);
             let (is_weak, opaque) = match tag.strip_prefix("W/") {
                 Some(opaque) => (true, opaque),
