@@ -1,6 +1,6 @@
 //! One connection, from its first byte to its last.
 
-use std::{convert::Infallible, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
+use std::{convert::Infallible, io, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
 use hyper::{
     Request, Response,
@@ -11,7 +11,7 @@ use hyper::{
 };
 use hyper_util::rt::TokioIo;
 use tokio::{
-    io::{AsyncRead, AsyncWrite},
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
     time::timeout,
 };
 use tower::{BoxError, Service, ServiceExt};
@@ -27,6 +27,9 @@ use crate::shutdown::Shutdown;
 const TOLD_LIMITS: usize = 2;
 /// How long a connection that was accepted just before the end may take to send its first request.
 const LAST_CALL: Duration = Duration::from_millis(500);
+/// How long, and for how many bytes, a client is listened to whose request could not be read.
+const LINGER: Duration = Duration::from_secs(1);
+const LINGER_BYTES: u64 = 4 << 20;
 
 /// What holds for a connection.
 pub(super) struct Rules {
@@ -68,36 +71,52 @@ where
             Ok::<_, Infallible>(response.map(|body| WatchedBody { body, pace }))
         }
     });
-    let stream = WatchedStream {
+    let mut stream = WatchedStream {
         stream,
         pace: Arc::clone(&pace),
     };
     let connection = http1::Builder::new()
         .max_headers(limits.max_headers * TOLD_LIMITS)
         .max_header_size(limits.max_header_bytes * TOLD_LIMITS)
-        .serve_connection(TokioIo::new(stream), service);
-    let mut connection = pin!(connection);
-    let to_its_end = async {
+        .serve_connection(TokioIo::new(&mut stream), service);
+    let was_refused = {
+        let mut connection = pin!(connection);
+        let to_its_end = async {
+            tokio::select! {
+                // First: what has come before the server ends is served.
+                biased;
+                ended = connection.as_mut() => return ended,
+                () = shutdown.draining() => {}
+            }
+            if pace.awaits_first_request()
+                && let Ok(ended) = timeout(LAST_CALL, connection.as_mut()).await
+            {
+                return ended;
+            }
+            connection.as_mut().graceful_shutdown();
+            connection.await
+        };
         tokio::select! {
-            // First: what has come before the server ends is served.
-            biased;
-            ended = connection.as_mut() => return ended,
-            () = shutdown.draining() => {}
-        }
-        if pace.awaits_first_request()
-            && let Ok(ended) = timeout(LAST_CALL, connection.as_mut()).await
-        {
-            return ended;
-        }
-        connection.as_mut().graceful_shutdown();
-        connection.await
-    };
-    tokio::select! {
-        ended = to_its_end => {
-            if let Err(error) = ended {
+            ended = to_its_end => ended.is_err_and(|error| {
                 tracing::debug!("a connection has broken: {error}");
+                error.is_parse()
+            }),
+            () = pace.overdue() => {
+                tracing::debug!("a connection took too long and was closed");
+                false
             }
         }
-        () = pace.overdue() => tracing::debug!("a connection took too long and was closed"),
+    };
+    if was_refused {
+        let _ = timeout(LINGER, discard_rest(stream)).await;
     }
+}
+
+/// Ends a connection whose client may still be sending: closed at once, it would be reset, and the
+/// answer lost with it.
+async fn discard_rest(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Result<()> {
+    stream.shutdown().await?;
+    let mut rest = stream.take(LINGER_BYTES);
+    tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
+    Ok(())
 }
