@@ -1,0 +1,42 @@
+//! `lookdown key`
+
+use lookdown::access::KeyList;
+
+use crate::lookdown;
+
+#[test]
+fn a_new_key_comes_with_the_line_that_makes_it_known() {
+    let scopes = ["--scope", "read", "--scope", "detect"];
+    let new = || {
+        lookdown(
+            &[&["key", "new", "--name", "gate"], &scopes[..]].concat(),
+            &[],
+        )
+    };
+    let output = new();
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    let lines: Vec<_> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    let [key, file_line, entry] = lines[..] else {
+        panic!("{text}");
+    };
+    let file = KeyList::from_toml(file_line).unwrap();
+    assert_eq!(file, entry.parse().unwrap());
+    let holder = file.holder_of(key.as_bytes()).unwrap();
+    assert_eq!(holder.name.to_string(), "gate");
+    assert_eq!(holder.scopes.joined("+"), "detect+read");
+    assert_ne!(new().stdout, output.stdout);
+}
+
+#[test]
+fn a_key_without_a_scope_or_with_an_odd_name_is_not_made() {
+    for arguments in [
+        &["key", "new", "--name", "gate"][..],
+        &["key", "new", "--name", "gate", "--scope", "root"],
+        &["key", "new", "--name", "a.b", "--scope", "read"],
+    ] {
+        let output = lookdown(arguments, &[]);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(output.stdout.is_empty());
+    }
+}

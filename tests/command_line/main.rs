@@ -1,0 +1,144 @@
+//! The executable: what it prints where, and how it ends.
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod calibration;
+mod evaluation;
+mod keys;
+
+use std::process::{Command, Output};
+
+pub(crate) fn lookdown(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookdown"));
+    command
+        .args(arguments)
+        .envs(environment.iter().copied())
+        .output()
+        .unwrap()
+}
+
+/// A failure must say one line on standard error, nothing on standard output, and end with 1.
+#[track_caller]
+pub(crate) fn assert_fails_with(output: &Output, parts: &[&str]) {
+    let message = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(output.stdout.is_empty());
+    assert_eq!(message.lines().count(), 1, "{message}");
+    for part in parts {
+        assert!(message.contains(part), "{message:?} does not say {part:?}");
+    }
+}
+
+#[test]
+fn the_api_description_goes_to_standard_output() {
+    let output = lookdown(&["openapi"], &[]);
+    assert!(output.status.success());
+    let document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(document["info"]["title"], "Lookdown");
+}
+
+#[test]
+fn a_parameter_out_of_range_is_refused_as_over_http() {
+    let output = lookdown(&["detect", "frame.jpg", "--score-threshold", "-1"], &[]);
+    assert_fails_with(&output, &["score_threshold: -1 is outside 0 to 1"]);
+}
+
+#[test]
+fn several_pictures_cannot_be_drawn_into_one_file() {
+    let output = lookdown(&["detect", "a.jpg", "b.jpg", "--annotate", "out.jpg"], &[]);
+    assert_fails_with(&output, &["--annotate", "single"]);
+}
+
+#[test]
+fn a_calibration_that_is_nowhere_is_refused_before_anything_is_loaded() {
+    let output = lookdown(&["detect", "a.jpg", "--calibration", "no/such.json"], &[]);
+    assert_fails_with(&output, &["--calibration", "no/such.json"]);
+}
+
+#[test]
+fn every_usable_picture_gets_a_line_and_every_other_a_sentence() {
+    let office = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
+    let calibration = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/samples/calibrations/office.json"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let text = folder.path().join("notes.txt");
+    std::fs::write(&text, "not a picture").unwrap();
+    let text = text.to_str().unwrap();
+
+    let images = ["detect", text, office, "/nowhere.jpg"];
+    let flags = ["--profile", "fast", "--calibration", calibration];
+    let output = lookdown(
+        &[&images[..], &flags].concat(),
+        &[("LOOKDOWN__LOG__FILTER", "warn")],
+    );
+    let messages = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{messages}");
+    let messages: Vec<_> = messages.lines().collect();
+    assert_eq!(messages.len(), 2, "{messages:?}");
+    assert!(
+        messages[0].starts_with(&format!("lookdown: {text}: ")),
+        "{messages:?}"
+    );
+    assert!(
+        messages[1].starts_with("lookdown: /nowhere.jpg: "),
+        "{messages:?}"
+    );
+
+    let reports = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(reports.lines().count(), 1);
+    let report: serde_json::Value = serde_json::from_str(&reports).unwrap();
+    assert_eq!(report["request_id"], office);
+    assert_eq!(report["calibration"]["id"], "office");
+    assert!(!report["persons"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn a_person_is_drawn_into_the_picture_on_request() {
+    let office = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = folder.path().join("drawn.jpg");
+    let flags = ["--profile", "fast", "--annotate", drawn.to_str().unwrap()];
+    let output = lookdown(&[&["detect", office], &flags[..]].concat(), &[]);
+    assert!(output.status.success(), "{output:?}");
+    let jpeg = std::fs::read(drawn).unwrap();
+    assert!(jpeg.starts_with(&[0xff, 0xd8, 0xff]));
+}
+
+#[test]
+fn a_folder_of_pictures_becomes_annotations_instead_of_reports() {
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/samples");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("labels");
+    let flags = ["--profile", "fast", "--format", "coco", "--out"];
+    let arguments = [&["detect", samples], &flags[..], &[out.to_str().unwrap()]].concat();
+    let output = lookdown(&arguments, &[]);
+    let messages = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{messages}");
+    assert!(output.stdout.is_empty());
+    assert!(messages.contains("fast: 3 of 3 images"), "{messages}");
+    let text = std::fs::read_to_string(out.join("annotations.json")).unwrap();
+    let annotations: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let images = annotations["images"].as_array().unwrap();
+    let names: Vec<_> = images
+        .iter()
+        .map(|image| image["file_name"].as_str())
+        .collect();
+    assert_eq!(names, ["canteen.jpg", "lounge.jpg", "office.jpg"].map(Some));
+    assert!(!annotations["annotations"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn pictures_that_would_share_their_annotations_are_refused_before_anything_is_loaded() {
+    let flags = ["--format", "voc", "--out", "/nowhere/labels"];
+    let arguments = [&["detect", "a/1.jpg", "b/1.png"], &flags[..]].concat();
+    let output = lookdown(&arguments, &[]);
+    assert_fails_with(&output, &["--format voc", "a/1.jpg", "b/1.png"]);
+}
+
+#[test]
+fn turned_boxes_are_refused_where_the_format_has_none() {
+    let flags = ["--format", "yolo", "--out", "labels", "--oriented"];
+    let output = lookdown(&[&["detect", "a.jpg"], &flags[..]].concat(), &[]);
+    assert_fails_with(&output, &["--oriented", "yolo", "cvat"]);
+}

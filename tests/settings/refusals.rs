@@ -1,0 +1,275 @@
+//! What is said about settings that cannot be used.
+
+use std::{collections::HashMap, path::Path};
+
+use lookdown::settings::load;
+
+use crate::{from_environment, from_file, refusal};
+
+#[test]
+fn an_unknown_key_is_refused_by_name() {
+    let in_file = refusal(from_file("[server]\nlistn = \"127.0.0.1:1\"\n"));
+    assert!(in_file.contains("server"), "{in_file}");
+    assert!(
+        in_file.contains("`listn`") && in_file.contains("`listen`"),
+        "{in_file}"
+    );
+    let group = refusal(from_file("[sever]\nlisten = \"127.0.0.1:1\"\n"));
+    assert!(
+        group.contains("`sever`") && group.contains("`server`"),
+        "{group}"
+    );
+    let variable = refusal(from_environment("LOOKDOWN__INFERENCE__THREAD", "2"));
+    assert!(
+        variable.contains("`thread`") && variable.contains("`threads`"),
+        "{variable}"
+    );
+}
+
+/// Variable, value, and what the refusal has to say: the key and a remedy.
+const UNUSABLE: [(&str, &str, &str, &str); 38] = [
+    (
+        "SERVER__LISTEN",
+        "localhost",
+        "server.listen",
+        "127.0.0.1:8080",
+    ),
+    (
+        "SERVER__MAX_BODY_BYTES",
+        "12",
+        "server.max_body_bytes",
+        "from 1024",
+    ),
+    (
+        "SERVER__MAX_BODY_BYTES",
+        "many",
+        "server.max_body_bytes",
+        "integer",
+    ),
+    (
+        "SERVER__MAX_BODY_BYTES",
+        "-1",
+        "server.max_body_bytes",
+        "integer",
+    ),
+    (
+        "SERVER__REQUEST_TIMEOUT_MILLIS",
+        "0",
+        "server.request_timeout_millis",
+        "from 1",
+    ),
+    (
+        "SERVER__METRICS_LISTEN",
+        "9090",
+        "server.metrics_listen",
+        "127.0.0.1:8080",
+    ),
+    (
+        "SERVER__MAX_CONNECTIONS",
+        "0",
+        "server.max_connections",
+        "from 1 to",
+    ),
+    (
+        "SERVER__HEADER_TIMEOUT_MILLIS",
+        "0",
+        "server.header_timeout_millis",
+        "from 1 to 600000",
+    ),
+    (
+        "SERVER__IDLE_TIMEOUT_MILLIS",
+        "600001",
+        "server.idle_timeout_millis",
+        "from 1 to 600000",
+    ),
+    (
+        "SERVER__MAX_HEADER_BYTES",
+        "512",
+        "server.max_header_bytes",
+        "from 1024 to 131072",
+    ),
+    (
+        "SERVER__MAX_HEADERS",
+        "2000",
+        "server.max_headers",
+        "from 16 to 1024",
+    ),
+    (
+        "SHUTDOWN__GRACE_MILLIS",
+        "600001",
+        "shutdown.grace_millis",
+        "from 0 to 600000",
+    ),
+    (
+        "SHUTDOWN__GRACE_MILLIS",
+        "5s",
+        "shutdown.grace_millis",
+        "integer",
+    ),
+    (
+        "SHUTDOWN__DRAIN_TIMEOUT_MILLIS",
+        "-1",
+        "shutdown.drain_timeout_millis",
+        "integer",
+    ),
+    (
+        "SERVER__TLS__HANDSHAKE_TIMEOUT_MILLIS",
+        "0",
+        "server.tls.handshake_timeout_millis",
+        "from 1 to 60000",
+    ),
+    (
+        "SERVER__TLS__POLL_SECONDS",
+        "100000",
+        "server.tls.poll_seconds",
+        "from 0 to",
+    ),
+    (
+        "INFERENCE__THREADS",
+        "100000",
+        "inference.threads",
+        "from 0 to",
+    ),
+    (
+        "INFERENCE__SCORE_FLOOR",
+        "2",
+        "inference.score_floor",
+        "from 0 to 1",
+    ),
+    (
+        "INFERENCE__SCORE_FLOOR",
+        "NaN",
+        "inference.score_floor",
+        "from 0 to 1",
+    ),
+    (
+        "INFERENCE__DEVICE",
+        "gpu",
+        "inference.device",
+        "cpu, cuda:N or tensorrt:N",
+    ),
+    (
+        "MODEL__POLL_SECONDS",
+        "100000",
+        "model.poll_seconds",
+        "from 0 to",
+    ),
+    (
+        "INFERENCE__MAX_BATCH_VIEWS",
+        "100000",
+        "inference.max_batch_views",
+        "from 0 to",
+    ),
+    ("INFERENCE__SESSIONS", "-1", "inference.sessions", "integer"),
+    (
+        "INFERENCE__MAX_QUEUE_DELAY_MILLIS",
+        "1001",
+        "inference.max_queue_delay_millis",
+        "from 0 to 1000",
+    ),
+    (
+        "LIMITS__MAX_IMAGE_SIDE",
+        "65536",
+        "limits.max_image_side",
+        "65535",
+    ),
+    (
+        "LIMITS__MAX_FRAMES_IN_FLIGHT",
+        "0",
+        "limits.max_frames_in_flight",
+        "from 1",
+    ),
+    (
+        "LIMITS__MAX_UPLOAD_BYTES",
+        "1024",
+        "limits.max_upload_bytes",
+        "33554432",
+    ),
+    (
+        "LIMITS__MIN_UPLOAD_BYTES_PER_SECOND",
+        "-1",
+        "limits.min_upload_bytes_per_second",
+        "integer",
+    ),
+    (
+        "LIMITS__REQUESTS_PER_SECOND",
+        "0.01",
+        "limits.requests_per_second",
+        "0.02 to 100000",
+    ),
+    (
+        "LIMITS__REQUESTS_PER_SECOND",
+        "NaN",
+        "limits.requests_per_second",
+        "0.02 to 100000",
+    ),
+    (
+        "LIMITS__REQUEST_BURST",
+        "0",
+        "limits.request_burst",
+        "from 1",
+    ),
+    (
+        "PAPER__FIELD_OF_VIEW",
+        "wide",
+        "paper.field_of_view",
+        "horizontal, diagonal, literal",
+    ),
+    ("LOG__FORMAT", "xml", "log.format", "text, json"),
+    (
+        "LOG__FILTER",
+        "lookdown=loud",
+        "log.filter",
+        "lookdown=debug",
+    ),
+    (
+        "TELEMETRY__OTLP_ENDPOINT",
+        "127.0.0.1:4318",
+        "telemetry.otlp_endpoint",
+        "http://127.0.0.1:4318",
+    ),
+    (
+        "TELEMETRY__OTLP_ENDPOINT",
+        "grpc://collector:4317",
+        "telemetry.otlp_endpoint",
+        "http://127.0.0.1:4318",
+    ),
+    (
+        "TELEMETRY__SAMPLE_RATIO",
+        "1.5",
+        "telemetry.sample_ratio",
+        "from 0 to 1",
+    ),
+    (
+        "TELEMETRY__SERVICE_NAME",
+        " ",
+        "telemetry.service_name",
+        "give a name",
+    ),
+];
+
+#[test]
+fn a_value_that_cannot_be_used_is_refused_with_key_value_and_remedy() {
+    for (variable, value, key, remedy) in UNUSABLE {
+        let message = refusal(from_environment(&format!("LOOKDOWN__{variable}"), value));
+        for part in [key, value, remedy] {
+            assert!(message.contains(part), "{message:?} does not say {part:?}");
+        }
+    }
+}
+
+#[test]
+fn a_file_that_is_not_toml_is_refused_with_the_place() {
+    let message = refusal(from_file("[server]\nlisten = \n"));
+    assert!(message.contains("lookdown.toml"), "{message}");
+    assert!(message.contains("line 2"), "{message}");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_refused_by_name() {
+    let message = refusal(load(Some(Path::new("/nowhere/l.toml")), HashMap::new()));
+    assert!(
+        message.contains("/nowhere/l.toml") && message.contains("--config"),
+        "{message}"
+    );
+}
