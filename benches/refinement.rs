@@ -5,13 +5,14 @@
 //! background whose scores are nearly all low. `random` and `strong` have no persons; of `random`,
 //! 7 % reach the score threshold, of `strong` 70 %.
 
-use std::{
-    error::Error,
-    hint::black_box,
-    time::{Duration, Instant},
-};
+#[path = "support/times.rs"]
+mod times;
+
+use std::{error::Error, hint::black_box};
 
 use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
+
+use self::times::times;
 
 const CANDIDATES: usize = 100_000;
 const FRAME_SIDE: f64 = 1680.0;
@@ -37,7 +38,7 @@ fn main() -> Outcome<()> {
                 max_detections: 1000,
             };
             let found = refine(&candidates, &parameters).len();
-            let time = times(|| {
+            let time = times(ROUNDS, || {
                 black_box(refine(&candidates, &parameters));
             });
             println!("{name}, {refinement}: {time}, {found} found");
@@ -121,17 +122,4 @@ impl Noise {
             expected_views: 1.0 + 5.0 * self.share(),
         })
     }
-}
-
-fn times(mut work: impl FnMut()) -> String {
-    let mut rounds: Vec<Duration> = (0..ROUNDS)
-        .map(|_| {
-            let started = Instant::now();
-            work();
-            started.elapsed()
-        })
-        .collect();
-    rounds.sort_unstable();
-    let [median, least] = [ROUNDS / 2, 0].map(|index| rounds[index].as_secs_f64() * 1e3);
-    format!("{median:.2} ms (least {least:.2})")
 }

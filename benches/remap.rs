@@ -5,6 +5,9 @@
 //! writes what both sides need into the folder, then renders the view whose index is on each line it
 //! reads and answers with the nanoseconds that took.
 
+#[path = "support/times.rs"]
+mod times;
+
 use std::{
     error::Error,
     f64::consts::FRAC_PI_2,
@@ -12,13 +15,15 @@ use std::{
     hint::black_box,
     io::{BufRead, stdin},
     path::Path,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use lookdown::{
     geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
     imaging::{Frame, NetworkInput, RemapTable},
 };
+
+use self::times::times;
 
 const FRAME_SIDE: u32 = 1680;
 const ROUNDS: usize = 240;
@@ -48,7 +53,7 @@ fn print_times() -> Outcome<()> {
             let views = plan.views(&mount, 416, 416);
             let lens = lens()?;
             let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
-            let time = times(|| {
+            let time = times(ROUNDS, || {
                 black_box(RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE));
             });
             let bytes = RemapTable::bytes(&tables);
@@ -64,9 +69,9 @@ fn print_times() -> Outcome<()> {
             view = (view + 1) % tables.len();
             &tables[view]
         };
-        let vector = times(|| next().render(&frame, &input, &mut slot));
+        let vector = times(ROUNDS, || next().render(&frame, &input, &mut slot));
         println!("a view of {side}², vector: {vector}");
-        let portable = times(|| next().render_portably(&frame, &input, &mut slot));
+        let portable = times(ROUNDS, || next().render_portably(&frame, &input, &mut slot));
         println!("a view of {side}², portable: {portable}");
     }
     Ok(())
@@ -142,17 +147,4 @@ fn frame() -> Outcome<Frame> {
     let bytes = 0..FRAME_SIDE * FRAME_SIDE * 3;
     let pixels = bytes.map(|index| index.wrapping_mul(2_654_435_761).to_le_bytes()[3]);
     Ok(Frame::new(FRAME_SIDE, FRAME_SIDE, pixels.collect())?)
-}
-
-fn times(mut work: impl FnMut()) -> String {
-    let mut rounds: Vec<Duration> = (0..ROUNDS)
-        .map(|_| {
-            let started = Instant::now();
-            work();
-            started.elapsed()
-        })
-        .collect();
-    rounds.sort_unstable();
-    let [median, least] = [ROUNDS / 2, 0].map(|index| rounds[index].as_secs_f64() * 1e3);
-    format!("{median:.3} ms (least {least:.3})")
 }

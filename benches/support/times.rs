@@ -1,0 +1,17 @@
+//! How long work takes that is done again and again.
+
+use std::time::{Duration, Instant};
+
+/// Median and least time of so many rounds (at least one), in milliseconds.
+pub(crate) fn times(rounds: usize, mut work: impl FnMut()) -> String {
+    let mut spent: Vec<Duration> = (0..rounds)
+        .map(|_| {
+            let started = Instant::now();
+            work();
+            started.elapsed()
+        })
+        .collect();
+    spent.sort_unstable();
+    let [median, least] = [rounds / 2, 0].map(|index| spent[index].as_secs_f64() * 1e3);
+    format!("{median:.3} ms (least {least:.3})")
+}
