@@ -6,6 +6,7 @@ mod cors;
 mod crowd;
 mod deadline;
 mod detect;
+mod entity_tags;
 mod envelope;
 mod foreign_pages;
 mod head;
@@ -18,6 +19,7 @@ mod rate_limit;
 mod report;
 mod repository;
 mod request_id;
+mod results;
 mod state;
 mod unread;
 mod upload;
@@ -60,6 +62,11 @@ fn client_routes() -> OpenApiRouter<ApiState> {
             calibrations::delete
         ))
         .routes(routes!(calibrations::views::get_views))
+        .routes(routes!(results::list))
+        .routes(routes!(results::latest::get_latest))
+        .routes(routes!(results::history::get_history))
+        .routes(routes!(results::events::of_camera))
+        .routes(routes!(results::events::of_all))
         .routes(routes!(repository::index))
         .routes(routes!(repository::load))
         .routes(routes!(repository::unload))

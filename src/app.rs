@@ -17,6 +17,7 @@ use crate::{
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
+    results::{MemoryResults, ResultStore},
     settings::{AccessSettings, CalibrationPlace, LimitSettings, Settings, find_calibrations},
     telemetry::Tracer,
     tls::Tls,
@@ -110,6 +111,7 @@ pub struct App {
     models: Arc<ModelRepository>,
     calibrations: Arc<Calibrations>,
     workers: Arc<WorkerPool>,
+    results: Arc<dyn ResultStore>,
     readiness: Readiness,
     metrics: Arc<Metrics>,
     /// The keys, if there are some.
@@ -142,6 +144,7 @@ impl App {
             .context("the operating system gives no thread for a worker")?;
         let workers = Arc::new(workers);
         let metrics = Arc::new(Metrics::new()?);
+        let results: Arc<dyn ResultStore> = Arc::new(MemoryResults::new(settings.results));
         let readiness = Readiness::default();
         let keys = open_keys(&settings.access)?;
         let tls = match settings.server.tls.clone() {
@@ -175,6 +178,7 @@ impl App {
             Arc::clone(&workers),
             Arc::clone(&models),
             Arc::clone(&calibrations),
+            Arc::clone(&results),
             Arc::clone(&metrics),
             readiness.clone(),
             options,
@@ -184,6 +188,7 @@ impl App {
             models,
             calibrations,
             workers,
+            results,
             readiness,
             metrics,
             keys,

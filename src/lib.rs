@@ -18,6 +18,7 @@ pub mod inference;
 pub mod metrics;
 pub mod pipeline;
 pub mod poller;
+pub mod results;
 pub mod revision;
 pub mod server;
 pub mod settings;

@@ -98,6 +98,18 @@ metrics! {
     rig_cache_builds: IntCounter = "rig_cache_builds_total" [];
     /// Times that remap tables were dropped to make room for others.
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
+    /// Cameras of which a report is kept.
+    results_cameras: IntGauge = "results_cameras" [];
+    /// Reports that are kept.
+    results_reports: IntGauge = "results_reports" [];
+    /// Memory that kept reports take, bytes.
+    results_bytes: IntGauge = "results_bytes" [];
+    /// Reports that were stored.
+    results_stored: IntCounter = "results_stored_total" [];
+    /// Who listens to reports: event streams, and requests that wait for a newer report.
+    results_listeners: IntGauge = "results_listeners" [];
+    /// Listeners given up because they did not keep up.
+    results_listeners_dropped: IntCounter = "results_listeners_dropped_total" [];
     /// When the server's TLS certificate ends, seconds since 1970; shown only with TLS.
     tls_certificate_expiry: IntGaugeVec = "tls_certificate_expiry_timestamp_seconds" [];
     /// Times that the files of TLS were found changed, by whether what they hold can be used.
@@ -184,6 +196,23 @@ impl Metrics {
         self.rig_cache_bytes.set(count(bytes));
         raise_to(&self.rig_cache_builds, builds);
         raise_to(&self.rig_cache_evictions, evictions);
+    }
+
+    /// Shows how many reports of how many cameras and bytes are kept, and how many were stored since
+    /// the start.
+    pub fn show_results(&self, cameras: usize, reports: usize, bytes: usize, stored: u64) {
+        let _one_scrape = self.one_scrape();
+        self.results_cameras.set(count(cameras));
+        self.results_reports.set(count(reports));
+        self.results_bytes.set(count(bytes));
+        raise_to(&self.results_stored, stored);
+    }
+
+    /// Shows how many listen, and how many were given up since the start.
+    pub fn show_listeners(&self, listeners: usize, dropped: u64) {
+        let _one_scrape = self.one_scrape();
+        self.results_listeners.set(count(listeners));
+        raise_to(&self.results_listeners_dropped, dropped);
     }
 
     /// All metrics in the Prometheus text format.

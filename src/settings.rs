@@ -10,6 +10,7 @@ mod check;
 mod error;
 mod locate;
 mod raw;
+mod results;
 mod source;
 mod threads;
 mod tls;
@@ -32,8 +33,8 @@ pub use threads::ThreadPlan;
 use url::Url;
 
 use crate::{
-    access::KeyList, geometry::FieldOfViewReading, inference::Device, server::ConnectionLimits,
-    tls::TlsOptions,
+    access::KeyList, geometry::FieldOfViewReading, inference::Device, results::ResultLimits,
+    server::ConnectionLimits, tls::TlsOptions,
 };
 
 /// Everything the operator may choose, checked.
@@ -55,6 +56,8 @@ pub struct Settings {
     pub threads: ThreadPlan,
     /// What one frame, and all frames together, may cost.
     pub limits: LimitSettings,
+    /// What is kept of reports.
+    pub results: ResultLimits,
     /// How the paper is read where it can be read in several ways.
     pub paper: PaperSettings,
     /// What is logged.

@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 20] = [
+const MAY_USE: [(&str, &[&str]); 21] = [
     ("access", &[]),
     ("revision", &[]),
     ("geometry", &[]),
@@ -16,6 +16,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
     ("metrics", &[]),
     ("shutdown", &[]),
     ("poller", &[]),
+    ("results", &[]),
     ("imaging", &["geometry"]),
     ("calibration", &["geometry", "revision"]),
     ("inference", &["detection", "imaging", "revision"]),
@@ -23,7 +24,14 @@ const MAY_USE: [(&str, &[&str]); 20] = [
     ("server", &["metrics", "shutdown", "tls"]),
     (
         "settings",
-        &["access", "geometry", "inference", "server", "tls"],
+        &[
+            "access",
+            "geometry",
+            "inference",
+            "results",
+            "server",
+            "tls",
+        ],
     ),
     ("telemetry", &["settings"]),
     (
@@ -60,6 +68,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
             "inference",
             "pipeline",
             "metrics",
+            "results",
             "telemetry",
         ],
     ),
@@ -75,6 +84,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
             "pipeline",
             "metrics",
             "poller",
+            "results",
             "server",
             "settings",
             "shutdown",

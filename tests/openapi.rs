@@ -126,6 +126,11 @@ fn every_operation_says_how_it_can_fail() {
             "detect_persons",
             "400 401 403 404 408 413 415 422 429 500 503 504",
         ),
+        ("list_results", "401 403 429"),
+        ("get_latest_result", "400 401 403 404 422 429 503"),
+        ("list_past_results", "400 401 403 404 422 429"),
+        ("listen_to_camera", "401 403 404 429 503"),
+        ("listen_to_all", "401 403 429 503"),
         ("list_calibrations", "401 403 429"),
         ("get_calibration", "400 401 403 404 429"),
         (

@@ -26,6 +26,7 @@ use lookdown::{
     },
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    results::{MemoryResults, ResultLimits, ResultStore},
     telemetry::Tracer,
 };
 use tokio::runtime::{self, Runtime};
@@ -132,10 +133,14 @@ fn router() -> Router {
     let workers = WorkerPool::start(&Arc::new(engine), one, one).unwrap();
     let readiness = Readiness::default();
     readiness.warmed_up();
+    let results = MemoryResults::new(ResultLimits::default());
+    // Streams have no end, and whoever waits for a report waits long.
+    results.listeners().end();
     api::router(ApiState::new(
         Arc::new(workers),
         Arc::new(models),
         calibrations,
+        Arc::new(results),
         Arc::new(Metrics::new().unwrap()),
         readiness,
         ApiOptions {

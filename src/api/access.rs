@@ -30,7 +30,7 @@ pub enum Access {
     Keys(Arc<AccessKeys>),
 }
 
-/// Whoever sent the request may read calibrations.
+/// Whoever sent the request may read calibrations and reports.
 pub(super) struct Reader;
 
 /// Whoever sent the request may list models, which tells of files of the server's machine.

@@ -18,7 +18,7 @@ use axum::{
 
 use self::{
     address::{CalibrationAddress, NewCalibrationAddress},
-    conditions::{entity_tag, is_unmodified, write_condition},
+    conditions::write_condition,
     row::CalibrationInfo,
     upload::CalibrationUpload,
 };
@@ -26,6 +26,7 @@ use super::{
     ApiState,
     access::{Administrator, Reader},
     deadline::Deadline,
+    entity_tags::{entity_tag, is_unmodified},
     openapi::{ChangeProblems, DeleteProblems, ReadProblems, UnknownCalibrationProblem},
     problem::{Problem, ProblemKind},
 };

@@ -14,6 +14,7 @@ use super::{
     detect::{INFERENCE_TIME, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
     rate_limit::{RATE_LIMIT, RATE_LIMIT_POLICY},
     request_id,
+    results::events::LAST_EVENT_ID,
 };
 
 /// The layer that lets pages of these origins call; none when there are none.
@@ -26,12 +27,13 @@ pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
     if origins.is_empty() {
         return None;
     }
-    let sent: [HeaderName; 6] = [
+    let sent: [HeaderName; 7] = [
         AUTHORIZATION,
         API_KEY,
         CONTENT_TYPE,
         IF_MATCH,
         IF_NONE_MATCH,
+        LAST_EVENT_ID,
         request_id::HEADER,
     ];
     let read: [HeaderName; 11] = [

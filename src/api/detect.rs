@@ -3,11 +3,12 @@
 use std::time::Instant;
 
 use axum::{
-    Extension, Json,
+    Extension,
     extract::State,
-    http::{HeaderName, HeaderValue},
+    http::{HeaderName, HeaderValue, header::CONTENT_TYPE},
     response::{AppendHeaders, IntoResponse},
 };
+use bytes::Bytes;
 use tokio::time::timeout_at;
 
 use super::{
@@ -22,6 +23,7 @@ use super::{
 use crate::{
     metrics::Metrics,
     pipeline::{DetectJob, DetectParameters, Detected, DetectionReport, Ticket},
+    results::NewReport,
     telemetry::RequestTrace,
 };
 
@@ -81,9 +83,18 @@ pub(super) async fn detect_persons(
         outcome.map_err(|_| timed_out(limit, limit.at() < server_limit.at()))??;
     describe(&trace, &report);
     record(&state.metrics, &report);
-    let report = Report::from(&report);
-    let timings = timing_headers(&report.timings_ms);
-    Ok((AppendHeaders(timings), Json(report)))
+    let sent = Report::from(&report);
+    let timings = timing_headers(&sent.timings_ms);
+    let json = Bytes::from(serde_json::to_vec(&sent).map_err(Problem::internal)?);
+    let kept = NewReport {
+        camera: report.camera,
+        received_at: report.received_at,
+        persons: report.persons.len(),
+        json: json.clone(),
+    };
+    state.results.publish(kept).await;
+    let content_type = [(CONTENT_TYPE, "application/json")];
+    Ok((AppendHeaders(timings), content_type, json))
 }
 
 fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {

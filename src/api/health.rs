@@ -179,8 +179,18 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     state
         .metrics
         .show_rig_cache(rigs.rigs, rigs.bytes, rigs.builds, rigs.evictions);
+    show_results(&state).await;
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
+}
+
+/// The kept reports, and who listens, as they are at this scrape.
+async fn show_results(state: &ApiState) {
+    let kept = state.results.usage().await;
+    let listeners = state.results.listeners();
+    let metrics = &state.metrics;
+    metrics.show_results(kept.cameras, kept.reports, kept.bytes, kept.published);
+    metrics.show_listeners(listeners.count(), listeners.dropped());
 }
 
 /// The models as they are at this scrape.

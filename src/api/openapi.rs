@@ -12,8 +12,9 @@ use security::Keys;
 
 pub(super) use parameters::{DetectForm, DetectQuery};
 pub(super) use problems::{
-    ChangeProblems, DeleteProblems, DetectProblems, FaultProblem, IndexProblems, LoadProblems,
-    NotReadyProblems, ReadProblems, UnknownCalibrationProblem, ViewsProblems,
+    CameraEventsProblems, ChangeProblems, DeleteProblems, DetectProblems, EventsProblems,
+    FaultProblem, HistoryProblems, IndexProblems, LatestProblems, LoadProblems, NotReadyProblems,
+    ReadProblems, UnknownCalibrationProblem, ViewsProblems,
 };
 
 use super::problem::ProblemBody;
@@ -29,6 +30,7 @@ use super::problem::ProblemBody;
     servers((url = "/", description = "This server")),
     tags(
         (name = "detection", description = "Frames in, persons out."),
+        (name = "results", description = "What was found last, for dashboards. Kept in memory, within limits."),
         (name = "calibrations", description = "The cameras. Changes are for administrators."),
         (name = "models", description = "Which models answer. Changes are for administrators."),
         (name = "operation", description = "Probes, metrics and this document."),

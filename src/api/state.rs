@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     calibration::Calibrations, inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool,
-    telemetry::Tracer,
+    results::ResultStore, telemetry::Tracer,
 };
 
 /// Who may do what, and what a request may cost.
@@ -47,6 +47,7 @@ pub struct ApiState {
     pub(super) workers: Arc<WorkerPool>,
     pub(super) models: Arc<ModelRepository>,
     pub(super) calibrations: Arc<Calibrations>,
+    pub(super) results: Arc<dyn ResultStore>,
     pub(super) metrics: Arc<Metrics>,
     pub(super) readiness: Readiness,
     pub(super) uploads: UploadBudget,
@@ -61,6 +62,7 @@ impl ApiState {
         workers: Arc<WorkerPool>,
         models: Arc<ModelRepository>,
         calibrations: Arc<Calibrations>,
+        results: Arc<dyn ResultStore>,
         metrics: Arc<Metrics>,
         readiness: Readiness,
         options: ApiOptions,
@@ -73,6 +75,7 @@ impl ApiState {
             workers,
             models,
             calibrations,
+            results,
             metrics,
             readiness,
             uploads: UploadBudget::new(options.max_upload_bytes),

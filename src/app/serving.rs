@@ -26,7 +26,7 @@ impl App {
         if self.keys.is_none() && !address.ip().is_loopback() {
             tracing::warn!(
                 "others reach this server, and there are no keys: whoever does may send frames and \
-                 read calibrations; set access.keys_file, or listen on 127.0.0.1 (server.listen)"
+                 read calibrations and reports; set access.keys_file, or listen on 127.0.0.1 (server.listen)"
             );
         }
         let _pollers = self.start_pollers()?;
@@ -111,6 +111,8 @@ impl App {
             () = shutdown.draining() => {}
         }
         tracing::info!("finishing what has arrived");
+        // Listeners would stay for ever.
+        self.results.listeners().end();
         shutdown.drain();
         sleep(drain_timeout).await;
     }

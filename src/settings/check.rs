@@ -24,7 +24,7 @@ const MIN_BODY_BYTES: u64 = 1024;
 /// 2 GiB: more than any picture within the pixel limits.
 const MAX_BODY_BYTES: u64 = 2 << 30;
 /// 1 TiB: more memory than any machine spends on this.
-const MAX_BYTES: u64 = 1 << 40;
+pub(super) const MAX_BYTES: u64 = 1 << 40;
 /// Ten minutes.
 const MAX_TIMEOUT_MILLIS: u64 = 600_000;
 /// No client gets by with less than the least; with twice the most, a head still has its place in
@@ -82,6 +82,7 @@ impl TryFrom<RawSettings> for Settings {
                     ],
                 )?,
             },
+            results: raw.results.try_into()?,
             log: log(raw.log)?,
             traces: raw.telemetry.try_into()?,
         })
@@ -320,7 +321,7 @@ fn wanted(key: &str, value: u64) -> Result<Option<NonZeroUsize>, SettingsError> 
     Ok(usize::try_from(value).ok().and_then(NonZeroUsize::new))
 }
 
-fn count(key: &str, value: u64) -> Result<NonZeroUsize, SettingsError> {
+pub(super) fn count(key: &str, value: u64) -> Result<NonZeroUsize, SettingsError> {
     let value = within(key, value, 1..=MAX_COUNT)?;
     let count = usize::try_from(value).ok().and_then(NonZeroUsize::new);
     Ok(count.unwrap_or(NonZeroUsize::MIN))
@@ -334,7 +335,11 @@ pub(super) fn millis(
     within(key, value, range).map(Duration::from_millis)
 }
 
-fn size(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<usize, SettingsError> {
+pub(super) fn size(
+    key: &str,
+    value: u64,
+    range: RangeInclusive<u64>,
+) -> Result<usize, SettingsError> {
     let value = within(key, value, range)?;
     Ok(usize::try_from(value).unwrap_or(usize::MAX))
 }

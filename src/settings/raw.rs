@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{access::RawAccess, locate, tls::RawTls, traces::RawTelemetry};
+use super::{access::RawAccess, locate, results::RawResults, tls::RawTls, traces::RawTelemetry};
 
 const MEBIBYTE: u64 = 1024 * 1024;
 
@@ -17,6 +17,7 @@ pub struct RawSettings {
     pub(super) model: RawModel,
     pub(super) inference: RawInference,
     pub(super) limits: RawLimits,
+    pub(super) results: RawResults,
     pub(super) paper: RawPaper,
     pub(super) log: RawLog,
     pub(super) telemetry: RawTelemetry,

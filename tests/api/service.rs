@@ -21,6 +21,7 @@ use lookdown::{
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    results::{MemoryResults, ResultLimits, ResultStore},
     telemetry::Tracer,
 };
 use serde_json::Value;
@@ -42,6 +43,7 @@ pub(crate) struct Service {
     pub(crate) gate: Arc<Gate>,
     pub(crate) readiness: Readiness,
     pub(crate) calibrations: Arc<Calibrations>,
+    pub(crate) results: Arc<MemoryResults>,
     /// The calibration `lobby`, and models in `models/`. Goes when the test does.
     pub(crate) folder: TempDir,
 }
@@ -54,6 +56,7 @@ pub(crate) struct Bounds {
     pub(crate) request_timeout: Duration,
     pub(crate) min_upload_bytes_per_second: Option<NonZeroU64>,
     pub(crate) request_rate: Option<RequestRate>,
+    pub(crate) results: ResultLimits,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
     pub(crate) tracer: Tracer,
@@ -68,6 +71,7 @@ impl Default for Bounds {
             request_timeout: Duration::from_secs(20),
             min_upload_bytes_per_second: NonZeroU64::new(1024),
             request_rate: None,
+            results: ResultLimits::default(),
             access: Access::Open {
                 own_machine_only: true,
             },
@@ -77,7 +81,7 @@ impl Default for Bounds {
     }
 }
 
-/// An answer, read to its end.
+/// An answer, read to its end if it has one.
 pub(crate) struct Answer {
     pub(crate) status: StatusCode,
     pub(crate) headers: HeaderMap,
@@ -198,10 +202,12 @@ impl Service {
         let workers = WorkerPool::start(&Arc::new(engine), NonZeroUsize::MIN, capacity).unwrap();
         let readiness = Readiness::default();
         readiness.warmed_up();
+        let results = Arc::new(MemoryResults::new(bounds.results));
         let state = ApiState::new(
             Arc::new(workers),
             models,
             Arc::clone(&calibrations),
+            Arc::clone(&results) as Arc<dyn ResultStore>,
             Arc::new(Metrics::new().unwrap()),
             readiness.clone(),
             ApiOptions {
@@ -223,13 +229,18 @@ impl Service {
             gate,
             readiness,
             calibrations,
+            results,
             folder,
         }
     }
 
     pub(crate) async fn send(&self, request: Request<Body>) -> Answer {
         let response = self.router.clone().oneshot(request).await.unwrap();
-        let (parts, body) = response.into_parts();
+        let (parts, mut body) = response.into_parts();
+        let content_type = parts.headers.get(CONTENT_TYPE);
+        if content_type.is_some_and(|kind| kind == "text/event-stream") {
+            body = Body::empty();
+        }
         Answer {
             status: parts.status,
             headers: parts.headers,

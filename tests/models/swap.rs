@@ -26,6 +26,7 @@ use lookdown::{
     inference::{ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    results::{MemoryResults, ResultLimits},
     telemetry::Tracer,
 };
 use serde_json::Value;
@@ -91,6 +92,7 @@ fn service(folder: &Path) -> Router {
         workers,
         Arc::new(models),
         Arc::new(calibrations),
+        Arc::new(MemoryResults::new(ResultLimits::default())),
         metrics,
         readiness,
         options,

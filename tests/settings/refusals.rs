@@ -27,7 +27,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 38] = [
+const UNUSABLE: [(&str, &str, &str, &str); 40] = [
     (
         "SERVER__LISTEN",
         "localhost",
@@ -245,6 +245,18 @@ const UNUSABLE: [(&str, &str, &str, &str); 38] = [
         " ",
         "telemetry.service_name",
         "give a name",
+    ),
+    (
+        "RESULTS__MAX_BYTES",
+        "1000",
+        "results.max_bytes",
+        "from 8388608",
+    ),
+    (
+        "RESULTS__MAX_LISTENERS",
+        "0",
+        "results.max_listeners",
+        "from 1",
     ),
 ];
 

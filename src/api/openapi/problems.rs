@@ -24,6 +24,8 @@ impl IntoResponses for DetectProblems {
                     | ProblemKind::TooManyConnections
                     | ProblemKind::NotFound
                     | ProblemKind::MethodNotAllowed
+                    | ProblemKind::UnknownCamera
+                    | ProblemKind::TooManyListeners
                     | ProblemKind::InvalidCalibration
                     | ProblemKind::CalibrationConflict
                     | ProblemKind::CalibrationsUnreachable
@@ -115,6 +117,65 @@ impl IntoResponses for UnknownCalibrationProblem {
                 .into_iter()
                 .chain([ProblemKind::UnknownCalibration]),
         )
+    }
+}
+
+/// What can go wrong with the latest report of a camera.
+pub(in crate::api) struct LatestProblems;
+
+impl IntoResponses for LatestProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_waiting = [
+            ProblemKind::UnknownParameter,
+            ProblemKind::RepeatedParameter,
+            ProblemKind::UnknownCamera,
+            ProblemKind::InvalidParameter,
+            ProblemKind::TooManyListeners,
+            ProblemKind::ShuttingDown,
+        ];
+        responses(OF_READING.into_iter().chain(of_waiting))
+    }
+}
+
+/// What can go wrong with the reports of a camera.
+pub(in crate::api) struct HistoryProblems;
+
+impl IntoResponses for HistoryProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_pages = [
+            ProblemKind::UnknownParameter,
+            ProblemKind::RepeatedParameter,
+            ProblemKind::UnknownCamera,
+            ProblemKind::InvalidParameter,
+        ];
+        responses(OF_READING.into_iter().chain(of_pages))
+    }
+}
+
+/// What can go wrong with listening.
+const OF_LISTENING: [ProblemKind; 5] = [
+    ProblemKind::KeyRequired,
+    ProblemKind::Forbidden,
+    ProblemKind::TooManyListeners,
+    ProblemKind::RateLimited,
+    ProblemKind::ShuttingDown,
+];
+
+/// What can go wrong with listening to a camera.
+pub(in crate::api) struct CameraEventsProblems;
+
+impl IntoResponses for CameraEventsProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses(OF_LISTENING.into_iter().chain([ProblemKind::UnknownCamera]))
+    }
+}
+
+/// What can go wrong with listening to all cameras.
+pub(in crate::api) struct EventsProblems;
+
+impl IntoResponses for EventsProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses(OF_LISTENING)
     }
 }
 

@@ -21,6 +21,8 @@ pub(in crate::api) enum ProblemKind {
     NotFound,
     /// The calibration does not exist.
     UnknownCalibration,
+    /// No report of the camera is kept.
+    UnknownCamera,
     /// The content makes no calibration.
     InvalidCalibration,
     /// The calibration's file does not allow it.
@@ -59,6 +61,8 @@ pub(in crate::api) enum ProblemKind {
     Overloaded,
     /// No place for another connection.
     TooManyConnections,
+    /// No place for another listener.
+    TooManyListeners,
     /// The client sends more often than it may.
     RateLimited,
     /// A fault of ours.
@@ -73,7 +77,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 32] = [
+    pub(in crate::api) const ALL: [Self; 34] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -82,6 +86,7 @@ impl ProblemKind {
         Self::Forbidden,
         Self::NotFound,
         Self::UnknownCalibration,
+        Self::UnknownCamera,
         Self::InvalidCalibration,
         Self::CalibrationConflict,
         Self::CalibrationsUnreachable,
@@ -101,6 +106,7 @@ impl ProblemKind {
         Self::UnfitImage,
         Self::Overloaded,
         Self::TooManyConnections,
+        Self::TooManyListeners,
         Self::RateLimited,
         Self::Internal,
         Self::WarmingUp,
@@ -119,6 +125,7 @@ impl ProblemKind {
             Self::Forbidden => ("forbidden", "That is not allowed"),
             Self::NotFound => ("not-found", "There is nothing here"),
             Self::UnknownCalibration => ("unknown-calibration", "There is no such calibration"),
+            Self::UnknownCamera => ("unknown-camera", "No report of this camera is kept"),
             Self::InvalidCalibration => ("invalid-calibration", "The calibration cannot be used"),
             Self::CalibrationConflict => (
                 "calibration-conflict",
@@ -150,6 +157,7 @@ impl ProblemKind {
             Self::UnfitImage => ("unfit-image", "The frame does not fit"),
             Self::Overloaded => ("overloaded", "Too many frames are waiting"),
             Self::TooManyConnections => ("too-many-connections", "Too many connections are open"),
+            Self::TooManyListeners => ("too-many-listeners", "Too many listen already"),
             Self::RateLimited => ("rate-limited", "The requests come too fast"),
             Self::Internal => ("internal", "There is a fault in the server"),
             Self::WarmingUp => ("warming-up", "The server is warming up"),
@@ -177,7 +185,10 @@ impl ProblemKind {
             | Self::MissingImage => StatusCode::BAD_REQUEST,
             Self::KeyRequired => StatusCode::UNAUTHORIZED,
             Self::Forbidden => StatusCode::FORBIDDEN,
-            Self::NotFound | Self::UnknownCalibration | Self::UnknownModel => StatusCode::NOT_FOUND,
+            Self::NotFound
+            | Self::UnknownCalibration
+            | Self::UnknownCamera
+            | Self::UnknownModel => StatusCode::NOT_FOUND,
             Self::ModelConflict | Self::CalibrationConflict => StatusCode::CONFLICT,
             Self::Outdated => StatusCode::PRECONDITION_FAILED,
             Self::InvalidCalibration
@@ -185,7 +196,9 @@ impl ProblemKind {
             | Self::InvalidParameter
             | Self::DamagedImage
             | Self::UnfitImage => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::ModelBusy | Self::Overloaded | Self::RateLimited => StatusCode::TOO_MANY_REQUESTS,
+            Self::ModelBusy | Self::Overloaded | Self::TooManyListeners | Self::RateLimited => {
+                StatusCode::TOO_MANY_REQUESTS
+            }
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
             Self::HeadersTooLarge => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
             Self::SlowUpload => StatusCode::REQUEST_TIMEOUT,
@@ -210,6 +223,7 @@ impl ProblemKind {
         matches!(
             self,
             Self::Overloaded
+                | Self::TooManyListeners
                 | Self::RateLimited
                 | Self::ModelBusy
                 | Self::TooManyConnections

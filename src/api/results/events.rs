@@ -1,0 +1,98 @@
+//! Reports as they come: server-sent events (HTML Living Standard, section 9.2).
+
+use std::{convert::Infallible, sync::Arc};
+
+use axum::{
+    body::Body,
+    extract::State,
+    http::{
+        HeaderMap, HeaderName,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
+    },
+    response::{IntoResponse, Response},
+};
+use futures_util::stream::unfold;
+
+use super::{NO_CACHE, address::CameraAddress, feed::Feed};
+use crate::{
+    api::{
+        ApiState,
+        access::Reader,
+        openapi::{CameraEventsProblems, EventsProblems},
+        problem::Problem,
+    },
+    results::Cameras,
+};
+
+pub(in crate::api) const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
+/// Tells nginx and what follows its example not to collect events.
+const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
+
+/// Listen to a camera.
+///
+/// Server-sent events: the latest report at once, then each as it comes, with its ID. Who comes back
+/// with `Last-Event-ID`, as browsers do by themselves, is told what was missed and is still kept.
+#[utoipa::path(
+    get, path = "/results/{camera}/events", tag = "results", operation_id = "listen_to_camera",
+    params(
+        ("camera" = String, Path, description = "The camera's name; it may be one that has no report yet."),
+        ("Last-Event-ID" = Option<String>, Header, nullable = false,
+            description = "The ID of the last report that was heard."),
+    ),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "A stream without an end; the data of each event is a report.",
+         body = String, content_type = "text/event-stream"),
+        CameraEventsProblems,
+    )
+)]
+pub(in crate::api) async fn of_camera(
+    State(state): State<ApiState>,
+    _reader: Reader,
+    CameraAddress(camera): CameraAddress,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    stream(&state, Cameras::One(camera), &headers).await
+}
+
+/// Listen to all cameras.
+///
+/// Server-sent events: the latest report of each camera, then every report as it comes.
+#[utoipa::path(
+    get, path = "/events", tag = "results", operation_id = "listen_to_all",
+    params(
+        ("Last-Event-ID" = Option<String>, Header, nullable = false,
+            description = "The ID of the last report that was heard."),
+    ),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "A stream without an end; the data of each event is a report.",
+         body = String, content_type = "text/event-stream"),
+        EventsProblems,
+    )
+)]
+pub(in crate::api) async fn of_all(
+    State(state): State<ApiState>,
+    _reader: Reader,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    stream(&state, Cameras::All, &headers).await
+}
+
+async fn stream(
+    state: &ApiState,
+    cameras: Cameras,
+    headers: &HeaderMap,
+) -> Result<Response, Problem> {
+    let last_heard = headers.get(LAST_EVENT_ID);
+    // What is no ID of ours was not heard from us.
+    let last_heard = last_heard.and_then(|id| id.to_str().ok()?.parse().ok());
+    let feed = Feed::begin(Arc::clone(&state.results), cameras, last_heard).await?;
+    let events = unfold(feed, async |mut feed| {
+        let event = feed.next().await?;
+        Some((Ok::<_, Infallible>(event), feed))
+    });
+    let headers = [(CONTENT_TYPE, "text/event-stream"), (ACCEL_BUFFERING, "no")];
+    let cache = [(CACHE_CONTROL, NO_CACHE)];
+    Ok((headers, cache, Body::from_stream(events)).into_response())
+}

@@ -1,0 +1,114 @@
+//! The latest report of a camera, at once or as soon as there is a newer one.
+
+use std::{sync::Arc, time::Duration};
+
+use axum::{
+    extract::State,
+    http::{
+        HeaderMap, StatusCode, Uri,
+        header::{CACHE_CONTROL, CONTENT_TYPE, ETAG},
+    },
+    response::{IntoResponse, Response},
+};
+use tokio::time::timeout_at;
+
+use super::{NO_CACHE, address::CameraAddress, not_allowed, unknown};
+use crate::{
+    api::{
+        ApiState,
+        access::Reader,
+        deadline::Deadline,
+        entity_tags::{entity_tag, is_unmodified},
+        openapi::LatestProblems,
+        problem::Problem,
+        report::Report,
+        upload::parameters_named,
+    },
+    results::{Cameras, StoredReport},
+};
+
+/// Ten minutes, as of `timeout_millis`.
+const MAX_WAIT_SECONDS: u64 = 600;
+
+/// Get the latest report of a camera.
+///
+/// `If-None-Match` with the `ETag` of the report one has is answered 304 while that is the latest. With
+/// `wait`, the answer waits for a newer one; 304 then says that none has come.
+#[utoipa::path(
+    get, path = "/results/{camera}/latest", tag = "results", operation_id = "get_latest_result",
+    params(
+        ("camera" = String, Path, description = "The camera's name."),
+        ("wait" = Option<u64>, Query, nullable = false, minimum = 0, maximum = 600,
+            description = "How long to wait for a report that is not the one of `If-None-Match`, seconds; no \
+                longer than the server lets any request take."),
+        ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
+            description = "The ETag of the report that is there already."),
+    ),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "The report.", body = Report,
+         headers(
+            ("ETag" = String, description = "The report's ID."),
+            ("Cache-Control" = String, description = "`no-cache`."),
+         )),
+        (status = NOT_MODIFIED, description = "There is none newer than the one asked with."),
+        LatestProblems,
+    )
+)]
+pub(in crate::api) async fn get_latest(
+    State(state): State<ApiState>,
+    _reader: Reader,
+    deadline: Deadline,
+    CameraAddress(camera): CameraAddress,
+    headers: HeaderMap,
+    uri: Uri,
+) -> Result<Response, Problem> {
+    let [wait] = parameters_named(&uri, ["wait"])?;
+    let wait = wait.map_or(Ok(Duration::ZERO), |seconds| parse_wait(&seconds))?;
+    let report = if wait.is_zero() {
+        state.results.latest(&camera).await
+    } else {
+        let limit = deadline.within(wait);
+        news(&state, &camera, &headers, limit).await?
+    };
+    let report = report.ok_or_else(|| unknown(&camera))?;
+    let id = report.id.to_string();
+    let about = [(ETAG, entity_tag(&id)), (CACHE_CONTROL, NO_CACHE)];
+    if is_unmodified(&headers, &id)? {
+        return Ok((StatusCode::NOT_MODIFIED, about).into_response());
+    }
+    let content_type = [(CONTENT_TYPE, "application/json")];
+    Ok((about, content_type, report.report.json.clone()).into_response())
+}
+
+/// The first report that the reader does not have, or the latest when none has come in time.
+async fn news(
+    state: &ApiState,
+    camera: &str,
+    headers: &HeaderMap,
+    limit: Deadline,
+) -> Result<Option<Arc<StoredReport>>, Problem> {
+    // Listens before it looks: nothing is missed in between.
+    let listeners = state.results.listeners();
+    let mut listening = listeners.listen(Cameras::One(camera.to_owned()))?;
+    let mut report = state.results.latest(camera).await;
+    let is_news = |report: &StoredReport| {
+        let known = is_unmodified(headers, &report.id.to_string());
+        known.map(|known| !known)
+    };
+    while !report.as_deref().map_or(Ok(false), is_news)?
+        && let Ok(Some(newer)) = timeout_at(limit.at(), listening.next()).await
+    {
+        report = Some(newer);
+    }
+    Ok(report)
+}
+
+fn parse_wait(text: &str) -> Result<Duration, Problem> {
+    let seconds = text.parse().ok().filter(|wait| *wait <= MAX_WAIT_SECONDS);
+    let seconds = seconds.ok_or_else(|| {
+        let rule = format!("a whole number of seconds from 0 to {MAX_WAIT_SECONDS}");
+        not_allowed("wait", text, &rule)
+    });
+    seconds.map(Duration::from_secs)
+}

@@ -1,0 +1,149 @@
+//! What is in memory, and what goes first when there is too much of it.
+
+use std::{
+    collections::{BTreeMap, HashMap, VecDeque},
+    ops::Bound::{Excluded, Unbounded},
+    sync::Arc,
+};
+
+use jiff::Timestamp;
+
+use crate::results::{Cameras, NewReport, ReportId, ResultLimits, ResultUse, StoredReport};
+
+/// Every report is in `cameras`, and in one of `latest` and `earlier`.
+#[derive(Debug)]
+pub(super) struct Kept {
+    limits: ResultLimits,
+    /// Of each camera, oldest first; at least one.
+    cameras: HashMap<String, VecDeque<Arc<StoredReport>>>,
+    /// The last of every camera.
+    latest: BTreeMap<ReportId, Arc<StoredReport>>,
+    /// All others.
+    earlier: BTreeMap<ReportId, Arc<StoredReport>>,
+    bytes: usize,
+    newest: ReportId,
+    published: u64,
+}
+
+impl Kept {
+    pub(super) fn new(limits: ResultLimits) -> Self {
+        Self {
+            limits,
+            cameras: HashMap::new(),
+            latest: BTreeMap::new(),
+            earlier: BTreeMap::new(),
+            bytes: 0,
+            newest: ReportId::default(),
+            published: 0,
+        }
+    }
+
+    /// Keeps a report, and lets go what there is no room for.
+    pub(super) fn add(&mut self, report: NewReport, now: Timestamp) -> Arc<StoredReport> {
+        let id = ReportId::next(self.newest, now);
+        let stored = Arc::new(StoredReport { id, report });
+        self.newest = id;
+        self.published += 1;
+        self.bytes += stored.bytes();
+        let camera = &stored.report.camera;
+        let reports = self.cameras.entry(camera.clone()).or_default();
+        if let Some(before) = reports.back() {
+            self.latest.remove(&before.id);
+            self.earlier.insert(before.id, Arc::clone(before));
+        }
+        reports.push_back(Arc::clone(&stored));
+        self.latest.insert(id, Arc::clone(&stored));
+        if reports.len() > self.limits.history_per_camera.get() {
+            self.forget_oldest_of(camera);
+        }
+        self.keep_limits();
+        stored
+    }
+
+    fn keep_limits(&mut self) {
+        while self.cameras.len() > self.limits.max_cameras.get()
+            && let Some((_, silent)) = self.latest.first_key_value()
+        {
+            let camera = silent.report.camera.clone();
+            while self.forget_oldest_of(&camera) {}
+        }
+        while (self.count() > self.limits.max_reports.get() || self.bytes > self.limits.max_bytes)
+            && let Some((_, oldest)) = self
+                .earlier
+                .first_key_value()
+                .or_else(|| self.latest.first_key_value())
+        {
+            let camera = oldest.report.camera.clone();
+            self.forget_oldest_of(&camera);
+        }
+    }
+
+    /// Says whether there was one.
+    fn forget_oldest_of(&mut self, camera: &str) -> bool {
+        let Some(reports) = self.cameras.get_mut(camera) else {
+            return false;
+        };
+        if let Some(oldest) = reports.pop_front() {
+            self.bytes -= oldest.bytes();
+            self.latest.remove(&oldest.id);
+            self.earlier.remove(&oldest.id);
+        }
+        if reports.is_empty() {
+            self.cameras.remove(camera);
+        }
+        true
+    }
+
+    fn count(&self) -> usize {
+        self.latest.len() + self.earlier.len()
+    }
+
+    pub(super) fn latest(&self, camera: &str) -> Option<Arc<StoredReport>> {
+        self.cameras.get(camera)?.back().cloned()
+    }
+
+    pub(super) fn latest_of_all(&self) -> Vec<Arc<StoredReport>> {
+        self.latest.values().cloned().collect()
+    }
+
+    pub(super) fn since(
+        &self,
+        cameras: &Cameras,
+        after: ReportId,
+        most: usize,
+    ) -> Vec<Arc<StoredReport>> {
+        match cameras {
+            Cameras::One(camera) => {
+                let Some(reports) = self.cameras.get(camera) else {
+                    return Vec::new();
+                };
+                let first = reports.partition_point(|report| report.id <= after);
+                reports.range(first..).take(most).cloned().collect()
+            }
+            Cameras::All => {
+                let range = (Excluded(after), Unbounded);
+                let [latest, earlier] =
+                    [&self.latest, &self.earlier].map(|reports| reports.range(range).take(most));
+                let mut found: Vec<_> = latest
+                    .chain(earlier)
+                    .map(|(_, found)| found.clone())
+                    .collect();
+                found.sort_unstable_by_key(|report| report.id);
+                found.truncate(most);
+                found
+            }
+        }
+    }
+
+    pub(super) fn usage(&self) -> ResultUse {
+        ResultUse {
+            cameras: self.cameras.len(),
+            reports: self.count(),
+            bytes: self.bytes,
+            published: self.published,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+use std::num::NonZeroUsize;
+
+use bytes::Bytes;
+use proptest::prelude::*;
+
+use super::*;
+
+const ROOMY: [usize; 4] = [1000, 1000, 1000, 1 << 20];
+
+fn kept([max_cameras, history_per_camera, max_reports, max_bytes]: [usize; 4]) -> Kept {
+    let count = |number| NonZeroUsize::new(number).unwrap();
+    Kept::new(ResultLimits {
+        max_cameras: count(max_cameras),
+        history_per_camera: count(history_per_camera),
+        max_reports: count(max_reports),
+        max_bytes,
+        max_listeners: NonZeroUsize::MIN,
+    })
+}
+
+fn add(kept: &mut Kept, camera: &str, length: usize) -> ReportId {
+    let report = NewReport {
+        camera: camera.to_owned(),
+        received_at: Timestamp::UNIX_EPOCH,
+        persons: 0,
+        json: Bytes::from(vec![b' '; length]),
+    };
+    kept.add(report, Timestamp::UNIX_EPOCH).id
+}
+
+fn ids(kept: &Kept, cameras: &Cameras, after: ReportId) -> Vec<ReportId> {
+    let found = kept.since(cameras, after, usize::MAX);
+    found.iter().map(|report| report.id).collect()
+}
+
+fn one(camera: &str) -> Cameras {
+    Cameras::One(camera.to_owned())
+}
+
+#[test]
+fn a_camera_keeps_its_last_reports_and_no_more() {
+    let mut kept = kept([10, 3, 100, 1 << 20]);
+    let given: Vec<_> = (0..5).map(|_| add(&mut kept, "lobby", 1)).collect();
+    let start = ReportId::default();
+    assert_eq!(ids(&kept, &one("lobby"), start), given[2..]);
+    assert_eq!(ids(&kept, &one("lobby"), given[3]), given[4..]);
+    assert_eq!(kept.latest("lobby").unwrap().id, given[4]);
+    assert!(ids(&kept, &one("hall"), start).is_empty());
+    assert!(kept.latest("hall").is_none());
+}
+
+#[test]
+fn all_cameras_are_told_in_the_order_in_which_their_reports_came_and_page_by_page() {
+    let mut kept = kept(ROOMY);
+    let cameras = ["a", "b", "a", "c", "b", "a"];
+    let given = cameras.map(|camera| add(&mut kept, camera, 1));
+    assert_eq!(ids(&kept, &Cameras::All, ReportId::default()), given);
+    assert_eq!(ids(&kept, &Cameras::All, given[2]), given[3..]);
+    let page = kept.since(&Cameras::All, given[0], 2);
+    let page: Vec<_> = page.iter().map(|report| report.id).collect();
+    assert_eq!(page, given[1..3]);
+    let latest: Vec<_> = kept
+        .latest_of_all()
+        .iter()
+        .map(|report| report.id)
+        .collect();
+    assert_eq!(latest, given[3..]);
+}
+
+#[test]
+fn of_too_many_cameras_the_one_goes_that_was_silent_for_longest() {
+    let mut kept = kept([2, 10, 100, 1 << 20]);
+    for camera in ["a", "a", "b", "a", "c"] {
+        add(&mut kept, camera, 1);
+    }
+    assert!(kept.latest("b").is_none());
+    assert_eq!(kept.usage().cameras, 2);
+    assert_eq!(kept.usage().reports, 4);
+}
+
+#[test]
+fn what_a_busy_camera_sends_does_not_cost_a_silent_one_its_latest_report() {
+    for limits in [[10, 100, 4, 1 << 20], [10, 100, 100, 3000]] {
+        let mut kept = kept(limits);
+        let silent = add(&mut kept, "silent", 100);
+        for _ in 0..50 {
+            add(&mut kept, "busy", 100);
+        }
+        assert_eq!(kept.latest("silent").unwrap().id, silent);
+        assert!(kept.usage().reports > 1);
+    }
+}
+
+#[test]
+fn a_report_larger_than_all_room_is_not_kept_and_nothing_else_either() {
+    let mut kept = kept([10, 10, 10, 1000]);
+    add(&mut kept, "a", 100);
+    add(&mut kept, "b", 5000);
+    assert_eq!(
+        kept.usage(),
+        ResultUse {
+            published: 2,
+            ..ResultUse::default()
+        }
+    );
+}
+
+proptest! {
+    #[test]
+    fn no_limit_is_passed_and_the_books_balance_whatever_comes(
+        limits in [1_usize..6, 1_usize..6, 1_usize..20, 200_usize..4000],
+        reports in prop::collection::vec((0_u8..8, 0_usize..600), 1..80),
+    ) {
+        let mut kept = kept(limits);
+        for (camera, length) in reports {
+            let id = add(&mut kept, &camera.to_string(), length);
+            let [max_cameras, per_camera, max_reports, max_bytes] = limits;
+            let usage = kept.usage();
+            prop_assert!(usage.cameras <= max_cameras);
+            prop_assert!(usage.reports <= max_reports);
+            prop_assert!(usage.bytes <= max_bytes);
+            prop_assert!(kept.cameras.values().all(|reports| (1..=per_camera).contains(&reports.len())));
+            let all = kept.since(&Cameras::All, ReportId::default(), usize::MAX);
+            prop_assert_eq!(all.len(), usage.reports);
+            prop_assert_eq!(all.iter().map(|report| report.bytes()).sum::<usize>(), usage.bytes);
+            prop_assert_eq!(kept.latest.len(), usage.cameras);
+            if let Some(last) = all.last() {
+                prop_assert_eq!(last.id, id);
+            }
+        }
+    }
+}

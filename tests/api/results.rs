@@ -1,0 +1,245 @@
+//! What was found last: the latest report of each camera, and those before it.
+
+use std::num::NonZeroUsize;
+
+use axum::{body::Body, http::Request};
+use bytes::Bytes;
+use jiff::Timestamp;
+use lookdown::results::{NewReport, ReportId, ResultLimits, ResultStore};
+use serde_json::{Value, json};
+
+use crate::service::{Answer, Bounds, Service, frame};
+
+impl Service {
+    /// Publishes a report that is nothing but a number.
+    pub(crate) async fn publish(&self, camera: &str, number: usize) -> ReportId {
+        let report = NewReport {
+            camera: camera.to_owned(),
+            received_at: "2026-11-21T09:30:00Z".parse().unwrap(),
+            persons: number,
+            json: Bytes::from(number.to_string()),
+        };
+        self.results.publish(report).await.id
+    }
+
+    pub(crate) async fn get_if_none_match(&self, path: &str, tag: &str) -> Answer {
+        let request = Request::get(path).header("if-none-match", tag);
+        self.send(request.body(Body::empty()).unwrap()).await
+    }
+}
+
+#[tokio::test]
+async fn the_latest_report_is_what_its_sender_was_answered_to_the_byte() {
+    let service = Service::start();
+    let path = "/results/hall/latest";
+    let query = "calibration=lobby&profile=fast&camera=hall";
+    let sent = service.post_raw(query, frame()).await;
+    let kept = service.get(path).await;
+    assert_eq!((kept.status.as_u16(), &kept.body), (200, &sent.body));
+    assert_eq!(kept.header("content-type"), "application/json");
+    assert_eq!(kept.header("cache-control"), "no-cache");
+    let tag = kept.header("etag").to_owned();
+    for (asked, status) in [(&*tag, 304), ("*", 304), ("\"1\"", 200), ("x", 400)] {
+        let answer = service.get_if_none_match(path, asked).await;
+        assert_eq!(answer.status, status, "{asked}");
+        if status == 304 {
+            assert_eq!((answer.header("etag"), answer.body.len()), (&*tag, 0));
+            assert_eq!(answer.header("cache-control"), "no-cache");
+        }
+    }
+    let newer = service.post_raw(query, frame()).await;
+    let answer = service.get_if_none_match(path, &tag).await;
+    assert_eq!((answer.status.as_u16(), answer.body), (200, newer.body));
+}
+
+#[tokio::test]
+async fn a_camera_without_a_name_is_its_calibration_and_without_that_the_assumed_one() {
+    let service = Service::start();
+    for query in [
+        "profile=fast",
+        "profile=fast&calibration=lobby",
+        "profile=fast&camera=hall",
+    ] {
+        let answer = service.post_raw(query, frame()).await;
+        assert_eq!(answer.status, 200, "{}", answer.text());
+    }
+    assert_eq!(
+        service
+            .post_raw("sigma=0&camera=nobody", frame())
+            .await
+            .status,
+        422
+    );
+    let list = service.get("/results").await;
+    assert_eq!(list.header("cache-control"), "no-cache");
+    let list = list.json();
+    let cameras: Vec<_> = list
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| &row["camera"])
+        .collect();
+    assert_eq!(cameras, ["assumed", "hall", "lobby"]);
+    let latest = service.get("/results/hall/latest").await;
+    let (row, report) = (&list[1], latest.json());
+    assert_eq!(row["id"].to_string(), latest.header("etag"));
+    assert_eq!(row["received_at"], report["received_at"]);
+    assert_eq!(row["persons"], report["persons"].as_array().unwrap().len());
+    let age = row["age_seconds"].as_f64().unwrap();
+    assert!((0.0..60.0).contains(&age), "{age}");
+}
+
+#[tokio::test]
+async fn a_camera_without_reports_is_404_and_says_where_to_look() {
+    let service = Service::start();
+    assert_eq!(service.get("/results").await.json(), json!([]));
+    for path in [
+        "/results/hall/latest",
+        "/results/hall/history",
+        "/results/%FF/latest",
+        "/results/%FF/events",
+    ] {
+        let answer = service.get(path).await;
+        assert_eq!(answer.status, 404, "{path}");
+        let problem = answer.problem();
+        assert_eq!(problem["type"], "urn:lookdown:problem:unknown-camera");
+        assert!(problem["detail"].as_str().unwrap().contains("/results"));
+    }
+}
+
+#[tokio::test]
+async fn a_camera_may_be_called_whatever_the_parameter_lets_through() {
+    let service = Service::start();
+    let query = "calibration=lobby&profile=fast&camera=hall%2Fnorth%20%C3%A9";
+    let sent = service.post_raw(query, frame()).await;
+    assert_eq!(sent.json()["camera"], "hall/north é");
+    let kept = service.get("/results/hall%2Fnorth%20%C3%A9/latest").await;
+    assert_eq!(kept.body, sent.body);
+}
+
+/// The reports in an answer, which are numbers, and the ID of the last.
+fn page(answer: &Answer) -> (Vec<u64>, Option<String>) {
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    assert_eq!(answer.header("content-type"), "application/json");
+    let page = answer.json();
+    let rows = page.as_array().unwrap();
+    let last = rows
+        .last()
+        .map(|row| row["id"].as_str().unwrap().to_owned());
+    let reports = rows.iter().map(|row| row["report"].as_u64().unwrap());
+    (reports.collect(), last)
+}
+
+#[tokio::test]
+async fn history_is_read_page_by_page_to_its_end() {
+    let service = Service::start();
+    for number in 0..5 {
+        service.publish("lobby", number).await;
+        service.publish("hall", 100).await;
+    }
+    let path = "/results/lobby/history";
+    assert_eq!(page(&service.get(path).await).0, [0, 1, 2, 3, 4]);
+    let (mut seen, mut since) = (Vec::new(), "0".to_owned());
+    loop {
+        let answer = service.get(&format!("{path}?limit=2&since={since}")).await;
+        let (reports, last) = page(&answer);
+        assert!(reports.len() <= 2);
+        seen.extend(reports);
+        let Some(last) = last else { break };
+        since = last;
+    }
+    assert_eq!(seen, [0, 1, 2, 3, 4]);
+}
+
+#[tokio::test]
+async fn history_begins_after_a_time_as_well_as_after_an_id() {
+    let service = Service::start();
+    let id = service.publish("lobby", 1).await;
+    let since = async |time: Timestamp| {
+        let path = format!("/results/lobby/history?since={time}");
+        page(&service.get(&path).await).0
+    };
+    let moment = jiff::SignedDuration::from_micros(1);
+    assert_eq!(since(id.time() - moment).await, [1]);
+    assert_eq!(since(id.time()).await, [0; 0]);
+    assert_eq!(since(Timestamp::UNIX_EPOCH).await, [1]);
+}
+
+#[tokio::test]
+async fn what_history_cannot_begin_with_or_count_to_is_refused_by_name() {
+    let service = Service::start();
+    service.publish("lobby", 1).await;
+    for (query, status, part) in [
+        ("since=yesterday", 422, "since: \"yesterday\""),
+        ("since=", 422, "since"),
+        ("limit=0", 422, "limit"),
+        ("limit=1001", 422, "1 to 1000"),
+        ("until=1", 400, "\"until\""),
+        ("limit=1&limit=2", 400, "twice"),
+    ] {
+        let answer = service
+            .get(&format!("/results/lobby/history?{query}"))
+            .await;
+        assert_eq!(answer.status, status, "{query}");
+        let problem = answer.problem();
+        assert!(
+            problem["detail"].as_str().unwrap().contains(part),
+            "{problem}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_page_of_large_reports_ends_early() {
+    let service = Service::start();
+    for _ in 0..3 {
+        let report = NewReport {
+            camera: "lobby".to_owned(),
+            received_at: Timestamp::UNIX_EPOCH,
+            persons: 0,
+            json: Bytes::from(format!("\"{}\"", "x".repeat(3 << 20))),
+        };
+        service.results.publish(report).await;
+    }
+    let answer = service.get("/results/lobby/history").await.json();
+    assert_eq!(answer.as_array().unwrap().len(), 2);
+}
+
+#[tokio::test]
+async fn no_more_is_kept_than_the_limits_let() {
+    let count = |number| NonZeroUsize::new(number).unwrap();
+    let service = Service::within(&Bounds {
+        results: ResultLimits {
+            max_cameras: count(2),
+            history_per_camera: count(3),
+            ..ResultLimits::default()
+        },
+        ..Bounds::default()
+    });
+    for (camera, number) in [("a", 1), ("b", 2), ("b", 3), ("b", 4), ("b", 5), ("c", 6)] {
+        service.publish(camera, number).await;
+    }
+    assert_eq!(service.get("/results/a/latest").await.status, 404);
+    let history = service.get("/results/b/history").await;
+    assert_eq!(page(&history).0, [3, 4, 5]);
+    let list = service.get("/results").await.json();
+    let persons: Vec<_> = list
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| &row["persons"])
+        .collect();
+    assert_eq!(persons, [&Value::from(5), &Value::from(6)]);
+    let metrics = service.get("/metrics").await.text();
+    for line in [
+        "lookdown_results_cameras 2",
+        "lookdown_results_reports 4",
+        "lookdown_results_stored_total 6",
+        "lookdown_results_listeners 0",
+    ] {
+        assert!(
+            metrics.lines().any(|told| told == line),
+            "{line}: {metrics}"
+        );
+    }
+}

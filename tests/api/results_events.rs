@@ -1,0 +1,218 @@
+//! Reports as they come: server-sent events.
+
+use std::{io::Read, time::Duration};
+
+use axum::{body::Body, http::Request, response::Response};
+use http_body_util::BodyExt;
+use lookdown::results::ResultStore;
+use tokio::time::{Instant, timeout};
+use tower::ServiceExt;
+
+use crate::{
+    server::{Server, rest_of},
+    service::Service,
+};
+
+const EVENTS: &str = "/results/lobby/events";
+/// More than are fetched, or wait for a listener, at a time.
+const MANY: usize = 100;
+
+/// A stream of events.
+struct Stream(Response);
+
+impl Stream {
+    async fn open(service: &Service, path: &str, last_heard: Option<&str>) -> Self {
+        let mut request = Request::get(path);
+        if let Some(id) = last_heard {
+            request = request.header("last-event-id", id);
+        }
+        let request = request.body(Body::empty()).unwrap();
+        let response = service.router.clone().oneshot(request).await.unwrap();
+        assert_eq!(response.status(), 200);
+        Self(response)
+    }
+
+    /// The next event or comment; `None` at the end.
+    async fn next(&mut self) -> Option<String> {
+        let frame = self.0.body_mut().frame().await?;
+        let bytes = frame.unwrap().into_data().unwrap();
+        Some(String::from_utf8(bytes.to_vec()).unwrap())
+    }
+
+    /// The data of the next event, which is a number.
+    async fn number(&mut self) -> usize {
+        let event = self.next().await.unwrap();
+        let data = event.lines().find_map(|line| line.strip_prefix("data: "));
+        data.unwrap().parse().unwrap()
+    }
+}
+
+#[tokio::test]
+async fn a_stream_begins_with_the_latest_report_and_goes_on_with_each_new_one() {
+    let service = Service::start();
+    service.publish("lobby", 1).await;
+    let first = service.publish("lobby", 2).await;
+    let mut stream = Stream::open(&service, EVENTS, None).await;
+    let headers = stream.0.headers();
+    for (name, value) in [
+        ("content-type", "text/event-stream"),
+        ("cache-control", "no-cache"),
+        ("x-accel-buffering", "no"),
+    ] {
+        assert_eq!(headers[name], value);
+    }
+    service.publish("hall", 3).await;
+    let second = service.publish("lobby", 4).await;
+    assert_eq!(
+        stream.next().await.unwrap(),
+        format!("id: {first}\ndata: 2\n\n")
+    );
+    assert_eq!(
+        stream.next().await.unwrap(),
+        format!("id: {second}\ndata: 4\n\n")
+    );
+}
+
+#[tokio::test]
+async fn who_listens_to_all_hears_the_latest_of_each_camera_and_then_everything() {
+    let service = Service::start();
+    for (camera, number) in [("lobby", 1), ("hall", 2), ("lobby", 3)] {
+        service.publish(camera, number).await;
+    }
+    let mut stream = Stream::open(&service, "/events", None).await;
+    service.publish("stairs", 4).await;
+    service.publish("lobby", 5).await;
+    for number in 2..=5 {
+        assert_eq!(stream.number().await, number);
+    }
+}
+
+#[tokio::test]
+async fn who_comes_back_hears_what_was_missed_once_and_then_goes_on() {
+    let service = Service::start();
+    let mut ids = Vec::new();
+    for number in 0..MANY {
+        ids.push(service.publish("lobby", number).await.to_string());
+        service.publish("hall", MANY + number).await;
+    }
+    let mut stream = Stream::open(&service, EVENTS, Some(&ids[9])).await;
+    service.publish("lobby", MANY).await;
+    for number in 10..MANY {
+        assert_eq!(stream.number().await, number);
+    }
+    service.publish("lobby", MANY + 1).await;
+    assert_eq!(stream.number().await, MANY);
+    assert_eq!(stream.number().await, MANY + 1);
+
+    let mut up_to_date = Stream::open(&service, EVENTS, Some(&ids[MANY - 1])).await;
+    assert_eq!(up_to_date.number().await, MANY);
+}
+
+#[tokio::test]
+async fn who_comes_from_elsewhere_begins_with_the_latest() {
+    let service = Service::start();
+    service.publish("lobby", 1).await;
+    service.publish("lobby", 2).await;
+    for stranger in ["18446744073709551615", "cam-7", "\u{e9}"] {
+        let mut stream = Stream::open(&service, EVENTS, Some(stranger)).await;
+        assert_eq!(stream.number().await, 2, "{stranger}");
+        let id = service.publish("lobby", 2).await;
+        let next = stream.next().await.unwrap();
+        assert!(next.starts_with(&format!("id: {id}\n")), "{next}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_silent_stream_gives_signs_of_life_that_are_no_events() {
+    let service = Service::start();
+    let mut stream = Stream::open(&service, EVENTS, None).await;
+    let began = Instant::now();
+    for _ in 0..3 {
+        let comment = stream.next().await.unwrap();
+        assert!(
+            comment.starts_with(':') && comment.ends_with("\n\n"),
+            "{comment:?}"
+        );
+    }
+    assert_eq!(began.elapsed(), Duration::from_secs(45));
+}
+
+#[tokio::test]
+async fn a_listener_that_leaves_makes_room() {
+    let service = Service::start();
+    let stream = Stream::open(&service, EVENTS, None).await;
+    assert_eq!(service.results.listeners().count(), 1);
+    drop(stream);
+    assert_eq!(service.results.listeners().count(), 0);
+}
+
+#[tokio::test]
+async fn a_listener_that_does_not_keep_up_is_given_up_and_can_come_back_for_the_rest() {
+    let service = Service::start();
+    let mut stream = Stream::open(&service, EVENTS, None).await;
+    for number in 0..MANY {
+        service.publish("lobby", number).await;
+    }
+    let mut heard = 0;
+    let mut last = String::new();
+    while let Some(event) = stream.next().await {
+        last = event;
+        heard += 1;
+    }
+    assert!((1..MANY).contains(&heard), "{heard}");
+    assert_eq!(service.results.listeners().dropped(), 1);
+    let metrics = service.get("/metrics").await.text();
+    let told = "lookdown_results_listeners_dropped_total 1";
+    assert!(metrics.lines().any(|line| line == told), "{metrics}");
+
+    let id = last.lines().next().unwrap().strip_prefix("id: ").unwrap();
+    let mut stream = Stream::open(&service, EVENTS, Some(id)).await;
+    for number in heard..MANY {
+        assert_eq!(stream.number().await, number);
+    }
+}
+
+impl Server {
+    /// A connection that listens, and was told so.
+    async fn listen(&self) -> std::net::TcpStream {
+        let request = format!("GET {EVENTS} HTTP/1.1\r\nHost: lookdown\r\n\r\n");
+        let mut connection = self.connect(request.as_bytes());
+        let mut head = [0; 12];
+        connection.read_exact(&mut head).unwrap();
+        assert_eq!(&head, b"HTTP/1.1 200");
+        self.shows("results_listeners", 1).await;
+        connection
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_listener_that_vanishes_from_the_network_is_noticed() {
+    let server = Server::start(&[]).await;
+    drop(server.listen().await);
+    server.shows("results_listeners", 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn at_the_end_of_the_server_streams_end_in_order_and_nobody_waits_any_longer() {
+    let server = Server::start(&[]).await;
+    let stream = server.listen().await;
+    assert!(server.detect().await.unwrap().unwrap().contains("200 OK"));
+    let latest = server.get("/results/lobby/latest").await;
+    let tag = latest.lines().find_map(|line| line.strip_prefix("etag: "));
+    let waiting = server.exchange(
+        &format!(
+            "GET /results/lobby/latest?wait=30 HTTP/1.1\r\nIf-None-Match: {}",
+            tag.unwrap()
+        ),
+        Vec::new(),
+    );
+    server.shows("results_listeners", 2).await;
+    server.shutdown.request_without_pause();
+    let told = rest_of(stream).await;
+    assert!(told.contains("\"camera\":\"lobby\""), "{told}");
+    assert!(told.ends_with("\r\n0\r\n\r\n"), "{told}");
+    let waiting = waiting.await.unwrap().unwrap();
+    assert!(waiting.contains("304 Not Modified"), "{waiting}");
+    let ended = timeout(Duration::from_secs(20), server.has_ended());
+    ended.await.unwrap();
+}

@@ -1,0 +1,149 @@
+//! Waiting for a report that is newer than the one at hand. The clock of most tests stands still until
+//! all tasks wait.
+
+use std::{num::NonZeroUsize, time::Duration};
+
+use lookdown::results::{ResultLimits, ResultStore};
+use tokio::{
+    task::yield_now,
+    time::{Instant, sleep},
+};
+
+use crate::service::{Bounds, Service};
+
+const WAIT: &str = "/results/lobby/latest?wait=10";
+
+impl Service {
+    /// Waits until so many listen.
+    pub(crate) async fn has_listeners(&self, count: usize) {
+        while self.results.listeners().count() != count {
+            yield_now().await;
+        }
+    }
+}
+
+#[tokio::test]
+async fn whoever_waits_is_answered_as_soon_as_there_is_something_newer() {
+    let service = Service::start();
+    let tag = format!("\"{}\"", service.publish("lobby", 1).await);
+    let (answer, id) = tokio::join!(service.get_if_none_match(WAIT, &tag), async {
+        service.has_listeners(1).await;
+        service.publish("hall", 2).await;
+        service.publish("lobby", 3).await
+    });
+    assert_eq!(
+        (answer.status.as_u16(), answer.text()),
+        (200, "3".to_owned())
+    );
+    assert_eq!(answer.header("etag"), format!("\"{id}\""));
+    service.has_listeners(0).await;
+}
+
+#[tokio::test]
+async fn whoever_waits_for_a_cameras_first_report_gets_it() {
+    let service = Service::start();
+    let (answer, _) = tokio::join!(service.get(WAIT), async {
+        service.has_listeners(1).await;
+        service.publish("lobby", 1).await
+    });
+    assert_eq!(
+        (answer.status.as_u16(), answer.text()),
+        (200, "1".to_owned())
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn without_anything_newer_the_wait_ends_when_asked_and_no_later_than_any_request() {
+    let service = Service::within(&Bounds {
+        request_timeout: Duration::from_secs(20),
+        ..Bounds::default()
+    });
+    let tag = format!("\"{}\"", service.publish("lobby", 1).await);
+    for (camera, wait, waited, status) in [
+        ("lobby", 7, 7, 304),
+        ("lobby", 600, 20, 304),
+        ("hall", 7, 7, 404),
+    ] {
+        let began = Instant::now();
+        let path = format!("/results/{camera}/latest?wait={wait}");
+        let answer = service.get_if_none_match(&path, &tag).await;
+        assert_eq!(answer.status, status, "{path}");
+        assert_eq!(began.elapsed().as_secs(), waited, "{path}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn whoever_does_not_have_the_latest_need_not_wait_for_it() {
+    let service = Service::start();
+    service.publish("lobby", 1).await;
+    let began = Instant::now();
+    for answer in [
+        service.get(WAIT).await,
+        service.get_if_none_match(WAIT, "\"1\"").await,
+    ] {
+        assert_eq!(answer.status, 200);
+    }
+    let now = service.get("/results/lobby/latest?wait=0").await;
+    assert_eq!(now.status, 200);
+    assert!(began.elapsed() < Duration::from_secs(1));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_reader_that_gives_up_waiting_leaves_nothing_behind() {
+    let service = Service::start();
+    tokio::select! {
+        _ = service.get(WAIT) => panic!("there was nothing to answer"),
+        () = sleep(Duration::from_secs(1)) => {}
+    }
+    assert_eq!(service.results.listeners().count(), 0);
+}
+
+#[tokio::test]
+async fn no_more_wait_than_there_are_places_and_the_others_are_told_so() {
+    let service = Service::within(&Bounds {
+        results: ResultLimits {
+            max_listeners: NonZeroUsize::MIN,
+            ..ResultLimits::default()
+        },
+        ..Bounds::default()
+    });
+    let (first, refused) = tokio::join!(service.get(WAIT), async {
+        service.has_listeners(1).await;
+        let refused = [
+            service.get("/results/hall/latest?wait=1").await,
+            service.get("/results/hall/events").await,
+            service.get("/events").await,
+        ];
+        service.publish("lobby", 1).await;
+        refused
+    });
+    for answer in refused {
+        assert_eq!(
+            (answer.status.as_u16(), answer.header("retry-after")),
+            (429, "1")
+        );
+        let problem = answer.problem();
+        assert_eq!(problem["type"], "urn:lookdown:problem:too-many-listeners");
+        assert!(
+            problem["detail"]
+                .as_str()
+                .unwrap()
+                .contains("results.max_listeners")
+        );
+    }
+    assert_eq!(first.status, 200);
+}
+
+#[tokio::test]
+async fn a_wait_is_seconds_up_to_ten_minutes() {
+    let service = Service::start();
+    service.publish("lobby", 1).await;
+    for wait in ["601", "-1", "1.5", "long", ""] {
+        let answer = service
+            .get(&format!("/results/lobby/latest?wait={wait}"))
+            .await;
+        assert_eq!(answer.status, 422, "{wait}");
+        let problem = answer.problem();
+        assert!(problem["detail"].as_str().unwrap().starts_with("wait: "));
+    }
+}
