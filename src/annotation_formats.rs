@@ -1,8 +1,10 @@
 //! Found persons in the file formats of annotation tools, ready to be corrected there: COCO,
-//! CVAT, YOLO, Pascal VOC. Text in memory; whoever asks for it writes or sends it.
+//! CVAT, YOLO, Pascal VOC; and as GeoJSON. Text in memory; whoever asks for it writes or sends it.
 
 mod coco;
 mod cvat;
+mod geojson;
+mod report;
 mod voc;
 mod xml;
 mod yolo;
@@ -11,7 +13,7 @@ use std::{fmt, str::FromStr};
 
 use crate::{
     detection::{BBox, FramePixels},
-    geometry::OrientedBox,
+    geometry::{OrientedBox, floor::FloorPosition},
 };
 
 /// What every box is a box of.
@@ -28,6 +30,8 @@ pub enum AnnotationFormat {
     Yolo,
     /// Pascal VOC: an XML file per image.
     Voc,
+    /// GeoJSON: a JSON file per image, the turned boxes as polygons in pixels.
+    GeoJson,
 }
 
 /// One picture and who is in it.
@@ -54,6 +58,8 @@ pub struct AnnotatedBox {
     pub oriented_box: OrientedBox,
     /// Confidence, 0 to 1.
     pub score: f64,
+    /// Where the person stands, when the camera's height is known.
+    pub floor: Option<FloorPosition>,
 }
 
 /// Which box of a person is written where a format has both kinds.
@@ -77,7 +83,7 @@ pub struct AnnotationFile {
 
 impl AnnotationFormat {
     /// Every format, in the order in which they are listed to users.
-    pub const ALL: [Self; 4] = [Self::Coco, Self::Cvat, Self::Yolo, Self::Voc];
+    pub const ALL: [Self; 5] = [Self::Coco, Self::Cvat, Self::Yolo, Self::Voc, Self::GeoJson];
 
     /// The name, as on the command line.
     #[must_use]
@@ -87,10 +93,11 @@ impl AnnotationFormat {
             Self::Cvat => "cvat",
             Self::Yolo => "yolo",
             Self::Voc => "voc",
+            Self::GeoJson => "geojson",
         }
     }
 
-    /// Whether the format has turned boxes.
+    /// Whether the format has turned boxes beside others, so that there is something to choose.
     #[must_use]
     pub fn has_oriented_boxes(self) -> bool {
         self == Self::Cvat
@@ -105,7 +112,20 @@ impl AnnotationFormat {
             Self::Coco => vec![file("annotations.json", coco::document(images))],
             Self::Cvat => vec![file("annotations.xml", cvat::document(images, boxes))],
             Self::Yolo => yolo::files(images),
-            Self::Voc => images.iter().map(voc::file).collect(),
+            Self::Voc => per_image(images, voc::path, voc::document),
+            Self::GeoJson => per_image(images, geojson::path, geojson::document),
+        }
+    }
+
+    /// What describes one image: its own file, or that of a folder in which it is alone.
+    #[must_use]
+    pub fn document(self, image: &AnnotatedImage, boxes: BoxKind) -> String {
+        match self {
+            Self::Coco => coco::document(std::slice::from_ref(image)),
+            Self::Cvat => cvat::document(std::slice::from_ref(image), boxes),
+            Self::Yolo => yolo::document(image),
+            Self::Voc => voc::document(image),
+            Self::GeoJson => geojson::document(image),
         }
     }
 
@@ -116,6 +136,7 @@ impl AnnotationFormat {
             Self::Coco | Self::Cvat => None,
             Self::Yolo => Some(yolo::path(image_file_name)),
             Self::Voc => Some(voc::path(image_file_name)),
+            Self::GeoJson => Some(geojson::path(image_file_name)),
         }
     }
 }
@@ -128,7 +149,7 @@ impl fmt::Display for AnnotationFormat {
 
 /// A name that is no format's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not a format; use one of coco, cvat, yolo, voc")]
+#[error("{0:?} is not a format; use one of coco, cvat, yolo, voc, geojson")]
 pub struct UnknownFormat(String);
 
 impl FromStr for AnnotationFormat {
@@ -152,6 +173,18 @@ impl AnnotatedImage {
             Some((inside.corners().map(pixels), person))
         })
     }
+}
+
+fn per_image(
+    images: &[AnnotatedImage],
+    path: fn(&str) -> String,
+    document: fn(&AnnotatedImage) -> String,
+) -> Vec<AnnotationFile> {
+    let files = images.iter().map(|image| AnnotationFile {
+        path: path(&image.file_name),
+        content: document(image),
+    });
+    files.collect()
 }
 
 fn file(path: &str, content: String) -> AnnotationFile {

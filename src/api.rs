@@ -1,6 +1,7 @@
 //! The only place that knows HTTP. One page of routes; every failure leaves as one envelope.
 
 mod access;
+mod answer;
 mod calibrations;
 mod cors;
 mod crowd;

@@ -15,5 +15,5 @@ pub use frame::{Frame, FrameError};
 pub use letterbox::Letterbox;
 pub use network_input::{ChannelOrder, NetworkInput, ViewBatch};
 pub use remap_table::RemapTable;
-pub use thumbnail::thumbnail;
+pub use thumbnail::{narrowed, thumbnail};
 pub use view_signature::ViewSignature;

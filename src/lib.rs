@@ -5,6 +5,7 @@
 //! map and the walk of one frame; dependencies between the modules point one way.
 
 pub mod access;
+pub mod annotated_picture;
 pub mod annotation_formats;
 pub mod api;
 pub mod app;

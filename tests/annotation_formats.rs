@@ -20,6 +20,7 @@ fn image(file_name: &str, left: f64) -> AnnotatedImage {
             bbox: BBox::new([left, 20.5, left + 40.25, 90.0]).unwrap(),
             oriented_box: OrientedBox::turned(Pixel::new(30.0, 55.0), 40.0, 70.0, 0.2),
             score: 0.9,
+            floor: None,
         }],
     }
 }

@@ -2,7 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "a failed encoding is a failed test")]
 
 use lookdown::imaging::Frame;
-use lookdown::imaging::annotate::{Mark, OrientedMark, annotate, encode_jpeg, encode_png};
+use lookdown::imaging::annotate::{
+    Drawing, Head, Mark, OrientedMark, annotate, encode_jpeg, encode_png,
+};
 use lookdown::imaging::decode::{DecodeLimits, decode};
 use proptest::prelude::*;
 
@@ -17,13 +19,14 @@ fn aligned(bbox: [f64; 4]) -> Mark {
     Mark {
         bbox,
         oriented: None,
+        head: None,
         label: String::new(),
     }
 }
 
 fn annotated(width: u32, height: u32, marks: &[Mark]) -> Frame {
     let mut frame = grey_frame(width, height);
-    annotate(&mut frame, marks);
+    annotate(&mut frame, &Drawing::of(marks.to_vec()));
     frame
 }
 
@@ -49,6 +52,72 @@ fn a_box_is_outlined_and_its_inside_stays_visible() {
     }
     assert!(!is_painted(&frame, 85, 105));
     assert!(!is_painted(&frame, 30, 100));
+}
+
+#[test]
+fn only_the_boxes_that_are_asked_for_are_outlined() {
+    let mark = Mark {
+        oriented: Some(OrientedMark {
+            cx: 100.0,
+            cy: 100.0,
+            width: 40.0,
+            height: 60.0,
+            angle_deg: 0.0,
+        }),
+        ..aligned([40.0, 40.0, 160.0, 160.0])
+    };
+    for (boxes, oriented) in [(true, true), (true, false), (false, true), (false, false)] {
+        let mut frame = grey_frame(200, 200);
+        let drawing = Drawing {
+            boxes,
+            oriented,
+            ..Drawing::of(vec![mark.clone()])
+        };
+        annotate(&mut frame, &drawing);
+        assert_eq!(is_painted(&frame, 40, 100), boxes);
+        assert_eq!(is_painted(&frame, 80, 100), oriented);
+    }
+}
+
+#[test]
+fn an_outline_stands_out_from_bright_and_from_dark_floors() {
+    for side in [300, 960, 4000] {
+        for floor in [0, 128, 255] {
+            let mut frame =
+                Frame::new(side, side, vec![floor; 3 * (side * side) as usize]).unwrap();
+            let size = f64::from(side);
+            let bbox = [0.25, 0.25, 0.75, 0.75].map(|part| part * size);
+            annotate(&mut frame, &Drawing::of(vec![aligned(bbox)]));
+            let light = |x: u32| {
+                let channels = frame.pixel(x, side / 2).map(u32::from);
+                channels.into_iter().sum::<u32>() / 3
+            };
+            let reach = side / 100 + 4;
+            let across: Vec<_> = (side / 4 - reach..side / 4 + reach).map(light).collect();
+            let (darkest, lightest) = (across.iter().min().unwrap(), across.iter().max().unwrap());
+            assert!(
+                lightest - darkest > 80,
+                "{side} pixels on {floor}: {across:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn lines_are_drawn_below_the_marks() {
+    let mut frame = grey_frame(200, 200);
+    let drawing = Drawing {
+        lines: vec![
+            vec![[10.5, 30.5], [190.5, 30.5], [190.5, 180.5]],
+            vec![[0.0, 100.0], [f64::NAN, 100.0]],
+        ],
+        ..Drawing::of(vec![aligned([100.5, 10.5, 150.5, 150.5])])
+    };
+    annotate(&mut frame, &drawing);
+    assert!(is_painted(&frame, 50, 30) && is_painted(&frame, 190, 100));
+    assert!(!is_painted(&frame, 50, 100));
+    let alone = annotated(200, 200, &drawing.marks);
+    assert_eq!(frame.pixel(100, 30), alone.pixel(100, 30));
 }
 
 #[test]
@@ -87,32 +156,100 @@ fn lines_and_text_grow_with_the_frame() {
     assert!((medium / large - 1.0).abs() < 0.1, "{medium} and {large}");
 }
 
+/// What a label paints, apart from its box: left, top, right and bottom of it, in whole pixels.
+fn painted_by_label(width: u32, height: u32, mark: &Mark) -> [u32; 4] {
+    let with = annotated(width, height, std::slice::from_ref(mark));
+    let bare = Mark {
+        label: String::new(),
+        ..mark.clone()
+    };
+    let without = annotated(width, height, &[bare]);
+    let mut painted = [u32::MAX, u32::MAX, 0, 0];
+    for y in 0..height {
+        for x in (0..width).filter(|&x| with.pixel(x, y) != without.pixel(x, y)) {
+            let [left, top, right, bottom] = painted;
+            painted = [left.min(x), top.min(y), right.max(x + 1), bottom.max(y + 1)];
+        }
+    }
+    painted
+}
+
 #[test]
 fn a_label_stays_whole_wherever_its_box_is() {
-    let plate = |bbox: [f64; 4]| {
-        let label = "person 0.87".to_owned();
-        let with = annotated(
-            400,
-            300,
-            &[Mark {
-                label,
+    for (width, height) in [(64, 64), (300, 200), (1600, 1200), (4000, 4000)] {
+        let (columns, rows) = (f64::from(width), f64::from(height));
+        let size = |bbox: [f64; 4]| {
+            let mark = Mark {
+                label: "0.87".to_owned(),
                 ..aligned(bbox)
-            }],
-        );
-        painted_count(&with).abs_diff(painted_count(&annotated(400, 300, &[aligned(bbox)])))
+            };
+            let [left, top, right, bottom] = painted_by_label(width, height, &mark);
+            [right - left, bottom - top]
+        };
+        let (x, y) = (columns / 2.0, rows / 2.0);
+        let whole = size([x, y, x + 2.0, y + 2.0]);
+        assert!(whole[0] > 20 && whole[1] > 10, "{whole:?}");
+        let mut borders = vec![[0.0, 0.0, columns, rows]];
+        for x in [0.0, x, columns - 3.0] {
+            for y in [0.0, y, rows - 3.0] {
+                borders.push([x, y, x + 3.0, y + 3.0]);
+                borders.push([x - 9.0, y - 9.0, x + 9.0, y + 9.0]);
+            }
+        }
+        for bbox in borders {
+            let here = size(bbox);
+            let is_whole = here.into_iter().zip(whole).all(|(a, b)| a.abs_diff(b) <= 2);
+            assert!(
+                is_whole,
+                "{width}×{height}, {bbox:?}: {here:?} of {whole:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_label_keeps_clear_of_heads() {
+    // Someone stands right above: the places above the box are on that one's head.
+    let head = Head {
+        cx: 200.0,
+        cy: 95.0,
+        radius: 40.0,
     };
-    let in_the_middle = plate([150.0, 120.0, 160.0, 130.0]);
-    for bbox in [
-        [2.0, 2.0, 12.0, 12.0],
-        [388.0, 2.0, 398.0, 12.0],
-        [388.0, 288.0, 398.0, 298.0],
-        [2.0, 288.0, 12.0, 298.0],
-    ] {
-        let here = plate(bbox);
-        assert!(
-            here.abs_diff(in_the_middle) < in_the_middle / 4,
-            "{bbox:?}: {here} of {in_the_middle}"
-        );
+    let neighbour = Mark {
+        head: Some(head),
+        ..aligned([160.0, 40.0, 240.0, 148.0])
+    };
+    let own = Mark {
+        label: "0.87".into(),
+        ..aligned([180.0, 150.0, 220.0, 200.0])
+    };
+    let bare = Mark {
+        label: String::new(),
+        ..own.clone()
+    };
+    let with = annotated(400, 400, &[neighbour.clone(), own]);
+    let without = annotated(400, 400, &[neighbour, bare]);
+    let changed = (0..150).flat_map(|y| (0..400).map(move |x| (x, y)));
+    let changed = changed.filter(|&(x, y)| with.pixel(x, y) != without.pixel(x, y));
+    assert_eq!(changed.count(), 0);
+    assert_ne!(with, without);
+}
+
+#[test]
+fn a_caption_is_written_whole_into_the_corner_and_labels_keep_clear_of_it() {
+    let caption = "2026-11-21 09:30:00 UTC";
+    for (width, height) in [(64, 64), (300, 300), (2000, 1000)] {
+        let mut frame = grey_frame(width, height);
+        let drawing = Drawing {
+            caption: caption.to_owned(),
+            ..Drawing::of(Vec::new())
+        };
+        annotate(&mut frame, &drawing);
+        let painted = |x: u32| (0..height).any(|y| is_painted(&frame, x, y));
+        let right = (0..width).rev().find(|&x| painted(x)).unwrap();
+        assert!(painted(4), "{width}×{height}");
+        assert!(right > width / 8 && right < width - 1, "{right} of {width}");
+        assert!(!is_painted(&frame, width / 2, height / 2));
     }
 }
 
@@ -189,7 +326,13 @@ proptest! {
         let oriented = oriented.map(|[cx, cy, width, height, angle_deg]| OrientedMark {
             cx, cy, width, height, angle_deg,
         });
-        let frame = annotated(width, height, &[Mark { bbox, oriented, label }]);
+        let caption = label.clone();
+        let head = oriented.map(|mark| Head { cx: mark.cx, cy: mark.cy, radius: mark.width });
+        let mark = Mark { bbox, oriented, head, label };
+        let lines = vec![vec![[bbox[0], bbox[1]], [bbox[2], bbox[3]]]];
+        let drawing = Drawing { lines, caption, ..Drawing::of(vec![mark]) };
+        let mut frame = grey_frame(width, height);
+        annotate(&mut frame, &drawing);
         prop_assert_eq!((frame.width(), frame.height()), (width, height));
     }
 }

@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 21] = [
+const MAY_USE: [(&str, &[&str]); 22] = [
     ("access", &[]),
     ("revision", &[]),
     ("geometry", &[]),
@@ -55,11 +55,13 @@ const MAY_USE: [(&str, &[&str]); 21] = [
             "pipeline",
         ],
     ),
-    ("annotation_formats", &["geometry", "detection"]),
+    ("annotation_formats", &["geometry", "detection", "pipeline"]),
+    ("annotated_picture", &["geometry", "imaging", "pipeline"]),
     (
         "api",
         &[
             "access",
+            "annotated_picture",
             "annotation_formats",
             "geometry",
             "detection",
@@ -97,6 +99,7 @@ const MAY_USE: [(&str, &[&str]); 21] = [
         "cli",
         &[
             "access",
+            "annotated_picture",
             "annotation_formats",
             "geometry",
             "detection",
@@ -127,6 +130,7 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 22] = [
     (
         "serde_json",
         &[
+            "annotated_picture",
             "annotation_formats",
             "api",
             "calibration",

@@ -6,7 +6,12 @@ use std::{
     fs,
 };
 
-use lookdown::{api::openapi_document, pipeline::DetectParameters};
+use lookdown::{
+    annotated_picture::{Layer, PictureOptions},
+    annotation_formats::AnnotationFormat,
+    api::openapi_document,
+    pipeline::DetectParameters,
+};
 use serde_json::Value;
 
 fn document() -> Value {
@@ -79,7 +84,8 @@ fn detection_describes_every_status_and_every_parameter() {
     let detect = &document["paths"]["/detect"]["post"];
     let statuses: Vec<_> = detect["responses"].as_object().unwrap().keys().collect();
     let expected = [
-        "200", "400", "401", "403", "404", "408", "413", "415", "422", "429", "500", "503", "504",
+        "200", "400", "401", "403", "404", "406", "408", "413", "415", "422", "429", "500", "503",
+        "504",
     ];
     assert_eq!(statuses, expected);
 
@@ -88,10 +94,15 @@ fn detection_describes_every_status_and_every_parameter() {
         .iter()
         .map(|parameter| parameter["name"].as_str().unwrap())
         .collect();
-    assert_eq!(query, DetectParameters::NAMES);
+    let names: Vec<_> = DetectParameters::NAMES
+        .into_iter()
+        .chain(["format"])
+        .chain(PictureOptions::NAMES)
+        .collect();
+    assert_eq!(query, names);
 
     let form = serde_json::to_string(&document["components"]["schemas"]).unwrap();
-    for name in DetectParameters::NAMES {
+    for name in names {
         assert!(
             form.contains(&format!("\"{name}\"")),
             "the form lacks {name}"
@@ -106,6 +117,36 @@ fn detection_describes_every_status_and_every_parameter() {
     ] {
         assert!(bodies.contains_key(media_type), "{media_type} is missing");
     }
+    let answers = detect["responses"]["200"]["content"].as_object().unwrap();
+    for media_type in ["application/json", "image/jpeg", "image/png"] {
+        assert!(
+            answers.contains_key(media_type),
+            "{media_type} is not answered"
+        );
+    }
+    let report = &answers["application/json"]["schema"]["$ref"];
+    assert_eq!(report, "#/components/schemas/Report");
+}
+
+#[test]
+fn the_forms_and_layers_that_are_described_are_those_that_are_read() {
+    let document = document();
+    let parameters = document["paths"]["/detect"]["post"]["parameters"].clone();
+    let of = |name: &str| {
+        let parameters = parameters.as_array().unwrap().iter();
+        let mut named = parameters.filter(|parameter| parameter["name"] == name);
+        named.next().unwrap()["schema"].clone()
+    };
+    let forms = of("format").to_string();
+    for format in AnnotationFormat::ALL {
+        assert!(
+            forms.contains(&format!("\"{format}\"")),
+            "{format}: {forms}"
+        );
+    }
+    let layers = Layer::ALL.map(Layer::name).join("|");
+    let pattern = format!("^(none|({layers})(,({layers}))*)$");
+    assert_eq!(of("draw")["pattern"], pattern);
 }
 
 #[test]
@@ -124,7 +165,7 @@ fn every_operation_says_how_it_can_fail() {
     let expected = [
         (
             "detect_persons",
-            "400 401 403 404 408 413 415 422 429 500 503 504",
+            "400 401 403 404 406 408 413 415 422 429 500 503 504",
         ),
         ("list_results", "401 403 429"),
         ("get_latest_result", "400 401 403 404 422 429 503"),

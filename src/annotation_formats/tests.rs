@@ -11,6 +11,7 @@ fn person(corners: [f64; 4], angle_deg: f64) -> AnnotatedBox {
             angle_deg.to_radians(),
         ),
         score: 0.876_54,
+        floor: None,
     }
 }
 
@@ -97,6 +98,51 @@ fn voc_has_corners_in_a_file_per_picture() {
                    <ymax>10.00</ymax>";
     assert!(text.contains(corners), "{text}");
     assert_eq!(text.matches("<object>").count(), 2);
+}
+
+#[test]
+fn geojson_has_the_turned_box_as_a_ring_and_the_floor_as_a_property() {
+    let mut image = image("hall/a.jpg");
+    image.persons[1].floor = Some(FloorPosition {
+        x_m: 1.873_49,
+        y_m: -0.5,
+    });
+    let text = AnnotationFormat::GeoJson.document(&image, BoxKind::AxisParallel);
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(document["type"], "FeatureCollection");
+    assert_eq!(document["features"].as_array().unwrap().len(), 2);
+    let expected = serde_json::json!({
+        "type": "Feature", "id": 2,
+        "geometry": {"type": "Polygon", "coordinates": [
+            [[50.0, 30.0], [70.0, 30.0], [70.0, 70.0], [50.0, 70.0], [50.0, 30.0]]]},
+        "properties": {
+            "label": "person", "score": 0.8765, "box": [190.0, 0.0, 200.0, 10.0],
+            "angle_deg": 0.0, "foot": [60.0, 70.0], "floor": {"x_m": 1.873, "y_m": -0.5}},
+    });
+    assert_eq!(document["features"][1], expected);
+    // The shoelace formula: positive where the ring is counterclockwise with y upward.
+    for feature in document["features"].as_array().unwrap() {
+        let ring: Vec<[f64; 2]> =
+            serde_json::from_value(feature["geometry"]["coordinates"][0].clone()).unwrap();
+        let area: f64 = ring
+            .windows(2)
+            .map(|pair| pair[0][0] * pair[1][1] - pair[1][0] * pair[0][1])
+            .sum();
+        assert!((area / 2.0 - 800.0).abs() < 2.0, "{area}");
+    }
+}
+
+#[test]
+fn the_document_of_an_image_is_its_file_in_a_folder_of_one() {
+    for format in AnnotationFormat::ALL {
+        let image = image("a.jpg");
+        let document = format.document(&image, BoxKind::Oriented);
+        let files = format.files(&[image], BoxKind::Oriented);
+        assert!(
+            files.iter().any(|file| file.content == document),
+            "{format}"
+        );
+    }
 }
 
 #[test]

@@ -1,14 +1,14 @@
 //! Pascal VOC: an XML file per image, in `Annotations/`. Boxes are corner-origin pixels with two
 //! decimals, as today's annotation tools write and read them.
 
-use super::{AnnotatedImage, AnnotationFile, LABEL, stem, xml::Xml};
+use super::{AnnotatedImage, LABEL, stem, xml::Xml};
 
 /// The path of an image's file.
 pub(super) fn path(image_file_name: &str) -> String {
     format!("Annotations/{}.xml", stem(image_file_name))
 }
 
-pub(super) fn file(image: &AnnotatedImage) -> AnnotationFile {
+pub(super) fn document(image: &AnnotatedImage) -> String {
     let (folder, name) = match image.file_name.rsplit_once('/') {
         Some((folder, name)) => (folder, name),
         None => ("", image.file_name.as_str()),
@@ -37,8 +37,5 @@ pub(super) fn file(image: &AnnotatedImage) -> AnnotationFile {
         xml.close("object");
     }
     xml.close("annotation");
-    AnnotationFile {
-        path: path(&image.file_name),
-        content: xml.finish(),
-    }
+    xml.finish()
 }

@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use super::{AnnotatedImage, AnnotationFile, LABEL, file, stem};
+use super::{AnnotatedImage, AnnotationFile, LABEL, file, per_image, stem};
 
 /// The path of an image's file.
 pub(super) fn path(image_file_name: &str) -> String {
@@ -17,14 +17,11 @@ pub(super) fn files(images: &[AnnotatedImage]) -> Vec<AnnotationFile> {
         file("data.yaml", data),
         file("classes.txt", format!("{LABEL}\n")),
     ];
-    files.extend(images.iter().map(|image| AnnotationFile {
-        path: path(&image.file_name),
-        content: labels(image),
-    }));
+    files.extend(per_image(images, path, document));
     files
 }
 
-fn labels(image: &AnnotatedImage) -> String {
+pub(super) fn document(image: &AnnotatedImage) -> String {
     let (width, height) = (f64::from(image.width), f64::from(image.height));
     let mut lines = String::new();
     for ([left, top, right, bottom], _) in image.boxes() {

@@ -11,7 +11,7 @@ use tower_http::cors::CorsLayer;
 
 use super::{
     access::API_KEY,
-    detect::{INFERENCE_TIME, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
+    detect::{INFERENCE_TIME, PERSON_COUNT, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
     rate_limit::{RATE_LIMIT, RATE_LIMIT_POLICY},
     request_id,
     results::events::LAST_EVENT_ID,
@@ -36,7 +36,7 @@ pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
         LAST_EVENT_ID,
         request_id::HEADER,
     ];
-    let read: [HeaderName; 11] = [
+    let read: [HeaderName; 12] = [
         ETAG,
         LOCATION,
         RATE_LIMIT,
@@ -45,6 +45,7 @@ pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
         SERVER_TIMING,
         WWW_AUTHENTICATE,
         INFERENCE_TIME,
+        PERSON_COUNT,
         QUEUE_TIME,
         TOTAL_TIME,
         request_id::HEADER,

@@ -13,6 +13,7 @@ use tokio::time::timeout_at;
 
 use super::{
     ApiState,
+    answer::{AnswerOptions, Content},
     deadline::Deadline,
     openapi::{DetectForm, DetectProblems, DetectQuery},
     problem::{Problem, ProblemKind},
@@ -33,6 +34,7 @@ pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-tim
 pub(super) const QUEUE_TIME: HeaderName = HeaderName::from_static("x-queue-time");
 pub(super) const INFERENCE_TIME: HeaderName = HeaderName::from_static("x-inference-time");
 pub(super) const TOTAL_TIME: HeaderName = HeaderName::from_static("x-total-time");
+pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-count");
 
 /// Find the persons in a frame.
 ///
@@ -40,6 +42,9 @@ pub(super) const TOTAL_TIME: HeaderName = HeaderName::from_static("x-total-time"
 /// parameters in the query. JPEG, PNG and WebP are read, whatever the content type says. Without
 /// `calibration` the lens circle is found in the frame and an ideal 180° equidistant lens that
 /// looks straight down is assumed.
+///
+/// The answer is the report as JSON unless `format` or `Accept` asks for another: the frame with boxes
+/// drawn into it, or a file for annotation tools.
 #[utoipa::path(
     post, path = "/detect", tag = "detection", operation_id = "detect_persons",
     params(DetectQuery),
@@ -52,8 +57,15 @@ pub(super) const TOTAL_TIME: HeaderName = HeaderName::from_static("x-total-time"
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
-        (status = OK, description = "The persons found, possibly none.", body = Report,
+        (status = OK, description = "The persons found, possibly none.",
+         content(
+            (Report = "application/json"),
+            ("image/jpeg"), ("image/png"),
+            (Object = "application/geo+json"), (Object = "application/x.coco+json"),
+            (String = "application/xml"), (String = "text/plain"),
+         ),
          headers(
+            ("X-Person-Count" = u64, description = "How many persons were found."),
             ("X-Request-Id" = String, description = "The request's own, or a new one."),
             ("Server-Timing" = String, description = "The stages, milliseconds."),
             ("X-Queue-Time" = f64, description = "How long views waited for the network, milliseconds."),
@@ -71,37 +83,55 @@ pub(super) async fn detect_persons(
 ) -> Result<impl IntoResponse, Problem> {
     let server_limit = upload.deadline;
     trace.stage("upload", server_limit.began().into_std(), upload.arrived);
-    let job = job(upload, &request_id)?;
+    let (job, answer) = job(upload, &request_id)?;
     let own_limit = job.parameters.timeout;
     let limit = own_limit.map_or(server_limit, |own| server_limit.within(own));
     let timeline = job.ticket.timeline.clone();
-    let outcome = timeout_at(limit.at(), state.workers.detect(job)).await;
+    let work = state.workers.detect_and(job, |detected| {
+        // The frame is kept for as long as the answer needs it, which a report does not.
+        let report = detected.report.clone();
+        (report, written(detected, answer))
+    });
+    let outcome = timeout_at(limit.at(), work).await;
     for span in timeline.spans(Instant::now()) {
         trace.stage(span.stage.name(), span.began, span.ended);
     }
-    let Detected { report, .. } =
+    let (report, written) =
         outcome.map_err(|_| timed_out(limit, limit.at() < server_limit.at()))??;
     describe(&trace, &report);
     record(&state.metrics, &report);
-    let sent = Report::from(&report);
-    let timings = timing_headers(&sent.timings_ms);
-    let json = Bytes::from(serde_json::to_vec(&sent).map_err(Problem::internal)?);
+    let (json, content) = written?;
+    let timings = timing_headers(&ReportTimings::from(&report.timings));
+    let persons = report.persons.len();
     let kept = NewReport {
         camera: report.camera,
         received_at: report.received_at,
-        persons: report.persons.len(),
-        json: json.clone(),
+        persons,
+        json,
     };
     state.results.publish(kept).await;
-    let content_type = [(CONTENT_TYPE, "application/json")];
-    Ok((AppendHeaders(timings), content_type, json))
+    let facts = [
+        (PERSON_COUNT, HeaderValue::from(persons)),
+        (CONTENT_TYPE, HeaderValue::from_static(content.media_type)),
+    ];
+    Ok((AppendHeaders(timings), facts, content.bytes))
 }
 
-fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {
-    let pairs = upload.parameters.iter();
+/// The report as it is kept, and what its sender is answered.
+fn written(detected: Detected, answer: AnswerOptions) -> Result<(Bytes, Content), Problem> {
+    let json = serde_json::to_vec(&Report::from(&detected.report)).map_err(Problem::internal)?;
+    let json = Bytes::from(json);
+    let content = answer.content(detected, &json)?;
+    Ok((json, content))
+}
+
+fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {
+    let parameters = &mut upload.parameters;
+    let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name)?;
+    let pairs = parameters.iter();
     let pairs = pairs.map(|(name, value)| (name.as_str(), value.as_str()));
     let parameters = DetectParameters::parse(pairs, DEFAULT_SCORE_THRESHOLD)?;
-    Ok(DetectJob {
+    let job = DetectJob {
         ticket: Ticket::of(parameters.priority),
         parameters,
         request_id: request_id.as_str().to_owned(),
@@ -109,7 +139,8 @@ fn job(upload: Upload, request_id: &RequestId) -> Result<DetectJob, Problem> {
         arrived: upload.arrived,
         image: upload.image,
         calibration: None,
-    })
+    };
+    Ok((job, answer))
 }
 
 fn timed_out(limit: Deadline, is_its_own: bool) -> Problem {

@@ -3,7 +3,8 @@
 //! A handler returns a [`Problem`]; the [envelope](super::envelope) writes it down with the path
 //! and the request ID, logs its cause and counts it. Statuses: 400 malformed, 401 no known key, 403 not
 //! allowed, 404
-//! unknown calibration, camera or model, 408 slow upload, 409 not while the models or calibrations are as they are,
+//! unknown calibration, camera or model, 406 nothing that is accepted, 408 slow upload, 409 not while the models or
+//! calibrations are as they are,
 //! 412 outdated, 413 too
 //! many bytes or pixels, 415 not a picture that can be read, 422 understood but unusable, 429 no
 //! place in the queue or among the listeners, or another model is being loaded, 503 no place at all (not ready or shutting

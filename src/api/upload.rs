@@ -6,19 +6,22 @@
 
 mod body;
 mod form;
+mod names;
 mod pace;
 
 use std::time::Instant as Arrival;
 
 use axum::{
     extract::{FromRequest, Query, Request},
-    http::{Uri, header::CONTENT_TYPE, request::Parts},
+    http::{HeaderMap, Uri, header::CONTENT_TYPE, request::Parts},
 };
 use bytes::Bytes;
 use jiff::Timestamp;
 
 pub(super) use body::{BodyReader, UploadBudget, next_chunk};
 pub(super) use pace::Pace;
+
+use names::{is_parameter, unknown_parameter};
 
 use super::{
     ApiState, Phase,
@@ -31,7 +34,11 @@ use crate::access::Scope;
 pub(super) struct Upload {
     /// The encoded frame.
     pub(super) image: Bytes,
-    /// Parameters by name, not checked yet.
+    /// The name of its file, if it was sent.
+    pub(super) file_name: Option<String>,
+    /// What the client accepts, among other things.
+    pub(super) headers: HeaderMap,
+    /// Parameters by name, all of which there are; their values are not checked yet.
     pub(super) parameters: Vec<(String, String)>,
     /// When its report must be there.
     pub(super) deadline: Deadline,
@@ -60,15 +67,21 @@ impl FromRequest<ApiState> for Upload {
         let held = reader.read(&parts.headers, body).await?;
         let arrived = Arrival::now();
         let mut parameters = query_parameters(&parts.uri)?;
-        let image = if is_multipart(&parts) {
+        if let Some((name, _)) = parameters.iter().find(|(name, _)| !is_parameter(name)) {
+            return Err(unknown_parameter(name));
+        }
+        let headers = parts.headers.clone();
+        let (image, file_name) = if is_multipart(&parts) {
             let form = form::parse(parts, held.bytes()).await?;
             parameters.extend(form.parameters);
-            held.with_bytes(form.image)
+            (held.with_bytes(form.image), form.file_name)
         } else {
-            held
+            (held, None)
         };
         Ok(Self {
             image: image.into_bytes(),
+            file_name,
+            headers,
             parameters,
             deadline,
             received_at,

@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     annotate: Option<PathBuf>,
     /// Write annotations to be corrected in the usual tools, into the folder --out, instead of
     /// reports: `coco` (annotations.json), `cvat` (annotations.xml, CVAT for images 1.1), `yolo`
-    /// (labels/, data.yaml, classes.txt) or `voc` (Annotations/)
+    /// (labels/, data.yaml, classes.txt), `voc` (Annotations/) or `geojson` (features/)
     #[arg(long, value_name = "FORMAT", requires = "out")]
     format: Option<AnnotationFormat>,
     /// The folder for --format

@@ -20,15 +20,26 @@ pub fn thumbnail(frame: &Frame, longer_side: u32) -> Frame {
         let scaled = u64::from(side) * u64::from(longer_side) / u64::from(longest);
         u32::try_from(scaled).unwrap_or(longer_side).max(1)
     };
-    ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(width, height, frame.pixels())
-        .map(|picture| {
-            resize(
-                &picture,
-                scaled(width),
-                scaled(height),
-                FilterType::Triangle,
-            )
-        })
+    resized(frame, scaled(width), scaled(height))
+}
+
+/// The picture made as narrow as this, every pixel taking part; a picture that is no wider stays
+/// as it is.
+#[must_use]
+pub fn narrowed(frame: &Frame, width: u32) -> Frame {
+    if frame.width() <= width {
+        return frame.clone();
+    }
+    let (rows, columns) = (u64::from(frame.height()), u64::from(frame.width()));
+    // Rounded to the nearest, and no larger than it was.
+    let height = (rows * u64::from(width) + columns / 2) / columns;
+    let height = u32::try_from(height).unwrap_or(frame.height()).max(1);
+    resized(frame, width.max(1), height)
+}
+
+fn resized(frame: &Frame, width: u32, height: u32) -> Frame {
+    ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(frame.width(), frame.height(), frame.pixels())
+        .map(|picture| resize(&picture, width, height, FilterType::Triangle))
         .and_then(|small| Frame::new(small.width(), small.height(), small.into_raw()).ok())
         // Neither can fail: a frame has as many bytes as its pixels take.
         .unwrap_or_else(|| frame.clone())
@@ -54,6 +65,16 @@ mod tests {
         let small = thumbnail(&wide, 40);
         assert_eq!((small.width(), small.height()), (40, 10));
         assert_eq!(small.pixel(39, 9), [7; 3]);
+    }
+
+    #[test]
+    fn a_narrowed_picture_has_the_width_and_the_nearest_height() {
+        let frame = Frame::new(10, 5, vec![7; 150]).unwrap();
+        let small = narrowed(&frame, 3);
+        assert_eq!((small.width(), small.height()), (3, 2));
+        assert_eq!(narrowed(&frame, 10), frame);
+        let line = Frame::new(1000, 1, vec![9; 3000]).unwrap();
+        assert_eq!(narrowed(&line, 10).height(), 1);
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! Camera rigs: a camera's geometry with the views of a plan and their remap tables, immutable
 //! and shared by every frame of that camera.
 
+use super::planned_views::view_outline;
 use crate::{
     calibration::CameraGeometry,
     detection::{BBox, FramePixels, ViewPixels},
-    geometry::{BackProjection, Footprint, Ray, ViewPlan, VirtualView},
+    geometry::{BackProjection, Footprint, Pixel, Ray, ViewPlan, VirtualView},
     imaging::{Frame, Letterbox, NetworkInput, RemapTable},
 };
 
@@ -99,6 +100,16 @@ impl CameraRig {
     /// How many of the planned views see nothing of the lens image.
     pub(super) fn views_outside(&self) -> usize {
         self.views_outside
+    }
+
+    /// The borders of the views, corner-origin frame pixels.
+    pub(super) fn view_outlines(&self) -> Vec<Vec<Pixel>> {
+        let Views::Virtual(views) = &self.views else {
+            return Vec::new();
+        };
+        let outlines = views.iter();
+        let outlines = outlines.map(|(view, _)| view_outline(view, &self.geometry.lens));
+        outlines.collect()
     }
 
     /// Memory held by the tables, bytes; what several of them share counts once.

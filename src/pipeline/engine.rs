@@ -135,9 +135,13 @@ impl Engine {
             },
             warnings: observation.warnings,
         };
+        let mut rigs: Vec<_> = observation.looks.into_iter().map(|look| look.rig).collect();
+        // Two models may have looked through the same views.
+        rigs.dedup_by(|one, other| Arc::ptr_eq(one, other));
         Ok(Detected {
             report,
             frame: observation.frame,
+            rigs,
         })
     }
 

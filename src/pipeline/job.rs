@@ -5,8 +5,8 @@ use std::{sync::Arc, time::Instant};
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{DetectParameters, DetectionReport, Ticket};
-use crate::{calibration::Calibration, imaging::Frame};
+use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
+use crate::{calibration::Calibration, geometry::Pixel, imaging::Frame};
 
 /// One frame to be looked at.
 #[derive(Debug, Clone)]
@@ -34,4 +34,15 @@ pub struct Detected {
     pub report: DetectionReport,
     /// The decoded frame, EXIF orientation applied.
     pub frame: Arc<Frame>,
+    pub(super) rigs: Vec<Arc<CameraRig>>,
+}
+
+impl Detected {
+    /// Where the views looked that the frame was seen through: their borders, corner-origin frame
+    /// pixels, closer looks after the plan's views; none when the detector saw the frame as it is.
+    #[must_use]
+    pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
+        let rigs = self.rigs.iter();
+        rigs.flat_map(|rig| rig.view_outlines()).collect()
+    }
 }

@@ -90,7 +90,7 @@ impl Engine {
                 .into_iter()
                 .flatten()
                 .map(|view| PlannedView {
-                    outline: outline(&view, lens),
+                    outline: view_outline(&view, lens),
                     view,
                 })
                 .collect(),
@@ -110,7 +110,9 @@ fn sees(view: &VirtualView, lens: &Lens) -> bool {
     })
 }
 
-fn outline(view: &VirtualView, lens: &Lens) -> Vec<Pixel> {
+/// The border of a view, clockwise from its top left corner, corner-origin frame pixels; what lies
+/// beyond the lens image is pulled to its rim.
+pub(super) fn view_outline(view: &VirtualView, lens: &Lens) -> Vec<Pixel> {
     let rays = view.border_rays(POINTS_PER_SIDE);
     rays.filter_map(|ray| lens.project_to_rim(&ray))
         .map(|pixel| cross_half_pixel(pixel, PixelConvention::CornerOrigin))

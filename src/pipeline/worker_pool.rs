@@ -18,12 +18,15 @@ use super::{
     service_rate::ServiceRate,
 };
 
-type Answer = Result<Detected, PipelineError>;
+/// Hands what came of a frame to whoever waits for it.
+type Delivery = Box<dyn FnOnce() + Send>;
+/// Finishes what came of a frame, which takes its time, and tells how to deliver it, which takes none.
+type Finish = Box<dyn FnOnce(Result<Detected, PipelineError>) -> Delivery + Send>;
 
 /// A frame in the queue with the way back to whoever waits for it.
 struct Entry {
     job: DetectJob,
-    answer: oneshot::Sender<Answer>,
+    finish: Finish,
     /// Whose log lines are those of the work.
     request: tracing::Span,
     /// Travels with the work: a place is free again when the work has ended, not when its client
@@ -90,6 +93,19 @@ impl WorkerPool {
     /// [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise what the engine
     /// says.
     pub async fn detect(&self, job: DetectJob) -> Result<Detected, PipelineError> {
+        self.detect_and(job, |detected| detected).await
+    }
+
+    /// The same, and `finish` is done with what was detected on the thread that worked on the frame,
+    /// before its place is free: what takes time, such as drawing, is bounded like the rest.
+    ///
+    /// # Errors
+    /// As [`WorkerPool::detect`].
+    pub async fn detect_and<T: Send + 'static>(
+        &self,
+        job: DetectJob,
+        finish: impl FnOnce(Detected) -> T + Send + 'static,
+    ) -> Result<T, PipelineError> {
         let places = Arc::clone(&self.shared.places);
         let Ok(place) = places.try_acquire_owned() else {
             return Err(self.overloaded());
@@ -101,7 +117,11 @@ impl WorkerPool {
         job.ticket.timeline.enter(Stage::Queue, job.arrived);
         let entry = Entry {
             job,
-            answer,
+            finish: Box::new(|outcome| {
+                let finished = outcome.map(finish);
+                // The client may have left meanwhile.
+                Box::new(|| drop(answer.send(finished)))
+            }),
             request: tracing::Span::current(),
             place,
         };
@@ -109,7 +129,7 @@ impl WorkerPool {
         queued.map_err(|_| PipelineError::ShuttingDown)?;
         waiting
             .await
-            .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker died on a frame"))))
+            .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker panicked on a frame"))))
     }
 
     /// Why a frame would be refused now, if it would: known before its bytes are read.
@@ -159,7 +179,7 @@ impl Shared {
         while let Some(entry) = self.queue.pop() {
             let Entry {
                 job,
-                answer,
+                finish,
                 request,
                 place,
             } = entry;
@@ -170,16 +190,20 @@ impl Shared {
                 self.rate().given_up(self.pending());
                 continue;
             }
-            let outcome = catch_unwind(AssertUnwindSafe(|| self.engine.detect(&job)))
-                .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker panicked on a frame"))));
-            if matches!(outcome, Err(PipelineError::Withdrawn)) {
-                self.withdrawn.fetch_add(1, Ordering::Relaxed);
-            }
+            let delivery = catch_unwind(AssertUnwindSafe(|| {
+                let outcome = self.engine.detect(&job);
+                if matches!(outcome, Err(PipelineError::Withdrawn)) {
+                    self.withdrawn.fetch_add(1, Ordering::Relaxed);
+                }
+                finish(outcome)
+            }));
             // Whoever sends the next frame on this answer must find the place free.
             drop((job, place));
             self.rate().ended(Instant::now(), self.pending());
-            // The client may have left meanwhile.
-            let _ = answer.send(outcome);
+            // After a panic nothing is delivered, which tells whoever waits.
+            if let Ok(deliver) = delivery {
+                deliver();
+            }
         }
     }
 

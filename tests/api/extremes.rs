@@ -122,7 +122,7 @@ async fn values_and_names_of_a_form_are_bounded_to_the_byte() {
             .chain(parameters)
             .collect::<Vec<_>>()
     };
-    for (count, kind) in [(16, "repeated-parameter"), (17, "malformed-request")] {
+    for (count, kind) in [(24, "repeated-parameter"), (25, "malformed-request")] {
         let answer = service.post_form(&fields(count)).await;
         let urn = format!("urn:lookdown:problem:{kind}");
         assert_eq!(answer.problem()["type"], urn, "{count} fields");

@@ -14,6 +14,7 @@ mod log;
 mod logs;
 mod metrics_table;
 mod operation;
+mod picture;
 mod rate_limit;
 mod refusals;
 mod report;

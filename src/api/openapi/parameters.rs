@@ -1,5 +1,5 @@
-//! The request parameters as they are described. `pipeline::DetectParameters` reads and checks
-//! them; a test holds the two together.
+//! The request parameters as they are described. `pipeline::DetectParameters` and `api::answer` read
+//! and check them; a test holds them together.
 
 use utoipa::{
     IntoParams, PartialSchema, ToSchema,
@@ -71,6 +71,31 @@ pub(in crate::api) struct DetectQuery {
     #[param(minimum = 1, maximum = 600_000, example = 2000)]
     #[schema(minimum = 1, maximum = 600_000, example = 2000)]
     timeout_millis: Option<u32>,
+    /// What the answer is: the report (`json`), the frame with boxes drawn into it (`image`: JPEG, or
+    /// PNG if `Accept` prefers it), or the persons as a file of COCO, CVAT, YOLO, Pascal VOC or as
+    /// GeoJSON, in pixels. By default what `Accept` prefers of JSON, JPEG, PNG and GeoJSON.
+    #[param(inline)]
+    #[schema(inline)]
+    format: Option<FormatName>,
+    /// What is drawn into a picture: some of `boxes`, `oriented`, `scores`, `views` and `timestamp`,
+    /// with commas, or `none`.
+    #[param(
+        default = "oriented,scores",
+        pattern = "^(none|(boxes|oriented|scores|views|timestamp)(,(boxes|oriented|scores|views|timestamp))*)$"
+    )]
+    #[schema(
+        default = "oriented,scores",
+        pattern = "^(none|(boxes|oriented|scores|views|timestamp)(,(boxes|oriented|scores|views|timestamp))*)$"
+    )]
+    draw: Option<String>,
+    /// Width of a picture, pixels; a frame that is no wider stays as it is.
+    #[param(minimum = 64, maximum = 8192, example = 640)]
+    #[schema(minimum = 64, maximum = 8192, example = 640)]
+    width: Option<u32>,
+    /// Quality of a JPEG.
+    #[param(minimum = 1, maximum = 100, default = 88)]
+    #[schema(minimum = 1, maximum = 100, default = 88)]
+    quality: Option<u8>,
 }
 
 /// The frame and parameters in a form: what `upload::form` reads.
@@ -99,6 +124,20 @@ impl PartialSchema for DetectForm {
         form.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
         form.into()
     }
+}
+
+/// A form of the answer.
+#[derive(ToSchema)]
+#[schema(rename_all = "lowercase")]
+#[expect(dead_code, reason = "describes what api::answer reads")]
+enum FormatName {
+    Json,
+    Image,
+    Coco,
+    Cvat,
+    Yolo,
+    Voc,
+    GeoJson,
 }
 
 /// A profile.

@@ -41,6 +41,8 @@ pub(in crate::api) enum ProblemKind {
     ModelBusy,
     /// The path does not offer this method.
     MethodNotAllowed,
+    /// Nothing that the client accepts is offered.
+    NotAcceptable,
     /// The request has too many headers, or too long ones.
     HeadersTooLarge,
     /// The body took too long to arrive.
@@ -77,7 +79,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 34] = [
+    pub(in crate::api) const ALL: [Self; 35] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -96,6 +98,7 @@ impl ProblemKind {
         Self::ModelRefused,
         Self::ModelBusy,
         Self::MethodNotAllowed,
+        Self::NotAcceptable,
         Self::HeadersTooLarge,
         Self::SlowUpload,
         Self::BodyTooLarge,
@@ -144,6 +147,7 @@ impl ProblemKind {
             Self::ModelRefused => ("model-refused", "The model cannot be used"),
             Self::ModelBusy => ("model-busy", "Another model is being loaded"),
             Self::MethodNotAllowed => ("method-not-allowed", "The method is not offered"),
+            Self::NotAcceptable => ("not-acceptable", "Nothing that is accepted is offered"),
             Self::HeadersTooLarge => ("headers-too-large", "The headers are too large"),
             Self::SlowUpload => ("slow-upload", "The body took too long to arrive"),
             Self::BodyTooLarge => ("body-too-large", "The body is too large"),
@@ -200,6 +204,7 @@ impl ProblemKind {
                 StatusCode::TOO_MANY_REQUESTS
             }
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
+            Self::NotAcceptable => StatusCode::NOT_ACCEPTABLE,
             Self::HeadersTooLarge => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
             Self::SlowUpload => StatusCode::REQUEST_TIMEOUT,
             Self::BodyTooLarge | Self::ImageTooLarge => StatusCode::PAYLOAD_TOO_LARGE,

@@ -10,24 +10,25 @@ use axum::{
 };
 use bytes::Bytes;
 
-use crate::{
-    api::problem::{Problem, ProblemKind},
-    pipeline::DetectParameters,
-};
+use super::names::{is_parameter, unknown_parameter};
+use crate::api::problem::{Problem, ProblemKind};
 
 /// The names of the frame's field.
 const IMAGE_NAMES: [&str; 2] = ["img", "image"];
 /// Most fields of a form: every parameter and the frame, with room for repetitions that deserve
 /// a better answer than this limit.
-const MAX_FIELDS: usize = 16;
+const MAX_FIELDS: usize = 24;
 /// Most bytes of a parameter's value.
 const MAX_VALUE_BYTES: usize = 1024;
-/// Most characters of an unknown name that are repeated to its sender.
-const MAX_NAME_CHARS: usize = 64;
+
+/// Most characters of the name of the frame's file.
+const MAX_FILE_NAME_CHARS: usize = 255;
 
 /// What a form held.
 pub(super) struct Form {
     pub(super) image: Bytes,
+    /// The name of the frame's file, without its folders.
+    pub(super) file_name: Option<String>,
     pub(super) parameters: Vec<(String, String)>,
 }
 
@@ -38,6 +39,7 @@ pub(super) async fn parse(parts: Parts, body: Bytes) -> Result<Form, Problem> {
         .await
         .map_err(|_| malformed("the Content-Type must be multipart/form-data with a boundary"))?;
     let mut image = None;
+    let mut file_name = None;
     let mut parameters = Vec::new();
     let mut fields = 0;
     while let Some(field) = multipart.next_field().await.map_err(broken)? {
@@ -48,19 +50,21 @@ pub(super) async fn parse(parts: Parts, body: Bytes) -> Result<Form, Problem> {
         }
         let name = field.name().unwrap_or_default().to_owned();
         if IMAGE_NAMES.contains(&name.as_str()) {
+            file_name = field.file_name().and_then(name_of_file);
             let bytes = field.bytes().await.map_err(broken)?;
             if image.replace(bytes).is_some() {
                 return Err(second_image(&name));
             }
-        } else if DetectParameters::NAMES.contains(&name.as_str()) {
+        } else if is_parameter(&name) {
             let value = value_of(&name, field).await?;
             parameters.push((name, value));
         } else {
-            return Err(unknown_field(&name));
+            return Err(unknown_parameter(&name));
         }
     }
     Ok(Form {
         image: image.ok_or_else(missing_image)?,
+        file_name,
         parameters,
     })
 }
@@ -89,14 +93,12 @@ fn second_image(name: &str) -> Problem {
     Problem::new(ProblemKind::RepeatedParameter, detail)
 }
 
-fn unknown_field(name: &str) -> Problem {
-    let shown: String = name.chars().take(MAX_NAME_CHARS).collect();
-    let known = DetectParameters::NAMES.join(", ");
-    let detail = format!(
-        "{shown}: there is no such field: send the frame as `img` or `image`; the parameters are \
-         {known}"
-    );
-    Problem::new(ProblemKind::UnknownParameter, detail)
+/// The last part of a path, of whichever system, as far as it is a name.
+fn name_of_file(path: &str) -> Option<String> {
+    let name = path.rsplit(['/', '\\']).next().unwrap_or(path);
+    let characters = name.chars().filter(|character| !character.is_control());
+    let name: String = characters.take(MAX_FILE_NAME_CHARS).collect();
+    (!name.is_empty()).then_some(name)
 }
 
 fn malformed(detail: &str) -> Problem {

@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 
 use super::pictures::Picture;
 use crate::{
-    annotation_formats::{AnnotatedBox, AnnotatedImage, AnnotationFormat, BoxKind},
+    annotation_formats::{AnnotatedImage, AnnotationFormat, BoxKind},
     pipeline::DetectionReport,
 };
 
@@ -57,22 +57,8 @@ impl Labels {
 
     /// Takes in what was found in a picture.
     pub(super) fn add(&mut self, picture: &Picture, report: &DetectionReport) {
-        let calibration = &report.calibration;
-        self.images.push(AnnotatedImage {
-            file_name: picture.name.clone(),
-            width: report.image_width,
-            height: report.image_height,
-            calibration: (!calibration.assumed).then(|| calibration.id.clone()),
-            persons: report
-                .persons
-                .iter()
-                .map(|person| AnnotatedBox {
-                    bbox: person.bbox,
-                    oriented_box: person.oriented_box,
-                    score: person.score,
-                })
-                .collect(),
-        });
+        let image = AnnotatedImage::of(report, picture.name.clone());
+        self.images.push(image);
     }
 
     /// Writes the files.

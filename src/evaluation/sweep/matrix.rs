@@ -8,7 +8,7 @@ use crate::{
     evaluation::{DetectedRow, EvaluatedRow, FoundPerson},
     imaging::{
         Frame, FrameError,
-        annotate::{Mark, annotate},
+        annotate::{Drawing, Mark, annotate},
         picture_grid::{GridCell, PictureGrid},
         thumbnail,
     },
@@ -48,7 +48,7 @@ pub fn matrix(
             .map(|person| mark(person, corner, scale))
             .collect();
         let mut picture = small.clone();
-        annotate(&mut picture, &marks);
+        annotate(&mut picture, &Drawing::of(marks));
         let boxes = if found.len() == 1 { "box" } else { "boxes" };
         let ap = evaluated.summary.ap50.all_point_area;
         Some(GridCell {
@@ -124,6 +124,7 @@ fn mark(person: &FoundPerson, [left, top]: [f64; 2], scale: f64) -> Mark {
     Mark {
         bbox: bbox.map(|side| side * scale),
         oriented: None,
+        head: None,
         label: String::new(),
     }
 }

@@ -108,7 +108,7 @@ impl Stroke {
     }
 
     /// Paints it.
-    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb) {
+    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) {
         let reach = self.half_width + 0.5;
         let [[_, from], [_, to]] = self.edge;
         for y in pixels(from.min(to) - reach, from.max(to) + reach, frame.height()) {
@@ -116,7 +116,7 @@ impl Stroke {
             let [left, right] = edge_span(self.edge, row, reach);
             for x in pixels(left, right, frame.width()) {
                 let coverage = reach - edge_distance(self.edge, [f64::from(x) + 0.5, row]);
-                blend(frame, x, y, colour, coverage.clamp(0.0, 1.0));
+                blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
             }
         }
     }
@@ -196,11 +196,16 @@ impl Plate {
         }
     }
 
-    /// Whether two plates cover a common point.
-    pub(super) fn overlaps(&self, other: &Self) -> bool {
-        self.left < other.left + other.width
-            && other.left < self.left + self.width
-            && self.top < other.top + other.height
-            && other.top < self.top + self.height
+    /// Left, top, right and bottom.
+    pub(super) fn corners(&self) -> [f64; 4] {
+        let (right, bottom) = (self.left + self.width, self.top + self.height);
+        [self.left, self.top, right, bottom]
+    }
+
+    /// What it shares with the rectangle between two corners, square pixels.
+    pub(super) fn shared_area(&self, [left, top, right, bottom]: &[f64; 4]) -> f64 {
+        let width = right.min(self.left + self.width) - left.max(self.left);
+        let height = bottom.min(self.top + self.height) - top.max(self.top);
+        width.max(0.0) * height.max(0.0)
     }
 }

@@ -1,16 +1,27 @@
-//! Plates with text, placed at their boxes where they stay inside the frame and clear of
-//! each other.
+//! Plates with text at their boxes, inside the frame, clear of each other and of heads.
 
-use super::canvas::{Plate, Rgb};
-use super::text::Text;
-use super::{Mark, line_width};
+use super::{
+    INK, Mark,
+    canvas::{Plate, Rgb},
+    line_width,
+    text::Text,
+    text_height,
+};
 use crate::imaging::frame::Frame;
 
-const INK: Rgb = [12, 14, 18];
 const PLATE_OPACITY: f64 = 0.92;
+/// How bad it is to cover a plate, a head or any box, by the share of the plate that does.
+const COST_OF_PLATE: f64 = 4.0;
+const COST_OF_HEAD: f64 = 3.0;
+const COST_OF_BOX: f64 = 1.0;
+/// How bad it is to be one place further down the list of places.
+const COST_OF_PLACE: f64 = 0.02;
 
-/// The plates of one frame.
-pub(super) struct Plates {
+/// The labels of one frame.
+pub(super) struct Labels<'a> {
+    marks: &'a [(&'a Mark, Rgb)],
+    heads: Vec<[f64; 4]>,
+    boxes: Vec<[f64; 4]>,
     text: Text,
     /// Between a box and its plate, in pixels.
     gap: f64,
@@ -18,62 +29,92 @@ pub(super) struct Plates {
     placed: Vec<Plate>,
 }
 
-impl Plates {
-    /// No plates yet; sizes fit the frame.
-    pub(super) fn new(frame: &Frame) -> Self {
-        let frame_size = [f64::from(frame.width()), f64::from(frame.height())];
+impl<'a> Labels<'a> {
+    /// Labels for these marks that leave what is `taken` free; sizes fit the frame.
+    pub(super) fn new(frame: &Frame, marks: &'a [(&'a Mark, Rgb)], taken: Option<Plate>) -> Self {
+        let heads = marks.iter().filter_map(|(mark, _)| mark.head);
+        let heads = heads.map(|head| {
+            let (x, y, radius) = (head.cx, head.cy, head.radius);
+            [x - radius, y - radius, x + radius, y + radius]
+        });
         Self {
-            text: Text::new((frame_size[0].min(frame_size[1]) / 48.0).max(12.0)),
+            marks,
+            heads: heads.collect(),
+            boxes: marks.iter().map(|(mark, _)| mark.extent()).collect(),
+            text: Text::new(text_height(frame)),
             gap: line_width(frame),
-            frame_size,
-            placed: Vec::new(),
+            frame_size: [f64::from(frame.width()), f64::from(frame.height())],
+            placed: taken.into_iter().collect(),
         }
     }
 
-    /// Draws the label of a mark, unless it is empty.
-    pub(super) fn draw(&mut self, frame: &mut Frame, mark: &Mark, colour: Rgb) {
-        let text_width = self.text.width(&mark.label);
-        if text_width <= 0.0 {
-            return;
+    /// Draws the labels that are not empty.
+    pub(super) fn draw(mut self, frame: &mut Frame) {
+        for (mark, colour) in self.marks {
+            let text_width = self.text.width(&mark.label);
+            if text_width <= 0.0 {
+                continue;
+            }
+            let line_height = self.text.height();
+            let padding = 0.3 * line_height;
+            let height = 1.15 * line_height;
+            let plate = self.place(mark, [text_width + 2.0 * padding, height]);
+            plate.draw(frame, *colour, PLATE_OPACITY);
+            let text_top = plate.top + (height - line_height) / 2.0;
+            let corner = [plate.left + padding, text_top];
+            self.text.write(frame, &mark.label, corner, INK);
+            self.placed.push(plate);
         }
-        let line_height = self.text.height();
-        let padding = 0.3 * line_height;
-        let height = 1.15 * line_height;
-        let plate = self.place(mark, [text_width + 2.0 * padding, height]);
-        plate.draw(frame, colour, PLATE_OPACITY);
-        let text_top = plate.top + (height - line_height) / 2.0;
-        let corner = [plate.left + padding, text_top];
-        self.text.write(frame, &mark.label, corner, INK);
-        self.placed.push(plate);
     }
 
-    /// Above the boxes where that is free, else below them; else above all the same, moved
-    /// into the frame.
+    /// The place at the boxes where the plate covers least: above them if all are alike.
     fn place(&self, mark: &Mark, [width, height]: [f64; 2]) -> Plate {
-        let extent = |axis: usize, fold: fn(f64, f64) -> f64| {
-            let coordinates = mark.corners().map(|corner| corner[axis]);
-            coordinates.reduce(fold).unwrap_or_default()
-        };
-        let (left, right) = (extent(0, f64::min), extent(0, f64::max));
-        let (top, bottom) = (extent(1, f64::min), extent(1, f64::max));
-        let [columns, rows] = self.frame_size;
+        let [left, top, right, bottom] = mark.extent();
         let (above, below) = (top - self.gap - height, bottom + self.gap);
-        let at = |left: f64, top: f64| Plate {
+        let (before, behind) = (left - self.gap - width, right + self.gap);
+        let middle = f64::midpoint(top, bottom) - height / 2.0;
+        let places = [
+            [left, above],
+            [right - width, above],
+            [left, below],
+            [right - width, below],
+            [behind, middle],
+            [before, middle],
+            [behind, above],
+            [before, above],
+            [behind, below],
+            [before, below],
+        ];
+        let [columns, rows] = self.frame_size;
+        let plates = places.map(|[left, top]| Plate {
             left: left.min(columns - width).max(0.0),
-            top,
+            top: top.min(rows - height).max(0.0),
             width,
             height,
             radius: 0.22 * height,
-        };
-        [
-            at(left, above),
-            at(right - width, above),
-            at(left, below),
-            at(right - width, below),
-        ]
-        .into_iter()
-        .filter(|plate| plate.top >= 0.0 && plate.top + height <= rows)
-        .find(|plate| !self.placed.iter().any(|other| plate.overlaps(other)))
-        .unwrap_or_else(|| at(left, above.min(rows - height).max(0.0)))
+        });
+        let (mut best, mut least) = (plates[0], f64::INFINITY);
+        for (index, plate) in (0_u32..).zip(plates) {
+            let cost = COST_OF_PLACE * f64::from(index) + self.cost(&plate);
+            if cost < least {
+                (best, least) = (plate, cost);
+            }
+        }
+        best
+    }
+
+    /// What the plate would cover.
+    fn cost(&self, plate: &Plate) -> f64 {
+        let covered =
+            |areas: &[[f64; 4]]| -> f64 { areas.iter().map(|area| plate.shared_area(area)).sum() };
+        let plates: f64 = self
+            .placed
+            .iter()
+            .map(|other| plate.shared_area(&other.corners()))
+            .sum();
+        let covered = COST_OF_PLATE * plates
+            + COST_OF_HEAD * covered(&self.heads)
+            + COST_OF_BOX * covered(&self.boxes);
+        covered / (plate.width * plate.height)
     }
 }

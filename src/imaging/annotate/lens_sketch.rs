@@ -89,7 +89,7 @@ fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, colour: 
             [corner_origin.x, corner_origin.y]
         });
         if let (Some(from), Some(to)) = (previous, point) {
-            Stroke::new(from, to, width).draw(frame, colour);
+            Stroke::new(from, to, width).draw(frame, colour, 1.0);
         }
         previous = point;
     }

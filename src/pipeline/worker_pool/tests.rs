@@ -31,7 +31,7 @@ fn direct_job() -> DetectJob {
     )
 }
 
-fn spawn(pool: &Arc<WorkerPool>) -> tokio::task::JoinHandle<Answer> {
+fn spawn(pool: &Arc<WorkerPool>) -> tokio::task::JoinHandle<Result<Detected, PipelineError>> {
     let pool = Arc::clone(pool);
     tokio::spawn(async move { pool.detect(direct_job()).await })
 }
@@ -114,6 +114,29 @@ async fn a_panic_on_one_frame_costs_one_answer_and_no_worker() {
     let pool = WorkerPool::start(&engine, NonZeroUsize::MIN, NonZeroUsize::MIN).unwrap();
     let failed = pool.detect(direct_job()).await.unwrap_err();
     assert!(matches!(failed, PipelineError::Internal(_)));
+    until_pending(&pool, 0).await;
+    pool.detect(direct_job()).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_done_with_a_report_holds_its_place_and_runs_on_the_worker() {
+    let engine = Arc::new(engine(BlobDetector::default(), None));
+    let pool = WorkerPool::start(&engine, NonZeroUsize::MIN, NonZeroUsize::MIN).unwrap();
+    let pool = Arc::new(pool);
+    let asked = Arc::clone(&pool);
+    let finished = pool.detect_and(direct_job(), move |detected| {
+        let thread = std::thread::current().name().map(ToOwned::to_owned);
+        (detected.report.persons.len(), asked.pending(), thread)
+    });
+    let (persons, pending, thread) = finished.await.unwrap();
+    assert_eq!((persons, pending), (1, 1));
+    assert_eq!(thread.as_deref(), Some("frame-worker-0"));
+    until_pending(&pool, 0).await;
+    let failed = pool.detect_and(direct_job(), |_| panic!("drawing goes wrong on purpose"));
+    assert!(matches!(
+        failed.await.unwrap_err(),
+        PipelineError::Internal(_)
+    ));
     until_pending(&pool, 0).await;
     pool.detect(direct_job()).await.unwrap();
 }

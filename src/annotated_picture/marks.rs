@@ -1,0 +1,39 @@
+//! A person as a mark in the frame.
+
+use crate::{
+    geometry::OrientedBox,
+    imaging::annotate::{Head, Mark, OrientedMark},
+    pipeline::Person,
+};
+
+/// The person's mark, with the score on its label if asked for.
+pub(super) fn mark(person: &Person, with_score: bool) -> Mark {
+    let oriented = &person.oriented_box;
+    Mark {
+        bbox: person.bbox.corners(),
+        oriented: Some(OrientedMark {
+            cx: oriented.center.x,
+            cy: oriented.center.y,
+            width: oriented.width,
+            height: oriented.height,
+            angle_deg: oriented.angle.to_degrees(),
+        }),
+        head: Some(head(oriented)),
+        label: if with_score {
+            format!("{:.2}", person.score)
+        } else {
+            String::new()
+        },
+    }
+}
+
+/// The circle that touches the upper short side of the box and both long ones.
+fn head(oriented: &OrientedBox) -> Head {
+    let radius = oriented.width.min(oriented.height) / 2.0;
+    let center = oriented.center + oriented.up * (oriented.height / 2.0 - radius);
+    Head {
+        cx: center.x,
+        cy: center.y,
+        radius,
+    }
+}

@@ -1,0 +1,122 @@
+//! GeoJSON (RFC 7946): a feature collection per image. The geometry of a person is the box turned
+//! along it. Positions are corner-origin frame pixels, x to the right and y down, not longitude and
+//! latitude, as programs for pictures read them; RFC 7946 leaves that to those who agree on it
+//! (section 4). Where a person stands on the floor, in metres, is a property.
+
+use serde::Serialize;
+
+use super::{AnnotatedBox, AnnotatedImage, LABEL, pixels, rounded, share, stem};
+use crate::geometry::OrientedBox;
+
+#[derive(Serialize)]
+struct FeatureCollection<'a> {
+    r#type: &'static str,
+    /// Beside GeoJSON's own members: the picture that positions are in.
+    image: Image<'a>,
+    features: Vec<Feature>,
+}
+
+#[derive(Serialize)]
+struct Image<'a> {
+    file_name: &'a str,
+    width: u32,
+    height: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct Feature {
+    r#type: &'static str,
+    id: usize,
+    geometry: Polygon,
+    properties: Properties,
+}
+
+#[derive(Serialize)]
+struct Polygon {
+    r#type: &'static str,
+    coordinates: [[[f64; 2]; 5]; 1],
+}
+
+#[derive(Serialize)]
+struct Properties {
+    label: &'static str,
+    score: f64,
+    /// Axis-parallel: left, top, right, bottom.
+    r#box: [f64; 4],
+    angle_deg: f64,
+    foot: [f64; 2],
+    floor: Option<Floor>,
+}
+
+#[derive(Serialize)]
+struct Floor {
+    x_m: f64,
+    y_m: f64,
+}
+
+/// The path of an image's file.
+pub(super) fn path(image_file_name: &str) -> String {
+    format!("features/{}.geojson", stem(image_file_name))
+}
+
+pub(super) fn document(image: &AnnotatedImage) -> String {
+    let features = image.boxes().zip(1..);
+    let document = FeatureCollection {
+        r#type: "FeatureCollection",
+        image: Image {
+            file_name: &image.file_name,
+            width: image.width,
+            height: image.height,
+            calibration: image.calibration.as_deref(),
+        },
+        features: features
+            .map(|((corners, person), id)| feature(id, corners, person))
+            .collect(),
+    };
+    // Numbers and texts in fixed places always have a JSON form.
+    serde_json::to_string_pretty(&document).unwrap_or_default()
+}
+
+fn feature(id: usize, corners: [f64; 4], person: &AnnotatedBox) -> Feature {
+    let oriented = &person.oriented_box;
+    let foot = oriented.foot();
+    Feature {
+        r#type: "Feature",
+        id,
+        geometry: Polygon {
+            r#type: "Polygon",
+            coordinates: [ring(oriented)],
+        },
+        properties: Properties {
+            label: LABEL,
+            score: share(person.score),
+            r#box: corners,
+            angle_deg: pixels(oriented.angle.to_degrees()),
+            foot: [pixels(foot.x), pixels(foot.y)],
+            floor: person.floor.map(|floor| Floor {
+                x_m: rounded(floor.x_m, 1_000.0),
+                y_m: rounded(floor.y_m, 1_000.0),
+            }),
+        },
+    }
+}
+
+/// The corners, the first one twice; counterclockwise where y grows upward, as RFC 7946 (section
+/// 3.1.6) has it, and so clockwise as seen in the picture.
+fn ring(oriented: &OrientedBox) -> [[f64; 2]; 5] {
+    let (up, center) = (oriented.up, oriented.center);
+    let right = nalgebra::Vector2::new(-up.y, up.x);
+    [
+        (-0.5, 0.5),
+        (0.5, 0.5),
+        (0.5, -0.5),
+        (-0.5, -0.5),
+        (-0.5, 0.5),
+    ]
+    .map(|(across, along)| {
+        let corner = center + right * (across * oriented.width) + up * (along * oriented.height);
+        [pixels(corner.x), pixels(corner.y)]
+    })
+}

@@ -1,0 +1,30 @@
+//! A report as an annotated image.
+
+use super::{AnnotatedBox, AnnotatedImage};
+use crate::pipeline::{DetectionReport, Person};
+
+impl AnnotatedImage {
+    /// The persons of a report, in the picture of this name.
+    #[must_use]
+    pub fn of(report: &DetectionReport, file_name: String) -> Self {
+        let calibration = &report.calibration;
+        Self {
+            file_name,
+            width: report.image_width,
+            height: report.image_height,
+            calibration: (!calibration.assumed).then(|| calibration.id.clone()),
+            persons: report.persons.iter().map(AnnotatedBox::from).collect(),
+        }
+    }
+}
+
+impl From<&Person> for AnnotatedBox {
+    fn from(person: &Person) -> Self {
+        Self {
+            bbox: person.bbox,
+            oriented_box: person.oriented_box,
+            score: person.score,
+            floor: person.floor,
+        }
+    }
+}

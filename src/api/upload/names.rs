@@ -1,0 +1,34 @@
+//! The parameters that may come with a frame.
+
+use crate::{
+    api::{
+        answer::AnswerOptions,
+        problem::{Problem, ProblemKind},
+    },
+    pipeline::DetectParameters,
+};
+
+/// Most characters of an unknown name that are repeated to its sender.
+const MAX_NAME_CHARS: usize = 64;
+
+/// Whether there is a parameter of this name.
+pub(super) fn is_parameter(name: &str) -> bool {
+    names().any(|known| known == name)
+}
+
+/// What the sender of another name is told.
+pub(super) fn unknown_parameter(name: &str) -> Problem {
+    let shown: String = name.chars().take(MAX_NAME_CHARS).collect();
+    let known = names().collect::<Vec<_>>().join(", ");
+    let detail = format!(
+        "{shown}: there is no such field or parameter: send the frame as `img` or `image`; the \
+         parameters are {known}"
+    );
+    Problem::new(ProblemKind::UnknownParameter, detail)
+}
+
+fn names() -> impl Iterator<Item = &'static str> {
+    DetectParameters::NAMES
+        .into_iter()
+        .chain(AnswerOptions::NAMES)
+}
