@@ -164,8 +164,16 @@ fn painted_by_label(width: u32, height: u32, mark: &Mark) -> [u32; 4] {
         ..mark.clone()
     };
     let without = annotated(width, height, &[bare]);
+    let row_bytes = 3 * width as usize;
+    let rows = with
+        .pixels()
+        .chunks_exact(row_bytes)
+        .zip(without.pixels().chunks_exact(row_bytes));
     let mut painted = [u32::MAX, u32::MAX, 0, 0];
-    for y in 0..height {
+    for (y, _) in (0..height)
+        .zip(rows)
+        .filter(|(_, (with, without))| with != without)
+    {
         for x in (0..width).filter(|&x| with.pixel(x, y) != without.pixel(x, y)) {
             let [left, top, right, bottom] = painted;
             painted = [left.min(x), top.min(y), right.max(x + 1), bottom.max(y + 1)];

@@ -20,7 +20,12 @@ use self::{
     labels::Labels,
     pictures::{Picture, pictures},
 };
-use super::{SettingsFile, annotate, parameters::ParameterFlags, progress::Progress};
+use super::{
+    SettingsFile,
+    annotate::{self, PictureFlags},
+    parameters::ParameterFlags,
+    progress::Progress,
+};
 use crate::{
     annotation_formats::{AnnotationFormat, BoxKind},
     api::Report,
@@ -46,8 +51,10 @@ pub(super) struct Arguments {
     #[command(flatten)]
     parameters: ParameterFlags,
     /// Also draw the persons into the picture; takes a single IMAGE
-    #[arg(long, value_name = "OUT.jpg")]
+    #[arg(long, value_name = "OUT.jpg|OUT.png")]
     annotate: Option<PathBuf>,
+    #[command(flatten)]
+    picture: PictureFlags,
     /// Write annotations to be corrected in the usual tools, into the folder --out, instead of
     /// reports: `coco` (annotations.json), `cvat` (annotations.xml, CVAT for images 1.1), `yolo`
     /// (labels/, data.yaml, classes.txt), `voc` (Annotations/) or `geojson` (features/)
@@ -70,6 +77,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         bail!("--annotate draws one picture: give a single IMAGE, or leave it out");
     }
     let (parameters, calibration) = parameters(arguments)?;
+    let options = arguments.picture.check()?;
     let mut labels = labels(arguments, &pictures)?;
     let settings = arguments.settings_file.load()?;
     let max_bytes = settings.server.max_body_bytes as u64;
@@ -88,7 +96,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
                     None => print(&detected)?,
                 }
                 if let Some(path) = &arguments.annotate {
-                    annotate::write(detected, path)?;
+                    annotate::write(detected, &options, path)?;
                 }
             }
             Err(error) => {

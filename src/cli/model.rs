@@ -15,6 +15,7 @@ use jiff::Timestamp;
 
 use super::{SettingsFile, annotate};
 use crate::{
+    annotated_picture::PictureOptions,
     app::{engine_for, onnx_options},
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
@@ -106,7 +107,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         .context(UNWRITABLE)?;
     }
     if let Some(path) = &arguments.annotate {
-        annotate::write(detected, path)?;
+        annotate::write(detected, &PictureOptions::default(), path)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -103,6 +103,26 @@ fn a_person_is_drawn_into_the_picture_on_request() {
     assert!(output.status.success(), "{output:?}");
     let jpeg = std::fs::read(drawn).unwrap();
     assert!(jpeg.starts_with(&[0xff, 0xd8, 0xff]));
+
+    let drawn = folder.path().join("drawn.png");
+    let flags = ["--profile", "fast", "--annotate", drawn.to_str().unwrap()];
+    let options = ["--draw", "boxes,views,timestamp", "--width", "300"];
+    let output = lookdown(&[&["detect", office], &flags[..], &options].concat(), &[]);
+    assert!(output.status.success(), "{output:?}");
+    let png = std::fs::read(drawn).unwrap();
+    assert!(png.starts_with(b"\x89PNG"));
+    // The width is the first number of the header (PNG specification, section 11.2.1).
+    assert_eq!(png[16..20], 300_u32.to_be_bytes());
+}
+
+#[test]
+fn options_of_pictures_are_checked_and_need_a_picture() {
+    let annotate = ["detect", "a.jpg", "--annotate", "out.jpg"];
+    let output = lookdown(&[&annotate[..], &["--draw", "hats"]].concat(), &[]);
+    assert_fails_with(&output, &["draw", "hats", "oriented"]);
+    let output = lookdown(&["detect", "a.jpg", "--width", "300"], &[]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && message.contains("--annotate"));
 }
 
 #[test]
