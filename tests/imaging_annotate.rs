@@ -152,7 +152,7 @@ fn lines_and_text_grow_with_the_frame() {
         let count = painted_count(&annotated(side, side, &[mark]));
         f64::from(u32::try_from(count).unwrap()) / (size * size)
     };
-    let (medium, large) = (share(900), share(2700));
+    let (medium, large) = (share(1800), share(3600));
     assert!((medium / large - 1.0).abs() < 0.1, "{medium} and {large}");
 }
 
@@ -206,7 +206,10 @@ fn a_label_stays_whole_wherever_its_box_is() {
         }
         for bbox in borders {
             let here = size(bbox);
-            let is_whole = here.into_iter().zip(whole).all(|(a, b)| a.abs_diff(b) <= 2);
+            // Where it lies on its own outline, which has its colour, a line's width is not seen.
+            let unseen = 3 + width.min(height) / 300;
+            let mut sides = here.into_iter().zip(whole);
+            let is_whole = sides.all(|(here, whole)| here.abs_diff(whole) <= unseen);
             assert!(
                 is_whole,
                 "{width}×{height}, {bbox:?}: {here:?} of {whole:?}"

@@ -45,7 +45,7 @@ const COLOURS: [Rgb; 6] = [
 ];
 /// Dark on both sides of each outline: it stands out from floors as bright as itself.
 const SHADOW: Rgb = [0, 0, 0];
-const SHADOW_OPACITY: f64 = 0.55;
+const SHADOW_OPACITY: f64 = 0.7;
 const THIN_OPACITY: f64 = 0.6;
 const LINE: Rgb = [235, 240, 255];
 const LINE_OPACITY: f64 = 0.55;
@@ -89,7 +89,7 @@ pub fn annotate(frame: &mut Frame, drawing: &Drawing) {
         let Some(main) = oriented.or(aligned) else {
             continue;
         };
-        let shadow_width = line_width + 2.0 * (0.35 * line_width).max(1.0);
+        let shadow_width = line_width + 2.0 * (0.5 * line_width).max(1.2);
         Outline::new(main, shadow_width).draw(frame, SHADOW, SHADOW_OPACITY);
         if let (Some(_), Some(aligned)) = (oriented, aligned) {
             Outline::new(aligned, line_width * 0.4).draw(frame, *colour, THIN_OPACITY);
@@ -108,7 +108,7 @@ fn is_drawable(line: &[[f64; 2]]) -> bool {
 
 /// Width of the main outline in pixels: a 450th of the shorter side, but visible.
 fn line_width(frame: &Frame) -> f64 {
-    (shorter_side(frame) / 450.0).max(1.3)
+    (shorter_side(frame) / 450.0).max(1.6)
 }
 
 /// Height of a line of text in pixels: a 48th of the shorter side, but legible.
