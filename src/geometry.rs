@@ -12,17 +12,21 @@ pub mod lens;
 pub mod mount;
 pub mod oriented_box;
 pub mod pixels;
+pub mod polygon;
 pub mod stature;
 pub mod view_plan;
 pub mod virtual_view;
+pub mod zone;
 pub mod zoom;
 
 pub use footprint::{BackProjection, Footprint};
 pub use lens::{Lens, LensError};
 pub use mount::Mount;
 pub use oriented_box::OrientedBox;
+pub use polygon::{Polygon, PolygonError};
 pub use view_plan::{FieldOfViewReading, ViewPlan};
 pub use virtual_view::VirtualView;
+pub use zone::{Zone, ZoneArea};
 
 /// A position in an image, in pixels.
 pub type Pixel = nalgebra::Point2<f64>;

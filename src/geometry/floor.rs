@@ -1,7 +1,7 @@
 //! Bearings and floor positions of pixels.
 
 use super::{
-    Lens, Mount, Pixel,
+    Lens, Mount, Pixel, Ray,
     pixels::{PixelConvention, cross_half_pixel},
 };
 
@@ -49,6 +49,15 @@ pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorP
         x_m: height_m * levelled.x / levelled.z,
         y_m: height_m * levelled.y / levelled.z,
     })
+}
+
+/// Where the lens shows a place on the floor, corner-origin frame pixels; `None` when the height is
+/// unknown or the lens does not see it.
+#[must_use]
+pub fn pixel_of(place: FloorPosition, lens: &Lens, mount: &Mount) -> Option<Pixel> {
+    let levelled = Ray::new(place.x_m, place.y_m, mount.height_m()?);
+    let pixel = lens.project(&(mount.camera_from_floor() * levelled))?;
+    Some(cross_half_pixel(pixel, PixelConvention::CornerOrigin))
 }
 
 #[cfg(test)]

@@ -1,0 +1,137 @@
+//! Zones: named areas of the frame or of the floor, and who stands in them.
+
+use super::{
+    Lens, Mount, Pixel,
+    floor::{FloorPosition, pixel_of},
+    polygon::Polygon,
+};
+
+/// A named area.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Zone {
+    /// Its name.
+    pub name: String,
+    /// Where it is.
+    pub area: ZoneArea,
+}
+
+/// Where a zone is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ZoneArea {
+    /// Corner-origin frame pixels.
+    Frame(Polygon),
+    /// Metres, as in [`FloorPosition`].
+    Floor(Polygon),
+}
+
+impl Zone {
+    /// Whether one stands in it whose foot is seen at `foot` (corner-origin frame pixels), which is
+    /// `floor`. What meets no floor is in no zone of it.
+    #[must_use]
+    pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
+        match &self.area {
+            ZoneArea::Frame(area) => area.holds(foot),
+            ZoneArea::Floor(area) => {
+                floor.is_some_and(|floor| area.holds(nalgebra::Point2::new(floor.x_m, floor.y_m)))
+            }
+        }
+    }
+
+    /// The same zone in frames `scale_x`, `scale_y` times as large; the floor stays as it is.
+    #[must_use]
+    pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
+        let area = match &self.area {
+            ZoneArea::Frame(area) => ZoneArea::Frame(area.scaled(scale_x, scale_y)),
+            ZoneArea::Floor(area) => ZoneArea::Floor(area.clone()),
+        };
+        Self {
+            name: self.name.clone(),
+            area,
+        }
+    }
+
+    /// Points along its outline, `points_per_edge` on each edge and the first one once more at the
+    /// end, corner-origin frame pixels; `None` where the lens does not see the floor. Straight edges
+    /// on the floor are curves in the frame.
+    #[must_use]
+    pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
+        let (ZoneArea::Frame(area) | ZoneArea::Floor(area)) = &self.area;
+        let along = area.edges().flat_map(|[a, b]| {
+            let shares = (0..points_per_edge)
+                .map(move |point| f64::from(point) / f64::from(points_per_edge));
+            shares.map(move |share| a + (b - a) * share)
+        });
+        let closed = along.chain(area.corners().first().copied());
+        let in_frame = closed.map(|point| match &self.area {
+            ZoneArea::Frame(_) => Some(point),
+            ZoneArea::Floor(_) => {
+                let (x_m, y_m) = (point.x, point.y);
+                pixel_of(FloorPosition { x_m, y_m }, lens, mount)
+            }
+        });
+        in_frame.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::floor::floor_position;
+
+    fn camera(tilt: f64) -> (Lens, Mount) {
+        let lens = Lens::equidistant_circle(299.5, 299.5, 300.0, 1.57).unwrap();
+        let up = nalgebra::Unit::new_normalize(nalgebra::Vector3::new(0.0, tilt, -1.0));
+        (lens, Mount::new(up, Some(3.0)))
+    }
+
+    fn square(left: f64, top: f64, side: f64) -> Polygon {
+        let (right, bottom) = (left + side, top + side);
+        Polygon::new(&[[left, top], [right, top], [right, bottom], [left, bottom]]).unwrap()
+    }
+
+    #[test]
+    fn a_zone_of_the_floor_is_asked_for_the_place_and_one_of_the_frame_for_the_pixel() {
+        let zone = |area| Zone {
+            name: "door".to_owned(),
+            area,
+        };
+        let of_frame = zone(ZoneArea::Frame(square(100.0, 100.0, 50.0)));
+        let of_floor = zone(ZoneArea::Floor(square(1.0, 1.0, 1.0)));
+        let (foot, place) = (Pixel::new(120.0, 120.0), |x_m| FloorPosition {
+            x_m,
+            y_m: 1.5,
+        });
+        assert!(of_frame.holds(foot, None));
+        assert!(!of_floor.holds(foot, None));
+        assert!(of_floor.holds(foot, Some(place(1.5))));
+        assert!(!of_floor.holds(foot, Some(place(2.5))));
+        // In frames of twice the size, pixels lie elsewhere, and the floor where it was.
+        assert!(!of_frame.scaled(2.0, 2.0).holds(foot, None));
+        assert!(of_frame.scaled(2.0, 2.0).holds(foot * 2.0, None));
+        assert_eq!(of_floor.scaled(2.0, 2.0), of_floor);
+    }
+
+    #[test]
+    fn the_outline_of_a_zone_of_the_floor_lies_where_its_floor_is_seen() {
+        for tilt in [0.0, 0.3] {
+            let (lens, mount) = camera(tilt);
+            let zone = Zone {
+                name: "door".to_owned(),
+                area: ZoneArea::Floor(square(0.5, -0.5, 2.0)),
+            };
+            let outline = zone.outline(&lens, &mount, 8);
+            assert_eq!(outline.len(), 33);
+            assert_eq!(outline.first(), outline.last());
+            for point in outline {
+                let floor = floor_position(point.unwrap(), &lens, &mount).unwrap();
+                let on_edge = [
+                    floor.x_m - 0.5,
+                    floor.x_m - 2.5,
+                    floor.y_m + 0.5,
+                    floor.y_m - 1.5,
+                ];
+                assert!(on_edge.iter().any(|off| off.abs() < 1e-6), "{floor:?}");
+            }
+        }
+    }
+}
