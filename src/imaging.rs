@@ -1,10 +1,12 @@
-//! Pixels: decoding with limits, finding the lens circle, remap tables, network input, drawing.
+//! Pixels: decoding with limits, finding the lens circle, privacy masks, remap tables, network input,
+//! drawing.
 
 pub mod annotate;
 pub mod decode;
 pub mod frame;
 pub mod lens_circle;
 mod letterbox;
+mod masked_pixels;
 mod network_input;
 pub mod picture_grid;
 mod remap_table;
@@ -13,6 +15,7 @@ mod view_signature;
 
 pub use frame::{Frame, FrameError};
 pub use letterbox::Letterbox;
+pub use masked_pixels::MaskedPixels;
 pub use network_input::{ChannelOrder, NetworkInput, ViewBatch};
 pub use remap_table::RemapTable;
 pub use thumbnail::{narrowed, thumbnail};

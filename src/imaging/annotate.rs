@@ -2,6 +2,7 @@
 //!
 //! Sizes grow with the frame, so that a thumbnail and a 4000-pixel frame read alike.
 
+mod area_sketch;
 mod canvas;
 mod caption;
 mod encode;
@@ -11,6 +12,7 @@ mod mark;
 pub(super) mod text;
 
 use super::frame::Frame;
+pub use area_sketch::sketch_areas;
 use canvas::{Outline, Rgb, Stroke};
 pub use encode::{EncodeError, encode_jpeg, encode_png};
 pub use lens_sketch::sketch_lens;

@@ -17,8 +17,9 @@ use self::{
     frame_from_plane::FrameFromPlane,
     node_grid::{NodeGrid, Places},
     row::{LANES, Planes, Row, Source},
+    scalar::Sample,
 };
-use super::{Frame, NetworkInput};
+use super::{Frame, MaskedPixels, NetworkInput};
 use crate::geometry::{Lens, Pixel, VirtualView};
 
 /// One view's sampling positions.
@@ -97,13 +98,28 @@ impl RemapTable {
     /// Whether any of the view's pixels sees some of the lens image in the frame.
     #[must_use]
     pub fn sees_anything(&self) -> bool {
+        self.has_sample(|_| true)
+    }
+
+    /// Whether any of them sees some of the lens image beside what is masked.
+    #[must_use]
+    pub fn sees_beside(&self, masked: &MaskedPixels) -> bool {
+        let width = self.frame_width as usize;
+        self.has_sample(|sample| {
+            let mut neighbours = sample.neighbours(width);
+            neighbours.any(|[x, y]| !masked.hides(x, y))
+        })
+    }
+
+    /// Whether one of the view's pixels has a sample for which `counts` holds.
+    fn has_sample(&self, counts: impl Fn(&Sample) -> bool) -> bool {
         let (width, height) = (self.frame_width as usize, self.frame_height as usize);
         let mut nodes = Places::default();
         (0..self.grid.visibility().rows()).any(|y| {
             let row = self.row(y, &mut nodes);
             (0..row.nodes.x.len() - 1).any(|index| {
                 let samples = row.block(index).samples(row.lanes(index), width, height);
-                samples.iter().any(Option::is_some)
+                samples.iter().flatten().any(&counts)
             })
         })
     }

@@ -67,6 +67,16 @@ impl Sample {
         })
     }
 
+    /// Column and row of its four neighbours.
+    pub(super) fn neighbours(&self, width: usize) -> impl Iterator<Item = [u32; 2]> {
+        let upper_left = [self.first_pixel % width, self.first_pixel / width];
+        #[expect(clippy::cast_possible_truncation, reason = "a frame's sides are u32")]
+        let [left, top] = upper_left.map(|index| index as u32);
+        [[0, 0], [1, 0], [0, 1], [1, 1]]
+            .into_iter()
+            .map(move |[right, down]| [left + right, top + down])
+    }
+
     /// One channel, in units of `1 / WEIGHT_ONE`.
     fn weighted_sum(&self, source: &Source, channel: usize) -> f32 {
         let mix = |pixel: usize| {

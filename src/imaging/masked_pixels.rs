@@ -1,0 +1,152 @@
+//! Privacy masks: the pixels under polygons, found once for frames of one size and then blanked in
+//! each.
+
+use std::ops::Range;
+
+use super::Frame;
+use crate::geometry::{
+    Pixel, Polygon,
+    pixels::{PixelConvention, cross_half_pixel},
+    polygon::{Edge, crossing},
+};
+
+/// The pixels that lie under masks, wholly or in part.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct MaskedPixels {
+    /// For each row its columns, from left to right, with gaps in between; empty without masks.
+    rows: Vec<Box<[Range<u32>]>>,
+}
+
+impl MaskedPixels {
+    /// Those under `masks` (corner-origin pixels) in frames of `width` × `height` pixels.
+    #[must_use]
+    pub fn new(masks: &[Polygon], width: u32, height: u32) -> Self {
+        if masks.is_empty() {
+            return Self::default();
+        }
+        let row = |y| {
+            let spans = masks.iter().flat_map(|mask| touched(mask, y, width));
+            joined(spans.collect())
+        };
+        Self {
+            rows: (0..height).map(row).collect(),
+        }
+    }
+
+    /// Whether there are no masks.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// How many they are.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        let spans = self.rows.iter().flatten();
+        spans.map(|span| u64::from(span.end - span.start)).sum()
+    }
+
+    /// Whether the pixel in column `x` and row `y` is one of them; those outside the frame are not.
+    #[must_use]
+    pub fn hides(&self, x: u32, y: u32) -> bool {
+        let Some(row) = self.rows.get(y as usize) else {
+            return false;
+        };
+        let following = row.partition_point(|span| span.start <= x);
+        following > 0 && x < row[following - 1].end
+    }
+
+    /// Whether the pixel is one of them in which a position (pixel centres) lies.
+    #[must_use]
+    pub fn hides_position(&self, position: Pixel) -> bool {
+        let position = cross_half_pixel(position, PixelConvention::CornerOrigin);
+        position.x >= 0.0
+            && position.y >= 0.0
+            && self.hides(whole(position.x.floor()), whole(position.y.floor()))
+    }
+
+    /// Makes them black in a frame of the size they were found for.
+    pub fn blank(&self, frame: &mut Frame) {
+        let row_bytes = 3 * frame.width() as usize;
+        let lines = frame.pixels_mut().chunks_exact_mut(row_bytes);
+        for (line, row) in lines.zip(&self.rows) {
+            for span in row {
+                line[3 * span.start as usize..3 * span.end as usize].fill(0);
+            }
+        }
+    }
+
+    /// Memory held, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let rows = self.rows.iter().map(|row| size_of_val(&**row));
+        size_of_val(self.rows.as_slice()) + rows.sum::<usize>()
+    }
+}
+
+/// The columns in which a polygon covers some of the row `y`: where its middle is inside, and where
+/// an edge runs through it.
+fn touched(polygon: &Polygon, y: u32, width: u32) -> Vec<Range<u32>> {
+    let [top, middle, bottom] = [0.0, 0.5, 1.0].map(|down| f64::from(y) + down);
+    let mut crossings: Vec<f64> = polygon
+        .edges()
+        .filter_map(|edge| crossing(edge, middle))
+        .collect();
+    crossings.sort_unstable_by(f64::total_cmp);
+    let inside = crossings
+        .chunks_exact(2)
+        .map(|pair| columns(pair[0], pair[1], width));
+    let along = polygon.edges().filter_map(|edge| extent(edge, top, bottom));
+    let along = along.map(|[left, right]| columns(left, right, width));
+    inside.chain(along).collect()
+}
+
+/// How far an edge reaches across between two heights, if it runs between them.
+fn extent([a, b]: Edge, top: f64, bottom: f64) -> Option<[f64; 2]> {
+    let [upper, lower] = if a.y <= b.y { [a, b] } else { [b, a] };
+    if lower.y <= top || upper.y >= bottom {
+        return None;
+    }
+    let at = |y: f64| {
+        let share = (y - upper.y) / (lower.y - upper.y);
+        upper.x + (lower.x - upper.x) * share
+    };
+    let first = if upper.y < top { at(top) } else { upper.x };
+    let last = if lower.y > bottom {
+        at(bottom)
+    } else {
+        lower.x
+    };
+    Some([first.min(last), first.max(last)])
+}
+
+/// The columns that lie between two places or hold one of them, cut to the frame.
+fn columns(left: f64, right: f64, width: u32) -> Range<u32> {
+    whole(left.floor()).min(width)..whole(right.ceil()).min(width)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "`as` saturates, which cuts to the frame"
+)]
+fn whole(coordinate: f64) -> u32 {
+    coordinate as u32
+}
+
+/// The same columns from left to right, none twice.
+fn joined(mut spans: Vec<Range<u32>>) -> Box<[Range<u32>]> {
+    spans.retain(|span| !span.is_empty());
+    spans.sort_unstable_by_key(|span| span.start);
+    let mut joined: Vec<Range<u32>> = Vec::new();
+    for span in spans {
+        match joined.last_mut() {
+            Some(last) if span.start <= last.end => last.end = last.end.max(span.end),
+            _ => joined.push(span),
+        }
+    }
+    joined.into_boxed_slice()
+}
+
+#[cfg(test)]
+mod tests;
