@@ -163,6 +163,7 @@ impl App {
             max_upload_bytes: settings.limits.max_upload_bytes,
             max_header_bytes: settings.server.connections.max_header_bytes,
             max_headers: settings.server.connections.max_headers,
+            zone_metrics: settings.calibrations.zone_metrics,
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
             min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,

@@ -1,5 +1,6 @@
 //! Calibrations: from a file to a checked camera, and the stores of such files.
 
+mod areas;
 mod calibrated_camera;
 mod calibrations;
 mod doubts;
@@ -13,6 +14,7 @@ pub mod native;
 mod plausibility;
 mod store;
 
+pub use areas::Areas;
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};
 pub use calibrations::{
     CalibrationEntry, CalibrationRow, Calibrations, CalibrationsHealth, ChangeError, Put, Reading,

@@ -1,5 +1,6 @@
 //! Every metric the server exposes: one struct with a registry of its own. A field's doc comment
-//! is its help text. Labels come from short fixed lists, never from what a client sends.
+//! is its help text. Labels come from short fixed lists, never from what a client sends; those of
+//! zones, which administrators name, are shown only when asked for, and a thousand at most.
 
 mod kind;
 mod process;
@@ -15,6 +16,9 @@ use prometheus::{
 
 use kind::Kind;
 use process::Process;
+
+/// Zones shown at most.
+const MAX_ZONE_ROWS: usize = 1000;
 
 /// Declares the struct, and registers each field under `lookdown_` and its name.
 macro_rules! metrics {
@@ -70,6 +74,8 @@ metrics! {
     non_finite: IntCounter = "non_finite_candidates_total" [];
     /// Persons reported.
     persons: IntCounter = "persons_total" [];
+    /// Persons in a zone of a calibration, in its latest frame; shown only with `calibrations.zone_metrics`.
+    zone_persons: IntGaugeVec = "zone_persons" ["calibration", "zone"];
     /// Requests that were answered with a problem, by its kind.
     failures: IntCounterVec = "request_failures_total" ["reason"];
     /// Frames that wait for a worker or are worked on.
@@ -127,6 +133,8 @@ struct Shown {
     /// Name and revision.
     models: BTreeSet<(String, String)>,
     calibrations: String,
+    /// Calibration and zone.
+    zones: BTreeSet<(String, String)>,
 }
 
 impl Metrics {
@@ -186,6 +194,37 @@ impl Metrics {
         self.calibration_files_broken.set(count(broken));
         self.calibration_store_up.set(i64::from(up));
         raise(&self.calibration_loads, loads);
+    }
+
+    /// Shows how many persons were in the zones (each by its name) of a calibration's latest frame.
+    /// A thousand zones are shown, further ones are not.
+    pub fn show_zones<'a>(
+        &self,
+        calibration: &str,
+        zones: impl IntoIterator<Item = (&'a str, usize)>,
+    ) {
+        let mut shown = self.one_scrape();
+        for (zone, persons) in zones {
+            let row = (calibration.to_owned(), zone.to_owned());
+            if shown.zones.len() < MAX_ZONE_ROWS || shown.zones.contains(&row) {
+                let gauge = self.zone_persons.with_label_values(&[calibration, zone]);
+                gauge.set(count(persons));
+                shown.zones.insert(row);
+            }
+        }
+    }
+
+    /// Shows those zones no more that are not `there`, by calibration and name.
+    pub fn retain_zones(&self, there: impl Fn(&str, &str) -> bool) {
+        let mut shown = self.one_scrape();
+        shown.zones.retain(|(calibration, zone)| {
+            let stays = there(calibration, zone);
+            if !stays {
+                // It was there, so it can be removed.
+                let _ = self.zone_persons.remove_label_values(&[calibration, zone]);
+            }
+            stays
+        });
     }
 
     /// Shows how many rigs of how many bytes are in memory, and how many were built and evicted
@@ -305,6 +344,35 @@ mod tests {
                 "lookdown_model_info{model=\"b\",revision=\"1\"} 1",
             ]
         );
+    }
+
+    #[test]
+    fn zones_are_shown_until_they_are_gone_and_no_more_than_a_thousand() {
+        let metrics = Metrics::new().unwrap();
+        let shown = || {
+            let text = metrics.render().unwrap();
+            let rows = text.lines().map(str::to_owned);
+            let rows = rows.filter(|line| line.starts_with("lookdown_zone_persons"));
+            rows.collect::<Vec<_>>()
+        };
+        assert!(shown().is_empty());
+        metrics.show_zones("lobby", [("door", 2), ("till", 0)]);
+        metrics.show_zones("lobby", [("door", 1), ("till", 3)]);
+        let (door, till) = (
+            "lookdown_zone_persons{calibration=\"lobby\",zone=\"door\"} 1",
+            "lookdown_zone_persons{calibration=\"lobby\",zone=\"till\"} 3",
+        );
+        assert_eq!(shown(), [door, till]);
+        metrics.retain_zones(|_, zone| zone != "door");
+        assert_eq!(shown(), [till]);
+        for calibration in 0..100 {
+            let names: Vec<_> = (0..20).map(|zone| zone.to_string()).collect();
+            metrics.show_zones(
+                &calibration.to_string(),
+                names.iter().map(|name| (name.as_str(), 1)),
+            );
+        }
+        assert_eq!(shown().len(), MAX_ZONE_ROWS);
     }
 
     #[test]

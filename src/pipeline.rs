@@ -31,7 +31,9 @@ pub use network::BatchOptions;
 pub use parameters::{DetectParameters, ParameterError, ParameterFault};
 pub use planned_views::{PlannedView, PlannedViews};
 pub use profile::Profile;
-pub use report::{CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts};
+pub use report::{
+    CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts, ZoneCount,
+};
 pub use rig_cache::RigCacheUse;
 pub use ticket::{Priority, Ticket};
 pub use timeline::{Stage, StageSpan, Timeline};

@@ -114,6 +114,8 @@ pub struct CalibrationSettings {
     pub poll_seconds: Option<NonZeroU64>,
     /// Whether calibrations can be changed over HTTP.
     pub writable: bool,
+    /// Whether the persons in each zone are shown as a metric.
+    pub zone_metrics: bool,
     /// Most memory that the tables of cameras may hold, bytes.
     pub cache_bytes: usize,
 }

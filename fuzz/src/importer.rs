@@ -73,6 +73,8 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
         image: NativeImage { width, height },
         lens: camera.lens.clone(),
         mount: camera.mount,
+        zones: camera.zones.clone(),
+        masks: camera.masks.clone(),
     });
     let Ok(Exported { content, .. }) = written else {
         return;
@@ -96,7 +98,12 @@ fn look_through(calibration: &Calibration) {
     assert!(calibration.doubts().len() < 10);
     // Half the size, as smaller frames of the same camera are.
     let halved = calibration.for_frame(width.div_ceil(2), height.div_ceil(2));
-    let halved = halved.ok().map(|geometry| geometry.lens);
+    let halved = halved.ok().map(|geometry| {
+        for mask in &geometry.areas.masks {
+            assert!(mask.corners().iter().all(|corner| corner.x.is_finite()));
+        }
+        geometry.lens
+    });
     for lens in std::iter::once(calibration.lens()).chain(&halved) {
         for (x, y) in PLACES.iter().flat_map(|x| PLACES.map(|y| (*x, y))) {
             let pixel = Pixel::new(x * f64::from(width), y * f64::from(height));

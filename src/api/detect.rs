@@ -100,6 +100,11 @@ pub(super) async fn detect_persons(
         outcome.map_err(|_| timed_out(limit, limit.at() < server_limit.at()))??;
     describe(&trace, &report);
     record(&state.metrics, &report);
+    if state.options.zone_metrics {
+        let zones = report.zones.iter();
+        let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
+        state.metrics.show_zones(&report.calibration.id, zones);
+    }
     let (json, content) = written?;
     let timings = timing_headers(&ReportTimings::from(&report.timings));
     let persons = report.persons.len();

@@ -175,6 +175,7 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     shown.inc_by(withdrawn.saturating_sub(shown.get()));
     show_models(&state);
     show_calibrations(&state);
+    forget_zones(&state);
     let rigs = state.workers.engine().rig_cache_use();
     state
         .metrics
@@ -203,6 +204,18 @@ fn show_models(state: &ApiState) {
     let counts = state.models.load_counts();
     let loads = [("success", counts.succeeded), ("failure", counts.failed)];
     state.metrics.show_models(&rows, &loads);
+}
+
+/// Of the zones, those that their calibrations still have.
+fn forget_zones(state: &ApiState) {
+    state.metrics.retain_zones(|calibration, zone| {
+        let entry = calibration.parse().ok();
+        let entry = entry.and_then(|id| state.calibrations.entry(&id));
+        entry.is_some_and(|entry| {
+            let mut zones = entry.calibration.areas().zones.iter();
+            zones.any(|known| known.name == zone)
+        })
+    });
 }
 
 /// The calibrations as they are at this scrape.

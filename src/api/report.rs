@@ -21,7 +21,7 @@ use utoipa::ToSchema;
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,
         "max_detections": 1000
     },
-    "views": {"inferred": 24, "unchanged": 0, "outside": 0},
+    "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},
         "score": 0.8731,
@@ -30,8 +30,10 @@ use utoipa::ToSchema;
         },
         "bearing": {"azimuth_deg": 349.87, "off_axis_deg": 41.71},
         "floor": {"x_m": 1.873, "y_m": -0.334},
-        "views": 3
+        "views": 3,
+        "zones": ["entrance"]
     }],
+    "zones": [{"name": "entrance", "persons": 1}, {"name": "till", "persons": 0}],
     "timings_ms": {
         "decode": 11.204, "calibrate": 0.015, "queue": 0.061, "remap": 21.377,
         "inference": 580.902, "refine": 0.412, "total": 614.122
@@ -63,6 +65,10 @@ pub struct Report {
     pub views: ReportViews,
     /// Persons, highest score first.
     pub persons: Vec<ReportPerson>,
+    /// How many of them are in each zone of the calibration, in its order; absent when it has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub zones: Option<Vec<ReportZone>>,
     /// Where the time went. The stages are disjoint; together they make the total but for
     /// scheduling gaps.
     pub timings_ms: ReportTimings,
@@ -123,6 +129,17 @@ pub struct ReportViews {
     pub unchanged: usize,
     /// These lie outside the lens image.
     pub outside: usize,
+    /// These see nothing but what the calibration's masks hide.
+    pub masked: usize,
+}
+
+/// A zone of the calibration.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct ReportZone {
+    /// Its name.
+    pub name: String,
+    /// How many persons are in it; one may be in several zones.
+    pub persons: usize,
 }
 
 /// One person.
@@ -141,6 +158,10 @@ pub struct ReportPerson {
     pub floor: Option<ReportFloor>,
     /// How many views agreed.
     pub views: usize,
+    /// The names of the zones that the person's foot is in; absent when the calibration has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub zones: Option<Vec<String>>,
 }
 
 /// Corner-origin frame pixels: a full frame is 0, 0, width, height.

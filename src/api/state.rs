@@ -25,6 +25,8 @@ pub struct ApiOptions {
     pub max_header_bytes: usize,
     /// Most headers of a request.
     pub max_headers: usize,
+    /// Whether the persons in each zone are shown as a metric.
+    pub zone_metrics: bool,
     /// Whether metrics are on a port of their own, and not among the other routes.
     pub metrics_elsewhere: bool,
     /// Longest a request may take, from its first byte to its answer.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{CalibrationError, CalibrationId, file};
+use super::{Areas, CalibrationError, CalibrationId, file};
 use crate::{
     geometry::{Lens, Mount, Pixel},
     revision::revision_of,
@@ -20,6 +20,7 @@ pub struct Calibration {
     image_height: u32,
     lens: Lens,
     mount: Mount,
+    areas: Areas,
 }
 
 /// A calibration fitted to the frames at hand.
@@ -29,6 +30,8 @@ pub struct CameraGeometry {
     pub lens: Lens,
     /// How the camera hangs.
     pub mount: Mount,
+    /// Its zones and masks, in pixels of the frame.
+    pub areas: Areas,
 }
 
 /// A frame of another aspect than its calibration.
@@ -64,7 +67,13 @@ impl Calibration {
             image_height,
             lens,
             mount,
+            areas: Areas::default(),
         }
+    }
+
+    /// The calibration with these zones and masks, in pixels of frames of its size.
+    pub(super) fn with_areas(self, areas: Areas) -> Self {
+        Self { areas, ..self }
     }
 
     /// The calibration's ID.
@@ -97,6 +106,12 @@ impl Calibration {
         &self.mount
     }
 
+    /// Its zones and masks, in pixels of frames of [`Calibration::image_size`].
+    #[must_use]
+    pub fn areas(&self) -> &Areas {
+        &self.areas
+    }
+
     /// The camera for frames of `width` × `height` pixels.
     ///
     /// # Errors
@@ -114,6 +129,7 @@ impl Calibration {
         Ok(CameraGeometry {
             lens: self.lens.scaled(scale_x, scale_y),
             mount: self.mount,
+            areas: self.areas.scaled(scale_x, scale_y),
         })
     }
 

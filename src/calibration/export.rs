@@ -123,6 +123,17 @@ impl Target {
                 self.name()
             ));
         }
+        for (areas, count) in [
+            ("zones", calibration.zones.len()),
+            ("masks", calibration.masks.len()),
+        ] {
+            if count > 0 {
+                lost.push(format!(
+                    "{} has no {areas}: those of the calibration ({count}) are left out",
+                    self.name()
+                ));
+            }
+        }
         lost
     }
 }

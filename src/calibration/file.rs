@@ -5,7 +5,7 @@ use std::{io::Read, path::Path};
 use nalgebra::{Unit, Vector3};
 
 use super::{
-    Calibration, CalibrationError, CalibrationId,
+    Areas, Calibration, CalibrationError, CalibrationId,
     formats::{CalibrationFile, Camera, FileCamera, Format, FormatError},
     native::{NativeImage, NativeMount},
     plausibility,
@@ -114,7 +114,9 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
     let lens = camera.lens.clone().into_lens();
     let lens = lens.map_err(|error| invalid("lens", error.to_string()))?;
     let mount = mount(&camera.mount).map_err(|problem| invalid("mount", problem))?;
-    let whole = Calibration::new(id, content, width, height, lens, mount);
+    let image = NativeImage { width, height };
+    let areas = Areas::checked(&camera.zones, &camera.masks, image, &mount)?;
+    let whole = Calibration::new(id, content, width, height, lens, mount).with_areas(areas);
     let within_frame = whole.clone().limited_to_image();
     plausibility::check(whole.lens(), width, height, within_frame.lens().max_theta())
         .map_err(|problem| invalid("lens", problem))?;

@@ -38,7 +38,7 @@ use self::{
     fields::Fields,
     recognise::{recognise_lines, recognise_tree},
 };
-use super::native::{NativeImage, NativeLens, NativeMount};
+use super::native::{NativeImage, NativeLens, NativeMask, NativeMount, NativeZone};
 
 /// Most cameras taken from one file.
 const MAX_CAMERAS: usize = 256;
@@ -70,6 +70,10 @@ pub struct Camera {
     pub lens: NativeLens,
     /// How it hangs; only native files tell, others mean straight down.
     pub mount: NativeMount,
+    /// Its zones; only native files have some.
+    pub zones: Vec<NativeZone>,
+    /// Its masks; only native files have some.
+    pub masks: Vec<NativeMask>,
     /// What had to be assumed, a sentence each.
     pub notes: Vec<String>,
 }
@@ -80,6 +84,8 @@ impl Camera {
             image,
             lens,
             mount: NativeMount::default(),
+            zones: Vec::new(),
+            masks: Vec::new(),
             notes: Vec::new(),
         }
     }

@@ -1,11 +1,14 @@
 //! The shape of the native calibration file, before its values are checked: what is read, and what
 //! other formats are turned into. Writing one gives a file that reads back as the same camera.
 
+mod areas;
 mod read_lens;
 
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+
+pub use areas::{NativeMask, NativeZone};
 
 /// A whole calibration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,6 +23,12 @@ pub struct NativeCalibration {
     /// How the camera hangs; straight down unless said otherwise.
     #[serde(default)]
     pub mount: NativeMount,
+    /// Areas that persons are counted in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zones: Vec<NativeZone>,
+    /// Areas that nobody looks at.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masks: Vec<NativeMask>,
 }
 
 /// A frame size.

@@ -1,12 +1,14 @@
 //! Camera rigs: a camera's geometry with the views of a plan and their remap tables, immutable
 //! and shared by every frame of that camera.
 
+use std::sync::Arc;
+
 use super::planned_views::view_outline;
 use crate::{
     calibration::CameraGeometry,
     detection::{BBox, FramePixels, ViewPixels},
     geometry::{BackProjection, Footprint, Pixel, Ray, ViewPlan, VirtualView},
-    imaging::{Frame, Letterbox, NetworkInput, RemapTable},
+    imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable},
 };
 
 /// A camera ready for frames of one size.
@@ -14,8 +16,10 @@ use crate::{
 pub(super) struct CameraRig {
     geometry: CameraGeometry,
     frame: BBox<FramePixels>,
+    masked: Arc<MaskedPixels>,
     views: Views,
     views_outside: usize,
+    views_masked: usize,
 }
 
 /// How the frame reaches the network.
@@ -29,7 +33,7 @@ enum Views {
 
 impl CameraRig {
     /// Tabulates the views of `plan` (without one, the frame is seen as it is). Views that see
-    /// nothing of the lens image are left out.
+    /// nothing of the lens image, or nothing beside its masks, are left out.
     pub(super) fn new(
         geometry: CameraGeometry,
         frame_width: u32,
@@ -37,16 +41,20 @@ impl CameraRig {
         plan: Option<&ViewPlan>,
         input: &NetworkInput,
     ) -> Self {
+        let masks = &geometry.areas.masks;
+        let masked = Arc::new(MaskedPixels::new(masks, frame_width, frame_height));
         let Some(plan) = plan else {
             return Self {
                 geometry,
                 frame: BBox::of_frame(frame_width, frame_height),
+                masked,
                 views: Views::Direct(Letterbox::new(frame_width, frame_height, input)),
                 views_outside: 0,
+                views_masked: 0,
             };
         };
         let views = plan.views(&geometry.mount, input.width, input.height);
-        Self::of_views(geometry, views, frame_width, frame_height)
+        Self::of_views(geometry, masked, views, frame_width, frame_height)
     }
 
     /// The same camera with other views.
@@ -56,12 +64,14 @@ impl CameraRig {
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
-        Self::of_views(self.geometry.clone(), views, frame_width, frame_height)
+        let (geometry, masked) = (self.geometry.clone(), Arc::clone(&self.masked));
+        Self::of_views(geometry, masked, views, frame_width, frame_height)
     }
 
     /// Views with their tables, without those that see nothing.
     fn of_views(
         geometry: CameraGeometry,
+        masked: Arc<MaskedPixels>,
         views: Vec<VirtualView>,
         frame_width: u32,
         frame_height: u32,
@@ -69,14 +79,25 @@ impl CameraRig {
         let planned = views.len();
         let tables = RemapTable::of_views(&views, &geometry.lens, frame_width, frame_height);
         let tabulated = views.into_iter().zip(tables);
-        let seeing = tabulated.filter(|(_, table)| table.sees_anything());
-        let seeing: Vec<_> = seeing.collect();
+        let within = tabulated.filter(|(_, table)| table.sees_anything());
+        let mut views: Vec<_> = within.collect();
+        let views_outside = planned - views.len();
+        if !masked.is_empty() {
+            views.retain(|(_, table)| table.sees_beside(&masked));
+        }
         Self {
             geometry,
             frame: BBox::of_frame(frame_width, frame_height),
-            views_outside: planned - seeing.len(),
-            views: Views::Virtual(seeing),
+            masked,
+            views_outside,
+            views_masked: planned - views_outside - views.len(),
+            views: Views::Virtual(views),
         }
+    }
+
+    /// Blanks what the camera's masks hide; nothing else may see the frame before.
+    pub(super) fn blank(&self, frame: &mut Frame) {
+        self.masked.blank(frame);
     }
 
     /// Lens and mount.
@@ -102,6 +123,11 @@ impl CameraRig {
         self.views_outside
     }
 
+    /// How many of the planned views see nothing of it beside what is masked.
+    pub(super) fn views_masked(&self) -> usize {
+        self.views_masked
+    }
+
     /// The borders of the views, corner-origin frame pixels.
     pub(super) fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let Views::Virtual(views) = &self.views else {
@@ -112,12 +138,13 @@ impl CameraRig {
         outlines.collect()
     }
 
-    /// Memory held by the tables, bytes; what several of them share counts once.
+    /// Memory held by the tables and masks, bytes; what several of them share counts once.
     pub(super) fn bytes(&self) -> usize {
-        match &self.views {
+        let tables = match &self.views {
             Views::Virtual(views) => RemapTable::bytes(views.iter().map(|(_, table)| table)),
             Views::Direct(_) => 0,
-        }
+        };
+        tables + self.masked.bytes()
     }
 
     /// Renders one view into its slot `[3, height, width]` of the network's input, on the calling

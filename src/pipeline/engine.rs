@@ -14,7 +14,7 @@ use super::{
     BatchOptions, DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person,
     PipelineError, Profile, Stage, StageTimings, merge,
     network::Network,
-    report::ModelUsed,
+    report::{ModelUsed, ZoneCount},
     rig_cache::RigCache,
     still_views::{CameraViews, StillViews},
 };
@@ -107,6 +107,7 @@ impl Engine {
         let persons = self.persons(&observation, &parameters.refinement);
         timeline.leave(Instant::now());
         let views = observation.view_counts();
+        let zones = ZoneCount::of(&observation.camera.rig.geometry().areas.zones, &persons);
         let calibration = observation.camera.used;
         let report = DetectionReport {
             request_id: job.request_id.clone(),
@@ -126,6 +127,7 @@ impl Engine {
             profile: parameters.profile,
             refinement: parameters.refinement,
             persons,
+            zones,
             views,
             batch_count: observation.batch_count,
             non_finite: observation.non_finite,
@@ -155,7 +157,7 @@ impl Engine {
         timeline.enter(Stage::Decode, Instant::now());
         let model = self.model(&job.parameters)?;
         let decoded = decode(&job.image, &self.options.decode_limits)?;
-        let frame = Arc::new(decoded.frame);
+        let mut frame = decoded.frame;
         check_size(&frame)?;
         timeline.enter(Stage::Calibrate, Instant::now());
 
@@ -168,6 +170,7 @@ impl Engine {
             );
         }
         let camera = self.camera(job, &frame, &model, &mut warnings)?;
+        camera.rig.blank(&mut frame);
         timeline.enter(Stage::Queue, Instant::now());
 
         let mut observation = Observation {
@@ -177,7 +180,7 @@ impl Engine {
             batch_count: 0,
             non_finite: 0,
             timeline: timeline.clone(),
-            frame,
+            frame: Arc::new(frame),
             camera,
             model,
             warnings,
@@ -250,5 +253,7 @@ fn check_size(frame: &Frame) -> Result<(), PipelineError> {
     Ok(())
 }
 
+#[cfg(test)]
+mod area_tests;
 #[cfg(test)]
 mod tests;

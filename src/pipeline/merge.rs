@@ -197,13 +197,16 @@ fn person(
     let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
     views.sort_unstable();
     views.dedup();
+    let foot = oriented_box.foot();
+    let floor = floor_position(foot, &geometry.lens, &geometry.mount);
     Some(Person {
         bbox,
         score,
         oriented_box,
         bearing: bearing(center, &geometry.lens),
-        floor: floor_position(oriented_box.foot(), &geometry.lens, &geometry.mount),
+        floor,
         views: views.len(),
+        zones: Person::zones_of(&geometry.areas.zones, foot, floor),
     })
 }
 

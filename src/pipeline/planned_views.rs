@@ -8,6 +8,7 @@ use crate::{
         pixels::{PixelConvention, cross_half_pixel},
         view_plan::Coverage,
     },
+    imaging::MaskedPixels,
 };
 
 /// Steps along each side of a view between the rays that decide whether it sees the lens image.
@@ -26,7 +27,7 @@ pub struct PlannedViews {
     pub image_width: u32,
     /// Height of the frames that outlines are in, pixels.
     pub image_height: u32,
-    /// The views that see some of the lens image, in plan order; none for [`Profile::Direct`].
+    /// The views that see some of the lens image beside its masks, in plan order; none for [`Profile::Direct`].
     pub views: Vec<PlannedView>,
     /// Share of the lens image that lies in at least one view, 0 to 1.
     pub seen_share: f64,
@@ -65,10 +66,12 @@ impl Engine {
         let (model, options) = (self.default_model(profile)?, self.options());
         let input = model.input();
         let (lens, (image_width, image_height)) = (calibration.lens(), calibration.image_size());
+        let masks = &calibration.areas().masks;
+        let masked = MaskedPixels::new(masks, image_width, image_height);
         let plan = profile.view_plan(options.paper_field_of_view);
         let views = plan.as_ref().map(|plan| {
             let mut views = plan.views(calibration.mount(), input.width, input.height);
-            views.retain(|view| sees(view, lens));
+            views.retain(|view| sees(view, lens, &masked));
             views
         });
         let coverage = views
@@ -98,14 +101,15 @@ impl Engine {
     }
 }
 
-/// Whether some of the lens image is in the view.
-fn sees(view: &VirtualView, lens: &Lens) -> bool {
+/// Whether some of the lens image is in the view that is not masked.
+fn sees(view: &VirtualView, lens: &Lens, masked: &MaskedPixels) -> bool {
     let place =
         |index: u32, side: u32| f64::from(index) / f64::from(SIGHT_STEPS) * f64::from(side) - 0.5;
     (0..=SIGHT_STEPS).any(|row| {
         (0..=SIGHT_STEPS).any(|column| {
             let pixel = Pixel::new(place(column, view.width()), place(row, view.height()));
-            lens.project(&view.ray_in_camera(&pixel)).is_some()
+            let seen = lens.project(&view.ray_in_camera(&pixel));
+            seen.is_some_and(|pixel| !masked.hides_position(pixel))
         })
     })
 }

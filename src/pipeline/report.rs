@@ -8,7 +8,7 @@ use super::Profile;
 use crate::{
     detection::{BBox, FramePixels, RefinementParameters},
     geometry::{
-        OrientedBox,
+        OrientedBox, Pixel, Zone,
         floor::{Bearing, FloorPosition},
     },
 };
@@ -38,6 +38,8 @@ pub struct DetectionReport {
     pub refinement: RefinementParameters,
     /// Persons, highest score first.
     pub persons: Vec<Person>,
+    /// How many of them are in each zone of the calibration, in its order.
+    pub zones: Vec<ZoneCount>,
     /// What became of the views.
     pub views: ViewCounts,
     /// In how many batches it saw them.
@@ -59,6 +61,8 @@ pub struct ViewCounts {
     pub unchanged: usize,
     /// These lie outside the lens image, where nothing can be seen.
     pub outside: usize,
+    /// These see nothing but what the camera's masks hide.
+    pub masked: usize,
 }
 
 /// Which calibration a report is based on.
@@ -70,6 +74,29 @@ pub struct CalibrationUsed {
     pub revision: String,
     /// Whether the lens was assumed from the circle found in the frame.
     pub assumed: bool,
+}
+
+/// How many persons are in a zone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ZoneCount {
+    /// The zone's name.
+    pub name: String,
+    /// Who is in it; one person may be in several.
+    pub persons: usize,
+}
+
+impl ZoneCount {
+    /// Counts who is in each zone.
+    pub(super) fn of(zones: &[Zone], persons: &[Person]) -> Vec<Self> {
+        let count = |zone: &Zone| Self {
+            name: zone.name.clone(),
+            persons: persons
+                .iter()
+                .filter(|person| person.zones.iter().flatten().any(|name| *name == zone.name))
+                .count(),
+        };
+        zones.iter().map(count).collect()
+    }
 }
 
 /// Which detector a report is based on.
@@ -96,6 +123,22 @@ pub struct Person {
     pub floor: Option<FloorPosition>,
     /// How many views agreed.
     pub views: usize,
+    /// The names of the zones that the person's foot is in; `None` when the calibration has none.
+    pub zones: Option<Vec<String>>,
+}
+
+impl Person {
+    /// The names of those `zones` that hold a foot seen at `foot`, which is `floor`; `None` when
+    /// there are no zones.
+    pub(super) fn zones_of(
+        zones: &[Zone],
+        foot: Pixel,
+        floor: Option<FloorPosition>,
+    ) -> Option<Vec<String>> {
+        let holding = zones.iter().filter(|zone| zone.holds(foot, floor));
+        let names = holding.map(|zone| zone.name.clone());
+        (!zones.is_empty()).then(|| names.collect())
+    }
 }
 
 /// Disjoint wall-clock spans of one frame; together they make `total` but for scheduling gaps.

@@ -62,6 +62,7 @@ impl TryFrom<RawSettings> for Settings {
                     raw.calibrations.poll_seconds,
                 )?,
                 writable: raw.calibrations.writable,
+                zone_metrics: raw.calibrations.zone_metrics,
                 cache_bytes: size(
                     "calibrations.cache_bytes",
                     raw.calibrations.cache_bytes,

@@ -80,6 +80,7 @@ pub(super) struct RawCalibrations {
     pub(super) path: String,
     pub(super) poll_seconds: u64,
     pub(super) writable: bool,
+    pub(super) zone_metrics: bool,
     pub(super) cache_bytes: u64,
 }
 
@@ -89,6 +90,7 @@ impl Default for RawCalibrations {
             path: locate::DEFAULT_CALIBRATIONS.to_owned(),
             poll_seconds: 2,
             writable: true,
+            zone_metrics: false,
             cache_bytes: 1024 * MEBIBYTE,
         }
     }

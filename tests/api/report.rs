@@ -12,6 +12,7 @@ use lookdown::{
     },
     pipeline::{
         CalibrationUsed, DetectionReport, ModelUsed, Person, Profile, StageTimings, ViewCounts,
+        ZoneCount,
     },
 };
 
@@ -35,6 +36,7 @@ fn person() -> Person {
             y_m: -0.000_1,
         }),
         views: 3,
+        zones: Some(vec!["entrance".to_owned()]),
     }
 }
 
@@ -42,6 +44,7 @@ fn report() -> DetectionReport {
     let unknown_place = Person {
         bearing: None,
         floor: None,
+        zones: Some(Vec::new()),
         ..person()
     };
     let micros = Duration::from_micros;
@@ -70,10 +73,15 @@ fn report() -> DetectionReport {
             max_detections: 1000,
         },
         persons: vec![person(), unknown_place],
+        zones: vec![ZoneCount {
+            name: "entrance".to_owned(),
+            persons: 1,
+        }],
         views: ViewCounts {
             inferred: 20,
             unchanged: 4,
             outside: 1,
+            masked: 2,
         },
         batch_count: 3,
         non_finite: 0,

@@ -57,6 +57,7 @@ pub(crate) struct Bounds {
     pub(crate) min_upload_bytes_per_second: Option<NonZeroU64>,
     pub(crate) request_rate: Option<RequestRate>,
     pub(crate) results: ResultLimits,
+    pub(crate) zone_metrics: bool,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
     pub(crate) tracer: Tracer,
@@ -72,6 +73,7 @@ impl Default for Bounds {
             min_upload_bytes_per_second: NonZeroU64::new(1024),
             request_rate: None,
             results: ResultLimits::default(),
+            zone_metrics: false,
             access: Access::Open {
                 own_machine_only: true,
             },
@@ -215,6 +217,7 @@ impl Service {
                 max_upload_bytes: bounds.max_upload_bytes,
                 max_header_bytes: 4096,
                 max_headers: 32,
+                zone_metrics: bounds.zone_metrics,
                 metrics_elsewhere: false,
                 request_timeout: bounds.request_timeout,
                 min_upload_bytes_per_second: bounds.min_upload_bytes_per_second,

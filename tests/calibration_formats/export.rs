@@ -148,6 +148,8 @@ fn a_native_file_keeps_everything() {
         image: told.image.unwrap(),
         lens: told.lens,
         mount: told.mount,
+        zones: told.zones,
+        masks: told.masks,
     };
     let written = Target::Native.write(&native).unwrap().content;
     let file = CalibrationFile::parse(written.as_bytes()).unwrap();

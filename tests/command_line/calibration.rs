@@ -143,3 +143,37 @@ fn a_preview_shows_the_lens_in_the_frame() {
         "{red} {green} {blue}"
     );
 }
+
+#[test]
+fn zones_and_masks_are_told_and_shown_in_the_preview() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, out] = ["office.json", "preview.jpg"].map(|name| {
+        let path = folder.path().join(name);
+        path.to_str().unwrap().to_owned()
+    });
+    let office = std::fs::read_to_string("samples/calibrations/office.json").unwrap();
+    let areas = r#""zones": [{"name": "desk", "frame_px": [[300, 300], [600, 300], [600, 600]]},
+                             {"name": "below", "floor_m": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}],
+                   "masks": [{"frame_px": [[0, 0], [960, 0], [960, 240], [0, 240]]}],"#;
+    std::fs::write(&file, office.replacen('{', &format!("{{{areas}"), 1)).unwrap();
+    let preview = ["--preview", "samples/office.jpg", "--out", &out];
+    let output = lookdown(
+        &[&["calibration", "check", &file][..], &preview].concat(),
+        &[],
+    );
+    let report = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "  zones      desk (in the frame), below (on the floor)\n",
+        "  masks      1, which hide 25.0 % of the frame\n",
+    ] {
+        assert!(report.contains(line), "{report}");
+    }
+    let limits = lookdown::imaging::decode::DecodeLimits::default();
+    let picture = lookdown::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
+    let picture = picture.unwrap().frame;
+    // Between the rings and lines that are drawn into the frame it is black.
+    let black = (0..240)
+        .flat_map(|y| (0..960).map(move |x| (x, y)))
+        .filter(|&(x, y)| picture.pixel(x, y).iter().all(|&value| value < 30));
+    assert!(black.count() > 100_000);
+}

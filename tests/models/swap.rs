@@ -74,6 +74,7 @@ fn service(folder: &Path) -> Router {
         max_upload_bytes: 1 << 27,
         max_header_bytes: 1 << 14,
         max_headers: 100,
+        zone_metrics: false,
         metrics_elsewhere: false,
         request_timeout: Duration::from_mins(2),
         min_upload_bytes_per_second: None,

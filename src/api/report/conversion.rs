@@ -2,7 +2,7 @@
 
 use super::{
     Report, ReportBearing, ReportBox, ReportCalibration, ReportFloor, ReportImage, ReportModel,
-    ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews,
+    ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews, ReportZone,
     rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
 };
 use crate::pipeline::{self, DetectionReport};
@@ -40,8 +40,13 @@ impl From<&DetectionReport> for Report {
                 inferred: report.views.inferred,
                 unchanged: report.views.unchanged,
                 outside: report.views.outside,
+                masked: report.views.masked,
             },
             persons: report.persons.iter().map(ReportPerson::from).collect(),
+            zones: (!report.zones.is_empty()).then(|| {
+                let zones = report.zones.iter();
+                zones.map(ReportZone::from).collect()
+            }),
             timings_ms: ReportTimings::from(&report.timings),
             warnings: report.warnings.clone(),
         }
@@ -76,6 +81,16 @@ impl From<&pipeline::Person> for ReportPerson {
                 y_m: metres(floor.y_m),
             }),
             views: person.views,
+            zones: person.zones.clone(),
+        }
+    }
+}
+
+impl From<&pipeline::ZoneCount> for ReportZone {
+    fn from(zone: &pipeline::ZoneCount) -> Self {
+        Self {
+            name: zone.name.clone(),
+            persons: zone.persons,
         }
     }
 }

@@ -65,6 +65,8 @@ fn entry(
             image: NativeImage { width, height },
             lens: told.lens,
             mount: told.mount,
+            zones: told.zones,
+            masks: told.masks,
         },
         notes: told.notes,
         calibration: Arc::new(calibration),

@@ -1,4 +1,5 @@
-//! The native format, in JSON, YAML or TOML: the only one that tells an ID and a mount.
+//! The native format, in JSON, YAML or TOML: the only one that tells an ID, a mount,
+//! zones and masks.
 
 use super::{
     CalibrationFile, Camera, FileCamera, Format, FormatError,
@@ -24,6 +25,8 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
                 image: Some(file.image),
                 lens: file.lens,
                 mount: file.mount,
+                zones: file.zones,
+                masks: file.masks,
                 notes: Vec::new(),
             }),
         }],

@@ -15,9 +15,12 @@ use super::{
     source::{NamedCamera, Source},
 };
 use crate::{
-    calibration::Calibration,
-    geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, view_plan::Coverage},
-    imaging::annotate::{encode_jpeg, sketch_lens},
+    calibration::{Areas, Calibration, CameraGeometry},
+    geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
+    imaging::{
+        MaskedPixels,
+        annotate::{encode_jpeg, sketch_areas, sketch_lens},
+    },
 };
 
 /// The views of the plan are as fine as the default network's input, pixels.
@@ -29,7 +32,7 @@ const JPEG_QUALITY: u8 = 92;
 pub(in super::super) struct Arguments {
     #[command(flatten)]
     source: Source,
-    /// Draw the lens and the balanced view plan into this frame of the camera
+    /// Draw the lens, the balanced view plan, zones and masks into this frame of the camera
     #[arg(long, value_name = "FRAME", requires = "out")]
     preview: Option<PathBuf>,
     /// Where to write the drawing, a JPEG file
@@ -110,6 +113,7 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
             ),
         ),
     ];
+    lines.extend(areas(calibration));
     let notes = told.into_iter().flat_map(|told| told.notes.iter().cloned());
     lines.extend(notes.map(|note| ("  note", note)));
     lines.extend(
@@ -169,6 +173,26 @@ fn mount(calibration: &Calibration) -> String {
     }
 }
 
+/// The zones and masks, if there are some.
+fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, String)> {
+    let Areas { zones, masks } = calibration.areas();
+    let names = zones.iter().map(|zone| match zone.area {
+        ZoneArea::Frame(_) => format!("{} (in the frame)", zone.name),
+        ZoneArea::Floor(_) => format!("{} (on the floor)", zone.name),
+    });
+    let names: Vec<_> = names.collect();
+    let zones = (!names.is_empty()).then(|| ("  zones", names.join(", ")));
+    let masks = (!masks.is_empty()).then(|| {
+        let (width, height) = calibration.image_size();
+        let hidden = MaskedPixels::new(masks, width, height).count();
+        #[expect(clippy::cast_precision_loss, reason = "pixels of a frame")]
+        let percent = 100.0 * hidden as f64 / (f64::from(width) * f64::from(height));
+        let text = format!("{}, which hide {percent:.1} % of the frame", masks.len());
+        ("  masks", text)
+    });
+    zones.into_iter().chain(masks)
+}
+
 fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<()> {
     let mut picture =
         read_frame(frame).with_context(|| format!("--preview: {}", frame.display()))?;
@@ -180,7 +204,9 @@ fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<(
              {calibrated_width}×{calibrated_height} of the calibration: give a frame of its camera"
         );
     };
-    sketch_lens(&mut picture, &geometry.lens, &views(calibration));
+    let CameraGeometry { lens, mount, areas } = &geometry;
+    sketch_areas(&mut picture, &areas.zones, &areas.masks, lens, mount);
+    sketch_lens(&mut picture, lens, &views(calibration));
     fs::write(out, encode_jpeg(&picture, JPEG_QUALITY)?)
         .with_context(|| format!("--out: {} cannot be written", out.display()))
 }

@@ -50,6 +50,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         image: NativeImage { width, height },
         lens: told.lens,
         mount: told.mount,
+        zones: told.zones,
+        masks: told.masks,
     })?;
     for note in told.notes.iter().chain(&exported.lost) {
         eprintln!("lookdown: {path}: {note}");

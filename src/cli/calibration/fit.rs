@@ -144,6 +144,8 @@ fn calibration(
             height_m: arguments.height,
             ..NativeMount::default()
         },
+        zones: Vec::new(),
+        masks: Vec::new(),
     })
 }
 

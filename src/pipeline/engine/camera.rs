@@ -4,7 +4,7 @@ use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 use super::Engine;
 use crate::{
-    calibration::{Calibration, CalibrationId, CameraGeometry},
+    calibration::{Areas, Calibration, CalibrationId, CameraGeometry},
     geometry::{Lens, Mount},
     imaging::{
         Frame, NetworkInput,
@@ -119,6 +119,7 @@ impl Engine {
         let geometry = CameraGeometry {
             lens,
             mount: Mount::default(),
+            areas: Areas::default(),
         };
         let used = CalibrationUsed {
             id: "assumed".to_owned(),

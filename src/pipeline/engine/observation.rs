@@ -42,6 +42,7 @@ impl Observation {
             inferred: self.view_count() - self.still_views,
             unchanged: self.still_views,
             outside: self.camera.rig.views_outside(),
+            masked: self.camera.rig.views_masked(),
         }
     }
 

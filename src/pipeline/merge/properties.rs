@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    calibration::CameraGeometry,
+    calibration::{Areas, CameraGeometry},
     geometry::{FieldOfViewReading, Lens, Mount},
     inference::{Model, ViewDetection},
     pipeline::{Profile, test_support::BlobDetector},
@@ -31,6 +31,7 @@ static LOOKS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(||
             let geometry = CameraGeometry {
                 lens: Lens::equidistant_circle(159.5, 119.5, radius, 1.57).unwrap(),
                 mount: Mount::new(up, Some(2.8)),
+                areas: Areas::default(),
             };
             let plan = profile.view_plan(FieldOfViewReading::default());
             let input = BlobDetector::default().input;

@@ -2,7 +2,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use super::*;
 use crate::{
-    calibration::CameraGeometry,
+    calibration::{Areas, CameraGeometry},
     geometry::{FieldOfViewReading, Lens, Mount},
     imaging::NetworkInput,
     inference::{Detector, HeadOutput, InferenceError},
@@ -69,6 +69,7 @@ fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
     let geometry = CameraGeometry {
         lens,
         mount: Mount::default(),
+        areas: Areas::default(),
     };
     let plan = Profile::Fast.view_plan(FieldOfViewReading::Horizontal);
     let rig = CameraRig::new(geometry, 64, 64, plan.as_ref(), &input);

@@ -1,6 +1,6 @@
 use super::*;
 use crate::{
-    calibration::CameraGeometry,
+    calibration::{Areas, CameraGeometry},
     geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
     imaging::NetworkInput,
 };
@@ -22,6 +22,7 @@ fn geometry() -> CameraGeometry {
     CameraGeometry {
         lens: Lens::equidistant_circle(31.5, 31.5, 32.0, 1.5).unwrap(),
         mount: Mount::default(),
+        areas: Areas::default(),
     }
 }
 

@@ -1,0 +1,150 @@
+//! The zones and masks of a calibration, checked.
+
+use std::collections::BTreeSet;
+
+use super::{
+    FormatError,
+    native::{NativeImage, NativeMask, NativeZone},
+};
+use crate::geometry::{Mount, Polygon, Zone, ZoneArea};
+
+/// Most zones of a calibration, and most masks.
+const MAX_AREAS: usize = 32;
+const MAX_NAME_CHARS: usize = 64;
+
+/// Areas that somebody has drawn into the frames or onto the floor of a camera.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Areas {
+    /// Where persons are counted; their names differ.
+    pub zones: Vec<Zone>,
+    /// What nobody looks at, corner-origin frame pixels.
+    pub masks: Vec<Polygon>,
+}
+
+impl Areas {
+    /// Checks what a file tells about frames of the size `image` of a camera that hangs as `mount`
+    /// says.
+    pub(super) fn checked(
+        zones: &[NativeZone],
+        masks: &[NativeMask],
+        image: NativeImage,
+        mount: &Mount,
+    ) -> Result<Self, FormatError> {
+        at_most("zones", zones.len())?;
+        at_most("masks", masks.len())?;
+        let mut names = BTreeSet::new();
+        let zones = zones.iter().enumerate().map(|(index, zone)| {
+            let field = format!("zones[{index}]");
+            name(&format!("{field}.name"), &zone.name)?;
+            if !names.insert(&zone.name) {
+                let problem = format!("another zone is called {:?}, too: rename one", zone.name);
+                return Err(FormatError::invalid(format!("{field}.name"), problem));
+            }
+            Ok(Zone {
+                name: zone.name.clone(),
+                area: area(&field, zone, image, mount)?,
+            })
+        });
+        let zones = zones.collect::<Result<_, _>>()?;
+        let masks = masks.iter().enumerate().map(|(index, mask)| {
+            let field = format!("masks[{index}].frame_px");
+            frame_polygon(&field, &mask.frame_px, image)
+        });
+        Ok(Self {
+            zones,
+            masks: masks.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// The same areas in frames `scale_x`, `scale_y` times as large.
+    #[must_use]
+    pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
+        let (zones, masks) = (self.zones.iter(), self.masks.iter());
+        Self {
+            zones: zones.map(|zone| zone.scaled(scale_x, scale_y)).collect(),
+            masks: masks.map(|mask| mask.scaled(scale_x, scale_y)).collect(),
+        }
+    }
+}
+
+fn at_most(field: &str, count: usize) -> Result<(), FormatError> {
+    if count <= MAX_AREAS {
+        return Ok(());
+    }
+    let problem = format!("there are {count}: a calibration may have {MAX_AREAS}");
+    Err(FormatError::invalid(field, problem))
+}
+
+fn name(field: &str, name: &str) -> Result<(), FormatError> {
+    let letter_or_digit = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let is_fine = name.len() <= MAX_NAME_CHARS
+        && name.starts_with(letter_or_digit)
+        && name
+            .chars()
+            .all(|c| letter_or_digit(c) || c == '_' || c == '-');
+    if is_fine {
+        return Ok(());
+    }
+    let shown: String = name.chars().take(MAX_NAME_CHARS).collect();
+    let problem = format!(
+        "it is {shown:?}: use 1 to {MAX_NAME_CHARS} of a-z, 0-9, _ and -, beginning with a letter or \
+         digit"
+    );
+    Err(FormatError::invalid(field, problem))
+}
+
+fn area(
+    field: &str,
+    zone: &NativeZone,
+    image: NativeImage,
+    mount: &Mount,
+) -> Result<ZoneArea, FormatError> {
+    match (&zone.frame_px, &zone.floor_m) {
+        (Some(corners), None) => {
+            let field = format!("{field}.frame_px");
+            Ok(ZoneArea::Frame(frame_polygon(&field, corners, image)?))
+        }
+        (None, Some(corners)) => {
+            let field = format!("{field}.floor_m");
+            if mount.height_m().is_none() {
+                let problem = "where the floor is follows from the camera's height: give \
+                               mount.height_m, or draw the zone in the frame with frame_px";
+                return Err(FormatError::invalid(field, problem));
+            }
+            Ok(ZoneArea::Floor(polygon(&field, corners)?))
+        }
+        (Some(_), Some(_)) => Err(FormatError::invalid(
+            field,
+            "it has both frame_px and floor_m: leave one out, or make two zones",
+        )),
+        (None, None) => Err(FormatError::invalid(
+            field,
+            "it has no corners: give frame_px in pixels of the frame, or floor_m in metres on the \
+             floor",
+        )),
+    }
+}
+
+fn frame_polygon(
+    field: &str,
+    corners: &[[f64; 2]],
+    image: NativeImage,
+) -> Result<Polygon, FormatError> {
+    let NativeImage { width, height } = image;
+    let polygon = polygon(field, corners)?;
+    if polygon.meets(&Polygon::of_frame(width, height)) {
+        return Ok(polygon);
+    }
+    let problem = format!(
+        "it lies wholly outside the frame of {width}×{height} pixels: give pixels of frames of that \
+         size"
+    );
+    Err(FormatError::invalid(field, problem))
+}
+
+fn polygon(field: &str, corners: &[[f64; 2]]) -> Result<Polygon, FormatError> {
+    Polygon::new(corners).map_err(|error| FormatError::invalid(field, error.to_string()))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,26 @@
+//! Zones and masks as they are written. Corners follow each other along the outline; pixels are
+//! corner-origin, of frames of the calibration's own size.
+
+use serde::{Deserialize, Serialize};
+
+/// A named area, in pixels of the frame or in metres on the floor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NativeZone {
+    /// Its name, `[a-z0-9][a-z0-9_-]{0,63}`.
+    pub name: String,
+    /// Corners `[x, y]`, frame pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_px: Option<Vec<[f64; 2]>>,
+    /// Corners `[x, y]`, metres on the floor from the place below the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor_m: Option<Vec<[f64; 2]>>,
+}
+
+/// An area that is blanked before anything looks at a frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NativeMask {
+    /// Corners `[x, y]`, frame pixels.
+    pub frame_px: Vec<[f64; 2]>,
+}

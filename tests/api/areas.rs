@@ -1,0 +1,133 @@
+//! Zones and masks of a calibration over HTTP.
+
+use serde_json::{Value, json};
+
+use crate::service::{Bounds, Service, frame};
+
+/// A calibration `lobby` for the frames of the service with these areas.
+fn lobby(zones: &Value, masks: &Value) -> Value {
+    json!({
+        "id": "lobby", "image": { "width": 200, "height": 200 },
+        "lens": { "model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5,
+            "max_theta": 1.5 },
+        "mount": { "world_up": [0.0, 0.0, -1.0], "height_m": 3.0 },
+        "zones": zones, "masks": masks
+    })
+}
+
+fn zones() -> Value {
+    json!([
+        { "name": "left", "frame_px": [[0.0, 0.0], [100.0, 0.0], [100.0, 200.0], [0.0, 200.0]] },
+        { "name": "right", "frame_px": [[100.0, 0.0], [200.0, 0.0], [200.0, 200.0], [100.0, 200.0]] },
+        { "name": "far", "floor_m": [[50.0, 0.0], [60.0, 0.0], [60.0, 9.5]] }
+    ])
+}
+
+#[tokio::test]
+async fn what_is_put_is_got_again() {
+    let service = Service::start();
+    let masks = json!([{ "frame_px": [[0.0, 0.0], [50.0, 0.0], [0.0, 50.5]] }]);
+    let sent = lobby(&zones(), &masks);
+    let answer = service.put("/calibrations/lobby", &sent.to_string()).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    assert_eq!(service.get("/calibrations/lobby").await.json(), sent);
+}
+
+#[tokio::test]
+async fn a_zone_that_crosses_itself_is_refused_in_a_sentence() {
+    let service = Service::start();
+    let zones = json!([{ "name": "a", "frame_px": [[0, 0], [9, 9], [9, 0], [0, 9]] }]);
+    let sent = lobby(&zones, &json!([]));
+    let answer = service.put("/calibrations/lobby", &sent.to_string()).await;
+    assert_eq!(answer.status, 422);
+    let detail = answer.problem()["detail"].as_str().unwrap().to_owned();
+    assert!(
+        detail.contains("zones[0].frame_px: the edge from corner 1 to 2 meets"),
+        "{detail}"
+    );
+}
+
+#[tokio::test]
+async fn a_report_tells_who_is_in_which_zone_only_where_there_are_some() {
+    let service = Service::start();
+    let report = async || {
+        let answer = service.post_raw("calibration=lobby&profile=fast", frame());
+        answer.await.json()
+    };
+    let without = report().await;
+    assert!(without.get("zones").is_none());
+    assert!(without["persons"][0].get("zones").is_none());
+    let sent = lobby(&zones(), &json!([]));
+    service.put("/calibrations/lobby", &sent.to_string()).await;
+    let with = report().await;
+    let persons = with["persons"].as_array().unwrap();
+    assert!(!persons.is_empty());
+    let counted: Vec<_> = ["left", "right", "far"]
+        .iter()
+        .map(|name| {
+            let is_in = |person: &&Value| {
+                let zones = person["zones"].as_array().unwrap();
+                zones.contains(&json!(name))
+            };
+            json!({ "name": name, "persons": persons.iter().filter(is_in).count() })
+        })
+        .collect();
+    assert_eq!(with["zones"], json!(counted));
+    let [left, right] = [0, 1].map(|zone| with["zones"][zone]["persons"].as_u64().unwrap());
+    assert_eq!(left + right, persons.len() as u64);
+}
+
+#[tokio::test]
+async fn zones_are_a_metric_when_asked_for_and_for_as_long_as_they_are_there() {
+    for zone_metrics in [false, true] {
+        let service = Service::within(&Bounds {
+            zone_metrics,
+            ..Bounds::default()
+        });
+        let shown = async || {
+            let metrics = service.get("/metrics").await.text();
+            let rows = metrics.lines().map(str::to_owned);
+            let rows = rows.filter(|line| line.starts_with("lookdown_zone_persons{"));
+            rows.collect::<Vec<_>>()
+        };
+        let sent = lobby(&zones(), &json!([]));
+        service.put("/calibrations/lobby", &sent.to_string()).await;
+        let query = "calibration=lobby&profile=fast";
+        let report = service.post_raw(query, frame()).await.json();
+        let row = |zone: &Value| {
+            let name = zone["name"].as_str().unwrap();
+            format!(
+                "lookdown_zone_persons{{calibration=\"lobby\",zone=\"{name}\"}} {}",
+                zone["persons"]
+            )
+        };
+        let mut expected: Vec<_> = report["zones"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(row)
+            .collect();
+        expected.sort_unstable();
+        if !zone_metrics {
+            expected.clear();
+        }
+        assert_eq!(shown().await, expected);
+        let sent = lobby(&json!([zones()[0]]), &json!([]));
+        service.put("/calibrations/lobby", &sent.to_string()).await;
+        assert_eq!(shown().await.len(), usize::from(zone_metrics));
+    }
+}
+
+#[tokio::test]
+async fn views_under_a_mask_are_counted_in_the_report_and_left_out_of_the_plan() {
+    let service = Service::start();
+    let masks = json!([{ "frame_px": [[100, 0], [200, 0], [200, 200], [100, 200]] }]);
+    let sent = lobby(&json!([]), &masks);
+    service.put("/calibrations/lobby", &sent.to_string()).await;
+    let report = service.post_raw("calibration=lobby", frame()).await.json();
+    let views = &report["views"];
+    let masked = views["masked"].as_u64().unwrap();
+    assert!(masked > 0, "{views}");
+    let plan = service.get("/calibrations/lobby/views").await.json();
+    assert_eq!(plan["cost"]["pictures"], views["inferred"]);
+}
