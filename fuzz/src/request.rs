@@ -148,6 +148,7 @@ fn router() -> Router {
             max_upload_bytes: 1 << 20,
             max_header_bytes: 1 << 14,
             max_headers: 100,
+            zone_metrics: false,
             metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),
             min_upload_bytes_per_second: None,

@@ -11,7 +11,7 @@ use super::{
     openapi::{FaultProblem, NotReadyProblems},
     problem::Problem,
 };
-use crate::calibration::CalibrationsHealth;
+use crate::calibration::{CalibrationId, CalibrationsHealth};
 
 /// Most broken files told.
 const MAX_PROBLEMS: usize = 100;
@@ -209,7 +209,7 @@ fn show_models(state: &ApiState) {
 /// Of the zones, those that their calibrations still have.
 fn forget_zones(state: &ApiState) {
     state.metrics.retain_zones(|calibration, zone| {
-        let entry = calibration.parse().ok();
+        let entry = calibration.parse::<CalibrationId>().ok();
         let entry = entry.and_then(|id| state.calibrations.entry(&id));
         entry.is_some_and(|entry| {
             let mut zones = entry.calibration.areas().zones.iter();

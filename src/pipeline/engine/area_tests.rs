@@ -22,7 +22,7 @@ fn calibration(areas: &str) -> Arc<Calibration> {
 }
 
 /// What is detected in a frame `scale` times as large with a disc of 20 pixels at `center`, in pixels
-/// of frames of the calibration.s size.
+/// of frames of the calibration's size.
 fn detected(engine: &Engine, areas: &str, profile: &str, scale: u32, center: [f64; 2]) -> Detected {
     let factor = f64::from(scale);
     let image = frame_with_disc(600 * scale, center.map(|at| at * factor), 20.0 * factor);
