@@ -97,7 +97,7 @@ async fn zones_are_a_metric_when_asked_for_and_for_as_long_as_they_are_there() {
         let row = |zone: &Value| {
             let name = zone["name"].as_str().unwrap();
             format!(
-                "lookdown_zone_persons{{calibration=\"lobby\",zone=\"{name}\"}} {}",
+                "lookdown_zone_persons{{zone=\"lobby/{name}\"}} {}",
                 zone["persons"]
             )
         };
