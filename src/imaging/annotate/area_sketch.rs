@@ -3,7 +3,7 @@
 use super::{
     Mark,
     canvas::{Rgb, Stroke},
-    label::Plates,
+    label::Labels,
     line_width,
 };
 use crate::{
@@ -29,7 +29,7 @@ pub fn sketch_areas(
     let width = line_width(frame);
     for mask in masks {
         for [from, to] in mask.edges() {
-            Stroke::new(from.into(), to.into(), width).draw(frame, MASK);
+            Stroke::new(from.into(), to.into(), width).draw(frame, MASK, 1.0);
         }
     }
     let outlines: Vec<_> = zones
@@ -39,16 +39,16 @@ pub fn sketch_areas(
     for (_, outline) in &outlines {
         for pair in outline.windows(2) {
             if let [Some(from), Some(to)] = *pair {
-                Stroke::new(from.into(), to.into(), width).draw(frame, ZONE);
+                Stroke::new(from.into(), to.into(), width).draw(frame, ZONE, 1.0);
             }
         }
     }
-    let mut plates = Plates::new(frame);
-    for (zone, outline) in &outlines {
-        if let Some(mark) = mark(zone, outline.iter().flatten()) {
-            plates.draw(frame, &mark, ZONE);
-        }
-    }
+    let marks: Vec<_> = outlines
+        .iter()
+        .filter_map(|(zone, outline)| mark(zone, outline.iter().flatten()))
+        .collect();
+    let marks: Vec<_> = marks.iter().map(|mark| (mark, ZONE)).collect();
+    Labels::new(frame, &marks, None).draw(frame);
 }
 
 /// The name of a zone at its bounding box; `None` when nothing of it is seen.
@@ -66,6 +66,7 @@ fn mark<'a>(zone: &Zone, outline: impl Iterator<Item = &'a Pixel>) -> Option<Mar
     Some(Mark {
         bbox,
         oriented: None,
+        head: None,
         label: zone.name.clone(),
     })
 }
