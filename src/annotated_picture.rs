@@ -73,9 +73,10 @@ fn drawing(detected: &Detected, options: &PictureOptions) -> Drawing {
         boxes: draws(Layer::Boxes),
         oriented: draws(Layer::Oriented),
         lines: lines.collect(),
-        caption: match draws(Layer::Timestamp) {
-            true => timestamp(report),
-            false => String::new(),
+        caption: if draws(Layer::Timestamp) {
+            timestamp(report)
+        } else {
+            String::new()
         },
     }
 }

@@ -71,33 +71,33 @@ impl<'a> Labels<'a> {
     fn place(&self, mark: &Mark, [width, height]: [f64; 2]) -> Plate {
         let [left, top, right, bottom] = mark.extent();
         let (above, below) = (top - self.gap - height, bottom + self.gap);
-        let (before, behind) = (left - self.gap - width, right + self.gap);
+        let (at_left, at_right) = (left - self.gap - width, right + self.gap);
         let middle = f64::midpoint(top, bottom) - height / 2.0;
-        let places = [
+        let corners = [
             [left, above],
             [right - width, above],
             [left, below],
             [right - width, below],
-            [behind, middle],
-            [before, middle],
-            [behind, above],
-            [before, above],
-            [behind, below],
-            [before, below],
+            [at_right, middle],
+            [at_left, middle],
+            [at_right, above],
+            [at_left, above],
+            [at_right, below],
+            [at_left, below],
         ];
         let [columns, rows] = self.frame_size;
-        let plates = places.map(|[left, top]| Plate {
+        let plates = corners.map(|[left, top]| Plate {
             left: left.min(columns - width).max(0.0),
             top: top.min(rows - height).max(0.0),
             width,
             height,
             radius: 0.22 * height,
         });
-        let (mut best, mut least) = (plates[0], f64::INFINITY);
+        let (mut best, mut lowest) = (plates[0], f64::INFINITY);
         for (index, plate) in (0_u32..).zip(plates) {
             let cost = COST_OF_PLACE * f64::from(index) + self.cost(&plate);
-            if cost < least {
-                (best, least) = (plate, cost);
+            if cost < lowest {
+                (best, lowest) = (plate, cost);
             }
         }
         best
