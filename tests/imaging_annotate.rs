@@ -158,23 +158,23 @@ fn lines_and_text_grow_with_the_frame() {
 
 /// What a label paints, apart from its box: left, top, right and bottom of it, in whole pixels.
 fn painted_by_label(width: u32, height: u32, mark: &Mark) -> [u32; 4] {
-    let with = annotated(width, height, std::slice::from_ref(mark));
+    let labelled = annotated(width, height, std::slice::from_ref(mark));
     let bare = Mark {
         label: String::new(),
         ..mark.clone()
     };
     let without = annotated(width, height, &[bare]);
     let row_bytes = 3 * width as usize;
-    let rows = with
+    let rows = labelled
         .pixels()
         .chunks_exact(row_bytes)
         .zip(without.pixels().chunks_exact(row_bytes));
     let mut painted = [u32::MAX, u32::MAX, 0, 0];
     for (y, _) in (0..height)
         .zip(rows)
-        .filter(|(_, (with, without))| with != without)
+        .filter(|(_, (labelled, without))| labelled != without)
     {
-        for x in (0..width).filter(|&x| with.pixel(x, y) != without.pixel(x, y)) {
+        for x in (0..width).filter(|&x| labelled.pixel(x, y) != without.pixel(x, y)) {
             let [left, top, right, bottom] = painted;
             painted = [left.min(x), top.min(y), right.max(x + 1), bottom.max(y + 1)];
         }

@@ -43,12 +43,12 @@ pub fn sketch_areas(
             }
         }
     }
-    let marks: Vec<_> = outlines
+    let named: Vec<_> = outlines
         .iter()
         .filter_map(|(zone, outline)| mark(zone, outline.iter().flatten()))
         .collect();
-    let marks: Vec<_> = marks.iter().map(|mark| (mark, ZONE)).collect();
-    Labels::new(frame, &marks, None).draw(frame);
+    let coloured: Vec<_> = named.iter().map(|mark| (mark, ZONE)).collect();
+    Labels::new(frame, &coloured, None).draw(frame);
 }
 
 /// The name of a zone at its bounding box; `None` when nothing of it is seen.

@@ -1,0 +1,103 @@
+use super::*;
+
+#[test]
+fn every_name_carries_the_prefix_and_every_metric_its_help() {
+    let metrics = Metrics::new().unwrap();
+    metrics.views.inc_by(24);
+    metrics
+        .queue_duration
+        .with_label_values(&["m", "fast"])
+        .observe(0.2);
+    let text = metrics.render().unwrap();
+    assert!(
+        text.contains(
+            "# HELP lookdown_views_total Views the network has seen of frames that got a report.\n"
+        ),
+        "{text}"
+    );
+    assert!(text.contains("\nlookdown_views_total 24\n"), "{text}");
+    let bucket =
+        "lookdown_queue_duration_seconds_bucket{model=\"m\",profile=\"fast\",le=\"0.25\"} 1";
+    assert!(text.contains(bucket), "{text}");
+}
+
+#[test]
+fn counts_of_the_rig_cache_rise_and_its_size_goes_up_and_down() {
+    let metrics = Metrics::new().unwrap();
+    metrics.show_rig_cache(2, 2000, 3, 1);
+    metrics.show_rig_cache(1, 1000, 4, 3);
+    let text = metrics.render().unwrap();
+    for line in [
+        "lookdown_rig_cache_rigs 1",
+        "lookdown_rig_cache_bytes 1000",
+        "lookdown_rig_cache_builds_total 4",
+        "lookdown_rig_cache_evictions_total 3",
+    ] {
+        assert!(text.contains(&format!("\n{line}\n")), "{text}");
+    }
+}
+
+#[test]
+fn a_model_that_was_replaced_is_shown_no_more() {
+    let metrics = Metrics::new().unwrap();
+    metrics.show_models(&[("a", "1"), ("b", "1")], &[("success", 2)]);
+    metrics.show_models(&[("a", "2"), ("b", "1")], &[("success", 3)]);
+    let loads = metrics.model_loads.with_label_values(&["success"]);
+    assert_eq!(loads.get(), 3);
+    let text = metrics.render().unwrap();
+    let shown = text
+        .lines()
+        .filter(|line| line.starts_with("lookdown_model_info"));
+    assert_eq!(
+        shown.collect::<Vec<_>>(),
+        [
+            "lookdown_model_info{model=\"a\",revision=\"2\"} 1",
+            "lookdown_model_info{model=\"b\",revision=\"1\"} 1",
+        ]
+    );
+}
+
+#[test]
+fn zones_are_shown_until_they_are_gone_and_no_more_than_a_thousand() {
+    let metrics = Metrics::new().unwrap();
+    let shown = || {
+        let text = metrics.render().unwrap();
+        let rows = text.lines().map(str::to_owned);
+        let rows = rows.filter(|line| line.starts_with("lookdown_zone_persons"));
+        rows.collect::<Vec<_>>()
+    };
+    assert!(shown().is_empty());
+    metrics.show_zones("lobby", [("door", 2), ("till", 0)]);
+    metrics.show_zones("lobby", [("door", 1), ("till", 3)]);
+    let (door, till) = (
+        "lookdown_zone_persons{zone=\"lobby/door\"} 1",
+        "lookdown_zone_persons{zone=\"lobby/till\"} 3",
+    );
+    assert_eq!(shown(), [door, till]);
+    metrics.retain_zones(|_, zone| zone != "door");
+    assert_eq!(shown(), [till]);
+    for calibration in 0..100 {
+        let names: Vec<_> = (0..20).map(|zone| zone.to_string()).collect();
+        metrics.show_zones(
+            &calibration.to_string(),
+            names.iter().map(|name| (name.as_str(), 1)),
+        );
+    }
+    assert_eq!(shown().len(), MAX_ZONE_ROWS);
+}
+
+#[test]
+fn of_all_calibrations_together_only_the_revision_of_now_is_shown() {
+    let metrics = Metrics::new().unwrap();
+    for revision in ["a", "a", "b"] {
+        metrics.show_calibrations(2, revision, 0, true, &[("success", 2)]);
+    }
+    let text = metrics.render().unwrap();
+    let shown = text
+        .lines()
+        .filter(|line| line.starts_with("lookdown_calibrations_info"));
+    assert_eq!(
+        shown.collect::<Vec<_>>(),
+        ["lookdown_calibrations_info{revision=\"b\"} 1"]
+    );
+}
