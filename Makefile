@@ -29,6 +29,8 @@ test: ## set up, then everything that needs nothing but this repository: formatt
 	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server auditor
 	cargo fmt --check
 	cargo clippy --all-targets --locked -- -D warnings
+	@# The fuzzers have a lock file of their own, which is to follow the other.
+	cargo tree --quiet --locked --manifest-path fuzz/Cargo.toml > /dev/null
 	$(CARGO_DENY) bans licenses sources
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
