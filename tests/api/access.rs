@@ -2,7 +2,6 @@
 
 use std::{collections::HashMap, fs, path::Path, sync::Arc};
 
-use axum::{body::Body, http::Request};
 use lookdown::{
     access::{AccessKeys, KeyDigest},
     api::Access,
@@ -11,7 +10,7 @@ use lookdown::{
 
 use crate::{
     log::Log,
-    service::{Answer, Bounds, Service, frame},
+    service::{Bounds, OPEN_PATHS, Service},
 };
 
 const FINDER: &str = "lookdown_finder";
@@ -67,21 +66,8 @@ fn guarded() -> Service {
     service_with(&Arc::new(keys))
 }
 
-async fn ask(service: &Service, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
-    let mut request = Request::builder().method(method).uri(path);
-    for (name, value) in headers {
-        request = request.header(*name, *value);
-    }
-    let body = if path.starts_with("/detect") {
-        Body::from(frame())
-    } else {
-        Body::empty()
-    };
-    service.send(request.body(body).unwrap()).await
-}
-
 async fn reads(service: &Service, headers: &[(&str, &str)]) -> u16 {
-    let answer = ask(service, "GET", "/calibrations", headers).await;
+    let answer = service.ask("GET", "/calibrations", headers).await;
     answer.status.as_u16()
 }
 
@@ -93,7 +79,7 @@ async fn reads_with(service: &Service, key: &str) -> u16 {
 async fn every_guarded_route_needs_a_key_of_its_scope_and_admin_opens_all() {
     let service = guarded();
     for (method, path, scope) in GUARDED {
-        let none = ask(&service, method, path, &[]).await;
+        let none = service.ask(method, path, &[]).await;
         assert_eq!(none.status, 401, "{method} {path}");
         assert_eq!(none.header("www-authenticate"), "Bearer");
         assert_eq!(none.problem()["type"], "urn:lookdown:problem:key-required");
@@ -104,7 +90,7 @@ async fn every_guarded_route_needs_a_key_of_its_scope_and_admin_opens_all() {
             (BOTH, &["detect", "read"]),
             (ADMINISTRATOR, &["detect", "read", "admin"]),
         ] {
-            let answer = ask(&service, method, path, &[("x-api-key", key)]).await;
+            let answer = service.ask(method, path, &[("x-api-key", key)]).await;
             let status = answer.status.as_u16();
             if scopes.contains(&scope) {
                 assert!(
@@ -129,14 +115,7 @@ async fn every_guarded_route_needs_a_key_of_its_scope_and_admin_opens_all() {
 #[tokio::test]
 async fn probes_metrics_and_pages_never_need_a_key() {
     let service = guarded();
-    for path in [
-        "/livez",
-        "/readyz",
-        "/metrics",
-        "/openapi.json",
-        "/docs/",
-        "/",
-    ] {
+    for path in OPEN_PATHS {
         let answer = service.get(path).await;
         assert!(answer.status.as_u16() < 400, "{path}: {}", answer.status);
     }
@@ -272,7 +251,7 @@ async fn without_keys_others_may_find_and_read_but_change_nothing() {
         ..Bounds::default()
     });
     for (method, path, scope) in GUARDED {
-        let answer = ask(&service, method, path, &[]).await;
+        let answer = service.ask(method, path, &[]).await;
         let open = scope == "detect" || method == "GET";
         assert_eq!(answer.status == 403, !open, "{method} {path}");
     }
@@ -289,7 +268,9 @@ async fn pages_of_the_origins_named_may_call_and_no_others() {
         ("access-control-request-method", "PUT"),
         ("access-control-request-headers", "authorization,x-api-key"),
     ];
-    let answer = ask(&service, "OPTIONS", "/calibrations/lobby", &ask_first).await;
+    let answer = service
+        .ask("OPTIONS", "/calibrations/lobby", &ask_first)
+        .await;
     assert_eq!(answer.status, 200);
     let header = |name: &str| answer.header(name).to_lowercase();
     assert_eq!(
@@ -303,14 +284,14 @@ async fn pages_of_the_origins_named_may_call_and_no_others() {
 
     let allowed = "access-control-allow-origin";
     let page = [("origin", "https://dashboard.example")];
-    let refused = ask(&service, "GET", "/calibrations/nobody", &page).await;
+    let refused = service.ask("GET", "/calibrations/nobody", &page).await;
     assert_eq!(
         (refused.status.as_u16(), refused.header(allowed)),
         (404, page[0].1)
     );
     let stranger = [("origin", "https://dashboard.example.evil")];
-    let answer = ask(&service, "GET", "/calibrations", &stranger).await;
+    let answer = service.ask("GET", "/calibrations", &stranger).await;
     assert!(!answer.headers.contains_key(allowed));
-    let none = ask(&Service::start(), "GET", "/calibrations", &page).await;
+    let none = Service::start().ask("GET", "/calibrations", &page).await;
     assert!(!none.headers.contains_key(allowed));
 }

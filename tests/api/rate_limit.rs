@@ -16,7 +16,7 @@ use tokio::{net::TcpSocket, task::spawn_blocking};
 
 use crate::{
     server::Server,
-    service::{Answer, Bounds, Service, frame},
+    service::{Answer, Bounds, OPEN_PATHS, Service, frame},
 };
 
 /// Two requests, and the next in 50 seconds: no test takes as long.
@@ -98,14 +98,7 @@ async fn every_route_of_clients_counts_and_tells_whatever_it_answers() {
 async fn probes_metrics_and_pages_are_not_counted() {
     let service = open_service();
     for _ in 0..3 {
-        for path in [
-            "/livez",
-            "/readyz",
-            "/metrics",
-            "/openapi.json",
-            "/docs/",
-            "/",
-        ] {
+        for path in OPEN_PATHS {
             let answer = service.get(path).await;
             assert!(answer.status.as_u16() < 400, "{path}");
             assert!(!answer.headers.contains_key("ratelimit"), "{path}");

@@ -35,6 +35,15 @@ pub(crate) const FRAME_SIDE: u32 = 200;
 const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
   "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707},
   "mount": {"world_up": [0, 0, -1], "height_m": 3} }"#;
+/// What is answered to everybody, always.
+pub(crate) const OPEN_PATHS: [&str; 6] = [
+    "/livez",
+    "/readyz",
+    "/metrics",
+    "/openapi.json",
+    "/docs/",
+    "/",
+];
 const BOUNDARY: &str = "edge-of-a-part";
 
 /// A running service without a socket.
@@ -235,6 +244,20 @@ impl Service {
             results,
             folder,
         }
+    }
+
+    /// Asks for `path`; what finds people gets a frame to find them in.
+    pub(crate) async fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
+        let mut request = Request::builder().method(method).uri(path);
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        let body = if path.starts_with("/detect") {
+            Body::from(frame())
+        } else {
+            Body::empty()
+        };
+        self.send(request.body(body).unwrap()).await
     }
 
     pub(crate) async fn send(&self, request: Request<Body>) -> Answer {

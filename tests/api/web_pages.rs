@@ -1,9 +1,8 @@
 //! Browsers: pages of strangers, and what a page of ours may do.
 
-use axum::{body::Body, http::Request};
 use lookdown::api::Access;
 
-use crate::service::{Answer, Bounds, Service, frame};
+use crate::service::{Answer, Bounds, Service};
 
 const CHANGING: [(&str, &str); 6] = [
     ("POST", "/detect?calibration=lobby&profile=fast"),
@@ -13,19 +12,6 @@ const CHANGING: [(&str, &str); 6] = [
     ("POST", "/v2/repository/models/eager/load"),
     ("POST", "/v2/repository/models/eager/unload"),
 ];
-
-async fn ask(service: &Service, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
-    let mut request = Request::builder().method(method).uri(path);
-    for (name, value) in headers {
-        request = request.header(*name, *value);
-    }
-    let body = if path.starts_with("/detect") {
-        Body::from(frame())
-    } else {
-        Body::empty()
-    };
-    service.send(request.body(body).unwrap()).await
-}
 
 fn open(own_machine_only: bool) -> Service {
     Service::within(&Bounds {
@@ -49,12 +35,12 @@ async fn a_page_of_a_stranger_changes_nothing_and_finds_nobody_where_there_are_n
     for (method, path) in CHANGING {
         for origin in ["https://evil.example", "http://localhost:9090", "null"] {
             let headers = [("host", "localhost:8080"), ("origin", origin)];
-            let answer = ask(&service, method, path, &headers).await;
+            let answer = service.ask(method, path, &headers).await;
             assert_refused(&answer, "access.cors_origins");
         }
         for origin in ["http://localhost:8080", "https://dashboard.example"] {
             let headers = [("host", "localhost:8080"), ("origin", origin)];
-            let answer = ask(&service, method, path, &headers).await;
+            let answer = service.ask(method, path, &headers).await;
             assert_ne!(answer.status, 403, "{method} {path} {origin}");
         }
     }
@@ -64,15 +50,13 @@ async fn a_page_of_a_stranger_changes_nothing_and_finds_nobody_where_there_are_n
     ];
     // What a page cannot read does no harm.
     assert_eq!(
-        ask(&service, "GET", "/calibrations", &stranger)
-            .await
-            .status,
+        service.ask("GET", "/calibrations", &stranger).await.status,
         200
     );
     let elsewhere = open(false);
     let (method, path) = CHANGING[0];
     assert_refused(
-        &ask(&elsewhere, method, path, &stranger).await,
+        &elsewhere.ask(method, path, &stranger).await,
         "evil.example",
     );
 }
@@ -86,7 +70,7 @@ async fn a_name_that_a_stranger_lets_lead_here_is_not_answered_on_the_own_machin
     ];
     for (method, path) in [("GET", "/calibrations"), CHANGING[0], CHANGING[1]] {
         assert_refused(
-            &ask(&service, method, path, &rebound).await,
+            &service.ask(method, path, &rebound).await,
             "evil.example:8080",
         );
     }
@@ -96,19 +80,20 @@ async fn a_name_that_a_stranger_lets_lead_here_is_not_answered_on_the_own_machin
         "localhost",
         "dashboard.example",
     ] {
-        let answer = ask(&service, "GET", "/calibrations", &[("host", host)]).await;
+        let answer = service.ask("GET", "/calibrations", &[("host", host)]).await;
         assert_eq!(answer.status, 200, "{host}");
     }
     for path in ["/livez", "/readyz", "/metrics"] {
         assert_eq!(
-            ask(&service, "GET", path, &rebound).await.status,
+            service.ask("GET", path, &rebound).await.status,
             200,
             "{path}"
         );
     }
     // Whoever lets others reach a server gives it a name.
     assert_eq!(
-        ask(&open(false), "GET", "/calibrations", &rebound)
+        open(false)
+            .ask("GET", "/calibrations", &rebound)
             .await
             .status,
         200
@@ -152,7 +137,7 @@ async fn pages_that_may_call_may_read_every_header_of_ours() {
         ("host", "localhost"),
         ("origin", "https://dashboard.example"),
     ];
-    let answer = ask(&service, CHANGING[0].0, CHANGING[0].1, &page).await;
+    let answer = service.ask(CHANGING[0].0, CHANGING[0].1, &page).await;
     assert_eq!(answer.status, 200);
     let exposed = answer
         .header("access-control-expose-headers")
