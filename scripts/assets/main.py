@@ -20,9 +20,10 @@ EVERY_MODEL = "models"
 CONVERTERS = "converters"
 S3_SERVER = "s3-server"
 RELIABILITY = "reliability"
+REAL_PARTS = "real-parts"
 BENCHES = "benches"
 AUDITOR = "auditor"
-MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, RELIABILITY, BENCHES, AUDITOR)
+MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, RELIABILITY, REAL_PARTS, BENCHES, AUDITOR)
 
 
 def main(arguments: list[str]) -> int:
@@ -30,7 +31,8 @@ def main(arguments: list[str]) -> int:
 
     `model` fetches the default models, `model NAME...` the named ones, `models` every one; `converters` installs
     what the converters import, for their tests; `s3-server` a server that the tests of buckets talk to;
-    `reliability` what the proofs of reliability run; `benches` what the benchmarks and the servers they compare with
+    `reliability` what the proofs of reliability run; `real-parts` the parts from PyPI that `make test-real` runs
+    Lookdown with, each in an environment of its own; `benches` what the benchmarks and the servers they compare with
     import; `auditor` cargo-deny.
     """
     signal.signal(signal.SIGTERM, _stop)
@@ -76,6 +78,10 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
         if RELIABILITY in arguments:
             listed = places.root / "tests" / "reliability" / "requirements.txt"
             PrivatePython(places, RELIABILITY, places.own / "reliability").install_file(listed, "--require-hashes")
+        if REAL_PARTS in arguments:
+            for listed in sorted((places.root / "tests" / "real" / "requirements").glob("*.txt")):
+                folder = places.own / "real" / listed.stem
+                PrivatePython(places, REAL_PARTS, folder).install_file(listed, "--require-hashes")
         if BENCHES in arguments:
             install_benches(places)
         for model in chosen_models(pins.models + pins.quantised, arguments):
