@@ -21,15 +21,15 @@ pub use error::TlsError;
 pub use options::TlsOptions;
 
 use self::{files::TlsFiles, handshake::shake_hands, identity::Identity};
-use crate::metrics::Metrics;
+use crate::{metrics::Metrics, watched_file::Complaint};
 
 /// The certificate and the private key that serve now.
 pub struct Tls {
     options: TlsOptions,
     metrics: Arc<Metrics>,
     serving: RwLock<Arc<Identity>>,
-    /// Why the newest files are not used, as it was last told.
-    told: Mutex<Option<String>>,
+    /// About the newest files. Held for as long as they are read.
+    complaint: Mutex<Complaint>,
 }
 
 impl Tls {
@@ -45,7 +45,7 @@ impl Tls {
             options,
             metrics,
             serving: RwLock::new(Arc::new(identity)),
-            told: Mutex::new(None),
+            complaint: Mutex::default(),
         })
     }
 
@@ -58,11 +58,12 @@ impl Tls {
     /// Reads the files again. If they cannot be used, what serves stays what it was, and the log
     /// says why, once for each reason. Connections that are there stay as they are.
     pub fn refresh(&self) {
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let complaint = self.complaint.lock();
+        let mut complaint = complaint.unwrap_or_else(PoisonError::into_inner);
         match self.newer() {
-            Ok(None) => *told = None,
+            Ok(None) => complaint.settle(),
             Ok(Some(identity)) => {
-                *told = None;
+                complaint.settle();
                 tracing::info!("the TLS certificate has changed: new connections get the new one");
                 show(&identity, &self.options, &self.metrics);
                 let mut serving = self.serving.write().unwrap_or_else(PoisonError::into_inner);
@@ -70,11 +71,10 @@ impl Tls {
             }
             Err(error) => {
                 let problem = error.to_string();
-                if told.as_ref() != Some(&problem) {
+                if complaint.is_news(&problem) {
                     tracing::error!("{problem}; the certificate that serves stays what it was");
                     let loads = &self.metrics.tls_certificate_loads;
                     loads.with_label_values(&["failure"]).inc();
-                    *told = Some(problem);
                 }
             }
         }

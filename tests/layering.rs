@@ -8,8 +8,10 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 22] = [
-    ("access", &[]),
+const MAY_USE: [(&str, &[&str]); 24] = [
+    ("plain_name", &[]),
+    ("watched_file", &[]),
+    ("access", &["plain_name", "watched_file"]),
     ("revision", &[]),
     ("geometry", &[]),
     ("detection", &[]),
@@ -18,9 +20,9 @@ const MAY_USE: [(&str, &[&str]); 22] = [
     ("poller", &[]),
     ("results", &[]),
     ("imaging", &["geometry"]),
-    ("calibration", &["geometry", "revision"]),
+    ("calibration", &["geometry", "plain_name", "revision"]),
     ("inference", &["detection", "imaging", "revision"]),
-    ("tls", &["metrics"]),
+    ("tls", &["metrics", "watched_file"]),
     ("server", &["metrics", "shutdown", "tls"]),
     (
         "settings",

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-const MAX_CHARS: usize = 64;
+use crate::plain_name::is_plain;
 
 /// What people call a key: 1 to 64 of a-z, 0-9, `_` and `-`, which TOML takes without quotes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,11 +17,9 @@ impl FromStr for KeyName {
     type Err = InvalidKeyName;
 
     fn from_str(name: &str) -> Result<Self, InvalidKeyName> {
-        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
-        let is_name = (1..=MAX_CHARS).contains(&name.len())
-            && name.starts_with(is_plain)
-            && name.chars().all(|c| is_plain(c) || c == '_' || c == '-');
-        is_name.then(|| Self(name.to_owned())).ok_or(InvalidKeyName)
+        is_plain(name)
+            .then(|| Self(name.to_owned()))
+            .ok_or(InvalidKeyName)
     }
 }
 

@@ -1,16 +1,13 @@
 //! The keys that are known now: those of the environment, and those of a file that may change.
 
 use std::{
-    fs::File,
-    io::{self, Read},
+    io,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError, RwLock},
 };
 
 use super::{Holder, KeyError, KeyList};
-
-/// A thousand keys take a fifth of it.
-const MAX_FILE_BYTES: u64 = 1 << 20;
+use crate::watched_file::{self, Complaint};
 
 /// The keys that are known now.
 #[derive(Debug)]
@@ -19,8 +16,8 @@ pub struct AccessKeys {
     lasting: KeyList,
     file: Option<PathBuf>,
     known: RwLock<Arc<KeyList>>,
-    /// Why the file's newest version is not used, as it was last told.
-    told: Mutex<Option<String>>,
+    /// About the file's newest version. Held for as long as it is read.
+    complaint: Mutex<Complaint>,
 }
 
 impl AccessKeys {
@@ -37,7 +34,7 @@ impl AccessKeys {
             lasting,
             file: file.map(Path::to_owned),
             known: RwLock::new(Arc::new(known)),
-            told: Mutex::new(None),
+            complaint: Mutex::default(),
         })
     }
 
@@ -45,10 +42,11 @@ impl AccessKeys {
     /// why, once for each reason.
     pub fn refresh(&self) {
         let Some(file) = &self.file else { return };
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let complaint = self.complaint.lock();
+        let mut complaint = complaint.unwrap_or_else(PoisonError::into_inner);
         match read(file, &self.lasting) {
             Ok(list) => {
-                *told = None;
+                complaint.settle();
                 if *self.known() != list {
                     tracing::info!(keys = list.len(), "the keys have changed");
                     let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
@@ -57,9 +55,8 @@ impl AccessKeys {
             }
             Err(error) => {
                 let problem = error.to_string();
-                if told.as_ref() != Some(&problem) {
+                if complaint.is_news(&problem) {
                     tracing::error!("{problem}; the keys stay as they were");
-                    *told = Some(problem);
                 }
             }
         }
@@ -90,12 +87,5 @@ fn read(path: &Path, lasting: &KeyList) -> Result<KeyList, KeyError> {
 }
 
 fn read_text(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    let read = File::open(path)?
-        .take(MAX_FILE_BYTES + 1)
-        .read_to_string(&mut text)?;
-    if read as u64 > MAX_FILE_BYTES {
-        return Err(io::Error::other("it has more than 1 MiB"));
-    }
-    Ok(text)
+    io::read_to_string(watched_file::read(path)?.as_slice())
 }

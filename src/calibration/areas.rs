@@ -6,11 +6,13 @@ use super::{
     FormatError,
     native::{NativeImage, NativeMask, NativeZone},
 };
-use crate::geometry::{Mount, Polygon, Zone, ZoneArea};
+use crate::{
+    geometry::{Mount, Polygon, Zone, ZoneArea},
+    plain_name::{MAX_CHARS, is_plain},
+};
 
 /// Most zones of a calibration, and most masks.
 const MAX_AREAS: usize = 32;
-const MAX_NAME_CHARS: usize = 64;
 
 /// Areas that somebody has drawn into the frames or onto the floor of a camera.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -76,18 +78,12 @@ fn at_most(field: &str, count: usize) -> Result<(), FormatError> {
 }
 
 fn name(field: &str, name: &str) -> Result<(), FormatError> {
-    let letter_or_digit = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
-    let is_fine = name.len() <= MAX_NAME_CHARS
-        && name.starts_with(letter_or_digit)
-        && name
-            .chars()
-            .all(|c| letter_or_digit(c) || c == '_' || c == '-');
-    if is_fine {
+    if is_plain(name) {
         return Ok(());
     }
-    let shown: String = name.chars().take(MAX_NAME_CHARS).collect();
+    let shown: String = name.chars().take(MAX_CHARS).collect();
     let problem = format!(
-        "it is {shown:?}: use 1 to {MAX_NAME_CHARS} of a-z, 0-9, _ and -, beginning with a letter or \
+        "it is {shown:?}: use 1 to {MAX_CHARS} of a-z, 0-9, _ and -, beginning with a letter or \
          digit"
     );
     Err(FormatError::invalid(field, problem))

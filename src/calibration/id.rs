@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-const MAX_CHARS: usize = 64;
+use crate::plain_name::{MAX_CHARS, is_plain};
 
 /// The ID of a calibration: `[a-z0-9][a-z0-9_-]{0,63}`. Safe in file names and URLs.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -50,13 +50,7 @@ impl FromStr for CalibrationId {
     type Err = InvalidCalibrationId;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let letter_or_digit = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
-        let valid = text.len() <= MAX_CHARS
-            && text.starts_with(letter_or_digit)
-            && text
-                .chars()
-                .all(|c| letter_or_digit(c) || c == '_' || c == '-');
-        if valid {
+        if is_plain(text) {
             Ok(Self(text.to_owned()))
         } else {
             // Enough to recognise it by, not enough to fill a log.

@@ -1,11 +1,6 @@
-//! The files of TLS as they are read: bounded, and with a digest that tells whether they changed.
+//! The files of TLS as they are read, with a digest that tells whether they changed.
 
-use std::{
-    fs::File,
-    io::{self, Read},
-    os::unix::fs::PermissionsExt,
-    path::Path,
-};
+use std::{os::unix::fs::PermissionsExt, path::Path};
 
 use rustls::pki_types::{
     CertificateDer, PrivateKeyDer,
@@ -14,11 +9,11 @@ use rustls::pki_types::{
 use sha2::{Digest, Sha256};
 
 use super::{TlsError, TlsOptions};
+use crate::watched_file;
+
 const CERTIFICATE: &str = "server.tls.certificate";
 const PRIVATE_KEY: &str = "server.tls.private_key";
 const CLIENT_CERTIFICATES: &str = "server.tls.client_certificates";
-/// A hundred certificates take a tenth of it.
-const MAX_FILE_BYTES: u64 = 1 << 20;
 /// Whoever is neither owner nor group may read.
 const READABLE_BY_OTHERS: u32 = 0o004;
 
@@ -122,20 +117,9 @@ fn certificates(
 }
 
 fn read(setting: &'static str, path: &Path) -> Result<Vec<u8>, TlsError> {
-    read_bytes(path).map_err(|cause| TlsError::Unreadable {
+    watched_file::read(path).map_err(|cause| TlsError::Unreadable {
         setting,
         path: path.to_owned(),
         cause,
     })
-}
-
-fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
-    let mut content = Vec::new();
-    let read = File::open(path)?
-        .take(MAX_FILE_BYTES + 1)
-        .read_to_end(&mut content)?;
-    if read as u64 > MAX_FILE_BYTES {
-        return Err(io::Error::other("it has more than 1 MiB"));
-    }
-    Ok(content)
 }
