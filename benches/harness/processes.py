@@ -79,9 +79,15 @@ def free_ports(count: int) -> list[int]:
 
 @contextlib.contextmanager
 def running(
-    name: str, command: list[str], port: int, ready: str, environment: dict[str, str], folder: Path = ROOT
+    name: str,
+    command: list[str],
+    port: int,
+    ready: str,
+    environment: dict[str, str],
+    folder: Path = ROOT,
+    host: str = "127.0.0.1",
 ) -> Iterator[Server]:
-    """A server that listens on `port` of this machine, from when it answers `ready` with 200 on."""
+    """A server that listens on `port` of `host`, from when it answers `ready` with 200 on."""
     WORK.mkdir(parents=True, exist_ok=True)
     log = WORK / f"{name}.log"
     started = time.monotonic()
@@ -96,7 +102,7 @@ def running(
             start_new_session=True,
         )
         try:
-            address = f"127.0.0.1:{port}"
+            address = f"{host}:{port}"
             _wait(process, f"http://{address}{ready}", name, log)
             yield Server(address, process, time.monotonic() - started)
         finally:
