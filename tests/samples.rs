@@ -151,3 +151,12 @@ fn the_paper_s_three_refinements_of_the_same_boxes_differ_as_the_method_says() {
     let sum = |scores: &[f64]| scores.iter().sum::<f64>();
     assert!(sum(&gaussian) < sum(&linear), "{gaussian:?} and {linear:?}");
 }
+
+#[test]
+fn quality_names_both_models_that_looked_and_the_other_profiles_one() {
+    let report = detect("office", &["--profile", "quality"]);
+    let names = ["model", "second_opinion"].map(|part| report[part]["name"].as_str().unwrap());
+    assert_eq!(names, ["nanodet_g_416", "ssdlite_mobilenet_v2_int8"]);
+    let one = detect("office", &["--profile", "fast"]);
+    assert!(one.get("second_opinion").is_none());
+}

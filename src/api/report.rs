@@ -57,6 +57,10 @@ pub struct Report {
     pub image: ReportImage,
     /// The detector used.
     pub model: ReportModel,
+    /// The detector that took some of the closer looks; absent where nobody else was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub second_opinion: Option<ReportModel>,
     /// The profile used.
     pub profile: &'static str,
     /// The refinement used, with all its parameters.

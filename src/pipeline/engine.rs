@@ -108,7 +108,7 @@ impl Engine {
         timeline.leave(Instant::now());
         let views = observation.view_counts();
         let zones = ZoneCount::of(&observation.camera.rig.geometry().areas.zones, &persons);
-        let calibration = observation.camera.used;
+        let calibration = observation.camera.used.clone();
         let report = DetectionReport {
             request_id: job.request_id.clone(),
             camera: parameters
@@ -120,10 +120,8 @@ impl Engine {
             calibration,
             image_width: observation.frame.width(),
             image_height: observation.frame.height(),
-            model: ModelUsed {
-                name: observation.model.name().to_owned(),
-                revision: observation.model.revision().to_owned(),
-            },
+            second_opinion: observation.second_opinion().map(ModelUsed::from),
+            model: ModelUsed::from(observation.model()),
             profile: parameters.profile,
             refinement: parameters.refinement,
             persons,

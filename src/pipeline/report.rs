@@ -11,6 +11,7 @@ use crate::{
         OrientedBox, Pixel, Zone,
         floor::{Bearing, FloorPosition},
     },
+    inference::Model,
 };
 
 /// The persons in one frame.
@@ -32,6 +33,8 @@ pub struct DetectionReport {
     pub image_height: u32,
     /// The detector used.
     pub model: ModelUsed,
+    /// The detector that took some of the closer looks, where the profile asks a second one.
+    pub second_opinion: Option<ModelUsed>,
     /// The profile used.
     pub profile: Profile,
     /// The refinement used, with all its parameters.
@@ -106,6 +109,15 @@ pub struct ModelUsed {
     pub name: String,
     /// Changes whenever the model's weights do.
     pub revision: String,
+}
+
+impl From<&Model> for ModelUsed {
+    fn from(model: &Model) -> Self {
+        Self {
+            name: model.name().to_owned(),
+            revision: model.revision().to_owned(),
+        }
+    }
 }
 
 /// One person.

@@ -64,6 +64,10 @@ fn report() -> DetectionReport {
             name: "ssdlite_mobilenet_v2".to_owned(),
             revision: "60303ae22b99".to_owned(),
         },
+        second_opinion: Some(ModelUsed {
+            name: "nanodet_g_416".to_owned(),
+            revision: "a3c2e9b54d10".to_owned(),
+        }),
         profile: Profile::Balanced,
         refinement: RefinementParameters {
             refinement: Refinement::Fusion,

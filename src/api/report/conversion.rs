@@ -5,7 +5,7 @@ use super::{
     ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews, ReportZone,
     rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
 };
-use crate::pipeline::{self, DetectionReport};
+use crate::pipeline::{self, DetectionReport, ModelUsed};
 
 impl From<&DetectionReport> for Report {
     fn from(report: &DetectionReport) -> Self {
@@ -24,10 +24,8 @@ impl From<&DetectionReport> for Report {
                 width: report.image_width,
                 height: report.image_height,
             },
-            model: ReportModel {
-                name: report.model.name.clone(),
-                revision: report.model.revision.clone(),
-            },
+            model: ReportModel::from(&report.model),
+            second_opinion: report.second_opinion.as_ref().map(ReportModel::from),
             profile: report.profile.name(),
             refinement: ReportRefinement {
                 name: refinement.refinement.name(),
@@ -49,6 +47,15 @@ impl From<&DetectionReport> for Report {
             }),
             timings_ms: ReportTimings::from(&report.timings),
             warnings: report.warnings.clone(),
+        }
+    }
+}
+
+impl From<&ModelUsed> for ReportModel {
+    fn from(model: &ModelUsed) -> Self {
+        Self {
+            name: model.name.clone(),
+            revision: model.revision.clone(),
         }
     }
 }

@@ -58,6 +58,12 @@ impl Observation {
         &self.model
     }
 
+    /// Another model that looked as well, if there was anything to look at again.
+    pub(super) fn second_opinion(&self) -> Option<&Model> {
+        let mut models = self.looks.iter().map(|look| &*look.model);
+        models.find(|model| model.name() != self.model.name())
+    }
+
     /// Waits for rounds that were queued together, and takes in what came of them. Views are
     /// rendered and looked at side by side: the span from the first to the last is divided in the
     /// proportion of the work.
