@@ -1,0 +1,131 @@
+"""How many replicas so many cameras need, by simulation: `scaling.py FIGURES.json [PROFILE...]` prints Markdown.
+
+FIGURES.json holds what was measured of one replica (docs/scaling.json). A replica is taken for a queue that works on
+one frame after the other with all its cores, which is what Lookdown does with the views of a frame, so a frame takes
+its CPU time divided by the cores. Cameras send at their own phase, a little irregularly; whoever stands before the
+replicas sends each frame to one of them at random, in turns, or to the one that is done first.
+"""
+
+import heapq
+import itertools
+import json
+import math
+import random
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+CAMERAS = (10, 100, 1000, 10_000)
+CORES = 4
+"""Of a replica."""
+FRAMES_PER_SECOND = 1.0
+JITTER_SECONDS = 0.05
+"""Most that a frame comes before or after its time."""
+SECONDS, WARM_UP_SECONDS = 60.0, 20.0
+TARGET_SECONDS = 1.0
+"""99 of 100 frames are answered within it."""
+SEED = 7
+
+
+
+def arrivals(cameras: int, chance: random.Random) -> list[float]:
+    """When frames come, ordered, seconds."""
+    period = 1.0 / FRAMES_PER_SECOND
+    phases = [chance.uniform(0.0, period) for _ in range(cameras)]
+    times = [
+        phase + turn * period + chance.uniform(-JITTER_SECONDS, JITTER_SECONDS)
+        for phase in phases
+        for turn in range(round(SECONDS * FRAMES_PER_SECOND))
+    ]
+    return sorted(times)
+
+
+def latencies(times: Iterable[float], service: float, replicas: int, balancer: str, chance: random.Random) -> list[float]:
+    """Seconds from a frame's arrival to its answer, frames of the warm-up left out."""
+    seen = []
+    for at, done in _answers(times, service, replicas, balancer, chance):
+        if at >= WARM_UP_SECONDS:
+            seen.append(done - at)
+    return seen
+
+
+def _answers(
+    times: Iterable[float], service: float, replicas: int, balancer: str, chance: random.Random
+) -> Iterator[tuple[float, float]]:
+    if balancer == "first done":
+        free = [0.0] * replicas
+        for at in times:
+            done = max(at, free[0]) + service
+            heapq.heapreplace(free, done)
+            yield at, done
+        return
+    turns = itertools.count()
+    free = [0.0] * replicas
+    for at in times:
+        chosen = chance.randrange(replicas) if balancer == "random" else next(turns) % replicas
+        free[chosen] = max(at, free[chosen]) + service
+        yield at, free[chosen]
+
+
+BALANCERS = ("random", "in turns", "first done")
+
+
+def needed(cameras: int, core_seconds: float, balancer: str) -> tuple[int, float]:
+    """The fewest replicas that keep to the target, and their 99th percentile in seconds."""
+    service = core_seconds / CORES
+    if service > TARGET_SECONDS:
+        raise ValueError(f"a frame alone takes {service:.2f} s on {CORES} cores, more than {TARGET_SECONDS:.2f} s")
+    times = arrivals(cameras, random.Random(SEED))
+    replicas = max(1, math.ceil(cameras * FRAMES_PER_SECOND * service))
+    # In steps of one in a hundred: among thousands nobody counts single ones.
+    while True:
+        slowest = percentile(latencies(times, service, replicas, balancer, random.Random(SEED)), 0.99)
+        if slowest <= TARGET_SECONDS:
+            return replicas, slowest
+        replicas += max(1, replicas // 100)
+
+
+def percentile(values: list[float], share: float) -> float:
+    """The value that so large a share of the values does not exceed."""
+    return sorted(values)[math.ceil(share * len(values)) - 1]
+
+
+def table(figures: dict, profile: str) -> str:
+    """One row for each number of cameras."""
+    core_seconds = figures["profiles"][profile]["core_ms_per_frame"] / 1000
+    views = figures["profiles"][profile]["views"]
+    lines = [
+        "| cameras | views/s | busy cores | replicas: " + " | ".join(BALANCERS) + " | into the replicas, Mbit/s |"
+        " Redis: commands/s | share of its core | cores per camera |",
+        "|" + "---:|" * (6 + len(BALANCERS)),
+    ]
+    for cameras in CAMERAS:
+        frames = cameras * FRAMES_PER_SECOND
+        counts = [needed(cameras, core_seconds, balancer)[0] for balancer in BALANCERS]
+        cells = [
+            f"{cameras:,}",
+            f"{frames * views:,.0f}",
+            f"{frames * core_seconds:,.1f}",
+            *(f"{count:,}" for count in counts),
+            f"{frames * figures['frame_bytes'] * 8 / 1e6:,.0f}",
+            f"{frames * figures['redis']['commands_per_report']:,.0f}",
+            f"{frames * figures['redis']['core_ms_per_report'] / 1000:.1%}",
+            f"{counts[-1] * CORES / cameras:.2f}",
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def main(arguments: list[str]) -> int:
+    """The exit status."""
+    if not arguments:
+        print("usage: scaling.py FIGURES.json [PROFILE...]", file=sys.stderr)
+        return 2
+    figures = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
+    for profile in arguments[1:] or figures["profiles"]:
+        print(f"`{profile}`:\n\n{table(figures, profile)}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
