@@ -56,7 +56,7 @@ test-real: ## the tests against real parts; as root on Debian it installs what i
 	@$(MAKE) --no-print-directory real
 
 real: ## the product with real parts beside it (browser, Redis, brokers, clients ...), or some PARTS of it: tests/real
-	@# One word per package that Debian has; comments start with a hash.
+	@# Words are packages that Debian has; comments start with a hash.
 	@scripts/packages.sh $$(sed 's/#.*//' tests/real/packages.txt)
 	@$(PYTHON) scripts/setup.py toolchain runtime model real-parts
 	cargo build --release --locked --target-dir target

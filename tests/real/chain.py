@@ -1,0 +1,161 @@
+"""Replicas of Lookdown on hosts of their own, with HAProxy in front, and Redis and a bucket that they share."""
+
+import contextlib
+import hashlib
+import socket
+import subprocess
+import tempfile
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+from cpu_share import cpu_share
+from harness.places import LOOKDOWN, ROOT
+from harness.processes import Server, running
+from hosts import Host, hosts
+from waiting import wait_until
+
+REPLICAS = ("r1", "r2", "r3")
+PORT = 8080
+GRACE_MILLIS = 2000
+KEY = "of-the-test"
+KEYS = f"test:admin:{hashlib.sha256(KEY.encode()).hexdigest()}"
+FRONT = """
+defaults
+    mode http
+    timeout connect 1s
+    timeout client 30s
+    timeout server 5s
+    timeout check 1s
+    # A request is sent to another replica only if this one cannot have seen it.
+    retries 3
+    retry-on conn-failure
+    option redispatch 1
+global
+    stats socket {socket} mode 600 level admin
+frontend front
+    bind :{port}
+    http-request return status 200 if {{ path /front }}
+    default_backend replicas
+backend replicas
+    balance leastconn
+    option httpchk GET /readyz
+    http-response set-header X-Replica %s
+    default-server check inter 250ms fall 2 rise 2
+"""
+
+
+class Chain:
+    """Everything that runs."""
+
+    def __init__(self, machines: dict[str, Host], folder: Path, settings: dict[str, str], cores: float | None):
+        self._machines, self._folder, self._settings, self._cores = machines, folder, settings, cores
+        self._stacks: dict[str, contextlib.ExitStack] = {}
+        self.replicas: dict[str, Server] = {}
+        self.front: Server
+
+    def host(self, name: str) -> Host:
+        """The host a replica runs on."""
+        return self._machines[name]
+
+    def start(self, name: str) -> None:
+        """A replica, until it is ready; one that was there is gone already, or is ended."""
+        self.end(name)
+        stack = self._stacks[name] = contextlib.ExitStack()
+        host, store = self._machines[name], self._machines["store"].address
+        variables = {f"LOOKDOWN__{key}": value for key, value in self._settings.items()} | {
+            "LOOKDOWN__SERVER__LISTEN": f"0.0.0.0:{PORT}",
+            "LOOKDOWN__SHUTDOWN__GRACE_MILLIS": str(GRACE_MILLIS),
+            "LOOKDOWN__ACCESS__KEYS": KEYS,
+            "LOOKDOWN__CALIBRATIONS__PATH": "s3://cameras/ceiling",
+            "LOOKDOWN__CALIBRATIONS__POLL_SECONDS": "1",
+            "LOOKDOWN__RESULTS__URL": f"redis://{store}",
+            "AWS_ENDPOINT": f"http://{store}:5000",
+            "AWS_ALLOW_HTTP": "true",
+            "AWS_ACCESS_KEY_ID": "lookdown",
+            "AWS_SECRET_ACCESS_KEY": "of-the-test",
+            "MALLOC_MMAP_THRESHOLD_": "131072",
+        }
+        inside = host.inside
+        if self._cores:
+            inside = [*stack.enter_context(cpu_share(name, self._cores)), *inside]
+        command = [*inside, str(LOOKDOWN), "serve"]
+        self.replicas[name] = stack.enter_context(
+            running(f"replica-{name}", command, PORT, "/readyz", variables, host=host.address)
+        )
+
+    def end(self, name: str) -> None:
+        """A replica and all that is left of it."""
+        if name in self._stacks:
+            self._stacks.pop(name).close()
+
+    def serve_with(self, count: int) -> None:
+        """Only so many replicas get requests."""
+        for number, name in enumerate(REPLICAS):
+            self._tell_front(f"set server replicas/{name} state {'ready' if number < count else 'maint'}")
+
+    def wait_until(self, name: str, state: str) -> None:
+        """Until the front takes a replica for `UP` or `DOWN`."""
+        wait_until(lambda: self._states()[name] == state, f"the front takes {name} for {state}")
+
+    def _states(self) -> dict[str, str]:
+        rows = [line.split(",") for line in self._tell_front("show stat").splitlines()]
+        return {row[1]: row[17].split()[0] for row in rows if row[0] == "replicas"}
+
+    def _tell_front(self, command: str) -> str:
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(self._folder / "front.socket"))
+            connection.sendall(f"{command}\n".encode())
+            return connection.makefile(encoding="utf-8").read()
+
+    def start_shared_parts(self, stack: contextlib.ExitStack) -> None:
+        """What the replicas need before they start, and what stands before them."""
+        store, front = self._machines["store"], self._machines["front"]
+        redis = ["redis-server", "--bind", store.address, "--protected-mode", "no", "--save", "", "--appendonly", "no"]
+        stack.enter_context(_beside([*store.inside, *redis], store, 6379))
+        moto = [str(ROOT / ".setup" / "venv" / "bin" / "moto_server"), "-H", store.address, "-p", "5000"]
+        stack.enter_context(_beside([*store.inside, *moto], store, 5000))
+        bucket = urllib.request.Request(f"http://{store.address}:5000/cameras", method="PUT")
+        urllib.request.urlopen(bucket, timeout=30).close()
+        servers = [f"    server {name} {self._machines[name].address}:{PORT}\n" for name in REPLICAS]
+        plan = self._folder / "haproxy.cfg"
+        listing = FRONT.format(socket=self._folder / "front.socket", port=PORT) + "".join(servers)
+        plan.write_text(listing, encoding="utf-8")
+        command = [*front.inside, "haproxy", "-db", "-f", str(plan)]
+        self.front = stack.enter_context(running("front", command, PORT, "/front", {}, host=front.address))
+
+
+@contextlib.contextmanager
+def chain(settings: dict[str, str], cores: float | None = None) -> Iterator[Chain]:
+    """Three replicas with these settings, each with so many cores, or all with those that there are."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        hosts("store", "front", *REPLICAS) as machines,
+        contextlib.ExitStack() as stack,
+    ):
+        made = Chain(machines, Path(folder), settings, cores)
+        made.start_shared_parts(stack)
+        for name in REPLICAS:
+            stack.callback(made.end, name)
+            made.start(name)
+        for name in REPLICAS:
+            made.wait_until(name, "UP")
+        yield made
+
+
+@contextlib.contextmanager
+def _beside(command: list[str], host: Host, port: int) -> Iterator[None]:
+    """A server that speaks no HTTP of ours, from when it can be connected to."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def listens() -> bool:
+        with contextlib.suppress(OSError), socket.create_connection((host.address, port), 1):
+            return True
+        return False
+
+    try:
+        wait_until(listens, f"{command[-1]} listens")
+        yield
+    finally:
+        process.kill()
+        process.wait()

@@ -1,0 +1,67 @@
+"""Clients that ask over and over until they are told to stop, and what became of each request."""
+
+import collections
+import contextlib
+import http.client
+import threading
+import time
+from collections.abc import Iterator
+
+LOST = {0, 502, 503, 504}
+"""No answer at all, or one in which the front says that it got none."""
+
+
+class Crowd:
+    """What the clients saw."""
+
+    def __init__(self):
+        self.statuses: collections.Counter[int] = collections.Counter()
+        self.replicas: collections.Counter[str] = collections.Counter()
+        self.stopped = threading.Event()
+        self._lock = threading.Lock()
+
+    @property
+    def lost(self) -> int:
+        """Requests without an answer from a replica."""
+        return sum(count for status, count in self.statuses.items() if status in LOST)
+
+    def count(self, status: int, replica: str) -> None:
+        """One request more."""
+        with self._lock:
+            self.statuses[status] += 1
+            self.replicas[replica] += 1
+
+    def ask(self, address: str, path: str, body: bytes, headers: dict[str, str]) -> None:
+        """One client, on a connection that it keeps for as long as it can."""
+        connection = http.client.HTTPConnection(address, timeout=30)
+        while not self.stopped.is_set():
+            try:
+                connection.request("POST", path, body, headers)
+                answer = connection.getresponse()
+                answer.read()
+                self.count(answer.status, answer.getheader("x-replica", ""))
+            except (OSError, http.client.HTTPException):
+                self.count(0, "")
+                connection.close()
+
+
+@contextlib.contextmanager
+def crowd(address: str, path: str, body: bytes, headers: dict[str, str], clients: int) -> Iterator[Crowd]:
+    """Clients that ask while this is open; all have their last answer when it closes."""
+    seen = Crowd()
+    threads = [threading.Thread(target=seen.ask, args=(address, path, body, headers)) for _ in range(clients)]
+    for thread in threads:
+        thread.start()
+    try:
+        yield seen
+    finally:
+        seen.stopped.set()
+        for thread in threads:
+            thread.join()
+
+
+def rate(seen: Crowd, seconds: float) -> float:
+    """Requests a second that were answered with success, from now on."""
+    before = seen.statuses[200]
+    time.sleep(seconds)
+    return (seen.statuses[200] - before) / seconds

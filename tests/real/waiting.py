@@ -1,0 +1,16 @@
+"""Waits for a state, never for a time."""
+
+import time
+from collections.abc import Callable
+
+PATIENCE_SECONDS = 30.0
+LOOKS_PER_SECOND = 50.0
+
+
+def wait_until(holds: Callable[[], bool], what: str, seconds: float = PATIENCE_SECONDS) -> None:
+    """Until it holds; an `AssertionError` that says what was waited for if it does not."""
+    deadline = time.monotonic() + seconds
+    while not holds():
+        if time.monotonic() > deadline:
+            raise AssertionError(f"waited {seconds:.0f} s in vain until {what}")
+        time.sleep(1.0 / LOOKS_PER_SECOND)
