@@ -119,10 +119,10 @@ impl Tls {
 /// Shows what serves from now on in the metrics, and in the log what somebody should look at.
 fn show(identity: &Identity, options: &TlsOptions, metrics: &Metrics) {
     identity.warn(Timestamp::now(), options);
-    metrics
-        .tls_certificate_loads
-        .with_label_values(&["success"])
-        .inc();
+    let loads = &metrics.tls_certificate_loads;
+    loads.with_label_values(&["success"]).inc();
+    // An alert must see the first failure, too: its counter is there from the start.
+    loads.with_label_values(&["failure"]);
     let expiry = &metrics.tls_certificate_expiry;
     match identity.validity {
         Some(validity) => {

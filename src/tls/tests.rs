@@ -104,6 +104,10 @@ async fn a_changed_certificate_is_shown_to_new_connections_and_old_ones_live_on(
     );
     has_metric(
         &tls,
+        "lookdown_tls_certificate_loads_total{result=\"failure\"} 0",
+    );
+    has_metric(
+        &tls,
         "lookdown_tls_certificate_expiry_timestamp_seconds 3471292800",
     );
 }
