@@ -4,11 +4,13 @@ mod annotate;
 mod calibration;
 mod detect;
 mod eval;
+mod health;
 mod key;
 mod model;
 mod parameters;
 mod progress;
 mod serve;
+mod shell;
 mod tune;
 
 use std::{
@@ -18,7 +20,7 @@ use std::{
 };
 
 use anyhow::Context;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::{
     api,
@@ -28,7 +30,7 @@ use crate::{
 
 /// Finds people in the pictures of ceiling fisheye cameras.
 #[derive(Debug, Parser)]
-#[command(version, propagate_version = true)]
+#[command(name = "lookdown", propagate_version = true)]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
@@ -38,6 +40,8 @@ struct CommandLine {
 enum Command {
     /// Start the HTTP server
     Serve(serve::Arguments),
+    /// Ask the server that runs on this machine with these settings whether it is ready: ends with 0 or 1
+    Health(health::Arguments),
     /// Find the persons in pictures: one JSON report per line on standard output
     Detect(Box<detect::Arguments>),
     /// Measure how good detections are on a data set: average precision and speed
@@ -55,6 +59,10 @@ enum Command {
     Tune(tune::Arguments),
     /// Print the OpenAPI document
     Openapi,
+    /// Print what lets a shell complete commands
+    Completions(shell::CompletionArguments),
+    /// Write the manual pages
+    Manual(shell::ManualArguments),
 }
 
 /// Where the settings come from.
@@ -74,11 +82,13 @@ impl SettingsFile {
     }
 }
 
-/// Does what the command line of this process asks for.
+/// Does what the command line of this process asks for. `commit` is the source's the binary was built from,
+/// if that was known.
 #[must_use]
-pub fn run() -> ExitCode {
-    let outcome = match CommandLine::parse().command {
+pub fn run(commit: Option<&str>) -> ExitCode {
+    let outcome = match parse(commit).command {
         Command::Serve(arguments) => serve::run(&arguments),
+        Command::Health(arguments) => health::run(&arguments),
         Command::Detect(arguments) => detect::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Calibration(command) => calibration::run(&command),
@@ -86,6 +96,8 @@ pub fn run() -> ExitCode {
         Command::Key(command) => key::run(&command),
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Openapi => print_openapi(),
+        Command::Completions(arguments) => shell::print_completions(&arguments, command(commit)),
+        Command::Manual(arguments) => shell::write_manual(&arguments, command(commit)),
     };
     match outcome {
         Ok(code) => code,
@@ -95,6 +107,20 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The command line, which ends the process with an explanation when it is not understood.
+fn parse(commit: Option<&str>) -> CommandLine {
+    let matches = command(commit).get_matches();
+    CommandLine::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
+fn command(commit: Option<&str>) -> clap::Command {
+    let version = env!("CARGO_PKG_VERSION");
+    CommandLine::command().version(match commit {
+        Some(commit) if !commit.is_empty() => format!("{version} (commit {commit})"),
+        _ => version.to_owned(),
+    })
 }
 
 fn print_openapi() -> anyhow::Result<ExitCode> {

@@ -20,6 +20,7 @@ pub mod metrics;
 pub mod pipeline;
 pub mod plain_name;
 pub mod poller;
+pub mod probe;
 pub mod results;
 pub mod revision;
 pub mod server;

@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 24] = [
+const MAY_USE: [(&str, &[&str]); 25] = [
     ("plain_name", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
@@ -36,6 +36,7 @@ const MAY_USE: [(&str, &[&str]); 24] = [
         ],
     ),
     ("telemetry", &["settings"]),
+    ("probe", &["settings"]),
     (
         "pipeline",
         &[
@@ -110,6 +111,7 @@ const MAY_USE: [(&str, &[&str]); 24] = [
             "inference",
             "pipeline",
             "evaluation",
+            "probe",
             "settings",
             "shutdown",
             "telemetry",
@@ -120,7 +122,7 @@ const MAY_USE: [(&str, &[&str]); 24] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 22] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 24] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -141,14 +143,16 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 22] = [
         ],
     ),
     ("clap", &["cli"]),
+    ("clap_complete", &["cli"]),
+    ("clap_mangen", &["cli"]),
     ("indicatif", &["cli"]),
     ("plotters", &["evaluation"]),
     ("config", &["settings"]),
     ("object_store", &["calibration"]),
-    ("rustls", &["calibration", "telemetry", "tls"]),
+    ("rustls", &["calibration", "probe", "telemetry", "tls"]),
     ("tokio_rustls", &["tls"]),
     ("x509_cert", &["tls"]),
-    ("reqwest", &["telemetry"]),
+    ("reqwest", &["probe", "telemetry"]),
     ("opentelemetry", &["telemetry"]),
     ("opentelemetry_sdk", &["telemetry"]),
     ("opentelemetry_otlp", &["telemetry"]),

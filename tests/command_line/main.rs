@@ -3,7 +3,9 @@
 
 mod calibration;
 mod evaluation;
+mod health;
 mod keys;
+mod shell;
 
 use std::process::{Command, Output};
 

@@ -1,0 +1,40 @@
+//! `lookdown health`
+
+use std::{
+    io::{self, Write},
+    process::ExitCode,
+};
+
+use anyhow::Context;
+use clap::Args;
+use tokio::runtime;
+
+use super::SettingsFile;
+use crate::probe::{self, Probe};
+
+/// Arguments of `lookdown health`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Only ask whether the process answers (/livez), not whether frames can be sent (/readyz)
+    #[arg(long)]
+    live: bool,
+    #[command(flatten)]
+    settings_file: SettingsFile,
+}
+
+/// Asks the server that runs with these settings.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let settings = arguments.settings_file.load()?;
+    let probe = if arguments.live {
+        Probe::Liveness
+    } else {
+        Probe::Readiness
+    };
+    let runtime = runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("the operating system gives no runtime")?;
+    let url = runtime.block_on(probe::ask(&settings.server, probe))?;
+    writeln!(io::stdout(), "{url} answered yes").context("standard output cannot be written")?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,69 @@
+use std::net::TcpListener;
+
+use super::*;
+use crate::settings;
+
+fn server(variables: &[(&str, &str)]) -> ServerSettings {
+    let variables = variables
+        .iter()
+        .map(|(key, value)| (format!("LOOKDOWN__SERVER__{key}"), (*value).to_owned()));
+    settings::load(None, variables).unwrap().server
+}
+
+const CERTIFICATE: [(&str, &str); 2] = [
+    ("TLS__CERTIFICATE", "server.pem"),
+    ("TLS__PRIVATE_KEY", "server.key"),
+];
+
+#[test]
+fn a_server_that_listens_everywhere_is_asked_on_its_own_machine() {
+    let cases = [
+        ("0.0.0.0:8080", "http://127.0.0.1:8080/readyz"),
+        ("[::]:8080", "http://[::1]:8080/readyz"),
+        ("192.0.2.7:80", "http://192.0.2.7:80/readyz"),
+    ];
+    for (listen, wanted) in cases {
+        let server = server(&[("LISTEN", listen)]);
+        assert_eq!(url(&server, Probe::Readiness).unwrap(), wanted);
+    }
+}
+
+#[test]
+fn with_a_certificate_the_question_is_asked_over_tls() {
+    let server = server(&CERTIFICATE);
+    let asked = url(&server, Probe::Liveness).unwrap();
+    assert_eq!(asked, "https://127.0.0.1:8080/livez");
+}
+
+#[test]
+fn a_port_for_metrics_is_asked_first_as_it_needs_no_certificate() {
+    let mut variables = CERTIFICATE.to_vec();
+    variables.push(("METRICS_LISTEN", "0.0.0.0:9090"));
+    let asked = url(&server(&variables), Probe::Readiness).unwrap();
+    assert_eq!(asked, "http://127.0.0.1:9090/readyz");
+}
+
+#[test]
+fn a_port_that_the_system_chooses_cannot_be_asked() {
+    let server = server(&[("LISTEN", "127.0.0.1:0")]);
+    let refused = url(&server, Probe::Readiness).unwrap_err();
+    assert!(refused.to_string().contains("server.listen"), "{refused}");
+}
+
+#[test]
+fn a_server_that_asks_for_certificates_is_explained() {
+    let mut variables = CERTIFICATE.to_vec();
+    variables.push(("TLS__CLIENT_CERTIFICATES", "clients.pem"));
+    assert!(hint(&server(&variables)).contains("server.metrics_listen"));
+    assert_eq!(hint(&server(&CERTIFICATE)), "");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_server_that_never_answers_is_given_up() {
+    // Connects, and says nothing: the clock is ahead of it as soon as nothing else is to be done.
+    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = silent.local_addr().unwrap().to_string();
+    let gave_up = ask(&server(&[("LISTEN", &address)]), Probe::Liveness).await;
+    let gave_up = gave_up.unwrap_err();
+    assert!(matches!(gave_up, ProbeError::Silent { .. }), "{gave_up}");
+}
