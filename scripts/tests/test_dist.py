@@ -1,0 +1,64 @@
+"""What is handed out is complete, can be checked, and is the same wherever it was packed."""
+
+import hashlib
+import subprocess
+import tarfile
+import tempfile
+import unittest
+from pathlib import Path
+
+from assets.machine import supported_cpu
+from assets.pins import read_pins
+from dist import ROOT, copy_files, describe_commands, files_of, pack, write_sums
+
+PROGRAM = """#!/bin/sh
+if [ "$1" = manual ]; then mkdir -p "$2" && echo page > "$2/lookdown.1"; else echo "complete $2"; fi
+"""
+
+
+class Dist(unittest.TestCase):
+    def setUp(self):
+        self.here = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.folder = self.here / "lookdown"
+        self.binary = self.here / "built"
+        self.binary.write_text(PROGRAM, encoding="utf-8")
+
+    def test_the_library_the_default_models_and_their_licences_belong_to_it(self):
+        pins = read_pins(ROOT / "scripts" / "pins.toml")
+        names = [name for _, name in files_of(ROOT, pins, supported_cpu())]
+        for name in ("LICENSE", "NOTICE", "runtime/libonnxruntime.so", "runtime/ThirdPartyNotices.txt"):
+            self.assertIn(name, names)
+        models = {name.split("/")[1] for name in names if name.endswith("/model.onnx")}
+        self.assertEqual(models, {model.name for model in pins.models + pins.quantised if model.default})
+
+    def test_a_file_that_is_missing_is_named(self):
+        with self.assertRaises(SystemExit) as refused:
+            copy_files(self.folder, self.binary, iter([(self.here / "gone.so", "gone.so")]))
+        self.assertIn("gone.so is missing", str(refused.exception))
+
+    def test_every_file_is_in_the_sums(self):
+        copy_files(self.folder, self.binary, iter(()))
+        describe_commands(self.folder)
+        write_sums(self.folder)
+        check = ["sha256sum", "--check", "--strict", "SHA256SUMS"]
+        checked = subprocess.run(check, cwd=self.folder, check=True, capture_output=True, text=True)
+        names = {line.rsplit(":", 1)[0] for line in checked.stdout.splitlines()}
+        completions = {f"completions/{name}" for name in ("lookdown.bash", "_lookdown", "lookdown.fish")}
+        self.assertEqual(names, {"lookdown", "man/man1/lookdown.1"} | completions)
+
+    def test_the_same_files_make_the_same_tarball(self):
+        sums = []
+        for name in ("first", "second"):
+            folder = self.here / name / "lookdown"
+            copy_files(folder, self.binary, iter(()))
+            tarball = self.here / name / "lookdown-1-linux.tar.gz"
+            pack(folder, tarball, 1_000_000_000)
+            sums.append(hashlib.sha256(tarball.read_bytes()).hexdigest())
+            with tarfile.open(tarball) as packed:
+                entry = packed.getmember("lookdown-1-linux/lookdown")
+                self.assertEqual((entry.mode, entry.uid, entry.mtime), (0o755, 0, 1_000_000_000))
+        self.assertEqual(sums[0], sums[1])
+
+
+if __name__ == "__main__":
+    unittest.main()
