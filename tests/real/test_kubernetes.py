@@ -1,0 +1,100 @@
+"""The manifests of k8s: valid, consistent with each other, and with the server that they start."""
+
+import os
+import subprocess
+import tomllib
+import unittest
+
+from harness.places import LOOKDOWN, ROOT
+from harness.processes import free_ports
+from kubernetes.tools import manifests, only, read_yaml
+
+OVERLAYS = ("overlays/cpu", "overlays/gpu", "overlays/ha")
+
+
+class Manifests(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.all = {folder: manifests(folder) for folder in ("base", *OVERLAYS)}
+
+    def test_services_budgets_and_policies_mean_the_pods(self):
+        for documents in self.all.values():
+            deployment = only(documents, "Deployment")["spec"]
+            labels = deployment["template"]["metadata"]["labels"]
+            self.assertLessEqual(deployment["selector"]["matchLabels"].items(), labels.items())
+            self.assertLessEqual(only(documents, "Service")["spec"]["selector"].items(), labels.items())
+            budget = only(documents, "PodDisruptionBudget")["spec"]["selector"]["matchLabels"]
+            self.assertLessEqual(budget.items(), labels.items())
+            for policy in (document["spec"] for document in documents if document["kind"] == "NetworkPolicy"):
+                self.assertLessEqual(policy["podSelector"]["matchLabels"].items(), labels.items())
+            for constraint in deployment["template"]["spec"]["topologySpreadConstraints"]:
+                self.assertLessEqual(constraint["labelSelector"]["matchLabels"].items(), labels.items())
+
+    def test_ports_have_the_names_and_numbers_that_are_used(self):
+        for documents in self.all.values():
+            settings = self.settings(documents)
+            container = self.container(documents)
+            ports = {port["name"]: port["containerPort"] for port in container["ports"]}
+            self.assertEqual(settings["LOOKDOWN__SERVER__LISTEN"], f"0.0.0.0:{ports['http']}")
+            self.assertEqual(settings["LOOKDOWN__SERVER__METRICS_LISTEN"], f"0.0.0.0:{ports['metrics']}")
+            self.assertEqual({port["targetPort"] for port in only(documents, "Service")["spec"]["ports"]}, {*ports})
+            for probe, path in (("startup", "/livez"), ("liveness", "/livez"), ("readiness", "/readyz")):
+                self.assertEqual(container[f"{probe}Probe"]["httpGet"], {"path": path, "port": "metrics"})
+
+    def test_a_pod_has_the_time_that_its_end_may_take(self):
+        defaults = tomllib.loads((ROOT / "config" / "lookdown.toml").read_text(encoding="utf-8"))
+        millis = defaults["shutdown"]["grace_millis"] + defaults["server"]["request_timeout_millis"]
+        for documents in self.all.values():
+            pod = only(documents, "Deployment")["spec"]["template"]["spec"]
+            before = self.container(documents)["lifecycle"]["preStop"]["sleep"]["seconds"]
+            self.assertGreater(pod["terminationGracePeriodSeconds"], before + millis / 1000)
+
+    def test_a_pod_may_do_nothing_that_it_need_not(self):
+        for documents in self.all.values():
+            pod = only(documents, "Deployment")["spec"]["template"]["spec"]
+            self.assertEqual((pod["automountServiceAccountToken"], pod["enableServiceLinks"]), (False, False))
+            self.assertEqual(pod["securityContext"]["seccompProfile"], {"type": "RuntimeDefault"})
+            self.assertTrue(pod["securityContext"]["runAsNonRoot"])
+            may = self.container(documents)["securityContext"]
+            self.assertEqual((may["readOnlyRootFilesystem"], may["allowPrivilegeEscalation"]), (True, False))
+            self.assertEqual(may["capabilities"], {"drop": ["ALL"]})
+
+    def test_the_server_could_start_with_the_settings(self):
+        for folder, documents in self.all.items():
+            mount, calibrations = self.container(documents)["volumeMounts"][0], ROOT / "k8s" / "base" / "calibrations"
+            settings = self.settings(documents)
+            self.assertEqual(settings["LOOKDOWN__CALIBRATIONS__PATH"], mount["mountPath"])
+            first, second = free_ports(2)
+            here = {
+                "LOOKDOWN__SERVER__LISTEN": f"127.0.0.1:{first}",
+                "LOOKDOWN__SERVER__METRICS_LISTEN": f"127.0.0.1:{second}",
+                "LOOKDOWN__CALIBRATIONS__PATH": str(calibrations),
+                # No GPU is needed to see that the rest is understood.
+                "LOOKDOWN__INFERENCE__DEVICE": "cpu",
+            }
+            environment = os.environ | settings | here
+            check = [LOOKDOWN, "serve", "--check"]
+            checked = subprocess.run(check, env=environment, capture_output=True, text=True, check=False)
+            self.assertEqual(checked.returncode, 0, f"{folder}: {checked.stderr}")
+            self.assertIn("1 calibrations can be used", checked.stdout)
+
+    def test_the_autoscaler_asks_for_the_metric_that_the_adapter_has(self):
+        (rule,) = read_yaml(ROOT / "k8s" / "monitoring" / "prometheus-adapter.yaml")["rules"]
+        metrics = only(self.all["overlays/ha"], "HorizontalPodAutoscaler")["spec"]["metrics"]
+        asked = [metric["pods"]["metric"]["name"] for metric in metrics if metric["type"] == "Pods"]
+        self.assertEqual(asked, [rule["name"]["as"]])
+
+    @staticmethod
+    def container(documents: list[dict]) -> dict:
+        (container,) = only(documents, "Deployment")["spec"]["template"]["spec"]["containers"]
+        return container
+
+    @staticmethod
+    def settings(documents: list[dict]) -> dict[str, str]:
+        maps = [document for document in documents if document["kind"] == "ConfigMap"]
+        (settings,) = [found["data"] for found in maps if found["metadata"]["name"].startswith("lookdown-settings")]
+        return settings
+
+
+if __name__ == "__main__":
+    unittest.main()

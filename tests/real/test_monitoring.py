@@ -1,0 +1,122 @@
+"""Alerts, the dashboard and the autoscaler's metric: understood by Prometheus, and about metrics that there are."""
+
+import http.client
+import json
+import re
+import shutil
+import ssl
+import tempfile
+import unittest
+from pathlib import Path
+
+from harness.places import LOOKDOWN, ROOT, SAMPLES
+from harness.processes import free_ports, running
+from kubernetes.tools import manifests, only, read_yaml, run
+
+MONITORING = ROOT / "k8s" / "monitoring"
+UNIT_TESTS = Path(__file__).with_name("kubernetes") / "alerts_test.yaml"
+SELECTOR = re.compile(r"\b(lookdown_\w+|process_\w+)(?:\{([^}]*)\})?")
+MATCHER = re.compile(r'(\w+)="([^"]+)"')
+# Those that Prometheus adds to what it scrapes.
+ITS_OWN = ("job", "instance", "namespace", "pod")
+
+
+class Monitoring(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.documents = manifests("monitoring")
+        cls.alerts = only(cls.documents, "PrometheusRule")["spec"]
+        cls.rules = [rule for group in cls.alerts["groups"] for rule in group["rules"]]
+        dashboard = json.loads((MONITORING / "dashboard.json").read_text(encoding="utf-8"))
+        cls.panels = [target["expr"] for panel in dashboard["panels"] for target in panel["targets"]]
+        (cls.adapter,) = read_yaml(MONITORING / "prometheus-adapter.yaml")["rules"]
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+
+    def test_alerts_fire_on_what_they_are_for_and_on_nothing_else(self):
+        self.write("rules.yaml", self.alerts)
+        run(["promtool", "check", "rules", self.folder / "rules.yaml"])
+        bare = [{part: rule[part] for part in rule if part != "annotations"} for rule in self.rules]
+        self.write("rules.yaml", {"groups": [{"name": "lookdown", "rules": bare}]})
+        shutil.copy(UNIT_TESTS, self.folder)
+        run(["promtool", "test", "rules", self.folder / UNIT_TESTS.name])
+        tested = UNIT_TESTS.read_text(encoding="utf-8")
+        self.assertEqual([rule["alert"] for rule in self.rules if f"alertname: {rule['alert']}\n" not in tested], [])
+
+    def test_every_alert_has_a_runbook(self):
+        operations = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+        anchors = {line.strip("# ").lower() for line in operations.splitlines() if line.startswith("### Lookdown")}
+        runbooks = {rule["annotations"]["runbook"] for rule in self.rules}
+        self.assertEqual(runbooks, {f"docs/operations.md#{anchor}" for anchor in anchors})
+
+    def test_prometheus_understands_the_dashboard(self):
+        self.assertTrue(self.panels)
+        rules = [
+            {"record": f"panel:{number}", "expr": expression.replace("$__rate_interval", "5m")}
+            for number, expression in enumerate(self.panels)
+        ]
+        self.write("panels.yaml", {"groups": [{"name": "panels", "rules": rules}]})
+        run(["promtool", "check", "rules", self.folder / "panels.yaml"])
+
+    def test_the_autoscalers_metric_is_the_mean_wait_and_zero_without_frames(self):
+        query = self.adapter["metricsQuery"].replace("<<.GroupBy>>", "pod").replace("<<.LabelMatchers>>", 'pod=~"a|b"')
+        series = {
+            'lookdown_queue_duration_seconds_sum{pod="a"}': "0+30x10",
+            'lookdown_queue_duration_seconds_count{pod="a"}': "0+120x10",
+            'lookdown_queue_duration_seconds_sum{pod="b"}': "7x10",
+            'lookdown_queue_duration_seconds_count{pod="b"}': "9x10",
+        }
+        samples = [{"labels": '{pod="a"}', "value": 0.25}, {"labels": '{pod="b"}', "value": 0}]
+        test = {
+            "interval": "1m",
+            "input_series": [{"series": name, "values": values} for name, values in series.items()],
+            "promql_expr_test": [{"expr": query, "eval_time": "8m", "exp_samples": samples}],
+        }
+        self.write("test.yaml", {"tests": [test]})
+        run(["promtool", "test", "rules", self.folder / "test.yaml"])
+
+    def test_every_metric_and_label_that_is_asked_for_is_in_a_scrape(self):
+        scrape = self.scrape()
+        queries = [rule["expr"] for rule in self.rules] + self.panels
+        queries += [self.adapter["seriesQuery"], self.adapter["metricsQuery"]]
+        asked = {found.groups() for query in queries for found in SELECTOR.finditer(query)}
+        self.assertGreater(len(asked), 20)
+        for name, labels in asked:
+            lines = [line for line in scrape.splitlines() if re.match(rf"{name}[{{ ]", line)]
+            self.assertTrue(lines, f"{name} is in no scrape")
+            for label, value in MATCHER.findall(labels or ""):
+                if label not in ITS_OWN and not value.startswith("$"):
+                    self.assertTrue(any(f'{label}="{value}"' in line for line in lines), f"{name}: {label}={value}")
+
+    def test_prometheus_takes_the_settings_beside_the_compose_file(self):
+        run(["promtool", "check", "config", ROOT / "docker" / "prometheus.yaml"])
+
+    def scrape(self) -> str:
+        """The metrics of a server that has answered a frame over TLS."""
+        key, certificate = self.folder / "key.pem", self.folder / "certificate.pem"
+        made = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
+        run([*made, "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", certificate])
+        port, metrics_port = free_ports(2)
+        settings = {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "SERVER__METRICS_LISTEN": f"127.0.0.1:{metrics_port}",
+            "SERVER__TLS__CERTIFICATE": str(certificate),
+            "SERVER__TLS__PRIVATE_KEY": str(key),
+            "SHUTDOWN__GRACE_MILLIS": "0",
+        }
+        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
+        with running("monitored", [str(LOOKDOWN), "serve"], metrics_port, "/readyz", environment) as server:
+            context = ssl.create_default_context(cafile=certificate)
+            connection = http.client.HTTPSConnection("localhost", port, timeout=60, context=context)
+            connection.request("POST", "/detect?profile=fast", (SAMPLES / "office.jpg").read_bytes())
+            self.assertEqual(connection.getresponse().status, 200)
+            return server.get("/metrics").decode()
+
+    def write(self, name: str, content: dict) -> None:
+        # YAML reads JSON.
+        (self.folder / name).write_text(json.dumps(content), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    unittest.main()
