@@ -1,0 +1,89 @@
+"""Builds the image from docker/Dockerfile with buildah, around the release binary that is there."""
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.places import LOOKDOWN, ROOT
+
+HERE = ROOT / ".setup" / "real" / "image"
+BASE = HERE / "debian"
+"""A Debian of the release that the Dockerfile names, as `debootstrap` makes it."""
+STORE = HERE / "store"
+# As root in a container that is not privileged, buildah can do with this alone.
+BUILDAH = ["buildah", f"--root={STORE}/images", f"--runroot={STORE}/run", "--storage-driver=vfs"]
+INSIDE = Path(__file__).with_name("inside.sh")
+
+
+class BuildError(Exception):
+    """A step that came to nothing, with what it said."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """An image and its files."""
+
+    root: Path
+    config: dict
+
+    def inside(self, *command: str, **variables: str) -> list[str]:
+        """The command line that runs a command in the image, with the image's environment and these variables."""
+        environment = dict(variable.split("=", 1) for variable in self.config["Env"]) | variables
+        assignments = [f"{name}={value}" for name, value in environment.items()]
+        isolated = ["/usr/bin/unshare", "--mount", "/bin/sh", str(INSIDE), str(self.root)]
+        return ["env", "-i", *assignments, *isolated, *command]
+
+    def size(self) -> int:
+        """The bytes of all files."""
+        files = (file for file in self.root.rglob("*") if file.is_file() and not file.is_symlink())
+        return sum(file.stat().st_size for file in files)
+
+
+def build() -> Image:
+    """The image, until `remove` is called."""
+    remove()
+    _run([sys.executable, ROOT / "scripts" / "dist.py", LOOKDOWN])
+    _import_base("debian:12-slim", "bookworm")
+    _buildah(
+        *("bud", "--isolation=chroot", "--pull-never", "--format=docker", "--build-arg=PROGRAM=prebuilt"),
+        *("--build-arg=LOOKDOWN_COMMIT=0123456789ab", f"--file={ROOT}/docker/Dockerfile", "--tag=lookdown", ROOT),
+    )
+    container = _buildah("from", "--pull-never", "lookdown")
+    root = Path(_buildah("mount", container))
+    # Container engines mount these.
+    for place in ("dev", "proc"):
+        (root / place).mkdir()
+    config = json.loads(_buildah("inspect", "--format={{json .Docker.Config}}", container))
+    return Image(root, config)
+
+
+def remove() -> None:
+    """Deletes all that was built, but for the base."""
+    shutil.rmtree(STORE, ignore_errors=True)
+
+
+def _import_base(name: str, release: str) -> None:
+    if not BASE.is_dir():
+        unfinished = HERE / "unfinished"
+        shutil.rmtree(unfinished, ignore_errors=True)
+        unfinished.parent.mkdir(parents=True, exist_ok=True)
+        _run(["debootstrap", "--variant=minbase", release, unfinished])
+        shutil.rmtree(unfinished / "var" / "cache" / "apt" / "archives")
+        unfinished.rename(BASE)
+    container = _buildah("from", "scratch")
+    _buildah("add", "--quiet", container, BASE, "/")
+    _buildah("commit", "--quiet", "--rm", container, name)
+
+
+def _buildah(*arguments) -> str:
+    return _run([*BUILDAH, *arguments])
+
+
+def _run(command: list) -> str:
+    answer = subprocess.run(list(map(str, command)), cwd=ROOT, capture_output=True, text=True, check=False)
+    if answer.returncode:
+        raise BuildError(f"{command[0]} failed:\n{answer.stdout[-3000:]}{answer.stderr[-3000:]}")
+    return answer.stdout.strip()

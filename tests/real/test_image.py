@@ -1,0 +1,79 @@
+"""The container image: built from its Dockerfile, and run as a container engine would run it."""
+
+import json
+import os
+import stat
+import subprocess
+import time
+import unittest
+
+from harness.places import ROOT, SAMPLES
+from harness.processes import free_ports, running
+from image.build import build, remove
+
+LARGEST_BYTES = 120_000_000
+PROGRAM = "/opt/lookdown/lookdown"
+
+
+class ContainerImage(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.addClassCleanup(remove)
+        started = time.monotonic()
+        cls.image = build()
+        print(f"image: {cls.image.size() / 1e6:.1f} MB, built in {time.monotonic() - started:.0f} s", flush=True)
+
+    def test_it_says_how_it_is_run(self):
+        config = self.image.config
+        self.assertEqual((config["User"], config["WorkingDir"]), ("65532:65532", "/opt/lookdown"))
+        self.assertEqual((config["Entrypoint"], config["Cmd"]), ([PROGRAM], ["serve"]))
+        self.assertEqual(config["Healthcheck"]["Test"], ["CMD", PROGRAM, "health"])
+        self.assertEqual(config["Labels"]["org.opencontainers.image.revision"], "0123456789ab")
+        self.assertEqual({*config["ExposedPorts"]}, {"8080/tcp"})
+
+    def test_it_is_small_and_has_no_other_program(self):
+        self.assertLess(self.image.size(), LARGEST_BYTES)
+        files = [file for file in self.image.root.rglob("*") if file.is_file() and os.access(file, os.X_OK)]
+        programs = {file.name for file in files if not file.name.startswith(("lib", "ld-"))}
+        self.assertEqual(programs, {"lookdown"})
+        writable = [file for file in self.image.root.rglob("*") if self.is_writable_by_the_user(file)]
+        self.assertEqual({str(file.relative_to(self.image.root)) for file in writable}, {"tmp", "opt/lookdown/calibrations"})
+
+    def test_every_work_of_others_is_there_with_its_licence(self):
+        for name in ("libc6", "libgcc-s1", "libstdc++6", "ca-certificates"):
+            self.assertTrue((self.image.root / "usr/share/doc" / name / "copyright").is_file(), name)
+            self.assertTrue((self.image.root / "var/lib/dpkg/status.d" / name).is_file(), name)
+        for name in ("LICENSE", "NOTICE", "runtime/LICENSE", "runtime/ThirdPartyNotices.txt", "lookdown.cdx.json"):
+            self.assertTrue((self.image.root / "opt/lookdown" / name).is_file(), name)
+
+    def test_it_serves_without_writing_and_its_health_check_knows(self):
+        (port,) = free_ports(1)
+        variables = {"LOOKDOWN__SERVER__LISTEN": f"0.0.0.0:{port}", "LOOKDOWN__SHUTDOWN__GRACE_MILLIS": "0"}
+        self.assertEqual(self.health(variables).returncode, 1)
+        config = self.image.config
+        command = self.image.inside(*config["Entrypoint"], *config["Cmd"], **variables)
+        with running("image", command, port, "/readyz", {}) as server:
+            print(f"image: ready after {server.seconds_to_ready:.2f} s", flush=True)
+            report = json.loads(server.post("/detect?profile=fast", (SAMPLES / "office.jpg").read_bytes()))
+            self.assertGreater(len(report["persons"]), 3)
+            healthy = self.health(variables)
+            self.assertEqual(healthy.returncode, 0, healthy.stderr)
+            server.process.terminate()
+            self.assertEqual(server.process.wait(30), 0)
+        self.assertEqual(self.health(variables).returncode, 1)
+
+    def health(self, variables: dict[str, str]) -> subprocess.CompletedProcess:
+        """What the image's health check says, by the settings of the container."""
+        check = self.image.config["Healthcheck"]["Test"][1:]
+        command = self.image.inside(*check, **variables)
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)
+
+    @staticmethod
+    def is_writable_by_the_user(file) -> bool:
+        found = file.lstat()
+        by_all = found.st_mode & stat.S_IWOTH and not stat.S_ISLNK(found.st_mode)
+        return bool(by_all) or found.st_uid == 65532
+
+
+if __name__ == "__main__":
+    unittest.main()
