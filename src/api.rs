@@ -6,9 +6,11 @@ mod calibrations;
 mod cors;
 mod crowd;
 mod deadline;
+mod deepstack;
 mod detect;
 mod entity_tags;
 mod envelope;
+mod find;
 mod foreign_pages;
 mod head;
 mod health;
@@ -56,6 +58,9 @@ fn routes() -> OpenApiRouter<ApiState> {
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
         .routes(routes!(detect::detect_persons))
+        .routes(routes!(deepstack::detect_as_deepstack))
+        .routes(routes!(deepstack::detect_as_deepstack_with))
+        .routes(routes!(deepstack::list_as_deepstack))
         .routes(routes!(calibrations::list))
         .routes(routes!(
             calibrations::get,

@@ -167,6 +167,12 @@ fn every_operation_says_how_it_can_fail() {
             "detect_persons",
             "400 401 403 404 406 408 413 415 422 429 500 503 504",
         ),
+        ("detect_as_deepstack", "400 401 403 408 413 429 500 503"),
+        (
+            "detect_as_deepstack_with",
+            "400 401 403 404 408 413 429 500 503",
+        ),
+        ("list_as_deepstack", "401 403 429"),
         ("list_results", "401 403 429"),
         ("get_latest_result", "400 401 403 404 422 429 503"),
         ("list_past_results", "400 401 403 404 422 429"),

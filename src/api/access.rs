@@ -73,10 +73,20 @@ impl FromRequestParts<ApiState> for Administrator {
 impl Access {
     /// Whether the request with these headers may do what `wanted` opens, as far as keys decide.
     pub(super) fn check(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
+        self.check_with(headers, None, wanted)
+    }
+
+    /// The same for a request that may show its key in a form.
+    pub(super) fn check_with(
+        &self,
+        headers: &HeaderMap,
+        in_form: Option<&str>,
+        wanted: Scope,
+    ) -> Result<(), Problem> {
         let Self::Keys(keys) = self else {
             return Ok(());
         };
-        let key = only_key(headers)?;
+        let key = only_key(shown_keys(headers).chain(in_form.map(str::as_bytes)))?;
         let holder = keys.holder_of(key).ok_or_else(|| {
             let detail = "the key is not known here: it was mistyped, or the server's operator \
                           has removed it";
@@ -97,7 +107,7 @@ impl Access {
     pub(super) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
         match self {
             Self::Open { .. } => None,
-            Self::Keys(keys) => keys.holder_of(only_key(headers).ok()?),
+            Self::Keys(keys) => keys.holder_of(only_key(shown_keys(headers)).ok()?),
         }
     }
 
@@ -116,8 +126,13 @@ impl Access {
     }
 }
 
-/// The one key of a request. Another scheme of `Authorization` is for somebody else on the way.
-fn only_key(headers: &HeaderMap) -> Result<&[u8], Problem> {
+/// Whether these headers show a key, of whomever.
+pub(super) fn shows_key(headers: &HeaderMap) -> bool {
+    shown_keys(headers).next().is_some()
+}
+
+/// The keys in the headers. Another scheme of `Authorization` is for somebody else on the way.
+fn shown_keys(headers: &HeaderMap) -> impl Iterator<Item = &[u8]> {
     let bearers = headers.get_all(AUTHORIZATION).iter().filter_map(|value| {
         let (scheme, key) = value.as_bytes().split_at_checked(BEARER.len())?;
         scheme
@@ -125,7 +140,11 @@ fn only_key(headers: &HeaderMap) -> Result<&[u8], Problem> {
             .then(|| key.trim_ascii())
     });
     let plain = headers.get_all(API_KEY).iter();
-    let mut keys = bearers.chain(plain.map(HeaderValue::as_bytes));
+    bearers.chain(plain.map(HeaderValue::as_bytes))
+}
+
+/// The one key of a request.
+fn only_key<'a>(mut keys: impl Iterator<Item = &'a [u8]>) -> Result<&'a [u8], Problem> {
     match (keys.next(), keys.next()) {
         (Some(key), None) => Ok(key),
         (None, _) => Err(Problem::new(

@@ -157,7 +157,7 @@ fn write_problem(
     path: &str,
     request_id: &RequestId,
 ) -> Response {
-    let status = problem.kind().status();
+    let status = problem.status_at(path);
     let body = Json(problem.body(path, request_id.as_str())).into_response();
     let (mut parts, _) = response.into_parts();
     parts.status = status;

@@ -12,9 +12,10 @@ use security::Keys;
 
 pub(super) use parameters::{DetectForm, DetectQuery};
 pub(super) use problems::{
-    CameraEventsProblems, ChangeProblems, DeleteProblems, DetectProblems, EventsProblems,
-    FaultProblem, HistoryProblems, IndexProblems, LatestProblems, LoadProblems, NotReadyProblems,
-    ReadProblems, UnknownCalibrationProblem, ViewsProblems,
+    CameraEventsProblems, ChangeProblems, DeepStackCustomProblems, DeepStackProblems,
+    DeleteProblems, DetectProblems, EventsProblems, FaultProblem, HistoryProblems, IndexProblems,
+    LatestProblems, LoadProblems, NotReadyProblems, ReadProblems, UnknownCalibrationProblem,
+    ViewsProblems,
 };
 
 use super::problem::ProblemBody;
@@ -30,6 +31,7 @@ use super::problem::ProblemBody;
     servers((url = "/", description = "This server")),
     tags(
         (name = "detection", description = "Frames in, persons out."),
+        (name = "deepstack", description = "The same for clients of DeepStack, such as Home Assistant and Blue Iris."),
         (name = "results", description = "What was found last, for dashboards. Kept in memory, within limits."),
         (name = "calibrations", description = "The cameras. Changes are for administrators."),
         (name = "models", description = "Which models answer. Changes are for administrators."),

@@ -18,13 +18,15 @@ use std::{sync::Arc, time::Duration};
 
 use axum::{
     http::{
-        HeaderValue,
+        HeaderValue, StatusCode,
         header::{RETRY_AFTER, WWW_AUTHENTICATE},
     },
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
 use utoipa::ToSchema;
+
+use super::deepstack;
 
 pub(super) use kind::ProblemKind;
 
@@ -100,16 +102,26 @@ impl Problem {
         self.cause.as_deref()
     }
 
+    /// The status with which a request for this path is answered.
+    pub(super) fn status_at(&self, path: &str) -> StatusCode {
+        if deepstack::speaks_at(path) {
+            deepstack::status_of(self.kind)
+        } else {
+            self.kind.status()
+        }
+    }
+
     /// As it is written to a client.
     pub(super) fn body(self, path: &str, request_id: &str) -> ProblemBody {
         ProblemBody {
             r#type: self.kind.urn(),
             title: self.kind.title(),
-            status: self.kind.status().as_u16(),
+            status: self.status_at(path).as_u16(),
             error: self.detail.clone(),
             detail: self.detail,
             instance: path.to_owned(),
             request_id: request_id.to_owned(),
+            success: deepstack::speaks_at(path).then_some(false),
         }
     }
 }
@@ -158,4 +170,8 @@ pub(super) struct ProblemBody {
     error: String,
     /// Identifies the request in the server's log.
     request_id: String,
+    /// Always false; only below `/v1/vision`, whose clients look for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    success: Option<bool>,
 }

@@ -13,7 +13,7 @@ use std::time::Instant as Arrival;
 
 use axum::{
     extract::{FromRequest, Query, Request},
-    http::{HeaderMap, Uri, header::CONTENT_TYPE, request::Parts},
+    http::{HeaderMap, Uri, header::CONTENT_TYPE},
 };
 use bytes::Bytes;
 use jiff::Timestamp;
@@ -22,6 +22,8 @@ pub(super) use body::{BodyReader, UploadBudget, next_chunk};
 pub(super) use pace::Pace;
 
 use names::{is_parameter, unknown_parameter};
+
+pub(super) use form::FieldUse;
 
 use super::{
     ApiState, Phase,
@@ -52,10 +54,30 @@ impl FromRequest<ApiState> for Upload {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let access = &state.options.access;
+        access.check(request.headers(), Scope::Detect)?;
+        let uri = request.uri().clone();
+        let mut upload = Self::receive(request, state, names::use_of).await?;
+        let mut parameters = query_parameters(&uri)?;
+        if let Some((name, _)) = parameters.iter().find(|(name, _)| !is_parameter(name)) {
+            return Err(unknown_parameter(name));
+        }
+        parameters.append(&mut upload.parameters);
+        upload.parameters = parameters;
+        Ok(upload)
+    }
+}
+
+impl Upload {
+    /// Reads a frame, alone or in a form whose fields are used as `use_of` says by their names. Who sent
+    /// it is not asked here.
+    pub(super) async fn receive(
+        request: Request,
+        state: &ApiState,
+        use_of: fn(&str) -> FieldUse,
+    ) -> Result<Self, Problem> {
         let received_at = Timestamp::now();
         let (parts, body) = request.into_parts();
-        let access = &state.options.access;
-        access.check(&parts.headers, Scope::Detect)?;
         if state.readiness.phase() == Phase::WarmingUp {
             return Err(Problem::warming_up());
         }
@@ -66,17 +88,12 @@ impl FromRequest<ApiState> for Upload {
         let reader = state.body_reader(state.options.max_body_bytes, remedy, deadline);
         let held = reader.read(&parts.headers, body).await?;
         let arrived = Arrival::now();
-        let mut parameters = query_parameters(&parts.uri)?;
-        if let Some((name, _)) = parameters.iter().find(|(name, _)| !is_parameter(name)) {
-            return Err(unknown_parameter(name));
-        }
         let headers = parts.headers.clone();
-        let (image, file_name) = if is_multipart(&parts) {
-            let form = form::parse(parts, held.bytes()).await?;
-            parameters.extend(form.parameters);
-            (held.with_bytes(form.image), form.file_name)
+        let (image, file_name, parameters) = if is_multipart(&headers) {
+            let form = form::parse(parts, held.bytes(), use_of).await?;
+            (held.with_bytes(form.image), form.file_name, form.parameters)
         } else {
-            (held, None)
+            (held, None, Vec::new())
         };
         Ok(Self {
             image: image.into_bytes(),
@@ -128,8 +145,9 @@ pub(super) fn parameters_named<const COUNT: usize>(
     Ok(values)
 }
 
-fn is_multipart(parts: &Parts) -> bool {
-    let content_type = parts.headers.get(CONTENT_TYPE);
+/// Whether the body is a form with files.
+pub(super) fn is_multipart(headers: &HeaderMap) -> bool {
+    let content_type = headers.get(CONTENT_TYPE);
     content_type.is_some_and(|value| {
         let value = value.as_bytes();
         value.len() >= 10 && value[..10].eq_ignore_ascii_case(b"multipart/")

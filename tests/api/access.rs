@@ -19,8 +19,11 @@ const ADMINISTRATOR: &str = "lookdown_administrator";
 const BOTH: &str = "lookdown_both";
 
 /// Every route that needs a scope.
-const GUARDED: [(&str, &str, &str); 14] = [
+const GUARDED: [(&str, &str, &str); 17] = [
     ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
+    ("POST", "/v1/vision/detection", "detect"),
+    ("POST", "/v1/vision/custom/lobby", "detect"),
+    ("POST", "/v1/vision/custom/list", "read"),
     ("GET", "/calibrations", "read"),
     ("GET", "/calibrations/lobby", "read"),
     ("GET", "/calibrations/lobby/views", "read"),
@@ -252,7 +255,8 @@ async fn without_keys_others_may_find_and_read_but_change_nothing() {
     });
     for (method, path, scope) in GUARDED {
         let answer = service.ask(method, path, &[]).await;
-        let open = scope == "detect" || method == "GET";
+        let lists = path.starts_with("/v1/vision/");
+        let open = scope == "detect" || method == "GET" || lists;
         assert_eq!(answer.status == 403, !open, "{method} {path}");
     }
 }

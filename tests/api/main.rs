@@ -6,6 +6,7 @@ mod areas;
 mod calibration_changes;
 mod calibrations;
 mod connections;
+mod deepstack;
 mod detect;
 mod detector;
 mod ending;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use axum::http::StatusCode;
 use utoipa::{
     IntoResponses, PartialSchema, ToSchema,
     openapi::{
@@ -9,7 +10,10 @@ use utoipa::{
     },
 };
 
-use crate::api::problem::{ProblemBody, ProblemKind};
+use crate::api::{
+    deepstack,
+    problem::{ProblemBody, ProblemKind},
+};
 
 /// What can go wrong with a frame.
 pub(in crate::api) struct DetectProblems;
@@ -39,6 +43,47 @@ impl IntoResponses for DetectProblems {
         responses(kinds.filter(|kind| !others(kind)))
     }
 }
+
+/// What can go wrong with a frame of a client of DeepStack.
+pub(in crate::api) struct DeepStackProblems;
+
+impl IntoResponses for DeepStackProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses_with(OF_DEEPSTACK, deepstack::status_of)
+    }
+}
+
+/// The same where the calibration is named.
+pub(in crate::api) struct DeepStackCustomProblems;
+
+impl IntoResponses for DeepStackCustomProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let kinds = OF_DEEPSTACK.into_iter();
+        let kinds = kinds.chain([ProblemKind::UnknownCalibration]);
+        responses_with(kinds, deepstack::status_of)
+    }
+}
+
+const OF_DEEPSTACK: [ProblemKind; 18] = [
+    ProblemKind::MalformedRequest,
+    ProblemKind::RepeatedParameter,
+    ProblemKind::MissingImage,
+    ProblemKind::KeyRequired,
+    ProblemKind::Forbidden,
+    ProblemKind::SlowUpload,
+    ProblemKind::BodyTooLarge,
+    ProblemKind::ImageTooLarge,
+    ProblemKind::UnsupportedImage,
+    ProblemKind::InvalidParameter,
+    ProblemKind::DamagedImage,
+    ProblemKind::UnfitImage,
+    ProblemKind::Overloaded,
+    ProblemKind::RateLimited,
+    ProblemKind::Internal,
+    ProblemKind::WarmingUp,
+    ProblemKind::ShuttingDown,
+    ProblemKind::Timeout,
+];
 
 /// The server takes no frames now.
 pub(in crate::api) struct NotReadyProblems;
@@ -245,10 +290,17 @@ impl IntoResponses for FaultProblem {
 }
 
 fn responses(kinds: impl IntoIterator<Item = ProblemKind>) -> BTreeMap<String, RefOr<Response>> {
+    responses_with(kinds, ProblemKind::status)
+}
+
+fn responses_with(
+    kinds: impl IntoIterator<Item = ProblemKind>,
+    status_of: impl Fn(ProblemKind) -> StatusCode,
+) -> BTreeMap<String, RefOr<Response>> {
     let mut by_status: BTreeMap<String, Vec<ProblemKind>> = BTreeMap::new();
     for kind in kinds {
         by_status
-            .entry(kind.status().as_str().to_owned())
+            .entry(status_of(kind).as_str().to_owned())
             .or_default()
             .push(kind);
     }

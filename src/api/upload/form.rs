@@ -1,4 +1,4 @@
-//! `multipart/form-data`: the frame in the field `img` or `image`, parameters as text fields.
+//! `multipart/form-data`: the frame and parameters as text fields.
 
 use axum::{
     body::Body,
@@ -10,11 +10,9 @@ use axum::{
 };
 use bytes::Bytes;
 
-use super::names::{is_parameter, unknown_parameter};
+use super::names::unknown_parameter;
 use crate::api::problem::{Problem, ProblemKind};
 
-/// The names of the frame's field.
-const IMAGE_NAMES: [&str; 2] = ["img", "image"];
 /// Most fields of a form: every parameter and the frame, with room for repetitions that deserve
 /// a better answer than this limit.
 const MAX_FIELDS: usize = 24;
@@ -23,6 +21,19 @@ const MAX_VALUE_BYTES: usize = 1024;
 
 /// Most characters of the name of the frame's file.
 const MAX_FILE_NAME_CHARS: usize = 255;
+
+/// What a field is for, by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::api) enum FieldUse {
+    /// It is the frame.
+    Frame,
+    /// It is a parameter.
+    Parameter,
+    /// It is for others, and not looked at.
+    None,
+    /// There is no such field: the form is refused.
+    Refused,
+}
 
 /// What a form held.
 pub(super) struct Form {
@@ -33,7 +44,11 @@ pub(super) struct Form {
 }
 
 /// Takes a form apart. `body` is whole, so nothing here waits for the client.
-pub(super) async fn parse(parts: Parts, body: Bytes) -> Result<Form, Problem> {
+pub(super) async fn parse(
+    parts: Parts,
+    body: Bytes,
+    use_of: fn(&str) -> FieldUse,
+) -> Result<Form, Problem> {
     let request = Request::from_parts(parts, Body::from(body));
     let mut multipart = Multipart::from_request(request, &())
         .await
@@ -49,17 +64,20 @@ pub(super) async fn parse(parts: Parts, body: Bytes) -> Result<Form, Problem> {
             return Err(malformed(&detail));
         }
         let name = field.name().unwrap_or_default().to_owned();
-        if IMAGE_NAMES.contains(&name.as_str()) {
-            file_name = field.file_name().and_then(name_of_file);
-            let bytes = field.bytes().await.map_err(broken)?;
-            if image.replace(bytes).is_some() {
-                return Err(second_image(&name));
+        match use_of(&name) {
+            FieldUse::Frame => {
+                file_name = field.file_name().and_then(name_of_file);
+                let bytes = field.bytes().await.map_err(broken)?;
+                if image.replace(bytes).is_some() {
+                    return Err(second_image(&name));
+                }
             }
-        } else if is_parameter(&name) {
-            let value = value_of(&name, field).await?;
-            parameters.push((name, value));
-        } else {
-            return Err(unknown_parameter(&name));
+            FieldUse::Parameter => {
+                let value = value_of(&name, field).await?;
+                parameters.push((name, value));
+            }
+            FieldUse::None => {}
+            FieldUse::Refused => return Err(unknown_parameter(&name)),
         }
     }
     Ok(Form {
@@ -83,8 +101,8 @@ async fn value_of(name: &str, field: Field<'_>) -> Result<String, Problem> {
 }
 
 fn missing_image() -> Problem {
-    let detail = "img: the form has no frame: send one in the field `img`, as in curl -F \
-                  img=@frame.jpg";
+    let detail = "img: the form has no frame: send one in the field `img` or `image`, as in curl \
+                  -F img=@frame.jpg";
     Problem::new(ProblemKind::MissingImage, detail)
 }
 

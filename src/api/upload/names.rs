@@ -1,5 +1,6 @@
 //! The parameters that may come with a frame.
 
+use super::form::FieldUse;
 use crate::{
     api::{
         answer::AnswerOptions,
@@ -8,12 +9,25 @@ use crate::{
     pipeline::DetectParameters,
 };
 
+/// The names of the frame's field.
+const FRAME_NAMES: [&str; 2] = ["img", "image"];
 /// Most characters of an unknown name that are repeated to its sender.
 const MAX_NAME_CHARS: usize = 64;
 
 /// Whether there is a parameter of this name.
 pub(super) fn is_parameter(name: &str) -> bool {
     names().any(|known| known == name)
+}
+
+/// What a field of the form is for.
+pub(super) fn use_of(name: &str) -> FieldUse {
+    if FRAME_NAMES.contains(&name) {
+        FieldUse::Frame
+    } else if is_parameter(name) {
+        FieldUse::Parameter
+    } else {
+        FieldUse::Refused
+    }
 }
 
 /// What the sender of another name is told.

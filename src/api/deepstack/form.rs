@@ -1,0 +1,127 @@
+//! What DeepStack's clients send: a form with the frame in `image`, `min_confidence` and `api_key`.
+
+use axum::extract::{FromRequest, Request};
+use utoipa::ToSchema;
+
+use crate::{
+    access::Scope,
+    api::{
+        ApiState, access,
+        problem::{Problem, ProblemKind},
+        request_id::RequestId,
+        upload::{FieldUse, Upload, is_multipart},
+    },
+    calibration::CalibrationId,
+    pipeline::{DetectJob, DetectParameters, ParameterError, Ticket},
+};
+
+const MIN_CONFIDENCE: &str = "min_confidence";
+const API_KEY: &str = "api_key";
+/// That of DeepStack's server for requests that name none.
+const DEFAULT_MIN_CONFIDENCE: f64 = 0.4;
+/// What `min_confidence` is called here.
+const SCORE_THRESHOLD: &str = "score_threshold";
+
+/// A frame as DeepStack's clients send it.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "describes what is read below")]
+pub(in crate::api) struct DeepStackForm {
+    /// The frame: a JPEG, PNG or WebP file.
+    #[schema(value_type = String, format = Binary, content_media_type = "application/octet-stream")]
+    image: Vec<u8>,
+    /// Leave out persons with a lower confidence.
+    #[schema(nullable = false, minimum = 0, maximum = 1, default = 0.4)]
+    min_confidence: Option<f64>,
+    /// A key with the scope `detect`, for clients that send it here instead of in a header; empty for
+    /// none.
+    #[schema(nullable = false)]
+    api_key: Option<String>,
+}
+
+/// A frame of somebody who may have it looked at.
+pub(in crate::api) struct DeepStackUpload(pub(super) Upload);
+
+impl FromRequest<ApiState> for DeepStackUpload {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let known = &state.options.access;
+        let headers = request.headers();
+        let is_form = is_multipart(headers);
+        // Who shows a key in the header is refused before anything is read; other keys are in the form.
+        if !is_form || access::shows_key(headers) {
+            known.check(headers, Scope::Detect)?;
+        }
+        if !is_form {
+            return Err(no_form());
+        }
+        let mut upload = Upload::receive(request, state, use_of).await?;
+        let mut keys = upload
+            .parameters
+            .extract_if(.., |(name, _)| name == API_KEY);
+        // Clients that have none send it empty.
+        let key = keys.next().filter(|(_, key)| !key.is_empty());
+        if keys.next().is_some() {
+            return Err(Problem::new(
+                ProblemKind::RepeatedParameter,
+                "api_key: it is given twice: give it once",
+            ));
+        }
+        drop(keys);
+        let key = key.as_ref().map(|(_, key)| key.as_str());
+        known.check_with(&upload.headers, key, Scope::Detect)?;
+        Ok(Self(upload))
+    }
+}
+
+fn use_of(name: &str) -> FieldUse {
+    match name {
+        "image" => FieldUse::Frame,
+        MIN_CONFIDENCE | API_KEY => FieldUse::Parameter,
+        // DeepStack passes over what it does not know, and clients rely on that.
+        _ => FieldUse::None,
+    }
+}
+
+fn no_form() -> Problem {
+    let detail = "image: the frame is to be sent in a form (multipart/form-data), as in curl -F \
+                  image=@frame.jpg";
+    Problem::new(ProblemKind::MissingImage, detail)
+}
+
+/// What is to be done.
+pub(super) fn job(
+    upload: Upload,
+    calibration: Option<CalibrationId>,
+    request_id: &RequestId,
+) -> Result<DetectJob, Problem> {
+    // All that are left are called so.
+    let thresholds = upload
+        .parameters
+        .iter()
+        .filter(|(_, value)| !value.is_empty());
+    let thresholds = thresholds.map(|(_, value)| (SCORE_THRESHOLD, value.as_str()));
+    let parameters =
+        DetectParameters::parse(thresholds, DEFAULT_MIN_CONFIDENCE).map_err(renamed)?;
+    let parameters = DetectParameters {
+        calibration,
+        ..parameters
+    };
+    Ok(DetectJob {
+        ticket: Ticket::of(parameters.priority),
+        parameters,
+        request_id: request_id.as_str().to_owned(),
+        received_at: upload.received_at,
+        arrived: upload.arrived,
+        image: upload.image,
+        calibration: None,
+    })
+}
+
+/// The same with the name that the sender knows.
+fn renamed(error: ParameterError) -> ParameterError {
+    ParameterError {
+        name: MIN_CONFIDENCE.to_owned(),
+        ..error
+    }
+}

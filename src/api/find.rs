@@ -1,0 +1,141 @@
+//! What every route that finds people does with a frame: it waits for the report as long as it may,
+//! counts, traces and keeps it.
+
+use std::time::Instant;
+
+use bytes::Bytes;
+use tokio::time::timeout_at;
+
+use super::{
+    ApiState,
+    deadline::Deadline,
+    problem::{Problem, ProblemKind},
+    report::Report,
+};
+use crate::{
+    metrics::Metrics,
+    pipeline::{DetectJob, Detected, DetectionReport},
+    results::NewReport,
+    telemetry::RequestTrace,
+};
+
+/// What an answer can be written from.
+pub(super) struct Found<'a> {
+    /// The frame and what was found in it.
+    pub(super) detected: Detected,
+    /// What was found as it is told.
+    pub(super) report: &'a Report,
+    /// The same as JSON, as it is kept.
+    pub(super) json: &'a Bytes,
+}
+
+/// Finds the persons in a frame and has the answer written while the frame still has its place.
+pub(super) async fn find<T: Send + 'static>(
+    state: &ApiState,
+    trace: &RequestTrace,
+    server_limit: Deadline,
+    job: DetectJob,
+    write: impl FnOnce(Found<'_>) -> Result<T, Problem> + Send + 'static,
+) -> Result<(DetectionReport, T), Problem> {
+    let own_limit = job.parameters.timeout;
+    let limit = own_limit.map_or(server_limit, |own| server_limit.within(own));
+    let timeline = job.ticket.timeline.clone();
+    let work = state.workers.detect_and(job, |detected| {
+        // The frame is kept for as long as the answer needs it, which a report does not.
+        let report = detected.report.clone();
+        (report, written(detected, write))
+    });
+    let outcome = timeout_at(limit.at(), work).await;
+    for span in timeline.spans(Instant::now()) {
+        trace.stage(span.stage.name(), span.began, span.ended);
+    }
+    let (report, written) =
+        outcome.map_err(|_| timed_out(limit, limit.at() < server_limit.at()))??;
+    describe(trace, &report);
+    record(&state.metrics, &report);
+    if state.options.zone_metrics {
+        let zones = report.zones.iter();
+        let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
+        state.metrics.show_zones(&report.calibration.id, zones);
+    }
+    let (json, answer) = written?;
+    let kept = NewReport {
+        camera: report.camera.clone(),
+        received_at: report.received_at,
+        persons: report.persons.len(),
+        json,
+    };
+    state.results.publish(kept).await;
+    Ok((report, answer))
+}
+
+/// The report as it is kept, and what its sender is answered.
+fn written<T>(
+    detected: Detected,
+    write: impl FnOnce(Found<'_>) -> Result<T, Problem>,
+) -> Result<(Bytes, T), Problem> {
+    let report = Report::from(&detected.report);
+    let json = serde_json::to_vec(&report).map_err(Problem::internal)?;
+    let json = Bytes::from(json);
+    let answer = write(Found {
+        detected,
+        report: &report,
+        json: &json,
+    })?;
+    Ok((json, answer))
+}
+
+fn timed_out(limit: Deadline, is_its_own: bool) -> Problem {
+    let seconds = limit.limit_seconds();
+    let whose = if is_its_own {
+        "timeout_millis"
+    } else {
+        "server.request_timeout_millis"
+    };
+    let detail = format!(
+        "the frame had no report within {seconds} s: use a faster profile, send fewer frames at \
+         a time, or raise {whose}"
+    );
+    Problem::new(ProblemKind::Timeout, detail)
+}
+
+/// What may explain how long a frame took.
+fn describe(trace: &RequestTrace, report: &DetectionReport) {
+    trace.note("lookdown.camera", report.camera.clone());
+    trace.note("lookdown.calibration", report.calibration.id.clone());
+    trace.note("lookdown.model", report.model.name.clone());
+    trace.note("lookdown.profile", report.profile.name());
+    for (key, count) in [
+        ("lookdown.views", report.views.inferred),
+        ("lookdown.batches", report.batch_count),
+        ("lookdown.persons", report.persons.len()),
+    ] {
+        trace.note(key, i64::try_from(count).unwrap_or(i64::MAX));
+    }
+}
+
+fn record(metrics: &Metrics, report: &DetectionReport) {
+    let labels = [report.model.name.as_str(), report.profile.name()];
+    let timings = &report.timings;
+    for (histogram, span) in [
+        (&metrics.request_duration, timings.total),
+        (&metrics.queue_duration, timings.queue),
+        (
+            &metrics.compute_input_duration,
+            timings.decode + timings.calibrate + timings.remap,
+        ),
+        (&metrics.compute_infer_duration, timings.inference),
+        (&metrics.compute_output_duration, timings.refine),
+    ] {
+        histogram
+            .with_label_values(&labels)
+            .observe(span.as_secs_f64());
+    }
+    metrics.views.inc_by(report.views.inferred as u64);
+    metrics
+        .unchanged_views
+        .inc_by(report.views.unchanged as u64);
+    metrics.batches.inc_by(report.batch_count as u64);
+    metrics.non_finite.inc_by(report.non_finite as u64);
+    metrics.persons.inc_by(report.persons.len() as u64);
+}

@@ -1,0 +1,342 @@
+//! What DeepStack's clients send and read.
+
+use std::sync::Arc;
+
+use axum::{body::Body, http::Request};
+use lookdown::{
+    access::{AccessKeys, KeyDigest},
+    api::Access,
+};
+use serde_json::Value;
+
+use crate::{
+    log::Log,
+    service::{Answer, Bounds, FRAME_SIDE, Service, form, frame},
+};
+
+const ANYWHERE: &str = "/v1/vision/detection";
+const LOBBY: &str = "/v1/vision/custom/lobby";
+const LIST: &str = "/v1/vision/custom/list";
+const KEY: &str = "lookdown_home_assistant";
+
+fn form_to(path: &str, parts: &[(&str, &[u8])]) -> Request<Body> {
+    let mut request = form(parts);
+    *request.uri_mut() = path.parse().unwrap();
+    request
+}
+
+async fn post(service: &Service, path: &str, parts: &[(&str, &[u8])]) -> Answer {
+    service.send(form_to(path, parts)).await
+}
+
+/// The answer must be a problem of this status that DeepStack's clients understand, too.
+#[track_caller]
+fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
+    assert_eq!(answer.status, status, "{}", answer.text());
+    let problem = answer.problem();
+    assert_eq!(problem["success"], false);
+    assert_eq!(problem["type"], format!("urn:lookdown:problem:{kind}"));
+    let error = problem["error"].as_str().unwrap();
+    assert!(error.contains(part), "{error}");
+}
+
+/// A service with one key of this scope.
+fn guarded(scope: &str) -> Service {
+    let digest = KeyDigest::of(KEY.as_bytes()).hexadecimal();
+    let keys = format!("home:{scope}:{digest}").parse().unwrap();
+    Service::within(&Bounds {
+        access: Access::Keys(Arc::new(AccessKeys::open(keys, None).unwrap())),
+        ..Bounds::default()
+    })
+}
+
+#[tokio::test]
+async fn a_frame_is_answered_in_deepstacks_shape_with_the_persons_that_detect_finds() {
+    let service = Service::start();
+    let image = frame();
+    let answer = post(
+        &service,
+        LOBBY,
+        &[("image", &image), ("min_confidence", b"0.3")],
+    )
+    .await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    assert_eq!(answer.header("content-type"), "application/json");
+    let answer = answer.json();
+    assert_eq!(answer["success"], true);
+    let seconds = answer["duration"].as_f64().unwrap();
+    assert!((0.0..20.0).contains(&seconds), "{seconds}");
+
+    let report = service.post_raw("calibration=lobby", image).await.json();
+    let persons = report["persons"].as_array().unwrap();
+    let predictions = answer["predictions"].as_array().unwrap();
+    assert_eq!(predictions.len(), persons.len());
+    assert!(!predictions.is_empty());
+    for (prediction, person) in predictions.iter().zip(persons) {
+        assert_eq!(prediction["label"], "person");
+        assert_eq!(prediction["confidence"], person["score"]);
+        for (edge, outwards) in [
+            ("x_min", -1.0),
+            ("y_min", -1.0),
+            ("x_max", 1.0),
+            ("y_max", 1.0),
+        ] {
+            let whole = prediction[edge].as_i64().unwrap();
+            assert!((0..=i64::from(FRAME_SIDE)).contains(&whole), "{prediction}");
+            let exact = person["box"][edge].as_f64().unwrap();
+            let beyond = (f64::from(i32::try_from(whole).unwrap()) - exact) * outwards;
+            assert!(
+                (0.0..1.0).contains(&beyond),
+                "{edge}: {prediction} {person}"
+            );
+        }
+    }
+}
+
+#[tokio::test]
+async fn without_a_calibration_the_circle_is_looked_for_and_reports_are_kept_for_both() {
+    let service = Service::start();
+    for path in [ANYWHERE, LOBBY] {
+        let answer = post(&service, path, &[("image", &frame())]).await;
+        assert_eq!(answer.status, 200, "{}", answer.text());
+    }
+    let cameras = service.get("/results").await.json();
+    let cameras: Vec<_> = cameras.as_array().unwrap().iter().collect();
+    let names: Vec<_> = cameras.iter().map(|row| &row["camera"]).collect();
+    assert!(names.contains(&&Value::from("assumed")), "{names:?}");
+    assert!(names.contains(&&Value::from("lobby")), "{names:?}");
+    let metrics = service.get("/metrics").await.text();
+    assert!(
+        metrics.contains("lookdown_results_stored_total 2"),
+        "{metrics}"
+    );
+    let route = "route=\"/v1/vision/custom/{calibration}\"";
+    assert!(metrics.contains(route), "{metrics}");
+}
+
+#[tokio::test]
+async fn the_least_confidence_is_theirs_by_default_and_an_empty_one_is_none() {
+    let service = Service::start();
+    for (sent, used) in [
+        (None, 0.4),
+        (Some(&b""[..]), 0.4),
+        (Some(b"0.8"), 0.8),
+        (Some(b"1"), 1.0),
+    ] {
+        let image = frame();
+        let mut parts: Vec<(&str, &[u8])> = vec![("image", &image)];
+        parts.extend(sent.map(|sent| ("min_confidence", sent)));
+        assert_eq!(post(&service, LOBBY, &parts).await.status, 200);
+        let report = service.get("/results/lobby/latest").await.json();
+        assert_eq!(report["refinement"]["score_threshold"], used);
+    }
+}
+
+#[tokio::test]
+async fn a_least_confidence_of_zero_costs_no_more_than_it_may() {
+    let service = Service::start();
+    service.gate.crowd(299);
+    for path in [ANYWHERE, LOBBY] {
+        let answer = post(
+            &service,
+            path,
+            &[("image", &frame()), ("min_confidence", b"0")],
+        )
+        .await;
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        let persons = answer.json()["predictions"].as_array().unwrap().len();
+        assert!((1..=1000).contains(&persons), "{persons}");
+    }
+    service.still_works().await;
+}
+
+#[tokio::test]
+async fn fields_that_are_not_known_are_passed_over() {
+    let service = Service::start();
+    let image = frame();
+    let parts: [(&str, &[u8]); 4] = [
+        ("userid", b"nobody"),
+        ("image\"; filename=\"image", &image),
+        ("admin_key", b"\xff\xfe"),
+        ("api_key", b""),
+    ];
+    let answer = post(&service, LOBBY, &parts).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+}
+
+#[tokio::test]
+async fn what_is_wrong_with_frame_or_field_is_told_with_deepstacks_statuses() {
+    let service = Service::start();
+    let good = frame();
+    let cut = &good[..good.len() - 20];
+    for (parts, kind, part) in [
+        (
+            &[("min_confidence", &b"0.4"[..])][..],
+            "missing-image",
+            "frame",
+        ),
+        (&[("image", b"")], "missing-image", "image"),
+        (&[("image", b"GIF89a or so")], "unsupported-image", "image"),
+        (&[("image", cut)], "damaged-image", "image"),
+        (
+            &[("image", &good), ("image", &good)],
+            "repeated-parameter",
+            "two frames",
+        ),
+        (
+            &[("image", &good), ("min_confidence", b"1.5")],
+            "invalid-parameter",
+            "min_confidence: 1.5",
+        ),
+        (
+            &[("image", &good), ("min_confidence", b"-1")],
+            "invalid-parameter",
+            "min_confidence: -1",
+        ),
+        (
+            &[("image", &good), ("min_confidence", b"NaN")],
+            "invalid-parameter",
+            "min_confidence",
+        ),
+        (
+            &[("image", &good), ("min_confidence", b"40%")],
+            "invalid-parameter",
+            "min_confidence",
+        ),
+        (
+            &[
+                ("image", &good),
+                ("min_confidence", b"0"),
+                ("min_confidence", b"1"),
+            ],
+            "repeated-parameter",
+            "min_confidence",
+        ),
+    ] {
+        assert_refused(&post(&service, LOBBY, parts).await, 400, kind, part);
+    }
+    let raw = Request::post(ANYWHERE)
+        .body(Body::from(good.clone()))
+        .unwrap();
+    assert_refused(&service.send(raw).await, 400, "missing-image", "form");
+    for path in ["/v1/vision/custom/nobody", "/v1/vision/custom/No%20ID"] {
+        let answer = post(&service, path, &[("image", &good)]).await;
+        assert_refused(&answer, 404, "unknown-calibration", "");
+    }
+    let answer = post(&service, "/v1/vision/face", &[("image", &good)]).await;
+    assert_refused(&answer, 404, "not-found", "/v1/vision/face");
+    assert_refused(
+        &service.get(ANYWHERE).await,
+        405,
+        "method-not-allowed",
+        "GET",
+    );
+    service.still_works().await;
+}
+
+#[tokio::test]
+async fn elsewhere_problems_say_nothing_of_success() {
+    let answer = Service::start().post_raw("", b"no picture".to_vec()).await;
+    assert_eq!(answer.status, 415);
+    assert!(answer.problem()["success"].is_null());
+}
+
+#[tokio::test]
+async fn a_frame_that_is_not_done_in_time_is_a_fault_of_the_server() {
+    let service = Service::within(&Bounds {
+        request_timeout: std::time::Duration::from_millis(300),
+        ..Bounds::default()
+    });
+    service.gate.close();
+    let answer = post(&service, LOBBY, &[("image", &frame())]).await;
+    service.gate.open();
+    assert_refused(&answer, 500, "timeout", "server.request_timeout_millis");
+}
+
+#[tokio::test]
+async fn frames_share_the_places_of_all_others() {
+    let service = Service::within(&Bounds {
+        frames_in_flight: 1,
+        ..Bounds::default()
+    });
+    service.gate.close();
+    let waiting = form_to(LOBBY, &[("image", &frame())]);
+    let first = tokio::spawn({
+        let router = service.router.clone();
+        async move {
+            tower::ServiceExt::oneshot(router, waiting)
+                .await
+                .unwrap()
+                .status()
+        }
+    });
+    service.gate.has_begun(1).await;
+    let answer = post(&service, ANYWHERE, &[("image", &frame())]).await;
+    assert_refused(&answer, 429, "overloaded", "frames");
+    assert!(!answer.header("retry-after").is_empty());
+    service.gate.open();
+    assert_eq!(first.await.unwrap(), 200);
+}
+
+#[tokio::test]
+async fn the_key_may_be_in_the_form_or_in_a_header_but_in_one_of_them_only() {
+    let service = guarded("detect");
+    let image = frame();
+    let image: (&str, &[u8]) = ("image", &image);
+    let log = Log::begin();
+    let in_form = ("api_key", KEY.as_bytes());
+    assert_eq!(post(&service, LOBBY, &[image, in_form]).await.status, 200);
+    assert_eq!(
+        post(&service, ANYWHERE, &[in_form, image]).await.status,
+        200
+    );
+
+    let with_header = |parts: &[(&str, &[u8])]| {
+        let mut request = form_to(LOBBY, parts);
+        request
+            .headers_mut()
+            .insert("x-api-key", KEY.parse().unwrap());
+        request
+    };
+    for parts in [&[image][..], &[image, ("api_key", b"")]] {
+        assert_eq!(service.send(with_header(parts)).await.status, 200);
+    }
+    let twice = service.send(with_header(&[image, in_form])).await;
+    assert_refused(&twice, 401, "key-required", "more than one key");
+
+    for parts in [
+        &[image][..],
+        &[image, ("api_key", b"")],
+        &[image, ("api_key", b"lookdown_stranger")],
+        &[image, ("api_key", &KEY.as_bytes()[1..])],
+    ] {
+        let answer = post(&service, LOBBY, parts).await;
+        assert_refused(&answer, 401, "key-required", "key");
+        assert_eq!(answer.header("www-authenticate"), "Bearer");
+    }
+    let raw = Request::post(LOBBY).body(Body::from(frame())).unwrap();
+    assert_refused(&service.send(raw).await, 401, "key-required", "key");
+    let answer = post(&service, LOBBY, &[image, in_form, in_form]).await;
+    assert_refused(&answer, 400, "repeated-parameter", "api_key");
+    assert!(!log.text().contains(KEY), "{}", log.text());
+}
+
+#[tokio::test]
+async fn a_key_of_another_scope_is_not_enough() {
+    let service = guarded("read");
+    let image = frame();
+    let parts = [("image", &image[..]), ("api_key", KEY.as_bytes())];
+    let answer = post(&service, LOBBY, &parts).await;
+    assert_refused(&answer, 403, "forbidden", "detect");
+}
+
+#[tokio::test]
+async fn the_calibrations_that_serve_are_listed_as_models() {
+    let service = Service::start();
+    std::fs::write(service.folder.path().join("broken.json"), "{").unwrap();
+    service.calibrations.refresh();
+    let answer = service.post(LIST, "").await;
+    assert_eq!(answer.status, 200);
+    let expected = serde_json::json!({"success": true, "models": ["lobby"]});
+    assert_eq!(answer.json(), expected);
+}

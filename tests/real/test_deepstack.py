@@ -1,0 +1,87 @@
+"""Lookdown as the server of DeepStack's clients: deepstack-python and deepstack-sdk, from PyPI."""
+
+import hashlib
+import json
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+from harness.places import ROOT, SAMPLES
+from support.lookdown import lookdown
+
+HERE = Path(__file__).resolve().parent
+PYTHON = ROOT / ".setup" / "real" / "deepstack" / "bin" / "python"
+CLIENTS = ("python", "sdk")
+OFFICE = SAMPLES / "office.jpg"
+PERSONS = 6
+"""In the frame of the office."""
+KEY = "lookdown_of_home_assistant"
+
+
+def ask(client: str, server, image: Path = OFFICE, model: str = "", key: str = "", confidence: float = 0.4) -> dict:
+    """What a client makes of the answer."""
+    port = server.address.rpartition(":")[2]
+    command = [PYTHON, HERE / "deepstack_client.py", client, port, image, model, key, str(confidence)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    return json.loads(done.stdout)
+
+
+class DeepStackClients(unittest.TestCase):
+    """What they get."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.server = cls.enterClassContext(lookdown({}))
+
+    def test_both_find_the_persons_with_and_without_a_calibration(self):
+        for client in CLIENTS:
+            for model in ("", "office"):
+                with self.subTest(client=client, model=model):
+                    predictions = ask(client, self.server, model=model)["predictions"]
+                    self.assertEqual(len(predictions), PERSONS)
+                    for person in predictions:
+                        self.assertEqual(person["label"], "person")
+                        self.assertGreaterEqual(person["confidence"], 0.4)
+                        edges = [person[edge] for edge in ("x_min", "y_min", "x_max", "y_max")]
+                        self.assertTrue(all(isinstance(edge, int) and 0 <= edge <= 960 for edge in edges), edges)
+                        self.assertLess(edges[0], edges[2])
+                        self.assertLess(edges[1], edges[3])
+
+    def test_confidence_counts_and_none_at_all_is_answered(self):
+        for client in CLIENTS:
+            found = {least: ask(client, self.server, confidence=least)["predictions"] for least in (0.0, 0.75, 1.0)}
+            counts = {least: len(predictions) for least, predictions in found.items()}
+            self.assertGreaterEqual(counts[0.0], PERSONS)
+            self.assertTrue(0 < counts[0.75] <= PERSONS, counts)
+            self.assertEqual(counts[1.0], 0)
+
+    def test_failures_are_those_that_they_know(self):
+        with tempfile.NamedTemporaryFile(suffix=".jpg") as file:
+            file.write(b"no picture")
+            file.flush()
+            invalid = Path(file.name)
+            self.assertIn("Invalid image", ask("sdk", self.server, invalid)["raised"])
+            self.assertIn("status code: 400", ask("python", self.server, invalid)["raised"])
+        self.assertIn("Bad url", ask("python", self.server, model="nobody")["raised"])
+        self.assertIn("404", ask("sdk", self.server, model="nobody")["raised"])
+
+    def test_what_they_found_is_among_the_results(self):
+        ask("python", self.server, model="office")
+        report = json.loads(self.server.get("/results/office/latest"))
+        self.assertEqual(len(report["persons"]), PERSONS)
+
+
+class Keys(unittest.TestCase):
+    """The key that they send in the form."""
+
+    def test_a_known_key_opens_and_no_other(self):
+        digest = hashlib.sha256(KEY.encode()).hexdigest()
+        with lookdown({"ACCESS__KEYS": f"home:detect:{digest}", "LOG__FILTER": "trace"}) as server:
+            for client in CLIENTS:
+                self.assertEqual(len(ask(client, server, key=KEY)["predictions"]), PERSONS)
+                for key in ("", "wrong"):
+                    self.assertIn("401", ask(client, server, key=key)["raised"])
+        log = (ROOT / ".setup" / "benches" / "work" / "lookdown.log").read_text(errors="replace")
+        self.assertIn("/v1/vision/detection", log)
+        self.assertNotIn(KEY, log)
