@@ -17,8 +17,11 @@ use crate::{
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
-    results::{MemoryResults, ResultStore},
-    settings::{AccessSettings, CalibrationPlace, LimitSettings, Settings, find_calibrations},
+    results::{MemoryResults, RedisResults, ResultStore},
+    settings::{
+        AccessSettings, CalibrationPlace, LimitSettings, ResultSettings, Settings,
+        find_calibrations,
+    },
     telemetry::Tracer,
     tls::Tls,
 };
@@ -144,7 +147,7 @@ impl App {
             .context("the operating system gives no thread for a worker")?;
         let workers = Arc::new(workers);
         let metrics = Arc::new(Metrics::new()?);
-        let results: Arc<dyn ResultStore> = Arc::new(MemoryResults::new(settings.results));
+        let results = open_results(&settings.results);
         let readiness = Readiness::default();
         let keys = open_keys(&settings.access)?;
         let tls = match settings.server.tls.clone() {
@@ -287,6 +290,14 @@ pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrati
         }),
     };
     Calibrations::open(store, settings.writable).context("calibrations.path")
+}
+
+/// Where the settings have reports kept. A Redis that is away is waited for in the background.
+fn open_results(settings: &ResultSettings) -> Arc<dyn ResultStore> {
+    match settings.redis.clone() {
+        Some(redis) => Arc::new(RedisResults::start(redis, settings.limits)),
+        None => Arc::new(MemoryResults::new(settings.limits)),
+    }
 }
 
 /// The keys that the settings describe; `None` when they describe none. A file without keys still

@@ -110,8 +110,14 @@ metrics! {
     results_reports: IntGauge = "results_reports" [];
     /// Memory that kept reports take, bytes.
     results_bytes: IntGauge = "results_bytes" [];
-    /// Reports that were stored.
+    /// Reports of this server that were stored.
     results_stored: IntCounter = "results_stored_total" [];
+    /// Reports of this server that wait to be stored.
+    results_waiting: IntGauge = "results_waiting" [];
+    /// Reports of this server that will not be stored: too many waited, or their place refused them.
+    results_dropped: IntCounter = "results_dropped_total" [];
+    /// 1 when the place of the results can be reached, else 0.
+    results_store_up: IntGauge = "results_store_up" [];
     /// Who listens to reports: event streams, and requests that wait for a newer report.
     results_listeners: IntGauge = "results_listeners" [];
     /// Listeners given up because they did not keep up.
@@ -239,14 +245,22 @@ impl Metrics {
         raise_to(&self.rig_cache_evictions, evictions);
     }
 
-    /// Shows how many reports of how many cameras and bytes are kept, and how many were stored since
-    /// the start.
-    pub fn show_results(&self, cameras: usize, reports: usize, bytes: usize, stored: u64) {
+    /// Shows how many reports of how many cameras and bytes are kept.
+    pub fn show_results(&self, cameras: usize, reports: usize, bytes: usize) {
         let _one_scrape = self.one_scrape();
         self.results_cameras.set(count(cameras));
         self.results_reports.set(count(reports));
         self.results_bytes.set(count(bytes));
+    }
+
+    /// Shows whether reports can be stored, how many wait for it, and how many were stored and dropped
+    /// since the start.
+    pub fn show_result_store(&self, up: bool, waiting: usize, stored: u64, dropped: u64) {
+        let _one_scrape = self.one_scrape();
+        self.results_store_up.set(i64::from(up));
+        self.results_waiting.set(count(waiting));
         raise_to(&self.results_stored, stored);
+        raise_to(&self.results_dropped, dropped);
     }
 
     /// Shows how many listen, and how many were given up since the start.

@@ -3,10 +3,12 @@
 
 mod listeners;
 mod memory;
+mod redis;
 mod report;
 mod store;
 
 pub use listeners::{ListenError, Listeners, Listening};
 pub use memory::MemoryResults;
+pub use redis::{RedisAddress, RedisAddressError, RedisOptions, RedisResults};
 pub use report::{NewReport, ReportId, StoredReport};
-pub use store::{Cameras, ResultLimits, ResultStore, ResultUse};
+pub use store::{Cameras, ResultLimits, ResultStore, ResultUse, StoreHealth, Unreachable};

@@ -33,8 +33,12 @@ pub use threads::ThreadPlan;
 use url::Url;
 
 use crate::{
-    access::KeyList, geometry::FieldOfViewReading, inference::Device, results::ResultLimits,
-    server::ConnectionLimits, tls::TlsOptions,
+    access::KeyList,
+    geometry::FieldOfViewReading,
+    inference::Device,
+    results::{RedisOptions, ResultLimits},
+    server::ConnectionLimits,
+    tls::TlsOptions,
 };
 
 /// Everything the operator may choose, checked.
@@ -56,8 +60,8 @@ pub struct Settings {
     pub threads: ThreadPlan,
     /// What one frame, and all frames together, may cost.
     pub limits: LimitSettings,
-    /// What is kept of reports.
-    pub results: ResultLimits,
+    /// What is kept of reports, and where.
+    pub results: ResultSettings,
     /// How the paper is read where it can be read in several ways.
     pub paper: PaperSettings,
     /// What is logged.
@@ -176,6 +180,15 @@ pub struct RequestRateSettings {
     pub per_second: f64,
     /// Requests at once after a pause.
     pub burst: NonZeroU32,
+}
+
+/// What is kept of reports, and where.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResultSettings {
+    /// The Redis that servers share; `None` for the memory of this process.
+    pub redis: Option<RedisOptions>,
+    /// How much.
+    pub limits: ResultLimits,
 }
 
 /// How the paper is read where it can be read in several ways.

@@ -122,7 +122,7 @@ const MAY_USE: [(&str, &[&str]); 25] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 24] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 25] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -149,7 +149,10 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 24] = [
     ("plotters", &["evaluation"]),
     ("config", &["settings"]),
     ("object_store", &["calibration"]),
-    ("rustls", &["calibration", "probe", "telemetry", "tls"]),
+    (
+        "rustls",
+        &["calibration", "probe", "results", "telemetry", "tls"],
+    ),
     ("tokio_rustls", &["tls"]),
     ("x509_cert", &["tls"]),
     ("reqwest", &["probe", "telemetry"]),
@@ -157,6 +160,7 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 24] = [
     ("opentelemetry_sdk", &["telemetry"]),
     ("opentelemetry_otlp", &["telemetry"]),
     ("prometheus", &["metrics"]),
+    ("redis", &["results"]),
 ];
 
 /// Every source file of the library with the top-level module it belongs to.

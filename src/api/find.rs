@@ -65,7 +65,7 @@ pub(super) async fn find<T: Send + 'static>(
         persons: report.persons.len(),
         json,
     };
-    state.results.publish(kept).await;
+    state.results.publish(kept);
     Ok((report, answer))
 }
 

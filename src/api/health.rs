@@ -87,6 +87,16 @@ pub(super) struct Ready {
     status: &'static str,
     /// How its calibrations are.
     calibrations: CalibrationHealth,
+    /// How the place of its results is.
+    results: ResultsHealth,
+}
+
+/// How the place of the results is.
+#[derive(serde::Serialize, ToSchema)]
+struct ResultsHealth {
+    /// Why it cannot be reached, if it cannot. Reports wait for it meanwhile.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    store_problem: Option<String>,
 }
 
 /// How the calibrations are.
@@ -140,7 +150,8 @@ pub(super) async fn livez() -> Json<Health> {
 /// Can frames be sent?
 ///
 /// Not before the network has run once, and no longer when the server was told to stop. Files of
-/// calibrations that cannot be used are told, but stop nothing: what was known of them goes on.
+/// calibrations that cannot be used are told, but stop nothing: what was known of them goes on. Nor does a
+/// place of results that cannot be reached.
 #[utoipa::path(
     get, path = "/readyz", tag = "operation", operation_id = "get_readiness",
     responses(
@@ -153,6 +164,9 @@ pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>,
         Phase::Ready => Ok(Json(Ready {
             status: "ready",
             calibrations: CalibrationHealth::from(state.calibrations.health()),
+            results: ResultsHealth {
+                store_problem: state.results.health().problem,
+            },
         })),
         Phase::WarmingUp => Err(Problem::warming_up()),
         Phase::Stopping => Err(Problem::shutting_down()),
@@ -187,10 +201,14 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
 
 /// The kept reports, and who listens, as they are at this scrape.
 async fn show_results(state: &ApiState) {
-    let kept = state.results.usage().await;
-    let listeners = state.results.listeners();
     let metrics = &state.metrics;
-    metrics.show_results(kept.cameras, kept.reports, kept.bytes, kept.published);
+    if let Ok(kept) = state.results.usage().await {
+        metrics.show_results(kept.cameras, kept.reports, kept.bytes);
+    }
+    let health = state.results.health();
+    let up = health.problem.is_none();
+    metrics.show_result_store(up, health.waiting, health.stored, health.dropped);
+    let listeners = state.results.listeners();
     metrics.show_listeners(listeners.count(), listeners.dropped());
 }
 

@@ -20,10 +20,10 @@ use self::row::CameraRow;
 use super::{
     ApiState,
     access::Reader,
-    openapi::ReadProblems,
+    openapi::ResultsProblems,
     problem::{Problem, ProblemKind},
 };
-use crate::results::ListenError;
+use crate::results::{ListenError, Unreachable};
 
 /// May be kept, but not shown before the server was asked whether it is still right.
 const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
@@ -36,17 +36,20 @@ const MAX_SHOWN_CHARS: usize = 64;
 #[utoipa::path(
     get, path = "/results", tag = "results", operation_id = "list_results",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    responses((status = OK, description = "By name.", body = Vec<CameraRow>), ReadProblems)
+    responses((status = OK, description = "By name.", body = Vec<CameraRow>), ResultsProblems)
 )]
-pub(super) async fn list(State(state): State<ApiState>, _reader: Reader) -> impl IntoResponse {
+pub(super) async fn list(
+    State(state): State<ApiState>,
+    _reader: Reader,
+) -> Result<impl IntoResponse, Problem> {
     let now = Timestamp::now();
-    let latest = state.results.latest_of_all().await;
+    let latest = state.results.latest_of_all().await?;
     let mut rows: Vec<_> = latest
         .iter()
         .map(|report| CameraRow::at(report, now))
         .collect();
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));
-    ([(CACHE_CONTROL, NO_CACHE)], Json(rows))
+    Ok(([(CACHE_CONTROL, NO_CACHE)], Json(rows)))
 }
 
 /// No report of that camera is kept.
@@ -63,6 +66,14 @@ fn not_allowed(name: &str, value: &str, rule: &str) -> Problem {
     let value: String = value.chars().take(MAX_SHOWN_CHARS).collect();
     let detail = format!("{name}: {value:?} is not {rule}");
     Problem::new(ProblemKind::InvalidParameter, detail)
+}
+
+/// Why it does not answer is the operator's business, who finds it in the log and in `/readyz`.
+impl From<Unreachable> for Problem {
+    fn from(_: Unreachable) -> Self {
+        let detail = "the place of the results does not answer now: try again; frames are looked at all the same";
+        Self::new(ProblemKind::ResultsUnreachable, detail)
+    }
 }
 
 impl From<ListenError> for Problem {

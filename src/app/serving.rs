@@ -53,6 +53,7 @@ impl App {
             tokio::try_join!(self.load_models(scheme, address, &shutdown), connections)?;
             let workers = Arc::clone(&self.workers);
             spawn_blocking(move || workers.shut_down()).await?;
+            self.results.flush().await;
             tracing::info!("stopped");
             anyhow::Ok(())
         };

@@ -82,6 +82,13 @@ impl Listeners {
         })
     }
 
+    /// Whether anybody would be told of a report of this camera.
+    pub(super) fn are_there_for(&self, camera: &str) -> bool {
+        let group = self.group();
+        let one = Cameras::One(camera.to_owned());
+        group.queues.contains_key(&Cameras::All) || group.queues.contains_key(&one)
+    }
+
     /// Tells a report to whoever listens to its camera. Never waits.
     pub fn tell(&self, report: &Arc<StoredReport>) {
         let mut group = self.group();

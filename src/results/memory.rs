@@ -12,7 +12,8 @@ use jiff::Timestamp;
 
 use self::kept::Kept;
 use super::{
-    Cameras, Listeners, NewReport, ReportId, ResultLimits, ResultStore, ResultUse, StoredReport,
+    Cameras, Listeners, NewReport, ReportId, ResultLimits, ResultStore, ResultUse, StoreHealth,
+    StoredReport, Unreachable,
 };
 
 /// Keeps reports in memory, within limits; they go when the process ends.
@@ -32,6 +33,15 @@ impl MemoryResults {
         }
     }
 
+    /// Keeps a report and tells whoever listens.
+    pub fn store(&self, report: NewReport) -> Arc<StoredReport> {
+        // Told while nobody else can publish: listeners rely on the order.
+        let mut kept = self.kept();
+        let stored = kept.add(report, Timestamp::now());
+        self.listeners.tell(&stored);
+        stored
+    }
+
     fn kept(&self) -> MutexGuard<'_, Kept> {
         // No change can panic half-way.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
@@ -40,20 +50,16 @@ impl MemoryResults {
 
 #[async_trait]
 impl ResultStore for MemoryResults {
-    async fn publish(&self, report: NewReport) -> Arc<StoredReport> {
-        // Told while nobody else can publish: listeners rely on the order.
-        let mut kept = self.kept();
-        let stored = kept.add(report, Timestamp::now());
-        self.listeners.tell(&stored);
-        stored
+    fn publish(&self, report: NewReport) {
+        self.store(report);
     }
 
-    async fn latest(&self, camera: &str) -> Option<Arc<StoredReport>> {
-        self.kept().latest(camera)
+    async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable> {
+        Ok(self.kept().latest(camera))
     }
 
-    async fn latest_of_all(&self) -> Vec<Arc<StoredReport>> {
-        self.kept().latest_of_all()
+    async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
+        Ok(self.kept().latest_of_all())
     }
 
     async fn since(
@@ -61,15 +67,24 @@ impl ResultStore for MemoryResults {
         cameras: &Cameras,
         after: ReportId,
         most: NonZeroUsize,
-    ) -> Vec<Arc<StoredReport>> {
-        self.kept().since(cameras, after, most.get())
+    ) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
+        Ok(self.kept().since(cameras, after, most.get()))
     }
 
     fn listeners(&self) -> &Arc<Listeners> {
         &self.listeners
     }
 
-    async fn usage(&self) -> ResultUse {
-        self.kept().usage()
+    async fn usage(&self) -> Result<ResultUse, Unreachable> {
+        Ok(self.kept().usage())
     }
+
+    fn health(&self) -> StoreHealth {
+        StoreHealth {
+            stored: self.kept().stored(),
+            ..StoreHealth::default()
+        }
+    }
+
+    async fn flush(&self) {}
 }

@@ -59,6 +59,14 @@ pub struct NewReport {
     pub json: Bytes,
 }
 
+impl NewReport {
+    /// About how much memory it takes when it is kept, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of::<StoredReport>() + self.json.len() + self.camera.len()
+    }
+}
+
 /// A report that is kept. It never changes.
 #[derive(Debug)]
 pub struct StoredReport {
@@ -66,14 +74,6 @@ pub struct StoredReport {
     pub id: ReportId,
     /// What is kept.
     pub report: NewReport,
-}
-
-impl StoredReport {
-    /// About how much memory it takes, bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        size_of::<Self>() + self.report.json.len() + self.report.camera.len()
-    }
 }
 
 #[cfg(test)]

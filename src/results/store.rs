@@ -15,31 +15,55 @@ pub enum Cameras {
     One(String),
 }
 
+/// The place where reports are kept does not answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the place of the results does not answer: {0}")]
+pub struct Unreachable(pub String);
+
 /// A place for reports. What it gives back is shared, not copied.
 #[async_trait]
 pub trait ResultStore: Send + Sync {
-    /// Keeps a report, gives it the next ID, and tells whoever listens, in the order of the IDs.
-    async fn publish(&self, report: NewReport) -> Arc<StoredReport>;
+    /// Keeps a report, gives it the next ID, and tells whoever listens, in the order of the IDs. Nobody
+    /// waits for that: a place that is elsewhere has it a little later.
+    fn publish(&self, report: NewReport);
 
     /// The latest report of a camera, if it has one.
-    async fn latest(&self, camera: &str) -> Option<Arc<StoredReport>>;
+    ///
+    /// # Errors
+    /// [`Unreachable`], as of all that is read.
+    async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable>;
 
     /// The latest report of every camera, in the order of their IDs.
-    async fn latest_of_all(&self) -> Vec<Arc<StoredReport>>;
+    ///
+    /// # Errors
+    /// [`Unreachable`].
+    async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable>;
 
     /// The first reports after `after` that are still kept, oldest first, `most` of them at most.
+    ///
+    /// # Errors
+    /// [`Unreachable`].
     async fn since(
         &self,
         cameras: &Cameras,
         after: ReportId,
         most: NonZeroUsize,
-    ) -> Vec<Arc<StoredReport>>;
+    ) -> Result<Vec<Arc<StoredReport>>, Unreachable>;
 
     /// Who listens to what is published, here or on another server with the same store.
     fn listeners(&self) -> &Arc<Listeners>;
 
     /// What is kept.
-    async fn usage(&self) -> ResultUse;
+    ///
+    /// # Errors
+    /// [`Unreachable`].
+    async fn usage(&self) -> Result<ResultUse, Unreachable>;
+
+    /// What became of what was published here.
+    fn health(&self) -> StoreHealth;
+
+    /// Waits until what was published here is kept, but not for a place that does not answer.
+    async fn flush(&self);
 }
 
 /// What is kept at most.
@@ -71,7 +95,7 @@ impl Default for ResultLimits {
     }
 }
 
-/// What is kept now, and what came so far.
+/// What is kept now.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ResultUse {
     /// Cameras with a report.
@@ -80,6 +104,17 @@ pub struct ResultUse {
     pub reports: usize,
     /// How much memory those take, bytes.
     pub bytes: usize,
-    /// Reports that were ever published here.
-    pub published: u64,
+}
+
+/// What became of the reports that were published here.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct StoreHealth {
+    /// Why their place cannot be reached, if it cannot.
+    pub problem: Option<String>,
+    /// How many were ever kept.
+    pub stored: u64,
+    /// How many never will be: too many waited, or their place refused them.
+    pub dropped: u64,
+    /// How many wait to be kept.
+    pub waiting: usize,
 }

@@ -296,7 +296,11 @@ fn address(key: &str, value: &str) -> Result<SocketAddr, SettingsError> {
     })
 }
 
-fn within(key: &str, value: u64, range: RangeInclusive<u64>) -> Result<u64, SettingsError> {
+pub(super) fn within(
+    key: &str,
+    value: u64,
+    range: RangeInclusive<u64>,
+) -> Result<u64, SettingsError> {
     if range.contains(&value) {
         return Ok(value);
     }

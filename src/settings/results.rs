@@ -1,20 +1,27 @@
 //! What is kept of reports, as it is written and checked.
 
+use std::time::Duration;
+
 use serde::Deserialize;
 
 use super::{
-    SettingsError,
-    check::{MAX_BYTES, count, size},
+    ResultSettings, SettingsError,
+    check::{MAX_BYTES, count, size, within},
 };
-use crate::results::ResultLimits;
+use crate::results::{RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
 
 /// 8 MiB: any one report has room.
 const MIN_BYTES: u64 = 8 << 20;
+/// A minute to a year.
+const AGES: std::ops::RangeInclusive<u64> = 60..=366 * 86_400;
 
 /// Table `results`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawResults {
+    url: String,
+    key_prefix: String,
+    max_age_seconds: u64,
     max_cameras: u64,
     history_per_camera: u64,
     max_reports: u64,
@@ -26,6 +33,9 @@ impl Default for RawResults {
     fn default() -> Self {
         let limits = ResultLimits::default();
         Self {
+            url: String::new(),
+            key_prefix: "lookdown".to_owned(),
+            max_age_seconds: 86_400,
             max_cameras: limits.max_cameras.get() as u64,
             history_per_camera: limits.history_per_camera.get() as u64,
             max_reports: limits.max_reports.get() as u64,
@@ -35,16 +45,45 @@ impl Default for RawResults {
     }
 }
 
-impl TryFrom<RawResults> for ResultLimits {
+impl TryFrom<RawResults> for ResultSettings {
     type Error = SettingsError;
 
     fn try_from(raw: RawResults) -> Result<Self, SettingsError> {
         Ok(Self {
-            max_cameras: count("results.max_cameras", raw.max_cameras)?,
-            history_per_camera: count("results.history_per_camera", raw.history_per_camera)?,
-            max_reports: count("results.max_reports", raw.max_reports)?,
-            max_bytes: size("results.max_bytes", raw.max_bytes, MIN_BYTES..=MAX_BYTES)?,
-            max_listeners: count("results.max_listeners", raw.max_listeners)?,
+            redis: redis(&raw)?,
+            limits: ResultLimits {
+                max_cameras: count("results.max_cameras", raw.max_cameras)?,
+                history_per_camera: count("results.history_per_camera", raw.history_per_camera)?,
+                max_reports: count("results.max_reports", raw.max_reports)?,
+                max_bytes: size("results.max_bytes", raw.max_bytes, MIN_BYTES..=MAX_BYTES)?,
+                max_listeners: count("results.max_listeners", raw.max_listeners)?,
+            },
         })
     }
+}
+
+fn redis(raw: &RawResults) -> Result<Option<RedisOptions>, SettingsError> {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
+    if !(1..=64).contains(&raw.key_prefix.len()) || !raw.key_prefix.chars().all(is_word) {
+        return Err(SettingsError::Value {
+            key: "results.key_prefix".to_owned(),
+            value: format!("{:?}", raw.key_prefix),
+            remedy: "give 1 to 64 of a-z, A-Z, 0-9, '_', '.' and '-'".to_owned(),
+        });
+    }
+    let max_age = within("results.max_age_seconds", raw.max_age_seconds, AGES)?;
+    if raw.url.is_empty() {
+        return Ok(None);
+    }
+    let address: Result<RedisAddress, _> = raw.url.parse();
+    let address = address.map_err(|error: RedisAddressError| SettingsError::Value {
+        key: "results.url".to_owned(),
+        value: "what it is".to_owned(),
+        remedy: error.to_string(),
+    })?;
+    Ok(Some(RedisOptions {
+        address,
+        key_prefix: raw.key_prefix.clone(),
+        max_age: Duration::from_secs(max_age),
+    }))
 }

@@ -22,6 +22,7 @@ mod refusals;
 mod report;
 mod repository;
 mod results;
+mod results_away;
 mod results_events;
 mod results_wait;
 mod serve;

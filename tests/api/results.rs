@@ -5,21 +5,21 @@ use std::num::NonZeroUsize;
 use axum::{body::Body, http::Request};
 use bytes::Bytes;
 use jiff::Timestamp;
-use lookdown::results::{NewReport, ReportId, ResultLimits, ResultStore};
+use lookdown::results::{NewReport, ReportId, ResultLimits};
 use serde_json::{Value, json};
 
 use crate::service::{Answer, Bounds, Service, frame};
 
 impl Service {
     /// Publishes a report that is nothing but a number.
-    pub(crate) async fn publish(&self, camera: &str, number: usize) -> ReportId {
+    pub(crate) fn publish(&self, camera: &str, number: usize) -> ReportId {
         let report = NewReport {
             camera: camera.to_owned(),
             received_at: "2026-11-21T09:30:00Z".parse().unwrap(),
             persons: number,
             json: Bytes::from(number.to_string()),
         };
-        self.results.publish(report).await.id
+        self.results.store(report).id
     }
 
     pub(crate) async fn get_if_none_match(&self, path: &str, tag: &str) -> Answer {
@@ -134,8 +134,8 @@ fn page(answer: &Answer) -> (Vec<u64>, Option<String>) {
 async fn history_is_read_page_by_page_to_its_end() {
     let service = Service::start();
     for number in 0..5 {
-        service.publish("lobby", number).await;
-        service.publish("hall", 100).await;
+        service.publish("lobby", number);
+        service.publish("hall", 100);
     }
     let path = "/results/lobby/history";
     assert_eq!(page(&service.get(path).await).0, [0, 1, 2, 3, 4]);
@@ -154,7 +154,7 @@ async fn history_is_read_page_by_page_to_its_end() {
 #[tokio::test]
 async fn history_begins_after_a_time_as_well_as_after_an_id() {
     let service = Service::start();
-    let id = service.publish("lobby", 1).await;
+    let id = service.publish("lobby", 1);
     let since = async |time: Timestamp| {
         let path = format!("/results/lobby/history?since={time}");
         page(&service.get(&path).await).0
@@ -168,7 +168,7 @@ async fn history_begins_after_a_time_as_well_as_after_an_id() {
 #[tokio::test]
 async fn what_history_cannot_begin_with_or_count_to_is_refused_by_name() {
     let service = Service::start();
-    service.publish("lobby", 1).await;
+    service.publish("lobby", 1);
     for (query, status, part) in [
         ("since=yesterday", 422, "since: \"yesterday\""),
         ("since=", 422, "since"),
@@ -199,7 +199,7 @@ async fn a_page_of_large_reports_ends_early() {
             persons: 0,
             json: Bytes::from(format!("\"{}\"", "x".repeat(3 << 20))),
         };
-        service.results.publish(report).await;
+        service.results.store(report);
     }
     let answer = service.get("/results/lobby/history").await.json();
     assert_eq!(answer.as_array().unwrap().len(), 2);
@@ -217,7 +217,7 @@ async fn no_more_is_kept_than_the_limits_let() {
         ..Bounds::default()
     });
     for (camera, number) in [("a", 1), ("b", 2), ("b", 3), ("b", 4), ("b", 5), ("c", 6)] {
-        service.publish(camera, number).await;
+        service.publish(camera, number);
     }
     assert_eq!(service.get("/results/a/latest").await.status, 404);
     let history = service.get("/results/b/history").await;

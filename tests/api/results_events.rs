@@ -50,8 +50,8 @@ impl Stream {
 #[tokio::test]
 async fn a_stream_begins_with_the_latest_report_and_goes_on_with_each_new_one() {
     let service = Service::start();
-    service.publish("lobby", 1).await;
-    let first = service.publish("lobby", 2).await;
+    service.publish("lobby", 1);
+    let first = service.publish("lobby", 2);
     let mut stream = Stream::open(&service, EVENTS, None).await;
     let headers = stream.0.headers();
     for (name, value) in [
@@ -61,8 +61,8 @@ async fn a_stream_begins_with_the_latest_report_and_goes_on_with_each_new_one() 
     ] {
         assert_eq!(headers[name], value);
     }
-    service.publish("hall", 3).await;
-    let second = service.publish("lobby", 4).await;
+    service.publish("hall", 3);
+    let second = service.publish("lobby", 4);
     assert_eq!(
         stream.next().await.unwrap(),
         format!("id: {first}\ndata: 2\n\n")
@@ -77,11 +77,11 @@ async fn a_stream_begins_with_the_latest_report_and_goes_on_with_each_new_one() 
 async fn who_listens_to_all_hears_the_latest_of_each_camera_and_then_everything() {
     let service = Service::start();
     for (camera, number) in [("lobby", 1), ("hall", 2), ("lobby", 3)] {
-        service.publish(camera, number).await;
+        service.publish(camera, number);
     }
     let mut stream = Stream::open(&service, "/events", None).await;
-    service.publish("stairs", 4).await;
-    service.publish("lobby", 5).await;
+    service.publish("stairs", 4);
+    service.publish("lobby", 5);
     for number in 2..=5 {
         assert_eq!(stream.number().await, number);
     }
@@ -92,15 +92,15 @@ async fn who_comes_back_hears_what_was_missed_once_and_then_goes_on() {
     let service = Service::start();
     let mut ids = Vec::new();
     for number in 0..MANY {
-        ids.push(service.publish("lobby", number).await.to_string());
-        service.publish("hall", MANY + number).await;
+        ids.push(service.publish("lobby", number).to_string());
+        service.publish("hall", MANY + number);
     }
     let mut stream = Stream::open(&service, EVENTS, Some(&ids[9])).await;
-    service.publish("lobby", MANY).await;
+    service.publish("lobby", MANY);
     for number in 10..MANY {
         assert_eq!(stream.number().await, number);
     }
-    service.publish("lobby", MANY + 1).await;
+    service.publish("lobby", MANY + 1);
     assert_eq!(stream.number().await, MANY);
     assert_eq!(stream.number().await, MANY + 1);
 
@@ -111,12 +111,12 @@ async fn who_comes_back_hears_what_was_missed_once_and_then_goes_on() {
 #[tokio::test]
 async fn who_comes_from_elsewhere_begins_with_the_latest() {
     let service = Service::start();
-    service.publish("lobby", 1).await;
-    service.publish("lobby", 2).await;
+    service.publish("lobby", 1);
+    service.publish("lobby", 2);
     for stranger in ["18446744073709551615", "cam-7", "\u{e9}"] {
         let mut stream = Stream::open(&service, EVENTS, Some(stranger)).await;
         assert_eq!(stream.number().await, 2, "{stranger}");
-        let id = service.publish("lobby", 2).await;
+        let id = service.publish("lobby", 2);
         let next = stream.next().await.unwrap();
         assert!(next.starts_with(&format!("id: {id}\n")), "{next}");
     }
@@ -151,7 +151,7 @@ async fn a_listener_that_does_not_keep_up_is_given_up_and_can_come_back_for_the_
     let service = Service::start();
     let mut stream = Stream::open(&service, EVENTS, None).await;
     for number in 0..MANY {
-        service.publish("lobby", number).await;
+        service.publish("lobby", number);
     }
     let mut heard = 0;
     let mut last = String::new();

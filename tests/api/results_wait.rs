@@ -25,11 +25,11 @@ impl Service {
 #[tokio::test]
 async fn whoever_waits_is_answered_as_soon_as_there_is_something_newer() {
     let service = Service::start();
-    let tag = format!("\"{}\"", service.publish("lobby", 1).await);
+    let tag = format!("\"{}\"", service.publish("lobby", 1));
     let (answer, id) = tokio::join!(service.get_if_none_match(WAIT, &tag), async {
         service.has_listeners(1).await;
-        service.publish("hall", 2).await;
-        service.publish("lobby", 3).await
+        service.publish("hall", 2);
+        service.publish("lobby", 3)
     });
     assert_eq!(
         (answer.status.as_u16(), answer.text()),
@@ -44,7 +44,7 @@ async fn whoever_waits_for_a_cameras_first_report_gets_it() {
     let service = Service::start();
     let (answer, _) = tokio::join!(service.get(WAIT), async {
         service.has_listeners(1).await;
-        service.publish("lobby", 1).await
+        service.publish("lobby", 1)
     });
     assert_eq!(
         (answer.status.as_u16(), answer.text()),
@@ -58,7 +58,7 @@ async fn without_anything_newer_the_wait_ends_when_asked_and_no_later_than_any_r
         request_timeout: Duration::from_secs(20),
         ..Bounds::default()
     });
-    let tag = format!("\"{}\"", service.publish("lobby", 1).await);
+    let tag = format!("\"{}\"", service.publish("lobby", 1));
     for (camera, wait, waited, status) in [
         ("lobby", 7, 7, 304),
         ("lobby", 600, 20, 304),
@@ -75,7 +75,7 @@ async fn without_anything_newer_the_wait_ends_when_asked_and_no_later_than_any_r
 #[tokio::test(start_paused = true)]
 async fn whoever_does_not_have_the_latest_need_not_wait_for_it() {
     let service = Service::start();
-    service.publish("lobby", 1).await;
+    service.publish("lobby", 1);
     let began = Instant::now();
     for answer in [
         service.get(WAIT).await,
@@ -114,7 +114,7 @@ async fn no_more_wait_than_there_are_places_and_the_others_are_told_so() {
             service.get("/results/hall/events").await,
             service.get("/events").await,
         ];
-        service.publish("lobby", 1).await;
+        service.publish("lobby", 1);
         refused
     });
     for answer in refused {
@@ -137,7 +137,7 @@ async fn no_more_wait_than_there_are_places_and_the_others_are_told_so() {
 #[tokio::test]
 async fn a_wait_is_seconds_up_to_ten_minutes() {
     let service = Service::start();
-    service.publish("lobby", 1).await;
+    service.publish("lobby", 1);
     for wait in ["601", "-1", "1.5", "long", ""] {
         let answer = service
             .get(&format!("/results/lobby/latest?wait={wait}"))

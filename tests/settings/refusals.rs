@@ -27,7 +27,25 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 40] = [
+const UNUSABLE: [(&str, &str, &str, &str); 43] = [
+    (
+        "RESULTS__URL",
+        "localhost:6379",
+        "results.url",
+        "redis://host:port",
+    ),
+    (
+        "RESULTS__KEY_PREFIX",
+        "a:b",
+        "results.key_prefix",
+        "1 to 64",
+    ),
+    (
+        "RESULTS__MAX_AGE_SECONDS",
+        "59",
+        "results.max_age_seconds",
+        "from 60",
+    ),
     (
         "SERVER__LISTEN",
         "localhost",

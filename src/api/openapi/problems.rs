@@ -33,6 +33,7 @@ impl IntoResponses for DetectProblems {
                     | ProblemKind::InvalidCalibration
                     | ProblemKind::CalibrationConflict
                     | ProblemKind::CalibrationsUnreachable
+                    | ProblemKind::ResultsUnreachable
                     | ProblemKind::Outdated
                     | ProblemKind::ModelConflict
                     | ProblemKind::ModelRefused
@@ -152,6 +153,20 @@ impl IntoResponses for ReadProblems {
     }
 }
 
+/// What can go wrong with listing the cameras that have reports.
+pub(in crate::api) struct ResultsProblems;
+
+impl IntoResponses for ResultsProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses([
+            ProblemKind::KeyRequired,
+            ProblemKind::Forbidden,
+            ProblemKind::ResultsUnreachable,
+            ProblemKind::RateLimited,
+        ])
+    }
+}
+
 /// What can go wrong with reading a calibration.
 pub(in crate::api) struct UnknownCalibrationProblem;
 
@@ -176,6 +191,7 @@ impl IntoResponses for LatestProblems {
             ProblemKind::UnknownCamera,
             ProblemKind::InvalidParameter,
             ProblemKind::TooManyListeners,
+            ProblemKind::ResultsUnreachable,
             ProblemKind::ShuttingDown,
         ];
         responses(OF_READING.into_iter().chain(of_waiting))
@@ -192,16 +208,18 @@ impl IntoResponses for HistoryProblems {
             ProblemKind::RepeatedParameter,
             ProblemKind::UnknownCamera,
             ProblemKind::InvalidParameter,
+            ProblemKind::ResultsUnreachable,
         ];
         responses(OF_READING.into_iter().chain(of_pages))
     }
 }
 
 /// What can go wrong with listening.
-const OF_LISTENING: [ProblemKind; 5] = [
+const OF_LISTENING: [ProblemKind; 6] = [
     ProblemKind::KeyRequired,
     ProblemKind::Forbidden,
     ProblemKind::TooManyListeners,
+    ProblemKind::ResultsUnreachable,
     ProblemKind::RateLimited,
     ProblemKind::ShuttingDown,
 ];

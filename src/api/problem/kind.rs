@@ -29,6 +29,8 @@ pub(in crate::api) enum ProblemKind {
     CalibrationConflict,
     /// The place of the calibrations does not answer.
     CalibrationsUnreachable,
+    /// The place of the results does not answer.
+    ResultsUnreachable,
     /// What the request is about has changed.
     Outdated,
     /// The model is not loaded.
@@ -79,7 +81,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 35] = [
+    pub(in crate::api) const ALL: [Self; 36] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -92,6 +94,7 @@ impl ProblemKind {
         Self::InvalidCalibration,
         Self::CalibrationConflict,
         Self::CalibrationsUnreachable,
+        Self::ResultsUnreachable,
         Self::Outdated,
         Self::UnknownModel,
         Self::ModelConflict,
@@ -137,6 +140,10 @@ impl ProblemKind {
             Self::CalibrationsUnreachable => (
                 "calibrations-unreachable",
                 "The place of the calibrations does not answer",
+            ),
+            Self::ResultsUnreachable => (
+                "results-unreachable",
+                "The place of the results does not answer",
             ),
             Self::Outdated => ("outdated", "What is there now is not what was meant"),
             Self::UnknownModel => ("unknown-model", "There is no such model"),
@@ -212,6 +219,7 @@ impl ProblemKind {
             Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
             Self::TooManyConnections
             | Self::CalibrationsUnreachable
+            | Self::ResultsUnreachable
             | Self::WarmingUp
             | Self::ShuttingDown => StatusCode::SERVICE_UNAVAILABLE,
             Self::Timeout => StatusCode::GATEWAY_TIMEOUT,
@@ -233,6 +241,7 @@ impl ProblemKind {
                 | Self::ModelBusy
                 | Self::TooManyConnections
                 | Self::CalibrationsUnreachable
+                | Self::ResultsUnreachable
                 | Self::WarmingUp
                 | Self::ShuttingDown
         )

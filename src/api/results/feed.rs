@@ -3,14 +3,19 @@
 use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use bytes::{BufMut, Bytes, BytesMut};
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
-use crate::results::{Cameras, ListenError, Listening, ReportId, ResultStore, StoredReport};
+use crate::{
+    api::problem::Problem,
+    results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
+};
 
 /// After so long without a report a comment is sent: proxies close connections that are silent, and
 /// who has gone without a word is found out.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 const SIGN_OF_LIFE: Bytes = Bytes::from_static(b": nothing new\n\n");
+/// Until a place of reports that does not answer is asked again.
+const PAUSE: Duration = Duration::from_secs(1);
 /// Missed reports that are fetched at a time.
 const PAGE: usize = 32;
 
@@ -31,17 +36,17 @@ impl Feed {
     /// Goes on after the report that was heard last, or begins with the latest of each camera.
     ///
     /// # Errors
-    /// [`ListenError`] when there is no place.
+    /// [`Problem`] when there is no place to listen, or nobody who knows the reports.
     pub(super) async fn begin(
         results: Arc<dyn ResultStore>,
         cameras: Cameras,
         last_heard: Option<ReportId>,
-    ) -> Result<Self, ListenError> {
+    ) -> Result<Self, Problem> {
         // Listens before it looks: nothing is missed in between.
         let listening = results.listeners().listen(cameras.clone())?;
         let latest = match &cameras {
-            Cameras::All => results.latest_of_all().await,
-            Cameras::One(camera) => results.latest(camera).await.into_iter().collect(),
+            Cameras::All => results.latest_of_all().await?,
+            Cameras::One(camera) => results.latest(camera).await?.into_iter().collect(),
         };
         let newest = latest.last().map(|report| report.id).unwrap_or_default();
         // What is ahead of all reports is an ID from elsewhere: nothing here comes after it.
@@ -68,6 +73,10 @@ impl Feed {
             if self.behind {
                 let page = NonZeroUsize::new(PAGE).unwrap_or(NonZeroUsize::MIN);
                 let missed = self.results.since(&self.cameras, self.last, page).await;
+                let Ok(missed) = missed else {
+                    sleep(PAUSE).await;
+                    return Some(SIGN_OF_LIFE);
+                };
                 self.behind = !missed.is_empty();
                 self.missed = missed.into();
                 continue;

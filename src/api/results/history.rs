@@ -69,11 +69,11 @@ pub(in crate::api) async fn get_history(
     let [since, limit] = parameters_named(&uri, ["since", "limit"])?;
     let since = since.map_or(Ok(ReportId::default()), |since| parse_since(&since))?;
     let limit = parse_limit(limit.as_deref())?;
-    if state.results.latest(&camera).await.is_none() {
+    if state.results.latest(&camera).await?.is_none() {
         return Err(unknown(&camera));
     }
     let camera = Cameras::One(camera);
-    let page = state.results.since(&camera, since, limit).await;
+    let page = state.results.since(&camera, since, limit).await?;
     let content_type = [(CONTENT_TYPE, "application/json")];
     let cache = [(CACHE_CONTROL, NO_CACHE)];
     let body = write(page.iter().map(AsRef::as_ref));

@@ -66,7 +66,7 @@ pub(in crate::api) async fn get_latest(
     let [wait] = parameters_named(&uri, ["wait"])?;
     let wait = wait.map_or(Ok(Duration::ZERO), |seconds| parse_wait(&seconds))?;
     let report = if wait.is_zero() {
-        state.results.latest(&camera).await
+        state.results.latest(&camera).await?
     } else {
         let limit = deadline.within(wait);
         news(&state, &camera, &headers, limit).await?
@@ -91,7 +91,7 @@ async fn news(
     // Listens before it looks: nothing is missed in between.
     let listeners = state.results.listeners();
     let mut listening = listeners.listen(Cameras::One(camera.to_owned()))?;
-    let mut report = state.results.latest(camera).await;
+    let mut report = state.results.latest(camera).await?;
     let is_news = |report: &StoredReport| {
         let known = is_unmodified(headers, &report.id.to_string());
         known.map(|known| !known)

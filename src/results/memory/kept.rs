@@ -22,7 +22,7 @@ pub(super) struct Kept {
     earlier: BTreeMap<ReportId, Arc<StoredReport>>,
     bytes: usize,
     newest: ReportId,
-    published: u64,
+    stored: u64,
 }
 
 impl Kept {
@@ -34,7 +34,7 @@ impl Kept {
             earlier: BTreeMap::new(),
             bytes: 0,
             newest: ReportId::default(),
-            published: 0,
+            stored: 0,
         }
     }
 
@@ -43,8 +43,8 @@ impl Kept {
         let id = ReportId::next(self.newest, now);
         let stored = Arc::new(StoredReport { id, report });
         self.newest = id;
-        self.published += 1;
-        self.bytes += stored.bytes();
+        self.stored += 1;
+        self.bytes += stored.report.bytes();
         let camera = &stored.report.camera;
         let reports = self.cameras.entry(camera.clone()).or_default();
         if let Some(before) = reports.back() {
@@ -84,7 +84,7 @@ impl Kept {
             return false;
         };
         if let Some(oldest) = reports.pop_front() {
-            self.bytes -= oldest.bytes();
+            self.bytes -= oldest.report.bytes();
             self.latest.remove(&oldest.id);
             self.earlier.remove(&oldest.id);
         }
@@ -135,12 +135,16 @@ impl Kept {
         }
     }
 
+    /// How many were ever kept.
+    pub(super) fn stored(&self) -> u64 {
+        self.stored
+    }
+
     pub(super) fn usage(&self) -> ResultUse {
         ResultUse {
             cameras: self.cameras.len(),
             reports: self.count(),
             bytes: self.bytes,
-            published: self.published,
         }
     }
 }

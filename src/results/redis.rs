@@ -1,0 +1,169 @@
+//! Reports in a Redis that several servers share, so that any of them answers for any camera.
+//!
+//! Two connections for a server, whoever listens: one for what is asked and sent, one that waits for
+//! news. Redis gives the IDs, so they are the same on every server. While it is away, reports wait in a
+//! bounded outbox and nobody waits for them.
+
+mod address;
+mod keys;
+mod link;
+mod outbox;
+mod reading;
+mod sender;
+mod session;
+
+use std::{
+    num::NonZeroUsize,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
+
+use async_trait::async_trait;
+use redis::RedisResult;
+use tokio::{task::JoinSet, time::timeout};
+
+pub use self::address::{RedisAddress, RedisAddressError};
+use self::{keys::Keys, link::Link, outbox::Outbox, reading::Reader};
+use super::{
+    Cameras, Listeners, NewReport, ReportId, ResultLimits, ResultStore, ResultUse, StoreHealth,
+    StoredReport, Unreachable,
+};
+
+/// How long the end of the server waits for reports that Redis does not have yet.
+const LAST_WAIT: Duration = Duration::from_secs(2);
+
+/// Which Redis, and which part of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RedisOptions {
+    /// Where it is.
+    pub address: RedisAddress,
+    /// How all keys begin: servers with the same one share their reports.
+    pub key_prefix: String,
+    /// How long a report is kept at most.
+    pub max_age: Duration,
+}
+
+/// Keeps reports in a Redis, within limits.
+#[derive(Debug)]
+pub struct RedisResults {
+    shared: Arc<Shared>,
+    /// End with this.
+    _tasks: JoinSet<()>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    options: RedisOptions,
+    limits: ResultLimits,
+    keys: Keys,
+    link: Link,
+    outbox: Outbox,
+    listeners: Arc<Listeners>,
+    stored: AtomicU64,
+}
+
+impl RedisResults {
+    /// A store that connects by itself, now and whenever it has to. Needs a tokio runtime.
+    #[must_use]
+    pub fn start(options: RedisOptions, limits: ResultLimits) -> Self {
+        // For TLS. Fails when there is one already, which is as good.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+        let shared = Arc::new(Shared {
+            keys: Keys::new(options.key_prefix.clone()),
+            options,
+            link: Link::default(),
+            outbox: Outbox::default(),
+            listeners: Arc::new(Listeners::new(limits.max_listeners)),
+            stored: AtomicU64::new(0),
+            limits,
+        });
+        let mut tasks = JoinSet::new();
+        tasks.spawn(session::keep(Arc::clone(&shared)));
+        tasks.spawn(sender::run(Arc::clone(&shared)));
+        Self {
+            shared,
+            _tasks: tasks,
+        }
+    }
+
+    /// Asks, if there is somebody to ask.
+    async fn ask<T>(
+        &self,
+        question: impl for<'a> AsyncFnOnce(Reader<'a>) -> RedisResult<T>,
+    ) -> Result<T, Unreachable> {
+        let line = self.shared.link.line()?;
+        let reader = Reader {
+            connection: line.connection.clone(),
+            keys: &self.shared.keys,
+        };
+        let outcome = question(reader).await;
+        self.shared.link.outcome(&line, outcome)
+    }
+}
+
+#[async_trait]
+impl ResultStore for RedisResults {
+    fn publish(&self, report: NewReport) {
+        self.shared.outbox.push(report);
+    }
+
+    async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable> {
+        self.ask(async |mut reader| reader.latest(camera).await)
+            .await
+    }
+
+    async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
+        self.ask(async |mut reader| reader.latest_of_all().await)
+            .await
+    }
+
+    async fn since(
+        &self,
+        cameras: &Cameras,
+        after: ReportId,
+        most: NonZeroUsize,
+    ) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
+        self.ask(async |mut reader| match cameras {
+            Cameras::All => reader.since(after, most).await,
+            Cameras::One(camera) => reader.since_of(camera, after, most).await,
+        })
+        .await
+    }
+
+    fn listeners(&self) -> &Arc<Listeners> {
+        &self.shared.listeners
+    }
+
+    async fn usage(&self) -> Result<ResultUse, Unreachable> {
+        self.ask(async |mut reader| reader.usage().await).await
+    }
+
+    fn health(&self) -> StoreHealth {
+        let Shared { link, outbox, .. } = &*self.shared;
+        StoreHealth {
+            problem: link.problem(),
+            stored: self.shared.stored.load(Ordering::Relaxed),
+            dropped: outbox.dropped(),
+            waiting: outbox.count(),
+        }
+    }
+
+    async fn flush(&self) {
+        let Shared { link, outbox, .. } = &*self.shared;
+        let sent = async {
+            tokio::select! {
+                () = outbox.is_empty() => {}
+                _ = link.lost() => {}
+            }
+        };
+        if timeout(LAST_WAIT, sent).await.is_err() || outbox.count() > 0 {
+            tracing::warn!(
+                "{} reports were not kept: Redis did not take them in time",
+                outbox.count()
+            );
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! What is where in Redis.
+
+/// The keys of one installation: all begin alike.
+#[derive(Debug)]
+pub(super) struct Keys {
+    prefix: String,
+}
+
+impl Keys {
+    pub(super) fn new(prefix: String) -> Self {
+        Self { prefix }
+    }
+
+    /// A stream of all reports: camera and bytes of each.
+    pub(super) fn reports(&self) -> String {
+        format!("{}:reports", self.prefix)
+    }
+
+    /// A sorted set of the reports that are not their camera's latest.
+    pub(super) fn earlier(&self) -> String {
+        format!("{}:earlier", self.prefix)
+    }
+
+    /// A sorted set of the cameras by the ID of their latest report.
+    pub(super) fn cameras(&self) -> String {
+        format!("{}:cameras", self.prefix)
+    }
+
+    /// A hash of the newest ID (`last`) and the bytes of all reports (`bytes`).
+    pub(super) fn totals(&self) -> String {
+        format!("{}:totals", self.prefix)
+    }
+
+    /// The number of the last report that a server has sent.
+    pub(super) fn sender(&self, server: &str) -> String {
+        format!("{}:sender:{server}", self.prefix)
+    }
+
+    /// A stream of a camera's reports.
+    pub(super) fn camera(&self, camera: &str) -> String {
+        format!("{}{camera}", self.prefix_of_cameras())
+    }
+
+    /// How the keys of all cameras begin.
+    pub(super) fn prefix_of_cameras(&self) -> String {
+        format!("{}:camera:", self.prefix)
+    }
+}

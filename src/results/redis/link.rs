@@ -1,0 +1,119 @@
+//! Whether Redis answers: one connection that all share while it does, and what is wrong while it does not.
+
+use redis::{RedisError, RetryMethod, aio::MultiplexedConnection};
+use tokio::sync::watch;
+
+use crate::results::Unreachable;
+
+/// The way to Redis, if there is one now.
+#[derive(Debug)]
+pub(super) struct Link(watch::Sender<State>);
+
+enum State {
+    Up(Line),
+    Down(String),
+}
+
+/// A connection, and the how many-th it is.
+#[derive(Clone)]
+pub(super) struct Line {
+    pub(super) connection: MultiplexedConnection,
+    number: u64,
+}
+
+impl std::fmt::Debug for State {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(self.problem().map_or("up", |_| "down"))
+    }
+}
+
+impl Default for Link {
+    fn default() -> Self {
+        Self(watch::Sender::new(State::Down(
+            "there is no connection yet".to_owned(),
+        )))
+    }
+}
+
+impl Link {
+    /// From now on there is this connection.
+    pub(super) fn is_up(&self, connection: MultiplexedConnection, number: u64) {
+        self.0.send_replace(State::Up(Line { connection, number }));
+    }
+
+    /// There is none, or none any more, for that reason.
+    pub(super) fn is_down(&self, problem: &RedisError) {
+        self.0.send_replace(State::Down(problem.to_string()));
+    }
+
+    /// What came of asking: a connection that has failed serves nobody any more.
+    pub(super) fn outcome<T>(
+        &self,
+        line: &Line,
+        outcome: Result<T, RedisError>,
+    ) -> Result<T, Unreachable> {
+        outcome.map_err(|error| {
+            if !is_refusal(&error) {
+                self.0.send_if_modified(|state| {
+                    // It may have been replaced meanwhile.
+                    let is_it = matches!(state, State::Up(now) if now.number == line.number);
+                    if is_it {
+                        *state = State::Down(error.to_string());
+                    }
+                    is_it
+                });
+            }
+            Unreachable(error.to_string())
+        })
+    }
+
+    /// The connection.
+    pub(super) fn line(&self) -> Result<Line, Unreachable> {
+        match &*self.0.borrow() {
+            State::Up(line) => Ok(line.clone()),
+            State::Down(problem) => Err(Unreachable(problem.clone())),
+        }
+    }
+
+    /// The connection, when there is one.
+    pub(super) async fn next_line(&self) -> Line {
+        loop {
+            let mut state = self.0.subscribe();
+            // The sender is `self`, so the channel cannot close meanwhile.
+            if let Ok(state) = state.wait_for(|state| state.problem().is_none()).await
+                && let State::Up(line) = &*state
+            {
+                return line.clone();
+            }
+        }
+    }
+
+    /// Waits until there is no connection, and says why.
+    pub(super) async fn lost(&self) -> String {
+        let mut state = self.0.subscribe();
+        let down = state.wait_for(|state| state.problem().is_some()).await;
+        down.ok()
+            .and_then(|state| state.problem().map(ToOwned::to_owned))
+            .unwrap_or_default()
+    }
+
+    /// What is wrong.
+    pub(super) fn problem(&self) -> Option<String> {
+        self.0.borrow().problem().map(ToOwned::to_owned)
+    }
+}
+
+impl State {
+    fn problem(&self) -> Option<&str> {
+        match self {
+            Self::Up(_) => None,
+            Self::Down(problem) => Some(problem),
+        }
+    }
+}
+
+/// Whether Redis has answered, and would answer the same again.
+pub(super) fn is_refusal(error: &RedisError) -> bool {
+    let is_about_us = !error.is_io_error() && !error.is_timeout();
+    is_about_us && matches!(error.retry_method(), RetryMethod::NoRetry)
+}

@@ -1,0 +1,177 @@
+//! What is asked of Redis, and reports out of its answers. What is no report of ours is passed over.
+
+use std::{num::NonZeroUsize, sync::Arc};
+
+use bytes::Bytes;
+use redis::{
+    FromRedisValue, Pipeline, RedisResult, Value,
+    aio::MultiplexedConnection,
+    cmd, pipe,
+    streams::{StreamId, StreamRangeReply},
+};
+
+use super::keys::Keys;
+use crate::results::{NewReport, ReportId, ResultUse, StoredReport};
+
+/// A place in the stream of all reports.
+pub(super) struct Entry {
+    pub(super) id: ReportId,
+    pub(super) camera: String,
+}
+
+/// Redis, and what is where in it.
+pub(super) struct Reader<'a> {
+    pub(super) connection: MultiplexedConnection,
+    pub(super) keys: &'a Keys,
+}
+
+impl Reader<'_> {
+    pub(super) async fn latest(&mut self, camera: &str) -> RedisResult<Option<Arc<StoredReport>>> {
+        let mut last = cmd("XREVRANGE");
+        last.arg(self.keys.camera(camera));
+        last.arg("+").arg("-").arg("COUNT").arg(1);
+        let found: StreamRangeReply = last.query_async(&mut self.connection).await?;
+        Ok(reports(camera, found).pop())
+    }
+
+    pub(super) async fn latest_of_all(&mut self) -> RedisResult<Vec<Arc<StoredReport>>> {
+        let mut all = cmd("ZRANGE");
+        all.arg(self.keys.cameras()).arg(0).arg(-1);
+        let cameras: Vec<String> = all.query_async(&mut self.connection).await?;
+        let mut each = pipe();
+        for camera in &cameras {
+            let last = each.cmd("XREVRANGE").arg(self.keys.camera(camera));
+            last.arg("+").arg("-").arg("COUNT").arg(1);
+        }
+        let mut latest = self.found(&each, cameras).await?;
+        // One may have been replaced since the cameras were listed.
+        latest.sort_unstable_by_key(|report| report.id);
+        Ok(latest)
+    }
+
+    pub(super) async fn since_of(
+        &mut self,
+        camera: &str,
+        after: ReportId,
+        most: NonZeroUsize,
+    ) -> RedisResult<Vec<Arc<StoredReport>>> {
+        let key = self.keys.camera(camera);
+        let found = self.range(key, after, most).await?;
+        Ok(reports(camera, found))
+    }
+
+    pub(super) async fn since(
+        &mut self,
+        after: ReportId,
+        most: NonZeroUsize,
+    ) -> RedisResult<Vec<Arc<StoredReport>>> {
+        let found = self.range(self.keys.reports(), after, most).await?;
+        self.reports_at(entries(found.ids)).await
+    }
+
+    /// The reports at these places, as far as they are still kept.
+    pub(super) async fn reports_at(
+        &mut self,
+        entries: Vec<Entry>,
+    ) -> RedisResult<Vec<Arc<StoredReport>>> {
+        let mut each = pipe();
+        for entry in &entries {
+            let id = format!("{}-0", entry.id);
+            let one = each.cmd("XRANGE").arg(self.keys.camera(&entry.camera));
+            one.arg(&id).arg(&id);
+        }
+        let cameras = entries.into_iter().map(|entry| entry.camera);
+        self.found(&each, cameras.collect()).await
+    }
+
+    /// The newest ID there ever was.
+    pub(super) async fn newest(&mut self) -> RedisResult<ReportId> {
+        let mut last = cmd("HGET");
+        last.arg(self.keys.totals()).arg("last");
+        let last: Option<String> = last.query_async(&mut self.connection).await?;
+        Ok(last.and_then(|id| id.parse().ok()).unwrap_or_default())
+    }
+
+    pub(super) async fn usage(&mut self) -> RedisResult<ResultUse> {
+        let mut counts = pipe();
+        counts.cmd("ZCARD").arg(self.keys.cameras());
+        counts.cmd("XLEN").arg(self.keys.reports());
+        counts.cmd("HGET").arg(self.keys.totals()).arg("bytes");
+        let counts = counts.query_async(&mut self.connection);
+        let (cameras, reports, bytes): (usize, usize, Option<usize>) = counts.await?;
+        Ok(ResultUse {
+            cameras,
+            reports,
+            bytes: bytes.unwrap_or_default(),
+        })
+    }
+
+    async fn range(
+        &mut self,
+        key: String,
+        after: ReportId,
+        most: NonZeroUsize,
+    ) -> RedisResult<StreamRangeReply> {
+        // The parts of a report's ID in Redis are its own and 0: this is just behind it.
+        let mut range = cmd("XRANGE");
+        range.arg(key).arg(format!("{after}-1")).arg("+");
+        range.arg("COUNT").arg(most.get());
+        range.query_async(&mut self.connection).await
+    }
+
+    /// What a pipeline finds that asks for a report of each of these cameras.
+    async fn found(
+        &mut self,
+        each: &Pipeline,
+        cameras: Vec<String>,
+    ) -> RedisResult<Vec<Arc<StoredReport>>> {
+        if cameras.is_empty() {
+            return Ok(Vec::new());
+        }
+        let found: Vec<StreamRangeReply> = each.query_async(&mut self.connection).await?;
+        let found = cameras.into_iter().zip(found);
+        Ok(found
+            .flat_map(|(camera, found)| reports(&camera, found))
+            .collect())
+    }
+}
+
+/// The places in a part of the stream of all reports.
+pub(super) fn entries(found: Vec<StreamId>) -> Vec<Entry> {
+    let entries = found.into_iter().filter_map(|entry| {
+        Some(Entry {
+            id: id_of(&entry)?,
+            camera: entry.get("camera")?,
+        })
+    });
+    entries.collect()
+}
+
+fn reports(camera: &str, found: StreamRangeReply) -> Vec<Arc<StoredReport>> {
+    let found = found.ids.into_iter();
+    found.filter_map(|entry| report(camera, entry)).collect()
+}
+
+fn report(camera: &str, mut entry: StreamId) -> Option<Arc<StoredReport>> {
+    let id = id_of(&entry)?;
+    let Value::BulkString(json) = entry.map.remove("json")? else {
+        return None;
+    };
+    Some(Arc::new(StoredReport {
+        id,
+        report: NewReport {
+            camera: camera.to_owned(),
+            received_at: text(&entry, "received_at")?.parse().ok()?,
+            persons: text(&entry, "persons")?.parse().ok()?,
+            json: Bytes::from(json),
+        },
+    }))
+}
+
+fn text(entry: &StreamId, field: &str) -> Option<String> {
+    String::from_redis_value_ref(entry.map.get(field)?).ok()
+}
+
+fn id_of(entry: &StreamId) -> Option<ReportId> {
+    entry.id.strip_suffix("-0")?.parse().ok()
+}

@@ -1,0 +1,95 @@
+//! Sends reports from the outbox to Redis, one after the other. Each is kept in one step, and once: when an
+//! answer got lost, Redis knows by the number that it has that report.
+
+use std::sync::{Arc, atomic::Ordering};
+
+use redis::{RedisResult, Script, aio::MultiplexedConnection};
+use uuid::Uuid;
+
+use super::{Shared, link::is_refusal};
+use crate::results::NewReport;
+
+/// What Redis does with a report.
+const RECORD: &str = include_str!("record.lua");
+
+/// Sends, for as long as the server runs. Refusals are logged until there is none, the first of them.
+pub(super) async fn run(shared: Arc<Shared>) {
+    let sender = Sender {
+        script: Script::new(RECORD),
+        key: shared.keys.sender(&Uuid::now_v7().to_string()),
+        shared: &shared,
+    };
+    let mut last_was_refused = false;
+    for number in 1.. {
+        let report = shared.outbox.first().await;
+        let refusal = sender.send(&report, number).await.err();
+        if let Some(refusal) = &refusal
+            && !last_was_refused
+        {
+            let address = &shared.options.address;
+            tracing::warn!("Redis at {address} refuses reports: {refusal}");
+        }
+        last_was_refused = refusal.is_some();
+        if !last_was_refused {
+            shared.stored.fetch_add(1, Ordering::Relaxed);
+        }
+        shared.outbox.done(last_was_refused);
+    }
+}
+
+struct Sender<'a> {
+    script: Script,
+    key: String,
+    shared: &'a Shared,
+}
+
+impl Sender<'_> {
+    /// Sends a report until Redis has answered; fails only with a refusal.
+    async fn send(&self, report: &NewReport, number: u64) -> RedisResult<()> {
+        loop {
+            let line = self.shared.link.next_line().await;
+            let outcome = self.record(line.connection.clone(), report, number).await;
+            match outcome {
+                Err(error) if !is_refusal(&error) => {
+                    // Waits for the next connection.
+                    let _ = self.shared.link.outcome(&line, Err::<(), _>(error));
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    async fn record(
+        &self,
+        mut connection: MultiplexedConnection,
+        report: &NewReport,
+        number: u64,
+    ) -> RedisResult<()> {
+        let (keys, limits) = (&self.shared.keys, &self.shared.limits);
+        let mut call = self.script.prepare_invoke();
+        for key in [
+            keys.reports(),
+            keys.earlier(),
+            keys.cameras(),
+            keys.totals(),
+        ] {
+            call.key(key);
+        }
+        call.key(&self.key);
+        call.arg(keys.prefix_of_cameras()).arg(number);
+        call.arg(&report.camera);
+        call.arg(report.received_at.to_string());
+        call.arg(report.persons).arg(&report.json[..]);
+        call.arg(report.bytes());
+        for limit in [
+            limits.max_cameras.get(),
+            limits.history_per_camera.get(),
+            limits.max_reports.get(),
+            limits.max_bytes,
+        ] {
+            call.arg(limit);
+        }
+        call.arg(self.shared.options.max_age.as_secs());
+        call.invoke_async(&mut connection).await
+    }
+}

@@ -1,0 +1,111 @@
+"""A Redis of our own: started, killed, halted, and asked."""
+
+import contextlib
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from harness.processes import free_ports
+
+
+class RedisServer:
+    """A `redis-server` on a port of this machine that keeps nothing on disk."""
+
+    def __init__(self, *options: str, password: str = "") -> None:
+        """`options` are those of its command line; the connection of this test sends `password`."""
+        (self.port,) = free_ports(1)
+        self.password = password
+        self._options = options
+        self._folder = Path(tempfile.mkdtemp(prefix="lookdown-redis-"))
+        self._process: subprocess.Popen | None = None
+
+    def __enter__(self) -> "RedisServer":
+        """Starts it."""
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Kills it."""
+        self.kill()
+        shutil.rmtree(self._folder)
+
+    @property
+    def url(self) -> str:
+        """What `results.url` takes."""
+        secret = f":{self.password}@" if self.password else ""
+        return f"redis://{secret}127.0.0.1:{self.port}/0"
+
+    def start(self) -> None:
+        """Until it answers."""
+        command = ["redis-server", "--port", str(self.port), "--bind", "127.0.0.1", "--save", "", *self._options]
+        self._process = subprocess.Popen(command, cwd=self._folder, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
+        deadline = time.monotonic() + 20.0
+        while True:
+            with contextlib.suppress(OSError, RedisError):
+                self.ask("PING")
+                return
+            if time.monotonic() > deadline:
+                raise TimeoutError("redis-server does not answer")
+            time.sleep(0.02)
+
+    def kill(self) -> None:
+        """At once: what it knew is gone."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+    def halt(self) -> None:
+        """Its connections stay, and nobody answers."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        """After `halt`."""
+        self._process.send_signal(signal.SIGCONT)
+
+    def ask(self, *words: object):
+        """The answer to one command."""
+        return self.ask_all([words])[0]
+
+    def ask_all(self, commands: list[tuple]) -> list:
+        """The answers to commands, in order."""
+        if self.password:
+            commands = [("AUTH", self.password), *commands]
+        with socket.create_connection(("127.0.0.1", self.port), 10.0) as connection, connection.makefile("rb") as answers:
+            connection.sendall(b"".join(_command(words) for words in commands))
+            told = [_answer(answers) for _ in commands]
+        for answer in told:
+            if isinstance(answer, RedisError):
+                raise answer
+        return told[1:] if self.password else told
+
+
+class RedisError(Exception):
+    """What Redis refused, and why."""
+
+
+def _command(words: tuple) -> bytes:
+    """As Redis reads it (RESP)."""
+    parts = [word if isinstance(word, bytes) else str(word).encode() for word in words]
+    lengths = b"".join(b"$%d\r\n%s\r\n" % (len(part), part) for part in parts)
+    return b"*%d\r\n%s" % (len(parts), lengths)
+
+
+def _answer(stream):
+    line = stream.readline()
+    if not line:
+        raise ConnectionError("Redis has closed the connection")
+    kind, rest = line[:1], line[1:-2]
+    if kind == b"+":
+        return rest.decode()
+    if kind == b"-":
+        return RedisError(rest.decode())
+    if kind == b":":
+        return int(rest)
+    if kind == b"$":
+        return None if rest == b"-1" else stream.read(int(rest) + 2)[:-2]
+    return None if rest == b"-1" else [_answer(stream) for _ in range(int(rest))]

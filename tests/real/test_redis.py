@@ -1,0 +1,417 @@
+"""Two servers that share a Redis: any answers for any camera, and none needs Redis to find persons."""
+
+import contextlib
+import http.client
+import json
+import random
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+import unittest.mock
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from harness.places import LOOKDOWN, ROOT
+from harness.places import WORK as LOGS
+from harness.processes import Server, free_ports, running
+from redis_server import RedisServer
+from support.exchange import Answer, ask
+from support.places import OFFICE, SAMPLES, TINY_MODEL
+
+PICTURE = OFFICE.read_bytes()
+PATIENCE = 20.0
+RECORD = (ROOT / "src" / "results" / "redis" / "record.lua").read_text(encoding="utf-8")
+"""What Redis does with a report."""
+
+
+@contextlib.contextmanager
+def replica(name: str, url: str, **settings: str) -> Iterator[Server]:
+    """A server of that name with that Redis; its log is `{name}.log`."""
+    (port,) = free_ports(1)
+    wanted = {
+        "SERVER__LISTEN": f"127.0.0.1:{port}",
+        "SHUTDOWN__GRACE_MILLIS": "0",
+        "CALIBRATIONS__PATH": str(SAMPLES / "calibrations"),
+        "MODEL__PATH": str(TINY_MODEL),
+        "RESULTS__URL": url,
+        **settings,
+    }
+    environment = {f"LOOKDOWN__{key}": value for key, value in wanted.items()}
+    with running(name, [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
+        until(lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "nobody" in name)
+        yield server
+
+
+def log_of(name: str) -> str:
+    """What a replica has said so far."""
+    return (LOGS / f"{name}.log").read_text(encoding="utf-8")
+
+
+def get(server: Server, path: str, **headers: str) -> Answer:
+    """The answer to a question."""
+    return ask(server.address, "GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+
+
+def detect(server: Server, camera: str) -> Answer:
+    """The answer to a frame."""
+    path = f"/detect?calibration=office&profile=fast&camera={camera}"
+    return ask(server.address, "POST", path, PICTURE, {"Content-Type": "image/jpeg"})
+
+
+def metric(server: Server, name: str) -> float:
+    """A metric without labels."""
+    lines = get(server, "/metrics").body.decode().splitlines()
+    return next(float(line.split()[1]) for line in lines if line.startswith(f"lookdown_{name} "))
+
+
+def until(holds: Callable[[], object]) -> object:
+    """What holds at last."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        found = holds()
+        if found:
+            return found
+        if time.monotonic() > deadline:
+            raise AssertionError("it did not come to that in time")
+        time.sleep(0.02)
+
+
+class Stream:
+    """Server-sent events."""
+
+    def __init__(self, server: Server, path: str, **headers: str) -> None:
+        """Listens from now on."""
+        self._connection = http.client.HTTPConnection(server.address, timeout=PATIENCE)
+        self._connection.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+        self._answer = self._connection.getresponse()
+        assert self._answer.status == 200, self._answer.read()
+
+    def next(self) -> tuple[str, bytes]:
+        """ID and data of the next event; comments are passed over."""
+        found = {}
+        while True:
+            line = self._answer.readline()
+            assert line, "the stream has ended"
+            name, _, value = line.rstrip(b"\n").partition(b": ")
+            if name:
+                found[name] = value
+            elif b"data" in found:
+                return found[b"id"].decode(), found[b"data"]
+
+    def close(self) -> None:
+        """Leaves."""
+        self._connection.close()
+
+
+class Shared(unittest.TestCase):
+    """Two servers and a Redis that works."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """One for all."""
+        cls.redis = cls.enterClassContext(RedisServer())
+        cls.one = cls.enterClassContext(replica("redis-one", cls.redis.url))
+        cls.other = cls.enterClassContext(replica("redis-other", cls.redis.url))
+
+    def latest(self, server: Server, camera: str, report: bytes) -> Answer:
+        """The latest report of a camera, when it is this one."""
+        path = f"/results/{camera}/latest"
+        until(lambda: get(server, path).body == report)
+        return get(server, path)
+
+    def test_a_report_is_the_same_on_every_server_to_the_byte_and_to_its_id(self) -> None:
+        """Latest, history, list and 304."""
+        sent = [detect(server, "hall").body for server in (self.one, self.other, self.one)]
+        one, other = (self.latest(server, "hall", sent[-1]) for server in (self.one, self.other))
+        self.assertEqual(one.headers["etag"], other.headers["etag"])
+        again = get(self.other, "/results/hall/latest", If_None_Match=one.headers["etag"])
+        self.assertEqual(again.status, 304)
+        pages = [get(server, "/results/hall/history").body for server in (self.one, self.other)]
+        self.assertEqual(pages[0], pages[1])
+        kept = [row["report"] for row in json.loads(pages[0])]
+        self.assertEqual(kept, [json.loads(report) for report in sent])
+        ids = [int(row["id"]) for row in json.loads(pages[0])]
+        self.assertEqual(sorted(set(ids)), ids)
+        self.assertLess(abs(ids[-1] / 1e6 - time.time()), 60.0)
+        since = [get(server, f"/results/hall/history?since={ids[0]}&limit=1").json() for server in (self.one, self.other)]
+        self.assertEqual(since[0], since[1])
+        self.assertEqual([int(row["id"]) for row in since[0]], ids[1:2])
+        rows = [
+            [{key: row[key] for key in ("camera", "id", "received_at", "persons")} for row in get(server, "/results").json()]
+            for server in (self.one, self.other)
+        ]
+        self.assertEqual(rows[0], rows[1])
+
+    def test_whoever_waits_at_one_server_is_answered_when_another_has_news(self) -> None:
+        """Long polls, also for the first report of a camera."""
+        for before in (None, "known"):
+            tag = '"0"'
+            if before:
+                first = detect(self.one, "stairs")
+                tag = self.latest(self.other, "stairs", first.body).headers["etag"]
+            answers: list[Answer] = []
+            path = "/results/stairs/latest?wait=10"
+            waiting = threading.Thread(target=lambda: answers.append(get(self.other, path, If_None_Match=tag)))
+            waiting.start()
+            until(lambda: metric(self.other, "results_listeners") >= 1.0)
+            began = time.monotonic()
+            sent = detect(self.one, "stairs")
+            waiting.join(PATIENCE)
+            self.assertEqual((answers[0].status, answers[0].body), (200, sent.body))
+            self.assertLess(time.monotonic() - began, 3.0)
+
+    def test_events_go_on_at_another_server_where_they_ended_at_one(self) -> None:
+        """`Last-Event-ID`, and both kinds of streams."""
+        first = detect(self.one, "yard").body
+        self.latest(self.other, "yard", first)
+        stream = Stream(self.one, "/results/yard/events")
+        identifier, data = stream.next()
+        self.assertEqual(data, first)
+        sent = [detect(self.other, "yard").body, detect(self.one, "yard").body]
+        self.assertEqual([stream.next()[1] for _ in sent], sent)
+        stream.close()
+        for path in ("/results/yard/events", "/events"):
+            resumed = Stream(self.other, path, Last_Event_ID=identifier)
+            self.assertEqual([resumed.next()[1] for _ in sent], sent)
+            newest = detect(self.one, "yard").body
+            self.assertEqual(resumed.next()[1], newest)
+            resumed.close()
+            sent.append(newest)
+
+    def test_listeners_cost_redis_no_connections(self) -> None:
+        """Two for each server, whoever listens."""
+        streams = [Stream(self.one, f"/results/camera-{number}/events") for number in range(30)]
+        clients = self.redis.ask("CLIENT", "LIST").decode().splitlines()
+        # This test is one of them.
+        self.assertEqual(len(clients) - 1, 4)
+        for stream in streams:
+            stream.close()
+
+    def test_nothing_stays_for_ever(self) -> None:
+        """Every key has an end."""
+        detect(self.one, "hall")
+        keys = self.redis.ask("KEYS", "*")
+        self.assertGreater(len(keys), 5)
+        for key in keys:
+            self.assertIn(self.redis.ask("TTL", key), range(80_000, 86_401), key)
+            self.assertTrue(key.startswith(b"lookdown:"), key)
+
+    def test_metrics_tell_what_is_in_redis(self) -> None:
+        """The same on both."""
+        detect(self.one, "hall")
+        until(lambda: metric(self.one, "results_waiting") == 0.0)
+        for name in ("results_cameras", "results_reports", "results_bytes"):
+            self.assertGreaterEqual(metric(self.one, name), 1.0)
+            self.assertEqual(metric(self.one, name), metric(self.other, name))
+        self.assertEqual(metric(self.one, "results_store_up"), 1.0)
+        self.assertEqual(metric(self.one, "results_dropped_total"), 0.0)
+
+
+class Away(unittest.TestCase):
+    """A Redis that does not answer."""
+
+    def test_frames_are_answered_as_ever_and_results_come_back_by_themselves(self) -> None:
+        """Killed and started anew, and halted and let go on, in the middle of frames."""
+        with RedisServer() as redis, replica("redis-left", redis.url) as server:
+            stream = Stream(server, "/results/hall/events")
+            statuses: list[int] = []
+            seconds: list[float] = []
+            over = threading.Event()
+
+            def send() -> None:
+                while not over.is_set():
+                    began = time.monotonic()
+                    statuses.append(detect(server, "hall").status)
+                    seconds.append(time.monotonic() - began)
+
+            sending = threading.Thread(target=send)
+            sending.start()
+            stream.next()
+            usual = max(seconds[:20], default=0.0)
+            for leave, come_back in ((redis.kill, redis.start), (redis.halt, redis.go_on)):
+                leave()
+                until(lambda: get(server, "/results/hall/latest").status == 503)
+                for path in ("/results", "/results/hall/latest", "/results/hall/history", "/events"):
+                    answer = get(server, path)
+                    self.assertEqual(answer.status, 503, path)
+                    self.assertEqual(answer.headers["retry-after"], "1")
+                    self.assertEqual(answer.json()["type"], "urn:lookdown:problem:results-unreachable")
+                ready = get(server, "/readyz")
+                self.assertEqual(ready.status, 200)
+                self.assertIn("store_problem", ready.json()["results"])
+                self.assertEqual(metric(server, "results_store_up"), 0.0)
+                time.sleep(1.0)
+                self.assertGreater(metric(server, "results_waiting"), 0.0)
+                come_back()
+                until(lambda: get(server, "/results/hall/latest").status == 200)
+                self.assertEqual(metric(server, "results_store_up"), 1.0)
+                until(lambda: metric(server, "results_waiting") <= 1.0)
+                stream.next()
+            over.set()
+            sending.join(PATIENCE)
+            print(f"{len(statuses)} frames, the slowest {max(seconds):.3f} s (before {usual:.3f} s)", end=" ... ")
+            self.assertEqual(set(statuses), {200})
+            self.assertLess(max(seconds), 2.0)
+            # What was found meanwhile is there, once.
+            until(lambda: metric(server, "results_waiting") == 0.0)
+            stored = [row["report"]["request_id"] for row in get(server, "/results/hall/history").json()]
+            self.assertEqual(len(set(stored)), len(stored))
+            stream.close()
+        told = log_of("redis-left")
+        self.assertEqual(told.count("does not answer"), 2, told)
+        self.assertEqual(told.count("answers again"), 2, told)
+
+    def test_a_server_starts_without_redis_and_finds_it_when_it_comes(self) -> None:
+        """Reports wait for it, within limits."""
+        redis = RedisServer()
+        with replica("redis-nobody", redis.url) as server:
+            sent = detect(server, "hall")
+            self.assertEqual(sent.status, 200)
+            self.assertEqual(get(server, "/results").status, 503)
+            with redis:
+                until(lambda: get(server, "/results/hall/latest").body == sent.body)
+                told = log_of("redis-nobody")
+        self.assertEqual((told.count("does not answer"), told.count("answers again")), (1, 1), told)
+
+    def test_what_was_found_last_is_kept_although_the_server_ends(self) -> None:
+        """The end waits for what is on its way."""
+        with RedisServer() as redis:
+            with replica("redis-ends", redis.url) as server:
+                sent = [detect(server, "hall").body for _ in range(5)]
+            kept = redis.ask("XRANGE", "lookdown:camera:hall", "-", "+")
+            self.assertEqual([entry[1][5] for entry in kept], sent)
+
+
+class Secrets(unittest.TestCase):
+    """Passwords and TLS."""
+
+    def test_a_password_is_used_and_never_told(self) -> None:
+        """A wrong one is told as such; when it is right at last, all goes well."""
+        with RedisServer("--requirepass", "s3cret-right", password="s3cret-right") as redis:
+            with replica("redis-password", redis.url) as server:
+                sent = detect(server, "hall").body
+                until(lambda: get(server, "/results/hall/latest").body == sent)
+                ready = get(server, "/readyz").body
+            wrong = redis.url.replace("right", "wrong")
+            with replica("redis-nobody-wrong", wrong) as server:
+                until(lambda: "WRONGPASS" in log_of("redis-nobody-wrong") or "assword" in log_of("redis-nobody-wrong"))
+                ready += get(server, "/readyz").body
+                redis.ask("CONFIG", "SET", "requirepass", "s3cret-wrong")
+                redis.password = "s3cret-wrong"
+                sent = detect(server, "hall").body
+                until(lambda: get(server, "/results/hall/latest").body == sent)
+        self.assertNotIn("s3cret", log_of("redis-password") + log_of("redis-nobody-wrong") + ready.decode())
+
+    @unittest.skipUnless(shutil.which("openssl"), "needs openssl")
+    def test_redis_may_speak_tls(self) -> None:
+        """With an authority that the machine knows; a stranger is not trusted."""
+        folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        certificate, key = folder / "redis.pem", folder / "redis.key"
+        make = "req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=localhost"
+        make += " -addext subjectAltName=DNS:localhost -addext basicConstraints=critical,CA:FALSE"
+        files = ["-keyout", str(key), "-out", str(certificate)]
+        subprocess.run(["openssl", *make.split(), *files], check=True, capture_output=True)
+        (port,) = free_ports(1)
+        options = f"--tls-port {port} --tls-cert-file {certificate} --tls-key-file {key} --tls-auth-clients no"
+        with RedisServer(*options.split()):
+            url = f"rediss://localhost:{port}"
+            with contextlib.ExitStack() as stack:
+                stack.enter_context(_variable("SSL_CERT_FILE", str(certificate)))
+                server = stack.enter_context(replica("redis-tls", url))
+                sent = detect(server, "hall").body
+                until(lambda: get(server, "/results/hall/latest").body == sent)
+            with replica("redis-nobody-trusts", url) as server:
+                self.assertEqual(get(server, "/results").status, 503)
+
+
+@contextlib.contextmanager
+def _variable(name: str, value: str) -> Iterator[None]:
+    with unittest.mock.patch.dict("os.environ", {name: value}):
+        yield
+
+
+class Bounds(unittest.TestCase):
+    """How much there may be."""
+
+    def test_servers_keep_to_their_settings(self) -> None:
+        """Cameras, history and reports."""
+        bounds = {"RESULTS__MAX_CAMERAS": "3", "RESULTS__HISTORY_PER_CAMERA": "4", "RESULTS__MAX_REPORTS": "8"}
+        with RedisServer() as redis, replica("redis-bounds", redis.url, **bounds) as server:
+            last = {}
+            for camera in "aabcbbbbbaaaacd":
+                last[camera] = detect(server, camera).body
+            until(lambda: metric(server, "results_waiting") == 0.0)
+            rows = get(server, "/results").json()
+            self.assertEqual([row["camera"] for row in rows], ["a", "c", "d"])
+            self.assertEqual(get(server, "/results/b/latest").status, 404)
+            self.assertEqual(len(get(server, "/results/a/history").json()), 4)
+            for camera in "acd":
+                self.assertEqual(get(server, f"/results/{camera}/latest").body, last[camera])
+
+    def test_a_report_and_what_it_displaces_are_one_step_that_is_done_once(self) -> None:
+        """The script alone, against the same rules in a few lines of Python."""
+        chance = random.Random(20261121)
+        with RedisServer() as redis:
+            for _ in range(30):
+                redis.ask("FLUSHALL")
+                limits = [chance.randrange(1, most) for most in (6, 6, 20, 4000)]
+                kept: list[tuple[str, int, int]] = []
+                for number in range(1, 60):
+                    report = (str(chance.randrange(8)), number, chance.randrange(200, 800))
+                    # Whoever gets no answer sends it again.
+                    redis.ask_all([record(report, limits)] * chance.choice((1, 1, 2)))
+                    kept = room_for(kept, report, limits)
+                    entries = redis.ask("XRANGE", "t:reports", "-", "+")
+                    self.assertEqual([tuple(entry[1][1::2]) for entry in entries], [_fields(one) for one in kept])
+                    ids = {int(one[1][1]): entry[0] for entry, one in zip(entries, _contents(redis, entries), strict=True)}
+                    self.assertEqual(list(ids), [one[1] for one in kept])
+                latest = {camera: ids[number] for camera, number, _ in kept}
+                by_age = sorted(latest, key=lambda camera: latest[camera])
+                self.assertEqual(redis.ask("ZRANGE", "t:cameras", 0, -1), [camera.encode() for camera in by_age])
+                self.assertEqual(redis.ask("ZCARD", "t:earlier"), len(kept) - len(latest))
+                self.assertEqual(int(redis.ask("HGET", "t:totals", "bytes")), sum(one[2] for one in kept))
+                self.assertEqual(len(redis.ask("KEYS", "t:camera:*")), len(latest))
+
+
+def record(report: tuple[str, int, int], limits: list[int]) -> tuple:
+    """The command for a report of a camera, with its number and its bytes."""
+    camera, number, size = report
+    keys = [f"t:{name}" for name in ("reports", "earlier", "cameras", "totals", "sender")]
+    return ("EVAL", RECORD, len(keys), *keys, "t:camera:", number, camera, "then", number, "{}", size, *limits, 3600)
+
+
+def room_for(kept: list[tuple[str, int, int]], report: tuple[str, int, int], limits: list[int]) -> list[tuple[str, int, int]]:
+    """What is kept, in order, when a report has come."""
+    most_cameras, most_of_camera, most_reports, most_bytes = limits
+    kept = [*kept, report]
+    own = [one for one in kept if one[0] == report[0]]
+    kept = [one for one in kept if one not in own[:-most_of_camera]]
+
+    def latest() -> dict[str, tuple[str, int, int]]:
+        return {one[0]: one for one in kept}
+
+    while len(latest()) > most_cameras:
+        silent = min(latest().values(), key=lambda one: one[1])[0]
+        kept = [one for one in kept if one[0] != silent]
+    while kept and (len(kept) > most_reports or sum(one[2] for one in kept) > most_bytes):
+        earlier = [one for one in kept if one not in latest().values()]
+        kept.remove((earlier or kept)[0])
+    return kept
+
+
+def _fields(report: tuple[str, int, int]) -> tuple[bytes, bytes]:
+    return report[0].encode(), str(report[2]).encode()
+
+
+def _contents(redis: RedisServer, entries: list) -> list:
+    """What the streams of the cameras have under the IDs of these entries."""
+    asked = [("XRANGE", b"t:camera:" + entry[1][1], entry[0], entry[0]) for entry in entries]
+    found = redis.ask_all(asked) if asked else []
+    return [(entry[0][0], entry[0][1][2:4]) for entry in found]
+
+
+if __name__ == "__main__":
+    unittest.main()
