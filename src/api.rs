@@ -15,6 +15,7 @@ mod foreign_pages;
 mod head;
 mod health;
 mod incoming_trace;
+mod limit;
 mod openapi;
 mod page_headers;
 mod problem;
@@ -26,6 +27,7 @@ mod results;
 mod state;
 mod unread;
 mod upload;
+mod v2;
 
 use axum::{
     Router,
@@ -73,19 +75,29 @@ fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(results::history::get_history))
         .routes(routes!(results::events::of_camera))
         .routes(routes!(results::events::of_all))
+        .routes(routes!(v2::model))
+        .routes(routes!(v2::model_version))
+        .routes(routes!(v2::model_ready))
+        .routes(routes!(v2::model_version_ready))
+        .routes(routes!(v2::infer))
+        .routes(routes!(v2::infer_version))
         .routes(routes!(repository::index))
         .routes(routes!(repository::load))
         .routes(routes!(repository::unload))
 }
 
 fn description() -> OpenApiRouter<ApiState> {
-    OpenApiRouter::new().routes(routes!(openapi::openapi_json))
+    OpenApiRouter::new()
+        .routes(routes!(openapi::openapi_json))
+        .routes(routes!(v2::server))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(health::livez))
         .routes(routes!(health::readyz))
+        .routes(routes!(v2::live))
+        .routes(routes!(v2::ready))
 }
 
 fn metrics() -> OpenApiRouter<ApiState> {

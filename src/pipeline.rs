@@ -26,7 +26,7 @@ mod worker_pool;
 pub use default_models::DefaultModels;
 pub use engine::{Engine, EngineOptions, Observation};
 pub use error::PipelineError;
-pub use job::{DetectJob, Detected};
+pub use job::{DetectJob, Detected, ViewsJob};
 pub use network::BatchOptions;
 pub use parameters::{DetectParameters, ParameterError, ParameterFault};
 pub use planned_views::{PlannedView, PlannedViews};

@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 25] = [
+const MAY_USE: [(&str, &[&str]); 26] = [
     ("plain_name", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
@@ -19,6 +19,7 @@ const MAY_USE: [(&str, &[&str]); 25] = [
     ("shutdown", &[]),
     ("poller", &[]),
     ("results", &[]),
+    ("open_inference", &[]),
     ("imaging", &["geometry"]),
     ("calibration", &["geometry", "plain_name", "revision"]),
     ("inference", &["detection", "imaging", "revision"]),
@@ -71,6 +72,7 @@ const MAY_USE: [(&str, &[&str]); 25] = [
             "imaging",
             "calibration",
             "inference",
+            "open_inference",
             "pipeline",
             "metrics",
             "results",
@@ -122,10 +124,11 @@ const MAY_USE: [(&str, &[&str]); 25] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 25] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 26] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
+    ("base64", &["open_inference"]),
     ("hyper", &["server"]),
     ("hyper_util", &["server"]),
     ("tower_http", &["api"]),
@@ -140,6 +143,7 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 25] = [
             "calibration",
             "cli",
             "evaluation",
+            "open_inference",
         ],
     ),
     ("clap", &["cli"]),

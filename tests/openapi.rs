@@ -162,6 +162,8 @@ fn every_operation_says_how_it_can_fail() {
         })
         .collect();
     let loading = "400 401 403 404 408 409 413 422 429 500 504";
+    let inferring = "400 401 403 404 408 413 415 422 429 500 503 504";
+    let of_models = "400 401 403 404 429";
     let expected = [
         (
             "detect_persons",
@@ -173,6 +175,12 @@ fn every_operation_says_how_it_can_fail() {
             "400 401 403 404 408 413 429 500 503",
         ),
         ("list_as_deepstack", "401 403 429"),
+        ("infer_with_model", inferring),
+        ("infer_with_model_version", inferring),
+        ("get_model", of_models),
+        ("get_model_version", of_models),
+        ("get_model_readiness", "400 401 403 404 429 503"),
+        ("get_model_version_readiness", "400 401 403 404 429 503"),
         ("list_results", "401 403 429"),
         ("get_latest_result", "400 401 403 404 422 429 503"),
         ("list_past_results", "400 401 403 404 422 429"),
@@ -192,6 +200,9 @@ fn every_operation_says_how_it_can_fail() {
         ("list_models", "400 401 403 408 413 429 500 504"),
         ("load_model", loading),
         ("unload_model", loading),
+        ("get_server_metadata", ""),
+        ("get_server_liveness", ""),
+        ("get_server_readiness", "503"),
         ("get_liveness", ""),
         ("get_readiness", "503"),
         ("get_metrics", "500"),

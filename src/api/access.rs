@@ -30,6 +30,9 @@ pub enum Access {
     Keys(Arc<AccessKeys>),
 }
 
+/// Whoever sent the request may find persons.
+pub(super) struct Finder;
+
 /// Whoever sent the request may read calibrations and reports.
 pub(super) struct Reader;
 
@@ -38,6 +41,15 @@ pub(super) struct ModelReader;
 
 /// Whoever sent the request may change the models and the calibrations of the server.
 pub(super) struct Administrator;
+
+impl FromRequestParts<ApiState> for Finder {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        state.options.access.check(&parts.headers, Scope::Detect)?;
+        Ok(Self)
+    }
+}
 
 impl FromRequestParts<ApiState> for Reader {
     type Rejection = Problem;

@@ -10,7 +10,7 @@ use axum::{
 use super::{
     ApiState,
     answer::AnswerOptions,
-    find::find,
+    find::{Found, find},
     openapi::{DetectForm, DetectProblems, DetectQuery},
     problem::Problem,
     report::{Report, ReportTimings},
@@ -18,12 +18,12 @@ use super::{
     upload::Upload,
 };
 use crate::{
-    pipeline::{DetectJob, DetectParameters, Ticket},
+    pipeline::{DetectJob, DetectParameters, DetectionReport, Ticket},
     telemetry::RequestTrace,
 };
 
 /// `C_t` of requests that name none.
-const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
+pub(super) const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
 pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 pub(super) const QUEUE_TIME: HeaderName = HeaderName::from_static("x-queue-time");
 pub(super) const INFERENCE_TIME: HeaderName = HeaderName::from_static("x-inference-time");
@@ -75,20 +75,20 @@ pub(super) async fn detect_persons(
     Extension(trace): Extension<RequestTrace>,
     upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
-    let limit = upload.deadline;
-    trace.stage("upload", limit.began().into_std(), upload.arrived);
+    let deadline = upload.deadline;
+    trace.stage("upload", deadline.began().into_std(), upload.arrived);
     let (job, answer) = job(upload, &request_id)?;
-    let (report, content) = find(&state, &trace, limit, job, |found| {
-        answer.content(found.detected, found.json)
-    })
-    .await?;
-    let timings = timing_headers(&ReportTimings::from(&report.timings));
-    let persons = report.persons.len();
-    let facts = [
-        (PERSON_COUNT, HeaderValue::from(persons)),
-        (CONTENT_TYPE, HeaderValue::from_static(content.media_type)),
-    ];
-    Ok((AppendHeaders(timings), facts, content.bytes))
+    let write = move |found: Found<'_>| answer.content(found.detected, found.json);
+    let (report, content) = find(&state, &trace, deadline, job, write).await?;
+    let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
+    Ok((AppendHeaders(facts(&report)), media_type, content.bytes))
+}
+
+/// What the sender of a frame is told beside the answer.
+pub(super) fn facts(report: &DetectionReport) -> [(HeaderName, HeaderValue); 5] {
+    let [stages, queue, inference, total] = timing_headers(&ReportTimings::from(&report.timings));
+    let count = (PERSON_COUNT, HeaderValue::from(report.persons.len()));
+    [stages, queue, inference, total, count]
 }
 
 fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {

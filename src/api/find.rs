@@ -1,17 +1,9 @@
 //! What every route that finds people does with a frame: it waits for the report as long as it may,
 //! counts, traces and keeps it.
 
-use std::time::Instant;
-
 use bytes::Bytes;
-use tokio::time::timeout_at;
 
-use super::{
-    ApiState,
-    deadline::Deadline,
-    problem::{Problem, ProblemKind},
-    report::Report,
-};
+use super::{ApiState, deadline::Deadline, limit::Limit, problem::Problem, report::Report};
 use crate::{
     metrics::Metrics,
     pipeline::{DetectJob, Detected, DetectionReport},
@@ -33,24 +25,18 @@ pub(super) struct Found<'a> {
 pub(super) async fn find<T: Send + 'static>(
     state: &ApiState,
     trace: &RequestTrace,
-    server_limit: Deadline,
+    deadline: Deadline,
     job: DetectJob,
     write: impl FnOnce(Found<'_>) -> Result<T, Problem> + Send + 'static,
 ) -> Result<(DetectionReport, T), Problem> {
-    let own_limit = job.parameters.timeout;
-    let limit = own_limit.map_or(server_limit, |own| server_limit.within(own));
+    let limit = Limit::of(deadline, job.parameters.timeout);
     let timeline = job.ticket.timeline.clone();
     let work = state.workers.detect_and(job, |detected| {
         // The frame is kept for as long as the answer needs it, which a report does not.
         let report = detected.report.clone();
         (report, written(detected, write))
     });
-    let outcome = timeout_at(limit.at(), work).await;
-    for span in timeline.spans(Instant::now()) {
-        trace.stage(span.stage.name(), span.began, span.ended);
-    }
-    let (report, written) =
-        outcome.map_err(|_| timed_out(limit, limit.at() < server_limit.at()))??;
+    let (report, written) = limit.wait(trace, &timeline, work).await?;
     describe(trace, &report);
     record(&state.metrics, &report);
     if state.options.zone_metrics {
@@ -83,20 +69,6 @@ fn written<T>(
         json: &json,
     })?;
     Ok((json, answer))
-}
-
-fn timed_out(limit: Deadline, is_its_own: bool) -> Problem {
-    let seconds = limit.limit_seconds();
-    let whose = if is_its_own {
-        "timeout_millis"
-    } else {
-        "server.request_timeout_millis"
-    };
-    let detail = format!(
-        "the frame had no report within {seconds} s: use a faster profile, send fewer frames at \
-         a time, or raise {whose}"
-    );
-    Problem::new(ProblemKind::Timeout, detail)
 }
 
 /// What may explain how long a frame took.

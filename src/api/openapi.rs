@@ -14,8 +14,8 @@ pub(super) use parameters::{DetectForm, DetectQuery};
 pub(super) use problems::{
     CameraEventsProblems, ChangeProblems, DeepStackCustomProblems, DeepStackProblems,
     DeleteProblems, DetectProblems, EventsProblems, FaultProblem, HistoryProblems, IndexProblems,
-    LatestProblems, LoadProblems, NotReadyProblems, ReadProblems, ResultsProblems,
-    UnknownCalibrationProblem, ViewsProblems,
+    InferProblems, LatestProblems, LoadProblems, ModelProblems, ModelReadyProblems,
+    NotReadyProblems, ReadProblems, ResultsProblems, UnknownCalibrationProblem, ViewsProblems,
 };
 
 use super::problem::ProblemBody;
@@ -32,6 +32,7 @@ use super::problem::ProblemBody;
     tags(
         (name = "detection", description = "Frames in, persons out."),
         (name = "deepstack", description = "The same for clients of DeepStack, such as Home Assistant and Blue Iris."),
+        (name = "inference", description = "The same for clients of the Open Inference Protocol (KServe V2)."),
         (name = "results", description = "What was found last, for dashboards. Kept within limits, in memory or in a Redis that servers share."),
         (name = "calibrations", description = "The cameras. Changes are for administrators."),
         (name = "models", description = "Which models answer. Changes are for administrators."),

@@ -4,12 +4,13 @@
 //! The whole body is read first, within bounds: its size, the rate at which it comes, the deadline of
 //! the request, and the memory that all bodies together may hold.
 
+mod arrival;
 mod body;
 mod form;
 mod names;
 mod pace;
 
-use std::time::Instant as Arrival;
+use std::time::Instant;
 
 use axum::{
     extract::{FromRequest, Query, Request},
@@ -18,6 +19,7 @@ use axum::{
 use bytes::Bytes;
 use jiff::Timestamp;
 
+pub(super) use arrival::Arrival;
 pub(super) use body::{BodyReader, UploadBudget, next_chunk};
 pub(super) use pace::Pace;
 
@@ -26,7 +28,7 @@ use names::{is_parameter, unknown_parameter};
 pub(super) use form::FieldUse;
 
 use super::{
-    ApiState, Phase,
+    ApiState,
     deadline::Deadline,
     problem::{Problem, ProblemKind},
 };
@@ -47,7 +49,7 @@ pub(super) struct Upload {
     /// When the request came.
     pub(super) received_at: Timestamp,
     /// When the whole body was in memory.
-    pub(super) arrived: Arrival,
+    pub(super) arrived: Instant,
 }
 
 impl FromRequest<ApiState> for Upload {
@@ -76,18 +78,13 @@ impl Upload {
         state: &ApiState,
         use_of: fn(&str) -> FieldUse,
     ) -> Result<Self, Problem> {
-        let received_at = Timestamp::now();
-        let (parts, body) = request.into_parts();
-        if state.readiness.phase() == Phase::WarmingUp {
-            return Err(Problem::warming_up());
-        }
-        // A frame that has no place needs none in memory either.
-        state.workers.admits()?;
-        let deadline = Deadline::of(&parts, state);
-        let remedy = "send a smaller picture or raise server.max_body_bytes";
-        let reader = state.body_reader(state.options.max_body_bytes, remedy, deadline);
-        let held = reader.read(&parts.headers, body).await?;
-        let arrived = Arrival::now();
+        let Arrival {
+            parts,
+            body: held,
+            deadline,
+            received_at,
+            arrived,
+        } = Arrival::receive(request, state).await?;
         let headers = parts.headers.clone();
         let (image, file_name, parameters) = if is_multipart(&headers) {
             let form = form::parse(parts, held.bytes(), use_of).await?;

@@ -60,6 +60,19 @@ impl NetworkInput {
             ChannelOrder::Bgr => [2, 1, 0],
         }
     }
+
+    /// Turns one view of plain pixels (planes of red, green and blue, 0 to 255) into input; both
+    /// have [`NetworkInput::view_len`] values.
+    pub fn fill(&self, slot: &mut [f32], pixels: &[f32]) {
+        let planes = slot.chunks_exact_mut(self.plane_len());
+        for (plane, (values, channel)) in planes.zip(self.source_channels()).enumerate() {
+            let (scale, offset) = (self.scale[plane], self.offset[plane]);
+            let source = &pixels[channel * self.plane_len()..];
+            for (value, pixel) in values.iter_mut().zip(source) {
+                *value = pixel * scale + offset;
+            }
+        }
+    }
 }
 
 /// Rendered views, ready for the network: `[views, 3, height, width]`, row-major.
@@ -105,5 +118,23 @@ impl ViewBatch {
     #[must_use]
     pub fn values(&self) -> &[f32] {
         &self.values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plain_pixels_are_normalised_plane_by_plane_in_the_networks_order() {
+        let input = NetworkInput {
+            channel_order: ChannelOrder::Bgr,
+            scale: [2.0, 1.0, 0.5],
+            offset: [0.0, 1.0, -1.0],
+            ..NetworkInput::plain(2, 1)
+        };
+        let mut slot = [0.0; 6];
+        input.fill(&mut slot, &[10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
+        assert_eq!(slot, [100.0, 120.0, 31.0, 41.0, 4.0, 9.0]);
     }
 }

@@ -3,9 +3,14 @@
 
 mod camera;
 mod closer;
+mod given_views;
 mod observation;
 
-use std::{num::NonZeroUsize, sync::Arc, time::Instant};
+use std::{
+    num::NonZeroUsize,
+    sync::{Arc, atomic::AtomicUsize},
+    time::Instant,
+};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -59,6 +64,8 @@ pub struct Engine {
     calibrations: Option<Arc<Calibrations>>,
     rigs: RigCache,
     still_views: StillViews,
+    /// Takes turns for views that do not come through the network's queue.
+    next_session: AtomicUsize,
     options: EngineOptions,
 }
 
@@ -85,6 +92,7 @@ impl Engine {
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes),
             still_views: StillViews::default(),
+            next_session: AtomicUsize::new(0),
             options,
         })
     }

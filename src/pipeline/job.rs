@@ -6,7 +6,7 @@ use bytes::Bytes;
 use jiff::Timestamp;
 
 use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
-use crate::{calibration::Calibration, geometry::Pixel, imaging::Frame};
+use crate::{calibration::Calibration, geometry::Pixel, imaging::Frame, inference::Model};
 
 /// One frame to be looked at.
 #[derive(Debug, Clone)]
@@ -25,6 +25,19 @@ pub struct DetectJob {
     pub parameters: DetectParameters,
     /// A calibration at hand, used instead of looking up `parameters.calibration`.
     pub calibration: Option<Arc<Calibration>>,
+}
+
+/// Views that somebody else has made, to be looked at as they are.
+pub struct ViewsJob {
+    /// When the whole request was in memory.
+    pub arrived: Instant,
+    /// Its turn, and whether anybody still waits for it.
+    pub ticket: Ticket,
+    /// Who looks.
+    pub model: Arc<Model>,
+    /// `[views, 3, height, width]` at the size of the model's input: planes of red, green and blue,
+    /// 0 to 255.
+    pub pixels: Vec<f32>,
 }
 
 /// A report together with the frame it is about.

@@ -14,19 +14,25 @@ use std::{
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 use super::{
-    DetectJob, Detected, Engine, PipelineError, Stage, error::internal, frame_queue::FrameQueue,
-    service_rate::ServiceRate,
+    DetectJob, Detected, Engine, PipelineError, Stage, Ticket, ViewsJob, error::internal,
+    frame_queue::FrameQueue, service_rate::ServiceRate,
 };
+use crate::inference::HeadOutput;
 
-/// Hands what came of a frame to whoever waits for it.
-type Delivery = Box<dyn FnOnce() + Send>;
-/// Finishes what came of a frame, which takes its time, and tells how to deliver it, which takes none.
-type Finish = Box<dyn FnOnce(Result<Detected, PipelineError>) -> Delivery + Send>;
+/// Does all the work on a frame, with the way back to whoever waits for it.
+type Work = Box<dyn FnOnce(&Engine) -> Done + Send>;
 
-/// A frame in the queue with the way back to whoever waits for it.
+/// What came of a frame.
+struct Done {
+    withdrawn: bool,
+    /// Hands it to whoever waits for it, which takes no time.
+    deliver: Box<dyn FnOnce() + Send>,
+}
+
+/// A frame in the queue.
 struct Entry {
-    job: DetectJob,
-    finish: Finish,
+    ticket: Ticket,
+    work: Work,
     /// Whose log lines are those of the work.
     request: tracing::Span,
     /// Travels with the work: a place is free again when the work has ended, not when its client
@@ -106,21 +112,50 @@ impl WorkerPool {
         job: DetectJob,
         finish: impl FnOnce(Detected) -> T + Send + 'static,
     ) -> Result<T, PipelineError> {
+        let ticket = job.ticket.clone();
+        ticket.timeline.enter(Stage::Queue, job.arrived);
+        let work = move |engine: &Engine| engine.detect(&job).map(finish);
+        self.queue(ticket, work).await
+    }
+
+    /// Queues views that somebody has made, and waits for what is found in them; otherwise as
+    /// [`WorkerPool::detect_and`].
+    ///
+    /// # Errors
+    /// As [`WorkerPool::detect`].
+    pub async fn look_and<T: Send + 'static>(
+        &self,
+        job: ViewsJob,
+        finish: impl FnOnce(HeadOutput) -> T + Send + 'static,
+    ) -> Result<T, PipelineError> {
+        let ticket = job.ticket.clone();
+        ticket.timeline.enter(Stage::Queue, job.arrived);
+        let work = move |engine: &Engine| engine.look(&job).map(finish);
+        self.queue(ticket, work).await
+    }
+
+    async fn queue<T: Send + 'static>(
+        &self,
+        ticket: Ticket,
+        work: impl FnOnce(&Engine) -> Result<T, PipelineError> + Send + 'static,
+    ) -> Result<T, PipelineError> {
         let places = Arc::clone(&self.shared.places);
         let Ok(place) = places.try_acquire_owned() else {
             return Err(self.overloaded());
         };
-        let _withdrawal = job.ticket.withdrawn.clone().drop_guard();
+        let _withdrawal = ticket.withdrawn.clone().drop_guard();
         let (answer, waiting) = oneshot::channel();
         self.shared.rate().began(Instant::now());
-        let priority = job.ticket.priority;
-        job.ticket.timeline.enter(Stage::Queue, job.arrived);
+        let priority = ticket.priority;
         let entry = Entry {
-            job,
-            finish: Box::new(|outcome| {
-                let finished = outcome.map(finish);
-                // The client may have left meanwhile.
-                Box::new(|| drop(answer.send(finished)))
+            ticket,
+            work: Box::new(|engine| {
+                let outcome = work(engine);
+                Done {
+                    withdrawn: matches!(outcome, Err(PipelineError::Withdrawn)),
+                    // The client may have left meanwhile.
+                    deliver: Box::new(|| drop(answer.send(outcome))),
+                }
             }),
             request: tracing::Span::current(),
             place,
@@ -178,31 +213,28 @@ impl Shared {
     fn work(&self) {
         while let Some(entry) = self.queue.pop() {
             let Entry {
-                job,
-                finish,
+                ticket,
+                work,
                 request,
                 place,
             } = entry;
             let _in_request = request.enter();
-            if job.ticket.withdrawn.is_cancelled() {
+            if ticket.withdrawn.is_cancelled() {
                 self.withdrawn.fetch_add(1, Ordering::Relaxed);
-                drop((job, place));
+                drop((work, place));
                 self.rate().given_up(self.pending());
                 continue;
             }
-            let delivery = catch_unwind(AssertUnwindSafe(|| {
-                let outcome = self.engine.detect(&job);
-                if matches!(outcome, Err(PipelineError::Withdrawn)) {
-                    self.withdrawn.fetch_add(1, Ordering::Relaxed);
-                }
-                finish(outcome)
-            }));
+            let done = catch_unwind(AssertUnwindSafe(|| work(&self.engine)));
             // Whoever sends the next frame on this answer must find the place free.
-            drop((job, place));
+            drop(place);
             self.rate().ended(Instant::now(), self.pending());
             // After a panic nothing is delivered, which tells whoever waits.
-            if let Ok(deliver) = delivery {
-                deliver();
+            if let Ok(done) = done {
+                if done.withdrawn {
+                    self.withdrawn.fetch_add(1, Ordering::Relaxed);
+                }
+                (done.deliver)();
             }
         }
     }

@@ -19,11 +19,17 @@ const ADMINISTRATOR: &str = "lookdown_administrator";
 const BOTH: &str = "lookdown_both";
 
 /// Every route that needs a scope.
-const GUARDED: [(&str, &str, &str); 17] = [
+const GUARDED: [(&str, &str, &str); 23] = [
     ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
     ("POST", "/v1/vision/detection", "detect"),
     ("POST", "/v1/vision/custom/lobby", "detect"),
     ("POST", "/v1/vision/custom/list", "read"),
+    ("GET", "/v2/models/eager", "detect"),
+    ("GET", "/v2/models/eager/ready", "detect"),
+    ("GET", "/v2/models/eager/versions/1", "detect"),
+    ("GET", "/v2/models/eager/versions/1/ready", "detect"),
+    ("POST", "/v2/models/lookdown/infer", "detect"),
+    ("POST", "/v2/models/lookdown/versions/1/infer", "detect"),
     ("GET", "/calibrations", "read"),
     ("GET", "/calibrations/lobby", "read"),
     ("GET", "/calibrations/lobby/views", "read"),

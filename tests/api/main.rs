@@ -32,4 +32,5 @@ mod slow;
 mod tls;
 mod traces;
 mod unread;
+mod v2;
 mod web_pages;

@@ -82,6 +82,8 @@ async fn every_route_of_clients_counts_and_tells_whatever_it_answers() {
         service.get("/calibrations/nobody").await,
         service.get("/calibrations/lobby/views").await,
         service.put("/calibrations/lobby", "nonsense").await,
+        service.get("/v2/models/lookdown/ready").await,
+        service.post("/v2/models/lookdown/infer", "").await,
         service.post("/v2/repository/index", "").await,
         service.post("/v2/repository/models/nobody/load", "").await,
         service

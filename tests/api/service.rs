@@ -36,13 +36,16 @@ const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
   "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707},
   "mount": {"world_up": [0, 0, -1], "height_m": 3} }"#;
 /// What is answered to everybody, always.
-pub(crate) const OPEN_PATHS: [&str; 6] = [
+pub(crate) const OPEN_PATHS: [&str; 9] = [
     "/livez",
     "/readyz",
     "/metrics",
     "/openapi.json",
     "/docs/",
     "/",
+    "/v2",
+    "/v2/health/live",
+    "/v2/health/ready",
 ];
 const BOUNDARY: &str = "edge-of-a-part";
 

@@ -16,9 +16,11 @@ use tokio::time::sleep;
 use crate::service::{Answer, Bounds, Service};
 
 /// Every route that reads a body.
-const WITH_BODY: [(&str, &str); 5] = [
+const WITH_BODY: [(&str, &str); 7] = [
     ("POST", "/detect?profile=fast"),
     ("PUT", "/calibrations/lobby"),
+    ("POST", "/v2/models/lookdown/infer"),
+    ("POST", "/v2/models/eager/versions/1/infer"),
     ("POST", "/v2/repository/index"),
     ("POST", "/v2/repository/models/eager/load"),
     ("POST", "/v2/repository/models/eager/unload"),

@@ -77,11 +77,13 @@ async fn what_a_refused_client_is_sending_is_read_on_every_route() {
     for (service, method, path, status) in [
         (&no_key, "POST", "/detect", 401),
         (&no_key, "PUT", "/calibrations/lobby", 401),
+        (&no_key, "POST", "/v2/models/lookdown/infer", 401),
         (&no_key, "POST", "/v2/repository/index", 401),
         (&no_key, "POST", "/v2/repository/models/eager/load", 401),
         (&open, "POST", "/nowhere", 404),
         (&open, "POST", "/calibrations", 405),
         (&open, "POST", "/detect", 413),
+        (&open, "POST", "/v2/models/lookdown/infer", 413),
         (&open, "PUT", "/calibrations/Not-An-Id", 422),
         (&rare, "PUT", "/calibrations/lobby", 429),
     ] {

@@ -4,10 +4,11 @@ use lookdown::api::Access;
 
 use crate::service::{Answer, Bounds, Service};
 
-const CHANGING: [(&str, &str); 6] = [
+const CHANGING: [(&str, &str); 7] = [
     ("POST", "/detect?calibration=lobby&profile=fast"),
     ("PUT", "/calibrations/lobby"),
     ("DELETE", "/calibrations/nobody"),
+    ("POST", "/v2/models/lookdown/infer"),
     ("POST", "/v2/repository/index"),
     ("POST", "/v2/repository/models/eager/load"),
     ("POST", "/v2/repository/models/eager/unload"),

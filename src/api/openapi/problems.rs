@@ -20,28 +20,71 @@ pub(in crate::api) struct DetectProblems;
 
 impl IntoResponses for DetectProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
-        // Those of other routes, and those of connections, which are of no route.
-        let others = |kind: &ProblemKind| {
-            matches!(
-                kind,
-                ProblemKind::HeadersTooLarge
-                    | ProblemKind::TooManyConnections
-                    | ProblemKind::NotFound
-                    | ProblemKind::MethodNotAllowed
-                    | ProblemKind::UnknownCamera
-                    | ProblemKind::TooManyListeners
-                    | ProblemKind::InvalidCalibration
-                    | ProblemKind::CalibrationConflict
-                    | ProblemKind::CalibrationsUnreachable
-                    | ProblemKind::ResultsUnreachable
-                    | ProblemKind::Outdated
-                    | ProblemKind::ModelConflict
-                    | ProblemKind::ModelRefused
-                    | ProblemKind::ModelBusy
-            )
-        };
-        let kinds = ProblemKind::ALL.into_iter();
-        responses(kinds.filter(|kind| !others(kind)))
+        responses(of_frames().filter(|kind| *kind != ProblemKind::InvalidTensor))
+    }
+}
+
+/// What can go wrong with a frame or views that come as tensors.
+pub(in crate::api) struct InferProblems;
+
+impl IntoResponses for InferProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_forms = [ProblemKind::MissingImage, ProblemKind::NotAcceptable];
+        responses(of_frames().filter(|kind| !of_forms.contains(kind)))
+    }
+}
+
+/// What can go wrong with frames, however they are sent.
+fn of_frames() -> impl Iterator<Item = ProblemKind> {
+    // Those of other routes, and those of connections, which are of no route.
+    let others = |kind: &ProblemKind| {
+        matches!(
+            kind,
+            ProblemKind::HeadersTooLarge
+                | ProblemKind::TooManyConnections
+                | ProblemKind::NotFound
+                | ProblemKind::MethodNotAllowed
+                | ProblemKind::UnknownCamera
+                | ProblemKind::TooManyListeners
+                | ProblemKind::InvalidCalibration
+                | ProblemKind::CalibrationConflict
+                | ProblemKind::CalibrationsUnreachable
+                | ProblemKind::ResultsUnreachable
+                | ProblemKind::Outdated
+                | ProblemKind::ModelConflict
+                | ProblemKind::ModelRefused
+                | ProblemKind::ModelBusy
+        )
+    };
+    ProblemKind::ALL
+        .into_iter()
+        .filter(move |kind| !others(kind))
+}
+
+/// What can go wrong with a model's metadata.
+pub(in crate::api) struct ModelProblems;
+
+const OF_MODELS: [ProblemKind; 5] = [
+    ProblemKind::MalformedRequest,
+    ProblemKind::KeyRequired,
+    ProblemKind::Forbidden,
+    ProblemKind::UnknownModel,
+    ProblemKind::RateLimited,
+];
+
+impl IntoResponses for ModelProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        responses(OF_MODELS)
+    }
+}
+
+/// What can go wrong with a model's readiness.
+pub(in crate::api) struct ModelReadyProblems;
+
+impl IntoResponses for ModelReadyProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let not_ready = [ProblemKind::WarmingUp, ProblemKind::ShuttingDown];
+        responses(OF_MODELS.into_iter().chain(not_ready))
     }
 }
 

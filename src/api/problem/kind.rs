@@ -57,6 +57,8 @@ pub(in crate::api) enum ProblemKind {
     UnsupportedImage,
     /// A parameter's value cannot be used.
     InvalidParameter,
+    /// A tensor is not what the model takes.
+    InvalidTensor,
     /// The frame cannot be decoded to its end.
     DamagedImage,
     /// The frame does not belong to the calibration, or is too small.
@@ -81,7 +83,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 36] = [
+    pub(in crate::api) const ALL: [Self; 37] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -108,6 +110,7 @@ impl ProblemKind {
         Self::ImageTooLarge,
         Self::UnsupportedImage,
         Self::InvalidParameter,
+        Self::InvalidTensor,
         Self::DamagedImage,
         Self::UnfitImage,
         Self::Overloaded,
@@ -164,6 +167,7 @@ impl ProblemKind {
                 "The frame is not in a format that can be read",
             ),
             Self::InvalidParameter => ("invalid-parameter", "A parameter cannot be used"),
+            Self::InvalidTensor => ("invalid-tensor", "A tensor cannot be used"),
             Self::DamagedImage => ("damaged-image", "The frame is damaged or cut off"),
             Self::UnfitImage => ("unfit-image", "The frame does not fit"),
             Self::Overloaded => ("overloaded", "Too many frames are waiting"),
@@ -205,6 +209,7 @@ impl ProblemKind {
             Self::InvalidCalibration
             | Self::ModelRefused
             | Self::InvalidParameter
+            | Self::InvalidTensor
             | Self::DamagedImage
             | Self::UnfitImage => StatusCode::UNPROCESSABLE_ENTITY,
             Self::ModelBusy | Self::Overloaded | Self::TooManyListeners | Self::RateLimited => {

@@ -1,0 +1,58 @@
+//! How long a client waits for what the workers do: as long as any request may take, or less if it
+//! said so.
+
+use std::{future::Future, time::Duration, time::Instant};
+
+use tokio::time::timeout_at;
+
+use super::{
+    deadline::Deadline,
+    problem::{Problem, ProblemKind},
+};
+use crate::{
+    pipeline::{PipelineError, Timeline},
+    telemetry::RequestTrace,
+};
+
+/// How long somebody waits.
+pub(super) struct Limit {
+    deadline: Deadline,
+    /// What to raise if it is too short.
+    set_by: &'static str,
+}
+
+impl Limit {
+    /// The server's limit, or the request's own if that is shorter.
+    pub(super) fn of(server: Deadline, own: Option<Duration>) -> Self {
+        let deadline = own.map_or(server, |own| server.within(own));
+        let set_by = if deadline.at() < server.at() {
+            "timeout_millis"
+        } else {
+            "server.request_timeout_millis"
+        };
+        Self { deadline, set_by }
+    }
+
+    /// Waits for work, and tells the trace in which stages it was.
+    pub(super) async fn wait<T>(
+        &self,
+        trace: &RequestTrace,
+        timeline: &Timeline,
+        work: impl Future<Output = Result<T, PipelineError>>,
+    ) -> Result<T, Problem> {
+        let outcome = timeout_at(self.deadline.at(), work).await;
+        for span in timeline.spans(Instant::now()) {
+            trace.stage(span.stage.name(), span.began, span.ended);
+        }
+        Ok(outcome.map_err(|_| self.timed_out())??)
+    }
+
+    fn timed_out(&self) -> Problem {
+        let (seconds, set_by) = (self.deadline.limit_seconds(), self.set_by);
+        let detail = format!(
+            "the frame had no report within {seconds} s: use a faster profile, send fewer frames at \
+             a time, or raise {set_by}"
+        );
+        Problem::new(ProblemKind::Timeout, detail)
+    }
+}

@@ -1,0 +1,65 @@
+//! A request to find somebody, whose whole body is in memory.
+
+use std::time::Instant;
+
+use axum::{
+    extract::{FromRequest, Request},
+    http::request::Parts,
+};
+use jiff::Timestamp;
+
+use super::body::HeldBytes;
+use crate::{
+    access::Scope,
+    api::{ApiState, Phase, deadline::Deadline, problem::Problem},
+};
+
+/// A request to find persons; all of it is there. Taken out of a request by a handler, it is of
+/// somebody who may.
+pub(in crate::api) struct Arrival {
+    pub(in crate::api) parts: Parts,
+    pub(in crate::api) body: HeldBytes,
+    /// When its answer must be there.
+    pub(in crate::api) deadline: Deadline,
+    /// When it came.
+    pub(in crate::api) received_at: Timestamp,
+    /// When its body was in memory.
+    pub(in crate::api) arrived: Instant,
+}
+
+impl FromRequest<ApiState> for Arrival {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let access = &state.options.access;
+        access.check(request.headers(), Scope::Detect)?;
+        Self::receive(request, state).await
+    }
+}
+
+impl Arrival {
+    /// Reads the request. Who sent it is not asked here.
+    pub(in crate::api) async fn receive(
+        request: Request,
+        state: &ApiState,
+    ) -> Result<Self, Problem> {
+        let received_at = Timestamp::now();
+        let (parts, body) = request.into_parts();
+        if state.readiness.phase() == Phase::WarmingUp {
+            return Err(Problem::warming_up());
+        }
+        // A frame that has no place needs none in memory either.
+        state.workers.admits()?;
+        let deadline = Deadline::of(&parts, state);
+        let remedy = "send a smaller picture or raise server.max_body_bytes";
+        let reader = state.body_reader(state.options.max_body_bytes, remedy, deadline);
+        let body = reader.read(&parts.headers, body).await?;
+        Ok(Self {
+            parts,
+            body,
+            deadline,
+            received_at,
+            arrived: Instant::now(),
+        })
+    }
+}

@@ -1,0 +1,171 @@
+//! A request to infer, read: its inputs, what it wants to be answered, and its parameters.
+
+use axum::http::{HeaderMap, header::CONTENT_ENCODING};
+use bytes::Bytes;
+
+use super::{
+    request_head::{self, InputHead, Parameter, Parameters, Table},
+    shown,
+    tensor::{Sent, Tensor, misfit},
+    wanted::Wanted,
+};
+use crate::{
+    api::problem::{Problem, ProblemKind},
+    open_inference::HEAD_LENGTH,
+};
+
+/// Longest ID of a request, characters.
+pub(super) const MAX_ID_CHARS: usize = 256;
+/// Most characters that are told of what is wrong with JSON: it may quote what was sent.
+const MAX_TOLD_CHARS: usize = 300;
+/// Tells how long the part of a tensor behind the JSON is.
+const BINARY_SIZE: &str = "binary_data_size";
+/// What parameters of tensors begin with that lie in memory of the server's machine.
+const SHARED_MEMORY: &str = "shared_memory";
+
+/// A request to infer.
+pub(super) struct InferRequest {
+    pub(super) id: Option<String>,
+    /// Those that are none of the protocol's own.
+    pub(super) parameters: Vec<(String, Parameter)>,
+    pub(super) inputs: Vec<Tensor>,
+    pub(super) wanted: Wanted,
+}
+
+impl InferRequest {
+    /// Reads a request: JSON, or as much JSON as `Inference-Header-Content-Length` says and bytes of
+    /// tensors behind it.
+    pub(super) fn read(headers: &HeaderMap, body: &Bytes) -> Result<Self, Problem> {
+        if let Some(encoding) = headers.get(CONTENT_ENCODING)
+            && encoding != "identity"
+        {
+            return Err(malformed("the body is compressed: send it as it is"));
+        }
+        let length = head_length(headers, body)?;
+        let mut behind = body.slice(length..);
+        let mut head = request_head::read(&body[..length]).map_err(|error| {
+            let told: String = error.to_string().chars().take(MAX_TOLD_CHARS).collect();
+            malformed(&format!("the JSON of the request cannot be used: {told}"))
+        })?;
+        let inputs = head.inputs.0.into_iter();
+        let inputs = inputs.map(|Table(input)| read_input(input, &mut behind));
+        let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
+        if !behind.is_empty() {
+            let spare = behind.len();
+            return Err(malformed(&format!(
+                "{spare} bytes follow that are no input's: {BINARY_SIZE} says of each input how many are"
+            )));
+        }
+        if let Some(id) = &head.id
+            && id.chars().count() > MAX_ID_CHARS
+        {
+            let detail = format!("id: it has more than {MAX_ID_CHARS} characters");
+            return Err(Problem::new(ProblemKind::InvalidParameter, detail));
+        }
+        let outputs = head.outputs.map_or_else(Vec::new, |outputs| outputs.0);
+        let outputs = outputs.into_iter().map(|Table(output)| output);
+        let wanted = Wanted::read(&mut head.parameters, outputs)?;
+        Ok(Self {
+            id: head.id,
+            parameters: head.parameters.0,
+            inputs,
+            wanted,
+        })
+    }
+
+    /// The one input of a model.
+    pub(super) fn only_input(&mut self, name: &str) -> Result<Tensor, Problem> {
+        let mut inputs = self.inputs.drain(..);
+        match (inputs.next(), inputs.next()) {
+            (Some(only), None) if only.name == name => Ok(only),
+            (None, _) => Err(misfit("inputs", &format!("{name} is missing"))),
+            (Some(other), None) => {
+                let wrong = format!("there is no such input: {name} is the one there is");
+                Err(misfit(&other.name, &wrong))
+            }
+            (Some(_), Some(_)) => Err(misfit(
+                "inputs",
+                &format!("{name} is the one input there is: send it once"),
+            )),
+        }
+    }
+}
+
+fn head_length(headers: &HeaderMap, body: &Bytes) -> Result<usize, Problem> {
+    let Some(told) = headers.get(HEAD_LENGTH) else {
+        return Ok(body.len());
+    };
+    let length = told.to_str().ok().and_then(|told| told.parse().ok());
+    length.filter(|length| *length <= body.len()).ok_or_else(|| {
+        let (told, sent) = (shown(&String::from_utf8_lossy(told.as_bytes())), body.len());
+        malformed(&format!(
+            "{HEAD_LENGTH} is {told:?}, and the body has {sent} bytes: it is the length of the JSON \
+             in it"
+        ))
+    })
+}
+
+/// Reads an input, whose bytes may be the next of those behind the JSON.
+fn read_input(mut input: InputHead<'_>, behind: &mut Bytes) -> Result<Tensor, Problem> {
+    let size = binary_size(&input.name, &mut input.parameters)?;
+    let sent = match (input.data, size) {
+        (Some(data), None) => Sent::Json(data.get()),
+        (None, Some(size)) if size <= behind.len() => Sent::Binary(behind.split_to(size)),
+        (None, Some(size)) => {
+            let left = behind.len();
+            let wrong = format!(
+                "its {BINARY_SIZE} is {size}, and {left} bytes are left behind the JSON, whose length is \
+                 said by {HEAD_LENGTH}"
+            );
+            return Err(misfit(&input.name, &wrong));
+        }
+        (Some(_), Some(_)) => {
+            let wrong = format!("it has data as well as {BINARY_SIZE}: send it once");
+            return Err(misfit(&input.name, &wrong));
+        }
+        (None, None) => {
+            let wrong = format!("it has neither data nor {BINARY_SIZE}");
+            return Err(misfit(&input.name, &wrong));
+        }
+    };
+    Tensor::read(input.name, &input.datatype, &input.shape.0, sent)
+}
+
+fn binary_size(tensor: &str, parameters: &mut Parameters) -> Result<Option<usize>, Problem> {
+    let size = match parameters.take(BINARY_SIZE) {
+        Some(Parameter::Number(number)) => number.parse().map(Some).map_err(|_| number),
+        Some(other) => Err(format!("{other:?}")),
+        None => Ok(None),
+    };
+    let size = size.map_err(|told| {
+        let wrong = format!(
+            "its {BINARY_SIZE} is {}: give a number of bytes",
+            shown(&told)
+        );
+        misfit(tensor, &wrong)
+    })?;
+    refuse_others(tensor, parameters, BINARY_SIZE)?;
+    Ok(size)
+}
+
+/// Refuses what is left of a tensor's parameters.
+pub(super) fn refuse_others(
+    tensor: &str,
+    parameters: &Parameters,
+    known: &str,
+) -> Result<(), Problem> {
+    let Some((name, _)) = parameters.0.first() else {
+        return Ok(());
+    };
+    let wrong = if name.starts_with(SHARED_MEMORY) {
+        "shared memory is not offered: send tensors in the body".to_owned()
+    } else {
+        let name = shown(name);
+        format!("there is no parameter {name:?} of a tensor: there is {known}")
+    };
+    Err(misfit(tensor, &wrong))
+}
+
+fn malformed(detail: &str) -> Problem {
+    Problem::new(ProblemKind::MalformedRequest, detail)
+}

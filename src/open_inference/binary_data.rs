@@ -1,0 +1,123 @@
+//! Tensors as bytes: numbers little-endian and row-major, an element of `BYTES` behind its length, which
+//! has four bytes, little-endian (extension `binary_tensor_data`).
+
+use bytes::{Buf, BufMut, Bytes, BytesMut};
+
+use super::Datatype;
+
+const LENGTH_BYTES: usize = 4;
+
+/// The one element of a tensor of `BYTES`.
+///
+/// # Errors
+/// The end of a sentence: what was sent, and what is needed.
+pub fn only_element(bytes: &Bytes) -> Result<Bytes, String> {
+    let mut rest = bytes.clone();
+    let length = rest.try_get_u32_le().map_err(|_| {
+        let sent = bytes.len();
+        format!("it has {sent} bytes: its length in four bytes, little-endian, comes first")
+    })?;
+    if rest.len() != length as usize {
+        let sent = rest.len();
+        return Err(format!(
+            "its length is {length}, but {sent} bytes follow: one element is taken, behind its length \
+             in four bytes, little-endian"
+        ));
+    }
+    Ok(rest)
+}
+
+/// An element of `BYTES` behind its length; `None` when that cannot be said in four bytes.
+#[must_use]
+pub fn element(content: &[u8]) -> Option<Bytes> {
+    let mut bytes = BytesMut::with_capacity(LENGTH_BYTES + content.len());
+    bytes.put_u32_le(u32::try_from(content.len()).ok()?);
+    bytes.put_slice(content);
+    Some(bytes.freeze())
+}
+
+/// `count` finite numbers of `UINT8` or `FP32`.
+///
+/// # Errors
+/// The end of a sentence: what was sent, and what is needed.
+pub fn numbers(bytes: &[u8], datatype: Datatype, count: usize) -> Result<Vec<f32>, String> {
+    let width = if datatype == Datatype::Uint8 { 1 } else { 4 };
+    if Some(bytes.len()) != count.checked_mul(width) {
+        let sent = bytes.len();
+        return Err(format!(
+            "it has {sent} bytes, and its shape asks for {count} numbers of {width} each"
+        ));
+    }
+    if datatype == Datatype::Uint8 {
+        return Ok(bytes.iter().map(|&byte| f32::from(byte)).collect());
+    }
+    let words = bytes.as_chunks::<4>().0.iter();
+    let numbers: Vec<_> = words.map(|&word| f32::from_le_bytes(word)).collect();
+    if numbers.iter().all(|number| number.is_finite()) {
+        Ok(numbers)
+    } else {
+        Err("it holds a number that is not finite".to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn an_element_comes_back_as_it_was(content in prop::collection::vec(any::<u8>(), 0..300)) {
+            let written = element(&content).unwrap();
+            prop_assert_eq!(only_element(&written).unwrap(), content);
+        }
+
+        #[test]
+        fn any_bytes_are_an_element_or_a_sentence(bytes in prop::collection::vec(any::<u8>(), 0..40)) {
+            let bytes = Bytes::from(bytes);
+            match only_element(&bytes) {
+                Ok(content) => prop_assert_eq!(element(&content).unwrap(), bytes),
+                Err(sentence) => prop_assert!(sentence.contains("length"), "{}", sentence),
+            }
+        }
+
+        #[test]
+        fn any_bytes_are_so_many_finite_numbers_or_a_sentence(
+            bytes in prop::collection::vec(any::<u8>(), 0..40), count in any::<usize>(), few in 0_usize..12,
+        ) {
+            for count in [count, few] {
+                for datatype in [Datatype::Uint8, Datatype::Fp32] {
+                    if let Ok(numbers) = numbers(&bytes, datatype, count) {
+                        prop_assert_eq!(numbers.len(), count);
+                        prop_assert!(numbers.iter().all(|number| number.is_finite()));
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn finite_numbers_come_back_as_they_were(
+            sent in prop::collection::vec(prop::num::f32::NORMAL | prop::num::f32::ZERO, 0..20),
+        ) {
+            let bytes: Vec<_> = sent.iter().flat_map(|number| number.to_le_bytes()).collect();
+            prop_assert_eq!(numbers(&bytes, Datatype::Fp32, sent.len()).unwrap(), sent);
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_refused() {
+        for wrong in [f32::NAN, f32::INFINITY] {
+            assert!(numbers(&wrong.to_le_bytes(), Datatype::Fp32, 1).is_err());
+        }
+    }
+
+    #[test]
+    fn a_cut_element_says_how_much_is_missing() {
+        let told = only_element(&Bytes::from_static(b"\x09\0\0\0abc")).unwrap_err();
+        assert!(
+            told.contains("its length is 9, but 3 bytes follow"),
+            "{told}"
+        );
+    }
+}

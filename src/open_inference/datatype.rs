@@ -1,0 +1,62 @@
+//! What the elements of a tensor are.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// What the elements of a tensor are, of all that the protocol has those that are used here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub enum Datatype {
+    /// Texts, or bytes of any kind.
+    Bytes,
+    /// Numbers of 32 bits, IEEE 754.
+    Fp32,
+    /// Whole numbers of 32 bits.
+    Int32,
+    /// Whole numbers 0 to 255.
+    Uint8,
+}
+
+impl Datatype {
+    const ALL: [Self; 4] = [Self::Bytes, Self::Fp32, Self::Int32, Self::Uint8];
+
+    /// The one of that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|datatype| datatype.name() == name)
+    }
+
+    /// As the protocol writes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bytes => "BYTES",
+            Self::Fp32 => "FP32",
+            Self::Int32 => "INT32",
+            Self::Uint8 => "UINT8",
+        }
+    }
+}
+
+impl fmt::Display for Datatype {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_datatype_is_written_as_it_is_named() {
+        for datatype in Datatype::ALL {
+            let written = serde_json::to_value(datatype).unwrap();
+            assert_eq!(written, datatype.name());
+            assert_eq!(Datatype::named(datatype.name()), Some(datatype));
+        }
+        assert_eq!(Datatype::named("FP16"), None);
+    }
+}

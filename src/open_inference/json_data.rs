@@ -1,0 +1,241 @@
+//! Tensors in JSON: lists, flat or nested as the shape is. They are read one by one into what they
+//! become, as a tree of JSON values takes many times the memory.
+
+use std::{borrow::Cow, fmt};
+
+use base64::{
+    Engine,
+    alphabet::STANDARD,
+    engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
+};
+use bytes::Bytes;
+use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
+
+use super::Datatype;
+
+/// With or without the `=` at the end.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
+/// The one element of a tensor of `BYTES`, which is base64.
+///
+/// # Errors
+/// The end of a sentence: what was sent, and what is needed.
+pub fn only_bytes(json: &str) -> Result<Bytes, String> {
+    let mut texts = Texts(Vec::new());
+    read(json, &mut texts)?;
+    let [text] = &texts.0[..] else {
+        return Err("its data are empty: one text of base64 is taken".to_owned());
+    };
+    let bytes = BASE64.decode(text.as_bytes());
+    let bytes = bytes.map_err(|error| format!("its data are no base64: {error}"))?;
+    Ok(bytes.into())
+}
+
+/// `count` finite numbers of `UINT8` or `FP32`.
+///
+/// # Errors
+/// The end of a sentence: what was sent, and what is needed.
+pub fn numbers(json: &str, datatype: Datatype, count: usize) -> Result<Vec<f32>, String> {
+    let mut numbers = Numbers {
+        datatype,
+        count,
+        values: Vec::new(),
+    };
+    read(json, &mut numbers)?;
+    let values = numbers.values;
+    if values.len() == count {
+        Ok(values)
+    } else {
+        let sent = values.len();
+        Err(format!(
+            "it has {sent} numbers, and its shape asks for {count}"
+        ))
+    }
+}
+
+/// Takes the elements of a list one by one.
+trait Elements<'de> {
+    fn number(&mut self, _number: f64) -> Result<(), String> {
+        Err("a text of base64 is taken, and no number".to_owned())
+    }
+
+    fn text(&mut self, _text: Cow<'de, str>) -> Result<(), String> {
+        Err("numbers are taken, and no text".to_owned())
+    }
+}
+
+struct Texts<'de>(Vec<Cow<'de, str>>);
+
+impl<'de> Elements<'de> for Texts<'de> {
+    fn text(&mut self, text: Cow<'de, str>) -> Result<(), String> {
+        if self.0.is_empty() {
+            self.0.push(text);
+            return Ok(());
+        }
+        Err("it has more than one element, and its shape asks for one".to_owned())
+    }
+}
+
+struct Numbers {
+    datatype: Datatype,
+    count: usize,
+    values: Vec<f32>,
+}
+
+impl Elements<'_> for Numbers {
+    fn number(&mut self, number: f64) -> Result<(), String> {
+        if self.values.len() == self.count {
+            let count = self.count;
+            return Err(format!(
+                "it has more numbers than the {count} that its shape asks for"
+            ));
+        }
+        let is_byte = (0.0..=255.0).contains(&number) && number.fract() == 0.0;
+        if self.datatype == Datatype::Uint8 && !is_byte {
+            return Err(format!(
+                "it holds {number}: UINT8 is a whole number from 0 to 255"
+            ));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "this is what FP32 means")]
+        let value = number as f32;
+        if !value.is_finite() {
+            return Err(format!("it holds {number}, which is beyond FP32"));
+        }
+        self.values.push(value);
+        Ok(())
+    }
+}
+
+fn read<'de>(json: &'de str, elements: &mut impl Elements<'de>) -> Result<(), String> {
+    let mut reader = serde_json::Deserializer::from_str(json);
+    if !json.trim_start().starts_with('[') {
+        return Err("its data are no list".to_owned());
+    }
+    // Where it happened says little: the data are one line of many.
+    let without_place = |error: serde_json::Error| {
+        let told = error.to_string();
+        let told = told
+            .rsplit_once(" at line ")
+            .map_or(&*told, |(told, _)| told);
+        format!("its data cannot be used: {told}")
+    };
+    Reading(elements)
+        .deserialize(&mut reader)
+        .map_err(without_place)
+}
+
+struct Reading<'a, E>(&'a mut E);
+
+impl<'de, E: Elements<'de>> DeserializeSeed<'de> for Reading<'_, E> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de, E: Elements<'de>> Visitor<'de> for Reading<'_, E> {
+    type Value = ();
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a list")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while list.next_element_seed(Reading(&mut *self.0))?.is_some() {}
+        Ok(())
+    }
+
+    fn visit_u64<F: Error>(self, number: u64) -> Result<(), F> {
+        #[expect(clippy::cast_precision_loss, reason = "it becomes FP32")]
+        self.visit_f64(number as f64)
+    }
+
+    fn visit_i64<F: Error>(self, number: i64) -> Result<(), F> {
+        #[expect(clippy::cast_precision_loss, reason = "it becomes FP32")]
+        self.visit_f64(number as f64)
+    }
+
+    fn visit_f64<F: Error>(self, number: f64) -> Result<(), F> {
+        self.0.number(number).map_err(F::custom)
+    }
+
+    fn visit_borrowed_str<F: Error>(self, text: &'de str) -> Result<(), F> {
+        self.0.text(Cow::Borrowed(text)).map_err(F::custom)
+    }
+
+    fn visit_str<F: Error>(self, text: &str) -> Result<(), F> {
+        let text = Cow::Owned(text.to_owned());
+        self.0.text(text).map_err(F::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn lists_are_flat_or_nested() {
+        for json in ["[1,2.5,3,4]", "[[1,2.5],[3,4]]", " [[[1],[2.5]],[[3],[4]]]"] {
+            let read = numbers(json, Datatype::Fp32, 4).unwrap();
+            assert_eq!(read, [1.0, 2.5, 3.0, 4.0], "{json}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fill_its_shape_is_told() {
+        for (json, count, part) in [
+            ("[1,2]", 3, "it has 2 numbers, and its shape asks for 3"),
+            ("[1,2,3]", 2, "more numbers than the 2"),
+            ("[1,256]", 2, "256"),
+            ("[1,0.5]", 2, "whole number"),
+            ("[\"a\"]", 1, "no text"),
+            ("[true]", 1, "boolean"),
+            ("{\"a\":1}", 1, "no list"),
+            ("7", 1, "no list"),
+        ] {
+            let told = numbers(json, Datatype::Uint8, count).unwrap_err();
+            assert!(
+                told.contains(part) && !told.contains("at line"),
+                "{json}: {told}"
+            );
+        }
+        let told = numbers("[1e39]", Datatype::Fp32, 1).unwrap_err();
+        assert!(told.contains("beyond FP32"), "{told}");
+    }
+
+    #[test]
+    fn frames_are_base64_with_or_without_padding() {
+        for json in ["[\"AP8B\"]", "[[\"AP8B\"]]", "[\"\\u0041P8B\"]"] {
+            assert_eq!(only_bytes(json).unwrap(), &b"\0\xff\x01"[..], "{json}");
+        }
+        assert_eq!(only_bytes("[\"AP8=\"]"), only_bytes("[\"AP8\"]"));
+        for (json, part) in [
+            ("[]", "empty"),
+            ("[\"AA==\",\"AA==\"]", "more than one"),
+            ("[\"a b\"]", "no base64"),
+            ("[7]", "no number"),
+            ("\"AA==\"", "no list"),
+        ] {
+            let told = only_bytes(json).unwrap_err();
+            assert!(told.contains(part), "{json}: {told}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_a_list_or_a_sentence(json in "[\\[\\]{},:\"0-9a-e.+\\- ]{0,40}", count in 0_usize..5) {
+            for read in [numbers(&json, Datatype::Fp32, count), numbers(&json, Datatype::Uint8, count)] {
+                if let Ok(read) = read {
+                    prop_assert_eq!(read.len(), count);
+                }
+            }
+            let _ = only_bytes(&json);
+        }
+    }
+}

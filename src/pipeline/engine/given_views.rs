@@ -1,0 +1,41 @@
+//! Views that somebody else has made: nothing but the network.
+
+use std::{sync::atomic::Ordering, time::Instant};
+
+use super::Engine;
+use crate::{
+    imaging::ViewBatch,
+    inference::HeadOutput,
+    pipeline::{PipelineError, Stage, ViewsJob, error::internal},
+};
+
+impl Engine {
+    /// Finds persons in views as they are, in batches as large as those of frames. Blocks: it waits
+    /// for the turn of a session, as the threads of the network do.
+    ///
+    /// # Errors
+    /// [`PipelineError`], by who is at fault.
+    pub fn look(&self, job: &ViewsJob) -> Result<HeadOutput, PipelineError> {
+        let input = job.model.input();
+        let views = job.model.batch_of(self.options.batches.max_views).get();
+        let session = self.next_session.fetch_add(1, Ordering::Relaxed);
+        let mut batch = ViewBatch::default();
+        let mut found = HeadOutput::default();
+        for pixels in job.pixels.chunks(views * input.view_len()) {
+            if job.ticket.withdrawn.is_cancelled() {
+                return Err(PipelineError::Withdrawn);
+            }
+            job.ticket.timeline.enter(Stage::Inference, Instant::now());
+            let slots = batch.prepare(pixels.len() / input.view_len(), input);
+            for (slot, view) in slots.zip(pixels.chunks_exact(input.view_len())) {
+                input.fill(slot, view);
+            }
+            let output = job.model.detect(session, &batch);
+            let output = output.map_err(|error| internal(anyhow::Error::new(error)))?;
+            found.non_finite += output.non_finite;
+            found.per_view.extend(output.per_view);
+        }
+        job.ticket.timeline.leave(Instant::now());
+        Ok(found)
+    }
+}

@@ -1,0 +1,90 @@
+"""Triton's own client finds persons: `tritonclient[http]`, in an environment of its own."""
+
+import json
+import os
+import subprocess
+import unittest
+from pathlib import Path
+
+from harness.places import ROOT, SAMPLES
+from support.lookdown import lookdown
+
+HERE = Path(__file__).resolve().parent
+PYTHON = ROOT / ".setup" / "real" / "v2_client" / "bin" / "python"
+ASKING = HERE / "v2_client" / "ask.py"
+
+
+class TritonClient(unittest.TestCase):
+    """One server, asked by a program that knows nothing but the protocol."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        frame = (SAMPLES / "office.jpg").read_bytes()
+        with lookdown({}) as server:
+            cls.report = json.loads(server.post("/detect?calibration=office&profile=fast", frame))
+            ran = subprocess.run(
+                [str(PYTHON), str(ASKING), server.address, str(SAMPLES / "office.jpg")],
+                capture_output=True,
+                text=True,
+                timeout=300,
+                env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+                check=False,
+            )
+        if ran.returncode:
+            raise AssertionError(f"the client failed: {ran.stderr[-3000:]}")
+        cls.told = json.loads(ran.stdout)
+
+    def test_it_sees_a_server_that_is_alive_and_ready(self) -> None:
+        self.assertEqual(self.told["health"], [True, True, True, True, False])
+        self.assertEqual(self.told["server"]["name"], "lookdown")
+        self.assertIn("binary_tensor_data", self.told["server"]["extensions"])
+        self.assertEqual(self.told["model"]["inputs"], [{"name": "image", "datatype": "BYTES", "shape": [1]}])
+        self.assertIn("READY", {row["state"] for row in self.told["index"]})
+
+    def test_json_and_bytes_both_ways_give_the_persons_of_the_report(self) -> None:
+        persons = self.report["persons"]
+        self.assertGreater(len(persons), 0)
+        self.assertEqual(len(self.told["found"]), 4)
+        for way, found in self.told["found"].items():
+            self.assertEqual(len(found["boxes"]), len(persons), way)
+            for box, score, person in zip(found["boxes"], found["scores"], persons):
+                self.assertAlmostEqual(score, person["score"], places=4)
+                for side, name in zip(box, ("x_min", "y_min", "x_max", "y_max")):
+                    self.assertAlmostEqual(side, person["box"][name], places=2)
+            self.assertEqual([len(row) for row in found["oriented_boxes"]], [5] * len(persons))
+            self.assertEqual(found["views"], [person["views"] for person in persons])
+            self.assertEqual(len(json.loads(found["report"])["persons"]), len(persons))
+            self.assertEqual((found["model"], found["id"]), ("lookdown", "17"))
+
+    def test_the_bare_detector_takes_views(self) -> None:
+        for datatype, found in self.told["views"].items():
+            boxes, scores = found
+            self.assertEqual((boxes[0], boxes[2]), (2, 4), datatype)
+            self.assertEqual(boxes[:2], scores, datatype)
+        self.assertEqual(self.told["views"]["UINT8"], self.told["views"]["FP32"])
+
+    def test_asynchronous_requests_are_answered(self) -> None:
+        self.assertEqual(self.told["asynchronous"], [len(self.report["persons"])] * 3)
+
+    def test_refusals_reach_the_caller_as_one_sentence(self) -> None:
+        refused = self.told["refused"]
+        for name, (status, part) in {
+            "unknown model": ("404", "model: "),
+            "no picture": ("415", "JPEG"),
+            "two frames": ("422", "one frame"),
+            "unknown parameter": ("400", "colour"),
+            "unknown calibration": ("404", "nobody"),
+            "score out of range": ("422", "score_threshold"),
+            "sequence": ("400", "sequence_id"),
+            "shared memory": ("422", "shared memory"),
+            "classes": ("422", "classification"),
+            "compressed": ("400", "compressed"),
+            "unknown output": ("422", "masks"),
+        }.items():
+            self.assertEqual(refused[name][0], status, (name, refused[name]))
+            self.assertIn(part, refused[name][1], name)
+            self.assertNotIn("\n", refused[name][1], name)
+
+
+if __name__ == "__main__":
+    unittest.main()

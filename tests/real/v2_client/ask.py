@@ -1,0 +1,109 @@
+"""Asks a server with Triton's client whatever it can be asked, and prints what it said as JSON: `ask.py ADDRESS FRAME`."""
+
+import base64
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from tritonclient.http import InferenceServerClient, InferInput, InferRequestedOutput
+from tritonclient.utils import InferenceServerException
+
+MODEL = "lookdown"
+DETECTOR = "nanodet_g_416"
+OUTPUTS = ("boxes", "scores", "oriented_boxes", "views", "report")
+FAST = {"calibration": "office", "profile": "fast"}
+
+
+def main(address: str, frame: bytes) -> dict:
+    """What the server said."""
+    client = InferenceServerClient(address, network_timeout=120.0, concurrency=4)
+    return {
+        "health": [
+            client.is_server_live(),
+            client.is_server_ready(),
+            client.is_model_ready(MODEL),
+            client.is_model_ready(MODEL, "1"),
+            client.is_model_ready("nobody"),
+        ],
+        "server": client.get_server_metadata(),
+        "model": client.get_model_metadata(MODEL),
+        "index": client.get_model_repository_index(),
+        "found": {
+            f"{'bytes' if sent else 'JSON'} to {'bytes' if answered else 'JSON'}": found(client, frame, sent, answered)
+            for sent in (True, False)
+            for answered in (True, False)
+        },
+        "views": {datatype: views(client, datatype) for datatype in ("UINT8", "FP32")},
+        "asynchronous": asynchronous(client, frame),
+        "refused": refused(client, frame),
+    }
+
+
+def image(content: bytes, binary: bool = True) -> InferInput:
+    """A frame as an input; as text it is base64."""
+    tensor = InferInput("image", [1], "BYTES")
+    element = content if binary else base64.b64encode(content)
+    return tensor.set_data_from_numpy(np.array([element], dtype=np.object_), binary_data=binary)
+
+
+def found(client: InferenceServerClient, frame: bytes, sent: bool, answered: bool) -> dict:
+    """The outputs for a frame that is sent and answered as bytes or in JSON."""
+    outputs = [InferRequestedOutput(name, binary_data=answered) for name in OUTPUTS]
+    asked = {"priority": 3, "timeout": 60_000_000, "parameters": FAST}
+    result = client.infer(MODEL, [image(frame, sent)], outputs=outputs, request_id="17", **asked)
+    arrays = {name: result.as_numpy(name) for name in OUTPUTS}
+    report = arrays.pop("report")[0]
+    told = {name: array.tolist() for name, array in arrays.items()}
+    told["report"] = report.decode() if isinstance(report, bytes) else report
+    answer = result.get_response()
+    return told | {"model": answer["model_name"], "id": answer["id"]}
+
+
+def views(client: InferenceServerClient, datatype: str) -> list:
+    """The shapes of the outputs for two grey views."""
+    shape = client.get_model_metadata(DETECTOR)["inputs"][0]["shape"]
+    grey = np.full([2, *shape[1:]], 128, dtype=np.uint8 if datatype == "UINT8" else np.float32)
+    tensor = InferInput("views", list(grey.shape), datatype).set_data_from_numpy(grey)
+    result = client.infer(DETECTOR, [tensor])
+    return [list(result.as_numpy(name).shape) for name in ("boxes", "scores")]
+
+
+def asynchronous(client: InferenceServerClient, frame: bytes) -> list[int]:
+    """How many persons each of some requests at once found."""
+    waiting = [client.async_infer(MODEL, [image(frame)], parameters=FAST) for _ in range(3)]
+    return [len(request.get_result().as_numpy("scores")) for request in waiting]
+
+
+def refused(client: InferenceServerClient, frame: bytes) -> dict:
+    """Status and sentence of requests that cannot be answered."""
+    good = [image(frame)]
+    two = InferInput("image", [2], "BYTES").set_data_from_numpy(np.array([frame, frame], dtype=np.object_))
+    shared = InferInput("image", [1], "BYTES").set_shared_memory("region", len(frame))
+    requests = {
+        "unknown model": ("nobody", good, {}),
+        "no picture": (MODEL, [image(b"no picture")], {}),
+        "two frames": (MODEL, [two], {}),
+        "unknown parameter": (MODEL, good, {"parameters": {"colour": "red"}}),
+        "unknown calibration": (MODEL, good, {"parameters": {"calibration": "nobody"}}),
+        "score out of range": (MODEL, good, {"parameters": {"score_threshold": 1.5}}),
+        "sequence": (MODEL, good, {"sequence_id": 7, "sequence_start": True}),
+        "shared memory": (MODEL, [shared], {}),
+        "classes": (MODEL, good, {"outputs": [InferRequestedOutput("scores", class_count=2)]}),
+        "compressed": (MODEL, good, {"request_compression_algorithm": "gzip"}),
+        "unknown output": (MODEL, good, {"outputs": [InferRequestedOutput("masks")]}),
+    }
+    return {name: refusal(client, *request) for name, request in requests.items()}
+
+
+def refusal(client: InferenceServerClient, model: str, inputs: list, options: dict) -> list[str]:
+    """What a request was refused with."""
+    try:
+        client.infer(model, inputs, **options)
+    except InferenceServerException as error:
+        return [error.status(), error.message()]
+    return ["200", "it was answered"]
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(sys.argv[1], Path(sys.argv[2]).read_bytes())))
