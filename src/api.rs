@@ -28,13 +28,12 @@ mod state;
 mod unread;
 mod upload;
 mod v2;
+mod web_page;
 
 use axum::{
     Router,
     extract::DefaultBodyLimit,
     middleware::{from_fn_with_state, map_response},
-    response::Redirect,
-    routing::get,
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
@@ -69,7 +68,10 @@ fn client_routes() -> OpenApiRouter<ApiState> {
             calibrations::put,
             calibrations::delete
         ))
-        .routes(routes!(calibrations::views::get_views))
+        .routes(routes!(
+            calibrations::views::get_views,
+            calibrations::views::try_views
+        ))
         .routes(routes!(results::list))
         .routes(routes!(results::latest::get_latest))
         .routes(routes!(results::history::get_history))
@@ -137,10 +139,8 @@ fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
 
 /// What people look at.
 fn pages() -> Router {
-    Router::new()
-        .route("/", get(async || Redirect::temporary("docs/")))
-        .merge(api_page())
-        .route_layer(map_response(page_headers::of_page))
+    let api_page = api_page().route_layer(map_response(page_headers::of_api_page));
+    web_page::router().merge(api_page)
 }
 
 /// What holds for every route.

@@ -76,6 +76,7 @@ const MAY_USE: [(&str, &[&str]); 26] = [
             "pipeline",
             "metrics",
             "results",
+            "revision",
             "telemetry",
         ],
     ),

@@ -15,7 +15,8 @@ pub(super) use problems::{
     CameraEventsProblems, ChangeProblems, DeepStackCustomProblems, DeepStackProblems,
     DeleteProblems, DetectProblems, EventsProblems, FaultProblem, HistoryProblems, IndexProblems,
     InferProblems, LatestProblems, LoadProblems, ModelProblems, ModelReadyProblems,
-    NotReadyProblems, ReadProblems, ResultsProblems, UnknownCalibrationProblem, ViewsProblems,
+    NotReadyProblems, ReadProblems, ResultsProblems, TrialProblems, UnknownCalibrationProblem,
+    ViewsProblems,
 };
 
 use super::problem::ProblemBody;

@@ -10,9 +10,15 @@ use axum::{
     response::Response,
 };
 
-/// What a page may load: scripts, styles and data of this server alone. The API page sets styles from
-/// its script, has pictures inside its styles and shows pictures that were answered.
-const PAGE_POLICY: HeaderValue = HeaderValue::from_static(
+/// What the web page may load: scripts, styles and data of this server alone, and the pictures that were given
+/// to it or answered.
+const WEB_PAGE_POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src \
+     'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+);
+
+/// What the API page may load: it sets styles from its script, too, and has pictures inside its styles.
+const API_PAGE_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' \
      blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
@@ -28,10 +34,19 @@ const ALWAYS: [(HeaderName, HeaderValue); 4] = [
     (X_FRAME_OPTIONS, HeaderValue::from_static("DENY")),
 ];
 
-/// Lets a page load what belongs to it.
-pub(super) async fn of_page(mut response: Response) -> Response {
+/// Lets the web page load what belongs to it.
+pub(super) async fn of_web_page(response: Response) -> Response {
+    with_policy(response, WEB_PAGE_POLICY)
+}
+
+/// Lets the API page load what belongs to it.
+pub(super) async fn of_api_page(response: Response) -> Response {
+    with_policy(response, API_PAGE_POLICY)
+}
+
+fn with_policy(mut response: Response, policy: HeaderValue) -> Response {
     let headers = response.headers_mut();
-    headers.insert(CONTENT_SECURITY_POLICY, PAGE_POLICY);
+    headers.insert(CONTENT_SECURITY_POLICY, policy);
     response
 }
 

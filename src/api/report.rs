@@ -3,6 +3,8 @@
 mod conversion;
 mod rounding;
 
+pub(super) use rounding::pixels;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 

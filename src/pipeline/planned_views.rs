@@ -52,6 +52,24 @@ pub struct PlannedView {
     pub outline: Vec<Pixel>,
 }
 
+impl PlannedView {
+    /// Where the nodes of a grid of `cells` × `cells` over the whole view lie in the frame, row by row from the top
+    /// left corner of the view, corner-origin frame pixels; `None` beyond the lens image.
+    #[must_use]
+    pub fn grid(&self, lens: &Lens, cells: u32) -> Vec<Option<Pixel>> {
+        let place =
+            |index: u32, side: u32| f64::from(index) / f64::from(cells) * f64::from(side) - 0.5;
+        let (width, height) = (self.view.width(), self.view.height());
+        let nodes = (0..=cells).flat_map(|row| (0..=cells).map(move |column| (column, row)));
+        let nodes = nodes.map(|(column, row)| {
+            let pixel = Pixel::new(place(column, width), place(row, height));
+            let seen = lens.project(&self.view.ray_in_camera(&pixel))?;
+            Some(cross_half_pixel(seen, PixelConvention::CornerOrigin))
+        });
+        nodes.collect()
+    }
+}
+
 impl Engine {
     /// The views through which frames of `calibration` are looked at, at the frame size that it
     /// was made for. Blocks for some ten milliseconds.

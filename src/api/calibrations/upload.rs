@@ -1,6 +1,9 @@
 //! An uploaded calibration file.
 
-use axum::extract::{FromRequest, Request};
+use axum::{
+    extract::{FromRequest, Request},
+    http::Uri,
+};
 use bytes::Bytes;
 
 use crate::{
@@ -21,23 +24,59 @@ pub(in crate::api) struct CalibrationUpload {
     pub(super) reading: Reading,
 }
 
+/// A calibration file to look through, and how.
+pub(in crate::api) struct CalibrationTrial {
+    /// The file.
+    pub(super) upload: CalibrationUpload,
+    /// The profile asked for.
+    pub(super) profile: Option<String>,
+    /// The grid asked for.
+    pub(super) grid: Option<String>,
+}
+
 impl FromRequest<ApiState> for CalibrationUpload {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
-        let (parts, body) = request.into_parts();
-        let deadline = Deadline::of(&parts, state);
-        let remedy = "a calibration file is far smaller";
-        let reader = state.body_reader(CalibrationFile::MAX_BYTES, remedy, deadline);
-        let content = reader.read(&parts.headers, body).await?;
-        let [camera, size] = parameters_named(&parts.uri, ["camera", "size"])?;
+        let (content, uri) = content(request, state).await?;
+        let [camera, size] = parameters_named(&uri, ["camera", "size"])?;
+        Self::new(content, camera, size)
+    }
+}
+
+impl FromRequest<ApiState> for CalibrationTrial {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let (content, uri) = content(request, state).await?;
+        let names = ["profile", "grid", "camera", "size"];
+        let [profile, grid, camera, size] = parameters_named(&uri, names)?;
+        Ok(Self {
+            upload: CalibrationUpload::new(content, camera, size)?,
+            profile,
+            grid,
+        })
+    }
+}
+
+impl CalibrationUpload {
+    fn new(content: Bytes, camera: Option<String>, size: Option<String>) -> Result<Self, Problem> {
         let size = size.map(|text| text.parse()).transpose();
         let size = size.map_err(|error: NotAFrameSize| {
             Problem::new(ProblemKind::InvalidParameter, format!("size: {error}"))
         })?;
         Ok(Self {
-            content: content.into_bytes(),
+            content,
             reading: Reading { camera, size },
         })
     }
+}
+
+async fn content(request: Request, state: &ApiState) -> Result<(Bytes, Uri), Problem> {
+    let (parts, body) = request.into_parts();
+    let deadline = Deadline::of(&parts, state);
+    let remedy = "a calibration file is far smaller";
+    let reader = state.body_reader(CalibrationFile::MAX_BYTES, remedy, deadline);
+    let content = reader.read(&parts.headers, body).await?;
+    Ok((content.into_bytes(), parts.uri))
 }

@@ -4,18 +4,27 @@ use axum::{Json, extract::State, http::Uri};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::{address::CalibrationAddress, unknown};
+use super::{
+    address::{CalibrationAddress, NewCalibrationAddress},
+    unknown,
+    upload::{CalibrationTrial, CalibrationUpload},
+};
 use crate::{
     api::{
         ApiState,
         access::Reader,
         deadline::Deadline,
-        openapi::ViewsProblems,
+        openapi::{TrialProblems, ViewsProblems},
         problem::{Problem, ProblemKind},
+        report::pixels,
         upload::parameters_named,
     },
+    calibration::{Calibration, Calibrations},
     pipeline::{PlannedView, PlannedViews, Profile},
 };
+
+/// Most cells along each side of a grid.
+const MAX_GRID_CELLS: u32 = 32;
 
 /// How a frame of a calibration is looked at.
 #[derive(Serialize, ToSchema)]
@@ -77,6 +86,12 @@ pub(in crate::api) struct ViewInfo {
     /// Its border in the frame, clockwise from its top left corner, corner-origin pixels; what lies
     /// beyond the lens image is pulled to its rim.
     outline: Vec<[f64; 2]>,
+    /// Where the nodes of a grid over the view lie in the frame, row by row from its top left corner,
+    /// corner-origin pixels; null beyond the lens image. With it, a frame is straightened without knowing
+    /// the lens. Absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    grid: Option<Vec<Option<[f64; 2]>>>,
 }
 
 /// How is a frame of this calibration looked at?
@@ -88,6 +103,8 @@ pub(in crate::api) struct ViewInfo {
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
         ("profile" = Option<String>, Query, description = "`balanced` by default."),
+        ("grid" = Option<u32>, Query, minimum = 1, maximum = 32,
+            description = "Tell a grid of so many cells along each side of a view, too."),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses((status = OK, description = "The view plan.", body = ViewPlanInfo), ViewsProblems)
@@ -99,25 +116,105 @@ pub(in crate::api) async fn get_views(
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
 ) -> Result<Json<ViewPlanInfo>, Problem> {
-    let [profile] = parameters_named(&uri, ["profile"])?;
-    let profile = match profile {
-        None => Profile::default(),
-        Some(name) => Profile::from_name(&name).ok_or_else(|| unknown_profile(&name))?,
-    };
+    let [profile, grid] = parameters_named(&uri, ["profile", "grid"])?;
+    let look = Look::parse(profile, grid)?;
     let calibrations = &state.calibrations;
     let entry = calibrations
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
+    let plan = deadline.blocking(move || look.plan(&state, &entry.calibration));
+    Ok(Json(plan.await?))
+}
+
+/// How would a frame be looked at with this calibration?
+///
+/// Takes what `PUT /calibrations/{id}` takes, by the same rules, and tells the view plan. Nothing is stored.
+#[utoipa::path(
+    post, path = "/calibrations/{id}/views", tag = "calibrations", operation_id = "try_views",
+    params(
+        ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
+        ("profile" = Option<String>, Query, description = "`balanced` by default."),
+        ("grid" = Option<u32>, Query, minimum = 1, maximum = 32,
+            description = "Tell a grid of so many cells along each side of a view, too."),
+        ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
+        ("size" = Option<String>, Query, description = "The size of the camera's frames in pixels, such as \
+            `1280x960`, for formats that do not tell it.", pattern = "^[0-9]+x[0-9]+$"),
+    ),
+    request_body(
+        description = "A calibration file, recognised from its content; at most 1 MiB.",
+        content(("application/json"), ("application/yaml"), ("application/octet-stream")),
+    ),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses((status = OK, description = "The view plan.", body = ViewPlanInfo), TrialProblems)
+)]
+pub(in crate::api) async fn try_views(
+    State(state): State<ApiState>,
+    _reader: Reader,
+    deadline: Deadline,
+    NewCalibrationAddress(id): NewCalibrationAddress,
+    trial: CalibrationTrial,
+) -> Result<Json<ViewPlanInfo>, Problem> {
+    let look = Look::parse(trial.profile, trial.grid)?;
+    let CalibrationUpload { content, reading } = trial.upload;
     let plan = deadline.blocking(move || {
-        let calibration = &entry.calibration;
-        let planned = state.workers.engine().planned_views(calibration, profile)?;
-        Ok::<_, Problem>(ViewPlanInfo {
-            calibration: calibration.id().to_string(),
-            revision: calibration.revision().to_owned(),
-            ..ViewPlanInfo::from(planned)
-        })
+        let entry = Calibrations::check(&id, &content, &reading)?;
+        look.plan(&state, &entry.calibration)
     });
     Ok(Json(plan.await?))
+}
+
+/// How to look at a frame, and what to tell of it.
+#[derive(Clone, Copy)]
+struct Look {
+    profile: Profile,
+    grid_cells: Option<u32>,
+}
+
+impl Look {
+    fn parse(profile: Option<String>, grid: Option<String>) -> Result<Self, Problem> {
+        let profile = match profile {
+            None => Profile::default(),
+            Some(name) => Profile::from_name(&name).ok_or_else(|| unknown_profile(&name))?,
+        };
+        let cells = |text: String| {
+            let cells = text
+                .parse()
+                .ok()
+                .filter(|cells| (1..=MAX_GRID_CELLS).contains(cells));
+            cells.ok_or_else(|| {
+                let text: String = text.chars().take(64).collect();
+                let detail =
+                    format!("grid: {text:?} is not a whole number from 1 to {MAX_GRID_CELLS}");
+                Problem::new(ProblemKind::InvalidParameter, detail)
+            })
+        };
+        let grid_cells = grid.map(cells).transpose()?;
+        Ok(Self {
+            profile,
+            grid_cells,
+        })
+    }
+
+    fn plan(self, state: &ApiState, calibration: &Calibration) -> Result<ViewPlanInfo, Problem> {
+        let engine = state.workers.engine();
+        let planned = engine.planned_views(calibration, self.profile)?;
+        let lens = calibration.lens();
+        let views = planned.views.iter().map(|view| ViewInfo {
+            grid: self.grid_cells.map(|cells| {
+                let nodes = view.grid(lens, cells).into_iter();
+                nodes
+                    .map(|node| node.map(|at| [pixels(at.x), pixels(at.y)]))
+                    .collect()
+            }),
+            ..ViewInfo::from(view)
+        });
+        Ok(ViewPlanInfo {
+            calibration: calibration.id().to_string(),
+            revision: calibration.revision().to_owned(),
+            views: views.collect(),
+            ..ViewPlanInfo::from(&planned)
+        })
+    }
 }
 
 fn unknown_profile(name: &str) -> Problem {
@@ -127,13 +224,13 @@ fn unknown_profile(name: &str) -> Problem {
     Problem::new(ProblemKind::InvalidParameter, detail)
 }
 
-impl From<PlannedViews> for ViewPlanInfo {
-    fn from(plan: PlannedViews) -> Self {
+impl From<&PlannedViews> for ViewPlanInfo {
+    fn from(plan: &PlannedViews) -> Self {
         Self {
             calibration: String::new(),
             revision: String::new(),
             profile: plan.profile.name(),
-            model: plan.model,
+            model: plan.model.clone(),
             image: [plan.image_width, plan.image_height],
             coverage: plan.seen_share,
             overlap: plan.mean_views,
@@ -143,7 +240,7 @@ impl From<PlannedViews> for ViewPlanInfo {
                 batches: plan.batches,
                 pixels: plan.pixels,
             },
-            views: plan.views.iter().map(ViewInfo::from).collect(),
+            views: Vec::new(),
         }
     }
 }
@@ -164,6 +261,7 @@ impl From<&PlannedView> for ViewInfo {
             focal: view.focal(),
             principal_point: [principal.x, principal.y],
             outline: planned.outline.iter().map(|at| [at.x, at.y]).collect(),
+            grid: None,
         }
     }
 }

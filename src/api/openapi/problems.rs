@@ -141,7 +141,7 @@ impl IntoResponses for NotReadyProblems {
 /// What can go wrong with listing the models.
 pub(in crate::api) struct IndexProblems;
 
-/// What can go wrong with every request of an administrator.
+/// What can go wrong with every request that brings a small body.
 const OF_ADMINISTRATION: [ProblemKind; 9] = [
     ProblemKind::MalformedRequest,
     ProblemKind::KeyRequired,
@@ -338,6 +338,22 @@ impl IntoResponses for ViewsProblems {
             ProblemKind::Timeout,
         ];
         responses(OF_READING.into_iter().chain(of_views))
+    }
+}
+
+/// What can go wrong with trying a calibration.
+pub(in crate::api) struct TrialProblems;
+
+impl IntoResponses for TrialProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_trials = [
+            ProblemKind::UnknownParameter,
+            ProblemKind::RepeatedParameter,
+            ProblemKind::InvalidCalibration,
+            ProblemKind::InvalidParameter,
+            ProblemKind::WarmingUp,
+        ];
+        responses(OF_ADMINISTRATION.into_iter().chain(of_trials))
     }
 }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// Two decimals: far below what a detector can tell.
-pub(super) fn pixels(value: f64) -> f64 {
+pub(in crate::api) fn pixels(value: f64) -> f64 {
     rounded(value, 100.0)
 }
 

@@ -31,6 +31,18 @@ pub struct Put {
 }
 
 impl Calibrations {
+    /// What `content` would be as the calibration `id`, by the rules of [`Calibrations::put`]; nothing is stored.
+    ///
+    /// # Errors
+    /// [`ChangeError`] for content that cannot be a calibration.
+    pub fn check(
+        id: &CalibrationId,
+        content: &[u8],
+        reading: &Reading,
+    ) -> Result<CalibrationEntry, ChangeError> {
+        import(id, &written_name(id), content, reading).map(|(entry, _)| entry)
+    }
+
     /// Checks `content`, a calibration file in any format with one camera or with that called
     /// `camera`, and stores it as the calibration `id`, in the native format. It serves when this
     /// returns. Blocks.

@@ -1,0 +1,7 @@
+/** Every test that needs a server, one after the other in one browser. */
+
+import "./agreement.js";
+import "./detect.js";
+import "./sections.js";
+import "./calibrate.js";
+import "./looks.js";

@@ -1,0 +1,108 @@
+/** The section Calibrate. */
+
+import assert from "node:assert/strict";
+import { SERVER, detectSample, pageTest } from "./browser.js";
+
+const FIXTURES = process.env.LOOKDOWN_FIXTURES;
+const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
+const stored = async (id) => (await fetch(`${SERVER}/calibrations/${id}`)).json();
+
+async function start(page, lens = "") {
+  await detectSample(page, "office", lens);
+  await go(page, "Calibrate");
+  await page.locator("#previews canvas").nth(3).waitFor();
+}
+
+/** Waits until `act` has had views straightened anew. */
+async function straightenedAfter(page, act) {
+  const answered = page.waitForResponse((answer) => answer.url().includes("/views?profile=fast"));
+  await act();
+  const answer = await answered;
+  await page.locator("#previews-progress:not([aria-busy])").waitFor();
+  return answer;
+}
+
+const pixels = (page) => page.locator("#previews canvas").first().evaluate((canvas) => canvas.toDataURL());
+
+pageTest("the circle that was found is laid over the frame, and the views follow it", "", async (page) => {
+  await start(page);
+  for (const name of ["Centre, from the left", "Centre, from the top", "Radius"]) {
+    assert.ok(Math.abs(Number(await page.getByLabel(name).inputValue()) - 480) < 1.5, name);
+  }
+  const before = await pixels(page);
+  await straightenedAfter(page, () => page.getByLabel("Field of view").fill("150"));
+  assert.notEqual(await pixels(page), before);
+  const handle = await page.locator("[data-handle=rim]").boundingBox();
+  const [x, y] = [handle.x + handle.width / 2, handle.y + handle.height / 2];
+  await straightenedAfter(page, async () => {
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x - 60, y - 60, { steps: 4 });
+    await page.mouse.up();
+  });
+  assert.ok(Number(await page.getByLabel("Radius").inputValue()) < 420);
+  await straightenedAfter(page, async () => {
+    await page.getByLabel("Centre, from the left").focus();
+    await page.keyboard.press("ArrowRight");
+  });
+  assert.ok(Math.abs(Number(await page.locator("output[for=calibrate-cx]").textContent()) - 480.1) < 1.5);
+});
+
+pageTest("a lens is saved with its height, serves at once and shows the floor", "", async (page) => {
+  await start(page);
+  await page.getByLabel("Height, metres").fill("2.9");
+  await page.getByLabel("Name", { exact: true }).fill("lobby");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByText("lobby is saved and serves.").waitFor();
+  const { lens, mount } = await stored("lobby");
+  assert.equal(mount.height_m, 2.9);
+  assert.equal(lens.model, "equidistant");
+  assert.ok(Math.abs(lens.focal - 305.58) < 0.5 && Math.abs(lens.cx - 479.5) < 0.5, JSON.stringify(lens));
+  await go(page, "Detect");
+  await page.getByText("m away").first().waitFor();
+  assert.equal(await page.getByLabel("Lens", { exact: true }).inputValue(), "lobby");
+  await go(page, "Floor");
+  await page.locator(".dot-mark").first().waitFor();
+  // A second time it replaces what is there.
+  await go(page, "Calibrate");
+  await page.getByLabel("Height, metres").fill("3.1");
+  await page.getByRole("button", { name: "Replace lobby" }).click();
+  await page.getByText("lobby is saved and serves.").waitFor();
+  assert.equal((await stored("lobby")).mount.height_m, 3.1);
+});
+
+pageTest("a file of another program is looked through and saved as it is", "", async (page) => {
+  await start(page);
+  const before = await pixels(page);
+  await straightenedAfter(page, () => page.locator("#import-file").setInputFiles(`${FIXTURES}/camodocal_mei.yaml`));
+  await page.getByText("From camodocal_mei.yaml").waitFor();
+  assert.notEqual(await pixels(page), before);
+  await page.getByLabel("Name", { exact: true }).fill("imported");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByText("imported is saved and serves.").waitFor();
+  assert.equal((await stored("imported")).lens.model, "mei");
+  await straightenedAfter(page, () => page.getByRole("button", { name: "Back to the circle" }).click());
+  assert.equal(await pixels(page), before);
+});
+
+pageTest("one that serves is opened and gone on from", "", async (page) => {
+  await start(page, "office");
+  const answer = await straightenedAfter(page, () => page.getByLabel("Go on from").selectOption("canteen"));
+  assert.equal(answer.status(), 200);
+  assert.equal(await page.getByLabel("Height, metres").inputValue(), "2.9");
+  assert.equal(await page.getByLabel("Name", { exact: true }).inputValue(), "canteen");
+  await page.getByRole("button", { name: "Replace canteen" }).waitFor();
+});
+
+pageTest(
+  "a file that makes no calibration is refused in the server's words",
+  "",
+  async (page) => {
+    await start(page);
+    const file = { name: "notes.txt", mimeType: "text/plain", buffer: Buffer.from("hello") };
+    const answer = await straightenedAfter(page, () => page.locator("#import-file").setInputFiles(file));
+    const { detail } = await answer.json();
+    await page.getByRole("alert").getByText(detail).waitFor();
+  },
+  { expected: /status of 4\d\d/ },
+);

@@ -1,0 +1,146 @@
+/** The section Detect. */
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { SAMPLES, assertAccessible, detectSample, pageTest, reportAfter } from "./browser.js";
+
+const count = (page) => page.locator("#persons li").count();
+const slide = (page, name, value) => page.getByLabel(name).fill(String(value));
+
+/** Hands a file to the page as the event `kind` does. */
+const hand = (page, kind, name, type, bytes) =>
+  page.evaluate(
+    ([kind, name, type, bytes]) => {
+      const transfer = new DataTransfer();
+      transfer.items.add(new File([new Uint8Array(bytes)], name, { type }));
+      const options = { bubbles: true, cancelable: true };
+      const event = kind === "drop" ? new DragEvent(kind, { ...options, dataTransfer: transfer }) : new ClipboardEvent(kind, { ...options, clipboardData: transfer });
+      document.querySelector("#stage").dispatchEvent(event);
+    },
+    [kind, name, type, [...bytes]],
+  );
+
+pageTest("a sample is picked with the keyboard, and its persons are found", "", async (page) => {
+  await page.locator("#calibration option[value=office]").waitFor({ state: "attached" });
+  await page.getByRole("button", { name: "office", exact: true }).focus();
+  const report = await reportAfter(page, () => page.keyboard.press("Enter"));
+  assert.equal(report.persons.length, 6);
+  assert.equal(report.calibration.assumed, true);
+  assert.equal(report.camera, "web-page");
+  await page.locator("#marks [data-person='5']").waitFor();
+  assert.equal(await page.locator("#marks [data-person]").count(), 6);
+  assert.equal(await page.locator("#count").textContent(), "6");
+  assert.match(await page.locator("#announcement").textContent(), /^6 persons found in \d+ milliseconds\.$/);
+  assert.equal(await page.locator("#timings dt").count(), 6);
+  assert.match(await page.locator("#warnings").textContent(), /no calibration was named/);
+  assert.match(await page.locator("#picture").getAttribute("alt"), /office\.jpg/);
+});
+
+pageTest("the marks lie where the report says", "", async (page) => {
+  const report = await reportAfter(page, () => detectSample(page, "office"));
+  const [first] = report.persons;
+  const picture = await page.locator("#picture").boundingBox();
+  const badge = await page.locator("#marks [data-person='0'] circle").boundingBox();
+  const scale = Math.min(picture.width, picture.height) / 960;
+  const at = (box, side, start) => box[start] + box[side] / 2;
+  const fromCentre = (value) => (value - 480) * scale;
+  assert.ok(Math.abs(at(badge, "width", "x") - at(picture, "width", "x") - fromCentre(first.oriented_box.cx)) < 1);
+  assert.ok(Math.abs(at(badge, "height", "y") - at(picture, "height", "y") - fromCentre(first.oriented_box.cy)) < 1);
+});
+
+pageTest("a frame is dropped, pasted or opened", "", async (page) => {
+  const bytes = await readFile(`${SAMPLES}/lounge.jpg`);
+  for (const kind of ["drop", "paste"]) {
+    const report = await reportAfter(page, () => hand(page, kind, "lounge.jpg", "image/jpeg", bytes));
+    assert.ok(report.persons.length > 0);
+  }
+  const report = await reportAfter(page, () => page.locator("#frame-file").setInputFiles(`${SAMPLES}/canteen.jpg`));
+  assert.equal(report.image.width, 960);
+  await page.getByAltText("The frame canteen.jpg").waitFor();
+});
+
+pageTest("what is no picture is refused with a sentence, and the next frame is welcome", "", async (page) => {
+  await hand(page, "drop", "notes.txt", "text/plain", Buffer.from("hello"));
+  await page.getByRole("alert").getByText("What was dropped is no picture.").waitFor();
+  await hand(page, "drop", "broken.jpg", "image/jpeg", Buffer.from("hello"));
+  await page.getByRole("alert").getByText("broken.jpg is no picture that this browser can read").waitFor();
+  await detectSample(page, "office");
+  assert.equal(await page.getByRole("alert").count(), 0);
+});
+
+pageTest("every parameter looks again at once", "", async (page) => {
+  const first = await reportAfter(page, () => detectSample(page, "office", "office"));
+  const all = first.persons.length;
+  const strict = await reportAfter(page, () => slide(page, "Score threshold", 0.6));
+  assert.equal(strict.refinement.score_threshold, 0.6);
+  await page.locator("#persons li").nth(all - 1).waitFor({ state: "detached" });
+  assert.equal(await count(page), strict.persons.length);
+  assert.ok(strict.persons.length < all);
+  const overlapping = await reportAfter(page, () => slide(page, "Overlap of one person", 0.2));
+  assert.equal(overlapping.refinement.iou_threshold, 0.2);
+  assert.ok(await page.getByLabel("Softness").isDisabled());
+  const soft = await reportAfter(page, () => page.getByLabel("Refinement").selectOption("soft_nms_gaussian"));
+  assert.equal(soft.refinement.name, "soft_nms_gaussian");
+  const softer = await reportAfter(page, () => slide(page, "Softness", 0.8));
+  assert.equal(softer.refinement.sigma, 0.8);
+  const fast = await reportAfter(page, () => page.getByText("fast", { exact: true }).click());
+  assert.deepEqual([fast.profile, fast.views.inferred], ["fast", 4]);
+  const reset = await reportAfter(page, () => page.getByRole("button", { name: "Reset" }).click());
+  assert.deepEqual([reset.profile, reset.refinement.name, reset.refinement.score_threshold], ["balanced", "fusion", 0.3]);
+});
+
+pageTest("the person in the list is the one in the picture", "", async (page) => {
+  await detectSample(page, "office");
+  const rows = page.locator("#persons button");
+  await rows.nth(2).focus();
+  await page.locator("#marks [data-person='2'].chosen").waitFor();
+  assert.equal(await page.locator("#marks .chosen").count(), 1);
+  await rows.nth(2).blur();
+  await page.locator("#marks [data-person='4'] circle").hover();
+  await page.locator("#persons button[data-person='4'].chosen").waitFor();
+});
+
+pageTest("whatever takes long is shown, and gone when it is done", "", async (page) => {
+  let release;
+  const released = new Promise((resolve) => (release = resolve));
+  await page.route("**/detect?*", async (route) => {
+    await released;
+    await route.continue();
+  });
+  await page.getByRole("button", { name: "office", exact: true }).click();
+  await page.getByRole("progressbar", { name: "Looking for people" }).waitFor();
+  release();
+  await page.locator("#persons li").first().waitFor();
+  assert.equal(await page.getByRole("progressbar").count(), 0);
+});
+
+pageTest(
+  "what the server refuses is told in its own words",
+  "",
+  async (page) => {
+    const detail = "all 8 places are taken: come again in 2 s";
+    const problem = { status: 429, contentType: "application/problem+json", body: JSON.stringify({ detail }) };
+    await page.route("**/detect?*", (route) => route.fulfill(problem));
+    await page.getByRole("button", { name: "office", exact: true }).click();
+    await page.getByRole("alert").getByText(detail).waitFor();
+  },
+  { expected: /status of 429/ },
+);
+
+pageTest("the report is saved as a file", "", async (page) => {
+  await detectSample(page, "office");
+  const downloading = page.waitForEvent("download");
+  await page.getByRole("button", { name: "Save the report" }).click();
+  const report = JSON.parse(await readFile(await (await downloading).path(), "utf8"));
+  assert.equal(report.persons.length, 6);
+});
+
+pageTest("the picture that was shown before leaves nothing behind", "", async (page) => {
+  await detectSample(page, "office");
+  await page.route("**/detect?*", () => {});
+  await page.getByRole("button", { name: "lounge", exact: true }).click();
+  await page.getByAltText("The frame lounge.jpg").waitFor();
+  assert.equal(await page.locator("#marks [data-person]").count(), 0);
+  assert.equal(await count(page), 0);
+  await assertAccessible(page);
+});

@@ -1,0 +1,89 @@
+/** What the page computes by itself. */
+
+import assert from "node:assert/strict";
+import test from "node:test";
+import { corners, holds, roundStep } from "../../../web/geometry.js";
+import { assumedCircle, calibrationOf, circleOf } from "../../../web/lens.js";
+import { steps } from "../../../web/plot.js";
+import { parseEvent } from "../../../web/server.js";
+import { continued, straighten } from "../../../web/straighten.js";
+
+const near = (one, other, tolerance = 1e-9) => assert.ok(Math.abs(one - other) <= tolerance, `${one} is not ${other}`);
+
+test("an oriented box turns clockwise on the screen", () => {
+  const upright = corners({ cx: 10, cy: 20, width: 4, height: 8, angle_deg: 0 });
+  assert.deepEqual(upright, [[8, 16], [12, 16], [12, 24], [8, 24]]);
+  // A quarter turn brings the top to the right.
+  const [topLeft] = corners({ cx: 10, cy: 20, width: 4, height: 8, angle_deg: 90 });
+  near(topLeft[0], 14);
+  near(topLeft[1], 18);
+});
+
+test("an outline holds what is inside, also when it is bent", () => {
+  const bent = [[0, 0], [10, 0], [10, 10], [5, 3], [0, 10]];
+  assert.ok(holds(bent, [5, 2]));
+  assert.ok(!holds(bent, [5, 6]));
+  assert.ok(!holds(bent, [11, 5]));
+});
+
+test("steps of axes are round", () => {
+  assert.deepEqual([[6, 3], [4.9, 6], [0.5, 5], [70, 6]].map(([length, most]) => roundStep(length, most)), [2, 1, 0.1, 20]);
+});
+
+test("a circle makes a lens that makes the circle again", () => {
+  for (const model of ["equidistant", "equisolid", "stereographic", "orthographic"]) {
+    const circle = { width: 960, height: 720, model, cx: 481.5, cy: 360.25, radius: 350, fieldOfView: 170, cameraHeight: 2.8 };
+    const file = calibrationOf({ id: "lobby", ...circle });
+    assert.equal(file.lens.cx, 481);
+    const back = circleOf(file);
+    for (const [name, value] of Object.entries(circle)) {
+      if (typeof value === "number") near(back[name], value, 1e-9);
+      else assert.equal(back[name], value);
+    }
+  }
+});
+
+test("what no circle makes is left as it is", () => {
+  const file = calibrationOf({ id: "lobby", width: 10, height: 10, model: "equidistant", cx: 5, cy: 5, radius: 5, fieldOfView: 180 });
+  assert.equal(circleOf({ ...file, lens: { ...file.lens, model: "mei" } }), null);
+  assert.equal(circleOf({ ...file, mount: { world_up: [0, -1, 0] } }), null);
+  assert.equal(circleOf({ ...file, masks: [{}] }), null);
+});
+
+test("a frame in which no circle was found has the largest that fits", () => {
+  const { cx, cy, radius } = assumedCircle({ image: { width: 800, height: 600 }, warnings: [] });
+  assert.deepEqual([cx, cy, radius], [400, 300, 300]);
+});
+
+test("straightening through a grid of the frame itself gives the frame", () => {
+  const [side, cells] = [8, 4];
+  const data = Uint8ClampedArray.from({ length: 4 * side * side }, (_, index) => (index % 4 === 3 ? 255 : (index * 7) % 251));
+  const pixels = { width: side, height: side, data };
+  const grid = Array.from({ length: (cells + 1) ** 2 }, (_, node) => [(node % (cells + 1)) * 2, Math.floor(node / (cells + 1)) * 2]);
+  const target = { width: side, height: side, data: new Uint8ClampedArray(data.length) };
+  straighten(pixels, side, grid, cells, target);
+  assert.deepEqual(target.data, data);
+  // The plan may have been made for frames of another size.
+  const doubled = grid.map((place) => place.map((value) => value * 2));
+  straighten(pixels, side * 2, doubled, cells, target);
+  assert.deepEqual(target.data, data);
+});
+
+test("a grid goes on beyond the lens image as straight as before", () => {
+  const grid = Array.from({ length: 25 }, (_, node) => (node % 5 < 3 ? [node % 5, Math.floor(node / 5)] : null));
+  const places = continued(grid, 4);
+  assert.deepEqual(places[4], [4, 0]);
+  assert.deepEqual(places[23], [3, 4]);
+  assert.ok(Number.isNaN(continued(Array(25).fill(null), 4)[0][0]));
+});
+
+test("a count holds until the next", () => {
+  const path = steps([{ time: 0, persons: 2 }, { time: 5, persons: 4 }], (time) => time, (persons) => -persons);
+  assert.equal(path, "M0.0 -2.0H5.0V-4.0");
+});
+
+test("events are read as they are sent", () => {
+  assert.deepEqual(parseEvent('id: 17\ndata: {"a": 1}'), { id: "17", data: '{"a": 1}' });
+  assert.deepEqual(parseEvent(": nothing new"), { id: "", data: "" });
+  assert.deepEqual(parseEvent("data: one\ndata: two"), { id: "", data: "one\ntwo" });
+});

@@ -1,0 +1,126 @@
+/** The sections Views, Floor and Live, and the key. */
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { SAMPLES, SERVER, detectSample, pageTest, reportAfter } from "./browser.js";
+
+const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
+
+pageTest("an address names its section, and a section without a frame says what is missing", "#views", async (page) => {
+  await page.getByRole("heading", { name: "Views", level: 1 }).waitFor();
+  await page.getByText("Pick a frame in Detect first: what the network saw").waitFor();
+  assert.equal(await page.title(), "Views – Lookdown");
+  await go(page, "Floor");
+  await page.getByText("its persons are shown here from above").waitFor();
+  await go(page, "Calibrate");
+  await page.getByText("Pick a frame of the camera in Detect first").waitFor();
+  assert.match(page.url(), /#calibrate$/);
+  await page.goBack();
+  await page.getByRole("heading", { name: "Floor", level: 1 }).waitFor();
+});
+
+for (const [lens, what] of [["", "a lens that was assumed"], ["office", "a calibration"]]) {
+  pageTest(`the views of ${what} are straightened, and tell who is in sight`, "", async (page) => {
+    await detectSample(page, "office", lens);
+    await go(page, "Views");
+    const tiles = page.getByRole("group", { name: "Views", exact: true }).getByRole("button");
+    await tiles.nth(23).waitFor();
+    assert.equal(await page.locator("#outlines polygon").count(), 24);
+    await page.getByText("24 views of the profile balanced see 100 % of the lens image").waitFor();
+    // The person by the paintings is in some views, and the others step back.
+    await page.getByRole("button", { name: "2", exact: true }).click();
+    await page.locator(".tile.dim").first().waitFor();
+    const seeing = await page.locator(".tile:not(.dim)").count();
+    assert.ok(seeing >= 4 && seeing <= 12, `${seeing}`);
+    assert.equal(await page.locator("#outlines .sees").count(), seeing);
+    await tiles.nth(2).click();
+    await page.locator("#outlines polygon.chosen").waitFor();
+    assert.equal(await tiles.nth(2).getAttribute("aria-pressed"), "true");
+    assert.ok((await colours(page, ".tile canvas")) > 200);
+  });
+}
+
+/** How many colours a canvas has: whether anything is in it. */
+const colours = (page, selector) =>
+  page.locator(selector).first().evaluate((canvas) => {
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    return new Set(new Uint32Array(data.buffer)).size;
+  });
+
+pageTest("a profile without views says so, and the paper's has all of its own", "", async (page) => {
+  await detectSample(page, "office", "office");
+  await reportAfter(page, () => page.getByText("direct", { exact: true }).click());
+  await go(page, "Views");
+  await page.getByText("there are no views").waitFor();
+  await go(page, "Detect");
+  await reportAfter(page, () => page.getByText("paper", { exact: true }).click());
+  await go(page, "Views");
+  await page.locator(".tile").nth(127).waitFor();
+});
+
+pageTest("persons stand on the floor map where the report says, if the height is known", "", async (page) => {
+  const report = await reportAfter(page, () => detectSample(page, "office", "office"));
+  await go(page, "Floor");
+  await page.locator(".dot-mark").first().waitFor();
+  assert.equal(await page.locator(".dot-mark").count(), report.persons.length);
+  const cells = await page.locator("#places tr").first().locator("td").allTextContents();
+  const { x_m: x, y_m: y } = report.persons[0].floor;
+  assert.deepEqual(cells.slice(0, 2), [x, y].map((value) => `${value.toFixed(2).replace("-", "−")} m`));
+  await page.getByText("2.9 m above the floor").waitFor();
+  const [camera, dot] = await Promise.all(["#map .camera", ".dot-mark[data-person='0'] circle"].map((at) => page.locator(at).boundingBox()));
+  assert.equal(Math.sign(dot.x - camera.x), Math.sign(x));
+  assert.equal(Math.sign(dot.y - camera.y), Math.sign(y));
+  await go(page, "Detect");
+  await reportAfter(page, () => page.getByLabel("Lens").selectOption(""));
+  await go(page, "Floor");
+  await page.getByText("The height of this camera above the floor is not known").waitFor();
+});
+
+async function post(camera, sample) {
+  const body = await readFile(`${SAMPLES}/${sample}.jpg`);
+  const answer = await fetch(`${SERVER}/detect?profile=fast&calibration=${sample}&camera=${camera}`, { method: "POST", body });
+  assert.equal(answer.status, 200);
+  return answer.json();
+}
+
+pageTest("a camera appears on the wall by itself, and its card follows it", "#live", async (page) => {
+  await page.locator("#section-live").waitFor();
+  const first = await post("hall 1", "office");
+  const card = page.getByRole("article", { name: "Camera hall 1" });
+  await card.waitFor();
+  await card.getByText(String(first.persons.length), { exact: true }).first().waitFor();
+  assert.equal(await card.locator(".sketch polygon").count(), first.persons.length);
+  const plot = card.getByRole("img", { name: "Persons over time" });
+  const second = await post("hall 1", "canteen");
+  assert.notEqual(second.persons.length, first.persons.length);
+  await card.locator(".big b").getByText(String(second.persons.length), { exact: true }).waitFor();
+  const most = Math.max(first.persons.length, second.persons.length);
+  assert.match(await plot.getAttribute("aria-label"), new RegExp(`${second.persons.length} persons? now, at most ${most} since`));
+});
+
+pageTest("whoever comes later sees what was seen before", "", async (page) => {
+  await post("yard", "office");
+  await post("yard", "lounge");
+  await go(page, "Live");
+  const card = page.getByRole("article", { name: "Camera yard" });
+  await card.waitFor();
+  assert.match(await card.locator(".plot .steps").getAttribute("d"), /V/);
+});
+
+pageTest(
+  "a server with keys asks for one, and works with it",
+  "",
+  async (page) => {
+    const dialog = page.getByRole("dialog", { name: "Key" });
+    await dialog.waitFor();
+    await dialog.getByText("This server wants a key").waitFor();
+    await dialog.getByLabel("API key").fill(process.env.LOOKDOWN_KEY);
+    await page.keyboard.press("Enter");
+    await page.locator("#calibration option[value=office]").waitFor({ state: "attached" });
+    await detectSample(page, "office", "office");
+    await go(page, "Live");
+    await page.getByRole("article", { name: "Camera web-page" }).waitFor();
+    assert.equal(await page.evaluate(() => localStorage.length), 0);
+  },
+  { server: process.env.LOOKDOWN_KEYED_URL, expected: /status of 401/ },
+);

@@ -1,0 +1,175 @@
+/** The section Calibrate: a circle over the frame, or a file of any format; its views straightened; saved. */
+
+import { drawCircle } from "./circle_handles.js";
+import { afterPause, element, find } from "./dom.js";
+import { assumedCircle, calibrationOf, circleOf } from "./lens.js";
+import { isServing, loadCalibrations } from "./parameters.js";
+import { shown, tell, withProgress } from "./progress.js";
+import { ask, askJson } from "./server.js";
+import { shared, whenChanged } from "./shared.js";
+import { viewCanvas } from "./straighten.js";
+import { GRID_CELLS } from "./views.js";
+
+const FIELDS = ["cx", "cy", "radius", "fieldOfView"];
+/** A circle that is being moved is looked through once it rests. */
+const REST_MILLIS = 120;
+const PREVIEW_PIXELS = 320;
+
+/** Where an import came from: `{name, content}`; null while the circle is edited. */
+let imported = null;
+let circle = null;
+let isVisible = false;
+let trying = null;
+
+const form = () => find("#calibration-form");
+const field = (name) => form().elements[name];
+
+/** The circle of the frame: what the server found, or all there is. */
+function begin() {
+  const { frame, report } = shared;
+  find("#calibrate-empty").hidden = Boolean(frame);
+  find("#calibrate-content").hidden = !frame;
+  if (!frame) return;
+  const picture = find("#calibrate-picture");
+  if (picture.src !== frame.url) {
+    Object.assign(picture, { src: frame.url, width: frame.width, height: frame.height });
+    circle = null;
+  }
+  const { width, height } = frame;
+  if (!circle) setCircle(assumedCircle(report ?? { image: { width, height }, warnings: [] }));
+  if (isVisible) look();
+}
+
+function setCircle(next) {
+  circle = next;
+  const reach = Math.max(circle.width, circle.height);
+  for (const name of FIELDS) {
+    if (name !== "fieldOfView") field(name).max = reach;
+    field(name).value = circle[name].toFixed(1);
+  }
+  field("model").value = circle.model;
+  field("cameraHeight").value = circle.cameraHeight ?? "";
+  drawn();
+}
+
+function drawn() {
+  const drawing = find("#circle");
+  drawing.classList.toggle("off", Boolean(imported));
+  if (imported) drawing.replaceChildren();
+  else drawCircle(drawing, circle, (moved) => edited({ ...circle, ...moved }));
+  for (const name of FIELDS) find(`output[for=calibrate-${name}]`).textContent = Number(field(name).value).toFixed(1);
+  find("#import-name").textContent = imported ? `From ${imported.name}: it is saved as it is.` : "";
+  find("#circle-fields").disabled = Boolean(imported);
+  find("#drop-import").hidden = !imported;
+  const id = field("id").value;
+  find("#save").textContent = isServing(id) ? `Replace ${id}` : "Save";
+}
+
+function edited(next) {
+  setCircle(next);
+  lookSoon();
+}
+
+const content = () => imported?.content ?? JSON.stringify(calibrationOf({ id: id(), ...circle }), null, 2);
+const id = () => field("id").value || "camera";
+/** Formats that do not tell the size of frames are told. */
+const size = () => (imported ? `&size=${shared.frame.width}x${shared.frame.height}` : "");
+
+async function look() {
+  const { frame } = shared;
+  if (!frame || !circle) return;
+  trying?.abort();
+  trying = new AbortController();
+  const options = { method: "POST", body: content(), signal: trying.signal };
+  const path = `calibrations/${id()}/views?profile=fast&grid=${GRID_CELLS}${size()}`;
+  const plan = await withProgress(find("#previews-progress"), "Straightening", () => askJson(path, options));
+  const views = plan.views.map((view, index) => {
+    const canvas = viewCanvas(view, GRID_CELLS, frame, plan.image[0], PREVIEW_PIXELS);
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", `Straightened view ${index + 1}`);
+    return canvas;
+  });
+  find("#previews").replaceChildren(...views);
+}
+
+const lookShown = shown(look);
+const lookSoon = afterPause(REST_MILLIS, lookShown);
+
+async function save() {
+  const name = id();
+  const before = shared.calibrations.find((calibration) => calibration.id === name);
+  const headers = before ? { "If-Match": `"${before.revision}"` } : { "If-None-Match": "*" };
+  const path = `calibrations/${name}${size().replace("&", "?")}`;
+  const options = { method: "PUT", body: content(), headers };
+  const answer = await withProgress(find("#save-progress"), "Saving", () => ask(path, options));
+  const { warnings = [] } = await answer.json();
+  await loadCalibrations();
+  find("#saved").textContent = [`${name} is saved and serves.`, ...warnings].join(" ");
+  find("#calibration").value = name;
+  find("#parameters").dispatchEvent(new Event("input"));
+  drawn();
+}
+
+/** A file from the disk; what it means is for the server to say. */
+async function importFile(file) {
+  const text = await file.text();
+  imported = { name: file.name, content: text };
+  // A file of ours has a name.
+  const own = /"id"\s*:\s*"([a-z0-9][a-z0-9_-]{0,63})"/.exec(text);
+  if (own) field("id").value = own[1];
+  drawn();
+  await look();
+}
+
+/** Goes on from a calibration that serves. */
+async function open(name) {
+  const file = await askJson(`calibrations/${name}`);
+  const known = circleOf(file);
+  field("id").value = name;
+  imported = known ? null : { name, content: JSON.stringify(file) };
+  if (known) setCircle(known);
+  drawn();
+  await look();
+}
+
+export function visible(is) {
+  isVisible = is;
+  if (is) begin();
+}
+
+export function start() {
+  whenChanged(["frame", "report"], begin);
+  whenChanged(["calibrations"], () => {
+    const choice = find("#open-calibration");
+    choice.replaceChildren(choice.firstElementChild, ...shared.calibrations.map(({ id }) => element("option", { value: id }, id)));
+  });
+  form().addEventListener("input", (event) => {
+    find("#saved").textContent = "";
+    if (event.target.closest("#circle-fields")) {
+      const values = Object.fromEntries(FIELDS.map((name) => [name, Number(field(name).value)]));
+      circle = { ...circle, ...values, model: field("model").value, cameraHeight: Number(field("cameraHeight").value) || null };
+      lookSoon();
+    }
+    if (circle) drawn();
+  });
+  form().addEventListener("submit", (event) => {
+    event.preventDefault();
+    shown(save)();
+  });
+  find("#import-file").addEventListener("change", (event) => {
+    const [file] = event.target.files;
+    event.target.value = "";
+    if (file) shown(importFile)(file);
+  });
+  find("#drop-import").addEventListener("click", () => {
+    imported = null;
+    tell(find("#previews-progress"), "");
+    drawn();
+    lookShown();
+  });
+  find("#open-calibration").addEventListener("change", (event) => {
+    const name = event.target.value;
+    event.target.value = "";
+    if (name) shown(open)(name);
+  });
+}

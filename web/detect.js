@@ -1,0 +1,74 @@
+/** The section Detect: a frame in, its persons over it; every change of a parameter looks again. */
+
+import { afterPause, element, find } from "./dom.js";
+import { clearFindings, showFindings } from "./findings.js";
+import { drawMarks, pointOut } from "./marks.js";
+import * as parameters from "./parameters.js";
+import { shown, withProgress } from "./progress.js";
+import { askJson } from "./server.js";
+import { change, shared, whenChanged } from "./shared.js";
+
+/** A slider that is being moved asks once it rests. */
+const REST_MILLIS = 150;
+
+let running = null;
+
+async function run() {
+  const { frame } = shared;
+  if (!frame) return;
+  running?.abort();
+  const now = (running = new AbortController());
+  const path = `detect?${parameters.query()}`;
+  const options = { method: "POST", body: frame.blob, signal: now.signal };
+  const report = await withProgress(find("#stage"), "Looking for people", () => askJson(path, options));
+  if (shared.frame === frame && running === now) change("report", report);
+}
+
+export const runShown = shown(run);
+
+function showFrame() {
+  const { frame } = shared;
+  const picture = find("#picture");
+  picture.src = frame.url;
+  picture.width = frame.width;
+  picture.height = frame.height;
+  picture.alt = `The frame ${frame.name}`;
+  find("#stage").classList.remove("blank");
+  find("#stage").style.aspectRatio = `${frame.width} / ${frame.height}`;
+  runShown();
+}
+
+function showReport() {
+  const { report } = shared;
+  find("#report-link").hidden = !report;
+  if (!report) {
+    find("#marks").replaceChildren();
+    clearFindings();
+    return;
+  }
+  drawMarks(find("#marks"), report);
+  pointOut(find("#marks"));
+  showFindings(report);
+}
+
+/** Hands the report out as a file. */
+function save() {
+  const blob = new Blob([JSON.stringify(shared.report, null, 1)], { type: "application/json" });
+  const url = URL.createObjectURL(blob);
+  element("a", { href: url, download: "report.json" }).click();
+  URL.revokeObjectURL(url);
+}
+
+export function start() {
+  parameters.start(afterPause(REST_MILLIS, runShown));
+  find("#report-link").addEventListener("click", save);
+  // Marks keep their size on the screen, whatever that of the picture is.
+  new ResizeObserver(() => shared.report && drawMarks(find("#marks"), shared.report)).observe(find("#marks"));
+  whenChanged(["frame"], showFrame);
+  whenChanged(["report"], showReport);
+  whenChanged(["person"], () => {
+    pointOut(find("#marks"));
+    pointOut(find("#persons"));
+  });
+  clearFindings();
+}

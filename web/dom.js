@@ -1,0 +1,36 @@
+/** Elements: found, made, filled. */
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export const find = (selector, within = document) => within.querySelector(selector);
+
+/** An element with attributes, listeners (`onclick` and the like) and children. */
+export function element(name, attributes = {}, ...children) {
+  return furnished(document.createElement(name), attributes, children);
+}
+
+/** The same for shapes of a drawing. */
+export function shape(name, attributes = {}, ...children) {
+  return furnished(document.createElementNS(SVG, name), attributes, children);
+}
+
+function furnished(node, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (typeof value === "function") node.addEventListener(name.slice(2), value);
+    else if (value !== false && value != null) node.setAttribute(name, value === true ? "" : value);
+  }
+  node.append(...children.flat().filter((child) => child != null));
+  return node;
+}
+
+/** Calls `act` once the calls have stopped for so long. */
+export function afterPause(millis, act) {
+  let timer;
+  return () => {
+    clearTimeout(timer);
+    timer = setTimeout(act, millis);
+  };
+}
+
+export const percent = (share) => `${Math.round(share * 100)} %`;
+export const plural = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;

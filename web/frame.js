@@ -1,0 +1,73 @@
+/** The frame: from a file, the clipboard, a drop or a sample. */
+
+import { element, find } from "./dom.js";
+import { tell } from "./progress.js";
+import { change, shared } from "./shared.js";
+
+/** Pixels of the longer side that views are straightened from. */
+const MAX_SIDE = 1600;
+
+/** Reads a picture and makes it the frame. */
+export async function show(blob, name) {
+  let picture;
+  try {
+    picture = await createImageBitmap(blob);
+  } catch {
+    tell(find("#stage"), `${name} is no picture that this browser can read: use a JPEG, PNG or WebP file.`);
+    return;
+  }
+  tell(find("#stage"), "");
+  const scale = Math.min(1, MAX_SIDE / Math.max(picture.width, picture.height));
+  const [width, height] = [picture.width, picture.height].map((side) => Math.round(side * scale));
+  const canvas = new OffscreenCanvas(width, height);
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  context.drawImage(picture, 0, 0, width, height);
+  if (shared.frame) URL.revokeObjectURL(shared.frame.url);
+  change("report", null);
+  change("person", null);
+  change("frame", {
+    blob,
+    name,
+    url: URL.createObjectURL(blob),
+    width: picture.width,
+    height: picture.height,
+    pixels: context.getImageData(0, 0, width, height),
+  });
+}
+
+const pictureIn = (files) => [...(files ?? [])].find((file) => file.type.startsWith("image/"));
+
+export function start() {
+  const input = find("#frame-file");
+  input.addEventListener("change", () => {
+    const [file] = input.files;
+    input.value = "";
+    if (file) show(file, file.name);
+  });
+  document.addEventListener("paste", (event) => {
+    const file = pictureIn(event.clipboardData?.files);
+    if (file) show(file, "the pasted picture");
+  });
+  document.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    document.body.classList.add("dropping");
+  });
+  for (const end of ["dragleave", "drop"]) {
+    document.addEventListener(end, () => document.body.classList.remove("dropping"));
+  }
+  document.addEventListener("drop", (event) => {
+    event.preventDefault();
+    const file = pictureIn(event.dataTransfer.files);
+    if (file) show(file, file.name);
+    else if (event.dataTransfer.files.length) tell(find("#stage"), "What was dropped is no picture.");
+  });
+  const samples = ["office", "canteen", "lounge"].map((name) => sample(name));
+  find("#samples").append(...samples);
+}
+
+function sample(name) {
+  const path = `assets/${name}.jpg`;
+  const pick = async () => show(await (await fetch(path)).blob(), `${name}.jpg`);
+  const picture = element("img", { src: path, alt: "", width: 56, height: 56 });
+  return element("button", { type: "button", class: "sample", onclick: pick }, picture, element("span", {}, name));
+}

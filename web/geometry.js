@@ -1,0 +1,33 @@
+/** Places in the frame, corner-origin pixels. */
+
+/** The corners of an oriented box, clockwise from its top left: its height axis is `angle_deg` clockwise from image up. */
+export function corners({ cx, cy, width, height, angle_deg: degrees }) {
+  const turn = (degrees * Math.PI) / 180;
+  const [sin, cos] = [Math.sin(turn), Math.cos(turn)];
+  const across = [-1, 1, 1, -1].map((sign) => (sign * width) / 2);
+  const along = [-1, -1, 1, 1].map((sign) => (sign * height) / 2);
+  return across.map((x, corner) => [cx + x * cos - along[corner] * sin, cy + x * sin + along[corner] * cos]);
+}
+
+/** Whether a place lies in an outline: it crosses it an odd number of times on the way out. */
+export function holds(outline, [x, y]) {
+  let inside = false;
+  outline.forEach(([x1, y1], index) => {
+    const [x2, y2] = outline[(index + 1) % outline.length];
+    if (y1 > y !== y2 > y && x < x1 + ((y - y1) / (y2 - y1)) * (x2 - x1)) inside = !inside;
+  });
+  return inside;
+}
+
+/** As the attribute `points` of a drawing. */
+export const points = (places) => places.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ");
+
+/** The centre of a person's box. */
+export const centre = ({ oriented_box: box }) => [box.cx, box.cy];
+
+/** The smallest of 1, 2 and 5 times a power of ten of which `most` steps reach `length`. */
+export function roundStep(length, most) {
+  const least = length / most;
+  const power = 10 ** Math.floor(Math.log10(least));
+  return [1, 2, 5, 10].map((factor) => factor * power).find((step) => step >= least * (1 - 1e-9));
+}

@@ -1,0 +1,54 @@
+/** Ideal lenses: a circle and a field of view make a calibration file, and the other way round. */
+
+/** Radius over focal length for an angle from the axis. */
+const CURVES = {
+  equidistant: (theta) => theta,
+  equisolid: (theta) => 2 * Math.sin(theta / 2),
+  stereographic: (theta) => 2 * Math.tan(theta / 2),
+  orthographic: (theta) => Math.sin(theta),
+};
+
+const STRAIGHT_DOWN = [0, 0, -1];
+
+/**
+ * The calibration file of a lens whose image is a circle: `cx`, `cy` and `radius` in corner-origin pixels of a
+ * frame of `width` × `height`, `fieldOfView` in degrees, `cameraHeight` in metres or null.
+ */
+export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldOfView, cameraHeight }) {
+  const maxTheta = (fieldOfView / 2) * (Math.PI / 180);
+  const mount = { world_up: STRAIGHT_DOWN };
+  if (cameraHeight) mount.height_m = cameraHeight;
+  return {
+    id,
+    image: { width, height },
+    // Lens functions speak of pixel centres.
+    lens: { model, focal: radius / CURVES[model](maxTheta), cx: cx - 0.5, cy: cy - 0.5, max_theta: maxTheta },
+    mount,
+  };
+}
+
+/** What `calibrationOf` would have made this file of; null for what it cannot make. */
+export function circleOf({ lens, mount, image, zones, masks }) {
+  const curve = CURVES[lens.model];
+  const focal = lens.focal ?? (lens.fx === lens.fy ? lens.fx : null);
+  const up = mount?.world_up ?? STRAIGHT_DOWN;
+  const isOther = up.some((part, axis) => Math.abs(part - STRAIGHT_DOWN[axis]) > 1e-6) || zones?.length || masks?.length;
+  if (!curve || !focal || !lens.max_theta || isOther) return null;
+  return {
+    ...image,
+    model: lens.model,
+    cx: lens.cx + 0.5,
+    cy: lens.cy + 0.5,
+    radius: focal * curve(lens.max_theta),
+    fieldOfView: (lens.max_theta * 360) / Math.PI,
+    cameraHeight: mount?.height_m ?? null,
+  };
+}
+
+/** The lens that the server assumed for a frame: its report tells the circle in a warning. */
+export function assumedCircle(report) {
+  const { width, height } = report.image;
+  const told = /centre ([\d.-]+), ([\d.-]+), radius ([\d.]+)/.exec(report.warnings.join(" "));
+  const [cx, cy, radius] = told ? told.slice(1).map(Number) : [width / 2, height / 2, Math.min(width, height) / 2];
+  return { width, height, model: "equidistant", cx, cy, radius, fieldOfView: 180, cameraHeight: null };
+}

@@ -1,0 +1,118 @@
+/** The section Live: a card for each camera, told by events. */
+
+import { element, find } from "./dom.js";
+import { sketch } from "./marks.js";
+import { stepPlot } from "./plot.js";
+import { shown, tell, withProgress } from "./progress.js";
+import { askJson, events } from "./server.js";
+
+/** Cameras that are shown at most, those that were heard of last. */
+const MAX_CARDS = 60;
+/** Reports that a plot goes back. */
+const MAX_HISTORY = 100;
+/** From the end of a stream to the next try. */
+const PAUSE_MILLIS = 2000;
+
+const cards = new Map();
+let listening = null;
+let lastId = "";
+
+/** Listens until it is told to stop; whoever comes back hears what was missed. */
+async function listen(signal) {
+  const wall = find("#wall-progress");
+  const cameras = await withProgress(wall, "Looking for cameras", () => askJson("results", { signal }));
+  cameras.sort((one, other) => one.age_seconds - other.age_seconds);
+  const known = cameras.slice(0, MAX_CARDS);
+  await withProgress(wall, "Reading what was seen before", () => Promise.all(known.map((row) => remember(row, signal))));
+  find("#wall-empty").hidden = cards.size > 0;
+  while (!signal.aborted) {
+    try {
+      const headers = lastId ? { "Last-Event-ID": lastId } : {};
+      for await (const { id, data } of events("events", { headers, signal })) {
+        tell(wall, "");
+        take(id, JSON.parse(data));
+      }
+    } catch (error) {
+      if (signal.aborted) return;
+      tell(wall, `${error.message} Trying again.`);
+    }
+    await new Promise((resolve) => setTimeout(resolve, PAUSE_MILLIS));
+  }
+}
+
+async function remember({ camera }, signal) {
+  const rows = await askJson(`results/${encodeURIComponent(camera)}/history?limit=${MAX_HISTORY}`, { signal });
+  for (const { id, report } of rows) take(id, report);
+}
+
+/** Takes in a report; one that is known changes nothing. */
+function take(id, report) {
+  const card = cards.get(report.camera) ?? added(report.camera);
+  if (Number(id) <= Number(card.id)) return;
+  if (Number(id) > Number(lastId)) lastId = id;
+  card.id = id;
+  card.history.push({ time: Date.parse(report.received_at), persons: report.persons.length });
+  card.history.splice(0, card.history.length - MAX_HISTORY);
+  card.report = report;
+  if (card.drawn) return;
+  // Many reports at once are drawn once.
+  card.drawn = requestAnimationFrame(() => draw(card));
+}
+
+function added(camera) {
+  const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
+  const card = { camera, node, id: "0", history: [], report: null, drawn: 0 };
+  if (cards.size >= MAX_CARDS) {
+    const [oldest] = [...cards.values()].sort((one, other) => Number(one.id) - Number(other.id));
+    oldest.node.remove();
+    cards.delete(oldest.camera);
+  }
+  cards.set(camera, card);
+  find("#wall").append(node);
+  find("#wall-empty").hidden = true;
+  return card;
+}
+
+function draw(card) {
+  card.drawn = 0;
+  const { report, history } = card;
+  const count = report.persons.length;
+  const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
+  card.age = element("span", { class: "age" });
+  card.node.replaceChildren(
+    element("header", {}, element("h2", {}, card.camera), card.age),
+    element("div", { class: "sight" }, sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
+    zones ? element("ul", { class: "zones" }, zones) : "",
+    stepPlot(history, Date.now()),
+  );
+  tellAge(card);
+}
+
+function tellAge({ age, history }) {
+  if (!age) return;
+  const seconds = Math.max(0, Math.round((Date.now() - history.at(-1).time) / 1000));
+  const [value, unit] = seconds < 60 ? [seconds, "s"] : seconds < 3600 ? [Math.floor(seconds / 60), "min"] : [Math.floor(seconds / 3600), "h"];
+  age.textContent = seconds < 2 ? "now" : `${value} ${unit} ago`;
+}
+
+const listenShown = shown(listen);
+
+export function visible(is) {
+  if (!is) {
+    listening?.abort();
+    listening = null;
+  } else if (!listening) {
+    listening = new AbortController();
+    listenShown(listening.signal);
+  }
+}
+
+export function restart() {
+  if (!listening) return;
+  visible(false);
+  visible(true);
+}
+
+export function start() {
+  setInterval(() => listening && cards.forEach(tellAge), 1000);
+}

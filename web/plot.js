@@ -1,0 +1,41 @@
+/** Persons over time, as steps: a count holds until the next report. */
+
+import { plural, shape } from "./dom.js";
+import { roundStep } from "./geometry.js";
+
+const [WIDTH, HEIGHT, LEFT, BOTTOM, TOP] = [320, 110, 24, 20, 8];
+
+const clock = (time) => new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+
+/** A drawing of `history`: `{time, persons}`, milliseconds since 1970, oldest first, at least one; until `now`. */
+export function stepPlot(history, now) {
+  const first = history[0].time;
+  // The clocks of the server and of this machine may differ.
+  const last = Math.max(now, history.at(-1).time);
+  const most = Math.max(1, ...history.map(({ persons }) => persons));
+  const step = Math.max(1, roundStep(most, 3));
+  const top = Math.ceil(most / step) * step;
+  const x = (time) => LEFT + ((time - first) / Math.max(1, last - first)) * (WIDTH - LEFT - 2);
+  const y = (persons) => TOP + (1 - persons / top) * (HEIGHT - TOP - BOTTOM);
+  const line = `${steps(history, x, y)}H${x(last).toFixed(1)}`;
+  const ticks = Array.from({ length: top / step + 1 }, (_, index) => index * step);
+  const count = history.at(-1).persons;
+  const label = `Persons over time: ${plural(count, "person")} now, at most ${most} since ${clock(first)}`;
+  return shape(
+    "svg",
+    { class: "plot", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label },
+    ...ticks.map((tick) => shape("path", { class: "grid", d: `M${LEFT} ${y(tick)}H${WIDTH}` })),
+    ...ticks.map((tick) => shape("text", { x: LEFT - 6, y: y(tick) + 4, "text-anchor": "end" }, String(tick))),
+    shape("path", { class: "area", d: `${line}V${y(0)}H${x(first)}Z` }),
+    shape("path", { class: "steps", d: line }),
+    shape("circle", { class: "now", cx: x(last), cy: y(count), r: 3 }),
+    shape("text", { x: LEFT, y: HEIGHT - 3 }, clock(first)),
+    shape("text", { x: WIDTH - 2, y: HEIGHT - 3, "text-anchor": "end" }, last > first ? clock(last) : ""),
+  );
+}
+
+/** The path of the steps. */
+export function steps(history, x, y) {
+  const rest = history.slice(1).map(({ time, persons }) => `H${x(time).toFixed(1)}V${y(persons).toFixed(1)}`);
+  return `M${x(history[0].time).toFixed(1)} ${y(history[0].persons).toFixed(1)}${rest.join("")}`;
+}

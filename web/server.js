@@ -1,0 +1,63 @@
+/** Talks to the server: relative addresses, the key if there is one, problems as errors. */
+
+const KEY = "lookdown-key";
+
+export const key = {
+  get: () => sessionStorage.getItem(KEY) ?? "",
+  set: (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY)),
+};
+
+/** What the server says is wrong (RFC 9457). */
+export class Problem extends Error {
+  constructor(status, text) {
+    super(text);
+    this.status = status;
+  }
+}
+
+/** The answer, if it is a success; otherwise throws what is wrong. */
+export async function ask(path, options = {}) {
+  const headers = new Headers(options.headers);
+  if (key.get()) headers.set("X-API-Key", key.get());
+  let answer;
+  try {
+    answer = await fetch(path, { ...options, headers });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Problem(0, "The server does not answer.");
+  }
+  if (answer.ok) return answer;
+  const told = await answer.json().catch(() => ({}));
+  if (answer.status === 401) document.dispatchEvent(new Event("key-wanted"));
+  throw new Problem(answer.status, told.detail ?? `The server answered ${answer.status}.`);
+}
+
+export const askJson = async (path, options) => (await ask(path, options)).json();
+
+/** Server-sent events of a path, `{id, data}` each. `EventSource` could not send the key. */
+export async function* events(path, options = {}) {
+  const answer = await ask(path, { ...options, headers: { Accept: "text/event-stream", ...options.headers } });
+  const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  for (;;) {
+    const { value, done } = await reader.read();
+    if (done) return;
+    const blocks = (text + value).split(/\r?\n\r?\n/);
+    text = blocks.pop();
+    for (const block of blocks) {
+      const event = parseEvent(block);
+      if (event.data) yield event;
+    }
+  }
+}
+
+/** One event from its lines. */
+export function parseEvent(block) {
+  const event = { id: "", data: "" };
+  for (const line of block.split(/\r?\n/)) {
+    const [, name, value] = /^(\w*): ?(.*)$/.exec(line) ?? [];
+    if (name === "id") event.id = value;
+    if (name === "data") event.data += (event.data && "\n") + value;
+  }
+  return event;
+}

@@ -1,0 +1,121 @@
+/** The section Views: what the network saw, and who was in sight of whom. */
+
+import { element, find, percent, plural, shape } from "./dom.js";
+import { centre, holds, points } from "./geometry.js";
+import { assumedCircle, calibrationOf } from "./lens.js";
+import { drawMarks, pointOut } from "./marks.js";
+import { shown, withProgress } from "./progress.js";
+import { askJson } from "./server.js";
+import { change, shared, whenChanged } from "./shared.js";
+import { viewCanvas } from "./straighten.js";
+
+export const GRID_CELLS = 16;
+/** Pixels of a straightened view's longer side. */
+const TILE_PIXELS = 224;
+
+let isVisible = false;
+let shownReport = null;
+let plan = null;
+let chosen = null;
+
+/** The plan that a frame was looked at with. */
+async function planOf(report) {
+  const query = `profile=${report.profile}&grid=${GRID_CELLS}`;
+  if (!report.calibration.assumed) {
+    return askJson(`calibrations/${report.calibration.id}/views?${query}`);
+  }
+  const file = calibrationOf({ id: "assumed", ...assumedCircle(report) });
+  return askJson(`calibrations/assumed/views?${query}`, { method: "POST", body: JSON.stringify(file) });
+}
+
+async function show() {
+  const { report, frame } = shared;
+  find("#views-empty").hidden = Boolean(report);
+  find("#views-content").hidden = !report;
+  if (!isVisible || !report || report === shownReport) return;
+  const sheet = find("#sheet");
+  const told = await withProgress(find("#views-progress"), "Straightening the views", () => planOf(report));
+  if (report !== shared.report) return;
+  [shownReport, plan, chosen] = [report, told, null];
+  const picture = find("#views-picture");
+  picture.src = frame.url;
+  picture.width = frame.width;
+  picture.height = frame.height;
+  drawOutlines();
+  drawMarks(find("#views-marks"), report);
+  find("#people").replaceChildren(...report.persons.map(chip));
+  const facts = `${plural(plan.views.length, "view")} of the profile ${plan.profile} see `;
+  find("#views-facts").textContent = plan.views.length
+    ? `${facts}${percent(plan.coverage)} of the lens image, a place of it ${plan.overlap.toFixed(1)} times on average.`
+    : "The profile direct looks at the frame itself: there are no views.";
+  sheet.classList.toggle("small", plan.views.length > 48);
+  sheet.replaceChildren(...plan.views.map((view, index) => tile(view, index, frame, report)));
+  pointOutAll();
+}
+
+function drawOutlines() {
+  const drawing = find("#outlines");
+  const [width, height] = plan.image;
+  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  const unit = Math.max(width, height) / 480;
+  const outline = (view, index) =>
+    shape("polygon", { points: points(view.outline), "data-view": index, "stroke-width": unit });
+  drawing.replaceChildren(...plan.views.map(outline));
+}
+
+function chip(person, index) {
+  const toggle = () => change("person", shared.person === index ? null : index);
+  return element("button", { type: "button", class: "chip", "data-person": index, onclick: toggle }, String(index + 1));
+}
+
+const small = (person) => element("i", { "data-person": person }, String(person + 1));
+
+/** A person's box centre in pixels of the frames that the plan was made for. */
+const placeOf = (person, report) => centre(person).map((value) => (value * plan.image[0]) / report.image.width);
+
+function tile(view, index, frame, report) {
+  const inSight = report.persons.flatMap((person, who) => (holds(view.outline, placeOf(person, report)) ? [who] : []));
+  const canvas = viewCanvas(view, GRID_CELLS, frame, plan.image[0], TILE_PIXELS);
+  canvas.setAttribute("aria-hidden", "true");
+  const who = inSight.map((person) => person + 1).join(", ");
+  const name = `View ${index + 1}, ${Math.round(view.off_axis_deg)}° off axis, ${who ? `persons ${who}` : "nobody in sight"}`;
+  const choose = () => {
+    chosen = chosen === index ? null : index;
+    pointOutAll();
+  };
+  const over = (at) => () => find("#outlines").children[index].classList.toggle("over", at);
+  return element(
+    "button",
+    { type: "button", class: "tile", "aria-label": name, "aria-pressed": "false", "data-holds": inSight.join(" "),
+      onclick: choose, onmouseenter: over(true), onmouseleave: over(false), onfocus: over(true), onblur: over(false) },
+    canvas,
+    element("span", { class: "caption", "aria-hidden": "true" }, element("b", {}, String(index + 1)), element("span", {}, inSight.map(small))),
+  );
+}
+
+function pointOutAll() {
+  pointOut(find("#views-marks"));
+  for (const node of find("#people").children) {
+    node.setAttribute("aria-pressed", String(Number(node.dataset.person) === shared.person));
+  }
+  [...find("#sheet").children].forEach((node, index) => {
+    const sees = shared.person === null || node.dataset.holds.split(" ").includes(String(shared.person));
+    node.classList.toggle("dim", !sees);
+    node.setAttribute("aria-pressed", String(index === chosen));
+    const outline = find("#outlines").children[index];
+    outline.classList.toggle("sees", shared.person !== null && sees);
+    outline.classList.toggle("chosen", index === chosen);
+  });
+}
+
+const showShown = shown(show);
+
+export function visible(is) {
+  isVisible = is;
+  showShown();
+}
+
+export function start() {
+  whenChanged(["report"], showShown);
+  whenChanged(["person"], () => plan && pointOutAll());
+}
