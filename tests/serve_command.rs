@@ -179,8 +179,8 @@ impl Server {
             log,
             port: String::new(),
         };
-        let line = server.says("listening on http://127.0.0.1:");
-        let (_, rest) = line.split_once("listening on http://127.0.0.1:").unwrap();
+        let line = server.says("listening on http");
+        let (_, rest) = line.split_once("://127.0.0.1:").unwrap();
         rest.split_once(',').unwrap().0.clone_into(&mut server.port);
         server.says("ready: try curl");
         server
@@ -267,4 +267,30 @@ fn a_server_out_of_file_descriptors_says_so_once_and_serves_when_there_are_some(
         !rest.iter().any(|line| line.contains(complaint)),
         "{rest:?}"
     );
+}
+
+#[test]
+fn a_health_check_asks_a_server_over_tls_whatever_names_its_certificate_is_for() {
+    let pair = rcgen::generate_simple_self_signed(["lookdown.example".to_owned()]).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let written = |name: &str, content: String| {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let certificate = written("server.pem", pair.cert.pem());
+    let private_key = written("server.key", pair.signing_key.serialize_pem());
+    let tls = [
+        ("LOOKDOWN__SERVER__TLS__CERTIFICATE", &*certificate),
+        ("LOOKDOWN__SERVER__TLS__PRIVATE_KEY", &*private_key),
+    ];
+    let server = Server::start("", &[NO_GRACE, tls[0], tls[1]]);
+    let address = format!("127.0.0.1:{}", server.port);
+    let output = run(
+        &["health"],
+        &[("LOOKDOWN__SERVER__LISTEN", &address), tls[0], tls[1]],
+    );
+    assert!(output.status.success(), "{output:?}");
+    server.signal("TERM");
+    server.has_ended();
 }
