@@ -2,12 +2,15 @@
 
 import json
 import os
+import re
 import stat
 import subprocess
 import time
 import unittest
+from fnmatch import fnmatch
+from pathlib import Path
 
-from harness.places import ROOT, SAMPLES
+from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports, running
 from image.build import build, remove
 
@@ -45,6 +48,20 @@ class ContainerImage(unittest.TestCase):
             self.assertTrue((self.image.root / "var/lib/dpkg/status.d" / name).is_file(), name)
         for name in ("LICENSE", "NOTICE", "runtime/LICENSE", "runtime/ThirdPartyNotices.txt", "lookdown.cdx.json"):
             self.assertTrue((self.image.root / "opt/lookdown" / name).is_file(), name)
+
+    def test_all_that_the_program_is_built_from_comes_into_the_image(self):
+        # Cargo lists the files that the binary was compiled from, what is embedded in it among them.
+        listed = LOOKDOWN.with_suffix(".d").read_text(encoding="utf-8").split(":", 1)[1].split()
+        sources = {str(Path(file).relative_to(ROOT)) for file in listed if "/target/" not in file}
+        self.assertIn("src/main.rs", sources)
+        dockerfile = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
+        copied = set(re.findall(r"^COPY (\w+) \1$", dockerfile, re.MULTILINE))
+        self.assertEqual({source for source in sources if source.split("/")[0] not in copied}, set())
+        ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+        let_in = [line.removeprefix("!") for line in ignored if line.startswith("!")]
+        for source in sources:
+            parts = [source, *map(str, Path(source).parents)]
+            self.assertTrue(any(fnmatch(part, pattern) for part in parts for pattern in let_in), source)
 
     def test_it_serves_without_writing_and_its_health_check_knows(self):
         (port,) = free_ports(1)

@@ -56,8 +56,7 @@ def build() -> Image:
     # Container engines mount these.
     for place in ("dev", "proc"):
         (root / place).mkdir()
-    config = json.loads(_buildah("inspect", "--format={{json .Docker.Config}}", container))
-    return Image(root, config)
+    return Image(root, json.loads(_buildah("inspect", container))["Docker"]["config"])
 
 
 def remove() -> None:
