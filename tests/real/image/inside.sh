@@ -9,5 +9,5 @@ shift
 /bin/mount --bind /dev "$root/dev"
 /bin/mount --bind /proc "$root/proc"
 /bin/mount -o remount,bind,ro "$root"
-exec /usr/bin/setpriv --reuid=65532 --regid=65532 --clear-groups --no-new-privs --inh-caps=-all --bounding-set=-all \
-    /usr/sbin/chroot "$root" "$@"
+# Another user than root has no capabilities.
+exec /usr/bin/setpriv --no-new-privs /usr/sbin/chroot --userspec=65532:65532 --groups= "$root" "$@"
