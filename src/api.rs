@@ -74,6 +74,7 @@ fn client_routes() -> OpenApiRouter<ApiState> {
         ))
         .routes(routes!(results::list))
         .routes(routes!(results::latest::get_latest))
+        .routes(routes!(results::picture::get_picture))
         .routes(routes!(results::history::get_history))
         .routes(routes!(results::events::of_camera))
         .routes(routes!(results::events::of_all))

@@ -167,6 +167,7 @@ impl App {
             max_header_bytes: settings.server.connections.max_header_bytes,
             max_headers: settings.server.connections.max_headers,
             zone_metrics: settings.calibrations.zone_metrics,
+            pictures_of: Arc::new(settings.results.pictures_of.clone()),
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
             min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,

@@ -110,6 +110,8 @@ metrics! {
     results_reports: IntGauge = "results_reports" [];
     /// Memory that kept reports take, bytes.
     results_bytes: IntGauge = "results_bytes" [];
+    /// Cameras of which a picture is kept.
+    results_pictures: IntGauge = "results_pictures" [];
     /// Reports of this server that were stored.
     results_stored: IntCounter = "results_stored_total" [];
     /// Reports of this server that wait to be stored.
@@ -245,12 +247,13 @@ impl Metrics {
         raise_to(&self.rig_cache_evictions, evictions);
     }
 
-    /// Shows how many reports of how many cameras and bytes are kept.
-    pub fn show_results(&self, cameras: usize, reports: usize, bytes: usize) {
+    /// Shows how many reports of how many cameras and bytes are kept, and how many pictures.
+    pub fn show_results(&self, cameras: usize, reports: usize, bytes: usize, pictures: usize) {
         let _one_scrape = self.one_scrape();
         self.results_cameras.set(count(cameras));
         self.results_reports.set(count(reports));
         self.results_bytes.set(count(bytes));
+        self.results_pictures.set(count(pictures));
     }
 
     /// Shows whether reports can be stored, how many wait for it, and how many were stored and dropped

@@ -3,12 +3,14 @@
 
 mod listeners;
 mod memory;
+mod picture;
 mod redis;
 mod report;
 mod store;
 
 pub use listeners::{ListenError, Listeners, Listening};
 pub use memory::MemoryResults;
+pub use picture::{NewPicture, PicturesOf, StoredPicture};
 pub use redis::{RedisAddress, RedisAddressError, RedisOptions, RedisResults};
 pub use report::{NewReport, ReportId, StoredReport};
 pub use store::{Cameras, ResultLimits, ResultStore, ResultUse, StoreHealth, Unreachable};

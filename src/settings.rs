@@ -36,7 +36,7 @@ use crate::{
     access::KeyList,
     geometry::FieldOfViewReading,
     inference::Device,
-    results::{RedisOptions, ResultLimits},
+    results::{PicturesOf, RedisOptions, ResultLimits},
     server::ConnectionLimits,
     tls::TlsOptions,
 };
@@ -187,6 +187,8 @@ pub struct RequestRateSettings {
 pub struct ResultSettings {
     /// The Redis that servers share; `None` for the memory of this process.
     pub redis: Option<RedisOptions>,
+    /// The cameras whose latest picture is kept as well.
+    pub pictures_of: PicturesOf,
     /// How much.
     pub limits: ResultLimits,
 }

@@ -6,8 +6,8 @@ use crate::{
     pipeline::Person,
 };
 
-/// The person's mark, with the score on its label if asked for.
-pub(super) fn mark(person: &Person, with_score: bool) -> Mark {
+/// The person's mark, with the score on its label.
+pub(super) fn mark(person: &Person) -> Mark {
     let oriented = &person.oriented_box;
     Mark {
         bbox: person.bbox.corners(),
@@ -19,11 +19,7 @@ pub(super) fn mark(person: &Person, with_score: bool) -> Mark {
             angle_deg: oriented.angle.to_degrees(),
         }),
         head: Some(head(oriented)),
-        label: if with_score {
-            format!("{:.2}", person.score)
-        } else {
-            String::new()
-        },
+        label: format!("{:.2}", person.score),
     }
 }
 

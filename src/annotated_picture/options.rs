@@ -22,6 +22,8 @@ pub enum Layer {
     Oriented,
     /// The score of each person.
     Scores,
+    /// The borders of the zones of the frame's calibration, with their names.
+    Zones,
     /// The borders of the views through which the frame was seen.
     Views,
     /// When the frame was taken, or came when nobody said that.
@@ -41,10 +43,11 @@ pub struct PictureOptions {
 
 impl Layer {
     /// Everything that can be drawn.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Boxes,
         Self::Oriented,
         Self::Scores,
+        Self::Zones,
         Self::Views,
         Self::Timestamp,
     ];
@@ -56,6 +59,7 @@ impl Layer {
             Self::Boxes => "boxes",
             Self::Oriented => "oriented",
             Self::Scores => "scores",
+            Self::Zones => "zones",
             Self::Views => "views",
             Self::Timestamp => "timestamp",
         }

@@ -1,13 +1,16 @@
 //! What every route that finds people does with a frame: it waits for the report as long as it may,
 //! counts, traces and keeps it.
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 
 use super::{ApiState, deadline::Deadline, limit::Limit, problem::Problem, report::Report};
 use crate::{
+    annotated_picture::KeptFrame,
     metrics::Metrics,
     pipeline::{DetectJob, Detected, DetectionReport},
-    results::NewReport,
+    results::{NewPicture, NewReport},
     telemetry::RequestTrace,
 };
 
@@ -31,12 +34,15 @@ pub(super) async fn find<T: Send + 'static>(
 ) -> Result<(DetectionReport, T), Problem> {
     let limit = Limit::of(deadline, job.parameters.timeout);
     let timeline = job.ticket.timeline.clone();
-    let work = state.workers.detect_and(job, |detected| {
+    let pictures_of = Arc::clone(&state.options.pictures_of);
+    let work = state.workers.detect_and(job, move |detected| {
         // The frame is kept for as long as the answer needs it, which a report does not.
         let report = detected.report.clone();
-        (report, written(detected, write))
+        let is_kept = pictures_of.include(&report.camera);
+        let picture = is_kept.then(|| picture(&detected)).flatten();
+        (report, picture, written(detected, write))
     });
-    let (report, written) = limit.wait(trace, &timeline, work).await?;
+    let (report, picture, written) = limit.wait(trace, &timeline, work).await?;
     describe(trace, &report);
     record(&state.metrics, &report);
     if state.options.zone_metrics {
@@ -51,7 +57,7 @@ pub(super) async fn find<T: Send + 'static>(
         persons: report.persons.len(),
         json,
     };
-    state.results.publish(kept);
+    state.results.publish(kept, picture);
     Ok((report, answer))
 }
 
@@ -69,6 +75,20 @@ fn written<T>(
         json: &json,
     })?;
     Ok((json, answer))
+}
+
+/// The picture that is kept of the frame. One that cannot be kept costs nobody the report.
+fn picture(detected: &Detected) -> Option<NewPicture> {
+    match KeptFrame::of(detected) {
+        Ok(kept) => Some(NewPicture {
+            frame: kept.jpeg,
+            sketch: kept.sketch,
+        }),
+        Err(error) => {
+            tracing::warn!("no picture is kept of this frame: {error}");
+            None
+        }
+    }
 }
 
 /// What may explain how long a frame took.

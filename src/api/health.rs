@@ -203,7 +203,7 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
 async fn show_results(state: &ApiState) {
     let metrics = &state.metrics;
     if let Ok(kept) = state.results.usage().await {
-        metrics.show_results(kept.cameras, kept.reports, kept.bytes);
+        metrics.show_results(kept.cameras, kept.reports, kept.bytes, kept.pictures);
     }
     let health = state.results.health();
     let up = health.problem.is_none();

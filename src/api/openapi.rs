@@ -10,13 +10,13 @@ use utoipa::{OpenApi, openapi};
 
 use security::Keys;
 
-pub(super) use parameters::{DetectForm, DetectQuery};
+pub(super) use parameters::{DetectForm, DetectQuery, PictureQuery};
 pub(super) use problems::{
     CameraEventsProblems, ChangeProblems, DeepStackCustomProblems, DeepStackProblems,
     DeleteProblems, DetectProblems, EventsProblems, FaultProblem, HistoryProblems, IndexProblems,
     InferProblems, LatestProblems, LoadProblems, ModelProblems, ModelReadyProblems,
-    NotReadyProblems, ReadProblems, ResultsProblems, TrialProblems, UnknownCalibrationProblem,
-    ViewsProblems,
+    NotReadyProblems, PictureProblems, ReadProblems, ResultsProblems, TrialProblems,
+    UnknownCalibrationProblem, ViewsProblems,
 };
 
 use super::problem::ProblemBody;

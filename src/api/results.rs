@@ -6,6 +6,7 @@ pub(super) mod events;
 mod feed;
 pub(super) mod history;
 pub(super) mod latest;
+pub(super) mod picture;
 mod row;
 
 use axum::{

@@ -10,8 +10,12 @@ use super::{
     upload::{BodyReader, UploadBudget},
 };
 use crate::{
-    calibration::Calibrations, inference::ModelRepository, metrics::Metrics, pipeline::WorkerPool,
-    results::ResultStore, telemetry::Tracer,
+    calibration::Calibrations,
+    inference::ModelRepository,
+    metrics::Metrics,
+    pipeline::WorkerPool,
+    results::{PicturesOf, ResultStore},
+    telemetry::Tracer,
 };
 
 /// Who may do what, and what a request may cost.
@@ -27,6 +31,8 @@ pub struct ApiOptions {
     pub max_headers: usize,
     /// Whether the persons in each zone are shown as a metric.
     pub zone_metrics: bool,
+    /// The cameras whose latest picture is kept.
+    pub pictures_of: Arc<PicturesOf>,
     /// Whether metrics are on a port of their own, and not among the other routes.
     pub metrics_elsewhere: bool,
     /// Longest a request may take, from its first byte to its answer.

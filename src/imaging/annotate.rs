@@ -1,4 +1,4 @@
-//! Found persons, drawn into their frame: an oriented box, its axis-aligned box, a label.
+//! Found persons, drawn into their frame: an oriented box, its axis-aligned box, a label; and zones.
 //!
 //! Sizes grow with the frame, so that a thumbnail and a 4000-pixel frame read alike.
 
@@ -12,7 +12,7 @@ mod mark;
 pub(super) mod text;
 
 use super::frame::Frame;
-pub use area_sketch::sketch_areas;
+pub use area_sketch::{ZoneOutline, sketch_areas};
 use canvas::{Outline, Rgb, Stroke};
 pub use encode::{EncodeError, encode_jpeg, encode_png};
 pub use lens_sketch::sketch_lens;
@@ -29,6 +29,8 @@ pub struct Drawing {
     pub oriented: bool,
     /// Thin lines below all marks, corner-origin frame pixels.
     pub lines: Vec<Vec<[f64; 2]>>,
+    /// Zones, above the lines and below all marks, with their names.
+    pub zones: Vec<ZoneOutline>,
     /// Text in the top left corner; empty for none.
     pub caption: String,
 }
@@ -64,6 +66,7 @@ impl Drawing {
             boxes: true,
             oriented: true,
             lines: Vec::new(),
+            zones: Vec::new(),
             caption: String::new(),
         }
     }
@@ -79,8 +82,11 @@ pub fn annotate(frame: &mut Frame, drawing: &Drawing) {
             stroke.draw(frame, LINE, LINE_OPACITY);
         }
     }
+    for zone in &drawing.zones {
+        zone.draw(frame, 0.6 * line_width);
+    }
     let marks = drawing.marks.iter().take(MOST_MARKS);
-    let marks: Vec<_> = marks
+    let mut marks: Vec<_> = marks
         .filter(|mark| mark.is_drawable())
         .zip(COLOURS.into_iter().cycle())
         .collect();
@@ -99,6 +105,8 @@ pub fn annotate(frame: &mut Frame, drawing: &Drawing) {
         Outline::new(main, line_width).draw(frame, *colour, 1.0);
     }
     let caption = caption::draw(frame, &drawing.caption);
+    let names: Vec<_> = drawing.zones.iter().filter_map(ZoneOutline::mark).collect();
+    marks.extend(names.iter().map(|name| (name, area_sketch::ZONE)));
     label::Labels::new(frame, &marks, caption).draw(frame);
 }
 

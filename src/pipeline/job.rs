@@ -6,7 +6,12 @@ use bytes::Bytes;
 use jiff::Timestamp;
 
 use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
-use crate::{calibration::Calibration, geometry::Pixel, imaging::Frame, inference::Model};
+use crate::{
+    calibration::Calibration,
+    geometry::Pixel,
+    imaging::{Frame, annotate::ZoneOutline},
+    inference::Model,
+};
 
 /// One frame to be looked at.
 #[derive(Debug, Clone)]
@@ -57,5 +62,17 @@ impl Detected {
     pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let rigs = self.rigs.iter();
         rigs.flat_map(|rig| rig.view_outlines()).collect()
+    }
+
+    /// The zones of the frame's calibration, as the frame shows them.
+    #[must_use]
+    pub fn zone_outlines(&self) -> Vec<ZoneOutline> {
+        // All rigs are of one camera.
+        let camera = self.rigs.first().map(|rig| rig.geometry());
+        let outlines = camera.into_iter().flat_map(|camera| {
+            let outline = |zone| ZoneOutline::of(zone, &camera.lens, &camera.mount);
+            camera.areas.zones.iter().map(outline)
+        });
+        outlines.collect()
     }
 }

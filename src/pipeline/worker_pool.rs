@@ -134,6 +134,18 @@ impl WorkerPool {
         self.queue(ticket, work).await
     }
 
+    /// Does other work that takes its time, such as drawing, in a place among the frames and in the middle of
+    /// their priorities: it is bounded as they are. Dropping the future withdraws what has not begun.
+    ///
+    /// # Errors
+    /// As [`WorkerPool::detect`].
+    pub async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, PipelineError> {
+        self.queue(Ticket::default(), |_: &Engine| Ok(work())).await
+    }
+
     async fn queue<T: Send + 'static>(
         &self,
         ticket: Ticket,

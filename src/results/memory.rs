@@ -1,6 +1,7 @@
 //! Reports in the memory of this process.
 
 mod kept;
+mod pictures;
 
 use std::{
     num::NonZeroUsize,
@@ -12,8 +13,8 @@ use jiff::Timestamp;
 
 use self::kept::Kept;
 use super::{
-    Cameras, Listeners, NewReport, ReportId, ResultLimits, ResultStore, ResultUse, StoreHealth,
-    StoredReport, Unreachable,
+    Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
+    StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
 
 /// Keeps reports in memory, within limits; they go when the process ends.
@@ -33,11 +34,11 @@ impl MemoryResults {
         }
     }
 
-    /// Keeps a report and tells whoever listens.
-    pub fn store(&self, report: NewReport) -> Arc<StoredReport> {
+    /// Keeps a report, perhaps with its picture, and tells whoever listens.
+    pub fn store(&self, report: NewReport, picture: Option<NewPicture>) -> Arc<StoredReport> {
         // Told while nobody else can publish: listeners rely on the order.
         let mut kept = self.kept();
-        let stored = kept.add(report, Timestamp::now());
+        let stored = kept.add(report, picture, Timestamp::now());
         self.listeners.tell(&stored);
         stored
     }
@@ -50,8 +51,8 @@ impl MemoryResults {
 
 #[async_trait]
 impl ResultStore for MemoryResults {
-    fn publish(&self, report: NewReport) {
-        self.store(report);
+    fn publish(&self, report: NewReport, picture: Option<NewPicture>) {
+        self.store(report, picture);
     }
 
     async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable> {
@@ -69,6 +70,10 @@ impl ResultStore for MemoryResults {
         most: NonZeroUsize,
     ) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
         Ok(self.kept().since(cameras, after, most.get()))
+    }
+
+    async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
+        Ok(self.kept().picture(camera))
     }
 
     fn listeners(&self) -> &Arc<Listeners> {

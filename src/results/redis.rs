@@ -28,8 +28,8 @@ use tokio::{task::JoinSet, time::timeout};
 pub use self::address::{RedisAddress, RedisAddressError};
 use self::{keys::Keys, link::Link, outbox::Outbox, reading::Reader};
 use super::{
-    Cameras, Listeners, NewReport, ReportId, ResultLimits, ResultStore, ResultUse, StoreHealth,
-    StoredReport, Unreachable,
+    Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
+    StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
 
 /// How long the end of the server waits for reports that Redis does not have yet.
@@ -106,8 +106,8 @@ impl RedisResults {
 
 #[async_trait]
 impl ResultStore for RedisResults {
-    fn publish(&self, report: NewReport) {
-        self.shared.outbox.push(report);
+    fn publish(&self, report: NewReport, picture: Option<NewPicture>) {
+        self.shared.outbox.push(report, picture);
     }
 
     async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable> {
@@ -131,6 +131,11 @@ impl ResultStore for RedisResults {
             Cameras::One(camera) => reader.since_of(camera, after, most).await,
         })
         .await
+    }
+
+    async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
+        self.ask(async |mut reader| reader.picture(camera).await)
+            .await
     }
 
     fn listeners(&self) -> &Arc<Listeners> {

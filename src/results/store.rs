@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, sync::Arc};
 
 use async_trait::async_trait;
 
-use super::{Listeners, NewReport, ReportId, StoredReport};
+use super::{Listeners, NewPicture, NewReport, ReportId, StoredPicture, StoredReport};
 
 /// Whose reports.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -24,8 +24,9 @@ pub struct Unreachable(pub String);
 #[async_trait]
 pub trait ResultStore: Send + Sync {
     /// Keeps a report, gives it the next ID, and tells whoever listens, in the order of the IDs. Nobody
-    /// waits for that: a place that is elsewhere has it a little later.
-    fn publish(&self, report: NewReport);
+    /// waits for that: a place that is elsewhere has it a little later. The picture takes the place of
+    /// the one before; so does none.
+    fn publish(&self, report: NewReport, picture: Option<NewPicture>);
 
     /// The latest report of a camera, if it has one.
     ///
@@ -49,6 +50,12 @@ pub trait ResultStore: Send + Sync {
         after: ReportId,
         most: NonZeroUsize,
     ) -> Result<Vec<Arc<StoredReport>>, Unreachable>;
+
+    /// The picture of a camera's latest report, if it is kept.
+    ///
+    /// # Errors
+    /// [`Unreachable`].
+    async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable>;
 
     /// Who listens to what is published, here or on another server with the same store.
     fn listeners(&self) -> &Arc<Listeners>;
@@ -77,6 +84,8 @@ pub struct ResultLimits {
     pub max_reports: NonZeroUsize,
     /// Bytes of all reports, in the same way.
     pub max_bytes: usize,
+    /// Cameras with a picture; the one that has been silent for longest loses its.
+    pub max_pictures: NonZeroUsize,
     /// Listeners at the same time.
     pub max_listeners: NonZeroUsize,
 }
@@ -90,6 +99,7 @@ impl Default for ResultLimits {
             history_per_camera: count(100),
             max_reports: count(10_000),
             max_bytes: 64 << 20,
+            max_pictures: count(64),
             max_listeners: count(256),
         }
     }
@@ -104,6 +114,8 @@ pub struct ResultUse {
     pub reports: usize,
     /// How much memory those take, bytes.
     pub bytes: usize,
+    /// Cameras with a picture.
+    pub pictures: usize,
 }
 
 /// What became of the reports that were published here.

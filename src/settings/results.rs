@@ -8,7 +8,7 @@ use super::{
     ResultSettings, SettingsError,
     check::{MAX_BYTES, count, size, within},
 };
-use crate::results::{RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
+use crate::results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
 
 /// 8 MiB: any one report has room.
 const MIN_BYTES: u64 = 8 << 20;
@@ -26,6 +26,8 @@ pub(super) struct RawResults {
     history_per_camera: u64,
     max_reports: u64,
     max_bytes: u64,
+    pictures: String,
+    max_pictures: u64,
     max_listeners: u64,
 }
 
@@ -40,6 +42,8 @@ impl Default for RawResults {
             history_per_camera: limits.history_per_camera.get() as u64,
             max_reports: limits.max_reports.get() as u64,
             max_bytes: limits.max_bytes as u64,
+            pictures: String::new(),
+            max_pictures: limits.max_pictures.get() as u64,
             max_listeners: limits.max_listeners.get() as u64,
         }
     }
@@ -51,15 +55,27 @@ impl TryFrom<RawResults> for ResultSettings {
     fn try_from(raw: RawResults) -> Result<Self, SettingsError> {
         Ok(Self {
             redis: redis(&raw)?,
+            pictures_of: pictures_of(&raw.pictures),
             limits: ResultLimits {
                 max_cameras: count("results.max_cameras", raw.max_cameras)?,
                 history_per_camera: count("results.history_per_camera", raw.history_per_camera)?,
                 max_reports: count("results.max_reports", raw.max_reports)?,
                 max_bytes: size("results.max_bytes", raw.max_bytes, MIN_BYTES..=MAX_BYTES)?,
+                max_pictures: count("results.max_pictures", raw.max_pictures)?,
                 max_listeners: count("results.max_listeners", raw.max_listeners)?,
             },
         })
     }
+}
+
+/// `*` is every camera.
+fn pictures_of(names: &str) -> PicturesOf {
+    let names = || names.split(',').map(str::trim);
+    if names().any(|name| name == "*") {
+        return PicturesOf::All;
+    }
+    let named = names().filter(|name| !name.is_empty());
+    PicturesOf::Some(named.map(ToOwned::to_owned).collect())
 }
 
 fn redis(raw: &RawResults) -> Result<Option<RedisOptions>, SettingsError> {

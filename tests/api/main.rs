@@ -11,6 +11,7 @@ mod detect;
 mod detector;
 mod ending;
 mod extremes;
+mod kept_pictures;
 mod load;
 mod log;
 mod logs;

@@ -19,7 +19,7 @@ impl Service {
             persons: number,
             json: Bytes::from(number.to_string()),
         };
-        self.results.store(report).id
+        self.results.store(report, None).id
     }
 
     pub(crate) async fn get_if_none_match(&self, path: &str, tag: &str) -> Answer {
@@ -199,7 +199,7 @@ async fn a_page_of_large_reports_ends_early() {
             persons: 0,
             json: Bytes::from(format!("\"{}\"", "x".repeat(3 << 20))),
         };
-        service.results.store(report);
+        service.results.store(report, None);
     }
     let answer = service.get("/results/lobby/history").await.json();
     assert_eq!(answer.as_array().unwrap().len(), 2);

@@ -21,7 +21,7 @@ use lookdown::{
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
     pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
-    results::{MemoryResults, ResultLimits, ResultStore},
+    results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
     telemetry::Tracer,
 };
 use serde_json::Value;
@@ -70,6 +70,7 @@ pub(crate) struct Bounds {
     pub(crate) request_rate: Option<RequestRate>,
     pub(crate) results: ResultLimits,
     pub(crate) zone_metrics: bool,
+    pub(crate) pictures_of: PicturesOf,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
     pub(crate) tracer: Tracer,
@@ -86,6 +87,7 @@ impl Default for Bounds {
             request_rate: None,
             results: ResultLimits::default(),
             zone_metrics: false,
+            pictures_of: PicturesOf::default(),
             access: Access::Open {
                 own_machine_only: true,
             },
@@ -230,6 +232,7 @@ impl Service {
                 max_header_bytes: 4096,
                 max_headers: 32,
                 zone_metrics: bounds.zone_metrics,
+                pictures_of: Arc::new(bounds.pictures_of.clone()),
                 metrics_elsewhere: false,
                 request_timeout: bounds.request_timeout,
                 min_upload_bytes_per_second: bounds.min_upload_bytes_per_second,

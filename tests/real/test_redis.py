@@ -25,6 +25,7 @@ PICTURE = OFFICE.read_bytes()
 PATIENCE = 20.0
 RECORD = (ROOT / "src" / "results" / "redis" / "record.lua").read_text(encoding="utf-8")
 """What Redis does with a report."""
+MOST_PICTURES = 2
 
 
 @contextlib.contextmanager
@@ -336,6 +337,32 @@ def _variable(name: str, value: str) -> Iterator[None]:
 class Bounds(unittest.TestCase):
     """How much there may be."""
 
+    def test_a_picture_is_drawn_by_any_server(self) -> None:
+        """The same everywhere, with its ETag; none of cameras that are not named."""
+        with RedisServer() as redis:
+            with (
+                replica("redis-camera", redis.url, RESULTS__PICTURES="hall") as one,
+                replica("redis-viewer", redis.url) as other,
+            ):
+                for camera in ("hall", "hall", "stairs"):
+                    detect(one, camera)
+                path = "/results/hall/latest.jpg?draw=boxes,scores,views,timestamp&width=640"
+                until(lambda: metric(one, "results_waiting") == 0.0)
+                pictures = [get(server, path) for server in (one, other)]
+                self.assertEqual([picture.status for picture in pictures], [200, 200])
+                self.assertTrue(pictures[0].body.startswith(b"\xff\xd8\xff"))
+                self.assertEqual(pictures[0].body, pictures[1].body)
+                latest = get(other, "/results/hall/latest").headers["etag"]
+                self.assertEqual([picture.headers["etag"] for picture in pictures], [latest, latest])
+                self.assertEqual(get(other, path, If_None_Match=latest).status, 304)
+                problem = get(other, "/results/stairs/latest.jpg").json()
+                self.assertEqual(problem["type"], "urn:lookdown:problem:picture-not-kept")
+                self.assertIn(redis.ask("TTL", "lookdown:picture:hall"), range(80_000, 86_401))
+                self.assertLess(redis.ask("MEMORY", "USAGE", "lookdown:picture:hall"), 4 << 20)
+                # A server that keeps none takes the one before away.
+                detect(other, "hall")
+                until(lambda: get(one, path).status == 404)
+
     def test_servers_keep_to_their_settings(self) -> None:
         """Cameras, history and reports."""
         bounds = {"RESULTS__MAX_CAMERAS": "3", "RESULTS__HISTORY_PER_CAMERA": "4", "RESULTS__MAX_REPORTS": "8"}
@@ -359,11 +386,14 @@ class Bounds(unittest.TestCase):
                 redis.ask("FLUSHALL")
                 limits = [chance.randrange(1, most) for most in (6, 6, 20, 4000)]
                 kept: list[tuple[str, int, int]] = []
+                pictured: list[str] = []
                 for number in range(1, 60):
                     report = (str(chance.randrange(8)), number, chance.randrange(200, 800))
                     # Whoever gets no answer sends it again.
                     redis.ask_all([record(report, limits)] * chance.choice((1, 1, 2)))
                     kept = room_for(kept, report, limits)
+                    pictured = [camera for camera in pictured if camera != report[0]] + [report[0]] * has_picture(number)
+                    pictured = [camera for camera in pictured if any(one[0] == camera for one in kept)][-MOST_PICTURES:]
                     entries = redis.ask("XRANGE", "t:reports", "-", "+")
                     self.assertEqual([tuple(entry[1][1::2]) for entry in entries], [_fields(one) for one in kept])
                     ids = {int(one[1][1]): entry[0] for entry, one in zip(entries, _contents(redis, entries), strict=True)}
@@ -374,13 +404,22 @@ class Bounds(unittest.TestCase):
                 self.assertEqual(redis.ask("ZCARD", "t:earlier"), len(kept) - len(latest))
                 self.assertEqual(int(redis.ask("HGET", "t:totals", "bytes")), sum(one[2] for one in kept))
                 self.assertEqual(len(redis.ask("KEYS", "t:camera:*")), len(latest))
+                self.assertEqual(redis.ask("ZRANGE", "t:pictures", 0, -1), [camera.encode() for camera in pictured])
+                self.assertEqual(len(redis.ask("KEYS", "t:picture:*")), len(pictured))
+
+
+def has_picture(number: int) -> bool:
+    """Whether the report of this number brings one."""
+    return number % 3 != 0
 
 
 def record(report: tuple[str, int, int], limits: list[int]) -> tuple:
     """The command for a report of a camera, with its number and its bytes."""
     camera, number, size = report
-    keys = [f"t:{name}" for name in ("reports", "earlier", "cameras", "totals", "sender")]
-    return ("EVAL", RECORD, len(keys), *keys, "t:camera:", number, camera, "then", number, "{}", size, *limits, 3600)
+    keys = [f"t:{name}" for name in ("reports", "earlier", "cameras", "totals", "pictures", "sender")]
+    picture = ("frame", "sketch") if has_picture(number) else ("", "")
+    told = (number, camera, "then", number, "{}", *picture, size)
+    return ("EVAL", RECORD, len(keys), *keys, "t:camera:", "t:picture:", *told, *limits, MOST_PICTURES, 3600)
 
 
 def room_for(kept: list[tuple[str, int, int]], report: tuple[str, int, int], limits: list[int]) -> list[tuple[str, int, int]]:

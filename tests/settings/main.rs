@@ -45,7 +45,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 59, "a key is missing from {example}");
+    assert_eq!(stated.count(), 61, "a key is missing from {example}");
 }
 
 #[test]
@@ -154,4 +154,21 @@ fn draining_takes_as_long_as_a_request_may_unless_somebody_says_otherwise() {
 fn without_a_number_of_sessions_the_machine_decides() {
     let sessions = defaults().threads.sessions;
     assert_eq!(sessions, std::thread::available_parallelism().unwrap());
+}
+
+#[test]
+fn pictures_are_kept_of_the_cameras_that_are_named_and_of_nobody_else() {
+    for (named, hall, stairs) in [
+        ("", false, false),
+        ("hall", true, false),
+        (" hall , yard,", true, false),
+        ("hall north", false, false),
+        ("*", true, true),
+        ("hall,*", true, true),
+    ] {
+        let settings = from_environment("LOOKDOWN__RESULTS__PICTURES", named).unwrap();
+        let pictures_of = settings.results.pictures_of;
+        let kept = ["hall", "stairs"].map(|camera| pictures_of.include(camera));
+        assert_eq!(kept, [hall, stairs], "{named:?}");
+    }
 }

@@ -77,15 +77,15 @@ pub(in crate::api) struct DetectQuery {
     #[param(inline)]
     #[schema(inline)]
     format: Option<FormatName>,
-    /// What is drawn into a picture: some of `boxes`, `oriented`, `scores`, `views` and `timestamp`,
-    /// with commas, or `none`.
+    /// What is drawn into a picture: some of `boxes`, `oriented`, `scores`, `zones`, `views` and
+    /// `timestamp`, with commas, or `none`.
     #[param(
         default = "oriented,scores",
-        pattern = "^(none|(boxes|oriented|scores|views|timestamp)(,(boxes|oriented|scores|views|timestamp))*)$"
+        pattern = "^(none|(boxes|oriented|scores|zones|views|timestamp)(,(boxes|oriented|scores|zones|views|timestamp))*)$"
     )]
     #[schema(
         default = "oriented,scores",
-        pattern = "^(none|(boxes|oriented|scores|views|timestamp)(,(boxes|oriented|scores|views|timestamp))*)$"
+        pattern = "^(none|(boxes|oriented|scores|zones|views|timestamp)(,(boxes|oriented|scores|zones|views|timestamp))*)$"
     )]
     draw: Option<String>,
     /// Width of a picture, pixels; a frame that is no wider stays as it is.
@@ -95,6 +95,29 @@ pub(in crate::api) struct DetectQuery {
     /// Quality of a JPEG.
     #[param(minimum = 1, maximum = 100, default = 88)]
     #[schema(minimum = 1, maximum = 100, default = 88)]
+    quality: Option<u8>,
+}
+
+/// How a picture is drawn, in the query.
+#[derive(IntoParams)]
+#[into_params(parameter_in = Query)]
+#[expect(
+    dead_code,
+    reason = "describes what annotated_picture::PictureOptions reads"
+)]
+pub(in crate::api) struct PictureQuery {
+    /// What is drawn: some of `boxes`, `oriented`, `scores`, `zones`, `views` and `timestamp`, with
+    /// commas, or `none`.
+    #[param(
+        default = "oriented,scores",
+        pattern = "^(none|(boxes|oriented|scores|zones|views|timestamp)(,(boxes|oriented|scores|zones|views|timestamp))*)$"
+    )]
+    draw: Option<String>,
+    /// Width, pixels; a frame that is no wider stays as it is.
+    #[param(minimum = 64, maximum = 8192, example = 640)]
+    width: Option<u32>,
+    /// Quality of the JPEG.
+    #[param(minimum = 1, maximum = 100, default = 88)]
     quality: Option<u8>,
 }
 

@@ -45,6 +45,7 @@ fn of_frames() -> impl Iterator<Item = ProblemKind> {
                 | ProblemKind::NotFound
                 | ProblemKind::MethodNotAllowed
                 | ProblemKind::UnknownCamera
+                | ProblemKind::PictureNotKept
                 | ProblemKind::TooManyListeners
                 | ProblemKind::InvalidCalibration
                 | ProblemKind::CalibrationConflict
@@ -238,6 +239,27 @@ impl IntoResponses for LatestProblems {
             ProblemKind::ShuttingDown,
         ];
         responses(OF_READING.into_iter().chain(of_waiting))
+    }
+}
+
+/// What can go wrong with the latest picture of a camera.
+pub(in crate::api) struct PictureProblems;
+
+impl IntoResponses for PictureProblems {
+    fn responses() -> BTreeMap<String, RefOr<Response>> {
+        let of_pictures = [
+            ProblemKind::UnknownParameter,
+            ProblemKind::RepeatedParameter,
+            ProblemKind::UnknownCamera,
+            ProblemKind::PictureNotKept,
+            ProblemKind::InvalidParameter,
+            ProblemKind::Overloaded,
+            ProblemKind::Internal,
+            ProblemKind::ResultsUnreachable,
+            ProblemKind::ShuttingDown,
+            ProblemKind::Timeout,
+        ];
+        responses(OF_READING.into_iter().chain(of_pictures))
     }
 }
 

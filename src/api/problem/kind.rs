@@ -23,6 +23,8 @@ pub(in crate::api) enum ProblemKind {
     UnknownCalibration,
     /// No report of the camera is kept.
     UnknownCamera,
+    /// No picture of the camera is kept.
+    PictureNotKept,
     /// The content makes no calibration.
     InvalidCalibration,
     /// The calibration's file does not allow it.
@@ -83,7 +85,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 37] = [
+    pub(in crate::api) const ALL: [Self; 38] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -93,6 +95,7 @@ impl ProblemKind {
         Self::NotFound,
         Self::UnknownCalibration,
         Self::UnknownCamera,
+        Self::PictureNotKept,
         Self::InvalidCalibration,
         Self::CalibrationConflict,
         Self::CalibrationsUnreachable,
@@ -135,6 +138,7 @@ impl ProblemKind {
             Self::NotFound => ("not-found", "There is nothing here"),
             Self::UnknownCalibration => ("unknown-calibration", "There is no such calibration"),
             Self::UnknownCamera => ("unknown-camera", "No report of this camera is kept"),
+            Self::PictureNotKept => ("picture-not-kept", "No picture of this camera is kept"),
             Self::InvalidCalibration => ("invalid-calibration", "The calibration cannot be used"),
             Self::CalibrationConflict => (
                 "calibration-conflict",
@@ -203,6 +207,7 @@ impl ProblemKind {
             Self::NotFound
             | Self::UnknownCalibration
             | Self::UnknownCamera
+            | Self::PictureNotKept
             | Self::UnknownModel => StatusCode::NOT_FOUND,
             Self::ModelConflict | Self::CalibrationConflict => StatusCode::CONFLICT,
             Self::Outdated => StatusCode::PRECONDITION_FAILED,

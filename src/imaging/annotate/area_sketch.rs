@@ -1,20 +1,74 @@
 //! Zones and masks drawn into a frame of their camera.
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     Mark,
     canvas::{Rgb, Stroke},
+    is_drawable,
     label::Labels,
     line_width,
 };
 use crate::{
-    geometry::{Lens, Mount, Pixel, Polygon, Zone},
+    geometry::{Lens, Mount, Polygon, Zone},
     imaging::{Frame, MaskedPixels},
 };
 
-const ZONE: Rgb = [126, 240, 110];
+pub(super) const ZONE: Rgb = [126, 240, 110];
 const MASK: Rgb = [255, 128, 210];
 /// Edges on the floor are curves in the frame.
 const POINTS_PER_EDGE: u32 = 32;
+
+/// A zone as a frame shows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ZoneOutline {
+    /// Its name.
+    pub name: String,
+    /// Its border, in pieces where the lens does not see all of it; corner-origin frame pixels.
+    pub lines: Vec<Vec<[f64; 2]>>,
+}
+
+impl ZoneOutline {
+    /// A zone that is in pixels of the frame, or on the floor seen through `lens`.
+    #[must_use]
+    pub fn of(zone: &Zone, lens: &Lens, mount: &Mount) -> Self {
+        let outline = zone.outline(lens, mount, POINTS_PER_EDGE);
+        let pieces = outline.split(Option::is_none);
+        let lines = pieces.map(|piece| piece.iter().flatten().map(|at| [at.x, at.y]).collect());
+        Self {
+            name: zone.name.clone(),
+            lines: lines.filter(|line: &Vec<_>| !line.is_empty()).collect(),
+        }
+    }
+
+    pub(super) fn draw(&self, frame: &mut Frame, width: f64) {
+        for line in self.lines.iter().filter(|line| is_drawable(line)) {
+            for pair in line.windows(2) {
+                Stroke::new(pair[0], pair[1], width).draw(frame, ZONE, 1.0);
+            }
+        }
+    }
+
+    /// Its name at its bounding box; `None` when nothing of it is seen.
+    pub(super) fn mark(&self) -> Option<Mark> {
+        let points = self.lines.iter().flatten().map(|&[x, y]| [x, y, x, y]);
+        let bbox = points.reduce(|a, b| {
+            [
+                a[0].min(b[0]),
+                a[1].min(b[1]),
+                a[2].max(b[2]),
+                a[3].max(b[3]),
+            ]
+        })?;
+        let mark = Mark {
+            bbox,
+            oriented: None,
+            head: None,
+            label: self.name.clone(),
+        };
+        mark.is_drawable().then_some(mark)
+    }
+}
 
 /// Blanks what is under `masks` and outlines them, and draws `zones` with their names; all are in
 /// pixels of the frame or on the floor seen through `lens`.
@@ -32,43 +86,14 @@ pub fn sketch_areas(
             Stroke::new(from.into(), to.into(), width).draw(frame, MASK, 1.0);
         }
     }
-    let outlines: Vec<_> = zones
-        .iter()
-        .map(|zone| (zone, zone.outline(lens, mount, POINTS_PER_EDGE)))
-        .collect();
-    for (_, outline) in &outlines {
-        for pair in outline.windows(2) {
-            if let [Some(from), Some(to)] = *pair {
-                Stroke::new(from.into(), to.into(), width).draw(frame, ZONE, 1.0);
-            }
-        }
+    let zones = zones.iter().map(|zone| ZoneOutline::of(zone, lens, mount));
+    let zones: Vec<_> = zones.collect();
+    for zone in &zones {
+        zone.draw(frame, width);
     }
-    let named: Vec<_> = outlines
-        .iter()
-        .filter_map(|(zone, outline)| mark(zone, outline.iter().flatten()))
-        .collect();
-    let coloured: Vec<_> = named.iter().map(|mark| (mark, ZONE)).collect();
-    Labels::new(frame, &coloured, None).draw(frame);
-}
-
-/// The name of a zone at its bounding box; `None` when nothing of it is seen.
-fn mark<'a>(zone: &Zone, outline: impl Iterator<Item = &'a Pixel>) -> Option<Mark> {
-    let bbox = outline
-        .map(|point| [point.x, point.y, point.x, point.y])
-        .reduce(|a, b| {
-            [
-                a[0].min(b[0]),
-                a[1].min(b[1]),
-                a[2].max(b[2]),
-                a[3].max(b[3]),
-            ]
-        })?;
-    Some(Mark {
-        bbox,
-        oriented: None,
-        head: None,
-        label: zone.name.clone(),
-    })
+    let names: Vec<_> = zones.iter().filter_map(ZoneOutline::mark).collect();
+    let names: Vec<_> = names.iter().map(|name| (name, ZONE)).collect();
+    Labels::new(frame, &names, None).draw(frame);
 }
 
 #[cfg(test)]

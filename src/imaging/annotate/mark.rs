@@ -1,10 +1,12 @@
 //! What is marked in a frame.
 
+use serde::{Deserialize, Serialize};
+
 use super::is_drawable;
 
 /// One thing to draw. All coordinates are frame pixels, corner-origin: pixel i covers
 /// [i, i + 1).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
     /// Axis-aligned box: x and y of its top-left corner, then of its bottom-right corner.
     pub bbox: [f64; 4],
@@ -17,7 +19,7 @@ pub struct Mark {
 }
 
 /// A rotated box.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OrientedMark {
     /// Column of the centre.
     pub cx: f64,
@@ -32,7 +34,7 @@ pub struct OrientedMark {
 }
 
 /// A circle around a head.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Head {
     /// Column of the centre.
     pub cx: f64,

@@ -65,6 +65,25 @@ async fn a_full_queue_refuses_at_once_and_serves_again_when_it_has_drained() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn other_work_waits_for_its_turn_in_a_place_among_the_frames() {
+    let (pool, begins, go) = gated_pool(2);
+    let first = spawn(&pool);
+    begins.recv().unwrap();
+    let others = Arc::clone(&pool);
+    let other = tokio::spawn(async move { others.run(|| 7).await });
+    until_pending(&pool, 2).await;
+    let refused = pool.run(|| 8).await.unwrap_err();
+    assert!(matches!(
+        refused,
+        PipelineError::Overloaded { capacity: 2, .. }
+    ));
+    go.send(()).unwrap();
+    first.await.unwrap().unwrap();
+    assert_eq!(other.await.unwrap().unwrap(), 7);
+    until_pending(&pool, 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_frame_whose_client_has_left_is_not_worked_on() {
     let (pool, begins, go) = gated_pool(4);
     let first = spawn(&pool);

@@ -8,7 +8,10 @@ use std::{
 
 use jiff::Timestamp;
 
-use crate::results::{Cameras, NewReport, ReportId, ResultLimits, ResultUse, StoredReport};
+use super::pictures::Pictures;
+use crate::results::{
+    Cameras, NewPicture, NewReport, ReportId, ResultLimits, ResultUse, StoredPicture, StoredReport,
+};
 
 /// Every report is in `cameras`, and in one of `latest` and `earlier`.
 #[derive(Debug)]
@@ -20,6 +23,7 @@ pub(super) struct Kept {
     latest: BTreeMap<ReportId, Arc<StoredReport>>,
     /// All others.
     earlier: BTreeMap<ReportId, Arc<StoredReport>>,
+    pictures: Pictures,
     bytes: usize,
     newest: ReportId,
     stored: u64,
@@ -28,6 +32,7 @@ pub(super) struct Kept {
 impl Kept {
     pub(super) fn new(limits: ResultLimits) -> Self {
         Self {
+            pictures: Pictures::new(limits.max_pictures),
             limits,
             cameras: HashMap::new(),
             latest: BTreeMap::new(),
@@ -39,13 +44,19 @@ impl Kept {
     }
 
     /// Keeps a report, and lets go what there is no room for.
-    pub(super) fn add(&mut self, report: NewReport, now: Timestamp) -> Arc<StoredReport> {
+    pub(super) fn add(
+        &mut self,
+        report: NewReport,
+        picture: Option<NewPicture>,
+        now: Timestamp,
+    ) -> Arc<StoredReport> {
         let id = ReportId::next(self.newest, now);
         let stored = Arc::new(StoredReport { id, report });
         self.newest = id;
         self.stored += 1;
         self.bytes += stored.report.bytes();
         let camera = &stored.report.camera;
+        self.pictures.replace(camera, id, picture);
         let reports = self.cameras.entry(camera.clone()).or_default();
         if let Some(before) = reports.back() {
             self.latest.remove(&before.id);
@@ -90,6 +101,7 @@ impl Kept {
         }
         if reports.is_empty() {
             self.cameras.remove(camera);
+            self.pictures.forget(camera);
         }
         true
     }
@@ -135,6 +147,10 @@ impl Kept {
         }
     }
 
+    pub(super) fn picture(&self, camera: &str) -> Option<Arc<StoredPicture>> {
+        self.pictures.of(camera)
+    }
+
     /// How many were ever kept.
     pub(super) fn stored(&self) -> u64 {
         self.stored
@@ -145,6 +161,7 @@ impl Kept {
             cameras: self.cameras.len(),
             reports: self.count(),
             bytes: self.bytes,
+            pictures: self.pictures.count(),
         }
     }
 }

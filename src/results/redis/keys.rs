@@ -31,6 +31,21 @@ impl Keys {
         format!("{}:totals", self.prefix)
     }
 
+    /// A sorted set of the cameras that have a picture by the ID of its report.
+    pub(super) fn pictures(&self) -> String {
+        format!("{}:pictures", self.prefix)
+    }
+
+    /// A hash of a camera's picture: the report's ID (`id`), `frame` and `sketch`.
+    pub(super) fn picture(&self, camera: &str) -> String {
+        format!("{}{camera}", self.prefix_of_pictures())
+    }
+
+    /// How the keys of all pictures begin.
+    pub(super) fn prefix_of_pictures(&self) -> String {
+        format!("{}:picture:", self.prefix)
+    }
+
     /// The number of the last report that a server has sent.
     pub(super) fn sender(&self, server: &str) -> String {
         format!("{}:sender:{server}", self.prefix)

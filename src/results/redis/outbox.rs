@@ -8,11 +8,18 @@ use std::{
 
 use tokio::sync::Notify;
 
-use crate::results::NewReport;
+use crate::results::{NewPicture, NewReport};
 
 /// What may wait: minutes of a few cameras.
 const MOST_REPORTS: usize = 1000;
 const MOST_BYTES: usize = 32 << 20;
+
+/// A report, perhaps with its picture.
+#[derive(Debug)]
+pub(super) struct Parcel {
+    pub(super) report: NewReport,
+    pub(super) picture: Option<NewPicture>,
+}
 
 /// Reports that wait, oldest first.
 #[derive(Debug, Default)]
@@ -23,7 +30,7 @@ pub(super) struct Outbox {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    reports: VecDeque<NewReport>,
+    parcels: VecDeque<Parcel>,
     bytes: usize,
     /// Whether one was taken and is not done with.
     one_is_taken: bool,
@@ -32,11 +39,13 @@ struct Waiting {
 
 impl Outbox {
     /// Puts a report behind the others. Never waits.
-    pub(super) fn push(&self, report: NewReport) {
+    pub(super) fn push(&self, report: NewReport, picture: Option<NewPicture>) {
+        let parcel = Parcel { report, picture };
         let mut waiting = self.waiting();
-        waiting.bytes += report.bytes();
-        waiting.reports.push_back(report);
-        while waiting.reports.len() > MOST_REPORTS || waiting.bytes > MOST_BYTES {
+        waiting.drop_picture_of(&parcel.report.camera);
+        waiting.bytes += parcel.bytes();
+        waiting.parcels.push_back(parcel);
+        while waiting.parcels.len() > MOST_REPORTS || waiting.bytes > MOST_BYTES {
             waiting.take_first();
             waiting.dropped += 1;
         }
@@ -45,7 +54,7 @@ impl Outbox {
     }
 
     /// Takes the first report, when there is one; [`Outbox::done`] says when it is done with.
-    pub(super) async fn first(&self) -> NewReport {
+    pub(super) async fn first(&self) -> Parcel {
         loop {
             let changed = self.changed.notified();
             tokio::pin!(changed);
@@ -83,7 +92,7 @@ impl Outbox {
     /// How many are not done with.
     pub(super) fn count(&self) -> usize {
         let waiting = self.waiting();
-        waiting.reports.len() + usize::from(waiting.one_is_taken)
+        waiting.parcels.len() + usize::from(waiting.one_is_taken)
     }
 
     /// How many were dropped or refused.
@@ -91,7 +100,7 @@ impl Outbox {
         self.waiting().dropped
     }
 
-    fn take(&self) -> Option<NewReport> {
+    fn take(&self) -> Option<Parcel> {
         let mut waiting = self.waiting();
         let first = waiting.take_first()?;
         waiting.one_is_taken = true;
@@ -104,9 +113,24 @@ impl Outbox {
     }
 }
 
+impl Parcel {
+    fn bytes(&self) -> usize {
+        self.report.bytes() + self.picture.as_ref().map_or(0, NewPicture::bytes)
+    }
+}
+
 impl Waiting {
-    fn take_first(&mut self) -> Option<NewReport> {
-        let first = self.reports.pop_front()?;
+    /// A picture that another follows is of no use any more.
+    fn drop_picture_of(&mut self, camera: &str) {
+        let mut own = self.parcels.iter_mut().rev();
+        let last = own.find(|parcel| parcel.report.camera == camera);
+        if let Some(picture) = last.and_then(|parcel| parcel.picture.take()) {
+            self.bytes -= picture.bytes();
+        }
+    }
+
+    fn take_first(&mut self) -> Option<Parcel> {
+        let first = self.parcels.pop_front()?;
         self.bytes -= first.bytes();
         Some(first)
     }
@@ -132,10 +156,12 @@ mod tests {
     async fn reports_leave_in_the_order_in_which_they_came() {
         let outbox = Outbox::default();
         let (taken, ()) = tokio::join!(
-            async { [outbox.first().await, outbox.first().await].map(|report| report.persons) },
             async {
-                outbox.push(report(1, 1));
-                outbox.push(report(2, 1));
+                [outbox.first().await, outbox.first().await].map(|parcel| parcel.report.persons)
+            },
+            async {
+                outbox.push(report(1, 1), None);
+                outbox.push(report(2, 1), None);
             }
         );
         assert_eq!(taken, [1, 2]);
@@ -146,13 +172,13 @@ mod tests {
         for length in [1, MOST_BYTES / 10] {
             let outbox = Outbox::default();
             for number in 0..2 * MOST_REPORTS {
-                outbox.push(report(number, length));
+                outbox.push(report(number, length), None);
             }
             let kept = outbox.count();
             assert!((1..=MOST_REPORTS).contains(&kept), "{kept}");
             assert!(kept * length <= MOST_BYTES);
             assert_eq!(outbox.dropped(), (2 * MOST_REPORTS - kept) as u64);
-            assert_eq!(outbox.first().await.persons, 2 * MOST_REPORTS - kept);
+            assert_eq!(outbox.first().await.report.persons, 2 * MOST_REPORTS - kept);
         }
     }
 
@@ -160,12 +186,30 @@ mod tests {
     async fn it_is_empty_when_the_last_report_is_done_with() {
         let outbox = Outbox::default();
         outbox.is_empty().await;
-        outbox.push(report(1, 1));
+        outbox.push(report(1, 1), None);
         tokio::join!(outbox.is_empty(), async {
             outbox.first().await;
             assert_eq!(outbox.count(), 1);
             outbox.done(true);
         });
         assert_eq!((outbox.count(), outbox.dropped()), (0, 1));
+    }
+
+    #[tokio::test]
+    async fn of_a_camera_only_the_latest_picture_waits() {
+        let outbox = Outbox::default();
+        let picture = |length| NewPicture {
+            frame: Bytes::from(vec![0; length]),
+            sketch: Bytes::new(),
+        };
+        for number in 1..=9 {
+            outbox.push(report(number, 1), Some(picture(MOST_BYTES / 2)));
+        }
+        assert_eq!((outbox.count(), outbox.dropped()), (9, 0));
+        for number in 1..=9 {
+            let parcel = outbox.first().await;
+            assert_eq!(parcel.report.persons, number);
+            assert_eq!(parcel.picture.is_some(), number == 9);
+        }
     }
 }

@@ -11,7 +11,7 @@ use redis::{
 };
 
 use super::keys::Keys;
-use crate::results::{NewReport, ReportId, ResultUse, StoredReport};
+use crate::results::{NewPicture, NewReport, ReportId, ResultUse, StoredPicture, StoredReport};
 
 /// A place in the stream of all reports.
 pub(super) struct Entry {
@@ -84,6 +84,27 @@ impl Reader<'_> {
         self.found(&each, cameras.collect()).await
     }
 
+    pub(super) async fn picture(
+        &mut self,
+        camera: &str,
+    ) -> RedisResult<Option<Arc<StoredPicture>>> {
+        let mut parts = cmd("HMGET");
+        parts.arg(self.keys.picture(camera));
+        parts.arg("id").arg("frame").arg("sketch");
+        let parts = parts.query_async(&mut self.connection);
+        let (id, frame, sketch): (Option<String>, Option<Vec<u8>>, Option<Vec<u8>>) = parts.await?;
+        let stored = || {
+            Some(Arc::new(StoredPicture {
+                id: id?.parse().ok()?,
+                picture: NewPicture {
+                    frame: frame?.into(),
+                    sketch: sketch?.into(),
+                },
+            }))
+        };
+        Ok(stored())
+    }
+
     /// The newest ID there ever was.
     pub(super) async fn newest(&mut self) -> RedisResult<ReportId> {
         let mut last = cmd("HGET");
@@ -97,12 +118,15 @@ impl Reader<'_> {
         counts.cmd("ZCARD").arg(self.keys.cameras());
         counts.cmd("XLEN").arg(self.keys.reports());
         counts.cmd("HGET").arg(self.keys.totals()).arg("bytes");
+        counts.cmd("ZCARD").arg(self.keys.pictures());
         let counts = counts.query_async(&mut self.connection);
-        let (cameras, reports, bytes): (usize, usize, Option<usize>) = counts.await?;
+        let (cameras, reports, bytes, pictures): (usize, usize, Option<usize>, usize) =
+            counts.await?;
         Ok(ResultUse {
             cameras,
             reports,
             bytes: bytes.unwrap_or_default(),
+            pictures,
         })
     }
 

@@ -2,14 +2,14 @@
 --
 -- `reports`: all that are kept, a stream of camera and bytes. `earlier`: the IDs of those that are not their
 -- camera's latest. `cameras`: each with the ID of its latest. `totals`: the newest ID, and the bytes of all
--- reports. `sender`: the number of the last report that this server sent. What is in a report is in a stream of
--- its camera, under the same ID.
-local reports, earlier, cameras, totals, sender = unpack(KEYS)
-local prefix_of_cameras, number, camera, received_at, persons, json = unpack(ARGV, 1, 6)
-local bytes = ARGV[7]
-local most_cameras, most_of_camera = tonumber(ARGV[8]), tonumber(ARGV[9])
-local most_reports, most_bytes = tonumber(ARGV[10]), tonumber(ARGV[11])
-local max_age_seconds = tonumber(ARGV[12])
+-- reports. `pictures`: the cameras that have one, with the ID of its report. `sender`: the number of the last
+-- report that this server sent. What is in a report is in a stream of its camera, under the same ID.
+local reports, earlier, cameras, totals, pictures, sender = unpack(KEYS)
+local prefix_of_cameras, prefix_of_pictures, number = unpack(ARGV, 1, 3)
+local camera, received_at, persons, json, frame, sketch, bytes = unpack(ARGV, 4, 10)
+local most_cameras, most_of_camera = tonumber(ARGV[11]), tonumber(ARGV[12])
+local most_reports, most_bytes = tonumber(ARGV[13]), tonumber(ARGV[14])
+local most_pictures, max_age_seconds = tonumber(ARGV[15]), tonumber(ARGV[16])
 -- Of what is too old, a report lets go more than itself.
 local OLD_AT_A_TIME = 100
 
@@ -22,6 +22,11 @@ end
 if redis.call('EXISTS', reports, totals) < 2 then
   redis.call('DEL', reports, earlier, cameras)
   redis.call('HSET', totals, 'bytes', 0)
+end
+
+local function forget_picture(name)
+  redis.call('DEL', prefix_of_pictures .. name)
+  redis.call('ZREM', pictures, name)
 end
 
 local function forget(id)
@@ -38,6 +43,7 @@ local function forget(id)
   if redis.call('XLEN', stream) == 0 then
     redis.call('DEL', stream)
     redis.call('ZREM', cameras, name)
+    forget_picture(name)
   end
 end
 
@@ -57,6 +63,13 @@ redis.call('XADD', reports, id, 'camera', camera, 'bytes', bytes)
 redis.call('ZADD', cameras, micros, camera)
 redis.call('HSET', totals, 'last', micros)
 redis.call('HINCRBY', totals, 'bytes', bytes)
+-- The picture is that of the latest report, or there is none.
+forget_picture(camera)
+if frame ~= '' then
+  redis.call('HSET', prefix_of_pictures .. camera, 'id', micros, 'frame', frame, 'sketch', sketch)
+  redis.call('EXPIRE', prefix_of_pictures .. camera, max_age_seconds)
+  redis.call('ZADD', pictures, micros, camera)
+end
 redis.call('SET', sender, number, 'EX', max_age_seconds)
 
 local oldest = string.format('%.0f', now - max_age_seconds * 1000000)
@@ -91,6 +104,11 @@ while too_many() do
   forget(first)
 end
 
-for _, key in ipairs({reports, earlier, cameras, totals, stream}) do
+redis.call('ZREMRANGEBYSCORE', pictures, '-inf', oldest)
+while redis.call('ZCARD', pictures) > most_pictures do
+  forget_picture(redis.call('ZRANGE', pictures, 0, 0)[1])
+end
+
+for _, key in ipairs({reports, earlier, cameras, totals, pictures, stream}) do
   redis.call('EXPIRE', key, max_age_seconds)
 end

@@ -6,8 +6,7 @@ use std::sync::{Arc, atomic::Ordering};
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use uuid::Uuid;
 
-use super::{Shared, link::is_refusal};
-use crate::results::NewReport;
+use super::{Shared, link::is_refusal, outbox::Parcel};
 
 /// What Redis does with a report.
 const RECORD: &str = include_str!("record.lua");
@@ -21,8 +20,8 @@ pub(super) async fn run(shared: Arc<Shared>) {
     };
     let mut last_was_refused = false;
     for number in 1.. {
-        let report = shared.outbox.first().await;
-        let refusal = sender.send(&report, number).await.err();
+        let parcel = shared.outbox.first().await;
+        let refusal = sender.send(&parcel, number).await.err();
         if let Some(refusal) = &refusal
             && !last_was_refused
         {
@@ -45,10 +44,10 @@ struct Sender<'a> {
 
 impl Sender<'_> {
     /// Sends a report until Redis has answered; fails only with a refusal.
-    async fn send(&self, report: &NewReport, number: u64) -> RedisResult<()> {
+    async fn send(&self, parcel: &Parcel, number: u64) -> RedisResult<()> {
         loop {
             let line = self.shared.link.next_line().await;
-            let outcome = self.record(line.connection.clone(), report, number).await;
+            let outcome = self.record(line.connection.clone(), parcel, number).await;
             match outcome {
                 Err(error) if !is_refusal(&error) => {
                     // Waits for the next connection.
@@ -62,7 +61,7 @@ impl Sender<'_> {
     async fn record(
         &self,
         mut connection: MultiplexedConnection,
-        report: &NewReport,
+        Parcel { report, picture }: &Parcel,
         number: u64,
     ) -> RedisResult<()> {
         let (keys, limits) = (&self.shared.keys, &self.shared.limits);
@@ -72,20 +71,27 @@ impl Sender<'_> {
             keys.earlier(),
             keys.cameras(),
             keys.totals(),
+            keys.pictures(),
         ] {
             call.key(key);
         }
         call.key(&self.key);
-        call.arg(keys.prefix_of_cameras()).arg(number);
+        call.arg(keys.prefix_of_cameras());
+        call.arg(keys.prefix_of_pictures()).arg(number);
         call.arg(&report.camera);
         call.arg(report.received_at.to_string());
         call.arg(report.persons).arg(&report.json[..]);
+        // No picture is one of no bytes.
+        let parts = picture.as_ref().map(|it| [&it.frame[..], &it.sketch[..]]);
+        let [frame, sketch] = parts.unwrap_or_default();
+        call.arg(frame).arg(sketch);
         call.arg(report.bytes());
         for limit in [
             limits.max_cameras.get(),
             limits.history_per_camera.get(),
             limits.max_reports.get(),
             limits.max_bytes,
+            limits.max_pictures.get(),
         ] {
             call.arg(limit);
         }

@@ -14,8 +14,23 @@ fn kept([max_cameras, history_per_camera, max_reports, max_bytes]: [usize; 4]) -
         history_per_camera: count(history_per_camera),
         max_reports: count(max_reports),
         max_bytes,
+        max_pictures: count(2),
         max_listeners: NonZeroUsize::MIN,
     })
+}
+
+fn add_with_picture(kept: &mut Kept, camera: &str) -> ReportId {
+    let report = NewReport {
+        camera: camera.to_owned(),
+        received_at: Timestamp::UNIX_EPOCH,
+        persons: 0,
+        json: Bytes::new(),
+    };
+    let picture = NewPicture {
+        frame: Bytes::from_static(b"frame"),
+        sketch: Bytes::from_static(b"sketch"),
+    };
+    kept.add(report, Some(picture), Timestamp::UNIX_EPOCH).id
 }
 
 fn add(kept: &mut Kept, camera: &str, length: usize) -> ReportId {
@@ -25,7 +40,7 @@ fn add(kept: &mut Kept, camera: &str, length: usize) -> ReportId {
         persons: 0,
         json: Bytes::from(vec![b' '; length]),
     };
-    kept.add(report, Timestamp::UNIX_EPOCH).id
+    kept.add(report, None, Timestamp::UNIX_EPOCH).id
 }
 
 fn ids(kept: &Kept, cameras: &Cameras, after: ReportId) -> Vec<ReportId> {
@@ -98,6 +113,32 @@ fn a_report_larger_than_all_room_is_not_kept_and_nothing_else_either() {
     add(&mut kept, "b", 5000);
     assert_eq!(kept.usage(), ResultUse::default());
     assert_eq!(kept.stored(), 2);
+}
+
+#[test]
+fn a_camera_has_the_picture_of_its_latest_report_or_none() {
+    let mut kept = kept([2, 1, 100, 1 << 20]);
+    add_with_picture(&mut kept, "a");
+    let id = add_with_picture(&mut kept, "a");
+    assert_eq!(kept.picture("a").unwrap().id, id);
+    add(&mut kept, "a", 1);
+    assert!(kept.picture("a").is_none());
+    // With its camera, its picture goes.
+    add_with_picture(&mut kept, "a");
+    add(&mut kept, "b", 1);
+    add(&mut kept, "c", 1);
+    assert!(kept.picture("a").is_none());
+    assert_eq!(kept.usage().pictures, 0);
+}
+
+#[test]
+fn of_too_many_pictures_the_oldest_goes() {
+    let mut kept = kept(ROOMY);
+    for camera in ["a", "b", "a", "c"] {
+        add_with_picture(&mut kept, camera);
+    }
+    let there = ["a", "b", "c"].map(|camera| kept.picture(camera).is_some());
+    assert_eq!(there, [true, false, true]);
 }
 
 proptest! {

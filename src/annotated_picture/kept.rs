@@ -1,0 +1,91 @@
+//! A frame that is kept with what can be drawn into it, so that it can be drawn later, elsewhere and
+//! as whoever asks wants it.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+
+use super::{Layer, PictureFormat, PictureOptions, drawn, sketch::Sketch};
+use crate::{
+    imaging::{
+        annotate::{EncodeError, encode_jpeg},
+        decode::{DecodeError, DecodeLimits, decode},
+        narrowed,
+    },
+    pipeline::Detected,
+};
+
+/// Frames that are wider are made as narrow as the first of these; as the next one if their files are too
+/// large then.
+const WIDTHS: [u32; 3] = [2560, 1280, 640];
+/// Hardly to be told from the original, also when it was drawn into and encoded again.
+const QUALITY: u8 = 92;
+/// 4 MiB: a frame that no camera delivers.
+const MAX_BYTES: usize = 4 << 20;
+
+/// A frame as it was looked at: upright, and masked where the calibration says so.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeptFrame {
+    /// The frame, 4 MiB at most.
+    pub jpeg: Bytes,
+    /// What can be drawn into it, JSON.
+    pub sketch: Bytes,
+}
+
+/// A kept frame that is none.
+#[derive(Debug, thiserror::Error)]
+pub enum KeptFrameError {
+    /// What can be drawn cannot be read or written.
+    #[error("what can be drawn into a kept frame is no such thing: {0}")]
+    Sketch(#[from] serde_json::Error),
+    /// The frame cannot be read.
+    #[error("a kept frame cannot be read: {0}")]
+    Frame(#[from] DecodeError),
+    /// The frame cannot be written.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// The frame is too large however narrow it is made.
+    #[error("a frame takes more than {MAX_BYTES} bytes as a JPEG of {} pixels across", WIDTHS[2])]
+    TooLarge,
+}
+
+impl KeptFrame {
+    /// What is kept of a frame. Takes tens of milliseconds for a large one: keep it off the async
+    /// runtime.
+    ///
+    /// # Errors
+    /// [`KeptFrameError`] for a frame that cannot be kept.
+    pub fn of(detected: &Detected) -> Result<Self, KeptFrameError> {
+        let sketch = Sketch::of(detected, &Layer::ALL).rounded();
+        let frame = &detected.frame;
+        for width in WIDTHS {
+            let jpeg = if frame.width() > width {
+                encode_jpeg(&narrowed(frame, width), QUALITY)?
+            } else {
+                encode_jpeg(frame, QUALITY)?
+            };
+            if jpeg.len() <= MAX_BYTES {
+                return Ok(Self {
+                    jpeg: jpeg.into(),
+                    sketch: serde_json::to_vec(&sketch)?.into(),
+                });
+            }
+        }
+        Err(KeptFrameError::TooLarge)
+    }
+
+    /// The frame with what the options want drawn into it, as JPEG. Takes as long as keeping it.
+    ///
+    /// # Errors
+    /// [`KeptFrameError`] for what was not made by [`KeptFrame::of`].
+    pub fn annotated(&self, options: &PictureOptions) -> Result<Vec<u8>, KeptFrameError> {
+        let sketch: Sketch = serde_json::from_slice(&self.sketch)?;
+        let frame = decode(&self.jpeg, &DecodeLimits::default())?.frame;
+        Ok(drawn(
+            Arc::new(frame),
+            &sketch,
+            PictureFormat::Jpeg,
+            options,
+        )?)
+    }
+}

@@ -1,0 +1,91 @@
+//! What can be drawn into a frame, apart from the frame.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Layer, marks};
+use crate::{
+    imaging::annotate::{Drawing, Mark, ZoneOutline},
+    pipeline::{Detected, DetectionReport},
+};
+
+/// What can be drawn into a frame; all places are corner-origin pixels of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sketch {
+    frame_width: u32,
+    /// The persons, with their scores.
+    marks: Vec<Mark>,
+    views: Vec<Vec<[f64; 2]>>,
+    zones: Vec<ZoneOutline>,
+    timestamp: String,
+}
+
+impl Sketch {
+    /// What these layers need of what was found.
+    pub(super) fn of(detected: &Detected, layers: &[Layer]) -> Self {
+        let report = &detected.report;
+        let views = layers.contains(&Layer::Views);
+        let views = views.then(|| detected.view_outlines());
+        let views = views.into_iter().flatten();
+        let zones = layers.contains(&Layer::Zones);
+        let zones = zones.then(|| detected.zone_outlines());
+        Self {
+            frame_width: detected.frame.width(),
+            marks: report.persons.iter().map(marks::mark).collect(),
+            views: views
+                .map(|outline| outline.iter().map(|at| [at.x, at.y]).collect())
+                .collect(),
+            zones: zones.unwrap_or_default(),
+            timestamp: timestamp(report),
+        }
+    }
+
+    /// The same with lines to a tenth of a pixel, which nobody sees and which take a third of the room.
+    pub(super) fn rounded(mut self) -> Self {
+        for coordinate in self.lines().flatten().flatten() {
+            *coordinate = (*coordinate * 10.0).round() / 10.0;
+        }
+        self
+    }
+
+    /// What is drawn of these layers, in pixels of a picture that is as wide as this.
+    pub(super) fn drawing(&self, picture_width: u32, layers: &[Layer]) -> Drawing {
+        let factor = f64::from(picture_width) / f64::from(self.frame_width.max(1));
+        let draws = |layer| layers.contains(&layer);
+        let mut sketch = self.clone();
+        for coordinate in sketch.lines().flatten().flatten() {
+            *coordinate *= factor;
+        }
+        let marks = sketch.marks.into_iter().map(|mark| {
+            let mark = mark.scaled(factor);
+            let label = if draws(Layer::Scores) {
+                mark.label
+            } else {
+                String::new()
+            };
+            Mark { label, ..mark }
+        });
+        Drawing {
+            marks: marks.collect(),
+            boxes: draws(Layer::Boxes),
+            oriented: draws(Layer::Oriented),
+            lines: wanted(draws(Layer::Views), sketch.views),
+            zones: wanted(draws(Layer::Zones), sketch.zones),
+            caption: wanted(draws(Layer::Timestamp), sketch.timestamp),
+        }
+    }
+
+    fn lines(&mut self) -> impl Iterator<Item = &mut Vec<[f64; 2]>> {
+        let zones = self.zones.iter_mut().flat_map(|zone| &mut zone.lines);
+        self.views.iter_mut().chain(zones)
+    }
+}
+
+fn wanted<T: Default>(is_wanted: bool, what: T) -> T {
+    if is_wanted { what } else { T::default() }
+}
+
+/// When the frame was taken, or came, to the second.
+fn timestamp(report: &DetectionReport) -> String {
+    let time = report.captured_at.unwrap_or(report.received_at);
+    time.strftime("%Y-%m-%d %H:%M:%S UTC").to_string()
+}

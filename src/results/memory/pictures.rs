@@ -1,0 +1,49 @@
+//! The latest picture of each camera that has one.
+
+use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
+
+use crate::results::{NewPicture, ReportId, StoredPicture};
+
+/// Of too many cameras, the one goes that was silent for longest.
+#[derive(Debug)]
+pub(super) struct Pictures {
+    most: NonZeroUsize,
+    of_cameras: HashMap<String, Arc<StoredPicture>>,
+}
+
+impl Pictures {
+    pub(super) fn new(most: NonZeroUsize) -> Self {
+        Self {
+            most,
+            of_cameras: HashMap::new(),
+        }
+    }
+
+    /// What the report of this ID says of the camera: that there is this picture, or none any more.
+    pub(super) fn replace(&mut self, camera: &str, id: ReportId, picture: Option<NewPicture>) {
+        let Some(picture) = picture else {
+            return self.forget(camera);
+        };
+        let stored = Arc::new(StoredPicture { id, picture });
+        self.of_cameras.insert(camera.to_owned(), stored);
+        while self.of_cameras.len() > self.most.get() {
+            let oldest = self.of_cameras.iter().min_by_key(|(_, stored)| stored.id);
+            if let Some(camera) = oldest.map(|(camera, _)| camera.clone()) {
+                self.of_cameras.remove(&camera);
+            }
+        }
+    }
+
+    pub(super) fn forget(&mut self, camera: &str) {
+        self.of_cameras.remove(camera);
+    }
+
+    pub(super) fn of(&self, camera: &str) -> Option<Arc<StoredPicture>> {
+        self.of_cameras.get(camera).cloned()
+    }
+
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.of_cameras.len()
+    }
+}

@@ -1,0 +1,179 @@
+//! The latest picture of a camera.
+
+use std::collections::BTreeSet;
+
+use lookdown::{
+    imaging::{
+        Frame,
+        decode::{DecodeLimits, decode},
+    },
+    results::PicturesOf,
+};
+use serde_json::json;
+
+use crate::service::{Answer, Bounds, Service, frame, frame_of};
+
+const PATH: &str = "/results/hall/latest.jpg";
+
+/// A service that keeps pictures of the camera `hall`.
+fn keeping() -> Service {
+    Service::within(&Bounds {
+        pictures_of: PicturesOf::Some(BTreeSet::from(["hall".to_owned()])),
+        ..Bounds::default()
+    })
+}
+
+impl Service {
+    async fn detect_in(&self, camera: &str) -> Answer {
+        let query = format!("calibration=lobby&profile=fast&camera={camera}");
+        let answer = self.post_raw(&query, frame()).await;
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        answer
+    }
+}
+
+fn picture(answer: &Answer) -> Frame {
+    let told = String::from_utf8_lossy(&answer.body);
+    assert_eq!(answer.status, 200, "{told}");
+    assert_eq!(answer.header("content-type"), "image/jpeg");
+    decode(&answer.body, &DecodeLimits::default())
+        .unwrap()
+        .frame
+}
+
+/// Whether the grey of the frame is what is seen there.
+fn is_grey(frame: &Frame, x: u32, y: u32) -> bool {
+    let pixel = frame.pixel(x, y);
+    pixel.iter().all(|value| value.abs_diff(128) < 12)
+}
+
+fn is_plain(frame: &Frame) -> bool {
+    (0..frame.height()).all(|y| (0..frame.width()).all(|x| is_grey(frame, x, y)))
+}
+
+#[tokio::test]
+async fn no_picture_is_kept_unless_the_settings_name_its_camera() {
+    for (service, camera) in [(Service::start(), "hall"), (keeping(), "stairs")] {
+        service.detect_in(camera).await;
+        let path = format!("/results/{camera}/latest.jpg");
+        let answer = service.get(&path).await;
+        assert_eq!(answer.status, 404);
+        let problem = answer.problem();
+        assert_eq!(problem["type"], "urn:lookdown:problem:picture-not-kept");
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains("results.pictures"), "{detail}");
+    }
+    let nobody = keeping().get(PATH).await.problem();
+    assert_eq!(nobody["type"], "urn:lookdown:problem:unknown-camera");
+}
+
+#[tokio::test]
+async fn all_cameras_may_have_pictures() {
+    let service = Service::within(&Bounds {
+        pictures_of: PicturesOf::All,
+        ..Bounds::default()
+    });
+    service.detect_in("hall").await;
+    picture(&service.get(PATH).await);
+    let metrics = service.get("/metrics").await.text();
+    let told = "lookdown_results_pictures 1";
+    assert!(metrics.lines().any(|line| line == told), "{metrics}");
+}
+
+#[tokio::test]
+async fn a_picture_is_drawn_as_whoever_asks_wants_it() {
+    let service = keeping();
+    service.detect_in("hall").await;
+    let mut seen = Vec::new();
+    for draw in [
+        "boxes",
+        "boxes,oriented",
+        "scores",
+        "views",
+        "timestamp",
+        "oriented,scores",
+    ] {
+        let drawn = picture(&service.get(&format!("{PATH}?draw={draw}")).await);
+        assert_eq!((drawn.width(), drawn.height()), (200, 200));
+        assert!(!is_plain(&drawn) && !seen.contains(&drawn), "{draw}");
+        seen.push(drawn);
+    }
+    assert!(seen.last() == Some(&picture(&service.get(PATH).await)));
+    assert!(is_plain(&picture(
+        &service.get(&format!("{PATH}?draw=none")).await
+    )));
+    let small = picture(&service.get(&format!("{PATH}?width=100")).await);
+    assert_eq!((small.width(), small.height()), (100, 100));
+    let mut lengths = Vec::new();
+    for quality in [1, 50, 100] {
+        let path = format!("{PATH}?quality={quality}");
+        lengths.push(service.get(&path).await.body.len());
+    }
+    assert!(lengths.is_sorted(), "{lengths:?}");
+    for (query, status) in [
+        ("draw=hats", 422),
+        ("width=63", 422),
+        ("quality=0", 422),
+        ("boxes=true", 400),
+        ("width=100&width=100", 400),
+    ] {
+        let answer = service.get(&format!("{PATH}?{query}")).await;
+        assert_eq!(answer.status, status, "{query}");
+        answer.problem();
+    }
+}
+
+#[tokio::test]
+async fn a_picture_is_sent_again_only_when_there_is_a_newer_one() {
+    let service = keeping();
+    service.detect_in("hall").await;
+    let first = service.get(PATH).await;
+    assert_eq!(first.header("cache-control"), "private, no-cache");
+    let tag = first.header("etag").to_owned();
+    let report = service.get("/results/hall/latest").await;
+    assert_eq!(report.header("etag"), tag);
+    let again = service.get_if_none_match(PATH, &tag).await;
+    assert_eq!((again.status.as_u16(), again.body.len()), (304, 0));
+    assert_eq!(again.header("etag"), tag);
+    assert_eq!(again.header("cache-control"), "private, no-cache");
+    service.detect_in("hall").await;
+    let newer = service.get_if_none_match(PATH, &tag).await;
+    assert_eq!(newer.status, 200);
+    assert_ne!(newer.header("etag"), tag);
+}
+
+#[tokio::test]
+async fn zones_are_drawn_and_what_is_masked_is_black() {
+    let service = keeping();
+    let lobby = json!({
+        "id": "lobby", "image": { "width": 200, "height": 200 },
+        "lens": { "model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5 },
+        "mount": { "world_up": [0.0, 0.0, -1.0], "height_m": 3.0 },
+        "zones": [
+            { "name": "till", "frame_px": [[100, 20], [180, 20], [180, 180], [100, 180]] },
+            { "name": "door", "floor_m": [[-2, -1], [-1, -1], [-1, 1], [-2, 1]] },
+        ],
+        "masks": [{ "frame_px": [[0, 0], [40, 0], [40, 40], [0, 40]] }],
+    });
+    let put = service.put("/calibrations/lobby", &lobby.to_string()).await;
+    assert_eq!(put.status, 200, "{}", put.text());
+    service.detect_in("hall").await;
+    let plain = picture(&service.get(&format!("{PATH}?draw=none")).await);
+    assert!(plain.pixel(20, 20).iter().all(|value| *value < 16));
+    let drawn = picture(&service.get(&format!("{PATH}?draw=zones")).await);
+    // The left border of the one, and that of the other: a metre beside the camera, 3 m below it.
+    for (x, y) in [(100, 150), (79, 99)] {
+        assert!(is_grey(&plain, x, y) && !is_grey(&drawn, x, y), "{x}, {y}");
+    }
+    assert!(is_grey(&drawn, 120, 190));
+}
+
+#[tokio::test]
+async fn a_large_frame_is_kept_smaller() {
+    let service = keeping();
+    let query = "profile=fast&camera=hall";
+    let answer = service.post_raw(query, frame_of(3000, 1500)).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    let kept = picture(&service.get(PATH).await);
+    assert_eq!((kept.width(), kept.height()), (2560, 1280));
+}
