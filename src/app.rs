@@ -15,6 +15,7 @@ use crate::{
     imaging::decode::DecodeLimits,
     inference::ModelRepository,
     metrics::Metrics,
+    mqtt::Publisher,
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     poller::Poller,
     results::{MemoryResults, RedisResults, ResultStore},
@@ -121,6 +122,8 @@ pub struct App {
     keys: Option<Arc<AccessKeys>>,
     /// The certificate, if there is one.
     tls: Option<Arc<Tls>>,
+    /// Who publishes reports, if somebody does.
+    publisher: Option<Publisher>,
     tracer: Tracer,
     state: ApiState,
     settings: Settings,
@@ -154,6 +157,10 @@ impl App {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
             None => None,
         };
+        let publisher = settings
+            .mqtt
+            .clone()
+            .map(|options| Publisher::new(options, Arc::clone(&results), Arc::clone(&metrics)));
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
             None => Access::Open {
@@ -198,6 +205,7 @@ impl App {
             metrics,
             keys,
             tls,
+            publisher: publisher.transpose()?,
             tracer,
             state,
             settings,

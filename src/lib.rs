@@ -17,6 +17,7 @@ pub mod geometry;
 pub mod imaging;
 pub mod inference;
 pub mod metrics;
+pub mod mqtt;
 pub mod open_inference;
 pub mod pipeline;
 pub mod plain_name;

@@ -124,6 +124,12 @@ metrics! {
     results_listeners: IntGauge = "results_listeners" [];
     /// Listeners given up because they did not keep up.
     results_listeners_dropped: IntCounter = "results_listeners_dropped_total" [];
+    /// 1 while there is a connection to the MQTT broker, else 0.
+    mqtt_connected: IntGauge = "mqtt_connected" [];
+    /// Reports published to the MQTT broker.
+    mqtt_reports_sent: IntCounter = "mqtt_reports_sent_total" [];
+    /// Reports not published because the MQTT broker was away or too slow, or their camera one too many.
+    mqtt_reports_dropped: IntCounter = "mqtt_reports_dropped_total" [];
     /// When the server's TLS certificate ends, seconds since 1970; shown only with TLS.
     tls_certificate_expiry: IntGaugeVec = "tls_certificate_expiry_timestamp_seconds" [];
     /// Times that the files of TLS were found changed, by whether what they hold can be used.

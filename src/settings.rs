@@ -9,12 +9,14 @@ mod calibration_place;
 mod check;
 mod error;
 mod locate;
+mod mqtt;
 mod raw;
 mod results;
 mod source;
 mod threads;
 mod tls;
 mod traces;
+mod unshown;
 
 use std::{
     net::SocketAddr,
@@ -36,6 +38,7 @@ use crate::{
     access::KeyList,
     geometry::FieldOfViewReading,
     inference::Device,
+    mqtt::MqttOptions,
     results::{PicturesOf, RedisOptions, ResultLimits},
     server::ConnectionLimits,
     tls::TlsOptions,
@@ -62,6 +65,8 @@ pub struct Settings {
     pub limits: LimitSettings,
     /// What is kept of reports, and where.
     pub results: ResultSettings,
+    /// The MQTT broker that is published to, if there is one.
+    pub mqtt: Option<MqttOptions>,
     /// How the paper is read where it can be read in several ways.
     pub paper: PaperSettings,
     /// What is logged.

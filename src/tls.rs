@@ -1,6 +1,7 @@
 //! TLS: the server's certificate and private key, read again when their files change, and the
-//! handshakes made with them.
+//! handshakes made with them; and TLS towards others.
 
+mod client;
 mod error;
 mod files;
 mod handshake;
@@ -17,6 +18,7 @@ use jiff::Timestamp;
 use tokio::{net::TcpStream, time::timeout};
 use tokio_rustls::server::TlsStream;
 
+pub use client::ClientTls;
 pub use error::TlsError;
 pub use options::TlsOptions;
 

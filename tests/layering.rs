@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 26] = [
+const MAY_USE: [(&str, &[&str]); 27] = [
     ("plain_name", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
@@ -25,12 +25,14 @@ const MAY_USE: [(&str, &[&str]); 26] = [
     ("inference", &["detection", "imaging", "revision"]),
     ("tls", &["metrics", "watched_file"]),
     ("server", &["metrics", "shutdown", "tls"]),
+    ("mqtt", &["metrics", "results", "tls"]),
     (
         "settings",
         &[
             "access",
             "geometry",
             "inference",
+            "mqtt",
             "results",
             "server",
             "tls",
@@ -91,6 +93,7 @@ const MAY_USE: [(&str, &[&str]); 26] = [
             "inference",
             "pipeline",
             "metrics",
+            "mqtt",
             "poller",
             "results",
             "server",
@@ -125,7 +128,7 @@ const MAY_USE: [(&str, &[&str]); 26] = [
 ];
 
 /// Crates that stand for the outside world, and the only modules that may name them.
-const ONLY_KNOWN_TO: [(&str, &[&str]); 26] = [
+const ONLY_KNOWN_TO: [(&str, &[&str]); 27] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -145,6 +148,7 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 26] = [
             "cli",
             "evaluation",
             "open_inference",
+            "mqtt",
         ],
     ),
     ("clap", &["cli"]),
@@ -152,6 +156,7 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 26] = [
     ("clap_mangen", &["cli"]),
     ("indicatif", &["cli"]),
     ("plotters", &["evaluation"]),
+    ("rumqttc", &["mqtt"]),
     ("config", &["settings"]),
     ("object_store", &["calibration"]),
     (

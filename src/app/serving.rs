@@ -1,8 +1,13 @@
 //! From the sockets to the last answer.
 
-use std::{future::pending, net::SocketAddr, sync::Arc};
+use std::{future::pending, net::SocketAddr, sync::Arc, time::Duration};
 
-use tokio::{net::TcpListener, task::spawn_blocking, time::sleep};
+use tokio::{
+    net::TcpListener,
+    spawn,
+    task::spawn_blocking,
+    time::{sleep, timeout},
+};
 
 use super::{App, Sockets};
 use crate::{
@@ -12,6 +17,9 @@ use crate::{
     shutdown::Shutdown,
 };
 
+/// Longest that the end waits for the MQTT broker.
+const FAREWELL: Duration = Duration::from_secs(3);
+
 impl App {
     /// Serves until `shutdown` asks for an end. Then readiness goes, and everything is served on for
     /// the grace period; after that, no more connections are accepted, and what has arrived is
@@ -19,7 +27,7 @@ impl App {
     ///
     /// # Errors
     /// When a model cannot be loaded or a socket fails.
-    pub async fn serve(self, sockets: Sockets, shutdown: Shutdown) -> anyhow::Result<()> {
+    pub async fn serve(mut self, sockets: Sockets, shutdown: Shutdown) -> anyhow::Result<()> {
         let address = sockets.main.local_addr()?;
         let scheme = if self.tls.is_some() { "https" } else { "http" };
         log_start(&self.settings, scheme, address);
@@ -30,6 +38,10 @@ impl App {
             );
         }
         let _pollers = self.start_pollers()?;
+        let publishing = self
+            .publisher
+            .take()
+            .map(|publisher| spawn(publisher.run()));
         let services = Services {
             regular: api::router(self.state.clone()),
             beyond_limit: api::crowded_router(self.state.clone()),
@@ -53,6 +65,10 @@ impl App {
             tokio::try_join!(self.load_models(scheme, address, &shutdown), connections)?;
             let workers = Arc::clone(&self.workers);
             spawn_blocking(move || workers.shut_down()).await?;
+            if let Some(publishing) = publishing {
+                // The results have ended, and a broker that takes too long has our will.
+                let _ = timeout(FAREWELL, publishing).await;
+            }
             self.results.flush().await;
             tracing::info!("stopped");
             anyhow::Ok(())

@@ -1,11 +1,11 @@
 //! Who may do what, as it is written and checked.
 
-use std::{fmt, path::PathBuf};
+use std::path::PathBuf;
 
 use serde::Deserialize;
 use url::{Origin, Url};
 
-use super::{AccessSettings, SettingsError, check::poll_seconds};
+use super::{AccessSettings, SettingsError, check::poll_seconds, unshown::Unshown};
 use crate::access::{KeyError, KeyList};
 
 /// Table `access`.
@@ -26,16 +26,6 @@ impl Default for RawAccess {
             poll_seconds: 2,
             cors_origins: String::new(),
         }
-    }
-}
-
-/// Text in which somebody may have written a key.
-#[derive(Clone, PartialEq, Default, Deserialize)]
-struct Unshown(String);
-
-impl fmt::Debug for Unshown {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str("…")
     }
 }
 

@@ -84,6 +84,7 @@ impl TryFrom<RawSettings> for Settings {
                 )?,
             },
             results: raw.results.try_into()?,
+            mqtt: raw.mqtt.checked()?,
             log: log(raw.log)?,
             traces: raw.telemetry.try_into()?,
         })

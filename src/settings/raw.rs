@@ -2,7 +2,10 @@
 
 use serde::Deserialize;
 
-use super::{access::RawAccess, locate, results::RawResults, tls::RawTls, traces::RawTelemetry};
+use super::{
+    access::RawAccess, locate, mqtt::RawMqtt, results::RawResults, tls::RawTls,
+    traces::RawTelemetry,
+};
 
 const MEBIBYTE: u64 = 1024 * 1024;
 
@@ -18,6 +21,7 @@ pub struct RawSettings {
     pub(super) inference: RawInference,
     pub(super) limits: RawLimits,
     pub(super) results: RawResults,
+    pub(super) mqtt: RawMqtt,
     pub(super) paper: RawPaper,
     pub(super) log: RawLog,
     pub(super) telemetry: RawTelemetry,

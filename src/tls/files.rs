@@ -83,6 +83,14 @@ impl TlsFiles {
     }
 }
 
+/// The authorities in a file that the setting `setting` names.
+pub(super) fn authorities(
+    setting: &'static str,
+    path: &Path,
+) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+    certificates(setting, path, &read(setting, path)?)
+}
+
 /// The error about a certificate in one of the files.
 pub(super) fn invalid(options: &TlsOptions, of_clients: bool, position: usize) -> TlsError {
     let (setting, path) = match &options.client_certificates {

@@ -75,6 +75,7 @@ fn service(folder: &Path) -> Router {
         max_header_bytes: 1 << 14,
         max_headers: 100,
         zone_metrics: false,
+        pictures_of: Arc::default(),
         metrics_elsewhere: false,
         request_timeout: Duration::from_mins(2),
         min_upload_bytes_per_second: None,

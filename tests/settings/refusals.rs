@@ -27,7 +27,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 43] = [
+const UNUSABLE: [(&str, &str, &str, &str); 48] = [
     (
         "RESULTS__URL",
         "localhost:6379",
@@ -46,6 +46,21 @@ const UNUSABLE: [(&str, &str, &str, &str); 43] = [
         "results.max_age_seconds",
         "from 60",
     ),
+    ("MQTT__URL", "http://broker", "mqtt.url", "mqtt://"),
+    (
+        "MQTT__TOPIC_PREFIX",
+        "home/#",
+        "mqtt.topic_prefix",
+        "lookdown",
+    ),
+    ("MQTT__TOPIC_PREFIX", "/home", "mqtt.topic_prefix", "topic"),
+    (
+        "MQTT__DISCOVERY_PREFIX",
+        "$SYS",
+        "mqtt.discovery_prefix",
+        "topic",
+    ),
+    ("MQTT__MAX_CAMERAS", "0", "mqtt.max_cameras", "from 1"),
     (
         "SERVER__LISTEN",
         "localhost",
@@ -302,4 +317,16 @@ fn a_file_that_is_not_there_is_refused_by_name() {
         message.contains("/nowhere/l.toml") && message.contains("--config"),
         "{message}"
     );
+}
+
+#[test]
+fn the_password_of_a_broker_is_neither_shown_nor_repeated() {
+    let url = "mqtt://home:s3cret@broker:1883";
+    let settings = from_environment("LOOKDOWN__MQTT__URL", url).unwrap();
+    let shown = format!("{settings:?}");
+    assert!(shown.contains("broker:1883"), "{shown}");
+    assert!(!shown.contains("s3cret"), "{shown}");
+    let refused = refusal(from_environment("LOOKDOWN__MQTT__URL", &format!("{url}/x")));
+    assert!(refused.contains("mqtt.url"), "{refused}");
+    assert!(!refused.contains("s3cret"), "{refused}");
 }

@@ -1,0 +1,143 @@
+//! What Home Assistant is told of a camera's entities (its documentation: MQTT, section "MQTT
+//! discovery"): occupancy, the number of persons, and that in each zone.
+
+use serde_json::{Value, json};
+
+use super::{
+    message::Message,
+    topics::{Topics, level},
+};
+
+/// What we are when we are there, and what the broker says when we are not.
+pub(super) const ONLINE: &str = "online";
+pub(super) const OFFLINE: &str = "offline";
+const SENSOR: &str = "sensor";
+const BINARY_SENSOR: &str = "binary_sensor";
+/// Home Assistant's template for a state that is ON or OFF.
+const IS_OCCUPIED: &str = "{{ 'ON' if value | int(0) > 0 else 'OFF' }}";
+
+/// The announcement of a camera and its zones; nothing where nobody wants to discover.
+pub(super) fn announcements<'a>(
+    topics: &Topics,
+    camera: &str,
+    zones: impl IntoIterator<Item = &'a str>,
+) -> Vec<Message> {
+    let occupancy = json!({
+        "name": "Occupancy",
+        "state_topic": topics.persons(camera),
+        "device_class": "occupancy",
+        "value_template": IS_OCCUPIED,
+    });
+    let persons = json!({
+        "name": "Persons",
+        "state_topic": topics.persons(camera),
+        "state_class": "measurement",
+        "icon": "mdi:account-group",
+    });
+    let zones = zones.into_iter().map(|zone| {
+        let config = json!({
+            "name": format!("Persons in {zone}"),
+            "state_topic": topics.zone(camera, zone),
+            "state_class": "measurement",
+            "icon": "mdi:account-group",
+        });
+        (SENSOR, zone_entity(zone), config)
+    });
+    let of_camera = [
+        (BINARY_SENSOR, "occupancy".to_owned(), occupancy),
+        (SENSOR, "persons".to_owned(), persons),
+    ];
+    let all = of_camera.into_iter().chain(zones);
+    all.filter_map(|(component, entity, config)| {
+        let id = format!("{}_{entity}", topics.device_id(camera));
+        let topic = topics.config(component, &id)?;
+        let config = completed(config, &id, topics, camera);
+        Some(Message::retained(topic, config.to_string()))
+    })
+    .collect()
+}
+
+/// What makes Home Assistant forget a zone.
+pub(super) fn withdrawal(topics: &Topics, camera: &str, zone: &str) -> Option<Message> {
+    let id = format!("{}_{}", topics.device_id(camera), zone_entity(zone));
+    topics.config(SENSOR, &id).map(Message::forget)
+}
+
+fn zone_entity(zone: &str) -> String {
+    format!("zone_{}", level(zone))
+}
+
+/// With what all entities of a camera have in common.
+fn completed(mut config: Value, id: &str, topics: &Topics, camera: &str) -> Value {
+    config["unique_id"] = json!(id);
+    config["availability_topic"] = json!(topics.status());
+    config["device"] = json!({
+        "identifiers": [topics.device_id(camera)],
+        "name": camera,
+        "manufacturer": "Lookdown",
+        "model": "Ceiling fisheye camera",
+    });
+    config["origin"] = json!({
+        "name": "Lookdown",
+        "sw_version": env!("CARGO_PKG_VERSION"),
+    });
+    config
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn topics() -> Topics {
+        Topics::new("lookdown", Some("homeassistant"))
+    }
+
+    #[test]
+    fn a_camera_is_an_occupancy_a_number_of_persons_and_one_for_each_zone() {
+        let messages = announcements(&topics(), "north gate", ["till"]);
+        let [occupancy, persons, till] = messages.as_slice() else {
+            panic!("{messages:?}")
+        };
+        assert!(messages.iter().all(|message| message.retained));
+        let config =
+            |message: &Message| -> Value { serde_json::from_slice(&message.payload).unwrap() };
+        let device = "lookdown_north_gate-d44d9e17";
+        assert_eq!(
+            occupancy.topic,
+            format!("homeassistant/binary_sensor/{device}_occupancy/config")
+        );
+        assert_eq!(config(occupancy)["device_class"], "occupancy");
+        assert_eq!(
+            persons.topic,
+            format!("homeassistant/sensor/{device}_persons/config")
+        );
+        assert_eq!(
+            till.topic,
+            format!("homeassistant/sensor/{device}_zone_till/config")
+        );
+        let state = "lookdown/cameras/north_gate-d44d9e17";
+        assert_eq!(config(persons)["state_topic"], format!("{state}/persons"));
+        assert_eq!(config(till)["state_topic"], format!("{state}/zones/till"));
+        for message in [occupancy, persons, till] {
+            let config = config(message);
+            assert_eq!(config["availability_topic"], "lookdown/status");
+            assert_eq!(config["device"]["name"], "north gate");
+            assert_eq!(config["device"]["identifiers"][0], device);
+        }
+    }
+
+    #[test]
+    fn a_zone_is_withdrawn_where_it_was_announced() {
+        let announced = announcements(&topics(), "lobby", ["till"]);
+        let withdrawn = withdrawal(&topics(), "lobby", "till").unwrap();
+        assert_eq!(withdrawn.topic, announced[2].topic);
+        assert!(withdrawn.payload.is_empty() && withdrawn.retained);
+    }
+
+    #[test]
+    fn nothing_is_announced_where_nobody_discovers() {
+        let topics = Topics::new("lookdown", None);
+        assert!(announcements(&topics, "lobby", ["till"]).is_empty());
+        assert_eq!(withdrawal(&topics, "lobby", "till"), None);
+    }
+}

@@ -1,0 +1,183 @@
+use bytes::Bytes;
+use futures_util::{SinkExt, StreamExt};
+use jiff::Timestamp;
+use rumqttc::{Codec, ConnAck, Connect, ConnectReturnCode, Packet, QoS};
+use tokio::net::{TcpListener, TcpStream};
+use tokio_util::codec::Framed;
+
+use super::*;
+use crate::results::{MemoryResults, NewReport, ResultLimits};
+
+type Client = Framed<TcpStream, Codec>;
+
+struct Setup {
+    listener: TcpListener,
+    results: Arc<MemoryResults>,
+    metrics: Arc<Metrics>,
+    publisher: Publisher,
+}
+
+async fn setup() -> Setup {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let results = Arc::new(MemoryResults::new(ResultLimits::default()));
+    let metrics = Arc::new(Metrics::new().unwrap());
+    let options = MqttOptions {
+        broker: format!("mqtt://home:secret@127.0.0.1:{port}")
+            .parse()
+            .unwrap(),
+        authorities: None,
+        topic_prefix: "lookdown".to_owned(),
+        discovery_prefix: Some("homeassistant".to_owned()),
+        max_cameras: NonZeroUsize::MIN,
+    };
+    let store = Arc::clone(&results) as Arc<dyn ResultStore>;
+    Setup {
+        listener,
+        results,
+        publisher: Publisher::new(options, store, Arc::clone(&metrics)).unwrap(),
+        metrics,
+    }
+}
+
+fn report(persons: usize) -> NewReport {
+    NewReport {
+        camera: "lobby".to_owned(),
+        received_at: Timestamp::UNIX_EPOCH,
+        persons,
+        json: Bytes::from_static(b"{}"),
+    }
+}
+
+/// A client of the broker that has said this.
+async fn accept(listener: &TcpListener) -> (Client, Connect) {
+    let (stream, _) = listener.accept().await.unwrap();
+    let codec = Codec {
+        max_incoming_size: 1 << 20,
+        max_outgoing_size: 1 << 20,
+    };
+    let mut client = Framed::new(stream, codec);
+    let Some(Ok(Packet::Connect(hello))) = client.next().await else {
+        panic!("no CONNECT came first");
+    };
+    (client, hello)
+}
+
+async fn welcome(client: &mut Client) {
+    let welcome = ConnAck::new(ConnectReturnCode::Success, false);
+    client.send(Packet::ConnAck(welcome)).await.unwrap();
+}
+
+/// The next message: topic, payload, whether it is kept.
+async fn heard(client: &mut Client) -> (String, String, bool) {
+    loop {
+        match client.next().await.unwrap().unwrap() {
+            Packet::Publish(said) => {
+                let payload = String::from_utf8(said.payload.to_vec()).unwrap();
+                return (said.topic, payload, said.retain);
+            }
+            Packet::Disconnect => return ("disconnected".to_owned(), String::new(), false),
+            _ => {}
+        }
+    }
+}
+
+fn said(topic: &str, payload: &str, retained: bool) -> (String, String, bool) {
+    (topic.to_owned(), payload.to_owned(), retained)
+}
+
+#[tokio::test]
+async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
+    let setup = setup().await;
+    let running = tokio::spawn(setup.publisher.run());
+    let (mut client, hello) = accept(&setup.listener).await;
+    let will = hello.last_will.unwrap();
+    assert_eq!(
+        (will.topic.as_str(), will.retain),
+        ("lookdown/status", true)
+    );
+    assert_eq!(will.message, "offline");
+    assert_eq!(hello.login.unwrap().password, "secret");
+    assert!(
+        hello.client_id.starts_with("lookdown-"),
+        "{}",
+        hello.client_id
+    );
+    welcome(&mut client).await;
+    let status = "lookdown/status";
+    assert_eq!(heard(&mut client).await, said(status, "online", true));
+
+    setup.results.publish(report(2), None);
+    let configs = [heard(&mut client).await, heard(&mut client).await];
+    assert!(
+        configs
+            .iter()
+            .all(|(topic, ..)| topic.starts_with("homeassistant/"))
+    );
+    let camera = "lookdown/cameras/lobby";
+    let count = said(&format!("{camera}/persons"), "2", true);
+    assert_eq!(heard(&mut client).await, count);
+    assert_eq!(
+        heard(&mut client).await,
+        said(&format!("{camera}/report"), "{}", false)
+    );
+
+    let birth = Publish::new("homeassistant/status", QoS::AtMostOnce, "online");
+    client.send(Packet::Publish(birth)).await.unwrap();
+    for config in configs {
+        assert_eq!(heard(&mut client).await, config);
+    }
+    assert_eq!(heard(&mut client).await, count);
+    let will = Publish::new(status, QoS::AtMostOnce, "offline");
+    client.send(Packet::Publish(will)).await.unwrap();
+    assert_eq!(heard(&mut client).await, said(status, "online", true));
+
+    setup.results.listeners().end();
+    assert_eq!(heard(&mut client).await, said(status, "offline", true));
+    assert_eq!(heard(&mut client).await.0, "disconnected");
+    running.await.unwrap();
+    assert_eq!(setup.metrics.mqtt_reports_sent.get(), 1);
+    assert_eq!(setup.metrics.mqtt_reports_dropped.get(), 0);
+    assert_eq!(setup.metrics.mqtt_connected.get(), 0);
+}
+
+#[tokio::test]
+async fn while_there_is_no_broker_reports_are_counted_and_nobody_waits() {
+    let setup = setup().await;
+    let running = tokio::spawn(setup.publisher.run());
+    // The connection is there, but nobody says welcome.
+    let (client, _) = accept(&setup.listener).await;
+    for _ in 0..1000 {
+        setup.results.publish(report(1), None);
+        tokio::task::yield_now().await;
+    }
+    setup.results.listeners().end();
+    running.await.unwrap();
+    drop(client);
+    assert_eq!(setup.metrics.mqtt_reports_dropped.get(), 1000);
+    assert_eq!(setup.metrics.mqtt_reports_sent.get(), 0);
+}
+
+#[tokio::test]
+async fn a_new_connection_is_told_what_is_true_now() {
+    let setup = setup().await;
+    setup.results.publish(report(7), None);
+    let running = tokio::spawn(setup.publisher.run());
+    let (mut client, _) = accept(&setup.listener).await;
+    welcome(&mut client).await;
+    let mut said = Vec::new();
+    while said.len() < 4 {
+        said.push(heard(&mut client).await);
+    }
+    assert_eq!(said[0].1, "online");
+    assert_eq!(
+        said[3],
+        (
+            "lookdown/cameras/lobby/persons".to_owned(),
+            "7".to_owned(),
+            true
+        )
+    );
+    setup.results.listeners().end();
+    running.await.unwrap();
+}

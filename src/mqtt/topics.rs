@@ -1,0 +1,135 @@
+//! Where messages go.
+
+use sha2::{Digest, Sha256};
+
+/// Longest name that stands for itself in a topic.
+const MAX_CHARS: usize = 64;
+/// Of a name that does not, so much is kept to recognise it by.
+const RECOGNISABLE_CHARS: usize = 32;
+
+/// The names of topics.
+#[derive(Debug, Clone)]
+pub(super) struct Topics {
+    prefix: String,
+    /// That of Home Assistant.
+    discovery: Option<String>,
+}
+
+impl Topics {
+    pub(super) fn new(prefix: &str, discovery: Option<&str>) -> Self {
+        Self {
+            prefix: prefix.to_owned(),
+            discovery: discovery.map(ToOwned::to_owned),
+        }
+    }
+
+    /// Whether we are there.
+    pub(super) fn status(&self) -> String {
+        format!("{}/status", self.prefix)
+    }
+
+    /// How many persons a camera sees.
+    pub(super) fn persons(&self, camera: &str) -> String {
+        format!("{}/persons", self.of_camera(camera))
+    }
+
+    /// How many of them are in a zone.
+    pub(super) fn zone(&self, camera: &str, zone: &str) -> String {
+        format!("{}/zones/{}", self.of_camera(camera), level(zone))
+    }
+
+    /// Reports of a camera.
+    pub(super) fn report(&self, camera: &str) -> String {
+        format!("{}/report", self.of_camera(camera))
+    }
+
+    fn of_camera(&self, camera: &str) -> String {
+        format!("{}/cameras/{}", self.prefix, level(camera))
+    }
+
+    /// Where Home Assistant says that it has started.
+    pub(super) fn birth(&self) -> Option<String> {
+        self.discovery
+            .as_ref()
+            .map(|prefix| format!("{prefix}/status"))
+    }
+
+    /// Where Home Assistant looks for an entity with this ID.
+    pub(super) fn config(&self, component: &str, unique_id: &str) -> Option<String> {
+        let prefix = self.discovery.as_ref()?;
+        Some(format!("{prefix}/{component}/{unique_id}/config"))
+    }
+
+    /// What tells a camera from everything else in Home Assistant.
+    pub(super) fn device_id(&self, camera: &str) -> String {
+        format!("{}_{}", level(&self.prefix), level(camera))
+    }
+}
+
+/// A name as one level of a topic, for which Home Assistant's alphabet of IDs will do
+/// (`[a-zA-Z0-9_-]`). Different names stay different: one that needs a change gets a piece of its digest.
+pub(super) fn level(name: &str) -> String {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !name.is_empty() && name.len() <= MAX_CHARS && name.chars().all(fits) {
+        return name.to_owned();
+    }
+    let characters = name.chars().take(RECOGNISABLE_CHARS);
+    let recognisable: String = characters.map(|c| if fits(c) { c } else { '_' }).collect();
+    let digest = Sha256::digest(name);
+    let [a, b, c, d] = [digest[0], digest[1], digest[2], digest[3]];
+    format!("{recognisable}-{a:02x}{b:02x}{c:02x}{d:02x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn plain_names_stand_for_themselves() {
+        let topics = Topics::new("lookdown", Some("homeassistant"));
+        assert_eq!(topics.persons("lobby"), "lookdown/cameras/lobby/persons");
+        assert_eq!(
+            topics.zone("Lobby-2", "till"),
+            "lookdown/cameras/Lobby-2/zones/till"
+        );
+        assert_eq!(topics.report("lobby"), "lookdown/cameras/lobby/report");
+        assert_eq!(topics.birth().unwrap(), "homeassistant/status");
+        let id = topics.device_id("lobby");
+        assert_eq!(id, "lookdown_lobby");
+        assert_eq!(
+            topics.config("sensor", &id).unwrap(),
+            "homeassistant/sensor/lookdown_lobby/config"
+        );
+        let without = Topics::new("lookdown", None);
+        assert_eq!(
+            (without.birth(), without.config("sensor", "x")),
+            (None, None)
+        );
+    }
+
+    #[test]
+    fn names_that_become_alike_are_still_told_apart() {
+        let names = [
+            "north gate",
+            "north+gate",
+            "north#gate",
+            "north/gate",
+            "",
+            "#",
+        ];
+        let levels = std::collections::BTreeSet::from(names.map(level));
+        assert_eq!(levels.len(), names.len(), "{levels:?}");
+        assert_eq!(level("north gate"), "north_gate-d44d9e17");
+    }
+
+    proptest! {
+        #[test]
+        fn every_name_is_one_short_level_without_wildcards(name in ".{0,128}") {
+            let level = level(&name);
+            prop_assert!((1..=MAX_CHARS).contains(&level.len()));
+            prop_assert!(level.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c)));
+        }
+    }
+}

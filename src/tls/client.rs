@@ -1,0 +1,55 @@
+//! TLS towards servers that we connect to.
+
+use std::{io, path::Path, sync::Arc};
+
+use rustls::{ClientConfig, RootCertStore, pki_types::ServerName};
+use tokio::net::TcpStream;
+use tokio_rustls::{TlsConnector, client::TlsStream};
+
+use super::{TlsError, files};
+
+/// Whom we trust when we connect.
+#[derive(Clone)]
+pub struct ClientTls(TlsConnector);
+
+impl ClientTls {
+    /// Trusts the authorities in a PEM file, which the setting `setting` names, or those that the
+    /// system trusts.
+    ///
+    /// # Errors
+    /// [`TlsError`] when the file cannot be used.
+    pub fn new(setting: &'static str, authorities: Option<&Path>) -> Result<Self, TlsError> {
+        let mut roots = RootCertStore::empty();
+        let trusted = match authorities {
+            Some(path) => files::authorities(setting, path)?,
+            None => rustls_native_certs::load_native_certs().certs,
+        };
+        // What cannot be used vouches for nobody.
+        let (_, refused) = roots.add_parsable_certificates(trusted);
+        if let Some(path) = authorities.filter(|_| refused > 0) {
+            return Err(TlsError::Damaged {
+                setting,
+                path: path.to_owned(),
+            });
+        }
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let config = ClientConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()?
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        Ok(Self(TlsConnector::from(Arc::new(config))))
+    }
+
+    /// Shakes hands with the server `host`, a name or an address.
+    ///
+    /// # Errors
+    /// When the server cannot show that it is this one, or the connection fails.
+    pub async fn connect(
+        &self,
+        host: &str,
+        connection: TcpStream,
+    ) -> io::Result<TlsStream<TcpStream>> {
+        let name = ServerName::try_from(host.to_owned()).map_err(io::Error::other)?;
+        self.0.connect(name, connection).await
+    }
+}

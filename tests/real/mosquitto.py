@@ -1,0 +1,125 @@
+"""The broker of the tests, and who listens to it."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from harness.processes import free_ports
+
+USER, PASSWORD = "lookdown", "s@cret/of:home"
+PASSWORD_IN_URL = "s%40cret%2Fof%3Ahome"
+PATIENCE = 15.0
+"""Seconds until what is to come must have come."""
+
+
+def until(what: str, is_so) -> None:
+    """Waits until it is so."""
+    deadline = time.monotonic() + PATIENCE
+    while not is_so():
+        if time.monotonic() > deadline:
+            raise AssertionError(f"{what} did not come within {PATIENCE:.0f} s")
+        time.sleep(0.05)
+
+
+@dataclass
+class Broker:
+    """A mosquitto that can be killed and started again at the same port. It keeps nothing on the disk."""
+
+    folder: Path
+    tls: dict[str, Path] = field(default_factory=dict)
+    port: int = field(default_factory=lambda: free_ports(1)[0])
+    process: subprocess.Popen | None = None
+
+    @property
+    def url(self) -> str:
+        """The setting `mqtt.url`."""
+        scheme = "mqtts" if self.tls else "mqtt"
+        return f"{scheme}://{USER}:{PASSWORD_IN_URL}@localhost:{self.port}"
+
+    def start(self) -> None:
+        """Until it answers."""
+        passwords, config = self.folder / "passwords", self.folder / "mosquitto.conf"
+        subprocess.run(["mosquitto_passwd", "-b", "-c", passwords, USER, PASSWORD], check=True, capture_output=True)
+        lines = [f"listener {self.port} 127.0.0.1", "allow_anonymous false", f"password_file {passwords}"]
+        lines += ["persistence false", "user root", *(f"{key} {path}" for key, path in self.tls.items())]
+        config.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        self.process = subprocess.Popen(
+            ["/usr/sbin/mosquitto", "-c", config], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        until("mosquitto", lambda: self.client("pub", "-t", "test", "-n").returncode == 0)
+
+    def stop(self, signal_number: int = signal.SIGTERM) -> None:
+        """Ends it."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.process.pid, signal_number)
+        self.process.wait(timeout=PATIENCE)
+
+    def client(self, which: str, *arguments: str) -> subprocess.CompletedProcess:
+        """Runs `mosquitto_pub` or `mosquitto_sub` to its end."""
+        command = [f"mosquitto_{which}", *self.login(), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
+
+    def login(self) -> list[str]:
+        """How the clients of mosquitto get in."""
+        authority = ["--cafile", str(self.tls["cafile"])] if self.tls else []
+        return ["-h", "localhost", "-p", str(self.port), "-u", USER, "-P", PASSWORD, *authority]
+
+    def retained(self) -> dict[str, str]:
+        """All that it keeps, by topic."""
+        said = self.client("sub", "-t", "#", "--retained-only", "-W", "1", "-F", "%t %p").stdout
+        return dict(line.split(" ", 1) for line in said.splitlines())
+
+    @contextlib.contextmanager
+    def listening(self, topic: str) -> Iterator[list[str]]:
+        """What is published meanwhile, a line of retained flag, topic and payload each."""
+        said: list[str] = []
+        with subprocess.Popen(
+            ["mosquitto_sub", *self.login(), "-v", "-t", topic, "-t", "test/begin", "-F", "%r %t %p"],
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as process:
+            os.set_blocking(process.stdout.fileno(), False)
+
+            def hear() -> list[str]:
+                with contextlib.suppress(TypeError):
+                    said.extend(line.rstrip("\n") for line in process.stdout)
+                return said
+
+            def begun() -> bool:
+                self.client("pub", "-t", "test/begin", "-n")
+                return any("test/begin" in line for line in hear())
+
+            until("the listener", begun)
+            said.clear()
+            try:
+                yield Heard(hear)
+            finally:
+                process.terminate()
+
+
+class Heard:
+    """Lines that are heard while one looks."""
+
+    def __init__(self, hear):
+        self.hear = hear
+
+    def of(self, topic: str) -> list[str]:
+        """The payloads of a topic."""
+        lines = (line.split(" ", 2) for line in self.hear())
+        return [payload for _, said, payload in lines if said == topic]
+
+
+@contextlib.contextmanager
+def broker(folder: Path, tls: dict[str, Path] | None = None) -> Iterator[Broker]:
+    """A broker that answers, and is stopped at the end."""
+    started = Broker(folder, tls or {})
+    started.start()
+    try:
+        yield started
+    finally:
+        started.stop()

@@ -1,0 +1,195 @@
+"""Lookdown with a real MQTT broker, mosquitto, as Home Assistant would find it there."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+from harness.places import ROOT, SAMPLES
+from mosquitto import PASSWORD, PASSWORD_IN_URL, broker, until
+from support.lookdown import TINY, lookdown
+
+OFFICE = (SAMPLES / "office.jpg").read_bytes()
+DETECT = "/detect?calibration=office&profile=fast"
+STATUS = "lookdown/status"
+PERSONS = "lookdown/cameras/office/persons"
+ZONES = "lookdown/cameras/office/zones"
+REPORT = "lookdown/cameras/office/report"
+CONFIGS = {
+    "homeassistant/binary_sensor/lookdown_office_occupancy/config",
+    "homeassistant/sensor/lookdown_office_persons/config",
+    "homeassistant/sensor/lookdown_office_zone_left/config",
+    "homeassistant/sensor/lookdown_office_zone_nobody/config",
+}
+AREAS = [
+    {"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]},
+    {"name": "nobody", "frame_px": [[0, 0], [4, 0], [4, 4], [0, 4]]},
+]
+
+
+class Mqtt(unittest.TestCase):
+    """What reaches the broker."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
+        self.calibrations = self.folder / "calibrations"
+        self.calibrations.mkdir()
+        (self.calibrations / "office.json").write_text(json.dumps(calibration | {"zones": AREAS}), encoding="utf-8")
+        self.broker = self.enterContext(broker(self.folder))
+
+    def lookdown(self, **settings: str):
+        """A server that publishes."""
+        wanted = {"MQTT__URL": self.broker.url} | TINY | settings
+        return lookdown(wanted, calibrations=self.calibrations)
+
+    def until_status(self, wanted: str) -> None:
+        """Until whoever comes to the broker is told this."""
+        until(f"the status {wanted}", lambda: self.broker.retained().get(STATUS) == wanted)
+
+    def metric(self, server, name: str) -> int:
+        """A metric without labels."""
+        lines = server.get("/metrics").decode().splitlines()
+        return int(next(line.split()[1] for line in lines if line.startswith(f"lookdown_{name} ")))
+
+    def test_counts_reports_and_discovery(self):
+        models = {"MODEL__PATH": ""}
+        with self.lookdown(**models) as server, self.broker.listening("lookdown/#") as heard:
+            self.until_status("online")
+            answer = server.post(DETECT, OFFICE)
+            until("the report", lambda: heard.of(REPORT) == [answer.decode()])
+            report = json.loads(answer)
+            self.assertGreater(len(report["persons"]), 3)
+            kept = self.broker.retained()
+            self.assertEqual(kept[PERSONS], str(len(report["persons"])))
+            self.assertNotIn(REPORT, kept)
+            for zone in report["zones"]:
+                self.assertEqual(kept[f"{ZONES}/{zone['name']}"], str(zone["persons"]))
+            self.assertEqual(kept[f"{ZONES}/nobody"], "0")
+            configs = {topic: json.loads(kept[topic]) for topic in kept if topic.startswith("homeassistant/")}
+            self.assertEqual(set(configs), CONFIGS)
+            self.assertEqual(len({config["unique_id"] for config in configs.values()}), len(CONFIGS))
+            for config in configs.values():
+                self.assertIn(config["state_topic"], kept)
+                self.assertEqual(config["availability_topic"], STATUS)
+                self.assertEqual(config["device"]["identifiers"], ["lookdown_office"])
+            self.assertEqual(self.metric(server, "mqtt_connected"), 1)
+            self.assertEqual(self.metric(server, "mqtt_reports_sent_total"), 1)
+
+    def test_home_assistant_that_starts_is_told_everything_again(self):
+        with self.lookdown() as server:
+            server.post(DETECT, OFFICE)
+            until("discovery", lambda: CONFIGS < set(self.broker.retained()))
+            for topic in (*CONFIGS, PERSONS):
+                self.broker.client("pub", "-r", "-n", "-t", topic)
+            self.assertFalse(CONFIGS & set(self.broker.retained()))
+            self.broker.client("pub", "-t", "homeassistant/status", "-m", "offline")
+            self.broker.client("pub", "-t", "homeassistant/status", "-m", "online")
+            until("discovery", lambda: {*CONFIGS, PERSONS} < set(self.broker.retained()))
+
+    def test_a_killed_server_is_offline_by_its_will(self):
+        with self.lookdown() as server:
+            self.until_status("online")
+            os.kill(server.pid, signal.SIGKILL)
+            self.until_status("offline")
+
+    def test_a_stopped_server_says_that_it_is_offline(self):
+        with self.lookdown() as server:
+            self.until_status("online")
+            with self.broker.listening(STATUS) as heard:
+                os.kill(server.pid, signal.SIGTERM)
+                self.assertEqual(server.process.wait(timeout=20), 0)
+                until("the farewell", lambda: heard.of(STATUS)[-1:] == ["offline"])
+        self.assertEqual(self.broker.retained()[STATUS], "offline")
+
+    def test_a_broker_that_was_killed_gets_what_is_true_now(self):
+        with self.lookdown() as server:
+            server.post(DETECT, OFFICE)
+            until("the count", lambda: PERSONS in self.broker.retained())
+            self.broker.stop(signal.SIGKILL)
+            until("the outage", lambda: self.metric(server, "mqtt_connected") == 0)
+            server.post(f"{DETECT}&camera=gate", OFFICE)
+            last = json.loads(server.post(f"{DETECT}&score_threshold=1", OFFICE))
+            self.broker.start()
+            until("all of it", lambda: {STATUS, *CONFIGS, PERSONS} < set(self.broker.retained()))
+            kept = self.broker.retained()
+            self.assertEqual(kept[STATUS], "online")
+            self.assertEqual(kept[PERSONS], str(len(last["persons"])))
+            self.assertIn("lookdown/cameras/gate/persons", kept)
+            self.assertEqual(self.metric(server, "mqtt_connected"), 1)
+            self.assertEqual(self.metric(server, "mqtt_reports_dropped_total"), 2)
+
+    def test_a_server_without_its_broker_serves_all_the_same(self):
+        self.broker.stop()
+        with self.lookdown() as server:
+            for _ in range(100):
+                server.post(DETECT, OFFICE)
+            until("the count", lambda: self.metric(server, "mqtt_reports_dropped_total") == 100)
+            os.kill(server.pid, signal.SIGTERM)
+            self.assertEqual(server.process.wait(timeout=20), 0)
+        self.broker.start()
+
+    def test_the_end_of_one_of_two_servers_leaves_the_other_online(self):
+        with self.lookdown(), contextlib.ExitStack() as other:
+            server = other.enter_context(self.lookdown())
+            self.until_status("online")
+            with self.broker.listening(STATUS) as heard:
+                os.kill(server.pid, signal.SIGKILL)
+                until("the contradiction", lambda: heard.of(STATUS)[-2:] == ["offline", "online"])
+            self.assertEqual(self.broker.retained()[STATUS], "online")
+
+    def test_names_that_are_no_topics_are_published_and_a_flood_of_them_is_not(self):
+        with self.lookdown(MQTT__MAX_CAMERAS="3") as server:
+            for camera in ("a%2Fb", "%23", "n%C3%B6rd+lich", "fourth", "fifth"):
+                server.post(f"{DETECT}&camera={camera}", OFFICE)
+            until("the reports", lambda: self.metric(server, "mqtt_reports_dropped_total") == 2)
+            self.assertEqual(self.metric(server, "mqtt_reports_sent_total"), 3)
+            topics = [topic for topic in self.broker.retained() if topic.endswith("/persons")]
+            self.assertEqual(len(topics), 3)
+            self.assertTrue(all(topic.count("/") == 3 for topic in topics), topics)
+
+    def test_a_wrong_password_is_told_once_and_never_shown(self):
+        wrong = self.broker.url.replace(PASSWORD_IN_URL, "wr0ng")
+        with self.lookdown(MQTT__URL=wrong, LOG__FILTER="trace") as server:
+            server.post(DETECT, OFFICE)
+            log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
+            until("the warning", lambda: "mqtt.url" in log.read_text(errors="replace"))
+            text = log.read_text(errors="replace")
+        self.assertEqual(text.count("nothing is published"), 1)
+        for secret in ("wr0ng", PASSWORD, PASSWORD_IN_URL):
+            self.assertNotIn(secret, text)
+
+
+class MqttOverTls(unittest.TestCase):
+    """The same, encrypted."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        certificate, key = self.folder / "broker.pem", self.folder / "broker.key"
+        subprocess.run(
+            [
+                *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"),
+                *("-days", "2", "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"),
+                *("-keyout", key, "-out", certificate),
+            ],
+            check=True,
+            capture_output=True,
+        )
+        tls = {"certfile": certificate, "keyfile": key, "cafile": certificate}
+        self.broker = self.enterContext(broker(self.folder, tls))
+
+    def test_a_broker_of_the_authority_is_spoken_to(self):
+        settings = {"MQTT__URL": self.broker.url, "MQTT__AUTHORITIES": str(self.broker.tls["cafile"])}
+        with lookdown(TINY | settings):
+            until("online", lambda: self.broker.retained().get(STATUS) == "online")
+
+    def test_another_is_told_nothing(self):
+        with lookdown(TINY | {"MQTT__URL": self.broker.url}) as server:
+            server.post(DETECT, OFFICE)
+            log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
+            until("the warning", lambda: "nothing is published" in log.read_text(errors="replace"))
+            self.assertEqual(self.broker.retained(), {})
