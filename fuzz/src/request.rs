@@ -149,6 +149,7 @@ fn router() -> Router {
             max_header_bytes: 1 << 14,
             max_headers: 100,
             zone_metrics: false,
+            pictures_of: Arc::default(),
             metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),
             min_upload_bytes_per_second: None,

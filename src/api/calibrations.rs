@@ -27,7 +27,7 @@ use super::{
     access::{Administrator, Reader},
     deadline::Deadline,
     entity_tags::{entity_tag, is_unmodified},
-    openapi::{ChangeProblems, DeleteProblems, ReadProblems, UnknownCalibrationProblem},
+    openapi::{ChangeProblems, DeleteProblems, RawBytes, ReadProblems, UnknownCalibrationProblem},
     problem::{Problem, ProblemKind},
 };
 use crate::calibration::ChangeError;
@@ -103,8 +103,8 @@ pub(super) async fn get(
             description = "`*`: create only."),
     ),
     request_body(
-        description = "A calibration file, recognised from its content; at most 1 MiB.",
-        content(("application/json"), ("application/yaml"), ("application/octet-stream")),
+        description = "A calibration file, recognised from its content, whatever the content type says; at most 1 MiB.",
+        content((Object = "application/json"), (inline(RawBytes) = "application/octet-stream")),
     ),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(

@@ -11,7 +11,7 @@ use super::{
     ApiState,
     answer::AnswerOptions,
     find::{Found, find},
-    openapi::{DetectForm, DetectProblems, DetectQuery},
+    openapi::{DetectForm, DetectProblems, DetectQuery, RawBytes},
     problem::Problem,
     report::{Report, ReportTimings},
     request_id::RequestId,
@@ -43,10 +43,10 @@ pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-co
     post, path = "/detect", tag = "detection", operation_id = "detect_persons",
     params(DetectQuery),
     request_body(
-        description = "The frame.",
+        description = "The frame: a form, or the file alone (JPEG, PNG or WebP, with any other content type).",
         content(
             (DetectForm = "multipart/form-data"),
-            ("image/jpeg"), ("image/png"), ("image/webp"), ("application/octet-stream"),
+            (inline(RawBytes) = "application/octet-stream"),
         )
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),

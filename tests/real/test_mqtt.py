@@ -169,17 +169,21 @@ class MqttOverTls(unittest.TestCase):
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        authority, authority_key = self.folder / "authority.pem", self.folder / "authority.key"
+        request, names = self.folder / "broker.csr", self.folder / "names"
         certificate, key = self.folder / "broker.pem", self.folder / "broker.key"
-        subprocess.run(
+        names.write_text("subjectAltName=DNS:localhost\n", encoding="utf-8")
+        new_key = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
+        for command in (
+            ["req", "-x509", *new_key, "-days", "2", "-subj", "/CN=home", "-keyout", authority_key, "-out", authority],
+            ["req", *new_key, "-subj", "/CN=localhost", "-keyout", key, "-out", request],
             [
-                *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"),
-                *("-days", "2", "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"),
-                *("-keyout", key, "-out", certificate),
+                *("x509", "-req", "-in", request, "-CA", authority, "-CAkey", authority_key, "-CAcreateserial"),
+                *("-days", "2", "-extfile", names, "-out", certificate),
             ],
-            check=True,
-            capture_output=True,
-        )
-        tls = {"certfile": certificate, "keyfile": key, "cafile": certificate}
+        ):
+            subprocess.run(["openssl", *command], check=True, capture_output=True)
+        tls = {"certfile": certificate, "keyfile": key, "cafile": authority}
         self.broker = self.enterContext(broker(self.folder, tls))
 
     def test_a_broker_of_the_authority_is_spoken_to(self):

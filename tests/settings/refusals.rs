@@ -27,7 +27,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 48] = [
+const UNUSABLE: [(&str, &str, &str, &str); 47] = [
     (
         "RESULTS__URL",
         "localhost:6379",
@@ -46,7 +46,6 @@ const UNUSABLE: [(&str, &str, &str, &str); 48] = [
         "results.max_age_seconds",
         "from 60",
     ),
-    ("MQTT__URL", "http://broker", "mqtt.url", "mqtt://"),
     (
         "MQTT__TOPIC_PREFIX",
         "home/#",
