@@ -10,7 +10,7 @@ use utoipa::{OpenApi, openapi};
 
 use security::Keys;
 
-pub(super) use parameters::{DetectForm, DetectQuery, PictureQuery, RawBytes};
+pub(super) use parameters::{DetectForm, DetectQuery, PictureQuery, RawBytes, fields};
 pub(super) use problems::{
     CameraEventsProblems, ChangeProblems, DeepStackCustomProblems, DeepStackProblems,
     DeleteProblems, DetectProblems, EventsProblems, FaultProblem, HistoryProblems, IndexProblems,

@@ -5,7 +5,7 @@
 use utoipa::{
     IntoParams, PartialSchema, ToSchema,
     openapi::{
-        KnownFormat, ObjectBuilder, RefOr, Schema, SchemaFormat,
+        KnownFormat, Object, ObjectBuilder, RefOr, Schema, SchemaFormat,
         schema::{AdditionalProperties, Type},
     },
 };
@@ -118,17 +118,21 @@ impl PartialSchema for DetectForm {
             .property("img", frame)
             .required("img")
             .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        let parameters = DetectQuery::into_params(|| None).into_iter();
-        let fields = parameters.filter_map(|parameter| {
-            let Some(RefOr::T(Schema::Object(mut field))) = parameter.schema else {
-                return None;
-            };
-            field.description = parameter.description;
-            Some((parameter.name, field))
-        });
-        let form = fields.fold(form, |form, (name, field)| form.property(name, field));
+        let form = fields().fold(form, |form, (name, field)| form.property(name, field));
         form.into()
     }
+}
+
+/// The parameters of the query as fields of an object.
+pub(in crate::api) fn fields() -> impl Iterator<Item = (String, Object)> {
+    let parameters = DetectQuery::into_params(|| None).into_iter();
+    parameters.filter_map(|parameter| {
+        let Some(RefOr::T(Schema::Object(mut field))) = parameter.schema else {
+            return None;
+        };
+        field.description = parameter.description;
+        Some((parameter.name, field))
+    })
 }
 
 /// Bytes as they are, in a body of their own.

@@ -9,7 +9,7 @@ use utoipa::{
 };
 
 use super::answer::BinarySize;
-use crate::{api::openapi::DetectQuery, pipeline::DetectParameters};
+use crate::{api::openapi::fields, pipeline::DetectParameters};
 
 /// A request to infer, its tensors in it. Where they come as bytes behind it, `binary_data_size` is a
 /// parameter of theirs instead of `data`.
@@ -85,21 +85,10 @@ impl ToSchema for InferParameters {
 impl PartialSchema for InferParameters {
     /// What the pipeline reads of the parameters of `/detect`, and the protocol's own.
     fn schema() -> RefOr<Schema> {
-        let query = DetectQuery::schema();
-        let RefOr::T(Schema::Object(mut parameters)) = query else {
-            return query;
-        };
         let description = "Parameters of `/detect`, and of the protocol. Detectors take the protocol's \
                            and `timeout_millis`.";
-        parameters.description = Some(description.to_owned());
         let known = DetectParameters::NAMES;
-        let others = parameters
-            .properties
-            .keys()
-            .filter(|name| !known.contains(&name.as_str()));
-        for name in others.cloned().collect::<Vec<_>>() {
-            parameters.properties.remove(&name);
-        }
+        let fields = fields().filter(|(name, _)| known.contains(&name.as_str()));
         let timeout = ObjectBuilder::new()
             .schema_type(Type::Integer)
             .minimum(Some(1))
@@ -108,13 +97,14 @@ impl PartialSchema for InferParameters {
                 "`timeout_millis` in microseconds, as the protocol has it.",
             ));
         let binary = Object::with_type(Type::Boolean);
-        parameters
-            .properties
-            .insert("timeout".to_owned(), timeout.into());
-        parameters
-            .properties
-            .insert("binary_data_output".to_owned(), binary.into());
-        parameters.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
+        let parameters = ObjectBuilder::new()
+            .description(Some(description))
+            .property("timeout", timeout)
+            .property("binary_data_output", binary)
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        let parameters = fields.fold(parameters, |object, (name, field)| {
+            object.property(name, field)
+        });
         parameters.into()
     }
 }
