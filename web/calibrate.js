@@ -15,7 +15,7 @@ const FIELDS = ["cx", "cy", "radius", "fieldOfView"];
 const REST_MILLIS = 120;
 const PREVIEW_PIXELS = 320;
 
-/** Where an import came from: `{name, content}`; null while the circle is edited. */
+/** An imported file: `{name, content, needsSize}`; null while the circle is edited. */
 let imported = null;
 let circle = null;
 let isVisible = false;
@@ -58,9 +58,9 @@ function drawn() {
   if (imported) drawing.replaceChildren();
   else drawCircle(drawing, circle, (moved) => edited({ ...circle, ...moved }));
   for (const name of FIELDS) find(`output[for=calibrate-${name}]`).textContent = Number(field(name).value).toFixed(1);
-  find("#import-name").textContent = imported ? `From ${imported.name}: it is saved as it is.` : "";
+  find("#import-name").textContent = imported ? `${imported.name} is saved as it is.` : "";
   find("#circle-fields").disabled = Boolean(imported);
-  find("#drop-import").hidden = !imported;
+  find("#import-fields").hidden = !imported;
   const id = field("id").value;
   find("#save").textContent = isServing(id) ? `Replace ${id}` : "Save";
 }
@@ -72,8 +72,14 @@ function edited(next) {
 
 const content = () => imported?.content ?? JSON.stringify(calibrationOf({ id: id(), ...circle }), null, 2);
 const id = () => field("id").value || "camera";
-/** Formats that do not tell the size of frames are told. */
-const size = () => (imported ? `&size=${shared.frame.width}x${shared.frame.height}` : "");
+
+/** How to read an imported file: which of its cameras, and the size of frames where its format does not tell it. */
+function reading() {
+  const query = new URLSearchParams();
+  if (imported && field("camera").value) query.set("camera", field("camera").value);
+  if (imported?.needsSize) query.set("size", `${shared.frame.width}x${shared.frame.height}`);
+  return query;
+}
 
 async function look() {
   const { frame } = shared;
@@ -81,8 +87,11 @@ async function look() {
   trying?.abort();
   trying = new AbortController();
   const options = { method: "POST", body: content(), signal: trying.signal };
-  const path = `calibrations/${id()}/views?profile=fast&grid=${GRID_CELLS}${size()}`;
-  const plan = await withProgress(find("#previews-progress"), "Straightening", () => askJson(path, options));
+  const attempt = () => {
+    const query = new URLSearchParams([["profile", "fast"], ["grid", GRID_CELLS], ...reading()]);
+    return askJson(`calibrations/${id()}/views?${query}`, options);
+  };
+  const plan = await withProgress(find("#previews-progress"), "Straightening", () => attempt().catch(sizeOr(attempt)));
   const views = plan.views.map((view, index) => {
     const canvas = viewCanvas(view, GRID_CELLS, frame, plan.image[0], PREVIEW_PIXELS);
     canvas.setAttribute("role", "img");
@@ -92,6 +101,13 @@ async function look() {
   find("#previews").replaceChildren(...views);
 }
 
+/** Whoever asks for the size of frames is told that of this one, and asked again. */
+const sizeOr = (again) => (problem) => {
+  if (!imported || imported.needsSize || !/\bsize\b/.test(problem.message)) throw problem;
+  imported.needsSize = true;
+  return again();
+};
+
 const lookShown = shown(look);
 const lookSoon = afterPause(REST_MILLIS, lookShown);
 
@@ -99,7 +115,7 @@ async function save() {
   const name = id();
   const before = shared.calibrations.find((calibration) => calibration.id === name);
   const headers = before ? { "If-Match": `"${before.revision}"` } : { "If-None-Match": "*" };
-  const path = `calibrations/${name}${size().replace("&", "?")}`;
+  const path = `calibrations/${name}?${reading()}`;
   const options = { method: "PUT", body: content(), headers };
   const answer = await withProgress(find("#save-progress"), "Saving", () => ask(path, options));
   const { warnings = [] } = await answer.json();
@@ -113,7 +129,7 @@ async function save() {
 /** A file from the disk; what it means is for the server to say. */
 async function importFile(file) {
   const text = await file.text();
-  imported = { name: file.name, content: text };
+  imported = { name: file.name, content: text, needsSize: false };
   // A file of ours has a name.
   const own = /"id"\s*:\s*"([a-z0-9][a-z0-9_-]{0,63})"/.exec(text);
   if (own) field("id").value = own[1];
@@ -126,7 +142,7 @@ async function open(name) {
   const file = await askJson(`calibrations/${name}`);
   const known = circleOf(file);
   field("id").value = name;
-  imported = known ? null : { name, content: JSON.stringify(file) };
+  imported = known ? null : { name, content: JSON.stringify(file), needsSize: false };
   if (known) setCircle(known);
   drawn();
   await look();
@@ -148,8 +164,8 @@ export function start() {
     if (event.target.closest("#circle-fields")) {
       const values = Object.fromEntries(FIELDS.map((name) => [name, Number(field(name).value)]));
       circle = { ...circle, ...values, model: field("model").value, cameraHeight: Number(field("cameraHeight").value) || null };
-      lookSoon();
     }
+    if (event.target.closest("#circle-fields, #import-fields")) lookSoon();
     if (circle) drawn();
   });
   form().addEventListener("submit", (event) => {

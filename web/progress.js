@@ -5,6 +5,16 @@ import { element, find } from "./dom.js";
 /** Work that takes longer is shown. */
 const PATIENCE_MILLIS = 300;
 
+/** How much is under way in a host: what was replaced ends after what replaces it has begun. */
+const underWay = new WeakMap();
+
+function count(host, change) {
+  const now = (underWay.get(host) ?? 0) + change;
+  underWay.set(host, now);
+  if (now) host.setAttribute("aria-busy", "true");
+  else host.removeAttribute("aria-busy");
+}
+
 /** Does `work` and shows a bar in `host` for as long as it takes; failures are told there, too. */
 export async function withProgress(host, label, work) {
   const began = performance.now();
@@ -25,7 +35,7 @@ export async function withProgress(host, label, work) {
     tick();
     ticking = setInterval(tick, 100);
   }, PATIENCE_MILLIS);
-  host.setAttribute("aria-busy", "true");
+  count(host, 1);
   try {
     const done = await work();
     tell(host, "");
@@ -37,7 +47,7 @@ export async function withProgress(host, label, work) {
     clearTimeout(waiting);
     clearInterval(ticking);
     bar.remove();
-    host.removeAttribute("aria-busy");
+    count(host, -1);
   }
 }
 

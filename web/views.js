@@ -68,7 +68,7 @@ function chip(person, index) {
   return element("button", { type: "button", class: "chip", "data-person": index, onclick: toggle }, String(index + 1));
 }
 
-const small = (person) => element("i", { "data-person": person }, String(person + 1));
+const small = (person) => element("i", {}, `${person + 1} `);
 
 /** A person's box centre in pixels of the frames that the plan was made for. */
 const placeOf = (person, report) => centre(person).map((value) => (value * plan.image[0]) / report.image.width);
@@ -77,8 +77,7 @@ function tile(view, index, frame, report) {
   const inSight = report.persons.flatMap((person, who) => (holds(view.outline, placeOf(person, report)) ? [who] : []));
   const canvas = viewCanvas(view, GRID_CELLS, frame, plan.image[0], TILE_PIXELS);
   canvas.setAttribute("aria-hidden", "true");
-  const who = inSight.map((person) => person + 1).join(", ");
-  const name = `View ${index + 1}, ${Math.round(view.off_axis_deg)}° off axis, ${who ? `persons ${who}` : "nobody in sight"}`;
+  const where = `, ${Math.round(view.off_axis_deg)}° off axis, ${inSight.length ? "sees" : "nobody in sight"} `;
   const choose = () => {
     chosen = chosen === index ? null : index;
     pointOutAll();
@@ -86,10 +85,15 @@ function tile(view, index, frame, report) {
   const over = (at) => () => find("#outlines").children[index].classList.toggle("over", at);
   return element(
     "button",
-    { type: "button", class: "tile", "aria-label": name, "aria-pressed": "false", "data-holds": inSight.join(" "),
+    { type: "button", class: "tile", "aria-pressed": "false", "data-holds": inSight.join(" "),
       onclick: choose, onmouseenter: over(true), onmouseleave: over(false), onfocus: over(true), onblur: over(false) },
     canvas,
-    element("span", { class: "caption", "aria-hidden": "true" }, element("b", {}, String(index + 1)), element("span", {}, inSight.map(small))),
+    element(
+      "span",
+      { class: "caption" },
+      element("b", {}, element("span", { class: "unseen" }, "View "), String(index + 1), element("span", { class: "unseen" }, where)),
+      element("span", {}, inSight.map(small)),
+    ),
   );
 }
 

@@ -19,7 +19,7 @@ const ADMINISTRATOR: &str = "lookdown_administrator";
 const BOTH: &str = "lookdown_both";
 
 /// Every route that needs a scope.
-const GUARDED: [(&str, &str, &str); 23] = [
+const GUARDED: [(&str, &str, &str); 24] = [
     ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
     ("POST", "/v1/vision/detection", "detect"),
     ("POST", "/v1/vision/custom/lobby", "detect"),
@@ -33,6 +33,7 @@ const GUARDED: [(&str, &str, &str); 23] = [
     ("GET", "/calibrations", "read"),
     ("GET", "/calibrations/lobby", "read"),
     ("GET", "/calibrations/lobby/views", "read"),
+    ("POST", "/calibrations/lobby/views", "read"),
     ("GET", "/results", "read"),
     ("GET", "/results/lobby/latest", "read"),
     ("GET", "/results/lobby/history", "read"),

@@ -230,3 +230,79 @@ async fn a_plan_for_the_frame_itself_has_no_views_and_odd_requests_are_refused()
         assert_eq!(answer.problem()["type"], urn, "{query}");
     }
 }
+
+#[tokio::test]
+async fn a_calibration_is_tried_before_it_is_stored() {
+    let service = Service::start();
+    let saved = service.get(PATH).await.text();
+    let trial = saved.replace("\"lobby\"", "\"trial\"");
+    let tried = service
+        .post("/calibrations/trial/views?profile=fast", &trial)
+        .await;
+    assert_eq!(tried.status, 200, "{}", tried.text());
+    let (tried, known) = (
+        tried.json(),
+        service
+            .get("/calibrations/lobby/views?profile=fast")
+            .await
+            .json(),
+    );
+    assert_eq!(tried["calibration"], "trial");
+    assert_eq!(tried["views"], known["views"]);
+    assert!(tried["views"][0].get("grid").is_none());
+    assert_eq!(service.get("/calibrations/trial").await.status, 404);
+    for (path, body, kind) in [
+        ("/calibrations/trial/views", "{}", "invalid-calibration"),
+        ("/calibrations/other/views", &*trial, "invalid-calibration"),
+        ("/calibrations/NO/views", &*trial, "invalid-calibration"),
+        (
+            "/calibrations/trial/views?profile=best",
+            &*trial,
+            "invalid-parameter",
+        ),
+        (
+            "/calibrations/trial/views?sigma=1",
+            &*trial,
+            "unknown-parameter",
+        ),
+    ] {
+        let urn = format!("urn:lookdown:problem:{kind}");
+        assert_eq!(
+            service.post(path, body).await.problem()["type"],
+            urn,
+            "{path}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_grid_says_where_a_view_looks_without_knowing_the_lens() {
+    let service = Service::start();
+    let path = format!("{PATH}/views?profile=fast&grid=16");
+    let plan = service.get(&path).await.json();
+    let image = [0, 1].map(|side| plan["image"][side].as_f64().unwrap());
+    for view in plan["views"].as_array().unwrap() {
+        let grid = view["grid"].as_array().unwrap();
+        assert_eq!(grid.len(), 17 * 17);
+        // What the lens does not see has no place.
+        let (seen, unseen): (Vec<_>, Vec<_>) = grid.iter().partition(|node| node.is_array());
+        assert!(seen.len() > 100 && !unseen.is_empty(), "{}", seen.len());
+        for node in seen {
+            let at = [0, 1].map(|side| node[side].as_f64().unwrap());
+            assert!((0..2).all(|side| (-1.0..=image[side] + 1.0).contains(&at[side])));
+        }
+        // Its middle is where the axis points: 63.66 pixels per radian around (100, 100).
+        let middle = &grid[8 * 17 + 8];
+        let [azimuth, off_axis] =
+            ["azimuth_deg", "off_axis_deg"].map(|name| view[name].as_f64().unwrap().to_radians());
+        let expected = [azimuth.cos(), azimuth.sin()].map(|part| 100.0 + 63.66 * off_axis * part);
+        for side in 0..2 {
+            let difference = middle[side].as_f64().unwrap() - expected[side];
+            assert!(difference.abs() < 0.1, "{middle} {expected:?}");
+        }
+    }
+    for grid in ["0", "33", "many", "-1"] {
+        let answer = service.get(&format!("{PATH}/views?grid={grid}")).await;
+        assert_eq!(answer.status, 422, "{grid}");
+    }
+}

@@ -159,3 +159,54 @@ async fn pages_that_may_call_may_read_every_header_of_ours() {
         assert!(exposed.split(',').any(|told| told.trim() == name), "{name}");
     }
 }
+
+#[tokio::test]
+async fn the_web_page_is_whole_and_its_styles_and_scripts_are_files() {
+    let service = Service::start();
+    let page = service.get("/").await;
+    assert_eq!(page.header("content-type"), "text/html; charset=utf-8");
+    let policy = page.header("content-security-policy");
+    assert!(!policy.contains("unsafe"), "{policy}");
+    let text = page.text();
+    assert!(!text.contains("http"), "the page asks other hosts");
+    assert!(!text.contains("style=") && !text.contains("<style"));
+    let links = text.split('"').filter(|part| part.starts_with("assets/"));
+    let links: Vec<_> = links.collect();
+    assert!(links.len() > 3, "{links:?}");
+    for link in links {
+        let asset = service.get(&format!("/{link}")).await;
+        assert_eq!(asset.status, 200, "{link}");
+        // A script that imports another names a file that is there.
+        for import in asset.text().split("from \"./").skip(1) {
+            let name = import.split('"').next().unwrap();
+            let imported = service.get(&format!("/assets/{name}")).await;
+            assert_eq!(
+                imported.header("content-type"),
+                "text/javascript; charset=utf-8",
+                "{name}"
+            );
+        }
+    }
+    let missing = service.get("/assets/nothing.js").await;
+    assert_eq!(missing.status, 404);
+    assert_eq!(missing.problem()["type"], "urn:lookdown:problem:not-found");
+}
+
+#[tokio::test]
+async fn a_browser_asks_whether_what_it_has_of_the_page_is_still_right() {
+    let service = Service::start();
+    for path in ["/", "/assets/office.jpg"] {
+        let first = service.get(path).await;
+        assert_eq!(first.header("cache-control"), "no-cache", "{path}");
+        let tag = first.header("etag").to_owned();
+        let again = service.ask("GET", path, &[("if-none-match", &tag)]).await;
+        assert_eq!(
+            (again.status.as_u16(), again.body.len()),
+            (304, 0),
+            "{path}"
+        );
+        assert_eq!(again.header("etag"), tag);
+        let other = [("if-none-match", "\"something else\"")];
+        assert_eq!(service.ask("GET", path, &other).await.status, 200);
+    }
+}

@@ -62,13 +62,15 @@ export async function detectSample(page, name, lens = "") {
   await page.locator("#persons li").first().waitFor();
 }
 
-/** Waits until `act` has made the server report again. */
+/** The report that the page has after `act` and did not have before. */
 export async function reportAfter(page, act) {
-  const answered = page.waitForResponse((answer) => answer.url().includes("/detect?") && answer.ok());
+  await page.evaluate(async () => {
+    window.shared = (await import("/assets/shared.js")).shared;
+    window.before = window.shared.report;
+  });
   await act();
-  const report = await (await answered).json();
-  await page.locator("#stage:not([aria-busy])").waitFor();
-  return report;
+  const report = await page.waitForFunction(() => window.shared.report !== window.before && window.shared.report);
+  return report.jsonValue();
 }
 
 /** What axe-core finds wrong with what is shown now. */

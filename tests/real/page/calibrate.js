@@ -18,7 +18,7 @@ async function straightenedAfter(page, act) {
   const answered = page.waitForResponse((answer) => answer.url().includes("/views?profile=fast"));
   await act();
   const answer = await answered;
-  await page.locator("#previews-progress:not([aria-busy])").waitFor();
+  await page.locator("#previews-progress:not([aria-busy])").waitFor({ state: "attached" });
   return answer;
 }
 
@@ -27,10 +27,10 @@ const pixels = (page) => page.locator("#previews canvas").first().evaluate((canv
 pageTest("the circle that was found is laid over the frame, and the views follow it", "", async (page) => {
   await start(page);
   for (const name of ["Centre, from the left", "Centre, from the top", "Radius"]) {
-    assert.ok(Math.abs(Number(await page.getByLabel(name).inputValue()) - 480) < 1.5, name);
+    assert.ok(Math.abs(Number(await page.getByRole("slider", { name }).inputValue()) - 480) < 1.5, name);
   }
   const before = await pixels(page);
-  await straightenedAfter(page, () => page.getByLabel("Field of view").fill("150"));
+  await straightenedAfter(page, () => page.getByRole("slider", { name: "Field of view" }).fill("150"));
   assert.notEqual(await pixels(page), before);
   const handle = await page.locator("[data-handle=rim]").boundingBox();
   const [x, y] = [handle.x + handle.width / 2, handle.y + handle.height / 2];
@@ -40,9 +40,9 @@ pageTest("the circle that was found is laid over the frame, and the views follow
     await page.mouse.move(x - 60, y - 60, { steps: 4 });
     await page.mouse.up();
   });
-  assert.ok(Number(await page.getByLabel("Radius").inputValue()) < 420);
+  assert.ok(Number(await page.getByRole("slider", { name: "Radius" }).inputValue()) < 420);
   await straightenedAfter(page, async () => {
-    await page.getByLabel("Centre, from the left").focus();
+    await page.getByRole("slider", { name: "Centre, from the left" }).focus();
     await page.keyboard.press("ArrowRight");
   });
   assert.ok(Math.abs(Number(await page.locator("output[for=calibrate-cx]").textContent()) - 480.1) < 1.5);
@@ -60,7 +60,7 @@ pageTest("a lens is saved with its height, serves at once and shows the floor", 
   assert.ok(Math.abs(lens.focal - 305.58) < 0.5 && Math.abs(lens.cx - 479.5) < 0.5, JSON.stringify(lens));
   await go(page, "Detect");
   await page.getByText("m away").first().waitFor();
-  assert.equal(await page.getByLabel("Lens", { exact: true }).inputValue(), "lobby");
+  assert.equal(await page.locator("#calibration").inputValue(), "lobby");
   await go(page, "Floor");
   await page.locator(".dot-mark").first().waitFor();
   // A second time it replaces what is there.
@@ -75,7 +75,7 @@ pageTest("a file of another program is looked through and saved as it is", "", a
   await start(page);
   const before = await pixels(page);
   await straightenedAfter(page, () => page.locator("#import-file").setInputFiles(`${FIXTURES}/camodocal_mei.yaml`));
-  await page.getByText("From camodocal_mei.yaml").waitFor();
+  await page.getByText("camodocal_mei.yaml is saved as it is.").waitFor();
   assert.notEqual(await pixels(page), before);
   await page.getByLabel("Name", { exact: true }).fill("imported");
   await page.getByRole("button", { name: "Save", exact: true }).click();
@@ -85,9 +85,27 @@ pageTest("a file of another program is looked through and saved as it is", "", a
   assert.equal(await pixels(page), before);
 });
 
+pageTest("of several cameras in a file, one is named", "", async (page) => {
+  await start(page);
+  await page.locator("#import-file").setInputFiles(`${FIXTURES}/kalibr_camchain.yaml`);
+  await page.getByRole("alert").getByText("cam0, cam1").waitFor();
+  const answer = await straightenedAfter(page, () => page.getByLabel("Camera of the file").fill("cam1"));
+  assert.equal(answer.status(), 200);
+  assert.equal(await page.getByRole("alert").count(), 0);
+}, { expected: /status of 422/ });
+
+pageTest("a file without the size of frames is read for that of this frame", "", async (page) => {
+  await start(page);
+  await page.locator("#import-file").setInputFiles(`${FIXTURES}/py_ocamcalib.json`);
+  const saying = page.getByRole("alert");
+  await page.waitForResponse((answer) => answer.url().includes("size=960x960"));
+  await page.locator("#previews-progress:not([aria-busy])").waitFor({ state: "attached" });
+  assert.equal(await saying.count(), 0, (await saying.allTextContents()).join());
+}, { expected: /status of 422/ });
+
 pageTest("one that serves is opened and gone on from", "", async (page) => {
   await start(page, "office");
-  const answer = await straightenedAfter(page, () => page.getByLabel("Go on from").selectOption("canteen"));
+  const answer = await straightenedAfter(page, () => page.locator("#open-calibration").selectOption("canteen"));
   assert.equal(answer.status(), 200);
   assert.equal(await page.getByLabel("Height, metres").inputValue(), "2.9");
   assert.equal(await page.getByLabel("Name", { exact: true }).inputValue(), "canteen");

@@ -5,7 +5,7 @@ import { readFile } from "node:fs/promises";
 import { SAMPLES, assertAccessible, detectSample, pageTest, reportAfter } from "./browser.js";
 
 const count = (page) => page.locator("#persons li").count();
-const slide = (page, name, value) => page.getByLabel(name).fill(String(value));
+const slide = (page, name, value) => page.getByRole("slider", { name }).fill(String(value));
 
 /** Hands a file to the page as the event `kind` does. */
 const hand = (page, kind, name, type, bytes) =>
@@ -78,12 +78,12 @@ pageTest("every parameter looks again at once", "", async (page) => {
   assert.ok(strict.persons.length < all);
   const overlapping = await reportAfter(page, () => slide(page, "Overlap of one person", 0.2));
   assert.equal(overlapping.refinement.iou_threshold, 0.2);
-  assert.ok(await page.getByLabel("Softness").isDisabled());
-  const soft = await reportAfter(page, () => page.getByLabel("Refinement").selectOption("soft_nms_gaussian"));
+  assert.ok(await page.getByRole("slider", { name: "Softness" }).isDisabled());
+  const soft = await reportAfter(page, () => page.locator("#refine").selectOption("soft_nms_gaussian"));
   assert.equal(soft.refinement.name, "soft_nms_gaussian");
   const softer = await reportAfter(page, () => slide(page, "Softness", 0.8));
   assert.equal(softer.refinement.sigma, 0.8);
-  const fast = await reportAfter(page, () => page.getByText("fast", { exact: true }).click());
+  const fast = await reportAfter(page, () => page.getByRole("radio", { name: "fast" }).check());
   assert.deepEqual([fast.profile, fast.views.inferred], ["fast", 4]);
   const reset = await reportAfter(page, () => page.getByRole("button", { name: "Reset" }).click());
   assert.deepEqual([reset.profile, reset.refinement.name, reset.refinement.score_threshold], ["balanced", "fusion", 0.3]);

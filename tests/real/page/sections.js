@@ -49,11 +49,11 @@ const colours = (page, selector) =>
 
 pageTest("a profile without views says so, and the paper's has all of its own", "", async (page) => {
   await detectSample(page, "office", "office");
-  await reportAfter(page, () => page.getByText("direct", { exact: true }).click());
+  await reportAfter(page, () => page.getByRole("radio", { name: "direct" }).check());
   await go(page, "Views");
   await page.getByText("there are no views").waitFor();
   await go(page, "Detect");
-  await reportAfter(page, () => page.getByText("paper", { exact: true }).click());
+  await reportAfter(page, () => page.getByRole("radio", { name: "paper" }).check());
   await go(page, "Views");
   await page.locator(".tile").nth(127).waitFor();
 });
@@ -71,7 +71,7 @@ pageTest("persons stand on the floor map where the report says, if the height is
   assert.equal(Math.sign(dot.x - camera.x), Math.sign(x));
   assert.equal(Math.sign(dot.y - camera.y), Math.sign(y));
   await go(page, "Detect");
-  await reportAfter(page, () => page.getByLabel("Lens").selectOption(""));
+  await reportAfter(page, () => page.locator("#calibration").selectOption(""));
   await go(page, "Floor");
   await page.getByText("The height of this camera above the floor is not known").waitFor();
 });
