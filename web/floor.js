@@ -71,7 +71,7 @@ function dot({ x_m: x, y_m: y }, index, scale) {
     "g",
     { class: "dot-mark", "data-person": index, transform: `translate(${x * scale} ${y * scale})`, ...over(index) },
     shape("circle", { r: 12 }),
-    shape("text", { y: 4.5 }, String(index + 1)),
+    shape("text", {}, String(index + 1)),
   );
 }
 

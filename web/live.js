@@ -4,7 +4,7 @@ import { element, find } from "./dom.js";
 import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
 import { shown, tell, withProgress } from "./progress.js";
-import { askJson, events } from "./server.js";
+import { ask, askJson, events } from "./server.js";
 
 /** Cameras that are shown at most, those that were heard of last. */
 const MAX_CARDS = 60;
@@ -61,14 +61,17 @@ function take(id, report) {
 
 function added(camera) {
   const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
-  const card = { camera, node, id: "0", history: [], report: null, drawn: 0 };
+  const card = { camera, node, id: "0", history: [], report: null, drawn: 0, picture: null, hasPicture: true, isAsking: false };
   if (cards.size >= MAX_CARDS) {
     const [oldest] = [...cards.values()].sort((one, other) => Number(one.id) - Number(other.id));
     oldest.node.remove();
+    if (oldest.picture) URL.revokeObjectURL(oldest.picture.src);
     cards.delete(oldest.camera);
   }
   cards.set(camera, card);
-  find("#wall").append(node);
+  const after = [...cards.values()].filter((other) => other.camera > camera);
+  after.sort((one, other) => (one.camera < other.camera ? -1 : 1));
+  find("#wall").insertBefore(node, after[0]?.node ?? null);
   find("#wall-empty").hidden = true;
   return card;
 }
@@ -81,11 +84,30 @@ function draw(card) {
   card.age = element("span", { class: "age" });
   card.node.replaceChildren(
     element("header", {}, element("h2", {}, card.camera), card.age),
-    element("div", { class: "sight" }, sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
+    element("div", { class: "sight" }, card.picture ?? sketch(report), element("p", { class: "big" }, element("b", {}, String(count)), count === 1 ? "person" : "persons")),
     zones ? element("ul", { class: "zones" }, zones) : "",
     stepPlot(history, Date.now()),
   );
   tellAge(card);
+  showPicture(card);
+}
+
+/** Puts the picture of the latest report in the place of the sketch, where the server keeps pictures of this camera. */
+async function showPicture(card) {
+  if (!card.hasPicture || card.isAsking) return;
+  card.isAsking = true;
+  try {
+    const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=oriented&width=480`);
+    const picture = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
+    await picture.decode();
+    find(".sight", card.node).firstChild.replaceWith(picture);
+    if (card.picture) URL.revokeObjectURL(card.picture.src);
+    card.picture = picture;
+  } catch (problem) {
+    if (problem.status === 404) card.hasPicture = false;
+  } finally {
+    card.isAsking = false;
+  }
 }
 
 function tellAge({ age, history }) {

@@ -1,8 +1,7 @@
 /** The sections Views, Floor and Live, and the key. */
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
-import { SAMPLES, SERVER, detectSample, pageTest, reportAfter } from "./browser.js";
+import { SAMPLES, detectSample, pageTest, post, reportAfter } from "./browser.js";
 
 const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
 
@@ -76,13 +75,6 @@ pageTest("persons stand on the floor map where the report says, if the height is
   await page.getByText("The height of this camera above the floor is not known").waitFor();
 });
 
-async function post(camera, sample) {
-  const body = await readFile(`${SAMPLES}/${sample}.jpg`);
-  const answer = await fetch(`${SERVER}/detect?profile=fast&calibration=${sample}&camera=${camera}`, { method: "POST", body });
-  assert.equal(answer.status, 200);
-  return answer.json();
-}
-
 pageTest("a camera appears on the wall by itself, and its card follows it", "#live", async (page) => {
   await page.locator("#section-live").waitFor();
   const first = await post("hall 1", "office");
@@ -96,6 +88,12 @@ pageTest("a camera appears on the wall by itself, and its card follows it", "#li
   await card.locator(".big b").getByText(String(second.persons.length), { exact: true }).waitFor();
   const most = Math.max(first.persons.length, second.persons.length);
   assert.match(await plot.getAttribute("aria-label"), new RegExp(`${second.persons.length} persons? now, at most ${most} since`));
+});
+
+pageTest("a camera whose pictures are kept is shown with them", "#live", async (page) => {
+  await page.route("**/latest.jpg?*", (route) => route.fulfill({ path: `${SAMPLES}/office.jpg`, contentType: "image/jpeg" }));
+  await post("gate", "office");
+  await page.getByRole("article", { name: "Camera gate" }).getByAltText("The latest frame of gate").waitFor();
 });
 
 pageTest("whoever comes later sees what was seen before", "", async (page) => {
