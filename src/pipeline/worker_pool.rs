@@ -162,7 +162,9 @@ impl WorkerPool {
         let entry = Entry {
             ticket,
             work: Box::new(|engine| {
-                let outcome = work(engine);
+                let outcome = catch_unwind(AssertUnwindSafe(|| work(engine)));
+                let panicked = || internal(anyhow::anyhow!("a worker panicked on a frame"));
+                let outcome = outcome.unwrap_or_else(|_| Err(panicked()));
                 Done {
                     withdrawn: matches!(outcome, Err(PipelineError::Withdrawn)),
                     // The client may have left meanwhile.
@@ -174,9 +176,8 @@ impl WorkerPool {
         };
         let queued = self.shared.queue.push(priority, entry);
         queued.map_err(|_| PipelineError::ShuttingDown)?;
-        waiting
-            .await
-            .unwrap_or_else(|_| Err(internal(anyhow::anyhow!("a worker panicked on a frame"))))
+        // Nothing is delivered of what was withdrawn, for which nobody waits.
+        waiting.await.unwrap_or(Err(PipelineError::Withdrawn))
     }
 
     /// Why a frame would be refused now, if it would: known before its bytes are read.
@@ -237,17 +238,14 @@ impl Shared {
                 self.rate().given_up(self.pending());
                 continue;
             }
-            let done = catch_unwind(AssertUnwindSafe(|| work(&self.engine)));
+            let done = work(&self.engine);
             // Whoever sends the next frame on this answer must find the place free.
             drop(place);
             self.rate().ended(Instant::now(), self.pending());
-            // After a panic nothing is delivered, which tells whoever waits.
-            if let Ok(done) = done {
-                if done.withdrawn {
-                    self.withdrawn.fetch_add(1, Ordering::Relaxed);
-                }
-                (done.deliver)();
+            if done.withdrawn {
+                self.withdrawn.fetch_add(1, Ordering::Relaxed);
             }
+            (done.deliver)();
         }
     }
 

@@ -49,8 +49,9 @@ class Host:
         _ip("-n", self._namespace, "link", "set", "lo", "up")
 
     def remove(self) -> None:
-        """Its cable goes with it."""
-        _ip("netns", "del", self._namespace)
+        """As far as it was made. Its cable first: the kernel takes its time over what is left in a namespace."""
+        subprocess.run(["ip", "link", "del", self._cable], stderr=subprocess.DEVNULL, check=False)
+        subprocess.run(["ip", "netns", "del", self._namespace], stderr=subprocess.DEVNULL, check=False)
 
 
 @contextlib.contextmanager
