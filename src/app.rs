@@ -58,6 +58,7 @@ pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
         remap_threads: settings.threads.remapping,
         paper_field_of_view: settings.paper.field_of_view,
         rig_cache_bytes: settings.calibrations.cache_bytes,
+        remembered_frames: settings.inference.remembered_frames,
     };
     let calibrations = Arc::new(open_calibrations(settings)?);
     let known = Some(Arc::clone(&calibrations));

@@ -104,6 +104,8 @@ metrics! {
     rig_cache_builds: IntCounter = "rig_cache_builds_total" [];
     /// Times that remap tables were dropped to make room for others.
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
+    /// Frames that were not looked at again, as what was found in them was remembered.
+    recalled_frames: IntCounter = "recalled_frames_total" [];
     /// Cameras of which a report is kept.
     results_cameras: IntGauge = "results_cameras" [];
     /// Reports that are kept.
@@ -251,6 +253,12 @@ impl Metrics {
         self.rig_cache_bytes.set(count(bytes));
         raise_to(&self.rig_cache_builds, builds);
         raise_to(&self.rig_cache_evictions, evictions);
+    }
+
+    /// Shows how many frames were recalled since the start.
+    pub fn show_recalled(&self, frames: u64) {
+        let _one_scrape = self.one_scrape();
+        raise_to(&self.recalled_frames, frames);
     }
 
     /// Shows how many reports of how many cameras and bytes are kept, and how many pictures.

@@ -13,6 +13,7 @@ mod parameters;
 mod planned_views;
 mod plausibility;
 mod profile;
+mod remembered_frames;
 mod report;
 mod rig_cache;
 mod service_rate;

@@ -157,6 +157,8 @@ pub struct InferenceSettings {
     pub score_floor: f64,
     /// Most candidates kept of one view, best first.
     pub max_detections_per_view: NonZeroUsize,
+    /// Most frames of which is remembered what was found in them, for requests that want it.
+    pub remembered_frames: usize,
 }
 
 /// What one frame, and all frames together, may cost.

@@ -48,6 +48,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "imaging",
             "calibration",
             "inference",
+            "revision",
         ],
     ),
     (

@@ -22,7 +22,7 @@ export function showFindings(report) {
   find("#count").textContent = persons.length;
   find("#count-word").textContent = persons.length === 1 ? "person" : "persons";
   find("#summary").textContent =
-    `${plural(looked, "view")}, ${millis(timings.total)} ms, ${report.model.name}, ${report.refinement.name}`;
+    `${plural(looked, "view")}${views.inferred ? "" : " remembered"}, ${millis(timings.total)} ms, ${report.model.name}, ${report.refinement.name}`;
   find("#announcement").textContent = `${plural(persons.length, "person")} found in ${millis(timings.total)} milliseconds.`;
   find("#persons").replaceChildren(...persons.map(row));
   find("#nobody").hidden = persons.length > 0;

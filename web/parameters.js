@@ -10,10 +10,11 @@ const OWN_REFINEMENT = { paper: "soft_nms_gaussian", direct: "nms" };
 
 const form = () => find("#parameters");
 
-/** As a query. Reports of the page are kept under a name of its own, not among those of a camera. */
+/** As a query. Reports of the page are kept under a name of its own, not among those of a camera; and as whoever
+ * moves a slider asks for the same frame again, what the network found in it is to be remembered. */
 export function query() {
   const given = [...new FormData(form())].filter(([, value]) => value !== "");
-  return new URLSearchParams([...given, ["camera", "web-page"]]);
+  return new URLSearchParams([...given, ["camera", "web-page"], ["remember", "true"]]);
 }
 
 export const profile = () => new FormData(form()).get("profile");

@@ -127,6 +127,7 @@ fn router() -> Router {
         remap_threads: one,
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 24,
+        remembered_frames: 4,
     };
     let registry = Arc::clone(models.registry());
     let engine = Engine::new(registry, Some(Arc::clone(&calibrations)), options).unwrap();

@@ -194,6 +194,8 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     state
         .metrics
         .show_rig_cache(rigs.rigs, rigs.bytes, rigs.builds, rigs.evictions);
+    let recalled = state.workers.engine().recalled_frames();
+    state.metrics.show_recalled(recalled);
     show_results(&state).await;
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))

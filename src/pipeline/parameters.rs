@@ -68,6 +68,8 @@ pub struct DetectParameters {
     /// Whether views in which nothing has moved since the camera's last frame need not be looked at
     /// again.
     pub motion: bool,
+    /// Whether what is found in the views is remembered, and used if it already is.
+    pub remember: bool,
     /// Its turn among the frames that wait.
     pub priority: Priority,
     /// How long the report is of use, from the arrival of the request.
@@ -76,7 +78,7 @@ pub struct DetectParameters {
 
 impl DetectParameters {
     /// The names every caller may use.
-    pub const NAMES: [&'static str; 13] = [
+    pub const NAMES: [&'static str; 14] = [
         "calibration",
         "camera",
         "profile",
@@ -88,6 +90,7 @@ impl DetectParameters {
         "max_detections",
         "captured_at",
         "motion",
+        "remember",
         "priority",
         "timeout_millis",
     ];
@@ -128,6 +131,7 @@ impl DetectParameters {
             max_detections,
             captured_at,
             motion,
+            remember,
             priority,
             timeout_millis,
         ] = given;
@@ -137,7 +141,7 @@ impl DetectParameters {
             Refinement::Fusion => DEFAULT_FUSION_IOU,
             _ => DEFAULT_SUPPRESSION_IOU,
         };
-        let motion = motion.map_or(Ok(false), parse_motion)?;
+        let motion = motion.map_or(Ok(false), |value| parse_switch("motion", value))?;
         if motion && camera.is_none() && calibration.is_none() {
             let rule = "name the camera, or its calibration: without a name there is no last \
                         frame to compare with";
@@ -166,6 +170,7 @@ impl DetectParameters {
             },
             captured_at: captured_at.map(parse_timestamp).transpose()?,
             motion,
+            remember: remember.map_or(Ok(false), |value| parse_switch("remember", value))?,
             priority: priority.map_or(Ok(Priority::default()), parse_priority)?,
             timeout: timeout_millis.map(parse_timeout).transpose()?,
         })
@@ -294,8 +299,8 @@ fn parse_priority(value: &str) -> Result<Priority, ParameterError> {
     Ok(Priority::new(level).unwrap_or_default())
 }
 
-fn parse_motion(value: &str) -> Result<bool, ParameterError> {
-    let wrong = |_| problem("motion", format!("{:?} is not true or false", shown(value)));
+fn parse_switch(name: &str, value: &str) -> Result<bool, ParameterError> {
+    let wrong = |_| problem(name, format!("{:?} is not true or false", shown(value)));
     value.parse().map_err(wrong)
 }
 

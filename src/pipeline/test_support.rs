@@ -108,6 +108,7 @@ pub(super) fn engine(detector: BlobDetector, calibrations: Option<Arc<Calibratio
         remap_threads: NonZeroUsize::new(2).unwrap(),
         paper_field_of_view: FieldOfViewReading::Horizontal,
         rig_cache_bytes: 1 << 26,
+        remembered_frames: 2,
     };
     let models = ModelRegistry::default();
     models

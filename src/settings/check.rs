@@ -197,6 +197,11 @@ fn inference(raw: &raw::RawInference) -> Result<InferenceSettings, SettingsError
             "inference.max_detections_per_view",
             raw.max_detections_per_view,
         )?,
+        remembered_frames: size(
+            "inference.remembered_frames",
+            raw.remembered_frames,
+            0..=MAX_COUNT,
+        )?,
     })
 }
 

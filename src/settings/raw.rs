@@ -133,6 +133,7 @@ pub(super) struct RawInference {
     pub(super) max_queue_delay_millis: u64,
     pub(super) score_floor: f64,
     pub(super) max_detections_per_view: u64,
+    pub(super) remembered_frames: u64,
 }
 
 impl Default for RawInference {
@@ -146,6 +147,7 @@ impl Default for RawInference {
             max_queue_delay_millis: 0,
             score_floor: 0.05,
             max_detections_per_view: 300,
+            remembered_frames: 32,
         }
     }
 }

@@ -174,6 +174,7 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
         remap_threads: one_view,
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 28,
+        remembered_frames: 4,
     };
     let store = Box::new(FolderStore::new(folder.path()));
     let calibrations = Arc::new(Calibrations::open(store, true).unwrap());

@@ -64,6 +64,7 @@ fn service(folder: &Path) -> Router {
         remap_threads: two,
         paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 28,
+        remembered_frames: 4,
     };
     let engine = Engine::new(Arc::clone(models.registry()), None, engine).unwrap();
     let workers = WorkerPool::start(&Arc::new(engine), two, NonZeroUsize::new(16).unwrap());

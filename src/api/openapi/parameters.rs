@@ -50,6 +50,10 @@ pub(in crate::api) struct DetectQuery {
     /// Do not look again at views in which nothing has moved since the last frame of this camera
     /// that this server saw; the report counts them. Needs `camera` or `calibration`.
     motion: Option<bool>,
+    /// Remember what is found in the views of this frame; and if the same file was sent before with
+    /// this, do not look again: another refinement or threshold needs no new inference. The report
+    /// counts all its views as unchanged then.
+    remember: Option<bool>,
     /// Whose turn comes first when frames wait: 1 before 9, 5 by default. Frames of one priority are served in
     /// the order of their arrival.
     #[param(minimum = 1, maximum = 9)]

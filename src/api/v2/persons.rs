@@ -138,7 +138,7 @@ pub(super) fn parameters(
 fn as_text<'a>(name: &'a str, value: &Parameter) -> Result<(&'a str, String), ParameterError> {
     let wanted = match name {
         "calibration" | "camera" | "profile" | "refine" | "model" | "captured_at" => "a text",
-        "motion" => "true or false",
+        "motion" | "remember" => "true or false",
         _ => "a number",
     };
     let text = match (value, wanted) {

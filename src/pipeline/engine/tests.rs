@@ -139,6 +139,41 @@ fn where_nothing_has_moved_the_network_need_not_look_again() {
 }
 
 #[test]
+fn a_remembered_frame_is_refined_anew_without_a_look() {
+    let (engine, _folder) = engine_with_lobby();
+    let report = |disc: [f64; 2], more: &[(&str, &str)]| {
+        let named = [("calibration", "lobby"), ("remember", "true")];
+        let named: Vec<_> = named.iter().chain(more).copied().collect();
+        let image = frame_with_disc(600, disc, 20.0);
+        engine.detect(&job(image, &named)).unwrap().report
+    };
+    let unchanged = |disc: [f64; 2], more: &[(&str, &str)]| report(disc, more).views.unchanged;
+    let first = report([420.0, 300.0], &[]);
+    assert_eq!((first.views.inferred, first.views.unchanged), (24, 0));
+    let again = report([420.0, 300.0], &[("refine", "nms")]);
+    assert_eq!((again.views.inferred, again.views.unchanged), (0, 24));
+    assert_eq!(
+        (again.batch_count, again.timings.inference.as_nanos()),
+        (0, 0)
+    );
+    assert_eq!(engine.recalled_frames(), 1);
+    // As it would be found by another look.
+    let parameters = [("calibration", "lobby"), ("refine", "nms")];
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let anew = engine.detect(&job(image, &parameters)).unwrap().report;
+    assert_eq!(anew.views.inferred, 24);
+    assert_eq!(anew.persons[0].bbox, again.persons[0].bbox);
+    assert_eq!(anew.persons[0].score, again.persons[0].score);
+
+    // Another frame, other views or another model that was asked for are another matter.
+    assert_eq!(unchanged([420.0, 330.0], &[]), 0);
+    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 0);
+    // Two are remembered: the first had to make room.
+    assert_eq!(unchanged([420.0, 300.0], &[]), 0);
+    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 24);
+}
+
+#[test]
 fn the_threshold_is_one_of_reported_scores() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);

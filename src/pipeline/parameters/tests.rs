@@ -31,11 +31,12 @@ fn every_parameter_is_taken_over() {
         ("max_detections", "5"),
         ("captured_at", "2026-11-21T09:30:00+01:00"),
         ("motion", "true"),
+        ("remember", "true"),
         ("priority", "2"),
         ("timeout_millis", "1500"),
     ])
     .unwrap();
-    assert!(parameters.motion);
+    assert!(parameters.motion && parameters.remember);
     assert_eq!(Some(parameters.priority), Priority::new(2));
     assert_eq!(parameters.timeout, Some(Duration::from_millis(1500)));
     assert_eq!(parameters.calibration.unwrap().as_str(), "lobby");

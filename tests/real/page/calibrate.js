@@ -1,7 +1,7 @@
 /** The section Calibrate. */
 
 import assert from "node:assert/strict";
-import { SERVER, detectSample, pageTest } from "./browser.js";
+import { SERVER, assertAccessible, detectSample, pageTest } from "./browser.js";
 
 const FIXTURES = process.env.LOOKDOWN_FIXTURES;
 const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
@@ -77,6 +77,7 @@ pageTest("a file of another program is looked through and saved as it is", "", a
   await straightenedAfter(page, () => page.locator("#import-file").setInputFiles(`${FIXTURES}/camodocal_mei.yaml`));
   await page.getByText("camodocal_mei.yaml is saved as it is.").waitFor();
   assert.notEqual(await pixels(page), before);
+  await assertAccessible(page);
   await page.getByLabel("Name", { exact: true }).fill("imported");
   await page.getByRole("button", { name: "Save", exact: true }).click();
   await page.getByText("imported is saved and serves.").waitFor();

@@ -1,7 +1,7 @@
 /** The sections Views, Floor and Live, and the key. */
 
 import assert from "node:assert/strict";
-import { SAMPLES, detectSample, pageTest, post, reportAfter } from "./browser.js";
+import { SAMPLES, assertAccessible, detectSample, pageTest, post, reportAfter } from "./browser.js";
 
 const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
 
@@ -112,6 +112,7 @@ pageTest(
     const dialog = page.getByRole("dialog", { name: "Key" });
     await dialog.waitFor();
     await dialog.getByText("This server wants a key").waitFor();
+    await assertAccessible(page);
     await dialog.getByLabel("API key").fill(process.env.LOOKDOWN_KEY);
     await page.keyboard.press("Enter");
     await page.locator("#calibration option[value=office]").waitFor({ state: "attached" });
