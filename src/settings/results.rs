@@ -69,12 +69,12 @@ impl TryFrom<RawResults> for ResultSettings {
 }
 
 /// `*` is every camera.
-fn pictures_of(names: &str) -> PicturesOf {
-    let names = || names.split(',').map(str::trim);
-    if names().any(|name| name == "*") {
+fn pictures_of(list: &str) -> PicturesOf {
+    let cameras = || list.split(',').map(str::trim);
+    if cameras().any(|camera| camera == "*") {
         return PicturesOf::All;
     }
-    let named = names().filter(|name| !name.is_empty());
+    let named = cameras().filter(|camera| !camera.is_empty());
     PicturesOf::Some(named.map(ToOwned::to_owned).collect())
 }
 
