@@ -26,7 +26,7 @@ use axum::{
 use super::{
     ApiState, Phase,
     access::Finder,
-    openapi::{InferProblems, ModelProblems, ModelReadyProblems, NotReadyProblems},
+    openapi::{InferProblems, ModelProblems, ModelReadyProblems, NotReadyProblems, RawBytes},
     problem::{Problem, ProblemKind},
     request_id::RequestId,
     upload::Arrival,
@@ -238,7 +238,7 @@ pub(super) async fn model_version_ready(
     ),
     request_body(
         description = "JSON, or JSON with the bytes of tensors behind it.",
-        content((InferRequestBody = "application/json"), ("application/octet-stream"))
+        content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
@@ -272,7 +272,7 @@ pub(super) async fn infer(
     ),
     request_body(
         description = "JSON, or JSON with the bytes of tensors behind it.",
-        content((InferRequestBody = "application/json"), ("application/octet-stream"))
+        content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(

@@ -20,6 +20,7 @@ def contents(files: list[Path]) -> strategies.SearchStrategy[bytes]:
     return strategies.sampled_from([file.read_bytes() for file in files])
 
 
+CALIBRATIONS_ARE_SENT = {"PUT /calibrations/{id}", "POST /calibrations/{id}/views"}
 CONDITION = re.compile(r'\*|"[!#-~]*"')
 ANY_PICTURE = contents([file for files in PICTURES.values() for file in files])
 for media_type, files in PICTURES.items():
@@ -45,6 +46,7 @@ def before_call(context, case, kwargs):
     if case.method == "PUT":
         # No file has a camera of a made-up name, and most tell their size.
         case.query = {}
+    if case.operation.label in CALIBRATIONS_ARE_SENT:
         case.body = CALIBRATIONS[len(repr(case.body)) % len(CALIBRATIONS)].read_bytes()
         case.media_type = "application/octet-stream"
     conditions = [name for name in ("If-Match", "If-None-Match") if name in (case.headers or {})]

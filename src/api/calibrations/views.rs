@@ -14,7 +14,7 @@ use crate::{
         ApiState,
         access::Reader,
         deadline::Deadline,
-        openapi::{TrialProblems, ViewsProblems},
+        openapi::{RawBytes, TrialProblems, ViewsProblems},
         problem::{Problem, ProblemKind},
         report::pixels,
         upload::parameters_named,
@@ -141,8 +141,8 @@ pub(in crate::api) async fn get_views(
             `1280x960`, for formats that do not tell it.", pattern = "^[0-9]+x[0-9]+$"),
     ),
     request_body(
-        description = "A calibration file, recognised from its content; at most 1 MiB.",
-        content(("application/json"), ("application/yaml"), ("application/octet-stream")),
+        description = "A calibration file, recognised from its content, whatever the content type says; at most 1 MiB.",
+        content((Object = "application/json"), (inline(RawBytes) = "application/octet-stream")),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses((status = OK, description = "The view plan.", body = ViewPlanInfo), TrialProblems)
