@@ -27,7 +27,7 @@ use crate::{
 const QUEUE: usize = 64;
 /// Pauses before the broker is tried again.
 const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
-const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+const LONGEST_PAUSE: Duration = Duration::from_mins(1);
 /// A connection that has lasted as long was a good one.
 const STEADY: Duration = Duration::from_secs(10);
 
