@@ -78,12 +78,12 @@ fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(results::history::get_history))
         .routes(routes!(results::events::of_camera))
         .routes(routes!(results::events::of_all))
-        .routes(routes!(v2::model))
-        .routes(routes!(v2::model_version))
-        .routes(routes!(v2::model_ready))
-        .routes(routes!(v2::model_version_ready))
-        .routes(routes!(v2::infer))
-        .routes(routes!(v2::infer_version))
+        .routes(routes!(v2::describe::model))
+        .routes(routes!(v2::describe::model_version))
+        .routes(routes!(v2::describe::model_ready))
+        .routes(routes!(v2::describe::model_version_ready))
+        .routes(routes!(v2::infer::infer))
+        .routes(routes!(v2::infer::infer_version))
         .routes(routes!(repository::index))
         .routes(routes!(repository::load))
         .routes(routes!(repository::unload))
@@ -92,15 +92,15 @@ fn client_routes() -> OpenApiRouter<ApiState> {
 fn description() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(openapi::openapi_json))
-        .routes(routes!(v2::server))
+        .routes(routes!(v2::describe::server))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(health::livez))
         .routes(routes!(health::readyz))
-        .routes(routes!(v2::live))
-        .routes(routes!(v2::ready))
+        .routes(routes!(v2::describe::live))
+        .routes(routes!(v2::describe::ready))
 }
 
 fn metrics() -> OpenApiRouter<ApiState> {

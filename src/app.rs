@@ -4,7 +4,7 @@ mod models;
 mod serving;
 mod sockets;
 
-use std::sync::Arc;
+use std::{num::NonZeroU64, sync::Arc};
 
 use anyhow::Context;
 
@@ -30,6 +30,9 @@ use crate::{
 pub use sockets::Sockets;
 
 pub(crate) use models::onnx_options;
+
+/// How often the inference server is looked after, seconds.
+const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
 /// An engine with the calibrations and the models it looks with.
 pub struct Assembly {
@@ -258,8 +261,15 @@ impl App {
             let every = tls.poll_seconds()?;
             Some(Poller::start("tls-watcher", every, move || tls.refresh()))
         });
+        let remote = self.models.remote().cloned();
+        let remote_poller = remote.map(|remote| {
+            Poller::start("remote-watcher", REMOTE_EVERY, move || {
+                remote.look_after();
+            })
+        });
         let pollers = model_poller
             .into_iter()
+            .chain(remote_poller)
             .chain(calibration_poller)
             .chain(key_poller)
             .chain(tls);

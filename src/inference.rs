@@ -8,15 +8,19 @@ mod model;
 mod onnx;
 mod onnx_file;
 mod registry;
+mod remote;
 mod repository;
+mod signature;
+mod staging;
 
 pub use detector::{Detector, InferenceError, ViewDetection};
 pub use device::{Device, UnknownDevice};
-pub use heads::HeadOutput;
+pub use heads::{CandidateOptions, HeadOutput};
 pub use manifest::{Layout, ManifestInput, ModelManifest};
 pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor};
 pub use registry::{ModelRegistry, RegistryFull};
+pub use remote::{RemoteCounts, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{
     LoadCounts, ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions,
     RepositoryRow, is_fetched,

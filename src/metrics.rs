@@ -86,6 +86,10 @@ metrics! {
     model_info: IntGaugeVec = "model_info" ["model", "revision"];
     /// Models loaded, and models that were refused when they were to be.
     model_loads: IntCounterVec = "model_loads_total" ["result"];
+    /// 1 when requests are sent to the inference server, 0 while it does not answer; shown only with one.
+    remote_up: IntGaugeVec = "remote_up" [];
+    /// Requests to the inference server by how they came out; shown only with one.
+    remote_requests: IntCounterVec = "remote_requests_total" ["result"];
     /// Calibrations that serve.
     calibrations: IntGauge = "calibrations" [];
     /// Always 1; says which calibrations serve, all of them together: equal where equal ones do.
@@ -185,6 +189,15 @@ impl Metrics {
                 .insert(((*name).to_owned(), (*revision).to_owned()));
         }
         raise(&self.model_loads, loads);
+    }
+
+    /// Shows whether requests are sent to the inference server, and how many came out how since the
+    /// start.
+    pub fn show_remote(&self, up: bool, requests: &[(&str, u64)]) {
+        let _one_scrape = self.one_scrape();
+        let none: [&str; 0] = [];
+        self.remote_up.with_label_values(&none).set(i64::from(up));
+        raise(&self.remote_requests, requests);
     }
 
     /// Shows how many calibrations serve and the revision of all of them, how many files are broken,

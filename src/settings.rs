@@ -11,6 +11,7 @@ mod error;
 mod locate;
 mod mqtt;
 mod raw;
+mod remote;
 mod results;
 mod source;
 mod threads;
@@ -29,8 +30,9 @@ pub use calibration_place::CalibrationPlace;
 pub use error::SettingsError;
 pub use locate::{find_beside_executable, find_calibrations};
 pub use raw::RawSettings;
+pub use remote::RemoteSettings;
 pub use source::{environment, load};
-pub use threads::ThreadPlan;
+pub use threads::{Computing, ThreadPlan};
 
 use url::Url;
 
@@ -149,6 +151,8 @@ pub struct InferenceSettings {
     pub library_path: PathBuf,
     /// What networks run on.
     pub device: Device,
+    /// The server that they run on instead.
+    pub remote: Option<RemoteSettings>,
     /// Most views in one run of the network.
     pub max_batch_views: NonZeroUsize,
     /// How long a view may wait for others to fill its batch.
@@ -159,6 +163,14 @@ pub struct InferenceSettings {
     pub max_detections_per_view: NonZeroUsize,
     /// Most frames of which is remembered what was found in them, for requests that want it.
     pub remembered_frames: usize,
+}
+
+impl InferenceSettings {
+    /// Where networks compute.
+    #[must_use]
+    pub fn computing(&self) -> Computing {
+        Computing::of(self.device, self.remote.is_some())
+    }
 }
 
 /// What one frame, and all frames together, may cost.

@@ -176,7 +176,7 @@ fn every_operation_says_how_it_can_fail() {
             (name, failures.join(" "))
         })
         .collect();
-    let loading = "400 401 403 404 408 409 413 422 429 500 504";
+    let loading = "400 401 403 404 408 409 413 422 429 500 503 504";
     let inferring = "400 401 403 404 408 413 415 422 429 500 503 504";
     let of_models = "400 401 403 404 429";
     let expected = [

@@ -11,7 +11,10 @@ use super::{
     openapi::{FaultProblem, NotReadyProblems},
     problem::Problem,
 };
-use crate::calibration::{CalibrationId, CalibrationsHealth};
+use crate::{
+    calibration::{CalibrationId, CalibrationsHealth},
+    pipeline::PipelineError,
+};
 
 /// Most broken files told.
 const MAX_PROBLEMS: usize = 100;
@@ -149,7 +152,8 @@ pub(super) async fn livez() -> Json<Health> {
 
 /// Can frames be sent?
 ///
-/// Not before the network has run once, and no longer when the server was told to stop. Files of
+/// Not before the network has run once, not while the server that it runs on does not answer, and no
+/// longer when this server was told to stop. Files of
 /// calibrations that cannot be used are told, but stop nothing: what was known of them goes on. Nor does a
 /// place of results that cannot be reached.
 #[utoipa::path(
@@ -160,14 +164,22 @@ pub(super) async fn livez() -> Json<Health> {
     )
 )]
 pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>, Problem> {
+    require_ready(&state)?;
+    Ok(Json(Ready {
+        status: "ready",
+        calibrations: CalibrationHealth::from(state.calibrations.health()),
+        results: ResultsHealth {
+            store_problem: state.results.health().problem,
+        },
+    }))
+}
+
+/// Refuses while frames cannot be sent, and says why.
+pub(super) fn require_ready(state: &ApiState) -> Result<(), Problem> {
+    let remote = state.models.remote();
     match state.readiness.phase() {
-        Phase::Ready => Ok(Json(Ready {
-            status: "ready",
-            calibrations: CalibrationHealth::from(state.calibrations.health()),
-            results: ResultsHealth {
-                store_problem: state.results.health().problem,
-            },
-        })),
+        Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
+        Phase::Ready => Err(PipelineError::InferenceUnavailable.into()),
         Phase::WarmingUp => Err(Problem::warming_up()),
         Phase::Stopping => Err(Problem::shutting_down()),
     }
@@ -188,6 +200,7 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     let shown = &state.metrics.withdrawn_frames;
     shown.inc_by(withdrawn.saturating_sub(shown.get()));
     show_models(&state);
+    show_remote(&state);
     show_calibrations(&state);
     forget_zones(&state);
     let rigs = state.workers.engine().rig_cache_use();
@@ -224,6 +237,21 @@ fn show_models(state: &ApiState) {
     let counts = state.models.load_counts();
     let loads = [("success", counts.succeeded), ("failure", counts.failed)];
     state.metrics.show_models(&rows, &loads);
+}
+
+/// The server that networks run on, if there is one.
+fn show_remote(state: &ApiState) {
+    let Some(remote) = state.models.remote() else {
+        return;
+    };
+    let counts = remote.counts();
+    let requests = [
+        ("answered", counts.answered),
+        ("busy", counts.busy),
+        ("failed", counts.failed),
+        ("not_sent", counts.not_sent),
+    ];
+    state.metrics.show_remote(remote.is_available(), &requests);
 }
 
 /// Of the zones, those that their calibrations still have.

@@ -17,7 +17,7 @@ use super::{
     openapi::{IndexProblems, LoadProblems},
     problem::{Problem, ProblemKind},
 };
-use crate::inference::{Model, RepositoryError, RepositoryRow};
+use crate::inference::{InferenceError, Model, RepositoryError, RepositoryRow};
 use body::{IndexRequest, LoadRequest, SmallBody, UnloadRequest};
 
 /// A model of the repository.
@@ -152,6 +152,10 @@ impl From<RepositoryError> for Problem {
             }
             RepositoryError::Kept { .. } | RepositoryError::Full(_) => ProblemKind::ModelConflict,
             RepositoryError::Busy => ProblemKind::ModelBusy,
+            RepositoryError::Refused(InferenceError::Remote { .. }) => {
+                ProblemKind::InferenceUnavailable
+            }
+            RepositoryError::Refused(InferenceError::RemoteBusy { .. }) => ProblemKind::ModelBusy,
             RepositoryError::OtherName { .. } | RepositoryError::Refused(_) => {
                 ProblemKind::ModelRefused
             }

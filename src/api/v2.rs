@@ -6,8 +6,10 @@
 //! takes views and answers with what it finds in each.
 
 mod answer;
+pub(super) mod describe;
 mod detector;
-pub(super) mod document;
+mod document;
+pub(super) mod infer;
 mod metadata;
 mod persons;
 mod request;
@@ -17,28 +19,15 @@ mod wanted;
 
 use std::sync::Arc;
 
-use axum::{
-    Extension, Json,
-    extract::{Path, State},
-    response::IntoResponse,
-};
-
 use super::{
-    ApiState, Phase,
-    access::Finder,
-    openapi::{InferProblems, ModelProblems, ModelReadyProblems, NotReadyProblems, RawBytes},
+    ApiState,
     problem::{Problem, ProblemKind},
-    request_id::RequestId,
-    upload::Arrival,
 };
-use crate::{inference::Model, telemetry::RequestTrace};
-use answer::InferAnswer;
-use document::{InferRequestBody, InferResponseBody};
-use metadata::{ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady};
-use request::InferRequest;
+use crate::inference::Model;
+use metadata::ModelMetadata;
 
 /// The model that finds the persons in frames.
-pub(super) const FRAME_MODEL: &str = "lookdown";
+const FRAME_MODEL: &str = "lookdown";
 /// The version of its inputs and outputs.
 const FRAME_MODEL_VERSION: &str = "1";
 
@@ -95,221 +84,4 @@ impl Asked {
 /// As much of a text as helps its sender.
 fn shown(text: &str) -> String {
     text.chars().take(64).collect()
-}
-
-/// What is this server?
-#[utoipa::path(
-    get, path = "/v2", tag = "operation", operation_id = "get_server_metadata",
-    responses((status = OK, description = "Its name, version and extensions.", body = ServerMetadata))
-)]
-pub(super) async fn server() -> Json<ServerMetadata> {
-    Json(ServerMetadata::default())
-}
-
-/// Is the process alive? As `/livez`, for clients of the Open Inference Protocol.
-#[utoipa::path(
-    get, path = "/v2/health/live", tag = "operation", operation_id = "get_server_liveness",
-    responses((status = OK, description = "The process answers.", body = ServerLive))
-)]
-pub(super) async fn live() -> Json<ServerLive> {
-    Json(ServerLive { live: true })
-}
-
-/// Can frames be sent? As `/readyz`, for clients of the Open Inference Protocol.
-#[utoipa::path(
-    get, path = "/v2/health/ready", tag = "operation", operation_id = "get_server_readiness",
-    responses(
-        (status = OK, description = "Frames can be sent.", body = ServerReady),
-        NotReadyProblems
-    )
-)]
-pub(super) async fn ready(State(state): State<ApiState>) -> Result<Json<ServerReady>, Problem> {
-    require_ready(&state)?;
-    Ok(Json(ServerReady { ready: true }))
-}
-
-fn require_ready(state: &ApiState) -> Result<(), Problem> {
-    match state.readiness.phase() {
-        Phase::Ready => Ok(()),
-        Phase::WarmingUp => Err(Problem::warming_up()),
-        Phase::Stopping => Err(Problem::shutting_down()),
-    }
-}
-
-/// What does a model take and answer?
-///
-/// `lookdown` takes a frame and answers with persons; the detectors take views.
-#[utoipa::path(
-    get, path = "/v2/models/{name}", tag = "inference", operation_id = "get_model",
-    params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "Its inputs and outputs.", body = ModelMetadata),
-        ModelProblems,
-    )
-)]
-pub(super) async fn model(
-    State(state): State<ApiState>,
-    _finder: Finder,
-    Path(name): Path<String>,
-) -> Result<Json<ModelMetadata>, Problem> {
-    Ok(Json(Asked::find(&state, &name, None)?.metadata()))
-}
-
-/// What does this version of a model take and answer?
-#[utoipa::path(
-    get, path = "/v2/models/{name}/versions/{version}", tag = "inference",
-    operation_id = "get_model_version",
-    params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "Its one version, as its metadata tells it."),
-    ),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "Its inputs and outputs.", body = ModelMetadata),
-        ModelProblems,
-    )
-)]
-pub(super) async fn model_version(
-    State(state): State<ApiState>,
-    _finder: Finder,
-    Path((name, version)): Path<(String, String)>,
-) -> Result<Json<ModelMetadata>, Problem> {
-    Ok(Json(Asked::find(&state, &name, Some(&version))?.metadata()))
-}
-
-/// Can a model be asked?
-#[utoipa::path(
-    get, path = "/v2/models/{name}/ready", tag = "inference", operation_id = "get_model_readiness",
-    params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "It can.", body = ModelReady),
-        ModelReadyProblems,
-    )
-)]
-pub(super) async fn model_ready(
-    State(state): State<ApiState>,
-    _finder: Finder,
-    Path(name): Path<String>,
-) -> Result<Json<ModelReady>, Problem> {
-    Asked::find(&state, &name, None)?;
-    require_ready(&state)?;
-    Ok(Json(ModelReady { name, ready: true }))
-}
-
-/// Can this version of a model be asked?
-#[utoipa::path(
-    get, path = "/v2/models/{name}/versions/{version}/ready", tag = "inference",
-    operation_id = "get_model_version_readiness",
-    params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "Its one version, as its metadata tells it."),
-    ),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "It can.", body = ModelReady),
-        ModelReadyProblems,
-    )
-)]
-pub(super) async fn model_version_ready(
-    State(state): State<ApiState>,
-    _finder: Finder,
-    Path((name, version)): Path<(String, String)>,
-) -> Result<Json<ModelReady>, Problem> {
-    Asked::find(&state, &name, Some(&version))?;
-    require_ready(&state)?;
-    Ok(Json(ModelReady { name, ready: true }))
-}
-
-/// Find persons as clients of the Open Inference Protocol ask.
-///
-/// `lookdown` takes `image` (`BYTES`, `[1]`): an encoded frame, base64 in JSON, as it is behind it. It
-/// answers with `boxes` (`[persons, 4]`), `scores`, `oriented_boxes` (`[persons, 5]`), `views` and
-/// `report`; the parameters of `/detect` are parameters of the request. A detector takes `views` (`FP32` or
-/// `UINT8`, `[views, 3, height, width]`, pixels 0 to 255) and answers with `boxes`
-/// (`[views, candidates, 4]`) and `scores` (`[views, candidates]`), filled up with zeros.
-#[utoipa::path(
-    post, path = "/v2/models/{name}/infer", tag = "inference", operation_id = "infer_with_model",
-    params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("Inference-Header-Content-Length" = Option<u32>, Header,
-         description = "Where tensors follow as bytes: the length of the JSON before them."),
-    ),
-    request_body(
-        description = "JSON, or JSON with the bytes of tensors behind it.",
-        content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
-    ),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "The outputs.",
-         content((InferResponseBody = "application/json"), ("application/octet-stream"))),
-        InferProblems,
-    )
-)]
-pub(super) async fn infer(
-    State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
-    Extension(trace): Extension<RequestTrace>,
-    Path(name): Path<String>,
-    arrival: Arrival,
-) -> Result<impl IntoResponse, Problem> {
-    let asked = Asked::find(&state, &name, None)?;
-    answered(&state, &request_id, &trace, asked, arrival).await
-}
-
-/// Find persons with this version of a model.
-///
-/// As without a version.
-#[utoipa::path(
-    post, path = "/v2/models/{name}/versions/{version}/infer", tag = "inference",
-    operation_id = "infer_with_model_version",
-    params(
-        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "Its one version, as its metadata tells it."),
-        ("Inference-Header-Content-Length" = Option<u32>, Header,
-         description = "Where tensors follow as bytes: the length of the JSON before them."),
-    ),
-    request_body(
-        description = "JSON, or JSON with the bytes of tensors behind it.",
-        content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
-    ),
-    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
-    responses(
-        (status = OK, description = "The outputs.",
-         content((InferResponseBody = "application/json"), ("application/octet-stream"))),
-        InferProblems,
-    )
-)]
-pub(super) async fn infer_version(
-    State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
-    Extension(trace): Extension<RequestTrace>,
-    Path((name, version)): Path<(String, String)>,
-    arrival: Arrival,
-) -> Result<impl IntoResponse, Problem> {
-    let asked = Asked::find(&state, &name, Some(&version))?;
-    answered(&state, &request_id, &trace, asked, arrival).await
-}
-
-async fn answered(
-    state: &ApiState,
-    request_id: &RequestId,
-    trace: &RequestTrace,
-    asked: Asked,
-    arrival: Arrival,
-) -> Result<InferAnswer, Problem> {
-    trace.stage(
-        "upload",
-        arrival.deadline.began().into_std(),
-        arrival.arrived,
-    );
-    let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
-    let read = move || InferRequest::read(&headers, &body);
-    let read = arrival.deadline.blocking(read).await?;
-    let times = (arrival.deadline, arrival.received_at, arrival.arrived);
-    match asked {
-        Asked::Frames => persons::infer(state, request_id, trace, read, times).await,
-        Asked::Views(model) => detector::infer(state, trace, model, read, times).await,
-    }
 }

@@ -1,14 +1,15 @@
 //! The models that the settings describe.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use crate::{
     inference::{
-        Detector, Device, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
-        OnnxDetector, OnnxOptions, RepositoryOptions, is_fetched,
+        CandidateOptions, Detector, Device, Model, ModelFolder, ModelLoader, ModelManifest,
+        ModelRepository, OnnxDetector, OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer,
+        RepositoryOptions, is_fetched,
     },
-    pipeline::DefaultModels,
-    settings::{Settings, SettingsError},
+    pipeline::{DefaultModels, Profile},
+    settings::{RemoteSettings, Settings, SettingsError},
 };
 
 /// The repository, none of its models loaded, and which of them answer by default.
@@ -16,9 +17,12 @@ use crate::{
 /// # Errors
 /// One sentence that names the setting: a file that is missing or cannot be used.
 pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, DefaultModels)> {
-    let loader = loader(settings)?;
     let path = settings.model.find_repository()?;
-    let one = settings.model.find_one()?;
+    let mut one = settings.model.find_one()?;
+    let remote = settings.inference.remote.as_ref();
+    if let (None, Some(model)) = (&one, remote.and_then(|remote| remote.model.as_ref())) {
+        one = Some(path.join(model));
+    }
     let elsewhere = match one {
         Some(path) => Some((ModelManifest::locate(&path)?.name, path)),
         None => None,
@@ -27,6 +31,7 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
         Some((name, _)) => DefaultModels::One(name.clone()),
         None => per_profile(&path, settings.inference.device),
     };
+    let called = defaults.of(Profile::default()).to_owned();
     let options = RepositoryOptions {
         folder: ModelFolder { path, elsewhere },
         warm_up_views: settings.inference.max_batch_views,
@@ -36,21 +41,52 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
             .map(ToOwned::to_owned)
             .collect(),
     };
-    Ok((ModelRepository::new(options, loader), defaults))
+    let repository = match remote {
+        Some(remote) => {
+            let server = Arc::new(RemoteServer::new(remote_options(remote, called))?);
+            let loader = remote_loader(settings, Arc::clone(&server));
+            ModelRepository::new(options, loader).on(server)
+        }
+        None => ModelRepository::new(options, onnx_loader(settings)?),
+    };
+    Ok((repository, defaults))
 }
 
-/// Makes models as the settings say.
-fn loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
+/// Makes models that run here.
+fn onnx_loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
     let library = settings.inference.find_library()?;
     let options = onnx_options(settings);
     let sessions = settings.threads.sessions;
     Ok(Box::new(move |path| {
         let (first, others) = OnnxDetector::load_sessions(&library, path, &options, sessions)?;
-        let others = others
-            .into_iter()
-            .map(|session| Box::new(session) as Box<dyn Detector>);
-        Ok(Model::of_sessions(Box::new(first), others.collect()))
+        Ok(model_of(first, others))
     }))
+}
+
+/// Makes models that run on another server.
+fn remote_loader(settings: &Settings, server: Arc<RemoteServer>) -> ModelLoader {
+    let options = candidate_options(settings);
+    let sessions = settings.threads.sessions;
+    Box::new(move |path| {
+        let (first, others) = RemoteDetector::load_sessions(&server, path, options, sessions)?;
+        Ok(model_of(first, others))
+    })
+}
+
+fn model_of<D: Detector + 'static>(first: D, others: Vec<D>) -> Model {
+    let others = others.into_iter();
+    let others = others.map(|session| Box::new(session) as Box<dyn Detector>);
+    Model::of_sessions(Box::new(first), others.collect())
+}
+
+/// The server that the settings name; `called` is its model here.
+fn remote_options(remote: &RemoteSettings, called: String) -> RemoteOptions {
+    RemoteOptions {
+        url: remote.url.clone(),
+        model: remote.model.clone().unwrap_or_else(|| called.clone()),
+        called,
+        patience: remote.patience,
+    }
 }
 
 /// How the settings want networks to be run.
@@ -58,6 +94,12 @@ pub(crate) fn onnx_options(settings: &Settings) -> OnnxOptions {
     OnnxOptions {
         device: settings.inference.device,
         threads: settings.threads.per_session,
+        candidates: candidate_options(settings),
+    }
+}
+
+fn candidate_options(settings: &Settings) -> CandidateOptions {
+    CandidateOptions {
         score_floor: settings.inference.score_floor,
         max_detections_per_view: settings.inference.max_detections_per_view.get(),
     }

@@ -12,6 +12,7 @@ use tokio::{
 use super::{App, Sockets};
 use crate::{
     api::{self, Phase},
+    inference::{InferenceError, RepositoryError},
     server::{self, Services},
     settings::{Settings, ShutdownSettings},
     shutdown::Shutdown,
@@ -19,6 +20,8 @@ use crate::{
 
 /// Longest that the end waits for the MQTT broker.
 const FAREWELL: Duration = Duration::from_secs(3);
+/// How long to wait for a server that networks run on before it is asked again.
+const REMOTE_AWAY: Duration = Duration::from_secs(1);
 
 impl App {
     /// Serves until `shutdown` asks for an end. Then readiness goes, and everything is served on for
@@ -134,6 +137,28 @@ impl App {
         sleep(drain_timeout).await;
     }
 
+    /// Loads a model, when the server that it runs on is there.
+    async fn load(&self, name: String, shutdown: &Shutdown) -> anyhow::Result<()> {
+        loop {
+            let remote = self.models.remote();
+            let loaded = if remote.is_none_or(|remote| remote.is_available()) {
+                let (models, name) = (Arc::clone(&self.models), name.clone());
+                Some(spawn_blocking(move || models.load(&name)).await?)
+            } else {
+                None
+            };
+            match loaded {
+                Some(Ok(_)) => return Ok(()),
+                None | Some(Err(RepositoryError::Refused(InferenceError::Remote { .. }))) => {}
+                Some(Err(error)) => return Err(error.into()),
+            }
+            tokio::select! {
+                () = sleep(REMOTE_AWAY) => {}
+                () = shutdown.requested() => return Ok(()),
+            }
+        }
+    }
+
     /// Loads the models, as long as the server is not told to stop. It is ready when it has the first.
     async fn load_models(
         &self,
@@ -145,8 +170,7 @@ impl App {
             if shutdown.is_requested() {
                 break;
             }
-            let models = Arc::clone(&self.models);
-            spawn_blocking(move || models.load(&name)).await??;
+            self.load(name, shutdown).await?;
             if self.readiness.phase() == Phase::WarmingUp {
                 self.readiness.warmed_up();
                 let port = address.port();

@@ -1,6 +1,6 @@
 //! What every detector offers.
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
 use super::{Device, HeadOutput};
 use crate::{
@@ -95,6 +95,28 @@ pub enum InferenceError {
         path: PathBuf,
         /// What was found and what is needed.
         problem: String,
+    },
+    /// The model on the inference server is not one that can be used here.
+    #[error("model: {model} on the server of inference.url cannot be used: {problem}")]
+    RemoteModel {
+        /// What it is called there.
+        model: String,
+        /// What was found and what is needed.
+        problem: String,
+    },
+    /// The inference server has no place for more.
+    #[error("the inference server has no place for more: send fewer frames at a time, or retry")]
+    RemoteBusy {
+        /// When it may have one.
+        retry_after: Duration,
+    },
+    /// The inference server cannot be reached, or does not answer what was asked.
+    #[error("inference.url: the server at {url} cannot be used: {detail}")]
+    Remote {
+        /// Its address.
+        url: String,
+        /// What went wrong.
+        detail: String,
     },
     /// The run-time failed on a batch.
     #[error("the network failed: {0}")]

@@ -79,6 +79,27 @@ pub struct HeadOutput {
     pub non_finite: usize,
 }
 
+/// What is kept of what networks answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CandidateOptions {
+    /// Boxes with a lower score are dropped, 0 to 1.
+    pub score_floor: f64,
+    /// The best so many boxes of a view are kept.
+    pub max_detections_per_view: usize,
+}
+
+impl HeadOutput {
+    /// Keeps the best `count` detections of each view.
+    pub(super) fn keep_best(&mut self, count: usize) {
+        for found in &mut self.per_view {
+            if found.len() > count {
+                found.select_nth_unstable_by(count, |a, b| b.score.total_cmp(&a.score));
+                found.truncate(count);
+            }
+        }
+    }
+}
+
 /// What every head does. `batch.views` is known in [`Decoder::decode`] only.
 trait Decoder {
     /// Whether outputs of these shapes can be decoded; otherwise a sentence.

@@ -3,24 +3,24 @@
 mod description;
 mod environment;
 mod provider;
-mod signature;
-mod staging;
 
 use std::{num::NonZeroUsize, path::Path};
 
 use ort::{session::Session, value::TensorRef};
 
-use self::{signature::Signature, staging::Staging};
 use super::{
-    Detector, Device, HeadOutput, InferenceError, ModelManifest, ViewDetection,
+    CandidateOptions, Detector, Device, HeadOutput, InferenceError, ModelManifest,
     heads::{Head, TensorView},
     onnx_file,
+    signature::Signature,
+    staging::{Staged, Staging},
 };
 use crate::{
     imaging::{NetworkInput, ViewBatch},
     revision::{revision_of, sha256_of},
 };
 
+pub(super) use description::{FLOAT, Metadata, float_shapes};
 pub use description::{ModelDescription, OnnxTensor};
 
 /// How a model is run.
@@ -30,10 +30,8 @@ pub struct OnnxOptions {
     pub device: Device,
     /// Threads within one run of the network.
     pub threads: NonZeroUsize,
-    /// Boxes with a lower score are dropped, 0 to 1.
-    pub score_floor: f64,
-    /// The best so many boxes of a view are kept.
-    pub max_detections_per_view: usize,
+    /// What is kept of what it answers.
+    pub candidates: CandidateOptions,
 }
 
 /// A model in an ONNX file, with the output head that its manifest names.
@@ -196,9 +194,7 @@ impl Detector for OnnxDetector {
                 .per_view
                 .extend(output.per_view.into_iter().take(views));
         }
-        for view in &mut found.per_view {
-            keep_best(view, options.max_detections_per_view);
-        }
+        found.keep_best(options.candidates.max_detections_per_view);
         Ok(found)
     }
 }
@@ -207,7 +203,7 @@ impl Detector for OnnxDetector {
 fn run(
     session: &mut Session,
     head: &Head,
-    staged: &staging::Staged<'_>,
+    staged: &Staged<'_>,
     input: &NetworkInput,
     options: &OnnxOptions,
 ) -> Result<HeadOutput, InferenceError> {
@@ -234,16 +230,5 @@ fn run(
             values,
         })
         .collect();
-    head.decode(&tensors, views, input, options.score_floor)
+    head.decode(&tensors, views, input, options.candidates.score_floor)
 }
-
-/// Keeps the best `count` detections of a view.
-fn keep_best(found: &mut Vec<ViewDetection>, count: usize) {
-    if found.len() > count {
-        found.select_nth_unstable_by(count, |a, b| b.score.total_cmp(&a.score));
-        found.truncate(count);
-    }
-}
-
-#[cfg(test)]
-mod tests;

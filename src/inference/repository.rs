@@ -19,7 +19,7 @@ use std::{
 };
 
 use self::stamp::{files_of, stamp};
-use super::{InferenceError, Model, ModelRegistry, model::ModelFiles};
+use super::{InferenceError, Model, ModelRegistry, RemoteServer, model::ModelFiles};
 
 pub use error::RepositoryError;
 pub use folder::{ModelFolder, is_fetched};
@@ -44,6 +44,7 @@ pub struct ModelRepository {
     options: RepositoryOptions,
     registry: Arc<ModelRegistry>,
     loader: ModelLoader,
+    remote: Option<Arc<RemoteServer>>,
     /// Held while a model is loaded: one at a time.
     memory: Mutex<Memory>,
     succeeded: AtomicU64,
@@ -89,10 +90,26 @@ impl ModelRepository {
             options,
             registry: Arc::default(),
             loader,
+            remote: None,
             memory: Mutex::default(),
             succeeded: AtomicU64::new(0),
             failed: AtomicU64::new(0),
         }
+    }
+
+    /// The same, with the server that the networks of its models run on.
+    #[must_use]
+    pub fn on(self, remote: Arc<RemoteServer>) -> Self {
+        Self {
+            remote: Some(remote),
+            ..self
+        }
+    }
+
+    /// The server that the networks run on, if they do not run here.
+    #[must_use]
+    pub fn remote(&self) -> Option<&Arc<RemoteServer>> {
+        self.remote.as_ref()
     }
 
     /// The models that answer.

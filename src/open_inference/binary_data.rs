@@ -41,23 +41,36 @@ pub fn element(content: &[u8]) -> Option<Bytes> {
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
 pub fn numbers(bytes: &[u8], datatype: Datatype, count: usize) -> Result<Vec<f32>, String> {
-    let width = if datatype == Datatype::Uint8 { 1 } else { 4 };
-    if Some(bytes.len()) != count.checked_mul(width) {
-        let sent = bytes.len();
-        return Err(format!(
-            "it has {sent} bytes, and its shape asks for {count} numbers of {width} each"
-        ));
-    }
     if datatype == Datatype::Uint8 {
+        check_length(bytes, count, 1)?;
         return Ok(bytes.iter().map(|&byte| f32::from(byte)).collect());
     }
-    let words = bytes.as_chunks::<4>().0.iter();
-    let numbers: Vec<_> = words.map(|&word| f32::from_le_bytes(word)).collect();
+    let numbers = floats(bytes, count)?;
     if numbers.iter().all(|number| number.is_finite()) {
         Ok(numbers)
     } else {
         Err("it holds a number that is not finite".to_owned())
     }
+}
+
+/// `count` numbers of `FP32`, whichever they are.
+///
+/// # Errors
+/// The end of a sentence: what was sent, and what is needed.
+pub fn floats(bytes: &[u8], count: usize) -> Result<Vec<f32>, String> {
+    check_length(bytes, count, size_of::<f32>())?;
+    let words = bytes.as_chunks().0.iter();
+    Ok(words.map(|&word| f32::from_le_bytes(word)).collect())
+}
+
+fn check_length(bytes: &[u8], count: usize, width: usize) -> Result<(), String> {
+    let sent = bytes.len();
+    if Some(sent) == count.checked_mul(width) {
+        return Ok(());
+    }
+    Err(format!(
+        "it has {sent} bytes, and its shape asks for {count} numbers of {width} each"
+    ))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::ParameterError;
-use crate::imaging::decode::DecodeError;
+use crate::{imaging::decode::DecodeError, inference::InferenceError};
 
 /// A frame that got no report.
 #[derive(Debug, thiserror::Error)]
@@ -70,6 +70,15 @@ pub enum PipelineError {
         /// they have been.
         retry_after: Duration,
     },
+    /// The server that networks run on has no place for more.
+    #[error("the inference server has no place for more: send fewer frames at a time, or retry")]
+    InferenceBusy {
+        /// When it may have one.
+        retry_after: Duration,
+    },
+    /// The server that networks run on cannot be reached, or fails.
+    #[error("the inference server does not answer: try again in a few seconds")]
+    InferenceUnavailable,
     /// Nobody waits for the report any more, so the frame was not looked at.
     #[error("the request was withdrawn before its frame had a report")]
     Withdrawn,
@@ -79,6 +88,17 @@ pub enum PipelineError {
     /// Our fault: logged with its cause, shown without it.
     #[error("the frame could not be processed because of a fault in the server")]
     Internal(#[source] anyhow::Error),
+}
+
+/// What a network's failure means for a frame.
+pub(super) fn of_inference(error: &InferenceError) -> PipelineError {
+    match error {
+        InferenceError::RemoteBusy { retry_after } => PipelineError::InferenceBusy {
+            retry_after: *retry_after,
+        },
+        InferenceError::Remote { .. } => PipelineError::InferenceUnavailable,
+        other => internal(anyhow::anyhow!("{other}")),
+    }
 }
 
 /// Our own fault, with its cause.

@@ -24,7 +24,7 @@ use self::view_queue::ViewQueue;
 use super::{
     Ticket,
     camera_rig::CameraRig,
-    error::{PipelineError, internal},
+    error::{PipelineError, internal, of_inference},
     still_views::CameraViews,
 };
 use crate::{
@@ -113,7 +113,7 @@ fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
         let look = || run::look(&claims, session, remappers, &mut batch);
         match catch_unwind(AssertUnwindSafe(look)) {
             Ok(Ok(run)) => run.hand_out(&claims),
-            Ok(Err(error)) => fail(&claims, || internal(anyhow::anyhow!("{error}"))),
+            Ok(Err(error)) => fail(&claims, || of_inference(&error)),
             Err(_) => fail(&claims, || {
                 internal(anyhow::anyhow!("the network's thread panicked on a batch"))
             }),

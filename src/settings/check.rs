@@ -10,14 +10,11 @@ use std::{
 
 use super::{
     CalibrationSettings, InferenceSettings, LimitSettings, LogFormat, LogSettings, ModelSettings,
-    PaperSettings, RawSettings, RequestRateSettings, ServerSettings, Settings, SettingsError,
-    ShutdownSettings, ThreadPlan, raw, threads,
+    PaperSettings, RawSettings, RemoteSettings, RequestRateSettings, ServerSettings, Settings,
+    SettingsError, ShutdownSettings, ThreadPlan, raw,
+    threads::{self, Computing},
 };
-use crate::{
-    geometry::FieldOfViewReading,
-    inference::{Device, UnknownDevice},
-    server::ConnectionLimits,
-};
+use crate::{geometry::FieldOfViewReading, inference::UnknownDevice, server::ConnectionLimits};
 
 /// A body smaller than this holds no picture.
 const MIN_BODY_BYTES: u64 = 1024;
@@ -26,7 +23,7 @@ const MAX_BODY_BYTES: u64 = 2 << 30;
 /// 1 TiB: more memory than any machine spends on this.
 pub(super) const MAX_BYTES: u64 = 1 << 40;
 /// Ten minutes.
-const MAX_TIMEOUT_MILLIS: u64 = 600_000;
+pub(super) const MAX_TIMEOUT_MILLIS: u64 = 600_000;
 /// No client gets by with less than the least; with twice the most, a head still has its place in
 /// the buffer of a connection.
 const HEADER_BYTES: RangeInclusive<u64> = 1024..=128 * 1024;
@@ -49,7 +46,7 @@ impl TryFrom<RawSettings> for Settings {
 
     fn try_from(raw: RawSettings) -> Result<Self, SettingsError> {
         let server = server(&raw.server)?;
-        let inference = inference(&raw.inference)?;
+        let inference = inference(&raw.inference, &raw.model)?;
         Ok(Self {
             limits: limits(&raw.limits, server.max_body_bytes)?,
             shutdown: shutdown(&raw.shutdown, server.request_timeout)?,
@@ -70,7 +67,7 @@ impl TryFrom<RawSettings> for Settings {
                 )?,
             },
             model: model(raw.model)?,
-            threads: threads(&raw.inference, inference.device)?,
+            threads: threads(&raw.inference, inference.computing())?,
             inference,
             paper: PaperSettings {
                 field_of_view: choice(
@@ -167,7 +164,10 @@ fn model(raw: raw::RawModel) -> Result<ModelSettings, SettingsError> {
     })
 }
 
-fn inference(raw: &raw::RawInference) -> Result<InferenceSettings, SettingsError> {
+fn inference(
+    raw: &raw::RawInference,
+    model: &raw::RawModel,
+) -> Result<InferenceSettings, SettingsError> {
     if !(0.0..=1.0).contains(&raw.score_floor) {
         return Err(SettingsError::Value {
             key: "inference.score_floor".to_owned(),
@@ -187,10 +187,13 @@ fn inference(raw: &raw::RawInference) -> Result<InferenceSettings, SettingsError
         0..=MAX_QUEUE_DELAY_MILLIS,
     )?;
     let max_batch_views = wanted("inference.max_batch_views", raw.max_batch_views)?;
+    let remote = RemoteSettings::checked(raw, model)?;
+    let computing = Computing::of(device, remote.is_some());
     Ok(InferenceSettings {
+        remote,
         library_path: path("inference.library_path", raw.library_path.clone())?,
         device,
-        max_batch_views: max_batch_views.unwrap_or_else(|| threads::batch_views(device)),
+        max_batch_views: max_batch_views.unwrap_or_else(|| threads::batch_views(computing)),
         max_queue_delay: Duration::from_millis(delay),
         score_floor: raw.score_floor,
         max_detections_per_view: count(
@@ -205,10 +208,14 @@ fn inference(raw: &raw::RawInference) -> Result<InferenceSettings, SettingsError
     })
 }
 
-fn threads(raw: &raw::RawInference, device: Device) -> Result<ThreadPlan, SettingsError> {
+fn threads(raw: &raw::RawInference, computing: Computing) -> Result<ThreadPlan, SettingsError> {
     let sessions = wanted("inference.sessions", raw.sessions)?;
     let per_session = wanted("inference.threads", raw.threads)?;
-    Ok(ThreadPlan::for_this_process(device, sessions, per_session))
+    Ok(ThreadPlan::for_this_process(
+        computing,
+        sessions,
+        per_session,
+    ))
 }
 
 fn limits(raw: &raw::RawLimits, max_body_bytes: usize) -> Result<LimitSettings, SettingsError> {
@@ -355,7 +362,11 @@ pub(super) fn size(
     Ok(usize::try_from(value).unwrap_or(usize::MAX))
 }
 
-fn choice<T: Copy>(key: &str, value: &str, choices: &[(&str, T)]) -> Result<T, SettingsError> {
+pub(super) fn choice<T: Copy>(
+    key: &str,
+    value: &str,
+    choices: &[(&str, T)],
+) -> Result<T, SettingsError> {
     let chosen = choices.iter().find(|(name, _)| *name == value);
     chosen.map(|(_, choice)| *choice).ok_or_else(|| {
         let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();

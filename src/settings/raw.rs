@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::{
-    access::RawAccess, locate, mqtt::RawMqtt, results::RawResults, tls::RawTls,
+    access::RawAccess, locate, mqtt::RawMqtt, remote, results::RawResults, tls::RawTls,
     traces::RawTelemetry,
 };
 
@@ -125,6 +125,10 @@ impl Default for RawModel {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct RawInference {
+    pub(super) backend: String,
+    pub(super) url: String,
+    pub(super) model: String,
+    pub(super) timeout_millis: u64,
     pub(super) library_path: String,
     pub(super) device: String,
     pub(super) sessions: u64,
@@ -139,6 +143,10 @@ pub(super) struct RawInference {
 impl Default for RawInference {
     fn default() -> Self {
         Self {
+            backend: remote::ONNX.to_owned(),
+            url: String::new(),
+            model: String::new(),
+            timeout_millis: 10_000,
             library_path: locate::DEFAULT_LIBRARY.to_owned(),
             device: "cpu".to_owned(),
             sessions: 0,

@@ -32,6 +32,7 @@ pub(crate) struct Gate {
 struct GateState {
     closed: bool,
     panics: bool,
+    fails: Option<InferenceError>,
     runs: usize,
     /// How many persons every view has besides the one in the middle.
     crowd: u32,
@@ -49,6 +50,11 @@ impl Gate {
     /// Makes the next run panic.
     pub(crate) fn panic_once(&self) {
         self.change(|state| state.panics = true);
+    }
+
+    /// Makes the next run fail.
+    pub(crate) fn fail_once(&self, error: InferenceError) {
+        self.change(|state| state.fails = Some(error));
     }
 
     /// Makes the next runs see as many persons more in every view.
@@ -111,6 +117,9 @@ impl Detector for EagerDetector {
 
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
         self.gate.pass();
+        if let Some(error) = self.gate.state.lock().unwrap().fails.take() {
+            return Err(error);
+        }
         let person = ViewDetection {
             bbox: BBox::new([24.0, 16.0, 40.0, 48.0]).unwrap(),
             score: 0.9,

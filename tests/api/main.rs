@@ -20,6 +20,7 @@ mod operation;
 mod picture;
 mod rate_limit;
 mod refusals;
+mod remote;
 mod report;
 mod repository;
 mod results;

@@ -17,18 +17,16 @@ const HEAD_LENGTH: &str = "inference-header-content-length";
 /// Base64 (RFC 4648, section 4), written here once more so that the server's is not asked.
 fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let text = bytes.chunks(3).flat_map(|chunk| {
-        let bits = chunk
-            .iter()
-            .fold(0_usize, |bits, byte| bits << 8 | usize::from(*byte))
-            << (8 * (3 - chunk.len()));
-        let letter = move |index: usize| match index <= chunk.len() {
-            true => char::from(LETTERS[bits >> (18 - 6 * index) & 63]),
-            false => '=',
-        };
-        (0..4).map(letter)
-    });
-    text.collect()
+    let mut text = String::new();
+    for chunk in bytes.chunks(3) {
+        let byte = |index: usize| usize::from(chunk.get(index).copied().unwrap_or(0));
+        let bits = byte(0) * 65_536 + byte(1) * 256 + byte(2);
+        for (index, unit) in [262_144, 4096, 64, 1].into_iter().enumerate() {
+            let letter = char::from(LETTERS[bits / unit % 64]);
+            text.push(if index <= chunk.len() { letter } else { '=' });
+        }
+    }
+    text
 }
 
 fn fast() -> Value {

@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::Command};
 
 use lookdown::{
     imaging::{Frame, Letterbox, ViewBatch},
-    inference::{Detector, OnnxDetector, OnnxOptions},
+    inference::{CandidateOptions, Detector, OnnxDetector, OnnxOptions},
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -43,8 +43,10 @@ fn yolov2_of_full_size_finds_what_the_reference_finds() {
         ["cfg", "weights"].map(|kind| folder.path().join(format!("yolov2.{kind}")));
     script("convert_darknet.py", &[&cfg, &weights, &model]);
     let thresholds_off = OnnxOptions {
-        score_floor: 0.0,
-        max_detections_per_view: 1000,
+        candidates: CandidateOptions {
+            score_floor: 0.0,
+            max_detections_per_view: 1000,
+        },
         ..options()
     };
     let mut detector = OnnxDetector::load(&library(), &model, &thresholds_off).unwrap();

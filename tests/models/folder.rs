@@ -6,7 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown::inference::{Device, InferenceError, Model, OnnxDetector, OnnxOptions};
+use lookdown::inference::{
+    CandidateOptions, Device, InferenceError, Model, OnnxDetector, OnnxOptions,
+};
 use tempfile::TempDir;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -31,8 +33,10 @@ pub(crate) fn options() -> OnnxOptions {
     OnnxOptions {
         device: Device::Cpu,
         threads: NonZeroUsize::new(2).unwrap(),
-        score_floor: 0.01,
-        max_detections_per_view: 100,
+        candidates: CandidateOptions {
+            score_floor: 0.01,
+            max_detections_per_view: 100,
+        },
     }
 }
 

@@ -27,7 +27,7 @@ fn an_unknown_key_is_refused_by_name() {
 }
 
 /// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 47] = [
+const UNUSABLE: [(&str, &str, &str, &str); 50] = [
     (
         "RESULTS__URL",
         "localhost:6379",
@@ -181,6 +181,24 @@ const UNUSABLE: [(&str, &str, &str, &str); 47] = [
         "cpu, cuda:N or tensorrt:N",
     ),
     (
+        "INFERENCE__BACKEND",
+        "grpc",
+        "inference.backend",
+        "onnx, v2",
+    ),
+    (
+        "INFERENCE__URL",
+        "http://127.0.0.1:8000",
+        "inference.url",
+        "inference.backend",
+    ),
+    (
+        "INFERENCE__TIMEOUT_MILLIS",
+        "0",
+        "inference.timeout_millis",
+        "from 1 to",
+    ),
+    (
         "MODEL__POLL_SECONDS",
         "100000",
         "model.poll_seconds",
@@ -328,4 +346,36 @@ fn the_password_of_a_broker_is_neither_shown_nor_repeated() {
     let refused = refusal(from_environment("LOOKDOWN__MQTT__URL", &format!("{url}/x")));
     assert!(refused.contains("mqtt.url"), "{refused}");
     assert!(!refused.contains("s3cret"), "{refused}");
+}
+
+#[test]
+fn an_inference_server_is_an_address_without_a_password() {
+    let with_url = |url: &str| {
+        let text = format!("[inference]\nbackend = \"v2\"\nmodel = \"m\"\nurl = \"{url}\"\n");
+        from_file(&text)
+    };
+    for url in [
+        "",
+        "127.0.0.1:8000",
+        "grpc://127.0.0.1:8001",
+        "http://a/?b",
+        "http://me:secret@host",
+    ] {
+        let told = refusal(with_url(url));
+        assert!(
+            told.contains("inference.url") && told.contains("http://"),
+            "{told}"
+        );
+        assert!(!told.contains("secret"), "{told}");
+    }
+    let nameless = refusal(from_environment("LOOKDOWN__INFERENCE__BACKEND", "v2"));
+    assert!(
+        nameless.contains("inference.model") && nameless.contains("model.path"),
+        "{nameless}"
+    );
+    let settings = with_url("https://host:8000/prefix").unwrap();
+    let remote = settings.inference.remote.unwrap();
+    assert_eq!(remote.url.as_str(), "https://host:8000/prefix");
+    assert_eq!(settings.inference.max_batch_views.get(), 8);
+    assert_eq!(settings.threads.sessions.get(), 2);
 }

@@ -84,8 +84,7 @@ pub(in crate::api) struct ModelReadyProblems;
 
 impl IntoResponses for ModelReadyProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
-        let not_ready = [ProblemKind::WarmingUp, ProblemKind::ShuttingDown];
-        responses(OF_MODELS.into_iter().chain(not_ready))
+        responses(OF_MODELS.into_iter().chain(NOT_READY))
     }
 }
 
@@ -109,7 +108,7 @@ impl IntoResponses for DeepStackCustomProblems {
     }
 }
 
-const OF_DEEPSTACK: [ProblemKind; 18] = [
+const OF_DEEPSTACK: [ProblemKind; 19] = [
     ProblemKind::MalformedRequest,
     ProblemKind::RepeatedParameter,
     ProblemKind::MissingImage,
@@ -125,9 +124,17 @@ const OF_DEEPSTACK: [ProblemKind; 18] = [
     ProblemKind::Overloaded,
     ProblemKind::RateLimited,
     ProblemKind::Internal,
+    ProblemKind::InferenceUnavailable,
     ProblemKind::WarmingUp,
     ProblemKind::ShuttingDown,
     ProblemKind::Timeout,
+];
+
+/// Why a server takes no frames now.
+const NOT_READY: [ProblemKind; 3] = [
+    ProblemKind::InferenceUnavailable,
+    ProblemKind::WarmingUp,
+    ProblemKind::ShuttingDown,
 ];
 
 /// The server takes no frames now.
@@ -135,7 +142,7 @@ pub(in crate::api) struct NotReadyProblems;
 
 impl IntoResponses for NotReadyProblems {
     fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses([ProblemKind::WarmingUp, ProblemKind::ShuttingDown])
+        responses(NOT_READY)
     }
 }
 
@@ -171,6 +178,7 @@ impl IntoResponses for LoadProblems {
             ProblemKind::ModelConflict,
             ProblemKind::ModelRefused,
             ProblemKind::ModelBusy,
+            ProblemKind::InferenceUnavailable,
         ];
         responses(OF_ADMINISTRATION.into_iter().chain(of_models))
     }

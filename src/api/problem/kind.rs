@@ -75,6 +75,8 @@ pub(in crate::api) enum ProblemKind {
     RateLimited,
     /// A fault of ours.
     Internal,
+    /// The server that networks run on does not answer.
+    InferenceUnavailable,
     /// The network has not run yet.
     WarmingUp,
     /// The server was told to stop.
@@ -85,7 +87,7 @@ pub(in crate::api) enum ProblemKind {
 
 impl ProblemKind {
     /// Every kind.
-    pub(in crate::api) const ALL: [Self; 38] = [
+    pub(in crate::api) const ALL: [Self; 39] = [
         Self::MalformedRequest,
         Self::UnknownParameter,
         Self::RepeatedParameter,
@@ -121,6 +123,7 @@ impl ProblemKind {
         Self::TooManyListeners,
         Self::RateLimited,
         Self::Internal,
+        Self::InferenceUnavailable,
         Self::WarmingUp,
         Self::ShuttingDown,
         Self::Timeout,
@@ -179,6 +182,10 @@ impl ProblemKind {
             Self::TooManyListeners => ("too-many-listeners", "Too many listen already"),
             Self::RateLimited => ("rate-limited", "The requests come too fast"),
             Self::Internal => ("internal", "There is a fault in the server"),
+            Self::InferenceUnavailable => (
+                "inference-unavailable",
+                "The inference server does not answer",
+            ),
             Self::WarmingUp => ("warming-up", "The server is warming up"),
             Self::ShuttingDown => ("shutting-down", "The server is shutting down"),
             Self::Timeout => ("timeout", "The deadline has passed"),
@@ -230,6 +237,7 @@ impl ProblemKind {
             Self::TooManyConnections
             | Self::CalibrationsUnreachable
             | Self::ResultsUnreachable
+            | Self::InferenceUnavailable
             | Self::WarmingUp
             | Self::ShuttingDown => StatusCode::SERVICE_UNAVAILABLE,
             Self::Timeout => StatusCode::GATEWAY_TIMEOUT,
@@ -252,6 +260,7 @@ impl ProblemKind {
                 | Self::TooManyConnections
                 | Self::CalibrationsUnreachable
                 | Self::ResultsUnreachable
+                | Self::InferenceUnavailable
                 | Self::WarmingUp
                 | Self::ShuttingDown
         )

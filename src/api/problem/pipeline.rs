@@ -18,13 +18,16 @@ impl From<PipelineError> for Problem {
             }
             PipelineError::ModelStarting => ProblemKind::WarmingUp,
             PipelineError::Overloaded { .. } => ProblemKind::Overloaded,
+            PipelineError::InferenceBusy { .. } => ProblemKind::Overloaded,
+            PipelineError::InferenceUnavailable => ProblemKind::InferenceUnavailable,
             PipelineError::ShuttingDown => ProblemKind::ShuttingDown,
             PipelineError::Withdrawn => ProblemKind::Timeout,
             PipelineError::Internal(_) => ProblemKind::Internal,
         };
         match error {
             PipelineError::Internal(cause) => Self::internal(cause),
-            PipelineError::Overloaded { retry_after, .. } => {
+            PipelineError::Overloaded { retry_after, .. }
+            | PipelineError::InferenceBusy { retry_after } => {
                 Self::new(kind, error.to_string()).with_retry_after(retry_after)
             }
             told => Self::new(kind, told.to_string()),

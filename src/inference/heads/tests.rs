@@ -3,7 +3,7 @@
 mod known_models;
 mod refusals;
 
-use super::{Head, HeadOutput, InferenceError, TensorView};
+use super::{Head, HeadOutput, InferenceError, TensorView, ViewDetection};
 use crate::{detection::BBox, imaging::NetworkInput};
 
 /// The head of a manifest's `[output]` table.
@@ -132,4 +132,20 @@ fn every_cell_of_a_plateau_is_a_peak() {
 fn of_too_many_equal_peaks_the_first_are_kept() {
     assert_eq!(plateau(3), [[5.0, 5.0], [15.0, 5.0], [25.0, 5.0]]);
     assert!(plateau(0).is_empty());
+}
+
+#[test]
+fn the_best_boxes_of_a_view_are_kept() {
+    let found = (0..50).map(|index| ViewDetection {
+        bbox: BBox::new([0.0, 0.0, 10.0, 10.0]).unwrap(),
+        score: f64::from(index * 7 % 50) / 50.0,
+    });
+    let mut output = HeadOutput {
+        per_view: vec![found.collect()],
+        non_finite: 0,
+    };
+    output.keep_best(10);
+    let found = &output.per_view[0];
+    assert_eq!(found.len(), 10);
+    assert!(found.iter().all(|detection| detection.score > 0.79));
 }

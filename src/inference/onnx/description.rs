@@ -49,15 +49,15 @@ pub struct OnnxTensor {
 }
 
 /// The element type of tensors that can be used.
-pub(super) const FLOAT: &str = "f32";
+pub(in crate::inference) const FLOAT: &str = "f32";
 
 /// What the ONNX file's metadata says, where exporters write it.
 #[derive(Debug, Default)]
-pub(super) struct Metadata {
-    pub(super) licence: Option<String>,
+pub(in crate::inference) struct Metadata {
+    pub(in crate::inference) licence: Option<String>,
     /// Height and width.
-    pub(super) size: Option<[u32; 2]>,
-    pub(super) stride: Option<u32>,
+    pub(in crate::inference) size: Option<[u32; 2]>,
+    pub(in crate::inference) stride: Option<u32>,
 }
 
 /// Reads the keys that Ultralytics' exporter writes; others write none.
@@ -103,7 +103,9 @@ fn tensor(outlet: &Outlet) -> OnnxTensor {
 }
 
 /// The shapes of the outputs that heads can read.
-pub(super) fn float_shapes(outputs: &[OnnxTensor]) -> impl Iterator<Item = OutputShape<'_>> {
+pub(in crate::inference) fn float_shapes(
+    outputs: &[OnnxTensor],
+) -> impl Iterator<Item = OutputShape<'_>> {
     let floats = outputs.iter().filter(|output| output.element == FLOAT);
     floats.map(|output| OutputShape {
         name: &output.name,

@@ -6,7 +6,7 @@ use super::Engine;
 use crate::{
     imaging::ViewBatch,
     inference::HeadOutput,
-    pipeline::{PipelineError, Stage, ViewsJob, error::internal},
+    pipeline::{PipelineError, Stage, ViewsJob, error::of_inference},
 };
 
 impl Engine {
@@ -31,7 +31,7 @@ impl Engine {
                 input.fill(slot, view);
             }
             let output = job.model.detect(session, &batch);
-            let output = output.map_err(|error| internal(anyhow::Error::new(error)))?;
+            let output = output.map_err(|error| of_inference(&error))?;
             found.non_finite += output.non_finite;
             found.per_view.extend(output.per_view);
         }

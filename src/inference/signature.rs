@@ -5,8 +5,10 @@ use std::{
     ops::RangeInclusive,
 };
 
-use super::description::{FLOAT, Metadata, OnnxTensor};
-use crate::inference::{Layout, ManifestInput};
+use super::{
+    Layout, ManifestInput, OnnxTensor,
+    onnx::{FLOAT, Metadata},
+};
 
 /// Network input sides accepted, pixels.
 const SIDE: RangeInclusive<u32> = 32..=4096;

@@ -2,11 +2,8 @@
 
 use std::num::NonZeroUsize;
 
-use super::signature::Signature;
-use crate::{
-    imaging::{NetworkInput, ViewBatch},
-    inference::Layout,
-};
+use super::{Layout, signature::Signature};
+use crate::imaging::{NetworkInput, ViewBatch};
 
 /// Turns batches into inputs.
 pub(super) struct Staging {

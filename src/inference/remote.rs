@@ -1,0 +1,128 @@
+//! Detectors whose network runs on another machine: any server of the Open Inference Protocol (KServe V2)
+//! over HTTP. Views go there as tensors, behind the JSON where the server takes that and in it otherwise;
+//! its outputs come back, and the head that the model's manifest names reads them here.
+
+mod breaker;
+mod connection;
+mod exchange;
+mod server;
+mod understood;
+
+use std::{num::NonZeroUsize, path::Path, sync::Arc};
+
+use self::{
+    exchange::{Answer, Question},
+    understood::Understood,
+};
+use super::{
+    CandidateOptions, Detector, HeadOutput, InferenceError, ModelManifest,
+    heads::TensorView,
+    staging::{Staged, Staging},
+};
+use crate::imaging::{NetworkInput, ViewBatch};
+
+pub use server::{RemoteCounts, RemoteOptions, RemoteServer};
+
+/// A model on an inference server.
+pub struct RemoteDetector {
+    server: Arc<RemoteServer>,
+    understood: Arc<Understood>,
+    staging: Staging,
+    options: CandidateOptions,
+}
+
+impl RemoteDetector {
+    /// Asks the server what its model takes and answers, and holds that against the manifest at `model`
+    /// (a folder or a `model.toml`; an ONNX file is not needed). `count` sessions send side by side: the
+    /// first, and the others. Blocks.
+    ///
+    /// # Errors
+    /// [`InferenceError`] when the server cannot be asked or the model cannot be used.
+    pub fn load_sessions(
+        server: &Arc<RemoteServer>,
+        model: &Path,
+        options: CandidateOptions,
+        count: NonZeroUsize,
+    ) -> Result<(Self, Vec<Self>), InferenceError> {
+        let manifest = ModelManifest::locate(model)?;
+        let understood = Arc::new(Understood::ask(server, manifest)?);
+        let session = || Self {
+            server: Arc::clone(server),
+            understood: Arc::clone(&understood),
+            staging: Staging::new(&understood.signature),
+            options,
+        };
+        let others = (1..count.get()).map(|_| session()).collect();
+        Ok((session(), others))
+    }
+}
+
+impl Detector for RemoteDetector {
+    fn name(&self) -> &str {
+        &self.understood.manifest.name
+    }
+
+    fn revision(&self) -> &str {
+        &self.understood.revision
+    }
+
+    fn input(&self) -> &NetworkInput {
+        &self.understood.input
+    }
+
+    fn views_per_run(&self) -> Option<NonZeroUsize> {
+        self.understood.signature.views_per_run
+    }
+
+    fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
+        let Self {
+            server,
+            understood,
+            staging,
+            options,
+        } = self;
+        let input = &understood.input;
+        let mut found = HeadOutput::default();
+        for piece in staging.pieces(batch, input) {
+            let staged = staging.stage(piece, input);
+            let views = piece.len() / input.view_len();
+            let output = run(server, understood, &staged, options.score_floor)?;
+            found.non_finite += output.non_finite;
+            found
+                .per_view
+                .extend(output.per_view.into_iter().take(views));
+        }
+        found.keep_best(options.max_detections_per_view);
+        Ok(found)
+    }
+}
+
+/// One request.
+fn run(
+    server: &RemoteServer,
+    understood: &Understood,
+    staged: &Staged<'_>,
+    score_floor: f64,
+) -> Result<HeadOutput, InferenceError> {
+    let question = Question {
+        input: staged.name,
+        shape: &staged.shape,
+        values: staged.values,
+        outputs: &understood.outputs,
+        as_bytes: understood.as_bytes,
+    };
+    let Answer { outputs } = server.infer(&understood.name_there, &question)?;
+    let tensors: Vec<_> = outputs
+        .iter()
+        .map(|output| TensorView {
+            name: &output.name,
+            shape: &output.shape,
+            values: &output.values,
+        })
+        .collect();
+    let head = &understood.manifest.output;
+    head.decode(&tensors, staged.shape[0], &understood.input, score_floor)
+}
+
+#[cfg(test)]
+mod tests;

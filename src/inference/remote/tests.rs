@@ -1,0 +1,195 @@
+//! A server that answers as it is told, on a real socket.
+
+mod fake;
+
+use std::{fs, path::Path, time::Duration};
+
+use tempfile::TempDir;
+
+use self::fake::{FakeServer, Told};
+use super::*;
+use crate::imaging::ViewBatch;
+
+/// A folder with a manifest and no weights.
+fn manifest() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "name = \"here\"\nonnx = \"model.onnx\"\n";
+    fs::write(folder.path().join("model.toml"), text).unwrap();
+    folder
+}
+
+fn server(fake: &FakeServer) -> Arc<RemoteServer> {
+    let options = RemoteOptions {
+        url: fake.address().parse().unwrap(),
+        model: "there".to_owned(),
+        called: "here".to_owned(),
+        patience: Duration::from_millis(500),
+    };
+    Arc::new(RemoteServer::new(options).unwrap())
+}
+
+fn load(server: &Arc<RemoteServer>, model: &Path) -> Result<RemoteDetector, InferenceError> {
+    let options = CandidateOptions {
+        score_floor: 0.1,
+        max_detections_per_view: 10,
+    };
+    RemoteDetector::load_sessions(server, model, options, NonZeroUsize::MIN).map(|(first, _)| first)
+}
+
+fn look(detector: &mut RemoteDetector, views: usize) -> Result<HeadOutput, InferenceError> {
+    let mut batch = ViewBatch::default();
+    for slot in batch.prepare(views, &detector.input().clone()) {
+        slot.fill(7.0);
+    }
+    detector.detect(&batch)
+}
+
+#[test]
+fn views_go_as_bytes_where_the_server_takes_them_and_as_lists_elsewhere() {
+    for (as_bytes, first_axis) in [(true, -1), (false, -1), (true, 2)] {
+        let fake = FakeServer::start(as_bytes, first_axis);
+        let folder = manifest();
+        let mut detector = load(&server(&fake), folder.path()).unwrap();
+        assert_eq!((detector.name(), detector.input().width), ("here", 32));
+        assert_eq!(
+            detector.views_per_run().is_some(),
+            first_axis == 2,
+            "the metadata say how many"
+        );
+        let found = look(&mut detector, 3).unwrap();
+        let scores: Vec<_> = found.per_view.iter().map(|view| view[0].score).collect();
+        assert_eq!(scores, [0.5; 3], "{as_bytes}");
+        assert_eq!(found.per_view[2][0].bbox.corners(), [1.0, 2.0, 3.0, 4.0]);
+        let lengths: Vec<_> = fake
+            .inferred()
+            .iter()
+            .map(|request| request.head_length.is_some())
+            .collect();
+        let requests = if first_axis == 2 { 2 } else { 1 };
+        assert_eq!(lengths, vec![as_bytes; requests]);
+        assert_eq!(fake.inferred()[0].path, "/v2/models/there/infer");
+    }
+}
+
+#[test]
+fn a_server_without_a_place_is_busy_and_one_that_is_not_ready_is_away() {
+    let fake = FakeServer::start(true, -1);
+    let folder = manifest();
+    let server = server(&fake);
+    let mut detector = load(&server, folder.path()).unwrap();
+    fake.tell(Told::status(429).header("Retry-After", "7"));
+    let error = look(&mut detector, 1).unwrap_err();
+    assert!(
+        matches!(error, InferenceError::RemoteBusy { retry_after } if retry_after.as_secs() == 7),
+        "{error}"
+    );
+    fake.tell(Told::status(503));
+    let error = look(&mut detector, 1).unwrap_err();
+    assert!(
+        matches!(error, InferenceError::RemoteBusy { .. }),
+        "{error}"
+    );
+    fake.be_ready(false);
+    fake.tell(Told::status(503));
+    let error = look(&mut detector, 1).unwrap_err();
+    assert!(matches!(error, InferenceError::Remote { .. }), "{error}");
+    let counts = server.counts();
+    assert_eq!((counts.busy, counts.failed, counts.answered), (2, 1, 0));
+}
+
+#[test]
+fn what_fails_again_and_again_is_not_asked_until_it_is_ready() {
+    let fake = FakeServer::start(true, -1);
+    let folder = manifest();
+    let server = server(&fake);
+    let mut detector = load(&server, folder.path()).unwrap();
+    for _ in 0..3 {
+        fake.tell(Told::status(500));
+        assert!(server.is_available());
+        let told = look(&mut detector, 1).unwrap_err().to_string();
+        assert!(told.contains("answered 500"), "{told}");
+    }
+    assert!(!server.is_available());
+    look(&mut detector, 1).unwrap_err();
+    assert_eq!((fake.inferred().len(), server.counts().not_sent), (3, 1));
+    fake.be_ready(false);
+    assert!(!server.look_after());
+    fake.be_ready(true);
+    assert!(server.look_after());
+    look(&mut detector, 1).unwrap();
+}
+
+#[test]
+fn an_idle_server_that_is_gone_is_noticed_and_one_that_answers_is_left_alone() {
+    let fake = FakeServer::start(true, -1);
+    let folder = manifest();
+    let server = server(&fake);
+    let mut detector = load(&server, folder.path()).unwrap();
+    fake.be_ready(false);
+    assert!(server.look_after() && server.look_after() && !server.look_after());
+    fake.be_ready(true);
+    assert!(server.look_after());
+    look(&mut detector, 1).unwrap();
+    fake.be_ready(false);
+    assert!((0..5).all(|_| server.look_after()), "it has just answered");
+}
+
+#[test]
+fn a_connection_that_was_closed_meanwhile_costs_nobody_an_answer() {
+    let fake = FakeServer::start(true, -1);
+    let folder = manifest();
+    let mut detector = load(&server(&fake), folder.path()).unwrap();
+    for _ in 0..3 {
+        fake.tell(Told::nothing());
+        look(&mut detector, 1).unwrap();
+    }
+}
+
+#[test]
+fn answers_that_are_none_are_told_and_slow_ones_are_given_up() {
+    let fake = FakeServer::start(true, -1);
+    let folder = manifest();
+    for (told, part) in [
+        (
+            Told::status(404).body("{\"error\":\"no model\"}"),
+            "no model",
+        ),
+        (Told::status(200).body("{}"), "cannot be read"),
+        (
+            Told::status(302).header("Location", "http://127.0.0.1:9/"),
+            "answered 302",
+        ),
+        (Told::slowly(), "timed out"),
+    ] {
+        let server = server(&fake);
+        let mut detector = load(&server, folder.path()).unwrap();
+        fake.tell(told);
+        let error = look(&mut detector, 1).unwrap_err();
+        assert!(matches!(error, InferenceError::Remote { .. }), "{error}");
+        assert!(error.to_string().contains(part), "{error}");
+    }
+    let server = server(&fake);
+    let mut detector = load(&server, folder.path()).unwrap();
+    fake.tell(Told::status(200).body("{\"outputs\":[]}"));
+    let error = look(&mut detector, 1).unwrap_err();
+    assert!(error.to_string().contains("no output \"boxes\""), "{error}");
+}
+
+#[test]
+fn a_model_that_cannot_be_used_is_refused_with_the_reason() {
+    let folder = manifest();
+    for (first_axis, part) in [(0, "32-bit floats"), (257, "at most 256")] {
+        let fake = FakeServer::start(true, first_axis);
+        let error = load(&server(&fake), folder.path()).err().unwrap();
+        assert!(
+            matches!(error, InferenceError::RemoteModel { .. }),
+            "{error}"
+        );
+        assert!(error.to_string().contains(part), "{error}");
+    }
+    let fake = FakeServer::start(true, -1);
+    let server = server(&fake);
+    fake.end();
+    let error = load(&server, folder.path()).err().unwrap();
+    assert!(matches!(error, InferenceError::Remote { .. }), "{error}");
+}

@@ -1,0 +1,63 @@
+//! What clients hear of the server that networks run on.
+
+use std::time::Duration;
+
+use lookdown::inference::InferenceError;
+
+use crate::service::{Service, frame};
+
+const FAST: &str = "calibration=lobby&profile=fast";
+
+#[tokio::test]
+async fn an_inference_server_without_a_place_is_ours_without_a_place() {
+    let service = Service::start();
+    let retry_after = Duration::from_secs(6);
+    service
+        .gate
+        .fail_once(InferenceError::RemoteBusy { retry_after });
+    let answer = service.post_raw(FAST, frame()).await;
+    assert_eq!(answer.status, 429);
+    assert_eq!(answer.header("retry-after"), "7");
+    let problem = answer.problem();
+    assert_eq!(problem["type"], "urn:lookdown:problem:overloaded");
+    assert!(
+        problem["detail"]
+            .as_str()
+            .unwrap()
+            .contains("inference server")
+    );
+    service.still_works().await;
+}
+
+#[tokio::test]
+async fn an_inference_server_that_is_away_is_no_fault_of_ours_and_its_address_is_not_told() {
+    let service = Service::start();
+    let away = || InferenceError::Remote {
+        url: "http://10.1.2.3:8000/".to_owned(),
+        detail: "the secret cause".to_owned(),
+    };
+    for path in ["/detect", "/v2/models/eager/infer"] {
+        service.gate.fail_once(away());
+        let answer = if path == "/detect" {
+            service.post_raw(FAST, frame()).await
+        } else {
+            let data = vec![0; 3 * 64 * 64];
+            let views = serde_json::json!({ "name": "views", "datatype": "UINT8", "shape": [1, 3, 64, 64], "data": data });
+            let body = serde_json::json!({ "inputs": [views] }).to_string();
+            service.post(path, &body).await
+        };
+        assert_eq!(answer.status, 503, "{path}: {}", answer.text());
+        assert_eq!(answer.header("retry-after"), "1");
+        let problem = answer.problem();
+        assert_eq!(
+            problem["type"],
+            "urn:lookdown:problem:inference-unavailable"
+        );
+        let text = answer.text();
+        assert!(
+            !text.contains("10.1.2.3") && !text.contains("secret"),
+            "{text}"
+        );
+        service.still_works().await;
+    }
+}

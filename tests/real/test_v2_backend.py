@@ -1,0 +1,154 @@
+"""Views are looked at by another server of the Open Inference Protocol: MLServer, and Lookdown itself."""
+
+import contextlib
+import json
+import signal
+import tempfile
+import time
+import unittest
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+from harness.places import ROOT, SAMPLES, model
+from harness.processes import Server, free_ports, running
+from support.lookdown import lookdown
+
+HERE = Path(__file__).resolve().parent
+MLSERVER = ROOT / ".setup" / "real" / "v2_backend" / "bin" / "mlserver"
+MODEL = "nanodet_g_416"
+SIDE = 416
+FRAME = (SAMPLES / "office.jpg").read_bytes()
+FAST = "/detect?calibration=office&profile=fast"
+BALANCED = "/detect?calibration=office"
+GONE_SECONDS = 20.0
+"""Within this time the server must have noticed that the other is gone, or is there again."""
+
+
+@contextlib.contextmanager
+def mlserver(port: int) -> Iterator[Server]:
+    """MLServer with the default model, which is called `people` there."""
+    grpc, metrics = free_ports(2)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        ports = {"http_port": port, "grpc_port": grpc, "metrics_port": metrics}
+        settings = {"host": "127.0.0.1", "parallel_workers": 0, "debug": False, **ports}
+        (folder / "settings.json").write_text(json.dumps(settings), encoding="utf-8")
+        described = {
+            "name": "people",
+            "implementation": "model.Network",
+            "inputs": [{"name": "images", "datatype": "FP32", "shape": [-1, 3, SIDE, SIDE]}],
+            "outputs": [
+                {"name": "boxes", "datatype": "FP32", "shape": [-1, -1, 4]},
+                {"name": "scores", "datatype": "FP32", "shape": [-1, -1]},
+            ],
+        }
+        (folder / "model-settings.json").write_text(json.dumps(described), encoding="utf-8")
+        environment = {"MODEL": str(model(MODEL)), "PYTHONPATH": str(HERE / "v2_backend")}
+        command = [str(MLSERVER), "start", str(folder)]
+        with running("v2_backend", command, port, "/v2/models/people/ready", environment, folder) as server:
+            yield server
+
+
+def asking(url: str, name: str = "") -> dict[str, str]:
+    """Settings of a server that has no network of its own."""
+    there = {"INFERENCE__BACKEND": "v2", "INFERENCE__URL": url, "INFERENCE__TIMEOUT_MILLIS": "60000"}
+    return there | {"INFERENCE__MODEL": name or MODEL, "MODEL__PATH": str(model(MODEL).parent)}
+
+
+def answer(server: Server, path: str, body: bytes | None = None) -> tuple[int, dict, dict]:
+    """Status, headers and JSON of an answer."""
+    request = urllib.request.Request(f"http://{server.address}{path}", body, {"Content-Type": "image/jpeg"})
+    try:
+        with urllib.request.urlopen(request, timeout=120) as told:
+            return told.status, dict(told.headers), json.loads(told.read())
+    except urllib.error.HTTPError as error:
+        return error.code, dict(error.headers), json.loads(error.read())
+
+
+def until(server: Server, status: int) -> dict:
+    """Waits until `/readyz` has that status; returns what it says."""
+    deadline = time.monotonic() + GONE_SECONDS
+    while True:
+        found, _, told = answer(server, "/readyz")
+        if found == status:
+            return told
+        if time.monotonic() > deadline:
+            raise AssertionError(f"/readyz is still {found} after {GONE_SECONDS:.0f} s: {told}")
+        time.sleep(0.05)
+
+
+def metric(server: Server, line: str) -> float:
+    """The value of a metric with its labels."""
+    lines = server.get("/metrics").decode().splitlines()
+    return float(next(row.rsplit(" ", 1)[1] for row in lines if row.startswith(line + " ")))
+
+
+class RemoteInference(unittest.TestCase):
+    """What is found does not depend on where the network runs, and an outage is clear and passes."""
+
+    def assert_same(self, report: dict, wanted: dict) -> None:
+        """Boxes equal to a hundredth of a pixel, scores to a thousandth."""
+        self.assertGreater(len(wanted["persons"]), 0)
+        self.assertEqual(len(report["persons"]), len(wanted["persons"]))
+        for person, other in zip(report["persons"], wanted["persons"]):
+            self.assertAlmostEqual(person["score"], other["score"], delta=1e-3)
+            self.assertEqual(person["views"], other["views"])
+            for side, place in other["box"].items():
+                self.assertAlmostEqual(person["box"][side], place, delta=0.02, msg=side)
+
+    def test_mlserver_finds_what_is_found_here_and_may_go_and_come_back(self) -> None:
+        with lookdown({"MODEL__PATH": str(model(MODEL).parent)}) as here:
+            local = {path: json.loads(here.post(path, FRAME)) for path in (FAST, BALANCED)}
+        (port,) = free_ports(1)
+        with contextlib.ExitStack() as stack:
+            first = contextlib.ExitStack()
+            stack.enter_context(first)
+            remote = first.enter_context(mlserver(port))
+            server = stack.enter_context(lookdown(asking(f"http://127.0.0.1:{port}", "people")))
+            for path, wanted in local.items():
+                self.assert_same(json.loads(server.post(path, FRAME)), wanted)
+            self.assertGreater(metric(server, 'lookdown_remote_requests_total{result="answered"}'), 0)
+            self.assertEqual(metric(server, "lookdown_remote_up"), 1)
+
+            remote.process.send_signal(signal.SIGKILL)
+            remote.process.wait()
+            status, headers, problem = answer(server, FAST, FRAME)
+            self.assertEqual((status, problem["type"]), (503, "urn:lookdown:problem:inference-unavailable"))
+            self.assertGreaterEqual(int(headers["Retry-After"]), 1)
+            self.assertNotIn(str(port), problem["error"])
+            self.assertEqual(until(server, 503)["type"], "urn:lookdown:problem:inference-unavailable")
+            began = time.monotonic()
+            self.assertEqual(answer(server, FAST, FRAME)[0], 503)
+            self.assertLess(time.monotonic() - began, 1.0, "an open breaker answers at once")
+            self.assertEqual(metric(server, "lookdown_remote_up"), 0)
+            self.assertEqual(answer(server, "/livez")[0], 200)
+            first.close()
+
+            stack.enter_context(mlserver(port))
+            until(server, 200)
+            self.assert_same(json.loads(server.post(FAST, FRAME)), local[FAST])
+
+    def test_a_server_that_starts_first_waits_for_the_other(self) -> None:
+        (port, own) = free_ports(2)
+        variables = asking(f"http://127.0.0.1:{port}", "people") | {"SERVER__LISTEN": f"127.0.0.1:{own}"}
+        variables |= {"CALIBRATIONS__PATH": str(SAMPLES / "calibrations"), "SHUTDOWN__GRACE_MILLIS": "0"}
+        command = [str(ROOT / "target" / "release" / "lookdown"), "serve"]
+        environment = {f"LOOKDOWN__{name}": value for name, value in variables.items()}
+        with running("lookdown", command, own, "/livez", environment) as server:
+            status, _, problem = answer(server, FAST, FRAME)
+            self.assertEqual((status, problem["type"]), (503, "urn:lookdown:problem:warming-up"))
+            with mlserver(port):
+                until(server, 200)
+                self.assertEqual(answer(server, FAST, FRAME)[0], 200)
+
+    def test_lookdown_itself_looks_for_another_with_views_as_bytes(self) -> None:
+        with lookdown({"MODEL__PATH": str(model(MODEL).parent), "LIMITS__MAX_FRAMES_IN_FLIGHT": "64"}) as here:
+            with lookdown(asking(f"http://{here.address}")) as front:
+                for path in (FAST, BALANCED):
+                    self.assert_same(json.loads(front.post(path, FRAME)), json.loads(here.post(path, FRAME)))
+
+
+if __name__ == "__main__":
+    unittest.main()
