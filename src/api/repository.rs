@@ -151,11 +151,12 @@ impl From<RepositoryError> for Problem {
                 ProblemKind::UnknownModel
             }
             RepositoryError::Kept { .. } | RepositoryError::Full(_) => ProblemKind::ModelConflict,
-            RepositoryError::Busy => ProblemKind::ModelBusy,
+            RepositoryError::Busy | RepositoryError::Refused(InferenceError::RemoteBusy { .. }) => {
+                ProblemKind::ModelBusy
+            }
             RepositoryError::Refused(InferenceError::Remote { .. }) => {
                 ProblemKind::InferenceUnavailable
             }
-            RepositoryError::Refused(InferenceError::RemoteBusy { .. }) => ProblemKind::ModelBusy,
             RepositoryError::OtherName { .. } | RepositoryError::Refused(_) => {
                 ProblemKind::ModelRefused
             }

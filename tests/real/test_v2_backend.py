@@ -9,6 +9,7 @@ import unittest
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from email.message import Message
 from pathlib import Path
 
 from harness.places import ROOT, SAMPLES, model
@@ -57,14 +58,14 @@ def asking(url: str, name: str = "") -> dict[str, str]:
     return there | {"INFERENCE__MODEL": name or MODEL, "MODEL__PATH": str(model(MODEL).parent)}
 
 
-def answer(server: Server, path: str, body: bytes | None = None) -> tuple[int, dict, dict]:
+def answer(server: Server, path: str, body: bytes | None = None) -> tuple[int, Message, dict]:
     """Status, headers and JSON of an answer."""
     request = urllib.request.Request(f"http://{server.address}{path}", body, {"Content-Type": "image/jpeg"})
     try:
         with urllib.request.urlopen(request, timeout=120) as told:
-            return told.status, dict(told.headers), json.loads(told.read())
+            return told.status, told.headers, json.loads(told.read())
     except urllib.error.HTTPError as error:
-        return error.code, dict(error.headers), json.loads(error.read())
+        return error.code, error.headers, json.loads(error.read())
 
 
 def until(server: Server, status: int) -> dict:

@@ -17,8 +17,9 @@ impl From<PipelineError> for Problem {
                 ProblemKind::UnfitImage
             }
             PipelineError::ModelStarting => ProblemKind::WarmingUp,
-            PipelineError::Overloaded { .. } => ProblemKind::Overloaded,
-            PipelineError::InferenceBusy { .. } => ProblemKind::Overloaded,
+            PipelineError::Overloaded { .. } | PipelineError::InferenceBusy { .. } => {
+                ProblemKind::Overloaded
+            }
             PipelineError::InferenceUnavailable => ProblemKind::InferenceUnavailable,
             PipelineError::ShuttingDown => ProblemKind::ShuttingDown,
             PipelineError::Withdrawn => ProblemKind::Timeout,

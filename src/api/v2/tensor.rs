@@ -58,8 +58,8 @@ fn read(datatype: &str, shape: &[u32], sent: Sent<'_>) -> Result<Values, String>
         let datatype = shown(datatype);
         format!("its datatype is {datatype:?}: BYTES, FP32 and UINT8 are read")
     })?;
-    let sides = shape.iter().map(|side| *side as usize);
-    let count = sides.fold(Some(1_usize), |count, side| count?.checked_mul(side));
+    let mut sides = shape.iter().map(|side| *side as usize);
+    let count = sides.try_fold(1_usize, usize::checked_mul);
     let count =
         count.ok_or_else(|| format!("its shape {shape:?} has more elements than memory"))?;
     let values = match (datatype, sent) {

@@ -64,7 +64,7 @@ impl Connection {
 
     /// Asks for what is at a path, whose parts are given.
     pub(super) fn get(&self, path: &[&str], patience: Duration) -> Result<Reply, String> {
-        self.reply(|| self.client.get(self.at(path)).timeout(patience))
+        reply(|| self.client.get(self.at(path)).timeout(patience))
     }
 
     /// Sends JSON, or, with the length of the JSON, JSON and bytes behind it.
@@ -74,7 +74,7 @@ impl Connection {
         body: &Bytes,
         head_length: Option<usize>,
     ) -> Result<Reply, String> {
-        self.reply(|| {
+        reply(|| {
             let request = self.client.post(self.at(path)).timeout(self.patience);
             let request = match head_length {
                 Some(length) => request
@@ -86,19 +86,6 @@ impl Connection {
         })
     }
 
-    /// Sends a request; once more when no connection could be made, or one that was kept was closed
-    /// before an answer came, as servers do that are restarted. Inference changes nothing there, so it may
-    /// be asked for twice; whoever takes too long is not given more work.
-    fn reply(&self, request: impl Fn() -> RequestBuilder) -> Result<Reply, String> {
-        let sent = match request().send() {
-            Err(error) if (error.is_connect() || error.is_request()) && !error.is_timeout() => {
-                request().send()
-            }
-            sent => sent,
-        };
-        sent.map_err(with_causes).and_then(read)
-    }
-
     /// The address of a path below the server's own.
     fn at(&self, path: &[&str]) -> Url {
         let mut address = self.address.clone();
@@ -108,6 +95,19 @@ impl Connection {
         }
         address
     }
+}
+
+/// Sends a request; once more when no connection could be made, or one that was kept was closed
+/// before an answer came, as servers do that are restarted. Inference changes nothing there, so it may
+/// be asked for twice; whoever takes too long is not given more work.
+fn reply(request: impl Fn() -> RequestBuilder) -> Result<Reply, String> {
+    let sent = match request().send() {
+        Err(error) if (error.is_connect() || error.is_request()) && !error.is_timeout() => {
+            request().send()
+        }
+        sent => sent,
+    };
+    sent.map_err(with_causes).and_then(read)
 }
 
 fn read(response: Response) -> Result<Reply, String> {
