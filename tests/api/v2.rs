@@ -36,7 +36,7 @@ fn fast() -> Value {
 }
 
 /// A request for the persons in a frame, the frame in its JSON.
-fn in_json(parameters: Value) -> Value {
+fn in_json(parameters: &Value) -> Value {
     let input =
         json!({ "name": "image", "datatype": "BYTES", "shape": [1], "data": [base64(&frame())] });
     json!({ "inputs": [input], "parameters": parameters })
@@ -57,7 +57,7 @@ async fn send(service: &Service, path: &str, head: &Value, behind: &[u8]) -> Ans
 }
 
 /// A request for the persons in a frame, the frame behind its JSON.
-fn in_bytes(frame: &[u8], parameters: Value) -> (Value, Vec<u8>) {
+fn in_bytes(frame: &[u8], parameters: &Value) -> (Value, Vec<u8>) {
     let behind = element(frame);
     let input = json!({
         "name": "image", "datatype": "BYTES", "shape": [1],
@@ -195,7 +195,7 @@ async fn a_frame_in_json_is_answered_as_detect_answers_it() {
         .post_raw("calibration=lobby&profile=fast", frame())
         .await
         .json();
-    let mut request = in_json(fast());
+    let mut request = in_json(&fast());
     request["id"] = json!("17");
     let answer = service.post(FRAMES, &request.to_string()).await;
     assert_eq!(answer.status, 200, "{}", answer.text());
@@ -249,7 +249,7 @@ async fn a_frame_in_json_is_answered_as_detect_answers_it() {
 #[tokio::test]
 async fn a_frame_behind_json_is_answered_the_same_and_outputs_come_as_bytes_where_asked() {
     let service = Service::start();
-    let wanted = service.post(FRAMES, &in_json(fast()).to_string()).await;
+    let wanted = service.post(FRAMES, &in_json(&fast()).to_string()).await;
     let (boxes, _) = output(&wanted, "boxes");
     let boxes = boxes["data"].as_array().unwrap().iter();
     #[expect(clippy::cast_possible_truncation, reason = "they are FP32")]
@@ -257,7 +257,7 @@ async fn a_frame_behind_json_is_answered_the_same_and_outputs_come_as_bytes_wher
 
     let mut parameters = fast();
     parameters["binary_data_output"] = json!(true);
-    let (head, behind) = in_bytes(&frame(), parameters);
+    let (head, behind) = in_bytes(&frame(), &parameters);
     let all = send(&service, FRAMES, &head, &behind).await;
     assert_eq!(all.status, 200);
     assert_eq!(all.header("content-type"), "application/octet-stream");
@@ -271,7 +271,7 @@ async fn a_frame_behind_json_is_answered_the_same_and_outputs_come_as_bytes_wher
     );
     serde_json::from_slice::<Value>(&report[4..]).unwrap();
 
-    let (mut head, behind) = in_bytes(&frame(), fast());
+    let (mut head, behind) = in_bytes(&frame(), &fast());
     let binary = json!({ "binary_data": true });
     head["outputs"] = json!([{ "name": "scores" }, { "name": "boxes", "parameters": binary }]);
     let some = send(&service, FRAMES, &head, &behind).await;
@@ -355,7 +355,9 @@ async fn parameters_of_detect_are_parameters_of_the_request() {
             "a parameter: a text",
         ),
     ] {
-        let answer = service.post(FRAMES, &in_json(parameters).to_string()).await;
+        let answer = service
+            .post(FRAMES, &in_json(&parameters).to_string())
+            .await;
         assert_refused(&answer, status, kind, part);
     }
     let mut parameters = fast();
@@ -363,7 +365,9 @@ async fn parameters_of_detect_are_parameters_of_the_request() {
     parameters["priority"] = json!(1);
     parameters["timeout"] = json!(10_000_000);
     parameters["refine"] = json!(null);
-    let answer = service.post(FRAMES, &in_json(parameters).to_string()).await;
+    let answer = service
+        .post(FRAMES, &in_json(&parameters).to_string())
+        .await;
     assert_eq!(output(&answer, "boxes").0["shape"], json!([0, 4]));
 }
 
@@ -373,7 +377,9 @@ async fn a_request_has_its_own_deadline_in_microseconds() {
     service.gate.close();
     let mut parameters = fast();
     parameters["timeout"] = json!(40_000);
-    let answer = service.post(FRAMES, &in_json(parameters).to_string()).await;
+    let answer = service
+        .post(FRAMES, &in_json(&parameters).to_string())
+        .await;
     assert_refused(&answer, 504, "timeout", "within 0.04 s");
     let views = json!({ "name": "views", "datatype": "UINT8", "shape": [1, 3, 64, 64],
         "parameters": { "binary_data_size": 12288 } });
@@ -469,6 +475,13 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
             .await;
         assert_refused(&answer, 422, "invalid-tensor", part);
     }
+    assert_eq!(service.gate.runs(), 0, "nothing of that was looked at");
+    service.still_works().await;
+}
+
+#[tokio::test]
+async fn outputs_that_there_are_not_are_told_in_one_sentence() {
+    let service = Service::start();
     for (outputs, part) in [
         (
             json!([{ "name": "masks" }]),
@@ -488,7 +501,7 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
             "shared memory is not offered",
         ),
     ] {
-        let mut request = in_json(fast());
+        let mut request = in_json(&fast());
         request["outputs"] = outputs;
         let answer = service.post(FRAMES, &request.to_string()).await;
         assert_refused(&answer, 422, "invalid-tensor", part);
@@ -528,12 +541,12 @@ async fn requests_that_are_none_are_malformed() {
         json!({ "inputs": [{ "name": "image", "shape": shape, "datatype": "BYTES", "data": [] }] });
     let answer = service.post(FRAMES, &long.to_string()).await;
     assert_refused(&answer, 400, "malformed-request", "more than 16");
-    let mut request = in_json(fast());
+    let mut request = in_json(&fast());
     request["id"] = json!("x".repeat(257));
     let answer = service.post(FRAMES, &request.to_string()).await;
     assert_refused(&answer, 422, "invalid-parameter", "id: ");
 
-    let whole = in_json(fast()).to_string();
+    let whole = in_json(&fast()).to_string();
     for (name, value, part) in [
         (HEAD_LENGTH, "1000000", "1000000"),
         (HEAD_LENGTH, "-1", "-1"),
@@ -552,7 +565,7 @@ async fn requests_that_are_none_are_malformed() {
 #[tokio::test]
 async fn bytes_that_do_not_add_up_are_told() {
     let service = Service::start();
-    let (head, behind) = in_bytes(&frame(), fast());
+    let (head, behind) = in_bytes(&frame(), &fast());
     let answer = send(&service, FRAMES, &head, &[&behind[..], b"more"].concat()).await;
     assert_refused(&answer, 400, "malformed-request", "4 bytes follow");
     let answer = send(&service, FRAMES, &head, &behind[..100]).await;
@@ -565,7 +578,7 @@ async fn bytes_that_do_not_add_up_are_told() {
     none["inputs"][0]["parameters"]["binary_data_size"] = json!(2);
     let answer = send(&service, FRAMES, &none, b"ab").await;
     assert_refused(&answer, 422, "invalid-tensor", "its length in four bytes");
-    let (head, behind) = in_bytes(b"no picture", fast());
+    let (head, behind) = in_bytes(b"no picture", &fast());
     let answer = send(&service, FRAMES, &head, &behind).await;
     assert_refused(&answer, 415, "unsupported-image", "");
 }
@@ -632,7 +645,7 @@ async fn views_that_a_detector_cannot_look_at_are_told() {
             views(json!([1, 3, 64, 64]), json!(vec![0; 12])),
             "asks for 12288",
         ),
-        (in_json(json!({})), "views is the one there is"),
+        (in_json(&json!({})), "views is the one there is"),
         (
             json!({ "inputs": [{ "name": "views", "datatype": "BYTES", "shape": [1], "data": ["AAAA"] }] }),
             "FP32 or UINT8",
@@ -705,7 +718,7 @@ async fn without_keys_everybody_who_reaches_the_server_may_ask_its_models() {
     assert_eq!(service.get("/v2/models/eager").await.status, 200);
     assert_eq!(
         service
-            .post(FRAMES, &in_json(fast()).to_string())
+            .post(FRAMES, &in_json(&fast()).to_string())
             .await
             .status,
         200
