@@ -1,5 +1,8 @@
 //! The problems that a route answers, grouped by status.
 
+mod frames;
+mod results;
+
 use std::collections::BTreeMap;
 
 use axum::http::StatusCode;
@@ -10,125 +13,16 @@ use utoipa::{
     },
 };
 
-use crate::api::{
-    deepstack,
-    problem::{ProblemBody, ProblemKind},
+pub(in crate::api) use frames::{
+    DeepStackCustomProblems, DeepStackProblems, DetectProblems, InferProblems, ModelProblems,
+    ModelReadyProblems,
+};
+pub(in crate::api) use results::{
+    CameraEventsProblems, EventsProblems, HistoryProblems, LatestProblems, PictureProblems,
+    ResultsProblems,
 };
 
-/// What can go wrong with a frame.
-pub(in crate::api) struct DetectProblems;
-
-impl IntoResponses for DetectProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses(of_frames().filter(|kind| *kind != ProblemKind::InvalidTensor))
-    }
-}
-
-/// What can go wrong with a frame or views that come as tensors.
-pub(in crate::api) struct InferProblems;
-
-impl IntoResponses for InferProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        let of_forms = [ProblemKind::MissingImage, ProblemKind::NotAcceptable];
-        responses(of_frames().filter(|kind| !of_forms.contains(kind)))
-    }
-}
-
-/// What can go wrong with frames, however they are sent.
-fn of_frames() -> impl Iterator<Item = ProblemKind> {
-    // Those of other routes, and those of connections, which are of no route.
-    let others = |kind: &ProblemKind| {
-        matches!(
-            kind,
-            ProblemKind::HeadersTooLarge
-                | ProblemKind::TooManyConnections
-                | ProblemKind::NotFound
-                | ProblemKind::MethodNotAllowed
-                | ProblemKind::UnknownCamera
-                | ProblemKind::PictureNotKept
-                | ProblemKind::TooManyListeners
-                | ProblemKind::InvalidCalibration
-                | ProblemKind::CalibrationConflict
-                | ProblemKind::CalibrationsUnreachable
-                | ProblemKind::ResultsUnreachable
-                | ProblemKind::Outdated
-                | ProblemKind::ModelConflict
-                | ProblemKind::ModelRefused
-                | ProblemKind::ModelBusy
-        )
-    };
-    ProblemKind::ALL
-        .into_iter()
-        .filter(move |kind| !others(kind))
-}
-
-/// What can go wrong with a model's metadata.
-pub(in crate::api) struct ModelProblems;
-
-const OF_MODELS: [ProblemKind; 5] = [
-    ProblemKind::MalformedRequest,
-    ProblemKind::KeyRequired,
-    ProblemKind::Forbidden,
-    ProblemKind::UnknownModel,
-    ProblemKind::RateLimited,
-];
-
-impl IntoResponses for ModelProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses(OF_MODELS)
-    }
-}
-
-/// What can go wrong with a model's readiness.
-pub(in crate::api) struct ModelReadyProblems;
-
-impl IntoResponses for ModelReadyProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses(OF_MODELS.into_iter().chain(NOT_READY))
-    }
-}
-
-/// What can go wrong with a frame of a client of DeepStack.
-pub(in crate::api) struct DeepStackProblems;
-
-impl IntoResponses for DeepStackProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses_with(OF_DEEPSTACK, deepstack::status_of)
-    }
-}
-
-/// The same where the calibration is named.
-pub(in crate::api) struct DeepStackCustomProblems;
-
-impl IntoResponses for DeepStackCustomProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        let kinds = OF_DEEPSTACK.into_iter();
-        let kinds = kinds.chain([ProblemKind::UnknownCalibration]);
-        responses_with(kinds, deepstack::status_of)
-    }
-}
-
-const OF_DEEPSTACK: [ProblemKind; 19] = [
-    ProblemKind::MalformedRequest,
-    ProblemKind::RepeatedParameter,
-    ProblemKind::MissingImage,
-    ProblemKind::KeyRequired,
-    ProblemKind::Forbidden,
-    ProblemKind::SlowUpload,
-    ProblemKind::BodyTooLarge,
-    ProblemKind::ImageTooLarge,
-    ProblemKind::UnsupportedImage,
-    ProblemKind::InvalidParameter,
-    ProblemKind::DamagedImage,
-    ProblemKind::UnfitImage,
-    ProblemKind::Overloaded,
-    ProblemKind::RateLimited,
-    ProblemKind::Internal,
-    ProblemKind::InferenceUnavailable,
-    ProblemKind::WarmingUp,
-    ProblemKind::ShuttingDown,
-    ProblemKind::Timeout,
-];
+use crate::api::problem::{ProblemBody, ProblemKind};
 
 /// Why a server takes no frames now.
 const NOT_READY: [ProblemKind; 3] = [
@@ -205,20 +99,6 @@ impl IntoResponses for ReadProblems {
     }
 }
 
-/// What can go wrong with listing the cameras that have reports.
-pub(in crate::api) struct ResultsProblems;
-
-impl IntoResponses for ResultsProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses([
-            ProblemKind::KeyRequired,
-            ProblemKind::Forbidden,
-            ProblemKind::ResultsUnreachable,
-            ProblemKind::RateLimited,
-        ])
-    }
-}
-
 /// What can go wrong with reading a calibration.
 pub(in crate::api) struct UnknownCalibrationProblem;
 
@@ -229,89 +109,6 @@ impl IntoResponses for UnknownCalibrationProblem {
                 .into_iter()
                 .chain([ProblemKind::UnknownCalibration]),
         )
-    }
-}
-
-/// What can go wrong with the latest report of a camera.
-pub(in crate::api) struct LatestProblems;
-
-impl IntoResponses for LatestProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        let of_waiting = [
-            ProblemKind::UnknownParameter,
-            ProblemKind::RepeatedParameter,
-            ProblemKind::UnknownCamera,
-            ProblemKind::InvalidParameter,
-            ProblemKind::TooManyListeners,
-            ProblemKind::ResultsUnreachable,
-            ProblemKind::ShuttingDown,
-        ];
-        responses(OF_READING.into_iter().chain(of_waiting))
-    }
-}
-
-/// What can go wrong with the latest picture of a camera.
-pub(in crate::api) struct PictureProblems;
-
-impl IntoResponses for PictureProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        let of_pictures = [
-            ProblemKind::UnknownParameter,
-            ProblemKind::RepeatedParameter,
-            ProblemKind::UnknownCamera,
-            ProblemKind::PictureNotKept,
-            ProblemKind::InvalidParameter,
-            ProblemKind::Overloaded,
-            ProblemKind::Internal,
-            ProblemKind::ResultsUnreachable,
-            ProblemKind::ShuttingDown,
-            ProblemKind::Timeout,
-        ];
-        responses(OF_READING.into_iter().chain(of_pictures))
-    }
-}
-
-/// What can go wrong with the reports of a camera.
-pub(in crate::api) struct HistoryProblems;
-
-impl IntoResponses for HistoryProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        let of_pages = [
-            ProblemKind::UnknownParameter,
-            ProblemKind::RepeatedParameter,
-            ProblemKind::UnknownCamera,
-            ProblemKind::InvalidParameter,
-            ProblemKind::ResultsUnreachable,
-        ];
-        responses(OF_READING.into_iter().chain(of_pages))
-    }
-}
-
-/// What can go wrong with listening.
-const OF_LISTENING: [ProblemKind; 6] = [
-    ProblemKind::KeyRequired,
-    ProblemKind::Forbidden,
-    ProblemKind::TooManyListeners,
-    ProblemKind::ResultsUnreachable,
-    ProblemKind::RateLimited,
-    ProblemKind::ShuttingDown,
-];
-
-/// What can go wrong with listening to a camera.
-pub(in crate::api) struct CameraEventsProblems;
-
-impl IntoResponses for CameraEventsProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses(OF_LISTENING.into_iter().chain([ProblemKind::UnknownCamera]))
-    }
-}
-
-/// What can go wrong with listening to all cameras.
-pub(in crate::api) struct EventsProblems;
-
-impl IntoResponses for EventsProblems {
-    fn responses() -> BTreeMap<String, RefOr<Response>> {
-        responses(OF_LISTENING)
     }
 }
 
