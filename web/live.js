@@ -97,7 +97,7 @@ async function showPicture(card) {
   if (!card.hasPicture || card.isAsking) return;
   card.isAsking = true;
   try {
-    const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=oriented&width=480`);
+    const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=oriented,zones&width=480`);
     const picture = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
     await picture.decode();
     find(".sight", card.node).firstChild.replaceWith(picture);

@@ -199,7 +199,7 @@ async fn a_browser_asks_whether_what_it_has_of_the_page_is_still_right() {
         let first = service.get(path).await;
         assert_eq!(first.header("cache-control"), "no-cache", "{path}");
         let tag = first.header("etag").to_owned();
-        let again = service.ask("GET", path, &[("if-none-match", &tag)]).await;
+        let again = service.ask("GET", path, &[("if-none-match", &*tag)]).await;
         assert_eq!(
             (again.status.as_u16(), again.body.len()),
             (304, 0),

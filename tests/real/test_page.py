@@ -16,6 +16,8 @@ from support.places import FIXTURES, ROOT, SAMPLES
 
 HERE = Path(__file__).resolve().parent / "page"
 KEY = "a key that only this test knows"
+PICTURED = "gate,office,canteen,lounge"
+"""Cameras whose pictures are kept."""
 
 
 class Page(unittest.TestCase):
@@ -42,7 +44,7 @@ class Page(unittest.TestCase):
             keys = Path(folder) / "keys.toml"
             digest = hashlib.sha256(KEY.encode()).hexdigest()
             keys.write_text(f'page = {{ scopes = ["detect", "read", "admin"], sha256 = "{digest}" }}\n', encoding="utf-8")
-            with lookdown({}, calibrations=calibrations) as server:
+            with lookdown({"RESULTS__PICTURES": PICTURED}, calibrations=calibrations) as server:
                 with lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed:
                     self.run_node(
                         "all.test.js",

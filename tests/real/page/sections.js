@@ -1,7 +1,7 @@
 /** The sections Views, Floor and Live, and the key. */
 
 import assert from "node:assert/strict";
-import { SAMPLES, assertAccessible, detectSample, pageTest, post, reportAfter } from "./browser.js";
+import { assertAccessible, detectSample, pageTest, post, reportAfter } from "./browser.js";
 
 const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
 
@@ -91,7 +91,6 @@ pageTest("a camera appears on the wall by itself, and its card follows it", "#li
 });
 
 pageTest("a camera whose pictures are kept is shown with them", "#live", async (page) => {
-  await page.route("**/latest.jpg?*", (route) => route.fulfill({ path: `${SAMPLES}/office.jpg`, contentType: "image/jpeg" }));
   await post("gate", "office");
   await page.getByRole("article", { name: "Camera gate" }).getByAltText("The latest frame of gate").waitFor();
 });
