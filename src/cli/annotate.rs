@@ -13,7 +13,7 @@ use crate::{
 /// What the picture of `--annotate` shows, by the names and rules of requests.
 #[derive(Debug, Default, Args)]
 pub(super) struct PictureFlags {
-    /// What is drawn: some of `boxes`, `oriented`, `scores`, `views` and `timestamp`, with commas, or
+    /// What is drawn: some of `boxes`, `oriented`, `scores`, `zones`, `views` and `timestamp`, with commas, or
     /// `none` [default: oriented,scores]
     #[arg(long, value_name = "LAYERS", requires = "annotate")]
     draw: Option<String>,
