@@ -70,7 +70,8 @@ def _import_base(name: str, release: str) -> None:
         shutil.rmtree(unfinished, ignore_errors=True)
         unfinished.parent.mkdir(parents=True, exist_ok=True)
         _run(["debootstrap", "--variant=minbase", release, unfinished])
-        shutil.rmtree(unfinished / "var" / "cache" / "apt" / "archives")
+        for package in (unfinished / "var" / "cache" / "apt" / "archives").glob("*.deb"):
+            package.unlink()
         unfinished.rename(BASE)
     container = _buildah("from", "scratch")
     _buildah("add", "--quiet", container, BASE, "/")
