@@ -1,0 +1,104 @@
+//! What the server and its models tell of themselves, and to whom.
+
+use axum::http::StatusCode;
+use lookdown::api::Access;
+use serde_json::json;
+
+use super::{FRAMES, assert_refused, fast, in_json};
+use crate::service::{Bounds, Service};
+
+#[tokio::test]
+async fn the_server_and_its_models_describe_themselves() {
+    let service = Service::start();
+    let server = service.get("/v2").await.json();
+    assert_eq!(server["name"], "lookdown");
+    assert_eq!(
+        server["extensions"],
+        json!(["binary_tensor_data", "model_repository"])
+    );
+    assert_eq!(
+        service.get("/v2/health/live").await.json(),
+        json!({ "live": true })
+    );
+    assert_eq!(
+        service.get("/v2/health/ready").await.json(),
+        json!({ "ready": true })
+    );
+
+    let frames = service.get("/v2/models/lookdown").await.json();
+    let image = json!([{ "name": "image", "datatype": "BYTES", "shape": [1] }]);
+    assert_eq!(
+        (&frames["inputs"], &frames["versions"]),
+        (&image, &json!(["1"]))
+    );
+    let outputs = frames["outputs"].as_array().unwrap().iter();
+    let outputs: Vec<_> = outputs
+        .map(|output| output["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        outputs,
+        ["boxes", "scores", "oriented_boxes", "views", "report"]
+    );
+
+    let detector = service.get("/v2/models/eager/versions/1").await.json();
+    let views = json!([{ "name": "views", "datatype": "FP32", "shape": [-1, 3, 64, 64] }]);
+    assert_eq!(
+        (&detector["name"], &detector["inputs"]),
+        (&json!("eager"), &views)
+    );
+    for model in [
+        "lookdown",
+        "eager",
+        "lookdown/versions/1",
+        "eager/versions/1",
+    ] {
+        let ready = service.get(&format!("/v2/models/{model}/ready")).await;
+        assert_eq!(
+            (ready.status, &ready.json()["ready"]),
+            (StatusCode::OK, &json!(true))
+        );
+    }
+    for path in [
+        "nobody",
+        "nobody/ready",
+        "eager/versions/2",
+        "lookdown/versions/2/ready",
+    ] {
+        let answer = service.get(&format!("/v2/models/{path}")).await;
+        assert_refused(&answer, 404, "unknown-model", "model: ");
+    }
+}
+
+#[tokio::test]
+async fn a_server_that_is_about_to_stop_is_not_ready_and_its_models_neither() {
+    let service = Service::start();
+    service.readiness.stopping();
+    for path in [
+        "/v2/health/ready",
+        "/v2/models/lookdown/ready",
+        "/v2/models/eager/versions/1/ready",
+    ] {
+        let answer = service.get(path).await;
+        assert_refused(&answer, 503, "shutting-down", "shutting down");
+        assert_eq!(answer.header("retry-after"), "1");
+    }
+    assert_eq!(service.get("/v2/health/live").await.status, 200);
+}
+
+#[tokio::test]
+async fn without_keys_everybody_who_reaches_the_server_may_ask_its_models() {
+    let service = Service::within(&Bounds {
+        access: Access::Open {
+            own_machine_only: false,
+        },
+        ..Bounds::default()
+    });
+    assert_eq!(service.get("/v2/models/eager").await.status, 200);
+    assert_eq!(
+        service
+            .post(FRAMES, &in_json(&fast()).to_string())
+            .await
+            .status,
+        200
+    );
+}
