@@ -17,8 +17,9 @@ use utoipa::ToSchema;
     "captured_at": "2026-11-21T09:30:00Z",
     "calibration": {"id": "lobby", "revision": "9f86d081884c", "assumed": false},
     "image": {"width": 1680, "height": 1680},
-    "model": {"name": "ssdlite_mobilenet_v2", "revision": "60303ae22b99"},
-    "profile": "balanced",
+    "model": {"name": "nanodet_g_416", "revision": "a3c2e9b54d10"},
+    "second_opinion": {"name": "ssdlite_mobilenet_v2_int8", "revision": "60303ae22b99"},
+    "profile": "quality",
     "refinement": {
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,
         "max_detections": 1000

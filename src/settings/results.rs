@@ -94,7 +94,7 @@ fn redis(raw: &RawResults) -> Result<Option<RedisOptions>, SettingsError> {
     let address: Result<RedisAddress, _> = raw.url.parse();
     let address = address.map_err(|error: RedisAddressError| SettingsError::Value {
         key: "results.url".to_owned(),
-        value: "what it is".to_owned(),
+        value: "no URL of a Redis".to_owned(),
         remedy: error.to_string(),
     })?;
     Ok(Some(RedisOptions {

@@ -262,7 +262,9 @@ async fn without_keys_others_may_find_and_read_but_change_nothing() {
     });
     for (method, path, scope) in GUARDED {
         let answer = service.ask(method, path, &[]).await;
-        assert_eq!(answer.status == 403, scope == "admin", "{method} {path}");
+        // Which models could be loaded is only of use to who may load them.
+        let closed = scope == "admin" || path == "/v2/repository/index";
+        assert_eq!(answer.status == 403, closed, "{method} {path}");
     }
 }
 

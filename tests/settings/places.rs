@@ -136,6 +136,17 @@ fn keys_and_origins_are_checked_and_a_key_in_the_wrong_place_is_not_repeated() {
 }
 
 #[test]
+fn what_is_no_address_of_a_redis_is_refused_without_repeating_it() {
+    let message = refusal(from_environment(
+        "LOOKDOWN__RESULTS__URL",
+        "http://:do-not-show-me@localhost:6379",
+    ));
+    let expected = "results.url is no URL of a Redis: give redis://host:port/database";
+    assert!(message.starts_with(expected), "{message}");
+    assert!(!message.contains("do-not-show-me"), "{message}");
+}
+
+#[test]
 fn a_collector_s_address_with_credentials_is_refused_without_repeating_them() {
     let endpoint = "LOOKDOWN__TELEMETRY__OTLP_ENDPOINT";
     let message = refusal(from_environment(
