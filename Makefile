@@ -66,6 +66,8 @@ test-real: ## the tests against real parts; as root on Debian it installs what i
 real: ## the product with real parts beside it (browser, Redis, brokers, clients ...), or some PARTS of it: tests/real
 	@# Words are packages that Debian has; comments start with a hash.
 	@scripts/packages.sh $$(sed 's/#.*//' tests/real/packages.txt)
+	@# Node.js of elsewhere brings npm with it, and Debian's cannot be beside it.
+	@command -v npm > /dev/null || scripts/packages.sh npm
 	@$(PYTHON) scripts/setup.py toolchain runtime model real-parts
 	cargo build --release --locked --target-dir target
 	$(PYTHON) tests/real/run.py $(PARTS)

@@ -37,7 +37,7 @@ function begin() {
   }
   const { width, height } = frame;
   if (!circle) setCircle(assumedCircle(report ?? { image: { width, height }, warnings: [] }));
-  if (isVisible) look();
+  if (isVisible) lookShown();
 }
 
 function setCircle(next) {

@@ -19,7 +19,7 @@ use crate::{
         access::Reader,
         deadline::Deadline,
         entity_tags::{entity_tag, is_unmodified},
-        openapi::{PictureProblems, PictureQuery},
+        openapi::{PictureProblems, PictureQuery, RawBytes},
         problem::{Problem, ProblemKind},
         upload::parameters_named,
     },
@@ -43,7 +43,7 @@ const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
-        (status = OK, description = "The picture.", content(("image/jpeg")),
+        (status = OK, description = "The picture.", content((inline(RawBytes) = "image/jpeg")),
          headers(
             ("ETag" = String, description = "The ID of the picture's report."),
             ("Cache-Control" = String, description = "`private, no-cache`."),
