@@ -8,6 +8,7 @@ use bytes::Bytes;
 use super::{Layer, PictureFormat, PictureOptions, drawn, sketch::Sketch};
 use crate::{
     imaging::{
+        Frame,
         annotate::{EncodeError, encode_jpeg},
         decode::{DecodeError, DecodeLimits, decode},
         narrowed,
@@ -23,7 +24,10 @@ const QUALITY: u8 = 92;
 /// 4 MiB: a frame that no camera delivers.
 const MAX_BYTES: usize = 4 << 20;
 
-/// A frame as it was looked at: upright, and masked where the calibration says so.
+/// How a JPEG begins (ITU-T T.81, B.2.1).
+const JPEG_START: [u8; 2] = [0xFF, 0xD8];
+
+/// A frame as it was looked at: masked where the calibration says so.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeptFrame {
     /// The frame, 4 MiB at most.
@@ -50,28 +54,23 @@ pub enum KeptFrameError {
 }
 
 impl KeptFrame {
-    /// What is kept of a frame. Takes tens of milliseconds for a large one: keep it off the async
-    /// runtime.
+    /// What is kept of a frame: the JPEG it came as, if that is small enough and nothing of it is hidden,
+    /// or else one that is made of it. That takes tens of milliseconds for a large one: keep it off the
+    /// async runtime.
     ///
     /// # Errors
     /// [`KeptFrameError`] for a frame that cannot be kept.
     pub fn of(detected: &Detected) -> Result<Self, KeptFrameError> {
         let sketch = Sketch::of(detected, &Layer::ALL).rounded();
-        let frame = &detected.frame;
-        for width in WIDTHS {
-            let jpeg = if frame.width() > width {
-                encode_jpeg(&narrowed(frame, width), QUALITY)?
-            } else {
-                encode_jpeg(frame, QUALITY)?
-            };
-            if jpeg.len() <= MAX_BYTES {
-                return Ok(Self {
-                    jpeg: jpeg.into(),
-                    sketch: serde_json::to_vec(&sketch)?.into(),
-                });
+        let sketch = serde_json::to_vec(&sketch)?.into();
+        let jpeg = match &detected.encoded {
+            Some(encoded) if is_kept_as_it_is(encoded, &detected.frame) => {
+                // Not with all of the body that it was part of.
+                Bytes::copy_from_slice(encoded)
             }
-        }
-        Err(KeptFrameError::TooLarge)
+            _ => jpeg_of(&detected.frame)?,
+        };
+        Ok(Self { jpeg, sketch })
     }
 
     /// The frame with what the options want drawn into it, as JPEG. Takes as long as keeping it.
@@ -88,4 +87,23 @@ impl KeptFrame {
             options,
         )?)
     }
+}
+
+fn is_kept_as_it_is(encoded: &[u8], frame: &Frame) -> bool {
+    encoded.starts_with(&JPEG_START) && encoded.len() <= MAX_BYTES && frame.width() <= WIDTHS[0]
+}
+
+/// A frame as a JPEG, as narrow as it must be.
+fn jpeg_of(frame: &Frame) -> Result<Bytes, KeptFrameError> {
+    for width in WIDTHS {
+        let jpeg = if frame.width() > width {
+            encode_jpeg(&narrowed(frame, width), QUALITY)?
+        } else {
+            encode_jpeg(frame, QUALITY)?
+        };
+        if jpeg.len() <= MAX_BYTES {
+            return Ok(jpeg.into());
+        }
+    }
+    Err(KeptFrameError::TooLarge)
 }

@@ -100,6 +100,11 @@ impl CameraRig {
         self.masked.blank(frame);
     }
 
+    /// Whether the camera has no masks that hide anything.
+    pub(super) fn hides_nothing(&self) -> bool {
+        self.masked.is_empty()
+    }
+
     /// Lens and mount.
     pub(super) fn geometry(&self) -> &CameraGeometry {
         &self.geometry

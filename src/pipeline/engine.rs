@@ -152,9 +152,11 @@ impl Engine {
         let mut rigs: Vec<_> = observation.looks.into_iter().map(|look| look.rig).collect();
         // Two models may have looked through the same views.
         rigs.dedup_by(|one, other| Arc::ptr_eq(one, other));
+        let hides_nothing = observation.camera.rig.hides_nothing();
         Ok(Detected {
             report,
             frame: observation.frame,
+            encoded: hides_nothing.then(|| job.image.clone()),
             rigs,
         })
     }

@@ -52,6 +52,8 @@ pub struct Detected {
     pub report: DetectionReport,
     /// The decoded frame, EXIF orientation applied.
     pub frame: Arc<Frame>,
+    /// What it was decoded from; `None` where masks hide some of that.
+    pub encoded: Option<Bytes>,
     pub(super) rigs: Vec<Arc<CameraRig>>,
 }
 

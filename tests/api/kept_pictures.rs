@@ -5,13 +5,14 @@ use std::collections::BTreeSet;
 use lookdown::{
     imaging::{
         Frame,
+        annotate::encode_jpeg,
         decode::{DecodeLimits, decode},
     },
-    results::PicturesOf,
+    results::{PicturesOf, ResultStore},
 };
 use serde_json::json;
 
-use crate::service::{Answer, Bounds, Service, frame, frame_of};
+use crate::service::{Answer, Bounds, FRAME_SIDE, Service, frame, frame_of};
 
 const PATH: &str = "/results/hall/latest.jpg";
 
@@ -166,6 +167,29 @@ async fn zones_are_drawn_and_what_is_masked_is_black() {
         assert!(is_grey(&plain, x, y) && !is_grey(&drawn, x, y), "{x}, {y}");
     }
     assert!(is_grey(&drawn, 120, 190));
+}
+
+#[tokio::test]
+async fn a_jpeg_is_kept_as_it_was_sent_unless_something_of_it_is_hidden() {
+    let service = keeping();
+    let side = FRAME_SIDE as usize;
+    let grey = Frame::new(FRAME_SIDE, FRAME_SIDE, vec![128; 3 * side * side]).unwrap();
+    let sent = encode_jpeg(&grey, 95).unwrap();
+    let query = "calibration=lobby&profile=fast&camera=hall";
+    let kept = async || {
+        service.post_raw(query, sent.clone()).await;
+        let kept = service.results.picture("hall").await.unwrap().unwrap();
+        kept.picture.frame.to_vec()
+    };
+    assert_eq!(kept().await, sent);
+    let mut lobby = service.get("/calibrations/lobby").await.json();
+    lobby["masks"] = json!([{ "frame_px": [[0, 0], [40, 0], [40, 40], [0, 40]] }]);
+    let put = service.put("/calibrations/lobby", &lobby.to_string()).await;
+    assert_eq!(put.status, 200, "{}", put.text());
+    let masked = decode(&kept().await, &DecodeLimits::default())
+        .unwrap()
+        .frame;
+    assert!(masked.pixel(20, 20).iter().all(|value| *value < 16));
 }
 
 #[tokio::test]
