@@ -11,7 +11,7 @@ import time
 from harness.effort import FULL, MEDIUM, SHORT
 from harness.processes import BenchError
 from harness.results import measure, write
-from parts import growth, lifetime, limit, overload, peers, remap, whole
+from parts import cameras, dashboards, growth, lifetime, limit, overload, peers, remap, whole
 
 PARTS = {
     "The whole service": whole,
@@ -21,6 +21,8 @@ PARTS = {
     "Remap": remap,
     "Start and memory": lifetime,
     "Growth": growth,
+    "Many cameras": cameras,
+    "Dashboards": dashboards,
 }
 EFFORTS = {effort.name: effort for effort in (SHORT, MEDIUM, FULL)}
 

@@ -1,19 +1,16 @@
-"""How cost grows with views, the frame, cameras and clients."""
-
-import tempfile
-from pathlib import Path
+"""How cost grows with views, the frame and clients."""
 
 from harness.charts import lines
 from harness.effort import Effort
-from harness.load import load, steady
+from harness.load import steady
 from harness.lookdown import MODEL, ROOMY, detect, lookdown, report, view_plan
-from harness.pictures import cameras, frame
+from harness.pictures import frame
 from harness.tables import table
 
 from .whole import stages_of
 
 PLANS = ("direct", "fast", "balanced", "paper")
-CAMERA_PROFILE = "fast"
+CLIENT_PROFILE = "fast"
 
 
 def measure(effort: Effort) -> dict:
@@ -21,7 +18,7 @@ def measure(effort: Effort) -> dict:
     with lookdown(ROOMY) as server:
         views = [with_views(effort, server, profile) for profile in PLANS]
         sides = [with_side(effort, server, side) for side in effort.sides]
-        path = detect(CAMERA_PROFILE, model=MODEL)
+        path = detect(CLIENT_PROFILE, model=MODEL)
         alone = stages_of(server, path, effort.frames)["total"] / 1000
         clients = [
             steady(server, [path], frame(), clients=count, seconds=effort.seconds / 2, frame_seconds=alone)
@@ -31,7 +28,6 @@ def measure(effort: Effort) -> dict:
         "views": views,
         "sides": sides,
         "clients": clients,
-        "cameras": [with_cameras(effort, count) for count in effort.cameras],
     }
 
 
@@ -52,24 +48,8 @@ def with_side(effort: Effort, server, side: int) -> dict:
     return {"side": side, "kilobytes": picture.stat().st_size / 1000, "stages": stages}
 
 
-def with_cameras(effort: Effort, count: int) -> dict:
-    """One camera's frames after all cameras were used once, and the memory they took."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        ids = cameras(folder, count)
-        with lookdown(ROOMY, folder) as server:
-            empty = server.usage().resident_bytes
-            for camera in ids:
-                report(server, detect(CAMERA_PROFILE, camera), frame())
-            used = server.usage().resident_bytes
-            told = load(server, [detect(CAMERA_PROFILE, ids[-1])], frame(), seconds=effort.seconds / 2)
-            everyone = [detect(CAMERA_PROFILE, camera) for camera in ids]
-            turns = load(server, everyone, frame(), seconds=effort.seconds / 2)
-    return {"cameras": count, "mib": (used - empty) / 2**20, "one": told["succeeded"], "all": turns["succeeded"]}
-
-
 def tell(raw: dict) -> str:
-    """The four tables as Markdown."""
+    """The three tables as Markdown."""
     return "\n".join(
         [
             f"With views (one client, {MODEL}, ms):\n",
@@ -82,12 +62,7 @@ def tell(raw: dict) -> str:
                 ("side, pixels", "JPEG, kB", "decode", "remap", "inference", "total"),
                 [sides_row(row) for row in raw["sides"]],
             ),
-            f"With cameras loaded and used (one client, `{CAMERA_PROFILE}`; memory from before the first frame):\n",
-            table(
-                ("cameras", "memory, MiB", "one of them: p50, ms", "in turns: p50, ms", "in turns: p99, ms"),
-                [cameras_row(row) for row in raw["cameras"]],
-            ),
-            f"With clients (closed loop, `{CAMERA_PROFILE}`):\n",
+            f"With clients (closed loop, `{CLIENT_PROFILE}`):\n",
             table(
                 ("clients", "frames/s", "p50, ms", "p99, ms", "cores used", "memory, MiB"),
                 [clients_row(told) for told in raw["clients"]],
@@ -105,12 +80,6 @@ def views_row(row: dict) -> tuple:
 def sides_row(row: dict) -> tuple:
     """One size of frame."""
     return row["side"], row["kilobytes"], *(row["stages"][name] for name in ("decode", "remap", "inference", "total"))
-
-
-def cameras_row(row: dict) -> tuple:
-    """One number of cameras."""
-    one, everyone = row["one"], row["all"]
-    return row["cameras"], row["mib"], one.get("p50_ms"), everyone.get("p50_ms"), everyone.get("p99_ms")
 
 
 def clients_row(told: dict) -> tuple:

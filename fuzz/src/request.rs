@@ -108,7 +108,7 @@ fn router() -> Router {
             warm_up_views: one,
             kept: vec!["nobody".to_owned()],
         },
-        Box::new(|_| Ok(Model::new(Box::new(Nobody(NetworkInput::plain(32, 32)))))),
+        Box::new(|_| Ok(Model::new(Box::new(Nobody(NetworkInput::plain(16, 16)))))),
     );
     models.load("nobody").unwrap();
     let calibrations = Arc::new(Calibrations::open(Box::new(Forgetful), true).unwrap());

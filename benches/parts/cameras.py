@@ -1,0 +1,72 @@
+"""Whether a camera's frames fare worse on a server that knows and has used many others, and what those take."""
+
+import tempfile
+from pathlib import Path
+
+from harness.effort import Effort
+from harness.figures import ratios, round_to, spread
+from harness.load import load
+from harness.lookdown import ROOMY, detect, lookdown, report
+from harness.pictures import cameras, frame
+from harness.tables import spread_cell, table
+
+PROFILE = "fast"
+
+
+def measure(effort: Effort) -> dict:
+    """Servers in turns: one with a single camera, and one with so many."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (only,) = cameras(folder, 1)
+        with lookdown(ROOMY, folder) as alone:
+            report(alone, detect(PROFILE, only), frame())
+            counts = [count for count in effort.cameras if count > 1]
+            return {"cameras": [beside(effort, alone, only, count) for count in counts]}
+
+
+def beside(effort: Effort, alone, only: str, count: int) -> dict:
+    """Medians of a window each: the camera alone, the same among `count` that were all used, and those in turns."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        ids = cameras(folder, count)
+        with lookdown(ROOMY, folder) as crowded:
+            empty = crowded.usage().resident_bytes
+            for camera in ids:
+                report(crowded, detect(PROFILE, camera), frame())
+            used = crowded.usage().resident_bytes
+            told = {"alone": [], "among": [], "turns": []}
+            for _ in range(effort.rounds):
+                for key, server, asked in (
+                    ("alone", alone, [only]),
+                    ("among", crowded, ids[-1:]),
+                    ("turns", crowded, ids),
+                ):
+                    paths = [detect(PROFILE, camera) for camera in asked]
+                    late = load(server, paths, frame(), seconds=effort.seconds / 4)["succeeded"]
+                    told[key].append(late["p50_ms"])
+    return {"count": count, "mib": (used - empty) / 2**20, **told}
+
+
+def tell(raw: dict) -> str:
+    """The table as Markdown."""
+    return (
+        f"One client, `{PROFILE}`, medians; memory from before the first frame:\n\n"
+        + table(
+            ("cameras", "memory, MiB", "one alone, ms", "one among them ÷ alone", "all in turns ÷ one alone"),
+            [
+                (
+                    row["count"],
+                    round_to(row["mib"]),
+                    round_to(spread(row["alone"]).median),
+                    spread_cell(ratios(row["among"], row["alone"]).as_json()),
+                    spread_cell(ratios(row["turns"], row["alone"]).as_json()),
+                )
+                for row in raw["cameras"]
+            ],
+        )
+    )
+
+
+def draw(_raw: dict) -> str:
+    """A table says it."""
+    return ""

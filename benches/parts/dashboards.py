@@ -1,0 +1,134 @@
+"""What dashboards cost: many that poll a camera each second with its ETag, and many that listen."""
+
+import asyncio
+import time
+import urllib.request
+from dataclasses import dataclass, field
+
+from harness.effort import Effort
+from harness.lookdown import detect, lookdown, report
+from harness.pictures import frame
+from harness.tables import table
+
+POLLERS = 200
+LISTENERS = 1000
+PATH = "/results/office/latest"
+EVENTS = "/results/office/events"
+SETTINGS = {"SERVER__MAX_CONNECTIONS": "2000", "RESULTS__MAX_LISTENERS": "1500", "SHUTDOWN__GRACE_MILLIS": "0"}
+REPORTS = 40
+"""While somebody listens; memory is looked at after the first quarter and at the end."""
+
+
+@dataclass
+class Heard:
+    """What all listeners together have heard."""
+
+    reports: int = 0
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
+
+    async def wait_for(self, reports: int) -> None:
+        """Until they have heard so many."""
+        while self.reports < reports:
+            self.changed.clear()
+            await self.changed.wait()
+
+
+def measure(effort: Effort) -> dict:
+    """The cost of pollers without new reports, as most polls are; then listeners and new reports."""
+    with lookdown(SETTINGS) as server:
+        report(server, detect("fast"), frame())
+        tag = server_tag(server)
+        seconds = max(effort.seconds, 5.0)
+        before, began = server.usage().cpu_seconds, time.monotonic()
+        statuses = asyncio.run(poll(server.address, tag, seconds))
+        polling = (server.usage().cpu_seconds - before) / (time.monotonic() - began)
+        listening = asyncio.run(listen(server))
+    return {"polling": {"statuses": statuses, "cores": polling}, "listening": listening}
+
+
+def server_tag(server) -> str:
+    """The entity tag of the latest report."""
+    with urllib.request.urlopen(f"http://{server.address}{PATH}", timeout=10) as answer:
+        return answer.headers["ETag"]
+
+
+async def poll(address: str, tag: str, seconds: float) -> dict[str, int]:
+    """How often each status was answered to all pollers."""
+    statuses: dict[str, int] = {}
+    end = time.monotonic() + seconds
+    request = f"GET {PATH} HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: {tag}\r\n\r\n".encode()
+
+    async def one(phase: float) -> None:
+        reader, writer = await connect(address)
+        await asyncio.sleep(phase)
+        while time.monotonic() < end:
+            writer.write(request)
+            head = await reader.readuntil(b"\r\n\r\n")
+            status = head[9:12].decode()
+            statuses[status] = statuses.get(status, 0) + 1
+            await asyncio.sleep(1.0)
+        writer.close()
+
+    await asyncio.gather(*(one(number / POLLERS) for number in range(POLLERS)))
+    return statuses
+
+
+async def listen(server) -> dict:
+    """Memory with everybody listening, and whether each hears of each report."""
+    heard, idle = Heard(), server.usage().resident_bytes
+
+    async def one() -> None:
+        reader, writer = await connect(server.address)
+        writer.write(f"GET {EVENTS} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        try:
+            while line := await reader.readline():
+                heard.reports += line.startswith(b"id:")
+                heard.changed.set()
+        finally:
+            writer.close()
+
+    listeners = [asyncio.create_task(one()) for _ in range(LISTENERS)]
+    # Each begins with the latest report.
+    await heard.wait_for(LISTENERS)
+    connected = server.usage().resident_bytes
+    resident = []
+    for number in range(1, REPORTS + 1):
+        await asyncio.to_thread(report, server, detect("fast"), frame())
+        await heard.wait_for(LISTENERS * (number + 1))
+        resident.append(server.usage().resident_bytes)
+    for listener in listeners:
+        listener.cancel()
+    await asyncio.gather(*listeners, return_exceptions=True)
+    early = resident[len(resident) // 4]
+    return {
+        "heard": heard.reports,
+        "kib_each": (connected - idle) / LISTENERS / 1024,
+        "mib": connected / 2**20,
+        "mib_more": (resident[-1] - early) / 2**20,
+    }
+
+
+async def connect(address: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """A connection to the server."""
+    host, _, port = address.rpartition(":")
+    return await asyncio.open_connection(host, int(port))
+
+
+def tell(raw: dict) -> str:
+    """Both as Markdown."""
+    polling, listening = raw["polling"], raw["listening"]
+    answers = ", ".join(f"{count} × {status}" for status, count in sorted(polling["statuses"].items()))
+    rows = [
+        (f"{POLLERS} pollers, one poll a second each with its ETag: answers", answers),
+        ("**share of a core**, %", 100 * polling["cores"]),
+        (f"{LISTENERS} listeners (server-sent events): reports heard of {LISTENERS * (REPORTS + 1)}", listening["heard"]),
+        ("memory for each, KiB", listening["kib_each"]),
+        ("memory with all of them, MiB", listening["mib"]),
+        (f"… and after {REPORTS - REPORTS // 4} more reports, MiB", listening["mib_more"]),
+    ]
+    return table(("", ""), rows)
+
+
+def draw(_raw: dict) -> str:
+    """A table says it."""
+    return ""
