@@ -36,7 +36,7 @@ use crate::{
     post, path = "/v2/models/{name}/infer", tag = "inference", operation_id = "infer_with_model",
     params(
         ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("Inference-Header-Content-Length" = Option<u32>, Header,
+        ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
          description = "Where tensors follow as bytes: the length of the JSON before them."),
     ),
     request_body(
@@ -70,7 +70,7 @@ pub(in crate::api) async fn infer(
     params(
         ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
         ("version" = String, Path, description = "Its one version, as its metadata tells it."),
-        ("Inference-Header-Content-Length" = Option<u32>, Header,
+        ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
          description = "Where tensors follow as bytes: the length of the JSON before them."),
     ),
     request_body(
