@@ -1,6 +1,6 @@
 //! What the handlers share.
 
-use std::{num::NonZeroU64, sync::Arc, time::Duration};
+use std::{num::NonZeroU64, ops::Deref, sync::Arc, time::Duration};
 
 use super::{
     Access, Readiness, RequestRate,
@@ -49,9 +49,12 @@ pub struct ApiOptions {
     pub tracer: Tracer,
 }
 
-/// What the handlers share. Clones are cheap.
+/// What the handlers share. Every layer of every request clones it: one count goes up, whatever is in it.
 #[derive(Clone)]
-pub struct ApiState {
+pub struct ApiState(Arc<Shared>);
+
+/// What is in it.
+pub struct Shared {
     pub(super) workers: Arc<WorkerPool>,
     pub(super) models: Arc<ModelRepository>,
     pub(super) calibrations: Arc<Calibrations>,
@@ -79,7 +82,7 @@ impl ApiState {
         for kind in ProblemKind::ALL {
             metrics.failures.with_label_values(&[kind.name()]);
         }
-        Self {
+        Self(Arc::new(Shared {
             workers,
             models,
             calibrations,
@@ -89,7 +92,7 @@ impl ApiState {
             uploads: UploadBudget::new(options.max_upload_bytes),
             rate_limiter: options.request_rate.map(RateLimiter::new),
             options,
-        }
+        }))
     }
 
     /// Reads bodies of up to `max_bytes`; `remedy` says what to do about larger ones.
@@ -106,5 +109,13 @@ impl ApiState {
             least_bytes_per_second: self.options.min_upload_bytes_per_second,
             deadline,
         }
+    }
+}
+
+impl Deref for ApiState {
+    type Target = Shared;
+
+    fn deref(&self) -> &Shared {
+        &self.0
     }
 }
