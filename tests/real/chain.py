@@ -13,6 +13,7 @@ from cpu_share import cpu_share
 from harness.places import LOOKDOWN, ROOT
 from harness.processes import Server, running
 from hosts import Host, hosts
+from redis_server import RedisServer
 from waiting import wait_until
 
 REPLICAS = ("r1", "r2", "r3")
@@ -53,6 +54,7 @@ class Chain:
         self._stacks: dict[str, contextlib.ExitStack] = {}
         self.replicas: dict[str, Server] = {}
         self.front: Server
+        self._redis: RedisServer
 
     def host(self, name: str) -> Host:
         """The host a replica runs on."""
@@ -69,7 +71,7 @@ class Chain:
             "LOOKDOWN__ACCESS__KEYS": KEYS,
             "LOOKDOWN__CALIBRATIONS__PATH": "s3://cameras/ceiling",
             "LOOKDOWN__CALIBRATIONS__POLL_SECONDS": "1",
-            "LOOKDOWN__RESULTS__URL": f"redis://{store}",
+            "LOOKDOWN__RESULTS__URL": self._redis.url,
             "AWS_ENDPOINT": f"http://{store}:5000",
             "AWS_ALLOW_HTTP": "true",
             "AWS_ACCESS_KEY_ID": "lookdown",
@@ -111,8 +113,7 @@ class Chain:
     def start_shared_parts(self, stack: contextlib.ExitStack) -> None:
         """What the replicas need before they start, and what stands before them."""
         store, front = self._machines["store"], self._machines["front"]
-        redis = ["redis-server", "--bind", store.address, "--protected-mode", "no", "--save", "", "--appendonly", "no"]
-        stack.enter_context(_beside([*store.inside, *redis], store, 6379))
+        self._redis = stack.enter_context(RedisServer(host=store.address, inside=store.inside))
         moto = [str(ROOT / ".setup" / "venv" / "bin" / "moto_server"), "-H", store.address, "-p", "5000"]
         stack.enter_context(_beside([*store.inside, *moto], store, 5000))
         bucket = urllib.request.Request(f"http://{store.address}:5000/cameras", method="PUT")

@@ -4,26 +4,15 @@ import contextlib
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from harness.processes import free_ports
+from waiting import PATIENCE_SECONDS, wait_until
 
 USER, PASSWORD = "lookdown", "s@cret/of:home"
 PASSWORD_IN_URL = "s%40cret%2Fof%3Ahome"
-PATIENCE = 15.0
-"""Seconds until what is to come must have come."""
-
-
-def until(what: str, is_so) -> None:
-    """Waits until it is so."""
-    deadline = time.monotonic() + PATIENCE
-    while not is_so():
-        if time.monotonic() > deadline:
-            raise AssertionError(f"{what} did not come within {PATIENCE:.0f} s")
-        time.sleep(0.05)
 
 
 @dataclass
@@ -51,18 +40,18 @@ class Broker:
         self.process = subprocess.Popen(
             ["/usr/sbin/mosquitto", "-c", config], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        until("mosquitto", lambda: self.client("pub", "-t", "test", "-n").returncode == 0)
+        wait_until(lambda: self.client("pub", "-t", "test", "-n").returncode == 0, "mosquitto answers")
 
     def stop(self, signal_number: int = signal.SIGTERM) -> None:
         """Ends it."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.process.pid, signal_number)
-        self.process.wait(timeout=PATIENCE)
+        self.process.wait(timeout=PATIENCE_SECONDS)
 
     def client(self, which: str, *arguments: str) -> subprocess.CompletedProcess:
         """Runs `mosquitto_pub` or `mosquitto_sub` to its end."""
         command = [f"mosquitto_{which}", *self.login(), *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_SECONDS)
 
     def login(self) -> list[str]:
         """How the clients of mosquitto get in."""
@@ -94,7 +83,7 @@ class Broker:
                 self.client("pub", "-t", "test/begin", "-n")
                 return any("test/begin" in line for line in hear())
 
-            until("the listener", begun)
+            wait_until(begun, "the listener hears")
             said.clear()
             try:
                 yield Heard(hear)

@@ -6,19 +6,24 @@ import signal
 import socket
 import subprocess
 import tempfile
-import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from harness.processes import free_ports
+from waiting import wait_until
 
 
 class RedisServer:
-    """A `redis-server` on a port of this machine that keeps nothing on disk."""
+    """A `redis-server` that keeps nothing on disk."""
 
-    def __init__(self, *options: str, password: str = "") -> None:
-        """`options` are those of its command line; the connection of this test sends `password`."""
+    def __init__(self, *options: str, password: str = "", host: str = "127.0.0.1", inside: Sequence[str] = ()) -> None:
+        """`options` are those of its command line; the connection of this test sends `password`.
+
+        `host` is the address it has, and the command `inside` starts another on the host with that address.
+        """
         (self.port,) = free_ports(1)
-        self.password = password
+        self.host, self.password = host, password
+        self._inside = inside
         self._options = options
         self._folder = Path(tempfile.mkdtemp(prefix="lookdown-redis-"))
         self._process: subprocess.Popen | None = None
@@ -37,20 +42,19 @@ class RedisServer:
     def url(self) -> str:
         """What `results.url` takes."""
         secret = f":{self.password}@" if self.password else ""
-        return f"redis://{secret}127.0.0.1:{self.port}/0"
+        return f"redis://{secret}{self.host}:{self.port}/0"
 
     def start(self) -> None:
         """Until it answers."""
-        command = ["redis-server", "--port", str(self.port), "--bind", "127.0.0.1", "--save", "", *self._options]
+        place = ["--port", str(self.port), "--bind", self.host, "--protected-mode", "no"]
+        command = [*self._inside, "redis-server", *place, "--save", "", *self._options]
         self._process = subprocess.Popen(command, cwd=self._folder, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
-        deadline = time.monotonic() + 20.0
-        while True:
-            with contextlib.suppress(OSError, RedisError):
-                self.ask("PING")
-                return
-            if time.monotonic() > deadline:
-                raise TimeoutError("redis-server does not answer")
-            time.sleep(0.02)
+        wait_until(self._answers, "redis-server answers")
+
+    def _answers(self) -> bool:
+        with contextlib.suppress(OSError, RedisError):
+            return bool(self.ask("PING"))
+        return False
 
     def kill(self) -> None:
         """At once: what it knew is gone."""
@@ -75,7 +79,7 @@ class RedisServer:
         """The answers to commands, in order."""
         if self.password:
             commands = [("AUTH", self.password), *commands]
-        with socket.create_connection(("127.0.0.1", self.port), 10.0) as connection, connection.makefile("rb") as answers:
+        with socket.create_connection((self.host, self.port), 10.0) as connection, connection.makefile("rb") as answers:
             connection.sendall(b"".join(_command(words) for words in commands))
             told = [_answer(answers) for _ in commands]
         for answer in told:

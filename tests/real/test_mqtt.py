@@ -10,8 +10,10 @@ import unittest
 from pathlib import Path
 
 from harness.places import ROOT, SAMPLES
-from mosquitto import PASSWORD, PASSWORD_IN_URL, broker, until
+from metrics import metric
+from mosquitto import PASSWORD, PASSWORD_IN_URL, broker
 from support.lookdown import TINY, lookdown
+from waiting import wait_until
 
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
@@ -49,19 +51,14 @@ class Mqtt(unittest.TestCase):
 
     def until_status(self, wanted: str) -> None:
         """Until whoever comes to the broker is told this."""
-        until(f"the status {wanted}", lambda: self.broker.retained().get(STATUS) == wanted)
-
-    def metric(self, server, name: str) -> int:
-        """A metric without labels."""
-        lines = server.get("/metrics").decode().splitlines()
-        return int(next(line.split()[1] for line in lines if line.startswith(f"lookdown_{name} ")))
+        wait_until(lambda: self.broker.retained().get(STATUS) == wanted, f"the status is {wanted}")
 
     def test_counts_reports_and_discovery(self):
         models = {"MODEL__PATH": ""}
         with self.lookdown(**models) as server, self.broker.listening("lookdown/#") as heard:
             self.until_status("online")
             answer = server.post(DETECT, OFFICE)
-            until("the report", lambda: heard.of(REPORT) == [answer.decode()])
+            wait_until(lambda: heard.of(REPORT) == [answer.decode()], "the report is heard")
             report = json.loads(answer)
             self.assertGreater(len(report["persons"]), 3)
             kept = self.broker.retained()
@@ -77,19 +74,19 @@ class Mqtt(unittest.TestCase):
                 self.assertIn(config["state_topic"], kept)
                 self.assertEqual(config["availability_topic"], STATUS)
                 self.assertEqual(config["device"]["identifiers"], ["lookdown_office"])
-            self.assertEqual(self.metric(server, "mqtt_connected"), 1)
-            self.assertEqual(self.metric(server, "mqtt_reports_sent_total"), 1)
+            self.assertEqual(metric(server, "mqtt_connected"), 1)
+            self.assertEqual(metric(server, "mqtt_reports_sent_total"), 1)
 
     def test_home_assistant_that_starts_is_told_everything_again(self):
         with self.lookdown() as server:
             server.post(DETECT, OFFICE)
-            until("discovery", lambda: CONFIGS < set(self.broker.retained()))
+            wait_until(lambda: CONFIGS < set(self.broker.retained()), "discovery is published")
             for topic in (*CONFIGS, PERSONS):
                 self.broker.client("pub", "-r", "-n", "-t", topic)
             self.assertFalse(CONFIGS & set(self.broker.retained()))
             self.broker.client("pub", "-t", "homeassistant/status", "-m", "offline")
             self.broker.client("pub", "-t", "homeassistant/status", "-m", "online")
-            until("discovery", lambda: {*CONFIGS, PERSONS} < set(self.broker.retained()))
+            wait_until(lambda: {*CONFIGS, PERSONS} < set(self.broker.retained()), "discovery is published")
 
     def test_a_killed_server_is_offline_by_its_will(self):
         with self.lookdown() as server:
@@ -103,32 +100,32 @@ class Mqtt(unittest.TestCase):
             with self.broker.listening(STATUS) as heard:
                 os.kill(server.pid, signal.SIGTERM)
                 self.assertEqual(server.process.wait(timeout=20), 0)
-                until("the farewell", lambda: heard.of(STATUS)[-1:] == ["offline"])
+                wait_until(lambda: heard.of(STATUS)[-1:] == ["offline"], "the farewell is heard")
         self.assertEqual(self.broker.retained()[STATUS], "offline")
 
     def test_a_broker_that_was_killed_gets_what_is_true_now(self):
         with self.lookdown() as server:
             server.post(DETECT, OFFICE)
-            until("the count", lambda: PERSONS in self.broker.retained())
+            wait_until(lambda: PERSONS in self.broker.retained(), "the count is right")
             self.broker.stop(signal.SIGKILL)
-            until("the outage", lambda: self.metric(server, "mqtt_connected") == 0)
+            wait_until(lambda: metric(server, "mqtt_connected") == 0, "the outage is noticed")
             server.post(f"{DETECT}&camera=gate", OFFICE)
             last = json.loads(server.post(f"{DETECT}&score_threshold=1", OFFICE))
             self.broker.start()
-            until("all of it", lambda: {STATUS, *CONFIGS, PERSONS} < set(self.broker.retained()))
+            wait_until(lambda: {STATUS, *CONFIGS, PERSONS} < set(self.broker.retained()), "all of it is there again")
             kept = self.broker.retained()
             self.assertEqual(kept[STATUS], "online")
             self.assertEqual(kept[PERSONS], str(len(last["persons"])))
             self.assertIn("lookdown/cameras/gate/persons", kept)
-            self.assertEqual(self.metric(server, "mqtt_connected"), 1)
-            self.assertEqual(self.metric(server, "mqtt_reports_dropped_total"), 2)
+            self.assertEqual(metric(server, "mqtt_connected"), 1)
+            self.assertEqual(metric(server, "mqtt_reports_dropped_total"), 2)
 
     def test_a_server_without_its_broker_serves_all_the_same(self):
         self.broker.stop()
         with self.lookdown() as server:
             for _ in range(100):
                 server.post(DETECT, OFFICE)
-            until("the count", lambda: self.metric(server, "mqtt_reports_dropped_total") == 100)
+            wait_until(lambda: metric(server, "mqtt_reports_dropped_total") == 100, "the count is right")
             os.kill(server.pid, signal.SIGTERM)
             self.assertEqual(server.process.wait(timeout=20), 0)
         self.broker.start()
@@ -139,15 +136,15 @@ class Mqtt(unittest.TestCase):
             self.until_status("online")
             with self.broker.listening(STATUS) as heard:
                 os.kill(server.pid, signal.SIGKILL)
-                until("the contradiction", lambda: heard.of(STATUS)[-2:] == ["offline", "online"])
+                wait_until(lambda: heard.of(STATUS)[-2:] == ["offline", "online"], "the end is contradicted")
             self.assertEqual(self.broker.retained()[STATUS], "online")
 
     def test_names_that_are_no_topics_are_published_and_a_flood_of_them_is_not(self):
         with self.lookdown(MQTT__MAX_CAMERAS="3") as server:
             for camera in ("a%2Fb", "%23", "n%C3%B6rd+lich", "fourth", "fifth"):
                 server.post(f"{DETECT}&camera={camera}", OFFICE)
-            until("the reports", lambda: self.metric(server, "mqtt_reports_dropped_total") == 2)
-            self.assertEqual(self.metric(server, "mqtt_reports_sent_total"), 3)
+            wait_until(lambda: metric(server, "mqtt_reports_dropped_total") == 2, "the reports are dropped")
+            self.assertEqual(metric(server, "mqtt_reports_sent_total"), 3)
             topics = [topic for topic in self.broker.retained() if topic.endswith("/persons")]
             self.assertEqual(len(topics), 3)
             self.assertTrue(all(topic.count("/") == 3 for topic in topics), topics)
@@ -157,7 +154,7 @@ class Mqtt(unittest.TestCase):
         with self.lookdown(MQTT__URL=wrong, LOG__FILTER="trace") as server:
             server.post(DETECT, OFFICE)
             log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
-            until("the warning", lambda: "mqtt.url" in log.read_text(errors="replace"))
+            wait_until(lambda: "mqtt.url" in log.read_text(errors="replace"), "the warning is logged")
             text = log.read_text(errors="replace")
         self.assertEqual(text.count("nothing is published"), 1)
         for secret in ("wr0ng", PASSWORD, PASSWORD_IN_URL):
@@ -189,11 +186,11 @@ class MqttOverTls(unittest.TestCase):
     def test_a_broker_of_the_authority_is_spoken_to(self):
         settings = {"MQTT__URL": self.broker.url, "MQTT__AUTHORITIES": str(self.broker.tls["cafile"])}
         with lookdown(TINY | settings):
-            until("online", lambda: self.broker.retained().get(STATUS) == "online")
+            wait_until(lambda: self.broker.retained().get(STATUS) == "online", "the status is online")
 
     def test_another_is_told_nothing(self):
         with lookdown(TINY | {"MQTT__URL": self.broker.url}) as server:
             server.post(DETECT, OFFICE)
             log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
-            until("the warning", lambda: "nothing is published" in log.read_text(errors="replace"))
+            wait_until(lambda: "nothing is published" in log.read_text(errors="replace"), "the warning is logged")
             self.assertEqual(self.broker.retained(), {})

@@ -11,18 +11,19 @@ import threading
 import time
 import unittest
 import unittest.mock
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from harness.places import LOOKDOWN, ROOT
 from harness.places import WORK as LOGS
 from harness.processes import Server, free_ports, running
+from metrics import metric
 from redis_server import RedisServer
 from support.exchange import Answer, ask
 from support.places import OFFICE, SAMPLES, TINY_MODEL
+from waiting import PATIENCE_SECONDS, wait_until
 
 PICTURE = OFFICE.read_bytes()
-PATIENCE = 20.0
 RECORD = (ROOT / "src" / "results" / "redis" / "record.lua").read_text(encoding="utf-8")
 """What Redis does with a report."""
 MOST_PICTURES = 2
@@ -42,7 +43,7 @@ def replica(name: str, url: str, **settings: str) -> Iterator[Server]:
     }
     environment = {f"LOOKDOWN__{key}": value for key, value in wanted.items()}
     with running(name, [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
-        until(lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "nobody" in name)
+        wait_until(lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "nobody" in name, "Redis is found")
         yield server
 
 
@@ -62,30 +63,12 @@ def detect(server: Server, camera: str) -> Answer:
     return ask(server.address, "POST", path, PICTURE, {"Content-Type": "image/jpeg"})
 
 
-def metric(server: Server, name: str) -> float:
-    """A metric without labels."""
-    lines = get(server, "/metrics").body.decode().splitlines()
-    return next(float(line.split()[1]) for line in lines if line.startswith(f"lookdown_{name} "))
-
-
-def until(holds: Callable[[], object]) -> object:
-    """What holds at last."""
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        found = holds()
-        if found:
-            return found
-        if time.monotonic() > deadline:
-            raise AssertionError("it did not come to that in time")
-        time.sleep(0.02)
-
-
 class Stream:
     """Server-sent events."""
 
     def __init__(self, server: Server, path: str, **headers: str) -> None:
         """Listens from now on."""
-        self._connection = http.client.HTTPConnection(server.address, timeout=PATIENCE)
+        self._connection = http.client.HTTPConnection(server.address, timeout=PATIENCE_SECONDS)
         self._connection.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
         self._answer = self._connection.getresponse()
         assert self._answer.status == 200, self._answer.read()
@@ -120,7 +103,7 @@ class Shared(unittest.TestCase):
     def latest(self, server: Server, camera: str, report: bytes) -> Answer:
         """The latest report of a camera, when it is this one."""
         path = f"/results/{camera}/latest"
-        until(lambda: get(server, path).body == report)
+        wait_until(lambda: get(server, path).body == report, "the report is the latest")
         return get(server, path)
 
     def test_a_report_is_the_same_on_every_server_to_the_byte_and_to_its_id(self) -> None:
@@ -157,10 +140,10 @@ class Shared(unittest.TestCase):
             path = "/results/stairs/latest?wait=10"
             waiting = threading.Thread(target=lambda: answers.append(get(self.other, path, If_None_Match=tag)))
             waiting.start()
-            until(lambda: metric(self.other, "results_listeners") >= 1.0)
+            wait_until(lambda: metric(self.other, "results_listeners") >= 1.0, "somebody listens")
             began = time.monotonic()
             sent = detect(self.one, "stairs")
-            waiting.join(PATIENCE)
+            waiting.join(PATIENCE_SECONDS)
             self.assertEqual((answers[0].status, answers[0].body), (200, sent.body))
             self.assertLess(time.monotonic() - began, 3.0)
 
@@ -203,7 +186,7 @@ class Shared(unittest.TestCase):
     def test_metrics_tell_what_is_in_redis(self) -> None:
         """The same on both."""
         detect(self.one, "hall")
-        until(lambda: metric(self.one, "results_waiting") == 0.0)
+        wait_until(lambda: metric(self.one, "results_waiting") == 0.0, "all is stored")
         for name in ("results_cameras", "results_reports", "results_bytes"):
             self.assertGreaterEqual(metric(self.one, name), 1.0)
             self.assertEqual(metric(self.one, name), metric(self.other, name))
@@ -234,7 +217,7 @@ class Away(unittest.TestCase):
             usual = max(seconds[:20], default=0.0)
             for leave, come_back in ((redis.kill, redis.start), (redis.halt, redis.go_on)):
                 leave()
-                until(lambda: get(server, "/results/hall/latest").status == 503)
+                wait_until(lambda: get(server, "/results/hall/latest").status == 503, "the outage is noticed")
                 for path in ("/results", "/results/hall/latest", "/results/hall/history", "/events"):
                     answer = get(server, path)
                     self.assertEqual(answer.status, 503, path)
@@ -244,20 +227,19 @@ class Away(unittest.TestCase):
                 self.assertEqual(ready.status, 200)
                 self.assertIn("store_problem", ready.json()["results"])
                 self.assertEqual(metric(server, "results_store_up"), 0.0)
-                time.sleep(1.0)
-                self.assertGreater(metric(server, "results_waiting"), 0.0)
+                wait_until(lambda: metric(server, "results_waiting") > 0.0, "reports wait for Redis")
                 come_back()
-                until(lambda: get(server, "/results/hall/latest").status == 200)
+                wait_until(lambda: get(server, "/results/hall/latest").status == 200, "Redis is there again")
                 self.assertEqual(metric(server, "results_store_up"), 1.0)
-                until(lambda: metric(server, "results_waiting") <= 1.0)
+                wait_until(lambda: metric(server, "results_waiting") <= 1.0, "what waited is stored")
                 stream.next()
             over.set()
-            sending.join(PATIENCE)
+            sending.join(PATIENCE_SECONDS)
             print(f"{len(statuses)} frames, the slowest {max(seconds):.3f} s (before {usual:.3f} s)", end=" ... ")
             self.assertEqual(set(statuses), {200})
             self.assertLess(max(seconds), 2.0)
             # What was found meanwhile is there, once.
-            until(lambda: metric(server, "results_waiting") == 0.0)
+            wait_until(lambda: metric(server, "results_waiting") == 0.0, "all is stored")
             stored = [row["report"]["request_id"] for row in get(server, "/results/hall/history").json()]
             self.assertEqual(len(set(stored)), len(stored))
             stream.close()
@@ -273,7 +255,7 @@ class Away(unittest.TestCase):
             self.assertEqual(sent.status, 200)
             self.assertEqual(get(server, "/results").status, 503)
             with redis:
-                until(lambda: get(server, "/results/hall/latest").body == sent.body)
+                wait_until(lambda: get(server, "/results/hall/latest").body == sent.body, "the report is the latest")
                 told = log_of("redis-nobody")
         self.assertEqual((told.count("does not answer"), told.count("answers again")), (1, 1), told)
 
@@ -294,16 +276,16 @@ class Secrets(unittest.TestCase):
         with RedisServer("--requirepass", "s3cret-right", password="s3cret-right") as redis:
             with replica("redis-password", redis.url) as server:
                 sent = detect(server, "hall").body
-                until(lambda: get(server, "/results/hall/latest").body == sent)
+                wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
                 ready = get(server, "/readyz").body
             wrong = redis.url.replace("right", "wrong")
             with replica("redis-nobody-wrong", wrong) as server:
-                until(lambda: "WRONGPASS" in log_of("redis-nobody-wrong") or "assword" in log_of("redis-nobody-wrong"))
+                wait_until(lambda: "WRONGPASS" in log_of("redis-nobody-wrong") or "assword" in log_of("redis-nobody-wrong"), "the wrong password is told")
                 ready += get(server, "/readyz").body
                 redis.ask("CONFIG", "SET", "requirepass", "s3cret-wrong")
                 redis.password = "s3cret-wrong"
                 sent = detect(server, "hall").body
-                until(lambda: get(server, "/results/hall/latest").body == sent)
+                wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
         self.assertNotIn("s3cret", log_of("redis-password") + log_of("redis-nobody-wrong") + ready.decode())
 
     @unittest.skipUnless(shutil.which("openssl"), "needs openssl")
@@ -323,7 +305,7 @@ class Secrets(unittest.TestCase):
                 stack.enter_context(_variable("SSL_CERT_FILE", str(certificate)))
                 server = stack.enter_context(replica("redis-tls", url))
                 sent = detect(server, "hall").body
-                until(lambda: get(server, "/results/hall/latest").body == sent)
+                wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
             with replica("redis-nobody-trusts", url) as server:
                 self.assertEqual(get(server, "/results").status, 503)
 
@@ -347,7 +329,7 @@ class Bounds(unittest.TestCase):
                 for camera in ("hall", "hall", "stairs"):
                     detect(one, camera)
                 path = "/results/hall/latest.jpg?draw=boxes,scores,views,timestamp&width=640"
-                until(lambda: metric(one, "results_waiting") == 0.0)
+                wait_until(lambda: metric(one, "results_waiting") == 0.0, "all is stored")
                 pictures = [get(server, path) for server in (one, other)]
                 self.assertEqual([picture.status for picture in pictures], [200, 200])
                 self.assertTrue(pictures[0].body.startswith(b"\xff\xd8\xff"))
@@ -361,7 +343,7 @@ class Bounds(unittest.TestCase):
                 self.assertLess(redis.ask("MEMORY", "USAGE", "lookdown:picture:hall"), 4 << 20)
                 # A server that keeps none takes the one before away.
                 detect(other, "hall")
-                until(lambda: get(one, path).status == 404)
+                wait_until(lambda: get(one, path).status == 404, "the picture is gone")
 
     def test_servers_keep_to_their_settings(self) -> None:
         """Cameras, history and reports."""
@@ -370,7 +352,7 @@ class Bounds(unittest.TestCase):
             last = {}
             for camera in "aabcbbbbbaaaacd":
                 last[camera] = detect(server, camera).body
-            until(lambda: metric(server, "results_waiting") == 0.0)
+            wait_until(lambda: metric(server, "results_waiting") == 0.0, "all is stored")
             rows = get(server, "/results").json()
             self.assertEqual([row["camera"] for row in rows], ["a", "c", "d"])
             self.assertEqual(get(server, "/results/b/latest").status, 404)

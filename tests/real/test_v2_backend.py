@@ -14,7 +14,9 @@ from pathlib import Path
 
 from harness.places import ROOT, SAMPLES, model
 from harness.processes import Server, free_ports, running
+from metrics import metric
 from support.lookdown import lookdown
+from waiting import wait_until
 
 HERE = Path(__file__).resolve().parent
 MLSERVER = ROOT / ".setup" / "real" / "v2_backend" / "bin" / "mlserver"
@@ -23,8 +25,8 @@ SIDE = 416
 FRAME = (SAMPLES / "office.jpg").read_bytes()
 FAST = "/detect?calibration=office&profile=fast"
 BALANCED = "/detect?calibration=office"
-GONE_SECONDS = 20.0
-"""Within this time the server must have noticed that the other is gone, or is there again."""
+NOTICED_SECONDS = 20.0
+"""Within this time a server must have noticed that the other is gone, or is there again."""
 
 
 @contextlib.contextmanager
@@ -68,22 +70,14 @@ def answer(server: Server, path: str, body: bytes | None = None) -> tuple[int, M
         return error.code, error.headers, json.loads(error.read())
 
 
-def until(server: Server, status: int) -> dict:
-    """Waits until `/readyz` has that status; returns what it says."""
-    deadline = time.monotonic() + GONE_SECONDS
-    while True:
+def when_ready_is(server: Server, status: int) -> dict:
+    """What `/readyz` says when it has that status."""
+
+    def said() -> dict | None:
         found, _, told = answer(server, "/readyz")
-        if found == status:
-            return told
-        if time.monotonic() > deadline:
-            raise AssertionError(f"/readyz is still {found} after {GONE_SECONDS:.0f} s: {told}")
-        time.sleep(0.05)
+        return told if found == status else None
 
-
-def metric(server: Server, line: str) -> float:
-    """The value of a metric with its labels."""
-    lines = server.get("/metrics").decode().splitlines()
-    return float(next(row.rsplit(" ", 1)[1] for row in lines if row.startswith(line + " ")))
+    return wait_until(said, f"/readyz answers {status}", NOTICED_SECONDS)
 
 
 class RemoteInference(unittest.TestCase):
@@ -110,8 +104,8 @@ class RemoteInference(unittest.TestCase):
             server = stack.enter_context(lookdown(asking(f"http://127.0.0.1:{port}", "people")))
             for path, wanted in local.items():
                 self.assert_same(json.loads(server.post(path, FRAME)), wanted)
-            self.assertGreater(metric(server, 'lookdown_remote_requests_total{result="answered"}'), 0)
-            self.assertEqual(metric(server, "lookdown_remote_up"), 1)
+            self.assertGreater(metric(server, 'remote_requests_total{result="answered"}'), 0)
+            self.assertEqual(metric(server, "remote_up"), 1)
 
             remote.process.send_signal(signal.SIGKILL)
             remote.process.wait()
@@ -119,16 +113,16 @@ class RemoteInference(unittest.TestCase):
             self.assertEqual((status, problem["type"]), (503, "urn:lookdown:problem:inference-unavailable"))
             self.assertGreaterEqual(int(headers["Retry-After"]), 1)
             self.assertNotIn(str(port), problem["error"])
-            self.assertEqual(until(server, 503)["type"], "urn:lookdown:problem:inference-unavailable")
+            self.assertEqual(when_ready_is(server, 503)["type"], "urn:lookdown:problem:inference-unavailable")
             began = time.monotonic()
             self.assertEqual(answer(server, FAST, FRAME)[0], 503)
             self.assertLess(time.monotonic() - began, 1.0, "an open breaker answers at once")
-            self.assertEqual(metric(server, "lookdown_remote_up"), 0)
+            self.assertEqual(metric(server, "remote_up"), 0)
             self.assertEqual(answer(server, "/livez")[0], 200)
             first.close()
 
             stack.enter_context(mlserver(port))
-            until(server, 200)
+            when_ready_is(server, 200)
             self.assert_same(json.loads(server.post(FAST, FRAME)), local[FAST])
 
     def test_a_server_that_starts_first_waits_for_the_other(self) -> None:
@@ -141,7 +135,7 @@ class RemoteInference(unittest.TestCase):
             status, _, problem = answer(server, FAST, FRAME)
             self.assertEqual((status, problem["type"]), (503, "urn:lookdown:problem:warming-up"))
             with mlserver(port):
-                until(server, 200)
+                when_ready_is(server, 200)
                 self.assertEqual(answer(server, FAST, FRAME)[0], 200)
 
     def test_lookdown_itself_looks_for_another_with_views_as_bytes(self) -> None:
