@@ -9,6 +9,7 @@ mod job;
 mod look;
 mod merge;
 mod network;
+mod parameter_error;
 mod parameters;
 mod planned_views;
 mod plausibility;
@@ -29,7 +30,8 @@ pub use engine::{Engine, EngineOptions, Observation};
 pub use error::PipelineError;
 pub use job::{DetectJob, Detected, ViewsJob};
 pub use network::BatchOptions;
-pub use parameters::{DetectParameters, ParameterError, ParameterFault};
+pub use parameter_error::{ParameterError, ParameterFault, shown, whole_number};
+pub use parameters::DetectParameters;
 pub use planned_views::{PlannedView, PlannedViews};
 pub use profile::Profile;
 pub use report::{

@@ -1,8 +1,8 @@
 //! What a picture shows and how large it is, from parameters by name.
 
-use std::{fmt::Display, ops::RangeInclusive, str::FromStr};
+use std::ops::RangeInclusive;
 
-use crate::pipeline::{ParameterError, ParameterFault};
+use crate::pipeline::{ParameterError, shown, whole_number};
 
 /// Widths that may be asked for, pixels.
 const WIDTHS: RangeInclusive<u32> = 64..=8192;
@@ -10,8 +10,6 @@ const QUALITIES: RangeInclusive<u8> = 1..=100;
 /// Hardly to be told from the original.
 const DEFAULT_QUALITY: u8 = 88;
 const NOTHING: &str = "none";
-/// Most characters of a value that are repeated to its sender.
-const MAX_SHOWN_CHARS: usize = 64;
 
 /// Something that can be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,7 +106,7 @@ fn parse_layers(value: &str) -> Result<Vec<Layer>, ParameterError> {
         let layer = layer.ok_or_else(|| {
             let known = Layer::ALL.map(Layer::name).join(", ");
             let name = shown(name);
-            bad_value(
+            ParameterError::bad_value(
                 "draw",
                 format!("{name:?} cannot be drawn; use {NOTHING}, or some of {known}, with commas"),
             )
@@ -120,35 +118,10 @@ fn parse_layers(value: &str) -> Result<Vec<Layer>, ParameterError> {
     Ok(layers)
 }
 
-fn whole_number<N: FromStr + PartialOrd + Display>(
-    name: &str,
-    value: &str,
-    range: RangeInclusive<N>,
-) -> Result<N, ParameterError> {
-    let number = value.parse().ok().filter(|number| range.contains(number));
-    number.ok_or_else(|| {
-        let (least, most) = range.into_inner();
-        let value = shown(value);
-        let rule = format!("{value:?} is not a whole number from {least} to {most}");
-        bad_value(name, rule)
-    })
-}
-
-fn shown(value: &str) -> String {
-    value.chars().take(MAX_SHOWN_CHARS).collect()
-}
-
-fn bad_value(name: &str, problem: String) -> ParameterError {
-    ParameterError {
-        name: name.to_owned(),
-        problem,
-        fault: ParameterFault::BadValue,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::ParameterFault;
 
     #[test]
     fn every_layer_is_read_by_its_name_once() {

@@ -13,7 +13,7 @@ use crate::{
     annotated_picture::{PictureOptions, annotated_picture},
     annotation_formats::{AnnotatedImage, BoxKind},
     imaging::annotate::EncodeError,
-    pipeline::{Detected, ParameterError, ParameterFault},
+    pipeline::{Detected, ParameterError},
 };
 
 /// What a frame is called whose sender gave it no name.
@@ -53,7 +53,7 @@ impl AnswerOptions {
         for (name, value) in parameters.extract_if(.., |(name, _)| own(name).is_some()) {
             let place = own(&name).and_then(|index| given.get_mut(index));
             if place.is_some_and(|place| place.replace(value).is_some()) {
-                return Err(repeated(name).into());
+                return Err(ParameterError::repeated(&name).into());
             }
         }
         let [format, draw, width, quality] = given.each_ref().map(Option::as_deref);
@@ -84,14 +84,6 @@ impl AnswerOptions {
             media_type: self.format.media_type(),
             bytes,
         })
-    }
-}
-
-fn repeated(name: String) -> ParameterError {
-    ParameterError {
-        name,
-        problem: "it is given twice: give it once".to_owned(),
-        fault: ParameterFault::Repeated,
     }
 }
 

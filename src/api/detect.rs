@@ -11,14 +11,14 @@ use super::{
     ApiState,
     answer::AnswerOptions,
     find::{Found, find},
-    openapi::{DetectForm, DetectProblems, DetectQuery, RawBytes},
+    openapi::{DetectForm, DetectProblems, DetectQuery, PictureQuery, RawBytes},
     problem::Problem,
     report::{Report, ReportTimings},
     request_id::RequestId,
     upload::Upload,
 };
 use crate::{
-    pipeline::{DetectJob, DetectParameters, DetectionReport, Ticket},
+    pipeline::{DetectJob, DetectParameters, DetectionReport},
     telemetry::RequestTrace,
 };
 
@@ -41,7 +41,7 @@ pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-co
 /// drawn into it, or a file for annotation tools.
 #[utoipa::path(
     post, path = "/detect", tag = "detection", operation_id = "detect_persons",
-    params(DetectQuery),
+    params(DetectQuery, PictureQuery),
     request_body(
         description = "The frame: a form, or the file alone (JPEG, PNG or WebP, with any other content type).",
         content(
@@ -93,20 +93,11 @@ pub(super) fn facts(report: &DetectionReport) -> [(HeaderName, HeaderValue); 5] 
 
 fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {
     let parameters = &mut upload.parameters;
-    let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name)?;
+    let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
     let pairs = parameters.iter();
     let pairs = pairs.map(|(name, value)| (name.as_str(), value.as_str()));
     let parameters = DetectParameters::parse(pairs, DEFAULT_SCORE_THRESHOLD)?;
-    let job = DetectJob {
-        ticket: Ticket::of(parameters.priority),
-        parameters,
-        request_id: request_id.as_str().to_owned(),
-        received_at: upload.received_at,
-        arrived: upload.arrived,
-        image: upload.image,
-        calibration: None,
-    };
-    Ok((job, answer))
+    Ok((upload.job(parameters, request_id), answer))
 }
 
 /// The stages as `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), and those that say how

@@ -63,12 +63,6 @@ fn unknown(camera: &str) -> Problem {
     Problem::new(ProblemKind::UnknownCamera, detail)
 }
 
-fn not_allowed(name: &str, value: &str, rule: &str) -> Problem {
-    let value: String = value.chars().take(MAX_SHOWN_CHARS).collect();
-    let detail = format!("{name}: {value:?} is not {rule}");
-    Problem::new(ProblemKind::InvalidParameter, detail)
-}
-
 /// Why it does not answer is the operator's business, who finds it in the log and in `/readyz`.
 impl From<Unreachable> for Problem {
     fn from(_: Unreachable) -> Self {

@@ -31,8 +31,12 @@ use super::{
     ApiState,
     deadline::Deadline,
     problem::{Problem, ProblemKind},
+    request_id::RequestId,
 };
-use crate::access::Scope;
+use crate::{
+    access::Scope,
+    pipeline::{DetectJob, DetectParameters},
+};
 
 /// A frame in memory and what its sender wants of it.
 pub(super) struct Upload {
@@ -71,6 +75,12 @@ impl FromRequest<ApiState> for Upload {
 }
 
 impl Upload {
+    /// The frame with parameters that were read from those that came with it.
+    pub(super) fn job(self, parameters: DetectParameters, request_id: &RequestId) -> DetectJob {
+        let id = request_id.as_str();
+        DetectJob::sent(self.image, parameters, id, self.received_at, self.arrived)
+    }
+
     /// Reads a frame, alone or in a form whose fields are used as `use_of` says by their names. Who sent
     /// it is not asked here.
     pub(super) async fn receive(

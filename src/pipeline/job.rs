@@ -32,6 +32,28 @@ pub struct DetectJob {
     pub calibration: Option<Arc<Calibration>>,
 }
 
+impl DetectJob {
+    /// A frame that a client has sent, in the turn that its parameters say.
+    #[must_use]
+    pub fn sent(
+        image: Bytes,
+        parameters: DetectParameters,
+        request_id: &str,
+        received_at: Timestamp,
+        arrived: Instant,
+    ) -> Self {
+        Self {
+            request_id: request_id.to_owned(),
+            received_at,
+            arrived,
+            image,
+            ticket: Ticket::of(parameters.priority),
+            parameters,
+            calibration: None,
+        }
+    }
+}
+
 /// Views that somebody else has made, to be looked at as they are.
 pub struct ViewsJob {
     /// When the whole request was in memory.

@@ -1,11 +1,14 @@
 //! Request parameters: the same names and rules in multipart fields, query strings and
 //! command-line flags, checked once.
 
-use std::{ops::RangeInclusive, time::Duration};
+use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::{Priority, Profile};
+use super::{
+    ParameterError, Priority, Profile,
+    parameter_error::{shown, whole_number},
+};
 use crate::{
     calibration::CalibrationId,
     detection::{Refinement, RefinementParameters},
@@ -13,8 +16,6 @@ use crate::{
 
 /// Longest camera name.
 const MAX_CAMERA_CHARS: usize = 128;
-/// Most characters of an unknown name that are repeated to its sender.
-const MAX_NAME_CHARS: usize = 64;
 /// Most persons a report may hold, and the default.
 const MAX_DETECTIONS: u64 = 10_000;
 const DEFAULT_MAX_DETECTIONS: usize = 1_000;
@@ -26,29 +27,6 @@ const DEFAULT_SUPPRESSION_IOU: f64 = 0.5;
 const DEFAULT_FUSION_IOU: f64 = 0.5;
 /// σ of Gaussian Soft-NMS; the paper does not state its best value.
 const DEFAULT_SIGMA: f64 = 0.3;
-
-/// A parameter that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{name}: {problem}")]
-pub struct ParameterError {
-    /// The parameter's name.
-    pub name: String,
-    /// One sentence: the value, and what would be right.
-    pub problem: String,
-    /// What is wrong with it.
-    pub fault: ParameterFault,
-}
-
-/// What is wrong with a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ParameterFault {
-    /// There is no such parameter.
-    UnknownName,
-    /// It was given more than once.
-    Repeated,
-    /// Its value is out of range or no value of its kind.
-    BadValue,
-}
 
 /// The checked parameters of one detection request.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,15 +86,10 @@ impl DetectParameters {
             let Some(index) = Self::NAMES.iter().position(|known| *known == name) else {
                 let known = Self::NAMES.join(", ");
                 let problem = format!("there is no such parameter; the parameters are {known}");
-                return Err(ParameterError::new(
-                    name,
-                    problem,
-                    ParameterFault::UnknownName,
-                ));
+                return Err(ParameterError::unknown(name, problem));
             };
             if given[index].replace(value).is_some() {
-                let problem = "it is given twice: give it once".to_owned();
-                return Err(ParameterError::new(name, problem, ParameterFault::Repeated));
+                return Err(ParameterError::repeated(name));
             }
         }
         let [
@@ -145,7 +118,7 @@ impl DetectParameters {
         if motion && camera.is_none() && calibration.is_none() {
             let rule = "name the camera, or its calibration: without a name there is no last \
                         frame to compare with";
-            return Err(problem("motion", rule.to_owned()));
+            return Err(ParameterError::bad_value("motion", rule.to_owned()));
         }
         Ok(Self {
             calibration: calibration.map(parse_calibration).transpose()?,
@@ -186,33 +159,10 @@ impl DetectParameters {
     }
 }
 
-impl ParameterError {
-    fn new(name: &str, problem: String, fault: ParameterFault) -> Self {
-        Self {
-            // Enough to recognise a made-up name by, not enough to fill a log.
-            name: name.chars().take(MAX_NAME_CHARS).collect(),
-            problem,
-            fault,
-        }
-    }
-}
-
-fn problem(name: &str, problem: String) -> ParameterError {
-    ParameterError::new(name, problem, ParameterFault::BadValue)
-}
-
-/// As much of a value as helps its sender.
-fn shown(value: &str) -> String {
-    value.chars().take(MAX_NAME_CHARS).collect()
-}
-
 fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
     Profile::from_name(value).ok_or_else(|| {
         let known = Profile::ALL.map(Profile::name).join(", ");
-        problem(
-            "profile",
-            format!("{:?} is not a profile; use one of {known}", shown(value)),
-        )
+        ParameterError::is_not("profile", value, &format!("a profile; use one of {known}"))
     })
 }
 
@@ -221,9 +171,10 @@ fn parse_refinement(value: &str) -> Result<Refinement, ParameterError> {
         let known = Refinement::ALL
             .map(|refinement| refinement.to_string())
             .join(", ");
-        problem(
+        ParameterError::is_not(
             "refine",
-            format!("{:?} is not a refinement; use one of {known}", shown(value)),
+            value,
+            &format!("a refinement; use one of {known}"),
         )
     })
 }
@@ -231,7 +182,7 @@ fn parse_refinement(value: &str) -> Result<Refinement, ParameterError> {
 fn parse_calibration(value: &str) -> Result<CalibrationId, ParameterError> {
     value
         .parse()
-        .map_err(|error| problem("calibration", format!("{error}")))
+        .map_err(|error| ParameterError::bad_value("calibration", format!("{error}")))
 }
 
 fn parse_camera(value: &str) -> Result<String, ParameterError> {
@@ -240,7 +191,7 @@ fn parse_camera(value: &str) -> Result<String, ParameterError> {
         && !value.chars().any(char::is_control);
     if !acceptable {
         let rule = format!("use 1 to {MAX_CAMERA_CHARS} characters without control characters");
-        return Err(problem(
+        return Err(ParameterError::bad_value(
             "camera",
             format!("the name cannot be used; {rule}"),
         ));
@@ -251,7 +202,7 @@ fn parse_camera(value: &str) -> Result<String, ParameterError> {
 fn number(name: &str, value: &str) -> Result<f64, ParameterError> {
     value
         .parse()
-        .map_err(|_| problem(name, format!("{:?} is not a number", shown(value))))
+        .map_err(|_| ParameterError::is_not(name, value, "a number"))
 }
 
 fn unit_interval(name: &str, value: Option<&str>, default: f64) -> Result<f64, ParameterError> {
@@ -260,7 +211,10 @@ fn unit_interval(name: &str, value: Option<&str>, default: f64) -> Result<f64, P
     };
     let parsed = number(name, value)?;
     if !(0.0..=1.0).contains(&parsed) {
-        return Err(problem(name, format!("{} is outside 0 to 1", shown(value))));
+        return Err(ParameterError::bad_value(
+            name,
+            format!("{} is outside 0 to 1", shown(value)),
+        ));
     }
     Ok(parsed)
 }
@@ -268,25 +222,12 @@ fn unit_interval(name: &str, value: Option<&str>, default: f64) -> Result<f64, P
 fn parse_sigma(value: &str) -> Result<f64, ParameterError> {
     let sigma = number("sigma", value)?;
     if !(sigma.is_finite() && sigma > 0.0) {
-        return Err(problem(
+        return Err(ParameterError::bad_value(
             "sigma",
             format!("{} is not a finite number above 0", shown(value)),
         ));
     }
     Ok(sigma)
-}
-
-fn whole_number(
-    name: &str,
-    value: &str,
-    range: RangeInclusive<u64>,
-) -> Result<u64, ParameterError> {
-    let number = value.parse().ok().filter(|number| range.contains(number));
-    number.ok_or_else(|| {
-        let (least, most) = range.into_inner();
-        let rule = format!("a whole number from {least} to {most}");
-        problem(name, format!("{:?} is not {rule}", shown(value)))
-    })
 }
 
 fn parse_max_detections(value: &str) -> Result<usize, ParameterError> {
@@ -300,8 +241,9 @@ fn parse_priority(value: &str) -> Result<Priority, ParameterError> {
 }
 
 fn parse_switch(name: &str, value: &str) -> Result<bool, ParameterError> {
-    let wrong = |_| problem(name, format!("{:?} is not true or false", shown(value)));
-    value.parse().map_err(wrong)
+    value
+        .parse()
+        .map_err(|_| ParameterError::is_not(name, value, "true or false"))
 }
 
 fn parse_timeout(value: &str) -> Result<Duration, ParameterError> {
@@ -310,14 +252,8 @@ fn parse_timeout(value: &str) -> Result<Duration, ParameterError> {
 
 fn parse_timestamp(value: &str) -> Result<Timestamp, ParameterError> {
     value.parse().map_err(|_| {
-        let example = "2026-11-21T09:30:00Z";
-        problem(
-            "captured_at",
-            format!(
-                "{:?} is not an RFC 3339 time with an offset, such as {example}",
-                shown(value)
-            ),
-        )
+        let rule = "an RFC 3339 time with an offset, such as 2026-11-21T09:30:00Z";
+        ParameterError::is_not("captured_at", value, rule)
     })
 }
 

@@ -2,7 +2,7 @@
 
 use axum::{Json, extract::State, http::Uri};
 use serde::Serialize;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
 use super::{
     address::{CalibrationAddress, NewCalibrationAddress},
@@ -20,7 +20,7 @@ use crate::{
         upload::parameters_named,
     },
     calibration::{Calibration, Calibrations},
-    pipeline::{PlannedView, PlannedViews, Profile},
+    pipeline::{PlannedView, PlannedViews, Profile, whole_number},
 };
 
 /// Most cells along each side of a grid.
@@ -94,6 +94,18 @@ pub(in crate::api) struct ViewInfo {
     grid: Option<Vec<Option<[f64; 2]>>>,
 }
 
+/// What is asked about a view plan, in the query.
+#[derive(IntoParams)]
+#[into_params(parameter_in = Query)]
+#[expect(dead_code, reason = "describes what Look reads")]
+struct LookQuery {
+    /// `balanced` by default.
+    profile: Option<String>,
+    /// Tell a grid of so many cells along each side of a view, too.
+    #[param(minimum = 1, maximum = 32)]
+    grid: Option<u32>,
+}
+
 /// How is a frame of this calibration looked at?
 ///
 /// Each view with its pose, intrinsics and outline in the frame; how much of the lens image the
@@ -102,9 +114,7 @@ pub(in crate::api) struct ViewInfo {
     get, path = "/calibrations/{id}/views", tag = "calibrations", operation_id = "get_views",
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
-        ("profile" = Option<String>, Query, description = "`balanced` by default."),
-        ("grid" = Option<u32>, Query, minimum = 1, maximum = 32,
-            description = "Tell a grid of so many cells along each side of a view, too."),
+        LookQuery,
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses((status = OK, description = "The view plan.", body = ViewPlanInfo), ViewsProblems)
@@ -133,9 +143,7 @@ pub(in crate::api) async fn get_views(
     post, path = "/calibrations/{id}/views", tag = "calibrations", operation_id = "try_views",
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
-        ("profile" = Option<String>, Query, description = "`balanced` by default."),
-        ("grid" = Option<u32>, Query, minimum = 1, maximum = 32,
-            description = "Tell a grid of so many cells along each side of a view, too."),
+        LookQuery,
         ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
         ("size" = Option<String>, Query, description = "The size of the camera's frames in pixels, such as \
             `1280x960`, for formats that do not tell it.", pattern = "^[0-9]+x[0-9]+$"),
@@ -176,18 +184,7 @@ impl Look {
             None => Profile::default(),
             Some(name) => Profile::from_name(&name).ok_or_else(|| unknown_profile(&name))?,
         };
-        let cells = |text: String| {
-            let cells = text
-                .parse()
-                .ok()
-                .filter(|cells| (1..=MAX_GRID_CELLS).contains(cells));
-            cells.ok_or_else(|| {
-                let text: String = text.chars().take(64).collect();
-                let detail =
-                    format!("grid: {text:?} is not a whole number from 1 to {MAX_GRID_CELLS}");
-                Problem::new(ProblemKind::InvalidParameter, detail)
-            })
-        };
+        let cells = |text: String| whole_number("grid", &text, 1..=MAX_GRID_CELLS);
         let grid_cells = grid.map(cells).transpose()?;
         Ok(Self {
             profile,

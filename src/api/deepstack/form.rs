@@ -12,7 +12,7 @@ use crate::{
         upload::{FieldUse, Upload, is_multipart},
     },
     calibration::CalibrationId,
-    pipeline::{DetectJob, DetectParameters, ParameterError, Ticket},
+    pipeline::{DetectJob, DetectParameters, ParameterError},
 };
 
 const MIN_CONFIDENCE: &str = "min_confidence";
@@ -107,15 +107,7 @@ pub(super) fn job(
         calibration,
         ..parameters
     };
-    Ok(DetectJob {
-        ticket: Ticket::of(parameters.priority),
-        parameters,
-        request_id: request_id.as_str().to_owned(),
-        received_at: upload.received_at,
-        arrived: upload.arrived,
-        image: upload.image,
-        calibration: None,
-    })
+    Ok(upload.job(parameters, request_id))
 }
 
 /// The same with the name that the sender knows.

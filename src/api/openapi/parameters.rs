@@ -10,7 +10,7 @@ use utoipa::{
     },
 };
 
-/// Parameters in the query.
+/// Parameters in the query, beside those of pictures.
 #[derive(IntoParams)]
 #[into_params(parameter_in = Query)]
 #[expect(dead_code, reason = "describes what pipeline::DetectParameters reads")]
@@ -67,18 +67,6 @@ pub(in crate::api) struct DetectQuery {
     /// GeoJSON, in pixels. By default what `Accept` prefers of JSON, JPEG, PNG and GeoJSON.
     #[param(inline)]
     format: Option<FormatName>,
-    /// What is drawn into a picture: some of `boxes`, `oriented`, `scores`, `zones`, `views` and
-    /// `timestamp`, with commas, or `none`; `oriented,scores` by default.
-    #[param(
-        pattern = "^(none|(boxes|oriented|scores|zones|views|timestamp)(,(boxes|oriented|scores|zones|views|timestamp))*)$"
-    )]
-    draw: Option<String>,
-    /// Width of a picture, pixels; a frame that is no wider stays as it is.
-    #[param(minimum = 64, maximum = 8192, example = 640)]
-    width: Option<u32>,
-    /// Quality of a JPEG; 88 by default.
-    #[param(minimum = 1, maximum = 100)]
-    quality: Option<u8>,
 }
 
 /// How a picture is drawn, in the query.
@@ -89,16 +77,16 @@ pub(in crate::api) struct DetectQuery {
     reason = "describes what annotated_picture::PictureOptions reads"
 )]
 pub(in crate::api) struct PictureQuery {
-    /// What is drawn: some of `boxes`, `oriented`, `scores`, `zones`, `views` and `timestamp`, with
+    /// What is drawn into a picture: some of `boxes`, `oriented`, `scores`, `zones`, `views` and `timestamp`, with
     /// commas, or `none`; `oriented,scores` by default.
     #[param(
         pattern = "^(none|(boxes|oriented|scores|zones|views|timestamp)(,(boxes|oriented|scores|zones|views|timestamp))*)$"
     )]
     draw: Option<String>,
-    /// Width, pixels; a frame that is no wider stays as it is.
+    /// Width of a picture, pixels; a frame that is no wider stays as it is.
     #[param(minimum = 64, maximum = 8192, example = 640)]
     width: Option<u32>,
-    /// Quality of the JPEG; 88 by default.
+    /// Quality of a JPEG; 88 by default.
     #[param(minimum = 1, maximum = 100)]
     quality: Option<u8>,
 }
@@ -127,9 +115,10 @@ impl PartialSchema for DetectForm {
     }
 }
 
-/// The parameters of the query as fields of an object.
+/// The parameters of `/detect` as fields of an object.
 pub(in crate::api) fn fields() -> impl Iterator<Item = (String, Object)> {
     let parameters = DetectQuery::into_params(|| None).into_iter();
+    let parameters = parameters.chain(PictureQuery::into_params(|| None));
     parameters.filter_map(|parameter| {
         let Some(RefOr::T(Schema::Object(mut field))) = parameter.schema else {
             return None;

@@ -14,12 +14,13 @@ use bytes::{BufMut, Bytes, BytesMut};
 use jiff::Timestamp;
 use utoipa::ToSchema;
 
-use super::{NO_CACHE, address::CameraAddress, not_allowed, unknown};
+use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState, access::Reader, openapi::HistoryProblems, problem::Problem, report::Report,
         upload::parameters_named,
     },
+    pipeline::{ParameterError, whole_number},
     results::{Cameras, ReportId, StoredReport},
 };
 
@@ -104,7 +105,7 @@ fn parse_since(text: &str) -> Result<ReportId, Problem> {
     text.parse().or_else(|_| of_time()).map_err(|_| {
         let rule = "the ID of a report, nor an RFC 3339 time with an offset, such as \
                     2026-11-21T09:30:00Z";
-        not_allowed("since", text, rule)
+        ParameterError::is_not("since", text, rule).into()
     })
 }
 
@@ -112,11 +113,6 @@ fn parse_limit(text: Option<&str>) -> Result<NonZeroUsize, Problem> {
     let Some(text) = text else {
         return Ok(NonZeroUsize::new(DEFAULT_LIMIT).unwrap_or(NonZeroUsize::MIN));
     };
-    let limit = text.parse::<NonZeroUsize>().ok();
-    limit
-        .filter(|limit| limit.get() <= MAX_LIMIT)
-        .ok_or_else(|| {
-            let rule = format!("a whole number from 1 to {MAX_LIMIT}");
-            not_allowed("limit", text, &rule)
-        })
+    let limit = whole_number("limit", text, 1..=MAX_LIMIT)?;
+    Ok(NonZeroUsize::new(limit).unwrap_or(NonZeroUsize::MIN))
 }

@@ -12,7 +12,7 @@ use axum::{
 };
 use tokio::time::timeout_at;
 
-use super::{NO_CACHE, address::CameraAddress, not_allowed, unknown};
+use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
@@ -24,6 +24,7 @@ use crate::{
         report::Report,
         upload::parameters_named,
     },
+    pipeline::ParameterError,
     results::{Cameras, StoredReport},
 };
 
@@ -108,7 +109,7 @@ fn parse_wait(text: &str) -> Result<Duration, Problem> {
     let seconds = text.parse().ok().filter(|wait| *wait <= MAX_WAIT_SECONDS);
     let seconds = seconds.ok_or_else(|| {
         let rule = format!("a whole number of seconds from 0 to {MAX_WAIT_SECONDS}");
-        not_allowed("wait", text, &rule)
+        Problem::from(ParameterError::is_not("wait", text, &rule))
     });
     seconds.map(Duration::from_secs)
 }

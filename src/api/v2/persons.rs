@@ -23,7 +23,7 @@ use crate::{
         request_id::RequestId,
     },
     open_inference::Datatype,
-    pipeline::{DetectJob, DetectParameters, ParameterError, ParameterFault, Ticket},
+    pipeline::{DetectJob, DetectParameters, ParameterError},
     telemetry::RequestTrace,
 };
 
@@ -66,15 +66,7 @@ pub(super) async fn infer(
         return Err(misfit(INPUT, "it is empty: send an encoded frame"));
     }
     let parameters = parameters(&request.parameters)?;
-    let job = DetectJob {
-        ticket: Ticket::of(parameters.priority),
-        parameters,
-        request_id: request_id.as_str().to_owned(),
-        received_at,
-        arrived,
-        image,
-        calibration: None,
-    };
+    let job = DetectJob::sent(image, parameters, request_id.as_str(), received_at, arrived);
     let write = move |found: Found<'_>| {
         let answerer = Answerer {
             model: FRAME_MODEL,
@@ -147,24 +139,22 @@ fn as_text<'a>(name: &'a str, value: &Parameter) -> Result<(&'a str, String), Pa
         (Parameter::Number(number), "a number") => number.clone(),
         // Who asks for what is not there hears that first.
         _ if name != TIMEOUT && !DetectParameters::NAMES.contains(&name) => String::new(),
-        _ => return Err(wrong(name, format!("{wanted} is needed"))),
+        _ => {
+            return Err(ParameterError::bad_value(
+                name,
+                format!("{wanted} is needed"),
+            ));
+        }
     };
     if name != TIMEOUT {
         return Ok((name, text));
     }
     let micros = text.parse::<u64>();
-    let micros =
-        micros.map_err(|_| wrong(name, format!("{text} is no whole number of microseconds")));
+    let micros = micros.map_err(|_| {
+        ParameterError::bad_value(name, format!("{text} is no whole number of microseconds"))
+    });
     Ok((
         "timeout_millis",
         micros?.div_ceil(MICROS_PER_MILLI).to_string(),
     ))
-}
-
-fn wrong(name: &str, problem: String) -> ParameterError {
-    ParameterError {
-        name: name.to_owned(),
-        problem,
-        fault: ParameterFault::BadValue,
-    }
 }

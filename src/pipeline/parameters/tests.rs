@@ -1,4 +1,5 @@
 use super::*;
+use crate::pipeline::ParameterFault;
 
 fn parse(pairs: &[(&str, &str)]) -> Result<DetectParameters, ParameterError> {
     DetectParameters::parse(pairs.iter().copied(), 0.3)
