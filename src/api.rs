@@ -32,13 +32,16 @@ mod web_page;
 
 use axum::{
     Router,
-    extract::DefaultBodyLimit,
     middleware::{from_fn_with_state, map_response},
 };
+use tower::{ServiceBuilder, util::option_layer};
+use tower_http::catch_panic::CatchPanicLayer;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use envelope::Surroundings;
+use foreign_pages::OwnPages;
+use rate_limit::RateLimiter;
 
 pub use access::Access;
 pub use health::{Phase, Readiness};
@@ -109,9 +112,13 @@ fn metrics() -> OpenApiRouter<ApiState> {
 
 /// The whole service.
 pub fn router(state: ApiState) -> Router {
-    let clients = Router::from(client_routes())
-        .route_layer(from_fn_with_state(state.clone(), rate_limit::apply))
-        .route_layer(from_fn_with_state(state.clone(), foreign_pages::refuse));
+    let options = &state.options;
+    let own_pages = OwnPages::of(options).map(|own| from_fn_with_state(own, foreign_pages::refuse));
+    let limiter = RateLimiter::of(options).map(|all| from_fn_with_state(all, rate_limit::apply));
+    let guards = ServiceBuilder::new()
+        .layer(option_layer(own_pages))
+        .layer(option_layer(limiter));
+    let clients = Router::from(client_routes()).route_layer(guards);
     let router = clients
         .merge(Router::from(description()))
         .merge(operation(state.options.metrics_elsewhere));
@@ -144,19 +151,20 @@ fn pages() -> Router {
     web_page::router().merge(api_page)
 }
 
-/// What holds for every route.
+/// What holds for every route, the outermost first. A router clones and boxes each of its layers for each
+/// request, so all of these are one. A handler that panics costs its own request only.
 fn surrounded(router: Router, state: ApiState) -> Router {
     let surroundings = Surroundings {
         metrics: state.metrics.clone(),
         tracer: state.options.tracer.clone(),
     };
-    let cors = cors::layer(&state.options.cors_origins);
-    let router = router
-        .layer(from_fn_with_state(state.clone(), head::within_bounds))
-        // Bodies are bounded where they are read.
-        .layer(DefaultBodyLimit::disable())
-        .layer(from_fn_with_state(state, unread::discard));
-    envelope::around(router, cors, surroundings).layer(map_response(page_headers::of_answer))
+    let layers = ServiceBuilder::new()
+        .layer(from_fn_with_state(surroundings, envelope::wrap))
+        .layer(option_layer(cors::layer(&state.options.cors_origins)))
+        .layer(CatchPanicLayer::custom(envelope::of_panic))
+        .layer(from_fn_with_state(state.clone(), unread::discard))
+        .layer(from_fn_with_state(state, head::within_bounds));
+    router.layer(layers)
 }
 
 /// The API page, from files inside the executable; it asks for nothing beyond this server.

@@ -1,19 +1,18 @@
 //! What surrounds every request: its ID, its log line, its metrics, and the one shape of failures.
 
-use std::{sync::Arc, time::Instant};
+use std::{any::Any, sync::Arc, time::Instant};
 
 use axum::{
-    Json, Router,
+    Json,
     extract::{MatchedPath, Request, State},
     http::{HeaderValue, Method, StatusCode, header},
-    middleware::{self, Next},
+    middleware::Next,
     response::{IntoResponse, Response},
 };
-use tower_http::{catch_panic::CatchPanicLayer, cors::CorsLayer};
 use tracing::Instrument;
 
 use super::{
-    incoming_trace,
+    incoming_trace, page_headers,
     problem::{Problem, ProblemKind},
     request_id::{self, RequestId},
 };
@@ -34,23 +33,13 @@ pub(super) struct Surroundings {
     pub(super) tracer: Tracer,
 }
 
-/// The router inside the envelope. A handler that panics costs its own request only.
-pub(super) fn around(
-    router: Router,
-    cors: Option<CorsLayer>,
-    surroundings: Surroundings,
-) -> Router {
-    let router = router.layer(CatchPanicLayer::custom(|_| {
-        Problem::fault().into_response()
-    }));
-    let router = match cors {
-        Some(cors) => router.layer(cors),
-        None => router,
-    };
-    router.layer(middleware::from_fn_with_state(surroundings, wrap))
+/// The answer to a request whose handler has panicked.
+pub(super) fn of_panic(_: Box<dyn Any + Send>) -> Response {
+    Problem::fault().into_response()
 }
 
-async fn wrap(
+/// Puts every answer into its envelope.
+pub(super) async fn wrap(
     State(Surroundings { metrics, tracer }): State<Surroundings>,
     mut request: Request,
     next: Next,
@@ -62,7 +51,7 @@ async fn wrap(
     let route = request.extensions().get::<MatchedPath>().cloned();
     let route = route.as_ref().map_or(UNMATCHED, MatchedPath::as_str);
     request.extensions_mut().insert(request_id.clone());
-    let trace = incoming_trace::begin(&tracer, format!("{method} {route}"), request.headers());
+    let trace = incoming_trace::begin(&tracer, || format!("{method} {route}"), request.headers());
     request.extensions_mut().insert(trace.clone());
 
     // Of the highest level, so that no filter which shows a line hides whose it is.
@@ -105,6 +94,7 @@ async fn wrap(
     end(&trace, status, reason);
     let headers = response.headers_mut();
     headers.insert(request_id::HEADER, request_id.header_value());
+    page_headers::complete(headers);
     response
 }
 
@@ -193,9 +183,10 @@ fn status_class(status: StatusCode) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use axum::{body::Body, routing::get};
+    use axum::{Router, body::Body, middleware::from_fn_with_state, routing::get};
     use http_body_util::BodyExt;
     use tower::ServiceExt;
+    use tower_http::catch_panic::CatchPanicLayer;
 
     use super::*;
 
@@ -205,15 +196,15 @@ mod tests {
             panic!("the secret cause")
         }
         let metrics = Arc::new(Metrics::new().unwrap());
-        let router = Router::new().route("/panics", get(panics));
-        let router = around(
-            router.route("/works", get(async || "fine")),
-            None,
-            Surroundings {
-                metrics: Arc::clone(&metrics),
-                tracer: Tracer::default(),
-            },
-        );
+        let surroundings = Surroundings {
+            metrics: Arc::clone(&metrics),
+            tracer: Tracer::default(),
+        };
+        let router = Router::new()
+            .route("/panics", get(panics))
+            .route("/works", get(async || "fine"))
+            .layer(CatchPanicLayer::custom(of_panic))
+            .layer(from_fn_with_state(surroundings, wrap));
 
         let get = |path| Request::get(path).body(Body::empty()).unwrap();
         let response = router.clone().oneshot(get("/panics")).await.unwrap();

@@ -7,7 +7,7 @@
 //! nor in `access.cors_origins`; and a server that only its own machine reaches answers no request
 //! for a public host name. Keys make both unnecessary: no browser adds them by itself.
 
-use std::net::IpAddr;
+use std::{net::IpAddr, sync::Arc};
 
 use axum::{
     extract::{Request, State},
@@ -21,34 +21,55 @@ use axum::{
 };
 
 use super::{
-    Access, ApiState,
+    Access, ApiOptions,
     problem::{Problem, ProblemKind},
 };
 
 /// Most characters of a header that are repeated to its sender.
 const MAX_SHOWN_CHARS: usize = 128;
 
+/// The pages that are not foreign.
+#[derive(Clone)]
+pub(super) struct OwnPages {
+    own_machine_only: bool,
+    /// The origins that may call.
+    allowed: Arc<[String]>,
+}
+
+impl OwnPages {
+    /// `None` where there are keys.
+    pub(super) fn of(options: &ApiOptions) -> Option<Self> {
+        match options.access {
+            Access::Open { own_machine_only } => Some(Self {
+                own_machine_only,
+                allowed: options.cors_origins.clone().into(),
+            }),
+            Access::Keys(_) => None,
+        }
+    }
+}
+
 /// Lets no request of a foreign page through.
 pub(super) async fn refuse(
-    State(state): State<ApiState>,
+    State(own_pages): State<OwnPages>,
     request: Request,
     next: Next,
 ) -> Response {
-    let options = &state.options;
-    let Access::Open { own_machine_only } = options.access else {
-        return next.run(request).await;
-    };
-    match check(&request, own_machine_only, &options.cors_origins) {
+    match check(&request, &own_pages) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     }
 }
 
-fn check(request: &Request, own_machine_only: bool, allowed: &[String]) -> Result<(), Problem> {
+fn check(request: &Request, own_pages: &OwnPages) -> Result<(), Problem> {
+    let OwnPages {
+        own_machine_only,
+        allowed,
+    } = own_pages;
     // Every browser names the host; what names none is no browser.
     let host = host_of(request.uri(), request.headers());
     if let Some(host) = &host
-        && own_machine_only
+        && *own_machine_only
         && !is_private(host.host())
         && !allowed.iter().any(|origin| names(origin, host))
     {

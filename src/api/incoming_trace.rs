@@ -4,8 +4,12 @@ use axum::http::HeaderMap;
 
 use crate::telemetry::{RequestTrace, Tracer};
 
-/// The request's place in its trace.
-pub(super) fn begin(tracer: &Tracer, name: String, headers: &HeaderMap) -> RequestTrace {
+/// The request's place in its trace; its span gets that name, if it has one.
+pub(super) fn begin(
+    tracer: &Tracer,
+    name: impl FnOnce() -> String,
+    headers: &HeaderMap,
+) -> RequestTrace {
     let mut parents = headers.get_all("traceparent").iter();
     let parent = parents.next().filter(|_| parents.next().is_none());
     let states = headers.get_all("tracestate").iter();

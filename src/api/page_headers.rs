@@ -50,11 +50,9 @@ fn with_policy(mut response: Response, policy: HeaderValue) -> Response {
     response
 }
 
-/// Adds to any answer what it does not say itself.
-pub(super) async fn of_answer(mut response: Response) -> Response {
-    let headers: &mut HeaderMap = response.headers_mut();
+/// Adds to the headers of any answer what it does not say itself.
+pub(super) fn complete(headers: &mut HeaderMap) {
     for (name, value) in ALWAYS {
         headers.entry(name).or_insert(value);
     }
-    response
 }

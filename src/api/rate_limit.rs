@@ -22,7 +22,7 @@ use axum::{
 
 use self::buckets::{Buckets, Client, Standing};
 use super::{
-    ApiState,
+    Access, ApiOptions,
     problem::{Problem, ProblemKind},
 };
 
@@ -48,22 +48,38 @@ impl RequestRate {
     }
 }
 
-/// The buckets of all clients. Clones share them.
+/// The buckets of all clients, and who they are. Clones share them.
 #[derive(Clone)]
 pub(super) struct RateLimiter {
+    access: Access,
     buckets: Arc<Mutex<Buckets>>,
     policy: HeaderValue,
 }
 
 impl RateLimiter {
-    pub(super) fn new(rate: RequestRate) -> Self {
+    /// Full buckets; `None` where everybody may ask as often as he wants.
+    pub(super) fn of(options: &ApiOptions) -> Option<Self> {
+        let rate = options.request_rate?;
         let (interval, burst) = (rate.interval(), rate.burst.get());
         let window = whole_seconds(interval * burst);
         // Digits are visible ASCII.
         let policy = format!("\"default\";q={burst};w={window}").parse();
-        Self {
+        Some(Self {
+            access: options.access.clone(),
             buckets: Arc::new(Mutex::new(Buckets::new(interval, burst))),
             policy: policy.unwrap_or(HeaderValue::from_static("\"default\"")),
+        })
+    }
+
+    /// Whose bucket a request is taken from.
+    fn client_of(&self, request: &Request) -> Client {
+        let address = || {
+            let address = request.extensions().get::<SocketAddr>();
+            address.map(SocketAddr::ip)
+        };
+        match self.access.holder(request.headers()) {
+            Some(holder) => Client::Key(holder.name.to_string()),
+            None => address().map_or(Client::Others, Client::at),
         }
     }
 
@@ -75,11 +91,12 @@ impl RateLimiter {
 }
 
 /// Lets through who may ask, and says on every answer how often that is.
-pub(super) async fn apply(State(state): State<ApiState>, request: Request, next: Next) -> Response {
-    let Some(limiter) = &state.rate_limiter else {
-        return next.run(request).await;
-    };
-    let standing = limiter.take(client_of(&state, &request));
+pub(super) async fn apply(
+    State(limiter): State<RateLimiter>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let standing = limiter.take(limiter.client_of(&request));
     let mut response = if standing.admitted {
         next.run(request).await
     } else {
@@ -96,19 +113,6 @@ pub(super) async fn apply(State(state): State<ApiState>, request: Request, next:
         headers.insert(RATE_LIMIT, remaining);
     }
     response
-}
-
-/// Whose bucket a request is taken from.
-fn client_of(state: &ApiState, request: &Request) -> Client {
-    let holder = state.options.access.holder(request.headers());
-    let address = || {
-        let address = request.extensions().get::<SocketAddr>();
-        address.map(SocketAddr::ip)
-    };
-    match holder {
-        Some(holder) => Client::Key(holder.name.to_string()),
-        None => address().map_or(Client::Others, Client::at),
-    }
 }
 
 fn too_fast(next_in: Duration) -> Problem {

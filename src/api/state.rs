@@ -6,7 +6,6 @@ use super::{
     Access, Readiness, RequestRate,
     deadline::Deadline,
     problem::ProblemKind,
-    rate_limit::RateLimiter,
     upload::{BodyReader, UploadBudget},
 };
 use crate::{
@@ -62,7 +61,6 @@ pub struct Shared {
     pub(super) metrics: Arc<Metrics>,
     pub(super) readiness: Readiness,
     pub(super) uploads: UploadBudget,
-    pub(super) rate_limiter: Option<RateLimiter>,
     pub(super) options: ApiOptions,
 }
 
@@ -90,7 +88,6 @@ impl ApiState {
             metrics,
             readiness,
             uploads: UploadBudget::new(options.max_upload_bytes),
-            rate_limiter: options.request_rate.map(RateLimiter::new),
             options,
         }))
     }

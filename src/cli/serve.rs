@@ -2,7 +2,9 @@
 
 use std::{
     io::{self, Write},
+    num::NonZeroUsize,
     process::ExitCode,
+    thread::available_parallelism,
     time::Duration,
 };
 
@@ -17,8 +19,8 @@ use crate::{
     shutdown::Shutdown,
 };
 
-/// Threads for sockets and JSON; frames have threads of their own.
-const RUNTIME_THREADS: usize = 2;
+/// Most threads for sockets and JSON; frames have threads of their own.
+const MAX_RUNTIME_THREADS: usize = 2;
 /// How long the end waits for a model that is being loaded.
 const LONGEST_LOAD: Duration = Duration::from_secs(10);
 
@@ -37,7 +39,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let runtime = runtime::Builder::new_multi_thread()
-        .worker_threads(RUNTIME_THREADS)
+        .worker_threads(runtime_threads())
         .enable_all()
         .build()
         .context("the operating system gives no thread")?;
@@ -50,6 +52,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     // is being loaded.
     runtime.shutdown_timeout(LONGEST_LOAD);
     outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// One per two cores: an idle second thread is woken for each request, in case there are more.
+fn runtime_threads() -> usize {
+    let cores = available_parallelism().map_or(1, NonZeroUsize::get);
+    (cores / 2).clamp(1, MAX_RUNTIME_THREADS)
 }
 
 async fn serve(settings: Settings) -> anyhow::Result<()> {

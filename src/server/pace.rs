@@ -1,11 +1,11 @@
 //! Who keeps a connection waiting, and until when it may.
 
-use std::{future::pending, time::Duration};
-
-use tokio::{
-    sync::watch,
-    time::{Instant, sleep_until},
+use std::{
+    sync::{Mutex, MutexGuard, PoisonError},
+    time::Duration,
 };
+
+use tokio::time::{Instant, sleep_until};
 
 use super::ConnectionLimits;
 
@@ -22,7 +22,7 @@ enum Phase {
     Service,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct State {
     phase: Phase,
     /// When the phase has taken too long.
@@ -34,7 +34,7 @@ struct State {
 /// Follows a connection, and notices when its client takes too long.
 #[derive(Debug)]
 pub(super) struct Pace {
-    state: watch::Sender<State>,
+    state: Mutex<State>,
     header_timeout: Duration,
     idle_timeout: Duration,
 }
@@ -48,7 +48,7 @@ impl Pace {
             blocked_until: None,
         };
         Self {
-            state: watch::Sender::new(state),
+            state: Mutex::new(state),
             header_timeout: limits.header_timeout,
             idle_timeout: limits.idle_timeout,
         }
@@ -56,69 +56,64 @@ impl Pace {
 
     /// Bytes have come.
     pub(super) fn received(&self) {
-        self.state.send_if_modified(|state| {
-            let head_begins = state.phase == Phase::Idle;
-            if head_begins {
-                state.phase = Phase::Head;
-                state.until = Some(Instant::now() + self.header_timeout);
-            }
-            head_begins
-        });
+        let mut state = self.state();
+        if state.phase == Phase::Idle {
+            state.phase = Phase::Head;
+            state.until = Some(Instant::now() + self.header_timeout);
+        }
     }
 
     /// The head of a request is complete.
     pub(super) fn request_begins(&self) {
-        self.state.send_modify(|state| {
-            state.phase = Phase::Service;
-            state.until = None;
-        });
+        let mut state = self.state();
+        state.phase = Phase::Service;
+        state.until = None;
     }
 
     /// The last byte of an answer is on its way.
     pub(super) fn request_ends(&self) {
-        self.state.send_modify(|state| {
-            state.phase = Phase::Idle;
-            state.until = Some(Instant::now() + self.idle_timeout);
-        });
+        let mut state = self.state();
+        state.phase = Phase::Idle;
+        state.until = Some(Instant::now() + self.idle_timeout);
     }
 
     /// The client takes, or does not take, what it is sent.
     pub(super) fn sending(&self, is_blocked: bool) {
-        self.state.send_if_modified(|state| {
-            let changes = is_blocked != state.blocked_until.is_some();
-            if changes {
-                state.blocked_until = is_blocked.then(|| Instant::now() + self.idle_timeout);
-            }
-            changes
-        });
+        let mut state = self.state();
+        if is_blocked != state.blocked_until.is_some() {
+            state.blocked_until = is_blocked.then(|| Instant::now() + self.idle_timeout);
+        }
     }
 
     /// Whether there was no request yet.
     pub(super) fn awaits_first_request(&self) -> bool {
-        self.state.borrow().phase == Phase::FirstHead
+        self.state().phase == Phase::FirstHead
     }
 
     /// Waits until the client has taken too long.
+    ///
+    /// Looks now and then, so that requests need not wake it: what is set between two looks is no earlier
+    /// than the second, because they are no further apart than the shortest timeout.
     pub(super) async fn overdue(&self) {
-        let mut changes = self.state.subscribe();
         loop {
-            let State {
-                until,
-                blocked_until,
-                ..
-            } = *changes.borrow_and_update();
-            let deadline = [until, blocked_until].into_iter().flatten().min();
-            let passed = async {
-                match deadline {
-                    Some(deadline) => sleep_until(deadline).await,
-                    None => pending().await,
-                }
-            };
-            tokio::select! {
-                // The sender is `self`, so the channel cannot close meanwhile.
-                _ = changes.changed() => {}
-                () = passed => return,
+            let now = Instant::now();
+            let next_look = now + self.header_timeout.min(self.idle_timeout);
+            let deadline = self.state().deadline();
+            if deadline.is_some_and(|deadline| deadline <= now) {
+                return;
             }
+            sleep_until(deadline.map_or(next_look, |deadline| deadline.min(next_look))).await;
         }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // No change can panic half-way.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn deadline(&self) -> Option<Instant> {
+        [self.until, self.blocked_until].into_iter().flatten().min()
     }
 }

@@ -22,6 +22,9 @@ pub struct IncomingTrace<'a> {
 impl IncomingTrace<'_> {
     /// The caller's span as a parent; a context without a span where the headers tell of none.
     pub(super) fn context(&self) -> Context {
+        if self.parent.is_none() {
+            return Context::new();
+        }
         TraceContextPropagator::new().extract_with_context(&Context::new(), self)
     }
 }

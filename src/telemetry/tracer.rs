@@ -79,12 +79,12 @@ impl Tracer {
     /// The trace of a request that begins now. Its span ends with [`RequestTrace::end`], or with the
     /// last clone of it.
     #[must_use]
-    pub fn request(&self, name: String, incoming: &IncomingTrace) -> RequestTrace {
+    pub fn request(&self, name: impl FnOnce() -> String, incoming: &IncomingTrace) -> RequestTrace {
         let parent = incoming.context();
         let Some(Exporting { tracer, .. }) = &self.0 else {
             return RequestTrace::not_recorded(&parent);
         };
-        let span = SpanBuilder::from_name(name).with_kind(SpanKind::Server);
+        let span = SpanBuilder::from_name(name()).with_kind(SpanKind::Server);
         let span = tracer.build_with_context(span, &parent);
         RequestTrace::recorded(&parent.with_span(span), tracer)
     }

@@ -3,7 +3,7 @@
 use axum::{
     body::Body,
     extract::{
-        FromRequest, Multipart, Request,
+        DefaultBodyLimit, FromRequest, Multipart, Request,
         multipart::{Field, MultipartError},
     },
     http::request::Parts,
@@ -49,7 +49,9 @@ pub(super) async fn parse(
     body: Bytes,
     use_of: fn(&str) -> FieldUse,
 ) -> Result<Form, Problem> {
-    let request = Request::from_parts(parts, Body::from(body));
+    let mut request = Request::from_parts(parts, Body::from(body));
+    // The body was bounded when it was read.
+    DefaultBodyLimit::disable().apply(&mut request);
     let mut multipart = Multipart::from_request(request, &())
         .await
         .map_err(|_| malformed("the Content-Type must be multipart/form-data with a boundary"))?;
