@@ -83,6 +83,7 @@ bench-full: ## the benchmarks for figures to rely on: two hours on a machine tha
 bench: BENCH = short
 bench-full: BENCH = full
 bench bench-full:
+	@scripts/packages.sh haproxy
 	@$(PYTHON) scripts/setup.py toolchain runtime model benches
 	cargo build --release --locked --target-dir target
 	cargo build --release --locked --example load --target-dir target

@@ -6,9 +6,12 @@ import urllib.request
 from dataclasses import dataclass, field
 
 from harness.effort import Effort
+from harness.figures import ratios, spread
+from harness.haproxy import haproxy
 from harness.lookdown import detect, lookdown, report
 from harness.pictures import frame
-from harness.tables import table
+from harness.processes import Server
+from harness.tables import spread_cell, table
 
 POLLERS = 200
 LISTENERS = 1000
@@ -34,19 +37,34 @@ class Heard:
 
 
 def measure(effort: Effort) -> dict:
-    """The cost of pollers without new reports, as most polls are; then listeners and new reports."""
-    with lookdown(SETTINGS) as server:
+    """The cost of pollers without new reports, as most polls are, in turns with a server that only answers; then
+    listeners and new reports."""
+    seconds = max(effort.seconds, 5.0)
+    ours, least = [], []
+    with lookdown(SETTINGS) as server, haproxy() as other:
         report(server, detect("fast"), frame())
         tag = server_tag(server)
-        seconds = max(effort.seconds, 5.0)
-        before, began = server.usage().cpu_seconds, time.monotonic()
-        statuses = asyncio.run(poll(server.address, tag, seconds))
-        polling = (server.usage().cpu_seconds - before) / (time.monotonic() - began)
+        for _ in range(effort.rounds):
+            ours.append(polled(server, tag, seconds))
+            least.append(polled(other, tag, seconds))
         listening = asyncio.run(listen(server))
-    return {"polling": {"statuses": statuses, "cores": polling}, "listening": listening}
+    return {
+        "statuses": ours[-1]["statuses"],
+        "percent": [turn["percent"] for turn in ours],
+        "least_percent": [turn["percent"] for turn in least],
+        "listening": listening,
+    }
 
 
-def server_tag(server) -> str:
+def polled(server: Server, tag: str, seconds: float) -> dict:
+    """What was answered to the pollers, and the share of a core that it took."""
+    before, began = server.usage().cpu_seconds, time.monotonic()
+    statuses = asyncio.run(poll(server.address, tag, seconds))
+    cores = (server.usage().cpu_seconds - before) / (time.monotonic() - began)
+    return {"statuses": statuses, "percent": 100 * cores}
+
+
+def server_tag(server: Server) -> str:
     """The entity tag of the latest report."""
     with urllib.request.urlopen(f"http://{server.address}{PATH}", timeout=10) as answer:
         return answer.headers["ETag"]
@@ -73,7 +91,7 @@ async def poll(address: str, tag: str, seconds: float) -> dict[str, int]:
     return statuses
 
 
-async def listen(server) -> dict:
+async def listen(server: Server) -> dict:
     """Memory with everybody listening, and whether each hears of each report."""
     heard, idle = Heard(), server.usage().resident_bytes
 
@@ -116,11 +134,13 @@ async def connect(address: str) -> tuple[asyncio.StreamReader, asyncio.StreamWri
 
 def tell(raw: dict) -> str:
     """Both as Markdown."""
-    polling, listening = raw["polling"], raw["listening"]
-    answers = ", ".join(f"{count} × {status}" for status, count in sorted(polling["statuses"].items()))
+    listening = raw["listening"]
+    answers = ", ".join(f"{count} × {status}" for status, count in sorted(raw["statuses"].items()))
     rows = [
         (f"{POLLERS} pollers, one poll a second each with its ETag: answers", answers),
-        ("**share of a core**, %", 100 * polling["cores"]),
+        ("**share of a core**, %", spread_cell(spread(raw["percent"]).as_json())),
+        ("HAProxy's for as many answers that are in its settings, in turns, %", spread_cell(spread(raw["least_percent"]).as_json())),
+        ("ours ÷ HAProxy's", spread_cell(ratios(raw["percent"], raw["least_percent"]).as_json())),
         (f"{LISTENERS} listeners (server-sent events): reports heard of {LISTENERS * (REPORTS + 1)}", listening["heard"]),
         ("memory for each, KiB", listening["kib_each"]),
         ("memory with all of them, MiB", listening["mib"]),

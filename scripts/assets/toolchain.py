@@ -13,7 +13,7 @@ VERSION = re.compile(r"rustc (\d+)\.(\d+)")
 
 
 def check_toolchain(root: Path) -> None:
-    """Cargo, a Rust that is new enough, and the linker that Rust calls. No C is compiled."""
+    """Cargo, a Rust that is new enough, and the C compiler, which compiles a crate's C and links."""
     wanted = tomllib.loads((root / "Cargo.toml").read_text(encoding="utf-8"))["package"]["rust-version"]
     advice = f"install Rust {wanted} or newer, with rustup or from your distribution, and run the set-up again"
     for program in ("cargo", "rustc"):

@@ -9,9 +9,10 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from harness.places import LOOKDOWN, ROOT, SAMPLES
+from harness.places import LOOKDOWN, ROOT, SAMPLES, model
 from harness.processes import free_ports, running
 from kubernetes.tools import manifests, only, read_yaml, run
+from waiting import wait_until
 
 MONITORING = ROOT / "k8s" / "monitoring"
 UNIT_TESTS = Path(__file__).with_name("kubernetes") / "alerts_test.yaml"
@@ -77,7 +78,7 @@ class Monitoring(unittest.TestCase):
         run(["promtool", "test", "rules", self.folder / "test.yaml"])
 
     def test_every_metric_and_label_that_is_asked_for_is_in_a_scrape(self):
-        scrape = self.scrape()
+        scrape = self.scrape() + self.scrape_of_one_that_is_cut_off()
         queries = [rule["expr"] for rule in self.rules] + self.panels
         queries += [self.adapter["seriesQuery"], self.adapter["metricsQuery"]]
         asked = {found.groups() for query in queries for found in SELECTOR.finditer(query)}
@@ -111,6 +112,22 @@ class Monitoring(unittest.TestCase):
             connection = http.client.HTTPSConnection("localhost", port, timeout=60, context=context)
             connection.request("POST", "/detect?profile=fast", (SAMPLES / "office.jpg").read_bytes())
             self.assertEqual(connection.getresponse().status, 200)
+            return server.get("/metrics").decode()
+
+    def scrape_of_one_that_is_cut_off(self) -> str:
+        """The metrics of a server whose inference server does not answer."""
+        port, nobody = free_ports(2)
+        settings = {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "INFERENCE__BACKEND": "v2",
+            "INFERENCE__URL": f"http://127.0.0.1:{nobody}",
+            "INFERENCE__MODEL": "nanodet_g_416",
+            "MODEL__PATH": str(model("nanodet_g_416").parent),
+            "SHUTDOWN__GRACE_MILLIS": "0",
+        }
+        environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
+        with running("cut-off", [str(LOOKDOWN), "serve"], port, "/livez", environment) as server:
+            wait_until(lambda: b"\nlookdown_remote_up 0\n" in server.get("/metrics"), "the outage is known")
             return server.get("/metrics").decode()
 
     def write(self, name: str, content: dict) -> None:
