@@ -70,7 +70,7 @@ impl Pace {
         state.until = None;
     }
 
-    /// The last byte of an answer is on its way.
+    /// All of an answer is ready to be sent.
     pub(super) fn request_ends(&self) {
         let mut state = self.state();
         state.phase = Phase::Idle;
@@ -82,6 +82,10 @@ impl Pace {
         let mut state = self.state();
         if is_blocked != state.blocked_until.is_some() {
             state.blocked_until = is_blocked.then(|| Instant::now() + self.idle_timeout);
+        }
+        // The body of an answer may be given up long before its last byte is taken.
+        if !is_blocked && state.phase == Phase::Idle {
+            state.until = Some(Instant::now() + self.idle_timeout);
         }
     }
 
@@ -115,5 +119,63 @@ impl Pace {
 impl State {
     fn deadline(&self) -> Option<Instant> {
         [self.until, self.blocked_until].into_iter().flatten().min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroUsize;
+
+    use tokio::time::{advance, timeout};
+
+    use super::*;
+
+    const IDLE: Duration = Duration::from_secs(4);
+
+    fn pace() -> Pace {
+        Pace::new(&ConnectionLimits {
+            max_connections: NonZeroUsize::MIN,
+            header_timeout: Duration::from_secs(1),
+            idle_timeout: IDLE,
+            max_header_bytes: 1024,
+            max_headers: 10,
+        })
+    }
+
+    async fn is_overdue(pace: &Pace) -> bool {
+        timeout(Duration::from_millis(1), pace.overdue())
+            .await
+            .is_ok()
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_client_that_goes_on_taking_its_answer_slowly_may_finish() {
+        let pace = pace();
+        pace.request_begins();
+        pace.request_ends();
+        for _ in 0..5 {
+            pace.sending(true);
+            advance(IDLE / 2).await;
+            pace.sending(false);
+            assert!(!is_overdue(&pace).await);
+        }
+        pace.sending(true);
+        advance(IDLE).await;
+        assert!(is_overdue(&pace).await);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_deadline_that_is_set_while_somebody_waits_is_kept_to() {
+        let pace = pace();
+        pace.request_begins();
+        pace.request_ends();
+        let began = Instant::now();
+        let head = async {
+            tokio::time::sleep(IDLE / 3).await;
+            pace.received();
+        };
+        tokio::join!(pace.overdue(), head);
+        let since_received = began.elapsed().saturating_sub(IDLE / 3);
+        assert_eq!(since_received.as_secs(), 1);
     }
 }
