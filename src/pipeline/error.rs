@@ -22,6 +22,14 @@ pub enum PipelineError {
         /// The ID asked for.
         id: String,
     },
+    /// The caller named a calibration whose file gives none.
+    #[error("calibration: {id:?} cannot be used: {problem}")]
+    UnusableCalibration {
+        /// The ID asked for.
+        id: String,
+        /// What is wrong with the file, or which of its cameras to name.
+        problem: String,
+    },
     /// The caller asked for a model that is not loaded.
     #[error("model: {name:?} is not loaded; use one of {loaded}, or leave it out")]
     UnknownModel {

@@ -68,6 +68,28 @@ async fn what_is_not_there_is_404_and_says_where_to_look() {
 }
 
 #[tokio::test]
+async fn a_frame_for_a_file_that_gives_no_calibration_is_told_what_to_name() {
+    let service = Service::start();
+    let rig = include_str!("../fixtures/calibrations/kalibr_camchain.yaml");
+    fs::write(service.folder.path().join("rig.yaml"), rig).unwrap();
+    fs::write(service.folder.path().join("hall.json"), "{}").unwrap();
+    service.calibrations.refresh();
+    for (calibration, told) in [
+        ("rig", "name one of rig-cam0, rig-cam1"),
+        ("hall", "cannot be used"),
+    ] {
+        let answer = service
+            .post_raw(&format!("calibration={calibration}"), frame())
+            .await;
+        assert_eq!(answer.status, 404);
+        let problem = answer.problem();
+        assert_eq!(problem["type"], "urn:lookdown:problem:unknown-calibration");
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains(told), "{detail}");
+    }
+}
+
+#[tokio::test]
 async fn a_broken_new_version_is_told_everywhere_and_the_old_one_serves() {
     let service = Service::start();
     let before = service.get(PATH).await;

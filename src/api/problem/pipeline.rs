@@ -11,7 +11,8 @@ impl From<PipelineError> for Problem {
         let kind = match &error {
             PipelineError::Parameter(error) => kind_of_parameter_error(error),
             PipelineError::Image(error) => kind_of_decode_error(error),
-            PipelineError::UnknownCalibration { .. } => ProblemKind::UnknownCalibration,
+            PipelineError::UnknownCalibration { .. }
+            | PipelineError::UnusableCalibration { .. } => ProblemKind::UnknownCalibration,
             PipelineError::UnknownModel { .. } => ProblemKind::UnknownModel,
             PipelineError::AspectMismatch { .. } | PipelineError::FrameTooSmall { .. } => {
                 ProblemKind::UnfitImage

@@ -4,11 +4,11 @@ use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 use super::Engine;
 use crate::{
-    calibration::{Areas, Calibration, CalibrationId, CameraGeometry},
+    calibration::{Areas, Calibration, CalibrationError, CalibrationId, CameraGeometry},
     geometry::{Lens, Mount},
     imaging::{
         Frame, NetworkInput,
-        lens_circle::{assumed_circle, find_lens_circle},
+        lens_circle::{LensCircle, assumed_circle, find_lens_circle},
     },
     inference::Model,
     pipeline::{
@@ -23,6 +23,22 @@ use crate::{
 /// Circles are rounded to this share of the radius, so that the jitter of one camera's frames
 /// finds one rig: a quarter of a percent moves no box by a visible amount.
 const CIRCLE_STEP_SHARE: f64 = 1.0 / 400.0;
+
+/// The camera with about that circle.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "steps within a bounded frame"
+)]
+fn rounded(circle: &LensCircle) -> RigCamera {
+    // The radius in steps that grow with it, and the centre in those that belong to it.
+    let radius = (circle.radius.max(1.0).ln() / CIRCLE_STEP_SHARE).round();
+    let step = ((radius * CIRCLE_STEP_SHARE).exp() * CIRCLE_STEP_SHARE).max(0.5);
+    RigCamera::Assumed {
+        cx: (circle.cx / step).round() as i64,
+        cy: (circle.cy / step).round() as i64,
+        radius: radius as i64,
+    }
+}
 
 /// The camera of a frame.
 pub(super) struct FrameCamera {
@@ -74,9 +90,13 @@ impl Engine {
 
     fn find_calibration(&self, id: &CalibrationId) -> Result<Arc<Calibration>, PipelineError> {
         let found = match &self.calibrations {
-            Some(calibrations) => calibrations
-                .get(id)
-                .map_err(|error| internal(anyhow::Error::new(error)))?,
+            Some(calibrations) => calibrations.get(id).map_err(|error| match error {
+                CalibrationError::Stored { problem, .. } => PipelineError::UnusableCalibration {
+                    id: id.to_string(),
+                    problem,
+                },
+                error => internal(anyhow::Error::new(error)),
+            })?,
             None => None,
         };
         found.ok_or_else(|| PipelineError::UnknownCalibration { id: id.to_string() })
@@ -96,17 +116,7 @@ impl Engine {
                 "taken to be as large as the frame, as none was found",
             ),
         };
-        let step = (circle.radius * CIRCLE_STEP_SHARE).max(0.5);
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "steps within a bounded frame"
-        )]
-        let steps = |value: f64| (value / step).round() as i64;
-        let camera = RigCamera::Assumed {
-            cx: steps(circle.cx),
-            cy: steps(circle.cy),
-            radius: steps(circle.radius),
-        };
+        let camera = rounded(&circle);
         let lens = Lens::equidistant_circle(circle.cx, circle.cy, circle.radius, FRAC_PI_2)
             .map_err(|error| internal(anyhow::Error::new(error)))?;
         warnings.push(format!(
@@ -150,5 +160,28 @@ impl Engine {
             self.remappers
                 .install(|| CameraRig::new(geometry, width, height, plan.as_ref(), input))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(cx: f64, cy: f64, radius: f64) -> LensCircle {
+        LensCircle { cx, cy, radius }
+    }
+
+    #[test]
+    fn circles_that_differ_are_cameras_of_their_own_also_in_proportion() {
+        let camera = rounded(&circle(840.0, 840.0, 830.0));
+        assert_ne!(rounded(&circle(800.0, 800.0, 790.476)), camera);
+        assert_ne!(rounded(&circle(846.0, 840.0, 830.0)), camera);
+        assert_ne!(rounded(&circle(840.0, 840.0, 836.0)), camera);
+    }
+
+    #[test]
+    fn the_jitter_of_a_cameras_circle_leaves_it_the_same_camera() {
+        let camera = rounded(&circle(840.0, 840.0, 830.0));
+        assert_eq!(rounded(&circle(840.2, 839.8, 830.2)), camera);
     }
 }
