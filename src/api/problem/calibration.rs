@@ -1,4 +1,4 @@
-//! Refused changes of calibrations as problems: the only place that decides their status.
+//! Changes of calibrations that came to nothing as problems: the only place that decides their status.
 
 use super::{Problem, ProblemKind};
 use crate::calibration::{ChangeError, StoreError};
@@ -13,6 +13,12 @@ impl From<ChangeError> for Problem {
             | ChangeError::UnknownCamera { .. } => ProblemKind::InvalidCalibration,
             ChangeError::Outdated { .. } => ProblemKind::Outdated,
             ChangeError::Shared { .. } => ProblemKind::CalibrationConflict,
+            ChangeError::Unseen(_) => {
+                tracing::warn!("{error}");
+                let detail = "the calibration was changed, but cannot be looked at now: get it \
+                              before you send the change again";
+                return Self::new(ProblemKind::CalibrationsUnreachable, detail);
+            }
             ChangeError::Store(StoreError::ReadOnly { .. }) => {
                 tracing::warn!("a calibration was not changed: {error}");
                 let detail = "calibrations cannot be changed here: their store is read only";

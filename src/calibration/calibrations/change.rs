@@ -48,7 +48,7 @@ impl Calibrations {
     /// returns. Blocks.
     ///
     /// # Errors
-    /// [`ChangeError`]; then nothing has changed.
+    /// [`ChangeError`]; then nothing has changed, but for [`ChangeError::Unseen`].
     pub fn put(
         &self,
         id: &CalibrationId,
@@ -73,13 +73,13 @@ impl Calibrations {
         }
         let expected = condition.replaces(file.map(|file| &file.named.file), &name);
         self.store.write(&name, written.as_bytes(), expected)?;
-        // It hides the others, so that a kill in between does no harm.
-        for hidden in file.into_iter().flat_map(|file| file.names()) {
-            if hidden != name {
-                self.store.delete(hidden)?;
-            }
-        }
-        self.look(&changing)?;
+        // It hides the others, so that neither a kill nor a failure from here on does harm.
+        let others = file.into_iter().flat_map(|file| file.names());
+        others
+            .filter(|other| *other != name)
+            .try_for_each(|hidden| self.store.delete(hidden))
+            .and_then(|()| self.look(&changing))
+            .map_err(ChangeError::Unseen)?;
         Ok(Put {
             entry: Arc::new(entry),
             created: replaced.is_none(),
@@ -121,8 +121,7 @@ impl Calibrations {
         for name in file.names().rev() {
             self.store.delete(name)?;
         }
-        self.look(&changing)?;
-        Ok(())
+        self.look(&changing).map_err(ChangeError::Unseen)
     }
 }
 

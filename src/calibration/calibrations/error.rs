@@ -1,8 +1,8 @@
-//! Why a calibration was not changed.
+//! Why a calibration was not changed, or nobody knows.
 
 use crate::calibration::{CalibrationId, FormatError, StoreError};
 
-/// A calibration that was not changed. Every message is one sentence with the remedy.
+/// A calibration that was not changed, or that could not be looked at afterwards. Every message is one sentence with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
     /// The operator has switched changes off.
@@ -53,6 +53,9 @@ pub enum ChangeError {
         /// The IDs of the cameras.
         ids: Vec<String>,
     },
+    /// The change was made, but could not be looked at.
+    #[error("the calibration was changed, but {0}")]
+    Unseen(StoreError),
     /// The store did not do it.
     #[error(transparent)]
     Store(StoreError),

@@ -1,4 +1,8 @@
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 use super::*;
 use crate::calibration::{FolderStore, Replaces, StoredFile};
@@ -167,6 +171,53 @@ fn a_file_that_cannot_be_read_is_tried_again_and_told_once() {
     assert_eq!(calibrations.health().loads_failed, 1);
     let error = calibrations.get(&id("lobby")).unwrap_err().to_string();
     assert_eq!(error, "liar/lobby.json: liar: it is gone");
+}
+
+#[test]
+fn a_change_that_cannot_be_looked_at_is_not_said_to_have_failed() {
+    /// Takes what is written and then does not answer.
+    #[derive(Debug, Default)]
+    struct Mute(AtomicBool);
+    impl CalibrationStore for Mute {
+        fn place(&self) -> String {
+            "mute".to_owned()
+        }
+        fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
+            if self.0.load(Ordering::Relaxed) {
+                let (place, problem) = (self.place(), "it is silent".to_owned());
+                return Err(StoreError::Unreachable { place, problem });
+            }
+            Ok(Vec::new())
+        }
+        fn read(&self, _: &[&str], _: usize) -> Vec<Result<Vec<u8>, StoreError>> {
+            Vec::new()
+        }
+        fn write(&self, _: &str, _: &[u8], _: Replaces<'_>) -> Result<(), StoreError> {
+            self.0.store(true, Ordering::Relaxed);
+            Ok(())
+        }
+        fn delete(&self, _: &str) -> Result<(), StoreError> {
+            Ok(())
+        }
+    }
+    let calibrations = Calibrations::open(Box::new(Mute::default()), true).unwrap();
+    let put = || {
+        let content = content("lobby", 190.0);
+        let always = WriteCondition::Always;
+        calibrations.put(
+            &id("lobby"),
+            content.as_bytes(),
+            &Reading::default(),
+            &always,
+        )
+    };
+    let changed = put().unwrap_err();
+    assert!(matches!(changed, ChangeError::Unseen(_)), "{changed}");
+    let not_changed = put().unwrap_err();
+    assert!(
+        matches!(not_changed, ChangeError::Store(_)),
+        "{not_changed}"
+    );
 }
 
 #[test]
