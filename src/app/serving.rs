@@ -12,7 +12,6 @@ use tokio::{
 use super::{App, Sockets};
 use crate::{
     api::{self, Phase},
-    inference::{InferenceError, RepositoryError},
     server::{self, Services},
     settings::{Settings, ShutdownSettings},
     shutdown::Shutdown,
@@ -20,8 +19,8 @@ use crate::{
 
 /// Longest that the end waits for the MQTT broker.
 const FAREWELL: Duration = Duration::from_secs(3);
-/// How long to wait for a server that networks run on before it is asked again.
-const REMOTE_AWAY: Duration = Duration::from_secs(1);
+/// How long to wait before a model is loaded that could not be for a reason that passes.
+const BEFORE_ANOTHER_LOAD: Duration = Duration::from_secs(1);
 
 impl App {
     /// Serves until `shutdown` asks for an end. Then readiness goes, and everything is served on for
@@ -137,11 +136,10 @@ impl App {
         sleep(drain_timeout).await;
     }
 
-    /// Loads a model, when the server that it runs on is there.
+    /// Loads a model, when the server that it runs on is there and has a place, and no other is being loaded.
     async fn load(&self, name: String, shutdown: &Shutdown) -> anyhow::Result<()> {
         loop {
-            let remote = self.models.remote();
-            let loaded = if remote.is_none_or(|remote| remote.is_available()) {
+            let loaded = if self.models.is_remote_available() {
                 let (models, name) = (Arc::clone(&self.models), name.clone());
                 Some(spawn_blocking(move || models.load(&name)).await?)
             } else {
@@ -149,11 +147,12 @@ impl App {
             };
             match loaded {
                 Some(Ok(_)) => return Ok(()),
-                None | Some(Err(RepositoryError::Refused(InferenceError::Remote { .. }))) => {}
+                None => {}
+                Some(Err(error)) if error.is_passing() => {}
                 Some(Err(error)) => return Err(error.into()),
             }
             tokio::select! {
-                () = sleep(REMOTE_AWAY) => {}
+                () = sleep(BEFORE_ANOTHER_LOAD) => {}
                 () = shutdown.requested() => return Ok(()),
             }
         }

@@ -112,6 +112,14 @@ impl ModelRepository {
         self.remote.as_ref()
     }
 
+    /// Whether networks can run as far as another server decides.
+    #[must_use]
+    pub fn is_remote_available(&self) -> bool {
+        self.remote
+            .as_ref()
+            .is_none_or(|remote| remote.is_available())
+    }
+
     /// The models that answer.
     #[must_use]
     pub fn registry(&self) -> &Arc<ModelRegistry> {
@@ -133,10 +141,7 @@ impl ModelRepository {
     /// [`RepositoryError`] when there is no such model, it fails its check, there is no room, or
     /// another model is being loaded.
     pub fn load(&self, name: &str) -> Result<Arc<Model>, RepositoryError> {
-        let mut memory = self.memory.try_lock().or_else(|error| match error {
-            TryLockError::Poisoned(poisoned) => Ok(poisoned.into_inner()),
-            TryLockError::WouldBlock => Err(RepositoryError::Busy),
-        })?;
+        let mut memory = self.try_lock()?;
         let path = self.options.folder.find(name)?;
         self.replace(&mut memory, name, &path)
     }
@@ -144,13 +149,15 @@ impl ModelRepository {
     /// Takes a model out. Frames that began with it finish with it.
     ///
     /// # Errors
-    /// [`RepositoryError`] when it is not loaded, or must be kept.
+    /// [`RepositoryError`] when it is not loaded, must be kept, or a model is being loaded, which may be
+    /// this one.
     pub fn unload(&self, name: &str) -> Result<(), RepositoryError> {
         if self.options.kept.iter().any(|kept| kept == name) {
             return Err(RepositoryError::Kept {
                 name: name.to_owned(),
             });
         }
+        let _no_load = self.try_lock()?;
         let removed = self.registry.remove(name);
         let removed = removed.ok_or_else(|| RepositoryError::NotLoaded {
             name: name.to_owned(),
@@ -184,6 +191,9 @@ impl ModelRepository {
     /// none is read while it is written, and a model that failed is not tried again until they
     /// change again.
     pub fn reload_changed(&self) {
+        if !self.is_remote_available() {
+            return;
+        }
         let mut memory = self.lock();
         for model in self.registry.all() {
             let Some(files) = model.files() else { continue };
@@ -234,7 +244,9 @@ impl ModelRepository {
             Err(error) => {
                 self.failed.fetch_add(1, Ordering::Relaxed);
                 memory.failures.insert(name.to_owned(), error.to_string());
-                memory.refused.insert(name.to_owned(), stamp);
+                if !error.is_passing() {
+                    memory.refused.insert(name.to_owned(), stamp);
+                }
                 tracing::error!(model = name, "not loaded: {error}");
                 Err(error)
             }
@@ -256,6 +268,14 @@ impl ModelRepository {
         });
         model.warm_up(self.options.warm_up_views)?;
         Ok(model)
+    }
+
+    /// Unless a model is being loaded.
+    fn try_lock(&self) -> Result<MutexGuard<'_, Memory>, RepositoryError> {
+        self.memory.try_lock().or_else(|error| match error {
+            TryLockError::Poisoned(poisoned) => Ok(poisoned.into_inner()),
+            TryLockError::WouldBlock => Err(RepositoryError::Busy),
+        })
     }
 
     fn lock(&self) -> MutexGuard<'_, Memory> {

@@ -1,15 +1,35 @@
 //! Loading, reloading and unloading, and what failures leave behind.
 
-use std::{fs, num::NonZeroUsize};
+use std::{
+    fs,
+    num::NonZeroUsize,
+    sync::{
+        Arc, Barrier,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+};
 
 use lookdown::inference::{
-    ModelFolder, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
+    InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
 };
 use tempfile::TempDir;
 
 use crate::folder::{fixture, model_of_two_sessions, write};
 
 const OTHER_ORDER: &str = "[input]\nchannel_order = \"bgr\"";
+
+/// Those of the models in a folder, of which `a` must stay.
+fn options_of(folder: &TempDir) -> RepositoryOptions {
+    RepositoryOptions {
+        folder: ModelFolder {
+            path: folder.path().to_owned(),
+            elsewhere: None,
+        },
+        warm_up_views: NonZeroUsize::new(3).unwrap(),
+        kept: vec!["a".to_owned()],
+    }
+}
 
 struct Models {
     repository: ModelRepository,
@@ -23,19 +43,8 @@ impl Models {
         for name in ["a", "b"] {
             write(&folder.path().join(name), name, "", &fixture("any_batch"));
         }
-        let options_of_repository = RepositoryOptions {
-            folder: ModelFolder {
-                path: folder.path().to_owned(),
-                elsewhere: None,
-            },
-            warm_up_views: NonZeroUsize::new(3).unwrap(),
-            kept: vec!["a".to_owned()],
-        };
         Self {
-            repository: ModelRepository::new(
-                options_of_repository,
-                Box::new(model_of_two_sessions),
-            ),
+            repository: ModelRepository::new(options_of(&folder), Box::new(model_of_two_sessions)),
             folder,
         }
     }
@@ -180,6 +189,59 @@ fn a_manifest_that_breaks_is_told_about_once_and_changes_nothing() {
     }
     assert_eq!(models.counts(), (1, 1));
     assert!(models.row("a").reason.unwrap().contains("line 1"));
+}
+
+#[test]
+fn nothing_is_unloaded_while_a_model_is_being_loaded() {
+    let Models { folder, .. } = Models::new();
+    let at_work = Arc::new(Barrier::new(2));
+    let at_work_too = Arc::clone(&at_work);
+    let repository = ModelRepository::new(
+        options_of(&folder),
+        Box::new(move |path| {
+            at_work_too.wait();
+            at_work_too.wait();
+            model_of_two_sessions(path)
+        }),
+    );
+    thread::scope(|scope| {
+        let loading = scope.spawn(|| repository.load("b"));
+        at_work.wait();
+        let refused = repository.unload("b").unwrap_err();
+        assert!(matches!(refused, RepositoryError::Busy), "{refused}");
+        at_work.wait();
+        loading.join().unwrap().unwrap();
+    });
+    repository.unload("b").unwrap();
+}
+
+#[test]
+fn files_that_changed_while_the_inference_server_was_away_are_tried_again() {
+    let models = Models::new();
+    let folder = &models.folder;
+    let is_away = Arc::new(AtomicBool::new(false));
+    let away = Arc::clone(&is_away);
+    let repository = ModelRepository::new(
+        options_of(folder),
+        Box::new(move |path| {
+            if away.load(Ordering::Relaxed) {
+                let (url, detail) = ("http://elsewhere".to_owned(), "silence".to_owned());
+                return Err(InferenceError::Remote { url, detail });
+            }
+            model_of_two_sessions(path)
+        }),
+    );
+    let before = repository.load("a").unwrap().revision().to_owned();
+    models.write("a", OTHER_ORDER, "any_batch");
+    is_away.store(true, Ordering::Relaxed);
+    repository.reload_changed();
+    repository.reload_changed();
+    assert_eq!(repository.load_counts().failed, 1);
+    is_away.store(false, Ordering::Relaxed);
+    repository.reload_changed();
+    repository.reload_changed();
+    let now = repository.registry().get("a").unwrap();
+    assert_ne!(now.revision(), before);
 }
 
 #[test]

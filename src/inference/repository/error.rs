@@ -47,3 +47,15 @@ pub enum RepositoryError {
     #[error(transparent)]
     Refused(#[from] InferenceError),
 }
+
+impl RepositoryError {
+    /// Whether it says nothing of the model, which may be loaded in a moment.
+    #[must_use]
+    pub fn is_passing(&self) -> bool {
+        matches!(
+            self,
+            Self::Busy
+                | Self::Refused(InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. })
+        )
+    }
+}
