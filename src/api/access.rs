@@ -65,8 +65,7 @@ impl FromRequestParts<ApiState> for ModelReader {
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
         let access = &state.options.access;
-        access.refuse_others_without_keys()?;
-        access.check(&parts.headers, Scope::Read)?;
+        access.check_of_its_own(&parts.headers, Scope::Read)?;
         Ok(Self)
     }
 }
@@ -76,8 +75,7 @@ impl FromRequestParts<ApiState> for Administrator {
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
         let access = &state.options.access;
-        access.refuse_others_without_keys()?;
-        access.check(&parts.headers, Scope::Admin)?;
+        access.check_of_its_own(&parts.headers, Scope::Admin)?;
         Ok(Self)
     }
 }
@@ -123,7 +121,8 @@ impl Access {
         }
     }
 
-    fn refuse_others_without_keys(&self) -> Result<(), Problem> {
+    /// The same for what is open to nobody but the server's own machine where there are no keys.
+    fn check_of_its_own(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
         match self {
             Self::Open {
                 own_machine_only: false,
@@ -133,7 +132,7 @@ impl Access {
                               others, too (server.listen)";
                 Err(Problem::new(ProblemKind::Forbidden, detail))
             }
-            _ => Ok(()),
+            _ => self.check(headers, wanted),
         }
     }
 }
