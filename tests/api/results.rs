@@ -10,16 +10,20 @@ use serde_json::{Value, json};
 
 use crate::service::{Answer, Bounds, Service, frame};
 
+/// A report that is nothing but a number.
+pub(crate) fn report(camera: &str, number: usize) -> NewReport {
+    NewReport {
+        camera: camera.to_owned(),
+        received_at: "2026-11-21T09:30:00Z".parse().unwrap(),
+        persons: number,
+        json: Bytes::from(number.to_string()),
+    }
+}
+
 impl Service {
     /// Publishes a report that is nothing but a number.
     pub(crate) fn publish(&self, camera: &str, number: usize) -> ReportId {
-        let report = NewReport {
-            camera: camera.to_owned(),
-            received_at: "2026-11-21T09:30:00Z".parse().unwrap(),
-            persons: number,
-            json: Bytes::from(number.to_string()),
-        };
-        self.results.store(report, None).id
+        self.results.store(report(camera, number), None).id
     }
 
     pub(crate) async fn get_if_none_match(&self, path: &str, tag: &str) -> Answer {

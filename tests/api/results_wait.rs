@@ -9,7 +9,10 @@ use tokio::{
     time::{Instant, sleep},
 };
 
-use crate::service::{Bounds, Service};
+use crate::{
+    results::report,
+    service::{Bounds, Service},
+};
 
 const WAIT: &str = "/results/lobby/latest?wait=10";
 
@@ -37,6 +40,24 @@ async fn whoever_waits_is_answered_as_soon_as_there_is_something_newer() {
     );
     assert_eq!(answer.header("etag"), format!("\"{id}\""));
     service.has_listeners(0).await;
+}
+
+#[tokio::test]
+async fn an_older_report_that_is_told_late_is_no_news() {
+    let service = Service::start();
+    let older = service.results.store(report("lobby", 1), None);
+    let tag = format!("\"{}\"", service.publish("lobby", 2));
+    let (answer, id) = tokio::join!(service.get_if_none_match(WAIT, &tag), async {
+        service.has_listeners(1).await;
+        // As a Redis does whose followers lag behind.
+        service.results.listeners().tell(&older);
+        service.publish("lobby", 3)
+    });
+    assert_eq!(
+        (answer.status.as_u16(), answer.text()),
+        (200, "3".to_owned())
+    );
+    assert_eq!(answer.header("etag"), format!("\"{id}\""));
 }
 
 #[tokio::test]

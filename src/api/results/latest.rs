@@ -98,9 +98,12 @@ async fn news(
         known.map(|known| !known)
     };
     while !report.as_deref().map_or(Ok(false), is_news)?
-        && let Ok(Some(newer)) = timeout_at(limit.at(), listening.next()).await
+        && let Ok(Some(told)) = timeout_at(limit.at(), listening.next()).await
     {
-        report = Some(newer);
+        // What is told may lag behind what was read.
+        if report.as_ref().is_none_or(|now| told.id > now.id) {
+            report = Some(told);
+        }
     }
     Ok(report)
 }
