@@ -46,7 +46,8 @@ const GUARDED: [(&str, &str, &str); 24] = [
     ("POST", "/v2/repository/models/eager/unload", "admin"),
 ];
 
-fn line(name: &str, scopes: &str, key: &str) -> String {
+/// A line of a file of keys.
+pub(crate) fn line(name: &str, scopes: &str, key: &str) -> String {
     let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
     format!("{name} = {{ scopes = [{scopes}], sha256 = \"{digest}\" }}\n")
 }
@@ -61,7 +62,7 @@ fn write_keys(file: &Path) {
     fs::write(file, lines.concat()).unwrap();
 }
 
-fn service_with(keys: &Arc<AccessKeys>) -> Service {
+pub(crate) fn service_with(keys: &Arc<AccessKeys>) -> Service {
     Service::within(&Bounds {
         access: Access::Keys(Arc::clone(keys)),
         ..Bounds::default()

@@ -26,6 +26,7 @@ mod repository;
 mod results;
 mod results_away;
 mod results_events;
+mod results_keys;
 mod results_wait;
 mod serve;
 mod server;

@@ -18,13 +18,22 @@ const EVENTS: &str = "/results/lobby/events";
 const MANY: usize = 100;
 
 /// A stream of events.
-struct Stream(Response);
+pub(crate) struct Stream(Response);
 
 impl Stream {
     async fn open(service: &Service, path: &str, last_heard: Option<&str>) -> Self {
+        let header = last_heard.map(|id| ("last-event-id", id));
+        Self::open_with(service, path, header).await
+    }
+
+    pub(crate) async fn open_with(
+        service: &Service,
+        path: &str,
+        header: Option<(&str, &str)>,
+    ) -> Self {
         let mut request = Request::get(path);
-        if let Some(id) = last_heard {
-            request = request.header("last-event-id", id);
+        if let Some((name, value)) = header {
+            request = request.header(name, value);
         }
         let request = request.body(Body::empty()).unwrap();
         let response = service.router.clone().oneshot(request).await.unwrap();
@@ -33,14 +42,14 @@ impl Stream {
     }
 
     /// The next event or comment; `None` at the end.
-    async fn next(&mut self) -> Option<String> {
+    pub(crate) async fn next(&mut self) -> Option<String> {
         let frame = self.0.body_mut().frame().await?;
         let bytes = frame.unwrap().into_data().unwrap();
         Some(String::from_utf8(bytes.to_vec()).unwrap())
     }
 
     /// The data of the next event, which is a number.
-    async fn number(&mut self) -> usize {
+    pub(crate) async fn number(&mut self) -> usize {
         let event = self.next().await.unwrap();
         let data = event.lines().find_map(|line| line.strip_prefix("data: "));
         data.unwrap().parse().unwrap()

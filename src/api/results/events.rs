@@ -52,7 +52,7 @@ pub(in crate::api) async fn of_camera(
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    stream(&state, Cameras::One(camera), &headers).await
+    stream(state, Cameras::One(camera), headers).await
 }
 
 /// Listen to all cameras.
@@ -76,21 +76,24 @@ pub(in crate::api) async fn of_all(
     _reader: Reader,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    stream(&state, Cameras::All, &headers).await
+    stream(state, Cameras::All, headers).await
 }
 
 async fn stream(
-    state: &ApiState,
+    state: ApiState,
     cameras: Cameras,
-    headers: &HeaderMap,
+    headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let last_heard = headers.get(LAST_EVENT_ID);
     // What is no ID of ours was not heard from us.
     let last_heard = last_heard.and_then(|id| id.to_str().ok()?.parse().ok());
     let feed = Feed::begin(Arc::clone(&state.results), cameras, last_heard).await?;
-    let events = unfold(feed, async |mut feed| {
+    let listener = (feed, state, headers);
+    let events = unfold(listener, async |(mut feed, state, headers)| {
         let event = feed.next().await?;
-        Some((Ok::<_, Infallible>(event), feed))
+        // The stream must not outlive its key.
+        Reader::check(&state, &headers).ok()?;
+        Some((Ok::<_, Infallible>(event), (feed, state, headers)))
     });
     let headers = [(CONTENT_TYPE, "text/event-stream"), (ACCEL_BUFFERING, "no")];
     let cache = [(CACHE_CONTROL, NO_CACHE)];

@@ -70,7 +70,10 @@ pub(in crate::api) async fn get_latest(
         state.results.latest(&camera).await?
     } else {
         let limit = deadline.within(wait);
-        news(&state, &camera, &headers, limit).await?
+        let report = news(&state, &camera, &headers, limit).await?;
+        // The key may have gone meanwhile.
+        Reader::check(&state, &headers)?;
+        report
     };
     let report = report.ok_or_else(|| unknown(&camera))?;
     let id = report.id.to_string();
