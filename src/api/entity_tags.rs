@@ -25,14 +25,19 @@ pub(super) fn is_unmodified(headers: &HeaderMap, value: &str) -> Result<bool, Pr
     })
 }
 
-/// The entity tags in a header. Weak ones are equal to nothing unless `weak` allows them.
+/// The entity tags in a header. Weak ones are equal to nothing unless `weak` allows them. Empty elements are
+/// passed over (RFC 9110, section 5.6.1.2), but not a header without any other: its sender has lost the tag.
 pub(super) fn named(
     headers: &HeaderMap,
     header: &HeaderName,
     weak: bool,
 ) -> Result<Option<Named>, Problem> {
+    if !headers.contains_key(header) {
+        return Ok(None);
+    }
     let mut tags = Vec::new();
     let mut any = false;
+    let mut is_empty = true;
     for value in headers.get_all(header) {
         // A comma may also be a character of a tag.
         let mut in_tag = false;
@@ -40,8 +45,10 @@ pub(super) fn named(
             in_tag ^= *byte == b'"';
             *byte == b',' && !in_tag
         };
-        for tag in value.as_bytes().split(is_between) {
-            let tag = std::str::from_utf8(tag).map_or("", str::trim);
+        let elements = value.as_bytes().split(is_between);
+        for element in elements.filter(|element| !element.trim_ascii().is_empty()) {
+            is_empty = false;
+            let tag = std::str::from_utf8(element).map_or("", str::trim);
             let (is_weak, opaque) = match tag.strip_prefix("W/") {
                 Some(opaque) => (true, opaque),
                 None => (false, tag),
@@ -54,19 +61,22 @@ pub(super) fn named(
                 // A weak tag is no promise about every byte.
                 Some(_) => {}
                 None if tag == "*" => any = true,
-                None => {
-                    let detail = format!(
-                        "{header}: {tag:?} is no entity tag: repeat the ETag of an answer with its \
-                         quotes, or give *"
-                    );
-                    return Err(Problem::new(ProblemKind::MalformedRequest, detail));
-                }
+                None => return Err(no_entity_tag(header, tag)),
             }
         }
     }
-    Ok(match (headers.contains_key(header), any) {
-        (false, _) => None,
-        (true, true) => Some(Named::Any),
-        (true, false) => Some(Named::Tags(tags)),
-    })
+    if is_empty {
+        return Err(no_entity_tag(header, ""));
+    }
+    Ok(Some(if any { Named::Any } else { Named::Tags(tags) }))
 }
+
+fn no_entity_tag(header: &HeaderName, text: &str) -> Problem {
+    let detail = format!(
+        "{header}: {text:?} is no entity tag: repeat the ETag of an answer with its quotes, or give *"
+    );
+    Problem::new(ProblemKind::MalformedRequest, detail)
+}
+
+#[cfg(test)]
+mod tests;
