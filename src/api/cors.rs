@@ -16,6 +16,7 @@ use super::{
     request_id,
     results::events::LAST_EVENT_ID,
 };
+use crate::open_inference::HEAD_LENGTH;
 
 /// The layer that lets pages of these origins call; none when there are none.
 pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
@@ -27,16 +28,18 @@ pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
     if origins.is_empty() {
         return None;
     }
-    let sent: [HeaderName; 7] = [
+    let head_length = HeaderName::from_static(HEAD_LENGTH);
+    let sent: [HeaderName; 8] = [
         AUTHORIZATION,
         API_KEY,
         CONTENT_TYPE,
         IF_MATCH,
         IF_NONE_MATCH,
         LAST_EVENT_ID,
+        head_length.clone(),
         request_id::HEADER,
     ];
-    let read: [HeaderName; 12] = [
+    let read: [HeaderName; 13] = [
         ETAG,
         LOCATION,
         RATE_LIMIT,
@@ -48,6 +51,7 @@ pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
         PERSON_COUNT,
         QUEUE_TIME,
         TOTAL_TIME,
+        head_length,
         request_id::HEADER,
     ];
     let layer = CorsLayer::new()

@@ -289,7 +289,11 @@ async fn pages_of_the_origins_named_may_call_and_no_others() {
         header("access-control-allow-origin"),
         "https://dashboard.example"
     );
-    for name in ["authorization", "x-api-key"] {
+    for name in [
+        "authorization",
+        "x-api-key",
+        "inference-header-content-length",
+    ] {
         assert!(header("access-control-allow-headers").contains(name));
     }
     assert!(header("access-control-allow-methods").contains("put"));

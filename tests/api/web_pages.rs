@@ -145,6 +145,7 @@ async fn pages_that_may_call_may_read_every_header_of_ours() {
         .to_lowercase();
     for name in [
         "etag",
+        "inference-header-content-length",
         "location",
         "ratelimit",
         "ratelimit-policy",
