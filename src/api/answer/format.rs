@@ -79,7 +79,8 @@ impl AnswerFormat {
 fn not_acceptable() -> Problem {
     let offered = NEGOTIABLE.map(|(_, media_type)| media_type).join(", ");
     let detail = format!(
-        "Accept: nothing that it names is offered here: name one of {offered}, leave it out, or          choose with the parameter format"
+        "Accept: nothing that it names is offered here: name one of {offered}, leave it out, or choose \
+         with the parameter format"
     );
     Problem::new(ProblemKind::NotAcceptable, detail)
 }
