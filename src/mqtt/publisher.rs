@@ -186,13 +186,15 @@ impl Publisher {
                 report = queue.recv() => match report {
                     Ok(report) => {
                         let messages = cameras.hear(&report);
-                        let counter = if messages.is_empty() {
+                        let is_one_too_many = messages.is_empty();
+                        let published = session.publish(messages).await;
+                        let counter = if is_one_too_many || published.is_err() {
                             &self.metrics.mqtt_reports_dropped
                         } else {
                             &self.metrics.mqtt_reports_sent
                         };
-                        session.publish(messages).await?;
                         counter.inc();
+                        published?;
                     }
                     Err(RecvError::Lagged(count)) => self.metrics.mqtt_reports_dropped.inc_by(count),
                     Err(RecvError::Closed) => return session.close(self.status(OFFLINE)).await,

@@ -159,6 +159,22 @@ async fn while_there_is_no_broker_reports_are_counted_and_nobody_waits() {
 }
 
 #[tokio::test]
+async fn a_report_that_does_not_get_through_is_counted_as_not_sent() {
+    let setup = setup().await;
+    let running = tokio::spawn(setup.publisher.run());
+    let (mut client, _) = accept(&setup.listener).await;
+    welcome(&mut client).await;
+    assert_eq!(heard(&mut client).await.1, "online");
+    // More than the broker is ever sent.
+    let json = Bytes::from(vec![b' '; 20 << 20]);
+    setup.results.publish(NewReport { json, ..report(1) }, None);
+    setup.results.listeners().end();
+    running.await.unwrap();
+    assert_eq!(setup.metrics.mqtt_reports_dropped.get(), 1);
+    assert_eq!(setup.metrics.mqtt_reports_sent.get(), 0);
+}
+
+#[tokio::test]
 async fn a_new_connection_is_told_what_is_true_now() {
     let setup = setup().await;
     setup.results.publish(report(7), None);
