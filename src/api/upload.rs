@@ -35,7 +35,7 @@ use super::{
 };
 use crate::{
     access::Scope,
-    pipeline::{DetectJob, DetectParameters},
+    pipeline::{DetectJob, DetectParameters, ParameterError},
 };
 
 /// A frame in memory and what its sender wants of it.
@@ -139,14 +139,12 @@ pub(super) fn parameters_named<const COUNT: usize>(
     let mut values = [const { None }; COUNT];
     for (given, value) in query_parameters(uri)? {
         let Some(index) = names.iter().position(|name| *name == given) else {
-            let given: String = given.chars().take(64).collect();
             let known = names.join(", ");
-            let detail = format!("there is no parameter {given:?} here: there is {known}");
-            return Err(Problem::new(ProblemKind::UnknownParameter, detail));
+            let problem = format!("there is no such parameter here; there is {known}");
+            return Err(ParameterError::unknown(&given, problem).into());
         };
         if values[index].replace(value).is_some() {
-            let detail = format!("{given} is given twice: give it once");
-            return Err(Problem::new(ProblemKind::RepeatedParameter, detail));
+            return Err(ParameterError::repeated(&given).into());
         }
     }
     Ok(values)

@@ -29,7 +29,9 @@ pub enum ParameterFault {
 }
 
 impl ParameterError {
-    pub(super) fn unknown(name: &str, problem: String) -> Self {
+    /// There is none of this name; `problem` says which there are.
+    #[must_use]
+    pub fn unknown(name: &str, problem: String) -> Self {
         Self::new(name, problem, ParameterFault::UnknownName)
     }
 

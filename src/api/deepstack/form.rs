@@ -62,10 +62,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         // Clients that have none send it empty.
         let key = keys.next().filter(|(_, key)| !key.is_empty());
         if keys.next().is_some() {
-            return Err(Problem::new(
-                ProblemKind::RepeatedParameter,
-                "api_key: it is given twice: give it once",
-            ));
+            return Err(ParameterError::repeated(API_KEY).into());
         }
         drop(keys);
         let key = key.as_ref().map(|(_, key)| key.as_str());

@@ -24,7 +24,7 @@ use crate::{
         report::Report,
         upload::parameters_named,
     },
-    pipeline::ParameterError,
+    pipeline::whole_number,
     results::{Cameras, StoredReport},
 };
 
@@ -65,7 +65,10 @@ pub(in crate::api) async fn get_latest(
     uri: Uri,
 ) -> Result<Response, Problem> {
     let [wait] = parameters_named(&uri, ["wait"])?;
-    let wait = wait.map_or(Ok(Duration::ZERO), |seconds| parse_wait(&seconds))?;
+    let seconds = wait.map_or(Ok(0), |wait| {
+        whole_number("wait", &wait, 0..=MAX_WAIT_SECONDS)
+    })?;
+    let wait = Duration::from_secs(seconds);
     let report = if wait.is_zero() {
         state.results.latest(&camera).await?
     } else {
@@ -109,13 +112,4 @@ async fn news(
         }
     }
     Ok(report)
-}
-
-fn parse_wait(text: &str) -> Result<Duration, Problem> {
-    let seconds = text.parse().ok().filter(|wait| *wait <= MAX_WAIT_SECONDS);
-    let seconds = seconds.ok_or_else(|| {
-        let rule = format!("a whole number of seconds from 0 to {MAX_WAIT_SECONDS}");
-        Problem::from(ParameterError::is_not("wait", text, &rule))
-    });
-    seconds.map(Duration::from_secs)
 }
