@@ -170,6 +170,13 @@ impl Metrics {
         Ok(metrics)
     }
 
+    /// Shows how many frames wait for a worker or are worked on, and how many were given up since the start.
+    pub fn show_frames(&self, pending: usize, withdrawn: u64) {
+        let _one_scrape = self.one_scrape();
+        self.pending_frames.set(count(pending));
+        raise_to(&self.withdrawn_frames, withdrawn);
+    }
+
     /// Shows these models, each by name and revision, and no others, and how many loads came out
     /// how since the start.
     pub fn show_models(&self, models: &[(&str, &str)], loads: &[(&str, u64)]) {

@@ -194,11 +194,10 @@ pub(super) fn require_ready(state: &ApiState) -> Result<(), Problem> {
     )
 )]
 pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoResponse, Problem> {
-    let pending = i64::try_from(state.workers.pending()).unwrap_or(i64::MAX);
-    state.metrics.pending_frames.set(pending);
-    let withdrawn = state.workers.withdrawn();
-    let shown = &state.metrics.withdrawn_frames;
-    shown.inc_by(withdrawn.saturating_sub(shown.get()));
+    let workers = &state.workers;
+    state
+        .metrics
+        .show_frames(workers.pending(), workers.withdrawn());
     show_models(&state);
     show_remote(&state);
     show_calibrations(&state);

@@ -22,6 +22,19 @@ fn every_name_carries_the_prefix_and_every_metric_its_help() {
 }
 
 #[test]
+fn scrapes_at_the_same_time_count_a_frame_that_was_given_up_once() {
+    const FRAMES: u64 = 20_000;
+    let metrics = Metrics::new().unwrap();
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| (1..=FRAMES).for_each(|frames| metrics.show_frames(2, frames)));
+        }
+    });
+    assert_eq!(metrics.withdrawn_frames.get(), FRAMES);
+    assert_eq!(metrics.pending_frames.get(), 2);
+}
+
+#[test]
 fn counts_of_the_rig_cache_rise_and_its_size_goes_up_and_down() {
     let metrics = Metrics::new().unwrap();
     metrics.show_rig_cache(2, 2000, 3, 1);
