@@ -184,7 +184,7 @@ pub struct LimitSettings {
     pub max_decode_bytes: u64,
     /// Most frames that wait for a worker or are worked on.
     pub max_frames_in_flight: NonZeroUsize,
-    /// Most bytes that all request bodies together may hold in memory.
+    /// Most bytes that all request bodies, and tensors unpacked from them, may hold in memory together.
     pub max_upload_bytes: usize,
     /// A body that comes more slowly is given up; `None` for none.
     pub min_upload_bytes_per_second: Option<NonZeroU64>,

@@ -22,7 +22,7 @@ use crate::{
 pub struct ApiOptions {
     /// Largest request body, bytes.
     pub max_body_bytes: usize,
-    /// Most bytes that all request bodies together may hold in memory.
+    /// Most bytes that all request bodies, and tensors unpacked from them, may hold in memory together.
     pub max_upload_bytes: usize,
     /// Most bytes of a request's head.
     pub max_header_bytes: usize,

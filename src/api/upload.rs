@@ -2,10 +2,11 @@
 //! body with the parameters in the query.
 //!
 //! The whole body is read first, within bounds: its size, the rate at which it comes, the deadline of
-//! the request, and the memory that all bodies together may hold.
+//! the request, and the memory that all requests together may hold.
 
 mod arrival;
 mod body;
+mod budget;
 mod form;
 mod names;
 mod pace;
@@ -20,7 +21,8 @@ use bytes::Bytes;
 use jiff::Timestamp;
 
 pub(super) use arrival::Arrival;
-pub(super) use body::{BodyReader, UploadBudget, next_chunk};
+pub(super) use body::{BodyReader, next_chunk};
+pub(super) use budget::{Held, UploadBudget};
 pub(super) use pace::Pace;
 
 use names::{is_parameter, unknown_parameter};

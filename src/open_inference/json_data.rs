@@ -19,6 +19,19 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
+/// Most bytes that [`only_bytes`] takes from data of this length: three of four letters.
+#[must_use]
+pub fn bytes_at_most(json: &str) -> usize {
+    // With the signs around them, there are at least four letters more than it decodes.
+    json.len() / 4 * 3
+}
+
+/// Most numbers that [`numbers`] takes from data of this length: each has a digit and a sign behind it.
+#[must_use]
+pub fn numbers_at_most(json: &str, count: usize) -> usize {
+    count.min(json.len() / 2)
+}
+
 /// The one element of a tensor of `BYTES`, which is base64.
 ///
 /// # Errors
@@ -42,7 +55,7 @@ pub fn numbers(json: &str, datatype: Datatype, count: usize) -> Result<Vec<f32>,
     let mut numbers = Numbers {
         datatype,
         count,
-        values: Vec::new(),
+        values: Vec::with_capacity(numbers_at_most(json, count)),
     };
     read(json, &mut numbers)?;
     let values = numbers.values;
@@ -175,6 +188,7 @@ impl<'de, E: Elements<'de>> Visitor<'de> for Reading<'_, E> {
 
 #[cfg(test)]
 mod tests {
+    use base64::engine::general_purpose::STANDARD_NO_PAD;
     use proptest::prelude::*;
 
     use super::*;
@@ -235,6 +249,20 @@ mod tests {
                 prop_assert!(length.is_err() || length == Ok(count));
             }
             let _ = only_bytes(&json);
+        }
+
+        #[test]
+        fn no_data_take_more_memory_than_their_length_tells(bytes in prop::collection::vec(any::<u8>(), 1..40)) {
+            for json in [BASE64.encode(&bytes), STANDARD_NO_PAD.encode(&bytes)] {
+                let json = format!("[{json:?}]");
+                let decoded = only_bytes(&json).unwrap().try_into_mut().unwrap();
+                prop_assert!(decoded.capacity() <= bytes_at_most(&json), "{}", decoded.capacity());
+            }
+            let digits: Vec<_> = bytes.iter().map(|byte| byte % 10).collect();
+            let json = format!("{digits:?}").replace(' ', "");
+            let read = numbers(&json, Datatype::Uint8, digits.len()).unwrap();
+            prop_assert_eq!(numbers_at_most(&json, usize::MAX), digits.len());
+            prop_assert_eq!(read.capacity(), digits.len());
         }
     }
 }

@@ -63,8 +63,8 @@ pub struct ViewsJob {
     /// Who looks.
     pub model: Arc<Model>,
     /// `[views, 3, height, width]` at the size of the model's input: planes of red, green and blue,
-    /// 0 to 255.
-    pub pixels: Vec<f32>,
+    /// 0 to 255. What their owner holds besides goes with them, when the work on them has ended.
+    pub pixels: Box<dyn AsRef<[f32]> + Send>,
 }
 
 /// A report together with the frame it is about.

@@ -6,9 +6,10 @@ use axum::{
     extract::{FromRequest, Request},
     http::request::Parts,
 };
+use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::body::HeldBytes;
+use super::budget::Held;
 use crate::{
     access::Scope,
     api::{ApiState, Phase, deadline::Deadline, problem::Problem},
@@ -18,7 +19,7 @@ use crate::{
 /// somebody who may.
 pub(in crate::api) struct Arrival {
     pub(in crate::api) parts: Parts,
-    pub(in crate::api) body: HeldBytes,
+    pub(in crate::api) body: Held<Bytes>,
     /// When its answer must be there.
     pub(in crate::api) deadline: Deadline,
     /// When it came.

@@ -1,65 +1,22 @@
 //! Reading a body within bounds.
 
-use std::{future::poll_fn, num::NonZeroU64, pin::Pin, sync::Arc};
+use std::{future::poll_fn, num::NonZeroU64, pin::Pin};
 
 use axum::{
     body::{Body, HttpBody},
     http::{HeaderMap, header::CONTENT_LENGTH},
 };
 use bytes::{Bytes, BytesMut};
-use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore},
-    time::timeout_at,
-};
+use tokio::time::timeout_at;
 
-use super::Pace;
+use super::{
+    Pace,
+    budget::{Held, UploadBudget},
+};
 use crate::api::{
     deadline::Deadline,
     problem::{Problem, ProblemKind},
 };
-
-/// The memory that all bodies together may hold, counted in bytes. Clones share it.
-#[derive(Clone)]
-pub(in crate::api) struct UploadBudget(Arc<Semaphore>);
-
-impl UploadBudget {
-    pub(in crate::api) fn new(bytes: usize) -> Self {
-        Self(Arc::new(Semaphore::new(bytes.min(Semaphore::MAX_PERMITS))))
-    }
-
-    fn take(&self, bytes: usize) -> Option<OwnedSemaphorePermit> {
-        let bytes = u32::try_from(bytes).ok()?;
-        Arc::clone(&self.0).try_acquire_many_owned(bytes).ok()
-    }
-}
-
-/// Bytes together with their share of the budget.
-pub(in crate::api) struct HeldBytes {
-    bytes: Bytes,
-    _share: OwnedSemaphorePermit,
-}
-
-impl HeldBytes {
-    pub(super) fn bytes(&self) -> Bytes {
-        self.bytes.clone()
-    }
-
-    /// Other bytes, copied from these, in their place.
-    pub(super) fn with_bytes(self, bytes: Bytes) -> Self {
-        Self { bytes, ..self }
-    }
-
-    /// Plain bytes that give their share back when the last clone of them is gone.
-    pub(in crate::api) fn into_bytes(self) -> Bytes {
-        Bytes::from_owner(self)
-    }
-}
-
-impl AsRef<[u8]> for HeldBytes {
-    fn as_ref(&self) -> &[u8] {
-        &self.bytes
-    }
-}
 
 /// What a body may cost.
 pub(in crate::api) struct BodyReader<'a> {
@@ -78,26 +35,22 @@ impl BodyReader<'_> {
         &self,
         headers: &HeaderMap,
         mut body: Body,
-    ) -> Result<HeldBytes, Problem> {
+    ) -> Result<Held<Bytes>, Problem> {
         if announced_bytes(headers).is_some_and(|bytes| bytes > self.max_bytes) {
             return Err(self.too_large());
         }
         let mut bytes = BytesMut::new();
-        let mut share = self.budget.take(0).ok_or_else(no_memory)?;
+        let mut share = self.budget.take(0)?;
         let mut pace = Pace::begin(self.least_bytes_per_second);
         while let Some(chunk) = self.next_in_time(&mut body, &pace).await? {
             if bytes.len() + chunk.len() > self.max_bytes {
                 return Err(self.too_large());
             }
-            let more = self.budget.take(chunk.len()).ok_or_else(no_memory)?;
-            share.merge(more);
+            share.merge(self.budget.take(chunk.len())?);
             bytes.extend_from_slice(&chunk);
             pace.came(chunk.len());
         }
-        Ok(HeldBytes {
-            bytes: bytes.freeze(),
-            _share: share,
-        })
+        Ok(Held::new(bytes.freeze(), share))
     }
 
     async fn next_in_time(&self, body: &mut Body, pace: &Pace) -> Result<Option<Bytes>, Problem> {
@@ -152,9 +105,4 @@ pub(in crate::api) async fn next_chunk(body: &mut Body) -> Result<Option<Bytes>,
             }
         }
     }
-}
-
-fn no_memory() -> Problem {
-    let detail = "too many request bodies are in memory already: send fewer at a time, or retry";
-    Problem::new(ProblemKind::Overloaded, detail)
 }

@@ -18,6 +18,7 @@ use crate::{
         deadline::Deadline,
         limit::Limit,
         problem::{Problem, ProblemKind},
+        upload::Held,
     },
     inference::{HeadOutput, Model},
     open_inference::Datatype,
@@ -55,7 +56,7 @@ pub(super) async fn infer(
     (deadline, _, arrived): (Deadline, Timestamp, Instant),
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
-    let pixels = pixels(request.only_input(INPUT)?, &model)?;
+    let pixels = Box::new(pixels(request.only_input(INPUT)?, &model)?);
     let parameters = view_parameters(&request)?;
     let ticket = Ticket::of(parameters.priority);
     let timeline = ticket.timeline.clone();
@@ -78,7 +79,7 @@ pub(super) async fn infer(
 }
 
 /// The pixels of views of the model's size.
-fn pixels(views: Tensor, model: &Model) -> Result<Vec<f32>, Problem> {
+fn pixels(views: Tensor, model: &Model) -> Result<Held<Vec<f32>>, Problem> {
     let (width, height) = (model.input().width, model.input().height);
     let sides = [3, height as usize, width as usize];
     let shape = views.shape;

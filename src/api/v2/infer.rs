@@ -108,7 +108,8 @@ async fn answered(
         arrival.arrived,
     );
     let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
-    let read = move || InferRequest::read(&headers, &body);
+    let budget = state.uploads.clone();
+    let read = move || InferRequest::read(&headers, &body, &budget);
     let read = arrival.deadline.blocking(read).await?;
     let times = (arrival.deadline, arrival.received_at, arrival.arrived);
     match asked {

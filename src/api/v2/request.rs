@@ -10,7 +10,10 @@ use super::{
     wanted::Wanted,
 };
 use crate::{
-    api::problem::{Problem, ProblemKind},
+    api::{
+        problem::{Problem, ProblemKind},
+        upload::UploadBudget,
+    },
     open_inference::HEAD_LENGTH,
 };
 
@@ -34,8 +37,12 @@ pub(super) struct InferRequest {
 
 impl InferRequest {
     /// Reads a request: JSON, or as much JSON as `Inference-Header-Content-Length` says and bytes of
-    /// tensors behind it.
-    pub(super) fn read(headers: &HeaderMap, body: &Bytes) -> Result<Self, Problem> {
+    /// tensors behind it. What is unpacked from it has its own share of the budget.
+    pub(super) fn read(
+        headers: &HeaderMap,
+        body: &Bytes,
+        budget: &UploadBudget,
+    ) -> Result<Self, Problem> {
         if let Some(encoding) = headers.get(CONTENT_ENCODING)
             && encoding != "identity"
         {
@@ -48,7 +55,7 @@ impl InferRequest {
             malformed(&format!("the JSON of the request cannot be used: {told}"))
         })?;
         let inputs = head.inputs.0.into_iter();
-        let inputs = inputs.map(|Table(input)| read_input(input, &mut behind));
+        let inputs = inputs.map(|Table(input)| read_input(input, &mut behind, budget));
         let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
         if !behind.is_empty() {
             let spare = behind.len();
@@ -106,7 +113,11 @@ fn head_length(headers: &HeaderMap, body: &Bytes) -> Result<usize, Problem> {
 }
 
 /// Reads an input, whose bytes may be the next of those behind the JSON.
-fn read_input(mut input: InputHead<'_>, behind: &mut Bytes) -> Result<Tensor, Problem> {
+fn read_input(
+    mut input: InputHead<'_>,
+    behind: &mut Bytes,
+    budget: &UploadBudget,
+) -> Result<Tensor, Problem> {
     let size = binary_size(&input.name, &mut input.parameters)?;
     let sent = match (input.data, size) {
         (Some(data), None) => Sent::Json(data.get()),
@@ -128,7 +139,7 @@ fn read_input(mut input: InputHead<'_>, behind: &mut Bytes) -> Result<Tensor, Pr
             return Err(misfit(&input.name, &wrong));
         }
     };
-    Tensor::read(input.name, &input.datatype, &input.shape.0, sent)
+    Tensor::read(input.name, &input.datatype, &input.shape.0, sent, budget)
 }
 
 fn binary_size(tensor: &str, parameters: &mut Parameters) -> Result<Option<usize>, Problem> {

@@ -1,28 +1,30 @@
 //! Tensors as they are sent: a name, a shape, and one frame or many numbers.
 
 use bytes::Bytes;
+use tokio::sync::OwnedSemaphorePermit;
 
 use super::shown;
 use crate::{
-    api::problem::{Problem, ProblemKind},
+    api::{
+        problem::{Problem, ProblemKind},
+        upload::{Held, UploadBudget},
+    },
     open_inference::{Datatype, binary_data, json_data},
 };
 
 /// An input as it was sent.
-#[derive(Debug, PartialEq)]
 pub(super) struct Tensor {
     pub(super) name: String,
     pub(super) shape: Vec<usize>,
     pub(super) values: Values,
 }
 
-/// What a tensor holds.
-#[derive(Debug, PartialEq)]
+/// What a tensor holds, with its share of the memory of requests.
 pub(super) enum Values {
     /// The one element of a tensor of `BYTES`.
     Frame(Bytes),
     /// Finite numbers, row-major.
-    Numbers(Vec<f32>),
+    Numbers(Held<Vec<f32>>),
 }
 
 /// A tensor's values as they were sent.
@@ -34,14 +36,18 @@ pub(super) enum Sent<'a> {
 }
 
 impl Tensor {
-    /// Reads the values of a tensor; the sentence says what is wrong with them.
+    /// Reads the values of a tensor, if there is memory for them; otherwise the sentence says what is wrong
+    /// with them.
     pub(super) fn read(
         name: String,
         datatype: &str,
         shape: &[u32],
         sent: Sent<'_>,
+        budget: &UploadBudget,
     ) -> Result<Self, Problem> {
-        let values = read(datatype, shape, sent);
+        let (datatype, count) = elements(datatype, shape).map_err(|wrong| misfit(&name, &wrong))?;
+        let room = budget.take(sent.unpacked_bytes(datatype, count))?;
+        let values = sent.values(datatype, count, room);
         let values = values.map_err(|wrong| misfit(&name, &wrong))?;
         let shape = shape.iter().map(|side| *side as usize).collect();
         Ok(Self {
@@ -52,7 +58,8 @@ impl Tensor {
     }
 }
 
-fn read(datatype: &str, shape: &[u32], sent: Sent<'_>) -> Result<Values, String> {
+/// What the elements of a tensor are, and how many.
+fn elements(datatype: &str, shape: &[u32]) -> Result<(Datatype, usize), String> {
     let known = Datatype::named(datatype).filter(|datatype| *datatype != Datatype::Int32);
     let datatype = known.ok_or_else(|| {
         let datatype = shown(datatype);
@@ -62,18 +69,50 @@ fn read(datatype: &str, shape: &[u32], sent: Sent<'_>) -> Result<Values, String>
     let count = sides.try_fold(1_usize, usize::checked_mul);
     let count =
         count.ok_or_else(|| format!("its shape {shape:?} has more elements than memory"))?;
-    let values = match (datatype, sent) {
-        (Datatype::Bytes, _) if count != 1 => {
-            return Err(format!(
-                "its shape is {shape:?}: one frame is taken at a time, [1]"
-            ));
+    if datatype == Datatype::Bytes && count != 1 {
+        return Err(format!(
+            "its shape is {shape:?}: one frame is taken at a time, [1]"
+        ));
+    }
+    Ok((datatype, count))
+}
+
+impl Sent<'_> {
+    /// Most memory that `count` elements take beside the body, bytes: known before they are read.
+    fn unpacked_bytes(&self, datatype: Datatype, count: usize) -> usize {
+        let numbers = |count| count * size_of::<f32>();
+        match (datatype, self) {
+            (Datatype::Bytes, Self::Json(text)) => json_data::bytes_at_most(text),
+            // It is a part of the body.
+            (Datatype::Bytes, Self::Binary(_)) => 0,
+            (_, Self::Json(text)) => numbers(json_data::numbers_at_most(text, count)),
+            (_, Self::Binary(bytes)) => numbers(count.min(bytes.len())),
         }
-        (Datatype::Bytes, Sent::Json(text)) => Values::Frame(json_data::only_bytes(text)?),
-        (Datatype::Bytes, Sent::Binary(bytes)) => Values::Frame(binary_data::only_element(&bytes)?),
-        (_, Sent::Json(text)) => Values::Numbers(json_data::numbers(text, datatype, count)?),
-        (_, Sent::Binary(bytes)) => Values::Numbers(binary_data::numbers(&bytes, datatype, count)?),
-    };
-    Ok(values)
+    }
+
+    fn values(
+        self,
+        datatype: Datatype,
+        count: usize,
+        room: OwnedSemaphorePermit,
+    ) -> Result<Values, String> {
+        Ok(match (datatype, self) {
+            (Datatype::Bytes, Self::Json(text)) => {
+                Values::Frame(Held::new(json_data::only_bytes(text)?, room).into_bytes())
+            }
+            (Datatype::Bytes, Self::Binary(bytes)) => {
+                Values::Frame(binary_data::only_element(&bytes)?)
+            }
+            (_, Self::Json(text)) => {
+                let numbers = json_data::numbers(text, datatype, count)?;
+                Values::Numbers(Held::new(numbers, room))
+            }
+            (_, Self::Binary(bytes)) => {
+                let numbers = binary_data::numbers(&bytes, datatype, count)?;
+                Values::Numbers(Held::new(numbers, room))
+            }
+        })
+    }
 }
 
 /// What the sender of a tensor that cannot be used is told.

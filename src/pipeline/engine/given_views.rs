@@ -21,7 +21,7 @@ impl Engine {
         let session = self.next_session.fetch_add(1, Ordering::Relaxed);
         let mut batch = ViewBatch::default();
         let mut found = HeadOutput::default();
-        for pixels in job.pixels.chunks(views * input.view_len()) {
+        for pixels in (*job.pixels).as_ref().chunks(views * input.view_len()) {
             if job.ticket.withdrawn.is_cancelled() {
                 return Err(PipelineError::Withdrawn);
             }

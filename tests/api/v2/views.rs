@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::{FRAMES, VIEWS, assert_refused, in_json, output, send};
-use crate::service::{Bounds, Service};
+use super::{FRAMES, VIEWS, assert_refused, base64, in_json, output, send};
+use crate::service::{Bounds, Service, incompressible_frame};
 
 #[tokio::test]
 async fn a_detector_finds_what_is_in_each_view() {
@@ -127,4 +127,55 @@ async fn views_have_places_like_frames_and_bodies_have_limits() {
     assert_refused(&answer, 500, "internal", "fault");
     let answer = send(&service, VIEWS, &head, &[0; 12288]).await;
     assert_eq!(answer.status, 200, "the place is free again");
+}
+
+#[tokio::test]
+async fn tensors_have_room_for_what_they_are_unpacked_to_or_may_retry() {
+    let (numbers, frame) = (3 * 64 * 64, incompressible_frame());
+    let views = |datatype: &str, data: Option<Vec<u8>>| {
+        let mut input = json!({ "name": "views", "datatype": datatype, "shape": [1, 3, 64, 64] });
+        match data {
+            Some(data) => input["data"] = json!(data),
+            None => input["parameters"] = json!({ "binary_data_size": numbers }),
+        }
+        json!({ "inputs": [input] })
+    };
+    let image =
+        json!({ "name": "image", "datatype": "BYTES", "shape": [1], "data": [base64(&frame)] });
+    let parameters = json!({ "calibration": "lobby", "profile": "fast" });
+    let frames = json!({ "inputs": [image], "parameters": parameters });
+    for (path, head, behind, unpacked) in [
+        (VIEWS, views("UINT8", None), vec![7; numbers], 4 * numbers),
+        (
+            VIEWS,
+            views("UINT8", Some(vec![7; numbers])),
+            vec![],
+            4 * numbers,
+        ),
+        (
+            VIEWS,
+            views("FP32", Some(vec![7; numbers])),
+            vec![],
+            4 * numbers,
+        ),
+        (FRAMES, frames, vec![], frame.len()),
+    ] {
+        // Room for one body and what it is unpacked to, whose padding is not known before.
+        let service = Service::within(&Bounds {
+            max_upload_bytes: head.to_string().len() + behind.len() + unpacked + 8,
+            ..Bounds::default()
+        });
+        service.gate.close();
+        let (waiting, refused) = tokio::join!(send(&service, path, &head, &behind), async {
+            service.gate.has_begun(1).await;
+            let refused = send(&service, path, &head, &behind).await;
+            service.gate.open();
+            refused
+        });
+        assert_eq!(waiting.status, 200, "{}", waiting.text());
+        assert_refused(&refused, 429, "overloaded", "bodies");
+        assert_eq!(refused.header("retry-after"), "1");
+        let answer = send(&service, path, &head, &behind).await;
+        assert_eq!(answer.status, 200, "the room is free again");
+    }
 }
