@@ -31,7 +31,7 @@ pub use error::PipelineError;
 pub use job::{DetectJob, Detected, ViewsJob};
 pub use network::BatchOptions;
 pub use parameter_error::{ParameterError, ParameterFault, shown, whole_number};
-pub use parameters::DetectParameters;
+pub use parameters::{DetectParameters, parse_profile};
 pub use planned_views::{PlannedView, PlannedViews};
 pub use profile::Profile;
 pub use report::{

@@ -1,6 +1,6 @@
 //! How long a request may take. Whatever waits on its behalf waits no longer than that.
 
-use std::{convert::Infallible, time::Duration};
+use std::{convert::Infallible, future::Future, time::Duration};
 
 use axum::{extract::FromRequestParts, http::request::Parts};
 use tokio::{
@@ -12,6 +12,7 @@ use super::{
     ApiState,
     problem::{Problem, ProblemKind},
 };
+use crate::pipeline::PipelineError;
 
 /// When a request must have been answered.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +52,24 @@ impl Deadline {
     /// How long the request may take in all, seconds.
     pub(super) fn limit_seconds(self) -> f64 {
         self.limit.as_secs_f64()
+    }
+
+    /// Waits for work that has a place among the frames; what of it has not begun by then never will. `undone`
+    /// begins the sentence for whoever is told so.
+    pub(super) async fn wait<T>(
+        self,
+        undone: &str,
+        work: impl Future<Output = Result<T, PipelineError>>,
+    ) -> Result<T, Problem> {
+        let done = timeout_at(self.at(), work).await;
+        let done = done.map_err(|_| {
+            let seconds = self.limit_seconds();
+            let detail = format!(
+                "{undone} within {seconds} s: ask less often, or raise server.request_timeout_millis"
+            );
+            Problem::new(ProblemKind::Timeout, detail)
+        })?;
+        Ok(done?)
     }
 
     /// Does work that blocks, away from the async runtime; what it logs is still the request's. Work

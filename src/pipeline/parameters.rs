@@ -159,7 +159,11 @@ impl DetectParameters {
     }
 }
 
-fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
+/// The profile of that name, as the parameter `profile` names it.
+///
+/// # Errors
+/// [`ParameterError`] when there is none.
+pub fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
     Profile::from_name(value).ok_or_else(|| {
         let known = Profile::ALL.map(Profile::name).join(", ");
         ParameterError::is_not("profile", value, &format!("a profile; use one of {known}"))

@@ -12,6 +12,7 @@ use tower::ServiceExt;
 use crate::service::{Bounds, Service, frame, incompressible_frame};
 
 const FAST: &str = "calibration=lobby&profile=fast";
+const VIEWS: &str = "/calibrations/lobby/views?profile=fast";
 
 /// Sends a good frame and does not wait for the answer.
 fn begin(service: &Service, image: Vec<u8>) -> JoinHandle<StatusCode> {
@@ -61,6 +62,66 @@ async fn all_bodies_together_stay_within_their_memory() {
     service.gate.open();
     assert_eq!(first.await.unwrap(), 200);
     assert_eq!(service.post_raw(FAST, image).await.status, 200);
+}
+
+#[tokio::test]
+async fn a_view_plan_has_a_place_among_the_frames_or_may_retry() {
+    let service = Service::within(&Bounds {
+        frames_in_flight: 1,
+        ..Bounds::default()
+    });
+    let trial = service.get("/calibrations/lobby").await.text();
+    service.gate.close();
+    let first = begin(&service, frame());
+    service.gate.has_begun(1).await;
+    for refused in [service.get(VIEWS).await, service.post(VIEWS, &trial).await] {
+        assert_eq!(refused.status, 429);
+        assert_eq!(refused.header("retry-after"), "1");
+        assert_eq!(refused.problem()["type"], "urn:lookdown:problem:overloaded");
+    }
+    service.gate.open();
+    assert_eq!(first.await.unwrap(), 200);
+    for plan in [service.get(VIEWS).await, service.post(VIEWS, &trial).await] {
+        assert_eq!(plan.status, 200);
+        assert_eq!(plan.header("content-type"), "application/json");
+    }
+}
+
+#[tokio::test]
+async fn a_view_plan_that_has_no_turn_in_time_is_given_up() {
+    let service = Service::within(&Bounds {
+        request_timeout: Duration::from_millis(50),
+        ..Bounds::default()
+    });
+    service.gate.close();
+    let first = begin(&service, frame());
+    service.gate.has_begun(1).await;
+    let late = service.get(VIEWS).await;
+    assert_eq!(late.status, 504);
+    let problem = late.problem();
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.starts_with("the view plan was not made within 0.05 s"));
+    assert_eq!(first.await.unwrap(), 504);
+    service.gate.open();
+}
+
+#[tokio::test]
+async fn a_view_plan_whose_client_left_is_never_made() {
+    let service = Service::start();
+    service.gate.close();
+    let first = begin(&service, frame());
+    service.gate.has_begun(1).await;
+    let request = Request::get(VIEWS).body(Body::empty()).unwrap();
+    let leaving = tokio::spawn(service.router.clone().oneshot(request));
+    while metric(&service, "lookdown_pending_frames").await < 2 {
+        tokio::task::yield_now().await;
+    }
+    leaving.abort();
+    assert!(leaving.await.unwrap_err().is_cancelled());
+    service.gate.open();
+    assert_eq!(first.await.unwrap(), 200);
+    service.still_works().await;
+    assert_eq!(metric(&service, "lookdown_withdrawn_frames_total").await, 1);
 }
 
 #[tokio::test]

@@ -1,6 +1,12 @@
 //! The view plan of a calibration.
 
-use axum::{Json, extract::State, http::Uri};
+use std::sync::Arc;
+
+use axum::{
+    extract::State,
+    http::{Uri, header::CONTENT_TYPE},
+    response::{IntoResponse, Response},
+};
 use serde::Serialize;
 use utoipa::{IntoParams, ToSchema};
 
@@ -15,12 +21,12 @@ use crate::{
         access::Reader,
         deadline::Deadline,
         openapi::{RawBytes, TrialProblems, ViewsProblems},
-        problem::{Problem, ProblemKind},
+        problem::Problem,
         report::pixels,
         upload::parameters_named,
     },
     calibration::{Calibration, Calibrations},
-    pipeline::{PlannedView, PlannedViews, Profile, whole_number},
+    pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},
 };
 
 /// Most cells along each side of a grid.
@@ -125,15 +131,15 @@ pub(in crate::api) async fn get_views(
     deadline: Deadline,
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
-) -> Result<Json<ViewPlanInfo>, Problem> {
+) -> Result<Response, Problem> {
     let [profile, grid] = parameters_named(&uri, ["profile", "grid"])?;
-    let look = Look::parse(profile, grid)?;
+    let look = Look::parse(profile.as_deref(), grid.as_deref())?;
     let calibrations = &state.calibrations;
     let entry = calibrations
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
-    let plan = deadline.blocking(move || look.plan(&state, &entry.calibration));
-    Ok(Json(plan.await?))
+    let plan = move |engine: &Engine| look.plan(engine, &entry.calibration);
+    answered(&state, deadline, plan).await
 }
 
 /// How would a frame be looked at with this calibration?
@@ -161,14 +167,31 @@ pub(in crate::api) async fn try_views(
     deadline: Deadline,
     NewCalibrationAddress(id): NewCalibrationAddress,
     trial: CalibrationTrial,
-) -> Result<Json<ViewPlanInfo>, Problem> {
-    let look = Look::parse(trial.profile, trial.grid)?;
+) -> Result<Response, Problem> {
+    let look = Look::parse(trial.profile.as_deref(), trial.grid.as_deref())?;
     let CalibrationUpload { content, reading } = trial.upload;
-    let plan = deadline.blocking(move || {
+    let plan = move |engine: &Engine| {
         let entry = Calibrations::check(&id, &content, &reading)?;
-        look.plan(&state, &entry.calibration)
+        look.plan(engine, &entry.calibration)
+    };
+    answered(&state, deadline, plan).await
+}
+
+/// A view plan as JSON. It may have megabytes: it is made and written in a place among the frames.
+async fn answered(
+    state: &ApiState,
+    deadline: Deadline,
+    plan: impl FnOnce(&Engine) -> Result<ViewPlanInfo, Problem> + Send + 'static,
+) -> Result<Response, Problem> {
+    let workers = Arc::clone(&state.workers);
+    let planning = state.workers.run(move || {
+        let plan = plan(workers.engine())?;
+        serde_json::to_vec(&plan).map_err(Problem::internal)
     });
-    Ok(Json(plan.await?))
+    let json = deadline
+        .wait("the view plan was not made", planning)
+        .await??;
+    Ok(([(CONTENT_TYPE, "application/json")], json).into_response())
 }
 
 /// How to look at a frame, and what to tell of it.
@@ -179,21 +202,17 @@ struct Look {
 }
 
 impl Look {
-    fn parse(profile: Option<String>, grid: Option<String>) -> Result<Self, Problem> {
-        let profile = match profile {
-            None => Profile::default(),
-            Some(name) => Profile::from_name(&name).ok_or_else(|| unknown_profile(&name))?,
-        };
-        let cells = |text: String| whole_number("grid", &text, 1..=MAX_GRID_CELLS);
+    fn parse(profile: Option<&str>, grid: Option<&str>) -> Result<Self, Problem> {
+        let profile = profile.map(parse_profile).transpose()?;
+        let cells = |text| whole_number("grid", text, 1..=MAX_GRID_CELLS);
         let grid_cells = grid.map(cells).transpose()?;
         Ok(Self {
-            profile,
+            profile: profile.unwrap_or_default(),
             grid_cells,
         })
     }
 
-    fn plan(self, state: &ApiState, calibration: &Calibration) -> Result<ViewPlanInfo, Problem> {
-        let engine = state.workers.engine();
+    fn plan(self, engine: &Engine, calibration: &Calibration) -> Result<ViewPlanInfo, Problem> {
         let planned = engine.planned_views(calibration, self.profile)?;
         let lens = calibration.lens();
         let views = planned.views.iter().map(|view| ViewInfo {
@@ -212,13 +231,6 @@ impl Look {
             ..ViewPlanInfo::from(&planned)
         })
     }
-}
-
-fn unknown_profile(name: &str) -> Problem {
-    let names = Profile::ALL.map(Profile::name).join(", ");
-    let name: String = name.chars().take(64).collect();
-    let detail = format!("profile: there is no {name:?}: use one of {names}");
-    Problem::new(ProblemKind::InvalidParameter, detail)
 }
 
 impl From<&PlannedViews> for ViewPlanInfo {

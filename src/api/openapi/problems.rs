@@ -160,8 +160,10 @@ impl IntoResponses for ViewsProblems {
             ProblemKind::RepeatedParameter,
             ProblemKind::UnknownCalibration,
             ProblemKind::InvalidParameter,
+            ProblemKind::Overloaded,
             ProblemKind::Internal,
             ProblemKind::WarmingUp,
+            ProblemKind::ShuttingDown,
             ProblemKind::Timeout,
         ];
         responses(OF_READING.into_iter().chain(of_views))
@@ -179,6 +181,7 @@ impl IntoResponses for TrialProblems {
             ProblemKind::InvalidCalibration,
             ProblemKind::InvalidParameter,
             ProblemKind::WarmingUp,
+            ProblemKind::ShuttingDown,
         ];
         responses(OF_ADMINISTRATION.into_iter().chain(of_trials))
     }

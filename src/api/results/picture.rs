@@ -9,7 +9,6 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use bytes::Bytes;
-use tokio::time::timeout_at;
 
 use super::{MAX_SHOWN_CHARS, address::CameraAddress, unknown};
 use crate::{
@@ -76,8 +75,7 @@ pub(in crate::api) async fn get_picture(
         sketch: kept.picture.sketch.clone(),
     };
     let drawing = state.workers.run(move || frame.annotated(&options));
-    let drawn = timeout_at(deadline.at(), drawing).await;
-    let drawn = drawn.map_err(|_| timed_out(deadline))??;
+    let drawn = deadline.wait("the picture was not drawn", drawing).await?;
     let picture = Bytes::from(drawn.map_err(Problem::internal)?);
     Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], picture).into_response())
 }
@@ -93,12 +91,4 @@ fn none_kept(camera: &str) -> Problem {
          the setting results.pictures names (* is all of them), but of no more than results.max_pictures"
     );
     Problem::new(ProblemKind::PictureNotKept, detail)
-}
-
-fn timed_out(deadline: Deadline) -> Problem {
-    let seconds = deadline.limit_seconds();
-    let detail = format!(
-        "the picture was not drawn within {seconds} s: ask less often, or raise server.request_timeout_millis"
-    );
-    Problem::new(ProblemKind::Timeout, detail)
 }
