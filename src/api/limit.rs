@@ -50,8 +50,8 @@ impl Limit {
     fn timed_out(&self) -> Problem {
         let (seconds, set_by) = (self.deadline.limit_seconds(), self.set_by);
         let detail = format!(
-            "the frame had no report within {seconds} s: use a faster profile, send fewer frames at \
-             a time, or raise {set_by}"
+            "there was no result within {seconds} s: send fewer frames or views at a time, use a faster \
+             profile for frames, or raise {set_by}"
         );
         Problem::new(ProblemKind::Timeout, detail)
     }
