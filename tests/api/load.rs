@@ -16,11 +16,29 @@ const VIEWS: &str = "/calibrations/lobby/views?profile=fast";
 
 /// Sends a good frame and does not wait for the answer.
 fn begin(service: &Service, image: Vec<u8>) -> JoinHandle<StatusCode> {
-    let request = Request::post(format!("/detect?{FAST}"))
-        .body(Body::from(image))
-        .unwrap();
+    let request = Request::post(format!("/detect?{FAST}"));
+    send(service, request.body(Body::from(image)).unwrap())
+}
+
+fn send(service: &Service, request: Request<Body>) -> JoinHandle<StatusCode> {
     let answer = service.router.clone().oneshot(request);
     tokio::spawn(async { answer.await.unwrap().status() })
+}
+
+/// Somebody asks while a frame is worked on, and leaves before it is his turn.
+async fn ask_and_leave(service: &Service, request: Request<Body>) {
+    service.gate.close();
+    let first = begin(service, frame());
+    service.gate.has_begun(1).await;
+    let leaving = send(service, request);
+    while metric(service, "lookdown_pending_frames").await < 2 {
+        tokio::task::yield_now().await;
+    }
+    leaving.abort();
+    assert!(leaving.await.unwrap_err().is_cancelled());
+    service.gate.open();
+    assert_eq!(first.await.unwrap(), 200);
+    service.still_works().await;
 }
 
 #[tokio::test]
@@ -108,37 +126,16 @@ async fn a_view_plan_that_has_no_turn_in_time_is_given_up() {
 #[tokio::test]
 async fn a_view_plan_whose_client_left_is_never_made() {
     let service = Service::start();
-    service.gate.close();
-    let first = begin(&service, frame());
-    service.gate.has_begun(1).await;
     let request = Request::get(VIEWS).body(Body::empty()).unwrap();
-    let leaving = tokio::spawn(service.router.clone().oneshot(request));
-    while metric(&service, "lookdown_pending_frames").await < 2 {
-        tokio::task::yield_now().await;
-    }
-    leaving.abort();
-    assert!(leaving.await.unwrap_err().is_cancelled());
-    service.gate.open();
-    assert_eq!(first.await.unwrap(), 200);
-    service.still_works().await;
+    ask_and_leave(&service, request).await;
     assert_eq!(metric(&service, "lookdown_withdrawn_frames_total").await, 1);
 }
 
 #[tokio::test]
 async fn a_frame_whose_client_left_is_not_worked_on() {
     let service = Service::start();
-    service.gate.close();
-    let first = begin(&service, frame());
-    service.gate.has_begun(1).await;
-    let leaving = begin(&service, frame());
-    while metric(&service, "lookdown_pending_frames").await < 2 {
-        tokio::task::yield_now().await;
-    }
-    leaving.abort();
-    assert!(leaving.await.unwrap_err().is_cancelled());
-    service.gate.open();
-    assert_eq!(first.await.unwrap(), 200);
-    service.still_works().await;
+    let request = Request::post(format!("/detect?{FAST}"));
+    ask_and_leave(&service, request.body(Body::from(frame())).unwrap()).await;
     assert_eq!(
         service.gate.runs(),
         2,
