@@ -29,7 +29,8 @@ def load(
     `resident_mib` at the end.
     """
     before, began = server.usage(), time.monotonic()
-    command = _command(server, paths, body, seconds, clients, rate, warm_up, content_type)
+    at_once = clients if rate is None else OPEN_LOOP_CLIENTS
+    command = _command(server, paths, body, seconds, at_once, rate, warm_up, content_type)
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     after, wall = server.usage(), time.monotonic() - began
     if answer.returncode != 0:
@@ -64,14 +65,16 @@ def steady(
     return told
 
 
-def start_load(server: Server, paths: list[str], body: Path, *, seconds: float, rate: float) -> subprocess.Popen:
-    """An open loop in the background."""
-    command = _command(server, paths, body, seconds, 1, rate, 1.0, "image/jpeg")
+def start_load(
+    server: Server, paths: list[str], body: Path, *, seconds: float, rate: float, clients: int = OPEN_LOOP_CLIENTS
+) -> subprocess.Popen:
+    """An open loop in the background, with up to `clients` requests at a time, each on a connection that is kept."""
+    command = _command(server, paths, body, seconds, clients, rate, 1.0, "image/jpeg")
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
 def _command(server, paths, body, seconds, clients, rate, warm_up, content_type) -> list[str]:
-    loop = ["--clients", clients] if rate is None else ["--rate", rate, "--clients", OPEN_LOOP_CLIENTS]
+    loop = ["--clients", clients, *([] if rate is None else ["--rate", rate])]
     turns = [word for path in paths for word in ("--path", path)]
     times = ["--seconds", seconds, "--warm-up-seconds", warm_up]
     command = [LOAD, server.address, *turns, "--body", body, "--content-type", content_type, *loop, *times]

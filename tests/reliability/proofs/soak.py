@@ -16,6 +16,8 @@ LOAD = 0.8
 """Of the capacity."""
 BAD_PER_SECOND = 4.0
 """Of each kind of bad input."""
+CLIENTS = 64
+"""Of each stream. They take turns and keep their connections: together, fewer than `server.max_connections`."""
 WARM_UP = 0.25
 """Share of the time that is not counted: caches fill, the allocator finds its size."""
 MOST_GROWTH = 0.05
@@ -70,7 +72,7 @@ def prove(effort: Effort) -> list[Row]:
 def _start(server, body: Path, stream: tuple, seconds: float) -> tuple:
     status, path, content, rate = stream
     body.write_bytes(content)
-    return status, start_load(server, [path], body, seconds=seconds, rate=rate)
+    return status, start_load(server, [path], body, seconds=seconds, rate=rate, clients=CLIENTS)
 
 
 def _ended(status: str, running) -> tuple[str, dict]:
