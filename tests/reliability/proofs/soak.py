@@ -51,7 +51,7 @@ def prove(effort: Effort) -> list[Row]:
             ]
     answered = sum(sum(told["statuses"].values()) for _, told in statuses)
     # Under random arrivals a queue may be full for a moment.
-    unexpected = {status: told["statuses"] for status, told in statuses if set(told["statuses"]) - {status, "429"}}
+    unexpected = [(status, told["statuses"]) for status, told in statuses if set(told["statuses"]) - {status, "429"}]
     cut_off = sum(told["broken"] + told["timed_out"] for _, told in statuses)
     grown, mean = (
         _grown(watch.samples, effort.soak_seconds),
