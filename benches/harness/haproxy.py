@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .processes import BenchError, Server, free_ports, running
 
-# Its rules cannot answer 304. This is as many headers, and a body that is not there either.
+# Its rules cannot answer 304. These are fewer headers than ours, and a body that is not there either.
 PLAN = """
 global
     nbthread 1

@@ -24,12 +24,13 @@ use super::{
     openapi::ResultsProblems,
     problem::{Problem, ProblemKind},
 };
-use crate::results::{ListenError, Unreachable};
+use crate::{
+    pipeline::shown,
+    results::{ListenError, Unreachable},
+};
 
 /// May be kept, but not shown before the server was asked whether it is still right.
 const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
-/// Most characters of a name that are repeated to its sender.
-const MAX_SHOWN_CHARS: usize = 64;
 
 /// Of which cameras are there reports?
 ///
@@ -55,7 +56,7 @@ pub(super) async fn list(
 
 /// No report of that camera is kept.
 fn unknown(camera: &str) -> Problem {
-    let camera: String = camera.chars().take(MAX_SHOWN_CHARS).collect();
+    let camera = shown(camera);
     let detail = format!(
         "no report of the camera {camera:?} is kept: GET /results lists the cameras, and a frame sent to \
          /detect with this name as the parameter camera makes it one of them"

@@ -23,7 +23,7 @@ use super::{
     ApiState,
     problem::{Problem, ProblemKind},
 };
-use crate::inference::Model;
+use crate::{inference::Model, pipeline::shown};
 use metadata::ModelMetadata;
 
 /// The model that finds the persons in frames.
@@ -79,9 +79,4 @@ impl Asked {
             Self::Views(model) => detector::metadata(model),
         }
     }
-}
-
-/// As much of a text as helps its sender.
-fn shown(text: &str) -> String {
-    text.chars().take(64).collect()
 }

@@ -10,7 +10,7 @@ use axum::{
 };
 use bytes::Bytes;
 
-use super::{MAX_SHOWN_CHARS, address::CameraAddress, unknown};
+use super::{address::CameraAddress, unknown};
 use crate::{
     annotated_picture::{KeptFrame, PictureOptions},
     api::{
@@ -22,6 +22,7 @@ use crate::{
         problem::{Problem, ProblemKind},
         upload::parameters_named,
     },
+    pipeline::shown,
 };
 
 /// For the eyes of who has asked, who may keep it, but must ask each time whether it is still right.
@@ -85,7 +86,7 @@ fn about(id: &str) -> [(HeaderName, HeaderValue); 2] {
 }
 
 fn none_kept(camera: &str) -> Problem {
-    let camera: String = camera.chars().take(MAX_SHOWN_CHARS).collect();
+    let camera = shown(camera);
     let detail = format!(
         "no picture of the camera {camera:?} is kept: pictures are kept from the next frame on of the cameras that \
          the setting results.pictures names (* is all of them), but of no more than results.max_pictures"

@@ -2,7 +2,8 @@
 
 use crate::calibration::{CalibrationId, FormatError, StoreError};
 
-/// A calibration that was not changed, or that could not be looked at afterwards. Every message is one sentence with the remedy.
+/// A calibration that was not changed, or that could not be looked at afterwards. Every message is one
+/// sentence with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
     /// The operator has switched changes off.
