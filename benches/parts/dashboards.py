@@ -39,14 +39,14 @@ class Heard:
 def measure(effort: Effort) -> dict:
     """The cost of pollers without new reports, as most polls are, in turns with a server that only answers; then
     listeners and new reports."""
-    seconds = max(effort.seconds, 5.0)
+    seconds = max(effort.seconds, 5.0) * 2
     ours, least = [], []
     with lookdown(SETTINGS) as server, haproxy() as other:
         report(server, detect("fast"), frame())
         tag = server_tag(server)
         for _ in range(effort.rounds):
-            ours.append(polled(server, tag, seconds))
-            least.append(polled(other, tag, seconds))
+            ours.append(asyncio.run(poll(server, tag, seconds)))
+            least.append(asyncio.run(poll(other, tag, seconds)))
         listening = asyncio.run(listen(server))
     return {
         "statuses": ours[-1]["statuses"],
@@ -56,39 +56,39 @@ def measure(effort: Effort) -> dict:
     }
 
 
-def polled(server: Server, tag: str, seconds: float) -> dict:
-    """What was answered to the pollers, and the share of a core that it took."""
-    before, began = server.usage().cpu_seconds, time.monotonic()
-    statuses = asyncio.run(poll(server.address, tag, seconds))
-    cores = (server.usage().cpu_seconds - before) / (time.monotonic() - began)
-    return {"statuses": statuses, "percent": 100 * cores}
-
-
 def server_tag(server: Server) -> str:
     """The entity tag of the latest report."""
     with urllib.request.urlopen(f"http://{server.address}{PATH}", timeout=10) as answer:
         return answer.headers["ETag"]
 
 
-async def poll(address: str, tag: str, seconds: float) -> dict[str, int]:
-    """How often each status was answered to all pollers."""
-    statuses: dict[str, int] = {}
-    end = time.monotonic() + seconds
+async def poll(server: Server, tag: str, seconds: float) -> dict:
+    """What was answered to the pollers, and the share of a core that it took. A dashboard keeps its connection, so
+    the time begins when each has one and has been answered once."""
     request = f"GET {PATH} HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: {tag}\r\n\r\n".encode()
+    statuses: dict[str, int] = {}
+    dashboards = [await connect(server.address) for _ in range(POLLERS)]
 
-    async def one(phase: float) -> None:
-        reader, writer = await connect(address)
+    async def ask(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> str:
+        writer.write(request)
+        return (await reader.readuntil(b"\r\n\r\n"))[9:12].decode()
+
+    for dashboard in dashboards:
+        await ask(*dashboard)
+    before, began = server.usage().cpu_seconds, time.monotonic()
+
+    async def keep_asking(dashboard: tuple[asyncio.StreamReader, asyncio.StreamWriter], phase: float) -> None:
         await asyncio.sleep(phase)
-        while time.monotonic() < end:
-            writer.write(request)
-            head = await reader.readuntil(b"\r\n\r\n")
-            status = head[9:12].decode()
+        while time.monotonic() < began + seconds:
+            status = await ask(*dashboard)
             statuses[status] = statuses.get(status, 0) + 1
             await asyncio.sleep(1.0)
-        writer.close()
 
-    await asyncio.gather(*(one(number / POLLERS) for number in range(POLLERS)))
-    return statuses
+    await asyncio.gather(*(keep_asking(each, number / POLLERS) for number, each in enumerate(dashboards)))
+    cores = (server.usage().cpu_seconds - before) / (time.monotonic() - began)
+    for _, writer in dashboards:
+        writer.close()
+    return {"statuses": statuses, "percent": 100 * cores}
 
 
 async def listen(server: Server) -> dict:
