@@ -35,18 +35,26 @@ pub(super) enum ClosedCurve {
 impl ClosedCurve {
     /// The normalised radius at `theta` radians, up to [`ClosedCurve::limit`].
     pub(super) fn radius(self, theta: f64) -> f64 {
-        let (sin, cos) = theta.sin_cos();
         match self {
             Self::Equidistant => theta,
             Self::Equisolid => 2.0 * (theta / 2.0).sin(),
             Self::Stereographic => 2.0 * (theta / 2.0).tan(),
-            Self::Orthographic => sin,
+            Self::Orthographic => theta.sin(),
             Self::Rectilinear => theta.tan(),
-            Self::Unified { alpha, beta } => unified_radius(alpha, beta, sin, cos),
-            Self::Sphere { xi } => sin / (xi + cos),
+            Self::Unified { alpha, beta } => unified_radius(alpha, beta, theta.sin_cos()),
+            Self::Sphere { xi } => {
+                let (sin, cos) = theta.sin_cos();
+                sin / (xi + cos)
+            }
             // A shift of the sphere, then the unified model (whose formula wants no unit vector).
-            Self::DoubleSphere { xi, alpha } => unified_radius(alpha, 1.0, sin, xi + cos),
-            Self::Fov { omega } => (2.0 * (omega / 2.0).tan() * sin).atan2(cos) / omega,
+            Self::DoubleSphere { xi, alpha } => {
+                let (sin, cos) = theta.sin_cos();
+                unified_radius(alpha, 1.0, (sin, xi + cos))
+            }
+            Self::Fov { omega } => {
+                let (sin, cos) = theta.sin_cos();
+                (2.0 * (omega / 2.0).tan() * sin).atan2(cos) / omega
+            }
         }
     }
 
@@ -90,7 +98,7 @@ impl ClosedCurve {
 }
 
 /// The unified model for the vector (`sin`, `cos`), of any length.
-fn unified_radius(alpha: f64, beta: f64, sin: f64, cos: f64) -> f64 {
+fn unified_radius(alpha: f64, beta: f64, (sin, cos): (f64, f64)) -> f64 {
     let distance = (beta * sin * sin + cos * cos).sqrt();
     sin / (alpha * distance + (1.0 - alpha) * cos)
 }

@@ -47,12 +47,8 @@ pub(super) type Lanes = u8;
 /// Where red, green and blue go to.
 pub(super) type Planes<'a> = [&'a mut [f32]; 3];
 
-/// Where those of one block go to.
-pub(super) struct Values<'a> {
-    pub(super) red: &'a mut [f32; LANES],
-    pub(super) green: &'a mut [f32; LANES],
-    pub(super) blue: &'a mut [f32; LANES],
-}
+/// Red, green and blue of one block.
+pub(super) type Values = [[f32; LANES]; 3];
 
 impl<'a> Source<'a> {
     pub(super) fn new(frame: &'a Frame, input: &NetworkInput) -> Self {
@@ -96,8 +92,8 @@ impl Row<'_> {
 }
 
 /// Renders some rows into `planes`, each of which holds as many rows: block by block, each in all
-/// rows, so that what they sample lies close together. `sample` writes the values of one block to
-/// their places in the planes, and is not asked where nothing is visible.
+/// rows, so that what they sample lies close together. `sample` gets a block, which of its pixels see
+/// the lens image, and its row's index; where none does, it is not asked.
 #[expect(
     clippy::inline_always,
     reason = "`sample` becomes vector code only within a function that may use it"
@@ -107,42 +103,34 @@ pub(super) fn render_band(
     source: &Source,
     rows: &[Row],
     planes: Planes,
-    sample: impl Fn(&Source, &Block, Lanes, Values),
+    sample: impl Fn(&Block, Lanes, usize) -> Values,
 ) {
     let [red, green, blue] = planes;
     let width = red.len() / rows.len();
     for (index, first_pixel) in (0..width).step_by(LANES).enumerate() {
+        let count = LANES.min(width - first_pixel);
         for (y, row) in rows.iter().enumerate() {
-            let (block, lanes) = (row.block(index), row.lanes(index));
-            let start = y * width + first_pixel;
-            let render = |values: Values| {
-                if lanes == 0 {
-                    let [red, green, blue] = source.offset;
-                    *values.red = [red; LANES];
-                    *values.green = [green; LANES];
-                    *values.blue = [blue; LANES];
-                } else {
-                    sample(source, &block, lanes, values);
-                }
-            };
-            if first_pixel + LANES <= width {
-                let whole = [&mut *red, &mut *green, &mut *blue]
-                    .map(|plane| plane[start..].first_chunk_mut());
-                if let [Some(red), Some(green), Some(blue)] = whole {
-                    render(Values { red, green, blue });
-                }
+            let lanes = row.lanes(index);
+            let [reds, greens, blues] = if lanes == 0 {
+                source.offset.map(|value| [value; LANES])
             } else {
-                let [mut red_end, mut green_end, mut blue_end] = [[0.0; LANES]; 3];
-                render(Values {
-                    red: &mut red_end,
-                    green: &mut green_end,
-                    blue: &mut blue_end,
-                });
-                let rest = width - first_pixel;
-                red[start..start + rest].copy_from_slice(&red_end[..rest]);
-                green[start..start + rest].copy_from_slice(&green_end[..rest]);
-                blue[start..start + rest].copy_from_slice(&blue_end[..rest]);
-            }
+                // The only call, so that it is compiled into this loop.
+                sample(&row.block(index), lanes, y)
+            };
+            let start = y * width + first_pixel;
+            let pixels = start..start + count;
+            write(&mut red[pixels.clone()], &reds);
+            write(&mut green[pixels.clone()], &greens);
+            write(&mut blue[pixels], &blues);
         }
+    }
+}
+
+/// The last block of a row may reach beyond it.
+#[inline]
+fn write(pixels: &mut [f32], values: &[f32; LANES]) {
+    match pixels.first_chunk_mut() {
+        Some(block) => *block = *values,
+        None => pixels.copy_from_slice(&values[..pixels.len()]),
     }
 }

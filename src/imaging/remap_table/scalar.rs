@@ -14,7 +14,8 @@ pub(super) struct Sample {
 }
 
 pub(super) fn render_rows(source: &Source, rows: &[Row], planes: Planes) {
-    render_band(source, rows, planes, sample_block);
+    let sample = |block: &Block, lanes, _| sample_block(source, block, lanes);
+    render_band(source, rows, planes, sample);
 }
 
 impl Block {
@@ -41,15 +42,14 @@ impl Block {
     }
 }
 
-fn sample_block(source: &Source, block: &Block, lanes: Lanes, values: Values) {
+fn sample_block(source: &Source, block: &Block, lanes: Lanes) -> Values {
     let samples = block.samples(lanes, source.width, source.height);
-    let slots = [values.red, values.green, values.blue];
-    for (channel, slot) in slots.into_iter().enumerate() {
-        *slot = samples.map(|sample| {
+    [0, 1, 2].map(|channel| {
+        samples.map(|sample| {
             let sum = sample.map_or(0.0, |sample| sample.weighted_sum(source, channel));
             sum * source.scale[channel] + source.offset[channel]
-        });
-    }
+        })
+    })
 }
 
 impl Sample {

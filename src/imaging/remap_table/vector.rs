@@ -39,9 +39,8 @@ pub(super) fn render_rows(_proof: Avx2, source: &Source, rows: &[Row], planes: P
 #[target_feature(enable = "avx2")]
 fn render_rows_with_avx2(source: &Source, rows: &[Row], planes: Planes) {
     let frame_lines = Lines::of(source);
-    render_band(source, rows, planes, |source, block, lanes, values| {
-        sample_block(source, &frame_lines, block, lanes, values);
-    });
+    let sample = |block: &Block, lanes, row| sample_block(source, &frame_lines, block, lanes, row);
+    render_band(source, rows, planes, sample);
 }
 
 /// The frame seen from two places. Eight bytes from the first one's start are a pixel and its right
@@ -75,9 +74,15 @@ struct Samples {
 }
 
 #[target_feature(enable = "avx2")]
-fn sample_block(source: &Source, frame_lines: &Lines, block: &Block, lanes: Lanes, values: Values) {
+fn sample_block(
+    source: &Source,
+    frame_lines: &Lines,
+    block: &Block,
+    lanes: Lanes,
+    row: usize,
+) -> Values {
     let samples = samples(source, block, lanes);
-    announce(frame_lines, &samples.first_bytes);
+    announce(source, &samples.first_bytes, row);
     let [low, high] = pixel_pairs(frame_lines.upper, &samples.first_bytes);
     let upper = weighted_sums(
         low_halves(low, high),
@@ -98,10 +103,7 @@ fn sample_block(source: &Source, frame_lines: &Lines, block: &Block, lanes: Lane
         let offset = _mm256_set1_ps(source.offset[channel]);
         singles(_mm256_add_ps(scaled, offset))
     };
-    let Values { red, green, blue } = values;
-    *red = value(0);
-    *green = value(1);
-    *blue = value(2);
+    [value(0), value(1), value(2)]
 }
 
 #[target_feature(enable = "avx2")]
@@ -128,19 +130,30 @@ fn samples(source: &Source, block: &Block, lanes: Lanes) -> Samples {
     }
 }
 
-/// How much farther than the last pixel of a block, seen from its first one, lies what is to be
-/// fetched: the middle of the block after the next.
-const AHEAD: u32 = 3;
+/// What the processor fetches at once, bytes.
+const CACHE_LINE: isize = 64;
 
-/// Lets the processor fetch what lies farther along the row: it follows neither the curves nor the
-/// rows of a view by itself.
+/// Lets the processor fetch what lies ahead: it follows neither the curves nor the rows of a view by
+/// itself.
+///
+/// Eight blocks, one below the other, are a patch that may lie in the frame at any angle. Each of
+/// them announces two pixels of the patch after the next, so that all announce its diagonals, which
+/// are close to each line of the frame that it meets; and what lies beside them on that line, as it
+/// is at a patch's sides that there is something new.
 #[target_feature(enable = "avx2")]
-fn announce(lines: &Lines, first_bytes: &[u32; LANES]) {
-    let [first, .., last] = *first_bytes;
-    // Beyond the frame, on either side, is its end.
-    let ahead = first.wrapping_add(AHEAD.wrapping_mul(last.wrapping_sub(first))) as usize;
-    for line in [lines.upper, lines.lower] {
-        _mm_prefetch::<_MM_HINT_T0>(line[ahead.min(line.len() - 1)..].as_ptr().cast());
+fn announce(source: &Source, first_bytes: &[u32; LANES], row: usize) {
+    let first_bytes = first_bytes.map(|byte| byte as usize);
+    let two_blocks = 2_usize.wrapping_mul(first_bytes[LANES - 1].wrapping_sub(first_bytes[0]));
+    for lane in [row, LANES - 1 - row] {
+        // Some of it may lie beyond the frame: nothing is read, only fetched.
+        let ahead = first_bytes[lane].wrapping_add(two_blocks);
+        let ahead = source.pixels.as_ptr().wrapping_add(ahead);
+        for beside in [-CACHE_LINE, 0, CACHE_LINE] {
+            let upper = ahead.wrapping_offset(beside);
+            let lower = upper.wrapping_add(3 * source.width);
+            _mm_prefetch::<_MM_HINT_T0>(upper.cast());
+            _mm_prefetch::<_MM_HINT_T0>(lower.cast());
+        }
     }
 }
 
