@@ -62,28 +62,27 @@ impl Footprint {
         mount: &Mount,
     ) -> Option<Self> {
         match back_projection {
-            BackProjection::CornerHull => Self::of_outline(corners(view_box), None, view, lens),
+            BackProjection::CornerHull => {
+                let rays = corners(view_box).map(|corner| ray_through(corner, view));
+                Self::of_outline(rays, None, lens)
+            }
             BackProjection::TiltedEllipse => {
                 let ellipse = Ellipse::inscribed(view_box, view, mount);
-                let extremities = Some(ellipse.extremities(view));
-                Self::of_outline(ellipse.outline(), extremities, view, lens)
+                Self::of_outline(ellipse.outline(), Some(ellipse.extremities()), lens)
             }
         }
     }
 
-    /// Maps an outline (corner-origin view pixels) to the frame.
+    /// Maps an outline (camera frame) to the frame.
     fn of_outline<const POINTS: usize>(
-        outline_in_view: [Pixel; POINTS],
+        outline_in_camera: [Ray; POINTS],
         extremities: Option<Extremities>,
-        view: &VirtualView,
         lens: &Lens,
     ) -> Option<Self> {
         let mut inside = 0_usize;
         let mut outline = Vec::with_capacity(POINTS);
         let mut rays = Vec::with_capacity(POINTS.div_ceil(RAY_STRIDE));
-        for (index, point) in outline_in_view.into_iter().enumerate() {
-            let pixel = cross_half_pixel(point, PixelConvention::PixelCentre);
-            let ray = view.ray_in_camera(&pixel);
+        for (index, ray) in outline_in_camera.into_iter().enumerate() {
             let seen = lens.project(&ray);
             inside += usize::from(seen.is_some());
             let Some(in_frame) = seen.or_else(|| lens.project_to_rim(&ray)) else {
@@ -163,19 +162,23 @@ fn corners([x_min, y_min, x_max, y_max]: [f64; 4]) -> [Pixel; 4] {
     ]
 }
 
-/// An ellipse in a view, corner-origin view pixels.
+/// The ray (camera frame) through a point of a view (corner-origin pixels).
+fn ray_through(point: Pixel, view: &VirtualView) -> Ray {
+    view.ray_in_camera(&cross_half_pixel(point, PixelConvention::PixelCentre))
+}
+
+/// An ellipse in the plane of a view, as rays (camera frame).
 struct Ellipse {
-    center: Pixel,
-    /// Unit vector from the feet to the head.
-    up: Vector2<f64>,
-    /// Semi-axis along `up`, pixels.
-    along: f64,
-    /// Semi-axis across `up`, pixels.
-    across: f64,
+    center: Ray,
+    /// From the centre along the vertical to the outline.
+    to_head: Ray,
+    /// From the centre to the right, across the vertical, to the outline.
+    to_right: Ray,
 }
 
 impl Ellipse {
-    /// The ellipse inscribed in a box whose major axis lies along the projected vertical.
+    /// The ellipse inscribed in a box (corner-origin view pixels) whose major axis lies along the
+    /// projected vertical.
     fn inscribed(
         [x_min, y_min, x_max, y_max]: [f64; 4],
         view: &VirtualView,
@@ -189,34 +192,27 @@ impl Ellipse {
             .vertical_at(&center_pixel, mount)
             .and_then(|vertical| ellipse_axes(vertical, half_width, half_height))
             .unwrap_or((-Vector2::y(), half_height, half_width));
+        let right = Vector2::new(-up.y, up.x);
+        let ray = view.ray_in_camera(&center_pixel);
+        // Rays through the plane of a view are an affine function of its pixels.
         Self {
-            center,
-            up,
-            along,
-            across,
+            center: ray,
+            to_head: ray_through(center + up * along, view) - ray,
+            to_right: ray_through(center + right * across, view) - ray,
         }
     }
 
-    /// The point at the angle with this sine and cosine from the head, clockwise.
-    fn at(&self, (sin, cos): (f64, f64)) -> Pixel {
-        let right = Vector2::new(-self.up.y, self.up.x);
-        self.center + self.up * (self.along * cos) + right * (self.across * sin)
+    /// Points from the head on, clockwise.
+    fn outline(&self) -> [Ray; ELLIPSE_POINTS] {
+        ELLIPSE_ANGLES.map(|(sin, cos)| self.center + self.to_head * cos + self.to_right * sin)
     }
 
-    fn outline(&self) -> [Pixel; ELLIPSE_POINTS] {
-        ELLIPSE_ANGLES.map(|angle| self.at(angle))
-    }
-
-    fn extremities(&self, view: &VirtualView) -> Extremities {
-        let ray = |angle: (f64, f64)| {
-            let pixel = cross_half_pixel(self.at(angle), PixelConvention::PixelCentre);
-            view.ray_in_camera(&pixel)
-        };
+    fn extremities(&self) -> Extremities {
         Extremities {
-            head: ray((0.0, 1.0)),
-            right: ray((1.0, 0.0)),
-            foot: ray((0.0, -1.0)),
-            left: ray((-1.0, 0.0)),
+            head: self.center + self.to_head,
+            right: self.center + self.to_right,
+            foot: self.center - self.to_head,
+            left: self.center - self.to_right,
         }
     }
 }

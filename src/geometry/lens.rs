@@ -120,7 +120,7 @@ impl Lens {
     /// beyond `max_theta`, exactly behind the camera, or for a ray that is not finite.
     #[must_use]
     pub fn project(&self, ray: &Ray) -> Option<Pixel> {
-        let off_axis = ray.x.hypot(ray.y);
+        let off_axis = ray.xy().norm();
         let theta = off_axis.atan2(ray.z);
         if off_axis == 0.0 {
             return (ray.z > 0.0).then(|| self.principal_point());
@@ -138,7 +138,7 @@ impl Lens {
     /// along its own azimuth. `None` only where there is no azimuth or nothing finite to map.
     #[must_use]
     pub fn project_to_rim(&self, ray: &Ray) -> Option<Pixel> {
-        let off_axis = ray.x.hypot(ray.y);
+        let off_axis = ray.xy().norm();
         if off_axis.atan2(ray.z) <= self.max_theta || off_axis == 0.0 {
             return self.project(ray);
         }

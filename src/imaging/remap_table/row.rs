@@ -91,31 +91,36 @@ impl Row<'_> {
     }
 }
 
-/// Renders some rows into `planes`, each of which holds as many rows: block by block, each in all
-/// rows, so that what they sample lies close together. `sample` gets a block, which of its pixels see
-/// the lens image, and its row's index; where none does, it is not asked.
+/// Renders some rows, at most as many as a block has pixels, into `planes`, each of which holds as
+/// many rows: block by block, each in all rows, so that what they sample lies close together. Of all
+/// these blocks it is found out first where they sample (`locate`, of a block and those of its pixels
+/// that see the lens image; it is not asked where none does), so that the processor need not wait for
+/// one before it begins with the next. `sample` gets that and the row's index.
 #[expect(
     clippy::inline_always,
-    reason = "`sample` becomes vector code only within a function that may use it"
+    reason = "`locate` and `sample` become vector code only within a function that may use it"
 )]
 #[inline(always)]
-pub(super) fn render_band(
+pub(super) fn render_band<Samples>(
     source: &Source,
     rows: &[Row],
     planes: Planes,
-    sample: impl Fn(&Block, Lanes, usize) -> Values,
+    locate: impl Fn(&Block, Lanes) -> Samples,
+    sample: impl Fn(&Samples, usize) -> Values,
 ) {
     let [red, green, blue] = planes;
     let width = red.len() / rows.len();
     for (index, first_pixel) in (0..width).step_by(LANES).enumerate() {
         let count = LANES.min(width - first_pixel);
-        for (y, row) in rows.iter().enumerate() {
+        let samples: [Option<Samples>; LANES] = std::array::from_fn(|y| {
+            let row = rows.get(y)?;
             let lanes = row.lanes(index);
-            let [reds, greens, blues] = if lanes == 0 {
-                source.offset.map(|value| [value; LANES])
-            } else {
-                // The only call, so that it is compiled into this loop.
-                sample(&row.block(index), lanes, y)
+            (lanes != 0).then(|| locate(&row.block(index), lanes))
+        });
+        for (y, samples) in samples.iter().enumerate().take(rows.len()) {
+            let [reds, greens, blues] = match samples {
+                Some(samples) => sample(samples, y),
+                None => source.offset.map(|value| [value; LANES]),
             };
             let start = y * width + first_pixel;
             let pixels = start..start + count;

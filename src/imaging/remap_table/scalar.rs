@@ -14,8 +14,9 @@ pub(super) struct Sample {
 }
 
 pub(super) fn render_rows(source: &Source, rows: &[Row], planes: Planes) {
-    let sample = |block: &Block, lanes, _| sample_block(source, block, lanes);
-    render_band(source, rows, planes, sample);
+    let locate = |block: &Block, lanes| block.samples(lanes, source.width, source.height);
+    let sample = |samples: &_, _| sample_block(source, samples);
+    render_band(source, rows, planes, locate, sample);
 }
 
 impl Block {
@@ -42,8 +43,7 @@ impl Block {
     }
 }
 
-fn sample_block(source: &Source, block: &Block, lanes: Lanes) -> Values {
-    let samples = block.samples(lanes, source.width, source.height);
+fn sample_block(source: &Source, samples: &[Option<Sample>; LANES]) -> Values {
     [0, 1, 2].map(|channel| {
         samples.map(|sample| {
             let sum = sample.map_or(0.0, |sample| sample.weighted_sum(source, channel));

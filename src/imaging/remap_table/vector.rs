@@ -39,8 +39,12 @@ pub(super) fn render_rows(_proof: Avx2, source: &Source, rows: &[Row], planes: P
 #[target_feature(enable = "avx2")]
 fn render_rows_with_avx2(source: &Source, rows: &[Row], planes: Planes) {
     let frame_lines = Lines::of(source);
-    let sample = |block: &Block, lanes, row| sample_block(source, &frame_lines, block, lanes, row);
-    render_band(source, rows, planes, sample);
+    let locate = |block: &Block, lanes| samples(source, block, lanes);
+    let sample = |samples: &_, row| {
+        announce(source, samples, row);
+        sample_block(source, &frame_lines, samples)
+    };
+    render_band(source, rows, planes, locate, sample);
 }
 
 /// The frame seen from two places. Eight bytes from the first one's start are a pixel and its right
@@ -74,15 +78,7 @@ struct Samples {
 }
 
 #[target_feature(enable = "avx2")]
-fn sample_block(
-    source: &Source,
-    frame_lines: &Lines,
-    block: &Block,
-    lanes: Lanes,
-    row: usize,
-) -> Values {
-    let samples = samples(source, block, lanes);
-    announce(source, &samples.first_bytes, row);
+fn sample_block(source: &Source, frame_lines: &Lines, samples: &Samples) -> Values {
     let [low, high] = pixel_pairs(frame_lines.upper, &samples.first_bytes);
     let upper = weighted_sums(
         low_halves(low, high),
@@ -141,8 +137,8 @@ const CACHE_LINE: isize = 64;
 /// are close to each line of the frame that it meets; and what lies beside them on that line, as it
 /// is at a patch's sides that there is something new.
 #[target_feature(enable = "avx2")]
-fn announce(source: &Source, first_bytes: &[u32; LANES], row: usize) {
-    let first_bytes = first_bytes.map(|byte| byte as usize);
+fn announce(source: &Source, samples: &Samples, row: usize) {
+    let first_bytes = samples.first_bytes.map(|byte| byte as usize);
     let two_blocks = 2_usize.wrapping_mul(first_bytes[LANES - 1].wrapping_sub(first_bytes[0]));
     for lane in [row, LANES - 1 - row] {
         // Some of it may lie beyond the frame: nothing is read, only fetched.
