@@ -1,5 +1,6 @@
 //! Remap tables: building those of a plan, and rendering a view, with vector instructions and
-//! without. `cargo bench --bench remap` prints milliseconds (median and least of many rounds).
+//! without. `cargo bench --bench remap` prints milliseconds (median and least of many rounds), also of
+//! rendering as in the server, where the network has pushed the frame out of the caches.
 //!
 //! `cargo bench --bench remap -- rounds FOLDER SIDE` is the half of `against_opencv.py` that is ours: it
 //! writes what both sides need into the folder, then renders the view whose index is on each line it
@@ -23,10 +24,12 @@ use lookdown::{
     imaging::{Frame, NetworkInput, RemapTable},
 };
 
-use self::times::times;
+use self::times::{times, times_after};
 
 const FRAME_SIDE: u32 = 1680;
 const ROUNDS: usize = 240;
+/// Words of memory which a network may go through from view to view: more than the caches hold.
+const NETWORK_WORDS: usize = 6 << 20;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -61,6 +64,7 @@ fn print_times() -> Outcome<()> {
         }
     }
     let frame = frame()?;
+    let mut network = vec![0_u64; NETWORK_WORDS];
     for side in [300, 416] {
         let (tables, input) = (tables(side)?, NetworkInput::plain(side, side));
         let mut slot = vec![0.0; input.view_len()];
@@ -71,6 +75,14 @@ fn print_times() -> Outcome<()> {
         };
         let vector = times(ROUNDS, || next().render(&frame, &input, &mut slot));
         println!("a view of {side}², vector: {vector}");
+        let another = || {
+            for word in &mut network {
+                *word = black_box(*word + 1);
+            }
+        };
+        let render = || next().render(&frame, &input, &mut slot);
+        let after_network = times_after(ROUNDS, another, render);
+        println!("a view of {side}², vector, with nothing in the caches: {after_network}");
         let portable = times(ROUNDS, || next().render_portably(&frame, &input, &mut slot));
         println!("a view of {side}², portable: {portable}");
     }

@@ -3,9 +3,19 @@
 use std::time::{Duration, Instant};
 
 /// Median and least time of so many rounds (at least one), in milliseconds.
-pub(crate) fn times(rounds: usize, mut work: impl FnMut()) -> String {
+pub(crate) fn times(rounds: usize, work: impl FnMut()) -> String {
+    times_after(rounds, || {}, work)
+}
+
+/// The same with something before each round that does not count.
+pub(crate) fn times_after(
+    rounds: usize,
+    mut before: impl FnMut(),
+    mut work: impl FnMut(),
+) -> String {
     let mut spent: Vec<Duration> = (0..rounds)
         .map(|_| {
+            before();
             let started = Instant::now();
             work();
             started.elapsed()

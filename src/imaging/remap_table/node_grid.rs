@@ -58,16 +58,19 @@ impl NodeGrid {
         let down = (y % step) as f32 / NODE_STEP as f32;
         let upper = y / step * self.nodes_across;
         let lower = upper + self.nodes_across;
-        let between = |coordinates: &[f32], node: usize| {
-            let (above, below) = (coordinates[upper + node], coordinates[lower + node]);
-            above + (below - above) * down
+        let end = lower + self.nodes_across;
+        // One thing at a time, each in a loop that becomes vector code.
+        let between = |coordinates: &[f32], places: &mut Vec<f32>| {
+            let pairs = coordinates[upper..lower]
+                .iter()
+                .zip(&coordinates[lower..end]);
+            places.clear();
+            places.extend(pairs.map(|(above, below)| above + (below - above) * down));
         };
-        places.x.clear();
-        places.y.clear();
-        for node in 0..self.nodes_across {
-            let [x, y] = transformed([between(&self.nodes.x, node), between(&self.nodes.y, node)]);
-            places.x.push(x);
-            places.y.push(y);
+        between(&self.nodes.x, &mut places.x);
+        between(&self.nodes.y, &mut places.y);
+        for (x, y) in places.x.iter_mut().zip(&mut places.y) {
+            [*x, *y] = transformed([*x, *y]);
         }
     }
 

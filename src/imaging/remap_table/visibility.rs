@@ -74,8 +74,16 @@ impl RowVisibility {
     /// Which of the eight pixels from `first_pixel` see the lens image, the first one in the lowest
     /// bit. What it says of pixels beyond the view's right border means nothing.
     pub(super) fn lanes(self, first_pixel: u32) -> u8 {
-        let below = |end: u32| (1_u32 << end.saturating_sub(first_pixel).min(8)) - 1;
-        let [in_span, ..] = (below(self.end) & !below(self.start)).to_le_bytes();
+        let lanes_before = |end: u32| end.saturating_sub(first_pixel).min(8);
+        let (start, end) = (lanes_before(self.start), lanes_before(self.end));
+        let in_span = if (start, end) == (0, 8) {
+            // As almost always.
+            u8::MAX
+        } else {
+            let below = |lane: u32| (1_u32 << lane) - 1;
+            let [in_span, ..] = (below(end) & !below(start)).to_le_bytes();
+            in_span
+        };
         if self.is_hidden { !in_span } else { in_span }
     }
 }
