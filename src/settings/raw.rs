@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::{
     access::RawAccess, locate, mqtt::RawMqtt, remote, results::RawResults, tls::RawTls,
-    traces::RawTelemetry,
+    traces::RawTelemetry, unshown::Unshown,
 };
 
 const MEBIBYTE: u64 = 1024 * 1024;
@@ -127,6 +127,7 @@ impl Default for RawModel {
 pub(super) struct RawInference {
     pub(super) backend: String,
     pub(super) url: String,
+    pub(super) bearer_token: Unshown,
     pub(super) model: String,
     pub(super) timeout_millis: u64,
     pub(super) library_path: String,
@@ -145,6 +146,7 @@ impl Default for RawInference {
         Self {
             backend: remote::ONNX.to_owned(),
             url: String::new(),
+            bearer_token: Unshown::default(),
             model: String::new(),
             timeout_millis: 10_000,
             library_path: locate::DEFAULT_LIBRARY.to_owned(),

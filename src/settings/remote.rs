@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use reqwest::header::HeaderValue;
 use url::Url;
 
 use super::{
     SettingsError,
     check::{MAX_TIMEOUT_MILLIS, choice, millis},
     raw::{RawInference, RawModel},
+    unshown::Unshown,
 };
 
 /// The backend that runs networks here.
@@ -15,11 +17,16 @@ pub(super) const ONNX: &str = "onnx";
 /// The backend that has a server of the Open Inference Protocol (KServe V2) run them.
 const V2: &str = "v2";
 
+/// What is shown instead of something secret.
+const HIDDEN: &str = "***";
+
 /// A server that networks run on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RemoteSettings {
     /// Its address, without `/v2`.
     pub url: Url,
+    /// Shows the server who asks: a whole `Authorization` header, sensitive.
+    pub authorization: Option<HeaderValue>,
     /// What the model is called there; by default as its manifest calls it.
     pub model: Option<String>,
     /// Longest that one request to it may take.
@@ -40,8 +47,17 @@ impl RemoteSettings {
             1..=MAX_TIMEOUT_MILLIS,
         )?;
         if !is_remote {
-            let both = [("inference.url", &raw.url), ("inference.model", &raw.model)];
-            let unused = both.into_iter().find(|(_, value)| !value.is_empty());
+            let hidden = if raw.bearer_token.0.is_empty() {
+                ""
+            } else {
+                HIDDEN
+            };
+            let all = [
+                ("inference.url", raw.url.as_str()),
+                ("inference.bearer_token", hidden),
+                ("inference.model", &raw.model),
+            ];
+            let unused = all.into_iter().find(|(_, value)| !value.is_empty());
             return unused.map_or(Ok(None), |(key, value)| {
                 let remedy =
                     "it is of use with inference.backend = \"v2\": set that too, or leave it out";
@@ -55,6 +71,7 @@ impl RemoteSettings {
         }
         Ok(Some(Self {
             url: address(&raw.url)?,
+            authorization: authorization(&raw.bearer_token)?,
             model: (!raw.model.is_empty()).then(|| raw.model.clone()),
             patience,
         }))
@@ -72,8 +89,25 @@ fn address(told: &str) -> Result<Url, SettingsError> {
         is_http && is_plain && is_open
     });
     // A password in it is not repeated.
-    let shown = if told.contains('@') { "***" } else { told };
+    let shown = if told.contains('@') { HIDDEN } else { told };
     url.ok_or_else(|| refused("inference.url", shown, remedy))
+}
+
+/// The header that shows a token, if there is one (RFC 6750, section 2.1).
+fn authorization(token: &Unshown) -> Result<Option<HeaderValue>, SettingsError> {
+    let Unshown(token) = token;
+    if token.is_empty() {
+        return Ok(None);
+    }
+    let is_token = token.bytes().all(|byte| byte.is_ascii_graphic());
+    let header = HeaderValue::try_from(format!("Bearer {token}")).ok();
+    let mut header = header.filter(|_| is_token).ok_or_else(|| {
+        let remedy = "give the token alone, as the inference server's operator gave it: letters, digits and \
+                      signs without spaces";
+        refused("inference.bearer_token", HIDDEN, remedy)
+    })?;
+    header.set_sensitive(true);
+    Ok(Some(header))
 }
 
 fn refused(key: &str, value: &str, remedy: &str) -> SettingsError {

@@ -45,7 +45,7 @@ fn the_example_file_states_every_key_at_its_default() {
         let key = line.split(" = ").next().unwrap_or_default();
         !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
     });
-    assert_eq!(stated.count(), 71, "a key is missing from {example}");
+    assert_eq!(stated.count(), 72, "a key is missing from {example}");
 }
 
 #[test]

@@ -362,6 +362,20 @@ fn an_inference_server_is_an_address_without_a_password() {
         );
         assert!(!told.contains("secret"), "{told}");
     }
+    let with_token = |token: &str| {
+        let rest = "backend = \"v2\"\nmodel = \"m\"\nurl = \"http://host:8000\"";
+        from_file(&format!(
+            "[inference]\n{rest}\nbearer_token = \"{token}\"\n"
+        ))
+    };
+    let remote = with_token("s3cret.+/=").unwrap().inference.remote.unwrap();
+    assert_eq!(remote.authorization.as_ref().unwrap(), "Bearer s3cret.+/=");
+    assert!(!format!("{remote:?}").contains("s3cret"), "{remote:?}");
+    let unused = from_environment("LOOKDOWN__INFERENCE__BEARER_TOKEN", "s3cret");
+    for told in [refusal(with_token("Bearer s3cret")), refusal(unused)] {
+        assert!(told.contains("inference.bearer_token"), "{told}");
+        assert!(!told.contains("s3cret"), "{told}");
+    }
     let nameless = refusal(from_environment("LOOKDOWN__INFERENCE__BACKEND", "v2"));
     assert!(
         nameless.contains("inference.model") && nameless.contains("model.path"),

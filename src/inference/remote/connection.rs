@@ -5,11 +5,12 @@ use std::{error::Error, io::Read, time::Duration};
 use bytes::Bytes;
 use reqwest::{
     blocking::{Client, RequestBuilder, Response},
-    header::{CONTENT_TYPE, RETRY_AFTER},
+    header::{AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER},
     redirect,
 };
 use url::Url;
 
+use super::RemoteOptions;
 use crate::open_inference::HEAD_LENGTH;
 
 /// Longest that a connection may take to be made.
@@ -42,19 +43,22 @@ impl Connection {
     ///
     /// # Errors
     /// When the system's certificates cannot be used.
-    pub(super) fn new(address: Url, patience: Duration) -> reqwest::Result<Self> {
+    pub(super) fn new(options: &RemoteOptions) -> reqwest::Result<Self> {
         // Fails when there is one already, which is as good.
         let _ = rustls::crypto::ring::default_provider().install_default();
+        let authorization = options.authorization.clone();
+        let headers = authorization.map(|header| (AUTHORIZATION, header));
         let client = Client::builder()
-            .connect_timeout(CONNECT_PATIENCE.min(patience))
+            .default_headers(headers.into_iter().collect())
+            .connect_timeout(CONNECT_PATIENCE.min(options.patience))
             .pool_idle_timeout(IDLE)
             .redirect(redirect::Policy::none())
             .no_proxy()
             .build()?;
         Ok(Self {
             client,
-            address,
-            patience,
+            address: options.url.clone(),
+            patience: options.patience,
         })
     }
 

@@ -9,6 +9,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use reqwest::header::HeaderValue;
 use url::Url;
 
 use super::{
@@ -32,6 +33,8 @@ const MAX_TOLD_CHARS: usize = 300;
 pub struct RemoteOptions {
     /// The server's address, without `/v2`.
     pub url: Url,
+    /// Sent with every request, if there is one.
+    pub authorization: Option<HeaderValue>,
     /// The model there whose readiness stands for the server's.
     pub model: String,
     /// The name in manifests of the model that is called `model` there; others are called the same.
@@ -72,7 +75,7 @@ impl RemoteServer {
     /// # Errors
     /// [`InferenceError::Remote`] when the system's certificates cannot be used.
     pub fn new(options: RemoteOptions) -> Result<Self, InferenceError> {
-        let connection = Connection::new(options.url.clone(), options.patience);
+        let connection = Connection::new(&options);
         let connection = connection.map_err(|error| InferenceError::Remote {
             url: options.url.to_string(),
             detail: error.to_string(),

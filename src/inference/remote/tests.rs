@@ -4,6 +4,7 @@ mod fake;
 
 use std::{fs, path::Path, time::Duration};
 
+use reqwest::header::HeaderValue;
 use tempfile::TempDir;
 
 use self::fake::{FakeServer, Told};
@@ -19,8 +20,13 @@ fn manifest() -> TempDir {
 }
 
 fn server(fake: &FakeServer) -> Arc<RemoteServer> {
+    server_with_token(fake, None)
+}
+
+fn server_with_token(fake: &FakeServer, token: Option<&'static str>) -> Arc<RemoteServer> {
     let options = RemoteOptions {
         url: fake.address().parse().unwrap(),
+        authorization: token.map(HeaderValue::from_static),
         model: "there".to_owned(),
         called: "here".to_owned(),
         patience: Duration::from_millis(500),
@@ -68,6 +74,24 @@ fn views_go_as_bytes_where_the_server_takes_them_and_as_lists_elsewhere() {
         let requests = if first_axis == 2 { 2 } else { 1 };
         assert_eq!(lengths, vec![as_bytes; requests]);
         assert_eq!(fake.inferred()[0].path, "/v2/models/there/infer");
+    }
+}
+
+#[test]
+fn every_request_shows_the_token_and_none_without_one_shows_any() {
+    for token in [None, Some("Bearer s3cret")] {
+        let fake = FakeServer::start(true, -1);
+        let folder = manifest();
+        let server = server_with_token(&fake, token);
+        look(&mut load(&server, folder.path()).unwrap(), 1).unwrap();
+        let shown = fake.authorizations();
+        // What it is, what the model takes, and a view.
+        assert!(shown.len() >= 3, "{shown:?}");
+        let expected = token.map(|_| "bearer s3cret");
+        assert!(
+            shown.iter().all(|shown| shown.as_deref() == expected),
+            "{shown:?}"
+        );
     }
 }
 

@@ -23,6 +23,8 @@ struct State {
     /// What the next requests to infer are answered, instead of as asked.
     told: VecDeque<Told>,
     inferred: Vec<Inferred>,
+    /// Of every request, in lower case.
+    authorizations: Vec<Option<String>>,
 }
 
 /// A request to infer that came.
@@ -85,6 +87,7 @@ impl FakeServer {
             has_ended: false,
             told: VecDeque::new(),
             inferred: Vec::new(),
+            authorizations: Vec::new(),
         }));
         let shared = Arc::clone(&state);
         let accept = move || {
@@ -123,6 +126,10 @@ impl FakeServer {
         self.state.lock().unwrap().inferred.clone()
     }
 
+    pub(super) fn authorizations(&self) -> Vec<Option<String>> {
+        self.state.lock().unwrap().authorizations.clone()
+    }
+
     /// Listens no more.
     pub(super) fn end(&self) {
         self.state.lock().unwrap().has_ended = true;
@@ -153,12 +160,13 @@ fn serve(stream: &TcpStream, state: &Mutex<State>) {
             }
             lines.push(line.trim().to_ascii_lowercase());
         }
-        let number = |name: &str| {
+        let header = |name: &str| {
             let mut values = lines.iter().filter_map(|line| line.strip_prefix(name));
-            values
-                .next()
-                .map(|value| value.trim().parse::<usize>().unwrap())
+            values.next().map(str::trim)
         };
+        let number = |name: &str| header(name).map(|value| value.parse::<usize>().unwrap());
+        let authorization = header("authorization:").map(str::to_owned);
+        state.lock().unwrap().authorizations.push(authorization);
         let mut body = vec![0; number("content-length:").unwrap_or(0)];
         reader.read_exact(&mut body).unwrap();
         let path = lines[0].split(' ').nth(1).unwrap().to_owned();
