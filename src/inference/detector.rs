@@ -118,6 +118,17 @@ pub enum InferenceError {
         /// What went wrong.
         detail: String,
     },
+    /// The inference server does not tell what it is asked without a token, or with this one.
+    #[error(
+        "inference.bearer_token: the server at {url} wants another: {detail}; give the one that its operator gave \
+         out"
+    )]
+    RemoteDenied {
+        /// Its address.
+        url: String,
+        /// What it said.
+        detail: String,
+    },
     /// The run-time failed on a batch.
     #[error("the network failed: {0}")]
     Run(String),

@@ -221,6 +221,13 @@ impl RemoteServer {
         }
     }
 
+    pub(super) fn denied(&self, detail: String) -> InferenceError {
+        InferenceError::RemoteDenied {
+            url: self.connection.address().to_string(),
+            detail,
+        }
+    }
+
     pub(super) fn away(&self, detail: String) -> InferenceError {
         InferenceError::Remote {
             url: self.connection.address().to_string(),

@@ -96,6 +96,23 @@ fn every_request_shows_the_token_and_none_without_one_shows_any() {
 }
 
 #[test]
+fn a_server_that_wants_another_token_says_so_at_the_start() {
+    let fake = FakeServer::start(true, -1);
+    fake.refuse_all(401);
+    let folder = manifest();
+    let error = load(&server(&fake), folder.path()).err().unwrap();
+    assert!(
+        matches!(error, InferenceError::RemoteDenied { .. }),
+        "{error}"
+    );
+    let told = error.to_string();
+    assert!(
+        told.contains("inference.bearer_token") && told.contains("401"),
+        "{told}"
+    );
+}
+
+#[test]
 fn a_server_without_a_place_is_busy_and_one_that_is_not_ready_is_away() {
     let fake = FakeServer::start(true, -1);
     let folder = manifest();

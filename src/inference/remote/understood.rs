@@ -107,8 +107,10 @@ fn told<T: for<'de> Deserialize<'de>>(
     path: &[&str],
 ) -> Result<T, InferenceError> {
     let reply = server.get(path)?;
-    if reply.status != 200 {
-        return Err(server.away(refusal(&reply)));
+    match reply.status {
+        200 => {}
+        401 | 403 => return Err(server.denied(refusal(&reply))),
+        _ => return Err(server.away(refusal(&reply))),
     }
     let read = serde_json::from_slice(&reply.body);
     read.map_err(|error| server.away(format!("its metadata cannot be read: {error}")))

@@ -52,10 +52,19 @@ impl RepositoryError {
     /// Whether it says nothing of the model, which may be loaded in a moment.
     #[must_use]
     pub fn is_passing(&self) -> bool {
-        matches!(
-            self,
-            Self::Busy
-                | Self::Refused(InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. })
-        )
+        self.is_denied()
+            || matches!(
+                self,
+                Self::Busy
+                    | Self::Refused(
+                        InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. }
+                    )
+            )
+    }
+
+    /// Whether the inference server wants another token: it passes, but not by itself.
+    #[must_use]
+    pub fn is_denied(&self) -> bool {
+        matches!(self, Self::Refused(InferenceError::RemoteDenied { .. }))
     }
 }

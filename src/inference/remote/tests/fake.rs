@@ -19,6 +19,8 @@ struct State {
     as_bytes: bool,
     first_axis: i64,
     is_ready: bool,
+    /// What everything is answered, instead of as asked.
+    refusal: Option<u16>,
     has_ended: bool,
     /// What the next requests to infer are answered, instead of as asked.
     told: VecDeque<Told>,
@@ -84,6 +86,7 @@ impl FakeServer {
             as_bytes,
             first_axis,
             is_ready: true,
+            refusal: None,
             has_ended: false,
             told: VecDeque::new(),
             inferred: Vec::new(),
@@ -120,6 +123,10 @@ impl FakeServer {
 
     pub(super) fn be_ready(&self, is_ready: bool) {
         self.state.lock().unwrap().is_ready = is_ready;
+    }
+
+    pub(super) fn refuse_all(&self, status: u16) {
+        self.state.lock().unwrap().refusal = Some(status);
     }
 
     pub(super) fn inferred(&self) -> Vec<Inferred> {
@@ -203,6 +210,9 @@ fn serve(stream: &TcpStream, state: &Mutex<State>) {
 fn answer(path: &str, body: &[u8], head_length: Option<usize>, state: &Mutex<State>) -> Told {
     let mut state = state.lock().unwrap();
     let json = |value: &Value| Told::status(200).body(value.to_string());
+    if let Some(status) = state.refusal {
+        return Told::status(status);
+    }
     match path {
         "/v2" => json(
             &json!({ "extensions": if state.as_bytes { vec!["binary_tensor_data"] } else { vec![] } }),
