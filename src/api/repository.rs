@@ -154,9 +154,9 @@ impl From<RepositoryError> for Problem {
             RepositoryError::Busy | RepositoryError::Refused(InferenceError::RemoteBusy { .. }) => {
                 ProblemKind::ModelBusy
             }
-            RepositoryError::Refused(InferenceError::Remote { .. }) => {
-                ProblemKind::InferenceUnavailable
-            }
+            RepositoryError::Refused(
+                InferenceError::Remote { .. } | InferenceError::RemoteDenied { .. },
+            ) => ProblemKind::InferenceUnavailable,
             RepositoryError::OtherName { .. } | RepositoryError::Refused(_) => {
                 ProblemKind::ModelRefused
             }

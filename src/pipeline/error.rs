@@ -104,7 +104,9 @@ pub(super) fn of_inference(error: &InferenceError) -> PipelineError {
         InferenceError::RemoteBusy { retry_after } => PipelineError::InferenceBusy {
             retry_after: *retry_after,
         },
-        InferenceError::Remote { .. } => PipelineError::InferenceUnavailable,
+        InferenceError::Remote { .. } | InferenceError::RemoteDenied { .. } => {
+            PipelineError::InferenceUnavailable
+        }
         other => internal(anyhow::anyhow!("{other}")),
     }
 }
