@@ -83,7 +83,7 @@ fn model_of<D: Detector + 'static>(first: D, others: Vec<D>) -> Model {
 fn remote_options(remote: &RemoteSettings, called: String) -> RemoteOptions {
     RemoteOptions {
         url: remote.url.clone(),
-        authorization: remote.authorization.clone(),
+        token: remote.token.clone(),
         model: remote.model.clone().unwrap_or_else(|| called.clone()),
         called,
         patience: remote.patience,

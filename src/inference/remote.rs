@@ -6,6 +6,7 @@ mod breaker;
 mod connection;
 mod exchange;
 mod server;
+mod token;
 mod understood;
 
 use std::{num::NonZeroUsize, path::Path, sync::Arc};
@@ -22,6 +23,7 @@ use super::{
 use crate::imaging::{NetworkInput, ViewBatch};
 
 pub use server::{RemoteCounts, RemoteOptions, RemoteServer};
+pub use token::{BearerToken, NoToken};
 
 /// A model on an inference server.
 pub struct RemoteDetector {

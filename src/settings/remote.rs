@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use reqwest::header::HeaderValue;
 use url::Url;
 
 use super::{
@@ -11,6 +10,7 @@ use super::{
     raw::{RawInference, RawModel},
     unshown::Unshown,
 };
+use crate::inference::{BearerToken, NoToken};
 
 /// The backend that runs networks here.
 pub(super) const ONNX: &str = "onnx";
@@ -25,8 +25,8 @@ const HIDDEN: &str = "***";
 pub struct RemoteSettings {
     /// Its address, without `/v2`.
     pub url: Url,
-    /// Shows the server who asks: a whole `Authorization` header, sensitive.
-    pub authorization: Option<HeaderValue>,
+    /// What it wants to see.
+    pub token: Option<BearerToken>,
     /// What the model is called there; by default as its manifest calls it.
     pub model: Option<String>,
     /// Longest that one request to it may take.
@@ -71,7 +71,7 @@ impl RemoteSettings {
         }
         Ok(Some(Self {
             url: address(&raw.url)?,
-            authorization: authorization(&raw.bearer_token)?,
+            token: token(&raw.bearer_token)?,
             model: (!raw.model.is_empty()).then(|| raw.model.clone()),
             patience,
         }))
@@ -93,21 +93,15 @@ fn address(told: &str) -> Result<Url, SettingsError> {
     url.ok_or_else(|| refused("inference.url", shown, remedy))
 }
 
-/// The header that shows a token, if there is one (RFC 6750, section 2.1).
-fn authorization(token: &Unshown) -> Result<Option<HeaderValue>, SettingsError> {
-    let Unshown(token) = token;
-    if token.is_empty() {
+fn token(written: &Unshown) -> Result<Option<BearerToken>, SettingsError> {
+    let Unshown(written) = written;
+    if written.is_empty() {
         return Ok(None);
     }
-    let is_token = token.bytes().all(|byte| byte.is_ascii_graphic());
-    let header = HeaderValue::try_from(format!("Bearer {token}")).ok();
-    let mut header = header.filter(|_| is_token).ok_or_else(|| {
-        let remedy = "give the token alone, as the inference server's operator gave it: letters, digits and \
-                      signs without spaces";
-        refused("inference.bearer_token", HIDDEN, remedy)
-    })?;
-    header.set_sensitive(true);
-    Ok(Some(header))
+    let token = written.parse();
+    token
+        .map(Some)
+        .map_err(|remedy: NoToken| refused("inference.bearer_token", HIDDEN, &remedy.to_string()))
 }
 
 fn refused(key: &str, value: &str, remedy: &str) -> SettingsError {

@@ -46,8 +46,8 @@ impl Connection {
     pub(super) fn new(options: &RemoteOptions) -> reqwest::Result<Self> {
         // Fails when there is one already, which is as good.
         let _ = rustls::crypto::ring::default_provider().install_default();
-        let authorization = options.authorization.clone();
-        let headers = authorization.map(|header| (AUTHORIZATION, header));
+        let token = options.token.as_ref();
+        let headers = token.map(|token| (AUTHORIZATION, token.authorization()));
         let client = Client::builder()
             .default_headers(headers.into_iter().collect())
             .connect_timeout(CONNECT_PATIENCE.min(options.patience))

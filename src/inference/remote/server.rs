@@ -9,13 +9,13 @@ use std::{
 };
 
 use bytes::Bytes;
-use reqwest::header::HeaderValue;
 use url::Url;
 
 use super::{
     breaker::Breaker,
     connection::{Connection, Reply},
     exchange::{Answer, Question},
+    token::BearerToken,
 };
 use crate::inference::InferenceError;
 
@@ -34,7 +34,7 @@ pub struct RemoteOptions {
     /// The server's address, without `/v2`.
     pub url: Url,
     /// Sent with every request, if there is one.
-    pub authorization: Option<HeaderValue>,
+    pub token: Option<BearerToken>,
     /// The model there whose readiness stands for the server's.
     pub model: String,
     /// The name in manifests of the model that is called `model` there; others are called the same.

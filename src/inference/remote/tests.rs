@@ -4,7 +4,6 @@ mod fake;
 
 use std::{fs, path::Path, time::Duration};
 
-use reqwest::header::HeaderValue;
 use tempfile::TempDir;
 
 use self::fake::{FakeServer, Told};
@@ -23,10 +22,10 @@ fn server(fake: &FakeServer) -> Arc<RemoteServer> {
     server_with_token(fake, None)
 }
 
-fn server_with_token(fake: &FakeServer, token: Option<&'static str>) -> Arc<RemoteServer> {
+fn server_with_token(fake: &FakeServer, token: Option<&str>) -> Arc<RemoteServer> {
     let options = RemoteOptions {
         url: fake.address().parse().unwrap(),
-        authorization: token.map(HeaderValue::from_static),
+        token: token.map(|token| token.parse().unwrap()),
         model: "there".to_owned(),
         called: "here".to_owned(),
         patience: Duration::from_millis(500),
@@ -79,7 +78,7 @@ fn views_go_as_bytes_where_the_server_takes_them_and_as_lists_elsewhere() {
 
 #[test]
 fn every_request_shows_the_token_and_none_without_one_shows_any() {
-    for token in [None, Some("Bearer s3cret")] {
+    for token in [None, Some("s3cret")] {
         let fake = FakeServer::start(true, -1);
         let folder = manifest();
         let server = server_with_token(&fake, token);

@@ -1,0 +1,42 @@
+//! The token that an inference server wants to see.
+
+use std::{fmt, str::FromStr};
+
+use reqwest::header::HeaderValue;
+
+/// A token, as it is sent with every request. It is never shown.
+#[derive(Clone, PartialEq)]
+pub struct BearerToken(HeaderValue);
+
+/// Text that is no token. It is not repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "give the token alone, as the inference server's operator gave it out: letters, digits and signs \
+     without spaces"
+)]
+pub struct NoToken;
+
+impl BearerToken {
+    /// The header `Authorization` that shows it (RFC 6750, section 2.1).
+    pub(super) fn authorization(&self) -> HeaderValue {
+        self.0.clone()
+    }
+}
+
+impl FromStr for BearerToken {
+    type Err = NoToken;
+
+    fn from_str(text: &str) -> Result<Self, NoToken> {
+        let is_token = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic());
+        let header = HeaderValue::try_from(format!("Bearer {text}"));
+        let mut header = header.ok().filter(|_| is_token).ok_or(NoToken)?;
+        header.set_sensitive(true);
+        Ok(Self(header))
+    }
+}
+
+impl fmt::Debug for BearerToken {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("…")
+    }
+}
