@@ -148,7 +148,7 @@ impl App {
             match loaded {
                 Some(Ok(_)) => return Ok(()),
                 None => {}
-                Some(Err(error)) if error.is_passing() && !error.is_denied() => {}
+                Some(Err(error)) if error.is_passing() => {}
                 Some(Err(error)) => return Err(error.into()),
             }
             tokio::select! {

@@ -244,7 +244,7 @@ impl ModelRepository {
             Err(error) => {
                 self.failed.fetch_add(1, Ordering::Relaxed);
                 memory.failures.insert(name.to_owned(), error.to_string());
-                if !error.is_passing() {
+                if error.is_of_model() {
                     memory.refused.insert(name.to_owned(), stamp);
                 }
                 tracing::error!(model = name, "not loaded: {error}");

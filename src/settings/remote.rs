@@ -95,13 +95,8 @@ fn address(told: &str) -> Result<Url, SettingsError> {
 
 fn token(written: &Unshown) -> Result<Option<BearerToken>, SettingsError> {
     let Unshown(written) = written;
-    if written.is_empty() {
-        return Ok(None);
-    }
-    let token = written.parse();
-    token
-        .map(Some)
-        .map_err(|remedy: NoToken| refused("inference.bearer_token", HIDDEN, &remedy.to_string()))
+    let token = (!written.is_empty()).then(|| written.parse()).transpose();
+    token.map_err(|remedy: NoToken| refused("inference.bearer_token", HIDDEN, &remedy.to_string()))
 }
 
 fn refused(key: &str, value: &str, remedy: &str) -> SettingsError {

@@ -1,11 +1,11 @@
 //! The token that an inference server wants to see.
 
-use std::{fmt, str::FromStr};
+use std::str::FromStr;
 
 use reqwest::header::HeaderValue;
 
-/// A token, as it is sent with every request. It is never shown.
-#[derive(Clone, PartialEq)]
+/// A token, as it is sent with every request: a sensitive header, which is never shown.
+#[derive(Debug, Clone, PartialEq)]
 pub struct BearerToken(HeaderValue);
 
 /// Text that is no token. It is not repeated.
@@ -32,11 +32,5 @@ impl FromStr for BearerToken {
         let mut header = header.ok().filter(|_| is_token).ok_or(NoToken)?;
         header.set_sensitive(true);
         Ok(Self(header))
-    }
-}
-
-impl fmt::Debug for BearerToken {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str("…")
     }
 }

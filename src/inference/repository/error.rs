@@ -49,22 +49,19 @@ pub enum RepositoryError {
 }
 
 impl RepositoryError {
-    /// Whether it says nothing of the model, which may be loaded in a moment.
+    /// Whether the model may be loaded in a moment, without anybody doing something.
     #[must_use]
     pub fn is_passing(&self) -> bool {
-        self.is_denied()
-            || matches!(
-                self,
-                Self::Busy
-                    | Self::Refused(
-                        InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. }
-                    )
-            )
+        matches!(
+            self,
+            Self::Busy
+                | Self::Refused(InferenceError::Remote { .. } | InferenceError::RemoteBusy { .. })
+        )
     }
 
-    /// Whether the inference server wants another token: it passes, but not by itself.
+    /// Whether it says something of the model: then nothing changes until its files do.
     #[must_use]
-    pub fn is_denied(&self) -> bool {
-        matches!(self, Self::Refused(InferenceError::RemoteDenied { .. }))
+    pub fn is_of_model(&self) -> bool {
+        !self.is_passing() && !matches!(self, Self::Refused(InferenceError::RemoteDenied { .. }))
     }
 }
