@@ -1,23 +1,27 @@
 //! Remap tables: where a view samples the frame, and the sampling itself.
 
+mod band;
 mod frame_from_plane;
 mod node_grid;
-mod row;
+mod rendering;
 mod scalar;
 #[cfg(target_arch = "x86_64")]
 #[expect(unsafe_code, reason = "the one place for vector instructions")]
 mod vector;
 mod visibility;
+mod whole_patches;
 
 use std::{collections::HashSet, sync::Arc};
 
 use rayon::prelude::*;
 
 use self::{
+    band::{Band, LANES},
     frame_from_plane::FrameFromPlane,
-    node_grid::{NodeGrid, Places},
-    row::{LANES, Planes, Row, Source},
+    node_grid::NodeGrid,
+    rendering::{Planes, Source},
     scalar::Sample,
+    whole_patches::WholePatches,
 };
 use super::{Frame, MaskedPixels, NetworkInput};
 use crate::geometry::{Lens, Pixel, VirtualView};
@@ -39,6 +43,7 @@ use crate::geometry::{Lens, Pixel, VirtualView};
 pub struct RemapTable {
     grid: Arc<NodeGrid>,
     frame_from_plane: FrameFromPlane,
+    whole_patches: WholePatches,
     frame_width: u32,
     frame_height: u32,
 }
@@ -71,11 +76,18 @@ impl RemapTable {
             .into_par_iter()
             .map(|view| Arc::new(NodeGrid::new(view, lens)))
             .collect();
-        let table = |(grid, turn): (usize, f64)| Self {
-            grid: Arc::clone(&grids[grid]),
-            frame_from_plane: FrameFromPlane::new(lens.image_plane(), turn),
-            frame_width,
-            frame_height,
+        let table = |(grid, turn): (usize, f64)| {
+            let grid = Arc::clone(&grids[grid]);
+            let frame_from_plane = FrameFromPlane::new(lens.image_plane(), turn);
+            let whole_patches =
+                WholePatches::new(&grid, &frame_from_plane, frame_width, frame_height);
+            Self {
+                grid,
+                frame_from_plane,
+                whole_patches,
+                frame_width,
+                frame_height,
+            }
         };
         shared.into_iter().map(table).collect()
     }
@@ -87,12 +99,13 @@ impl RemapTable {
     /// When the pixel lies outside the view.
     #[must_use]
     pub fn position(&self, x: u32, y: u32) -> Option<Pixel> {
-        let mut nodes = Places::default();
-        let row = self.row(y as usize, &mut nodes);
-        let (block, lane) = (x as usize / LANES, x as usize % LANES);
-        let lanes = row.lanes(block);
-        let [x, y] = row.block(block).position(lane).map(f64::from);
-        (lanes >> lane & 1 == 1 && !x.is_nan()).then(|| Pixel::new(x, y))
+        let (x, y) = (x as usize, y as usize);
+        let band = self.band(y / LANES);
+        let patch = band.patch(x / LANES);
+        let lanes = band.lanes(y % LANES, x / LANES);
+        let is_visible = lanes >> (x % LANES) & 1 == 1;
+        let [x, y] = patch.block(y % LANES).position(x % LANES).map(f64::from);
+        (is_visible && !x.is_nan()).then(|| Pixel::new(x, y))
     }
 
     /// Whether any of the view's pixels sees some of the lens image in the frame.
@@ -114,12 +127,15 @@ impl RemapTable {
     /// Whether one of the view's pixels has a sample for which `counts` holds.
     fn has_sample(&self, counts: impl Fn(&Sample) -> bool) -> bool {
         let (width, height) = (self.frame_width as usize, self.frame_height as usize);
-        let mut nodes = Places::default();
-        (0..self.grid.visibility().rows()).any(|y| {
-            let row = self.row(y, &mut nodes);
-            (0..row.nodes.x.len() - 1).any(|index| {
-                let samples = row.block(index).samples(row.lanes(index), width, height);
-                samples.iter().flatten().any(&counts)
+        (0..self.bands()).any(|index| {
+            let band = self.band(index);
+            (0..band.patches()).any(|index| {
+                let patch = band.patch(index);
+                (0..band.rows.len()).any(|row| {
+                    let lanes = band.lanes(row, index);
+                    let samples = patch.block(row).samples(lanes, width, height);
+                    samples.iter().flatten().any(&counts)
+                })
             })
         })
     }
@@ -130,7 +146,8 @@ impl RemapTable {
         let mut counted = HashSet::new();
         let bytes = tables.into_iter().map(|table| {
             let is_first = counted.insert(Arc::as_ptr(&table.grid));
-            size_of::<Self>() + if is_first { table.grid.bytes() } else { 0 }
+            let grid = if is_first { table.grid.bytes() } else { 0 };
+            size_of::<Self>() + table.whole_patches.bytes() + grid
         });
         bytes.sum()
     }
@@ -143,8 +160,8 @@ impl RemapTable {
         if let Some(avx2) = vector::Avx2::detect()
             && i32::try_from(frame.pixels().len()).is_ok()
         {
-            self.render_bands(frame, input, slot, |source, rows, planes| {
-                vector::render_rows(avx2, source, rows, planes);
+            self.render_bands(frame, input, slot, |source, band, planes| {
+                vector::render(avx2, source, band, planes);
             });
             return;
         }
@@ -154,7 +171,7 @@ impl RemapTable {
     /// What [`RemapTable::render`] does where there are no vector instructions it knows: the same,
     /// to the bit.
     pub fn render_portably(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
-        self.render_bands(frame, input, slot, scalar::render_rows);
+        self.render_bands(frame, input, slot, scalar::render);
     }
 
     fn render_bands(
@@ -162,7 +179,7 @@ impl RemapTable {
         frame: &Frame,
         input: &NetworkInput,
         slot: &mut [f32],
-        render_rows: impl Fn(&Source, &[Row], Planes),
+        render: impl Fn(&Source, &Band, Planes),
     ) {
         debug_assert_eq!(
             (frame.width(), frame.height()),
@@ -173,28 +190,29 @@ impl RemapTable {
         let (second, third) = rest.split_at_mut(input.plane_len());
         let band_len = LANES * input.width as usize;
         let [first, second, third] = [first, second, third].map(|plane| plane.chunks_mut(band_len));
-        let mut nodes: [Places; LANES] = std::array::from_fn(|_| Places::default());
-        for (band, ((first, second), third)) in first.zip(second).zip(third).enumerate() {
-            let rows = first.len() / input.width as usize;
-            let rows = nodes[..rows].iter_mut().enumerate();
-            let rows: Vec<_> = rows
-                .map(|(row, nodes)| self.row(band * LANES + row, nodes))
-                .collect();
+        for (index, ((first, second), third)) in first.zip(second).zip(third).enumerate() {
             let mut planes = [first, second, third];
             if input.source_channels()[0] != 0 {
                 planes.reverse();
             }
-            render_rows(&source, &rows, planes);
+            render(&source, &self.band(index), planes);
         }
     }
 
-    /// The view's row `y`; `nodes` is where its nodes are kept.
-    fn row<'a>(&self, y: usize, nodes: &'a mut Places) -> Row<'a> {
-        let to_frame = |place| self.frame_from_plane.pixel_at(place);
-        self.grid.along_row(y, to_frame, nodes);
-        Row {
-            nodes,
-            visibility: self.grid.visibility().row(y),
+    /// The view's bands, of eight rows each; the last one may be of fewer.
+    fn bands(&self) -> usize {
+        self.grid.visibility().rows().div_ceil(LANES)
+    }
+
+    fn band(&self, index: usize) -> Band<'_> {
+        let visibility = self.grid.visibility();
+        Band {
+            above: self.grid.nodes(index),
+            below: self.grid.nodes(index + 1),
+            frame_from_plane: &self.frame_from_plane,
+            visibility,
+            rows: index * LANES..visibility.rows().min((index + 1) * LANES),
+            whole_patches: self.whole_patches.band(index),
         }
     }
 }

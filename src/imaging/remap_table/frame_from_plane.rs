@@ -1,5 +1,7 @@
 //! From the plane that the views of a ring share to the frame of one of them.
 
+use std::array;
+
 use crate::geometry::lens::ImagePlane;
 
 /// An affine map in the precision in which nodes are kept.
@@ -28,6 +30,18 @@ impl FrameFromPlane {
 
     /// The frame's pixel (pixel centres) at a place of the plane.
     pub(super) fn pixel_at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        [self.x, self.y].map(|[of_x, of_y, offset]| of_x * x + of_y * y + offset)
+        self.pixels_at(&[x], &[y]).map(|[coordinate]| coordinate)
+    }
+
+    /// Columns and rows of the frame's pixels (pixel centres) at some places of the plane.
+    #[expect(
+        clippy::inline_always,
+        reason = "this becomes vector code only within a function that may use it"
+    )]
+    #[inline(always)]
+    pub(super) fn pixels_at<const N: usize>(&self, x: &[f32; N], y: &[f32; N]) -> [[f32; N]; 2] {
+        [self.x, self.y].map(|[of_x, of_y, offset]| {
+            array::from_fn(|place| of_x * x[place] + of_y * y[place] + offset)
+        })
     }
 }

@@ -6,72 +6,59 @@ use crate::geometry::{Lens, Pixel, VirtualView};
 /// Positions are exact at every so many view pixels, across and down.
 pub(super) const NODE_STEP: u32 = 8;
 
-/// One view's nodes. Blocks of 8×8 pixels lie between them, the last ones beyond the view's right
+/// One view's nodes. Patches of 8×8 pixels lie between them, the last ones beyond the view's right
 /// and lower border where its sides are no multiples of 8.
 #[derive(Debug)]
 pub(super) struct NodeGrid {
     /// Row by row.
-    nodes: Places,
+    x: Vec<f32>,
+    y: Vec<f32>,
     nodes_across: usize,
     visibility: Visibility,
 }
 
-/// Positions, in the normalised plane or in the frame, coordinate by coordinate.
-#[derive(Debug, Default)]
-pub(super) struct Places {
-    pub(super) x: Vec<f32>,
-    pub(super) y: Vec<f32>,
+/// A row of nodes: places in the normalised plane, coordinate by coordinate.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Nodes<'a> {
+    pub(super) x: &'a [f32],
+    pub(super) y: &'a [f32],
 }
 
 impl NodeGrid {
     pub(super) fn new(view: &VirtualView, lens: &Lens) -> Self {
-        let blocks_across = view.width().div_ceil(NODE_STEP);
-        let blocks_down = view.height().div_ceil(NODE_STEP);
-        let mut nodes = Places::default();
-        for row in 0..=blocks_down {
-            for column in 0..=blocks_across {
+        let patches_across = view.width().div_ceil(NODE_STEP);
+        let patches_down = view.height().div_ceil(NODE_STEP);
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for row in 0..=patches_down {
+            for column in 0..=patches_across {
                 let pixel = Pixel::new(f64::from(column * NODE_STEP), f64::from(row * NODE_STEP));
                 let place = lens.continued_beyond_rim(&view.ray_in_camera(&pixel));
-                // A node without a place hides the four blocks around it.
+                // A node without a place hides the four patches around it.
                 let place = place.unwrap_or(Pixel::new(f64::NAN, f64::NAN));
-                nodes.x.push(single(place.x));
-                nodes.y.push(single(place.y));
+                x.push(single(place.x));
+                y.push(single(place.y));
             }
         }
         Self {
-            nodes,
-            nodes_across: blocks_across as usize + 1,
+            x,
+            y,
+            nodes_across: patches_across as usize + 1,
             visibility: Visibility::new(view, lens),
         }
     }
 
-    /// What lies between the nodes above and below the view's row `y`: one place per node, passed
-    /// through `transformed` and put into `places`.
-    pub(super) fn along_row(
-        &self,
-        y: usize,
-        transformed: impl Fn([f32; 2]) -> [f32; 2],
-        places: &mut Places,
-    ) {
-        let step = NODE_STEP as usize;
-        #[expect(clippy::cast_precision_loss, reason = "below 8")]
-        let down = (y % step) as f32 / NODE_STEP as f32;
-        let upper = y / step * self.nodes_across;
-        let lower = upper + self.nodes_across;
-        let end = lower + self.nodes_across;
-        // One thing at a time, each in a loop that becomes vector code.
-        let between = |coordinates: &[f32], places: &mut Vec<f32>| {
-            let pairs = coordinates[upper..lower]
-                .iter()
-                .zip(&coordinates[lower..end]);
-            places.clear();
-            places.extend(pairs.map(|(above, below)| above + (below - above) * down));
-        };
-        between(&self.nodes.x, &mut places.x);
-        between(&self.nodes.y, &mut places.y);
-        for (x, y) in places.x.iter_mut().zip(&mut places.y) {
-            [*x, *y] = transformed([*x, *y]);
+    /// The nodes of a row, from the top.
+    pub(super) fn nodes(&self, row: usize) -> Nodes<'_> {
+        let row = row * self.nodes_across..(row + 1) * self.nodes_across;
+        Nodes {
+            x: &self.x[row.clone()],
+            y: &self.y[row],
         }
+    }
+
+    /// Patches in a row.
+    pub(super) fn patches_across(&self) -> usize {
+        self.nodes_across - 1
     }
 
     /// Which pixels see the lens image.
@@ -81,7 +68,7 @@ impl NodeGrid {
 
     /// Memory held, bytes.
     pub(super) fn bytes(&self) -> usize {
-        let coordinates = [self.nodes.x.as_slice(), self.nodes.y.as_slice()];
+        let coordinates = [self.x.as_slice(), self.y.as_slice()];
         size_of::<Self>()
             + coordinates.map(size_of_val).iter().sum::<usize>()
             + self.visibility.bytes()

@@ -1,6 +1,9 @@
 //! Sampling one pixel at a time, on every machine.
 
-use super::row::{Block, LANES, Lanes, Planes, Row, Source, Values, WEIGHT_ONE, render_band};
+use super::{
+    band::{Band, Block, LANES, Lanes, Seen},
+    rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
+};
 
 /// Four neighbours of a position in the frame and their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,10 +16,16 @@ pub(super) struct Sample {
     lower_weight: f32,
 }
 
-pub(super) fn render_rows(source: &Source, rows: &[Row], planes: Planes) {
-    let locate = |block: &Block, lanes| block.samples(lanes, source.width, source.height);
+pub(super) fn render(source: &Source, band: &Band, planes: Planes) {
+    let locate = |block: &Block, seen| {
+        let lanes = match seen {
+            Seen::Whole => Lanes::MAX,
+            Seen::Lanes(lanes) => lanes,
+        };
+        block.samples(lanes, source.width, source.height)
+    };
     let sample = |samples: &_, _| sample_block(source, samples);
-    render_band(source, rows, planes, locate, sample);
+    render_band(source, band, planes, locate, sample, |_| {});
 }
 
 impl Block {

@@ -4,17 +4,24 @@
 //! The only module with unsafe code. Pixels are read through slices; what is unsafe is to call
 //! functions that need AVX2, and to see a vector as an array.
 
-use std::arch::x86_64::{
-    __m256, __m256i, _CMP_LE_OQ, _MM_HINT_T0, _mm_prefetch, _mm256_add_epi32, _mm256_add_ps,
-    _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_ps,
-    _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps, _mm256_cvttps_epi32, _mm256_madd_epi16,
-    _mm256_max_ps, _mm256_min_epi32, _mm256_min_ps, _mm256_mul_ps, _mm256_mullo_epi32,
-    _mm256_or_si256, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi8, _mm256_setr_epi32,
-    _mm256_setr_epi64x, _mm256_setr_ps, _mm256_setzero_ps, _mm256_shuffle_epi8, _mm256_shuffle_ps,
-    _mm256_slli_epi32, _mm256_srli_epi32, _mm256_srli_epi64, _mm256_sub_epi32, _mm256_sub_ps,
+use std::{
+    arch::x86_64::{
+        __m256, __m256i, _CMP_LE_OQ, _MM_HINT_T0, _mm_prefetch, _mm256_add_epi32, _mm256_add_ps,
+        _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_castps_si256,
+        _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps,
+        _mm256_cvttps_epi32, _mm256_madd_epi16, _mm256_max_ps, _mm256_min_epi32, _mm256_min_ps,
+        _mm256_mul_ps, _mm256_mullo_epi32, _mm256_or_si256, _mm256_set1_epi32, _mm256_set1_ps,
+        _mm256_setr_epi8, _mm256_setr_epi32, _mm256_setr_epi64x, _mm256_setr_ps, _mm256_setzero_ps,
+        _mm256_shuffle_epi8, _mm256_shuffle_ps, _mm256_slli_epi32, _mm256_srli_epi32,
+        _mm256_srli_epi64, _mm256_sub_epi32, _mm256_sub_ps,
+    },
+    ptr,
 };
 
-use super::row::{Block, LANES, Lanes, Planes, Row, Source, Values, WEIGHT_ONE, render_band};
+use super::{
+    band::{Band, Block, LANES, Lanes, Seen},
+    rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
+};
 
 /// The bytes of two neighbouring pixels, and two more.
 const PAIR_BYTES: usize = 8;
@@ -30,21 +37,25 @@ impl Avx2 {
     }
 }
 
-/// As `scalar::render_rows`, for frames of less than 2 GiB.
-pub(super) fn render_rows(_proof: Avx2, source: &Source, rows: &[Row], planes: Planes) {
+/// As `scalar::render`, for frames of less than 2 GiB.
+pub(super) fn render(_proof: Avx2, source: &Source, band: &Band, planes: Planes) {
     // SAFETY: there is proof that the processor has AVX2.
-    unsafe { render_rows_with_avx2(source, rows, planes) }
+    unsafe { render_with_avx2(source, band, planes) }
 }
 
 #[target_feature(enable = "avx2")]
-fn render_rows_with_avx2(source: &Source, rows: &[Row], planes: Planes) {
+fn render_with_avx2(source: &Source, band: &Band, planes: Planes) {
     let frame_lines = Lines::of(source);
-    let locate = |block: &Block, lanes| samples(source, block, lanes);
+    let locate = |block: &Block, seen| match seen {
+        Seen::Whole => whole_samples(source, block),
+        Seen::Lanes(lanes) => samples(source, block, lanes),
+    };
     let sample = |samples: &_, row| {
-        announce(source, samples, row);
+        announce_pixels(source, samples, row);
         sample_block(source, &frame_lines, samples)
     };
-    render_band(source, rows, planes, locate, sample);
+    let announce = |place: &f32| _mm_prefetch::<_MM_HINT_T0>(ptr::from_ref(place).cast());
+    render_band(source, band, planes, locate, sample, announce);
 }
 
 /// The frame seen from two places. Eight bytes from the first one's start are a pixel and its right
@@ -102,27 +113,61 @@ fn sample_block(source: &Source, frame_lines: &Lines, samples: &Samples) -> Valu
     [value(0), value(1), value(2)]
 }
 
+/// Of a block all of whose pixels see the lens image, within the frame.
+#[target_feature(enable = "avx2")]
+fn whole_samples(source: &Source, block: &Block) -> Samples {
+    let [left, top] = [0, 1].map(|axis| {
+        let position = positions(block.start[axis], block.step[axis]);
+        Neighbours::of(position, _mm256_cvttps_epi32(position))
+    });
+    let all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+    Samples::new(source, &left, &top, all)
+}
+
 #[target_feature(enable = "avx2")]
 fn samples(source: &Source, block: &Block, lanes: Lanes) -> Samples {
-    let (left, right_weight, is_within_width) = split(block.start[0], block.step[0], source.width);
-    let (top, lower_weight, is_within_height) = split(block.start[1], block.step[1], source.height);
-    let pixel = _mm256_add_epi32(_mm256_mullo_epi32(top, whole(source.width)), left);
-    let first_byte = _mm256_add_epi32(_mm256_slli_epi32::<1>(pixel), pixel);
-    let one = i32::from(WEIGHT_ONE);
-    let right = _mm256_mul_ps(right_weight, _mm256_set1_ps(f32::from(WEIGHT_ONE)));
-    let right = _mm256_cvttps_epi32(right);
-    let left = _mm256_sub_epi32(_mm256_set1_epi32(one), right);
+    let (left, is_within_width) = split(block.start[0], block.step[0], source.width);
+    let (top, is_within_height) = split(block.start[1], block.step[1], source.height);
     let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
     let lanes = _mm256_and_si256(_mm256_set1_epi32(i32::from(lanes)), bits);
+    let sees_lens = _mm256_castsi256_ps(_mm256_cmpeq_epi32(lanes, bits));
     let is_within = _mm256_and_ps(is_within_width, is_within_height);
-    Samples {
-        first_bytes: words(first_byte),
-        weights: _mm256_or_si256(_mm256_slli_epi32::<16>(right), left),
-        lower_weight,
-        is_visible: _mm256_and_ps(
-            is_within,
-            _mm256_castsi256_ps(_mm256_cmpeq_epi32(lanes, bits)),
-        ),
+    Samples::new(source, &left, &top, _mm256_and_ps(is_within, sees_lens))
+}
+
+impl Samples {
+    #[target_feature(enable = "avx2")]
+    fn new(source: &Source, left: &Neighbours, top: &Neighbours, is_visible: __m256) -> Self {
+        let pixel = _mm256_mullo_epi32(top.lower, whole(source.width));
+        let pixel = _mm256_add_epi32(pixel, left.lower);
+        let first_byte = _mm256_add_epi32(_mm256_slli_epi32::<1>(pixel), pixel);
+        let one = i32::from(WEIGHT_ONE);
+        let right = _mm256_mul_ps(left.upper_weight, _mm256_set1_ps(f32::from(WEIGHT_ONE)));
+        let right = _mm256_cvttps_epi32(right);
+        let left = _mm256_sub_epi32(_mm256_set1_epi32(one), right);
+        Self {
+            first_bytes: words(first_byte),
+            weights: _mm256_or_si256(_mm256_slli_epi32::<16>(right), left),
+            lower_weight: top.upper_weight,
+            is_visible,
+        }
+    }
+}
+
+/// Along one axis, of two neighbours each the lower one (the left or upper one in the frame), and the
+/// weight of the other.
+struct Neighbours {
+    lower: __m256i,
+    upper_weight: __m256,
+}
+
+impl Neighbours {
+    #[target_feature(enable = "avx2")]
+    fn of(position: __m256, lower: __m256i) -> Self {
+        Self {
+            lower,
+            upper_weight: _mm256_sub_ps(position, _mm256_cvtepi32_ps(lower)),
+        }
     }
 }
 
@@ -137,7 +182,7 @@ const CACHE_LINE: isize = 64;
 /// are close to each line of the frame that it meets; and what lies beside them on that line, as it
 /// is at a patch's sides that there is something new.
 #[target_feature(enable = "avx2")]
-fn announce(source: &Source, samples: &Samples, row: usize) {
+fn announce_pixels(source: &Source, samples: &Samples, row: usize) {
     let first_bytes = samples.first_bytes.map(|byte| byte as usize);
     let two_blocks = 2_usize.wrapping_mul(first_bytes[LANES - 1].wrapping_sub(first_bytes[0]));
     for lane in [row, LANES - 1 - row] {
@@ -153,20 +198,25 @@ fn announce(source: &Source, samples: &Samples, row: usize) {
     }
 }
 
-/// As `scalar::split`: lower neighbours, weights of the upper ones, and whether that is within.
+/// Along one axis, where the pixels of a block sample.
 #[target_feature(enable = "avx2")]
-fn split(start: f32, step: f32, count: usize) -> (__m256i, __m256, __m256) {
+fn positions(start: f32, step: f32) -> __m256 {
     let lane = _mm256_setr_ps(0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0);
     let steps = _mm256_mul_ps(_mm256_set1_ps(step), lane);
-    let position = _mm256_add_ps(_mm256_set1_ps(start), steps);
+    _mm256_add_ps(_mm256_set1_ps(start), steps)
+}
+
+/// As `scalar::split`: neighbours, and whether that is within.
+#[target_feature(enable = "avx2")]
+fn split(start: f32, step: f32, count: usize) -> (Neighbours, __m256) {
+    let position = positions(start, step);
     let last = _mm256_cvtepi32_ps(whole(count - 1));
     // In this order what is no number becomes 0, and is not within.
     let within = _mm256_min_ps(_mm256_max_ps(position, _mm256_setzero_ps()), last);
     let beyond = _mm256_andnot_ps(_mm256_set1_ps(-0.0), _mm256_sub_ps(position, within));
     let is_within = _mm256_cmp_ps::<_CMP_LE_OQ>(beyond, _mm256_set1_ps(0.5));
     let lower = _mm256_min_epi32(_mm256_cvttps_epi32(within), whole(count - 2));
-    let weight = _mm256_sub_ps(within, _mm256_cvtepi32_ps(lower));
-    (lower, weight, is_within)
+    (Neighbours::of(within, lower), is_within)
 }
 
 /// Eight bytes from each of the given ones: of pixels 0, 1, 4 and 5, and of 2, 3, 6 and 7.

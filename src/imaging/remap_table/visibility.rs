@@ -6,16 +6,17 @@ use crate::geometry::{Lens, Pixel, VirtualView};
 /// lens sees, or, where that is more than a half space, what it does not.
 #[derive(Debug)]
 pub(super) struct Visibility {
-    spans: Vec<[u32; 2]>,
-    spans_are_hidden: bool,
+    /// Of each row, the first pixel of its span and the first one after it.
+    pub(super) spans: Vec<[u32; 2]>,
+    pub(super) spans_are_hidden: bool,
 }
 
 /// One row of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RowVisibility {
-    pub(super) start: u32,
-    pub(super) end: u32,
-    pub(super) is_hidden: bool,
+    start: u32,
+    end: u32,
+    is_hidden: bool,
 }
 
 impl Visibility {

@@ -1,8 +1,9 @@
-//! Single rows, pixel by pixel.
+//! Single bands, pixel by pixel.
 
 use proptest::prelude::*;
 
-use super::super::{visibility::RowVisibility, *};
+use super::super::{node_grid::Nodes, visibility::Visibility, *};
+use crate::geometry::lens::ImagePlane;
 
 pub(super) fn noise(width: u32, height: u32) -> Frame {
     let pixels = (0..width * height * 3).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
@@ -29,35 +30,49 @@ pub(super) fn reference(frame: &Frame, position: &Pixel, channel: usize) -> f64 
         + at(left + 1.0, top + 1.0) * right_weight * lower_weight
 }
 
+/// The frame's pixels as the plane.
+fn identity() -> FrameFromPlane {
+    let plane = ImagePlane {
+        fx: 1.0,
+        fy: 1.0,
+        skew: 0.0,
+        row_skew: 0.0,
+        cx: 0.0,
+        cy: 0.0,
+    };
+    FrameFromPlane::new(&plane, 0.0)
+}
+
 fn rendered(
-    row: &Row,
+    band: &Band,
     frame: &Frame,
     input: &NetworkInput,
-    render_rows: impl Fn(&Source, &[Row], Planes),
+    render: impl Fn(&Source, &Band, Planes),
 ) -> Vec<f32> {
     let mut values = vec![-1.0; input.view_len()];
     let mut planes = values.chunks_exact_mut(input.plane_len());
     let planes = std::array::from_fn(|_| planes.next().unwrap());
-    render_rows(
-        &Source::new(frame, input),
-        std::slice::from_ref(row),
-        planes,
-    );
+    render(&Source::new(frame, input), band, planes);
     values
 }
 
 /// R, G and B at one position.
 fn sampled(position: [f32; 2], frame: &Frame) -> Vec<f32> {
-    let [x, y] = position.map(|coordinate| vec![coordinate; 2]);
-    let row = Row {
-        nodes: &Places { x, y },
-        visibility: RowVisibility {
-            start: 0,
-            end: 1,
-            is_hidden: false,
-        },
+    let [x, y] = position.map(|coordinate| [coordinate; 2]);
+    let nodes = Nodes { x: &x, y: &y };
+    let visibility = Visibility {
+        spans: vec![[0, 1]],
+        spans_are_hidden: false,
     };
-    rendered(&row, frame, &NetworkInput::plain(1, 1), scalar::render_rows)
+    let band = Band {
+        above: nodes,
+        below: nodes,
+        frame_from_plane: &identity(),
+        visibility: &visibility,
+        rows: 0..1,
+        whole_patches: 0..0,
+    };
+    rendered(&band, frame, &NetworkInput::plain(1, 1), scalar::render)
 }
 
 fn precise([x, y]: [f32; 2]) -> Pixel {
@@ -120,35 +135,44 @@ proptest! {
     #[test]
     fn vectors_sample_the_same_to_the_bit(
         (frame_width, frame_height) in (2..12_u32, 2..9_u32),
-        view_width in 1..40_u32,
+        (view_width, rows) in (1..40_u32, 1..9_u32),
         nodes in prop::collection::vec(
             prop_oneof![
                 20 => (-3.0..14.0_f32, -3.0..11.0_f32),
                 3 => (prop::num::f32::ANY, prop::num::f32::ANY),
                 3 => (0..12_u8, 0..9_u8).prop_map(|(x, y)| (f32::from(x), f32::from(y))),
             ],
-            6,
+            12,
         ),
-        (start, length) in (0..40_u32, 0..40_u32),
-        is_hidden: bool,
+        spans in prop::collection::vec((0..40_u32, 0..40_u32), 8),
+        spans_are_hidden: bool,
     ) {
         let Some(avx2) = vector::Avx2::detect() else {
             return Ok(());
         };
-        let (x, y) = nodes.into_iter().unzip();
-        let row = Row {
-            nodes: &Places { x, y },
-            visibility: RowVisibility { start, end: start + length, is_hidden },
+        let (x, y): (Vec<_>, Vec<_>) = nodes.into_iter().unzip();
+        let visibility = Visibility {
+            spans: spans.into_iter().map(|(start, length)| [start, start + length]).collect(),
+            spans_are_hidden,
+        };
+        let across = view_width.div_ceil(8) as usize + 1;
+        let band = Band {
+            above: Nodes { x: &x[..across], y: &y[..across] },
+            below: Nodes { x: &x[6..6 + across], y: &y[6..6 + across] },
+            frame_from_plane: &identity(),
+            visibility: &visibility,
+            rows: 0..rows as usize,
+            whole_patches: 0..0,
         };
         let frame = noise(frame_width, frame_height);
         let input = NetworkInput {
             scale: [0.5, 1.0 / 58.0, 1.0],
             offset: [-1.0, -2.1, 0.0],
-            ..NetworkInput::plain(view_width, 1)
+            ..NetworkInput::plain(view_width, rows)
         };
-        let with_vectors = rendered(&row, &frame, &input, |source, rows, planes| {
-            vector::render_rows(avx2, source, rows, planes);
+        let with_vectors = rendered(&band, &frame, &input, |source, band, planes| {
+            vector::render(avx2, source, band, planes);
         });
-        prop_assert_eq!(with_vectors, rendered(&row, &frame, &input, scalar::render_rows));
+        prop_assert_eq!(with_vectors, rendered(&band, &frame, &input, scalar::render));
     }
 }

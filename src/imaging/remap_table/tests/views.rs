@@ -100,6 +100,36 @@ fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
 }
 
 #[test]
+fn whole_patches_see_the_lens_image_within_the_frame_with_every_pixel() {
+    for lens in every_lens() {
+        let views = ViewPlan::balanced().views(&Mount::default(), 100, 100);
+        let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
+        let last = f64::from(FRAME_SIDE - 1);
+        let mut whole = 0;
+        for (table, band) in tables
+            .iter()
+            .flat_map(|table| (0..table.bands()).map(move |band| (table, table.band(band))))
+        {
+            for (x, y) in band.whole_patches.flat_map(|patch| {
+                let rows = band.rows.clone();
+                rows.flat_map(move |y| (8 * patch..8 * patch + 8).map(move |x| (x, y)))
+            }) {
+                whole += 1;
+                let [x, y] = [x, y].map(|coordinate| u32::try_from(coordinate).unwrap());
+                let position = table.position(x, y).unwrap();
+                let is_within = |place: f64| (0.0..last).contains(&place);
+                assert!(
+                    is_within(position.x) && is_within(position.y),
+                    "{position:?}"
+                );
+            }
+        }
+        let share = f64::from(whole) / (24.0 * 100.0 * 100.0);
+        assert!(share > 0.5, "{}: {share}", lens.model());
+    }
+}
+
+#[test]
 fn views_that_are_not_turned_about_the_optical_axis_share_nothing() {
     let lens = Lens::equidistant_circle(99.5, 99.5, 100.0, 1.5).unwrap();
     let views = ViewPlan::balanced().views(&tilted(), 64, 64);
@@ -116,8 +146,6 @@ fn shared_grids_count_once() {
     let views = ViewPlan::fast().views(&Mount::default(), 64, 64);
     let tables = RemapTable::of_views(&views, &lens, 200, 200);
     let one = RemapTable::bytes(&tables[..1]);
-    assert_eq!(
-        RemapTable::bytes(&tables),
-        one + 3 * size_of::<RemapTable>()
-    );
+    let own = size_of::<RemapTable>() + tables[1].whole_patches.bytes();
+    assert_eq!(RemapTable::bytes(&tables), one + 3 * own);
 }
