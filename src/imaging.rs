@@ -9,6 +9,7 @@ mod letterbox;
 mod masked_pixels;
 mod network_input;
 pub mod picture_grid;
+mod pixel_memory;
 mod remap_table;
 mod thumbnail;
 mod view_signature;

@@ -8,10 +8,11 @@ mod error;
 use std::io::Cursor;
 
 use image::codecs::{jpeg::JpegDecoder, png::PngDecoder, webp::WebPDecoder};
+use image::error::{LimitError, LimitErrorKind};
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage};
 
-use super::frame::Frame;
+use super::{frame::Frame, pixel_memory};
 pub use error::{DecodeError, ExceededLimit};
 
 /// How large a picture may be. All of these hold at once, and all are checked
@@ -163,7 +164,7 @@ impl<'a> Task<'a> {
             });
         }
         let orientation = decoder.orientation().map_err(|e| self.refusal(e))?;
-        let picture = DynamicImage::from_decoder(decoder).map_err(|e| self.refusal(e))?;
+        let picture = read(decoder).map_err(|e| self.refusal(e))?;
         let mut upright = DynamicImage::ImageRgb8(rgb_over_black(picture));
         upright.apply_orientation(orientation);
         let (width, height) = (upright.width(), upright.height());
@@ -190,6 +191,20 @@ impl<'a> Task<'a> {
             other => self.corrupt(other.to_string().trim()),
         }
     }
+}
+
+/// As `DynamicImage::from_decoder`, but what frames mostly are goes to memory that frames had.
+fn read(decoder: impl ImageDecoder) -> Result<DynamicImage, ImageError> {
+    if decoder.color_type() != ColorType::Rgb8 {
+        return DynamicImage::from_decoder(decoder);
+    }
+    let (width, height) = decoder.dimensions();
+    let too_large = || ImageError::Limits(LimitError::from_kind(LimitErrorKind::DimensionError));
+    let bytes = usize::try_from(decoder.total_bytes()).map_err(|_| too_large())?;
+    let pixels = pixel_memory::zeros(bytes);
+    let mut picture = RgbImage::from_raw(width, height, pixels).ok_or_else(too_large)?;
+    decoder.read_image(&mut picture)?;
+    Ok(DynamicImage::ImageRgb8(picture))
 }
 
 fn unsupported(found: impl Into<String>) -> DecodeError {

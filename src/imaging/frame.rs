@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::pixel_memory::Pixels;
+
 /// A picture in 8-bit RGB, rows from top to bottom, without padding.
 ///
 /// *Invariant:* both sides are at least 1 and there are exactly
@@ -10,7 +12,7 @@ use std::ops::Range;
 pub struct Frame {
     width: u32,
     height: u32,
-    pixels: Vec<u8>,
+    pixels: Pixels,
 }
 
 /// Why bytes do not make a [`Frame`].
@@ -58,7 +60,7 @@ impl Frame {
         Ok(Self {
             width,
             height,
-            pixels,
+            pixels: pixels.into(),
         })
     }
 
