@@ -15,6 +15,7 @@ from support.row import Row
 HERE = Path(__file__).resolve().parents[1]
 CASES = re.compile(r"([\d,]+) generated")
 FAILURE = re.compile(r"^- (.+)$", re.MULTILINE)
+OWN_ERROR = re.compile(r"^ +🚫 (.+: \d+)$", re.MULTILINE)
 LINKS = re.compile(r"API Links: +(.+)$", re.MULTILINE)
 ENDS = {0: "held", 1: "failures"}
 
@@ -35,6 +36,7 @@ def prove(effort: Effort) -> list[Row]:
     cases, links = CASES.search(said), LINKS.search(said)
     row.seen = f"{cases[1] if cases else 'no'} requests; links: {links[1] if links else 'none'}"
     row.faults += sorted(set(FAILURE.findall(said)))
+    row.faults += [f"schemathesis could not go on ({error})" for error in OWN_ERROR.findall(said)]
     row.require(alive, "the server ended")
     row.require(code == 0 or bool(row.faults), f"schemathesis ended with {code}: see {WORK.relative_to(ROOT)}")
     return [row]
