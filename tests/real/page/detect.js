@@ -39,8 +39,10 @@ pageTest("a sample is picked with the keyboard, and its persons are found", "", 
 pageTest("the marks lie where the report says", "", async (page) => {
   const report = await reportAfter(page, () => detectSample(page, "office"));
   const [first] = report.persons;
-  const picture = await page.locator("#picture").boundingBox();
-  const badge = await page.locator("#marks [data-person='0'] circle").boundingBox();
+  // Both at one moment: what comes later on the page may move them.
+  const [picture, badge] = await page.evaluate(() =>
+    ["#picture", "#marks [data-person='0'] circle"].map((name) => document.querySelector(name).getBoundingClientRect().toJSON()),
+  );
   const scale = Math.min(picture.width, picture.height) / 960;
   const at = (box, side, start) => box[start] + box[side] / 2;
   const fromCentre = (value) => (value - 480) * scale;
