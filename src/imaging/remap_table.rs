@@ -127,7 +127,7 @@ impl RemapTable {
     /// Whether one of the view's pixels has a sample for which `counts` holds.
     fn has_sample(&self, counts: impl Fn(&Sample) -> bool) -> bool {
         let (width, height) = (self.frame_width as usize, self.frame_height as usize);
-        (0..self.bands()).any(|index| {
+        (0..self.grid.visibility().bands()).any(|index| {
             let band = self.band(index);
             (0..band.patches()).any(|index| {
                 let patch = band.patch(index);
@@ -199,11 +199,6 @@ impl RemapTable {
         }
     }
 
-    /// The view's bands, of eight rows each; the last one may be of fewer.
-    fn bands(&self) -> usize {
-        self.grid.visibility().rows().div_ceil(LANES)
-    }
-
     fn band(&self, index: usize) -> Band<'_> {
         let visibility = self.grid.visibility();
         Band {
@@ -211,7 +206,7 @@ impl RemapTable {
             below: self.grid.nodes(index + 1),
             frame_from_plane: &self.frame_from_plane,
             visibility,
-            rows: index * LANES..visibility.rows().min((index + 1) * LANES),
+            rows: visibility.rows_of_band(index),
             whole_patches: self.whole_patches.band(index),
         }
     }

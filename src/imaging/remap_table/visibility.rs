@@ -1,5 +1,8 @@
 //! Which pixels of a view see the lens image.
 
+use std::ops::Range;
+
+use super::band::LANES;
 use crate::geometry::{Lens, Pixel, VirtualView};
 
 /// In each row of a view one span of pixels, which meets a cone about the optical axis: what the
@@ -60,9 +63,14 @@ impl Visibility {
         }
     }
 
-    /// The height of the view.
-    pub(super) fn rows(&self) -> usize {
-        self.spans.len()
+    /// How many bands of eight rows the view has; the last one may be of fewer.
+    pub(super) fn bands(&self) -> usize {
+        self.spans.len().div_ceil(LANES)
+    }
+
+    /// The view's rows that a band has.
+    pub(super) fn rows_of_band(&self, band: usize) -> Range<usize> {
+        band * LANES..self.spans.len().min((band + 1) * LANES)
     }
 
     /// Memory held, bytes.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{band::LANES, frame_from_plane::FrameFromPlane, node_grid::NodeGrid};
+use super::{frame_from_plane::FrameFromPlane, node_grid::NodeGrid};
 
 /// Of each band of a view, the longest run of patches of which all pixels see the lens image, a
 /// pixel or more from the frame's borders.
@@ -30,9 +30,9 @@ impl WholePatches {
         };
         #[expect(clippy::cast_possible_truncation, reason = "a view's width is a u32")]
         let patches = grid.patches_across() as u32;
-        let view_rows = grid.visibility().rows();
+        let visibility = grid.visibility();
         let band = |band: usize| {
-            let rows = band * LANES..view_rows.min((band + 1) * LANES);
+            let rows = visibility.rows_of_band(band);
             let is_whole = |patch: u32| {
                 let column = patch as usize;
                 let corners = [
@@ -46,12 +46,12 @@ impl WholePatches {
                     .all(|&(row, column)| node_is_within(row, column))
                     && rows
                         .clone()
-                        .all(|row| grid.visibility().row(row).lanes(8 * patch) == u8::MAX)
+                        .all(|row| visibility.row(row).lanes(8 * patch) == u8::MAX)
             };
             longest_run(patches, is_whole)
         };
         Self {
-            bands: (0..view_rows.div_ceil(LANES)).map(band).collect(),
+            bands: (0..visibility.bands()).map(band).collect(),
         }
     }
 

@@ -106,10 +106,9 @@ fn whole_patches_see_the_lens_image_within_the_frame_with_every_pixel() {
         let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
         let last = f64::from(FRAME_SIDE - 1);
         let mut whole = 0;
-        for (table, band) in tables
-            .iter()
-            .flat_map(|table| (0..table.bands()).map(move |band| (table, table.band(band))))
-        {
+        for (table, band) in tables.iter().flat_map(|table| {
+            (0..table.grid.visibility().bands()).map(move |band| (table, table.band(band)))
+        }) {
             for (x, y) in band.whole_patches.flat_map(|patch| {
                 let rows = band.rows.clone();
                 rows.flat_map(move |y| (8 * patch..8 * patch + 8).map(move |x| (x, y)))
