@@ -11,7 +11,7 @@ use std::sync::Arc;
 use crate::{
     imaging::{
         Frame,
-        annotate::{EncodeError, annotate, encode_jpeg, encode_png},
+        annotate::{Cancelled, EncodeError, annotate_unless, encode_jpeg, encode_png},
         narrowed,
     },
     pipeline::Detected,
@@ -20,6 +20,10 @@ use crate::{
 pub use kept::{KeptFrame, KeptFrameError};
 pub use options::{Layer, PictureOptions};
 use sketch::Sketch;
+
+/// The width of a wider frame's picture when none is asked for, pixels: more than a screen shows, and
+/// little enough that drawing never costs more than decoding.
+const DEFAULT_MAX_WIDTH: u32 = 2048;
 
 /// A file format of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,18 +34,30 @@ pub enum PictureFormat {
     Png,
 }
 
-/// Draws what was found into its frame. Takes tens of milliseconds for a large frame: keep it off
-/// the async runtime.
+/// The reason why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The client no longer waits for it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The frame is larger than the format allows.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+}
+
+/// Draws the persons into their frame. Takes tens of milliseconds for a large frame: keep it off
+/// the async runtime. Stops when the job is withdrawn.
 ///
 /// # Errors
-/// [`EncodeError`] when the frame is larger than the format allows.
+/// [`PictureError`] when the frame is larger than the format allows, or the job was withdrawn.
 pub fn annotated_picture(
     detected: Detected,
     format: PictureFormat,
     options: &PictureOptions,
-) -> Result<Vec<u8>, EncodeError> {
+) -> Result<Vec<u8>, PictureError> {
     let sketch = Sketch::of(&detected, &options.layers);
-    drawn(detected.frame, &sketch, format, options)
+    let is_cancelled = || detected.withdrawn.is_cancelled();
+    drawn(detected.frame, &sketch, format, options, &is_cancelled)
 }
 
 /// Draws into a frame, which may be smaller than the one that the sketch was made of.
@@ -50,17 +66,19 @@ fn drawn(
     sketch: &Sketch,
     format: PictureFormat,
     options: &PictureOptions,
-) -> Result<Vec<u8>, EncodeError> {
-    let width = options.width.unwrap_or(u32::MAX);
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<u8>, PictureError> {
+    let width = options.width.unwrap_or(DEFAULT_MAX_WIDTH);
     let mut picture = if frame.width() > width {
         narrowed(&frame, width)
     } else {
         Arc::unwrap_or_clone(frame)
     };
     let drawing = sketch.drawing(picture.width(), &options.layers);
-    annotate(&mut picture, &drawing);
-    match format {
+    annotate_unless(&mut picture, &drawing, is_cancelled)?;
+    let encoded = match format {
         PictureFormat::Jpeg => encode_jpeg(&picture, options.quality),
         PictureFormat::Png => encode_png(&picture),
-    }
+    };
+    Ok(encoded?)
 }

@@ -3,7 +3,8 @@
 
 use lookdown::imaging::Frame;
 use lookdown::imaging::annotate::{
-    Drawing, Head, Mark, OrientedMark, annotate, encode_jpeg, encode_png,
+    Cancelled, Drawing, Head, Mark, OrientedMark, annotate, annotate_unless, encode_jpeg,
+    encode_png,
 };
 use lookdown::imaging::decode::{DecodeLimits, decode};
 use proptest::prelude::*;
@@ -52,6 +53,47 @@ fn a_box_is_outlined_and_its_inside_stays_visible() {
     }
     assert!(!is_painted(&frame, 85, 105));
     assert!(!is_painted(&frame, 30, 100));
+}
+
+/// Marks as large as the frame, and a small one behind them.
+fn many_large_marks(side: f64) -> Vec<Mark> {
+    let large = |index: u32| {
+        let inset = f64::from(index % 7);
+        aligned([inset, inset, side - inset, side - inset])
+    };
+    let mut marks: Vec<_> = (0..900).map(large).collect();
+    let middle = side / 2.0;
+    marks.push(aligned([
+        middle - 20.0,
+        middle - 20.0,
+        middle + 20.0,
+        middle + 20.0,
+    ]));
+    marks
+}
+
+#[test]
+fn marks_beyond_the_painting_budget_are_left_out() {
+    let marks = many_large_marks(3000.0);
+    let frame = annotated(3000, 3000, &marks);
+    assert!(is_painted(&frame, 1500, 3));
+    assert!(!is_painted(&frame, 1480, 1500));
+    let alone = annotated(3000, 3000, &marks[900..]);
+    assert!(is_painted(&alone, 1480, 1500));
+}
+
+#[test]
+fn drawing_stops_at_the_next_mark_when_cancelled() {
+    let asked = std::cell::Cell::new(0);
+    let is_cancelled = || {
+        asked.set(asked.get() + 1);
+        asked.get() > 3
+    };
+    let mut frame = grey_frame(400, 400);
+    let drawing = Drawing::of(vec![aligned([50.0, 50.0, 90.0, 90.0]); 900]);
+    let outcome = annotate_unless(&mut frame, &drawing, &is_cancelled);
+    assert_eq!(outcome, Err(Cancelled));
+    assert_eq!(asked.get(), 4);
 }
 
 #[test]

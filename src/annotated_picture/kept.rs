@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::{Layer, PictureFormat, PictureOptions, drawn, sketch::Sketch};
+use super::{Layer, PictureError, PictureFormat, PictureOptions, drawn, sketch::Sketch};
 use crate::{
     imaging::{
         Frame,
@@ -48,6 +48,9 @@ pub enum KeptFrameError {
     /// The frame cannot be written.
     #[error(transparent)]
     Encode(#[from] EncodeError),
+    /// The picture cannot be drawn.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// The frame is too large however narrow it is made.
     #[error("a frame takes more than {MAX_BYTES} bytes as a JPEG of {} pixels across", WIDTHS[2])]
     TooLarge,
@@ -73,11 +76,16 @@ impl KeptFrame {
         Ok(Self { jpeg, sketch })
     }
 
-    /// The frame with what the options want drawn into it, as JPEG. Takes as long as keeping it.
+    /// The frame with what the options want drawn into it, as JPEG. Takes as long as keeping it, and
+    /// stops when `is_cancelled` returns true.
     ///
     /// # Errors
     /// [`KeptFrameError`] for what was not made by [`KeptFrame::of`].
-    pub fn annotated(&self, options: &PictureOptions) -> Result<Vec<u8>, KeptFrameError> {
+    pub fn annotated(
+        &self,
+        options: &PictureOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Vec<u8>, KeptFrameError> {
         let sketch: Sketch = serde_json::from_slice(&self.sketch)?;
         let frame = decode(&self.jpeg, &DecodeLimits::default())?.frame;
         Ok(drawn(
@@ -85,6 +93,7 @@ impl KeptFrame {
             &sketch,
             PictureFormat::Jpeg,
             options,
+            is_cancelled,
         )?)
     }
 }

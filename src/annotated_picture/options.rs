@@ -33,7 +33,7 @@ pub enum Layer {
 pub struct PictureOptions {
     /// What is drawn.
     pub layers: Vec<Layer>,
-    /// Width in pixels; a frame that is no wider stays as it is.
+    /// Width in pixels, 2048 if none is given; a frame that is no wider stays as it is.
     pub width: Option<u32>,
     /// Quality of a JPEG, 1 to 100.
     pub quality: u8,

@@ -10,10 +10,9 @@ use bytes::Bytes;
 use self::format::AnswerFormat;
 use super::problem::{Problem, ProblemKind};
 use crate::{
-    annotated_picture::{PictureOptions, annotated_picture},
+    annotated_picture::{PictureError, PictureOptions, annotated_picture},
     annotation_formats::{AnnotatedImage, BoxKind},
-    imaging::annotate::EncodeError,
-    pipeline::{Detected, ParameterError},
+    pipeline::{Detected, ParameterError, PipelineError},
 };
 
 /// What a frame is called whose sender gave it no name.
@@ -72,7 +71,7 @@ impl AnswerOptions {
             AnswerFormat::Report => json.clone(),
             AnswerFormat::Picture(format) => {
                 let picture = annotated_picture(detected, format, &self.picture);
-                picture.map_err(too_large)?.into()
+                picture.map_err(not_drawn)?.into()
             }
             AnswerFormat::Annotations(format) => {
                 let name = self.file_name.unwrap_or_else(|| NAMELESS.to_owned());
@@ -87,7 +86,11 @@ impl AnswerOptions {
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "the shape map_err needs")]
-fn too_large(error: EncodeError) -> Problem {
-    Problem::new(ProblemKind::UnfitImage, format!("{error}: ask for a width"))
+fn not_drawn(error: PictureError) -> Problem {
+    match error {
+        PictureError::Cancelled(_) => PipelineError::Withdrawn.into(),
+        PictureError::Encode(error) => {
+            Problem::new(ProblemKind::UnfitImage, format!("{error}: ask for a width"))
+        }
+    }
 }

@@ -17,7 +17,7 @@ pub(super) struct PictureFlags {
     /// `none` [default: oriented,scores]
     #[arg(long, value_name = "LAYERS", requires = "annotate")]
     draw: Option<String>,
-    /// Width of the picture, 64 to 8192 pixels; never wider than the frame [default: the frame's]
+    /// Width of the picture, 64 to 8192 pixels; never wider than the frame [default: the frame's, 2048 at most]
     #[arg(long, value_name = "PIXELS", requires = "annotate")]
     width: Option<String>,
     /// Quality of a JPEG, 1 to 100 [default: 88]

@@ -5,6 +5,7 @@
 mod area_sketch;
 mod canvas;
 mod caption;
+mod effort;
 mod encode;
 mod label;
 mod lens_sketch;
@@ -14,6 +15,8 @@ pub(super) mod text;
 use super::frame::Frame;
 pub use area_sketch::{ZoneOutline, sketch_areas};
 use canvas::{Outline, Rgb, Stroke};
+pub use effort::Cancelled;
+use effort::Effort;
 pub use encode::{EncodeError, encode_jpeg, encode_png};
 pub use lens_sketch::sketch_lens;
 pub use mark::{Head, Mark, OrientedMark};
@@ -74,16 +77,39 @@ impl Drawing {
 
 /// Draws into the frame, labels above all boxes. Parts outside the frame are cut off; a mark
 /// or line with a coordinate that is not finite, or beyond a million pixels, is left out.
+///
+/// The work is bounded: lines, zones, marks and labels are drawn in this order until as many pixels
+/// are painted as the frame has twice, and the rest is left out.
 pub fn annotate(frame: &mut Frame, drawing: &Drawing) {
+    // Without a reason to stop it cannot fail.
+    let _ = annotate_unless(frame, drawing, &|| false);
+}
+
+/// Draws like [`annotate`], and asks `is_cancelled` before each shape.
+///
+/// # Errors
+/// [`Cancelled`] as soon as `is_cancelled` returns true; the frame is then partly drawn.
+pub fn annotate_unless(
+    frame: &mut Frame,
+    drawing: &Drawing,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(), Cancelled> {
+    let mut effort = Effort::new(frame.width(), frame.height(), is_cancelled);
     let line_width = line_width(frame);
     for line in drawing.lines.iter().filter(|line| is_drawable(line)) {
+        if !effort.allows_more()? {
+            break;
+        }
         for pair in line.windows(2) {
             let stroke = Stroke::new(pair[0], pair[1], (0.4 * line_width).max(1.0));
-            stroke.draw(frame, LINE, LINE_OPACITY);
+            effort.spend(stroke.draw(frame, LINE, LINE_OPACITY));
         }
     }
     for zone in &drawing.zones {
-        zone.draw(frame, 0.6 * line_width);
+        if !effort.allows_more()? {
+            break;
+        }
+        effort.spend(zone.draw(frame, 0.6 * line_width));
     }
     let marks = drawing.marks.iter().take(MOST_MARKS);
     let mut marks: Vec<_> = marks
@@ -91,6 +117,9 @@ pub fn annotate(frame: &mut Frame, drawing: &Drawing) {
         .zip(COLOURS.into_iter().cycle())
         .collect();
     for (mark, colour) in &marks {
+        if !effort.allows_more()? {
+            break;
+        }
         let oriented = mark.oriented.filter(|_| drawing.oriented);
         let oriented = oriented.map(|oriented| oriented.corners());
         let aligned = drawing.boxes.then(|| mark.aligned_corners());
@@ -98,16 +127,18 @@ pub fn annotate(frame: &mut Frame, drawing: &Drawing) {
             continue;
         };
         let shadow_width = line_width + 2.0 * (0.5 * line_width).max(1.2);
-        Outline::new(main, shadow_width).draw(frame, SHADOW, SHADOW_OPACITY);
+        let shadow = Outline::new(main, shadow_width);
+        effort.spend(shadow.draw(frame, SHADOW, SHADOW_OPACITY));
         if let (Some(_), Some(aligned)) = (oriented, aligned) {
-            Outline::new(aligned, line_width * 0.4).draw(frame, *colour, THIN_OPACITY);
+            let thin = Outline::new(aligned, line_width * 0.4);
+            effort.spend(thin.draw(frame, *colour, THIN_OPACITY));
         }
-        Outline::new(main, line_width).draw(frame, *colour, 1.0);
+        effort.spend(Outline::new(main, line_width).draw(frame, *colour, 1.0));
     }
     let caption = caption::draw(frame, &drawing.caption);
     let names: Vec<_> = drawing.zones.iter().filter_map(ZoneOutline::mark).collect();
     marks.extend(names.iter().map(|name| (name, area_sketch::ZONE)));
-    label::Labels::new(frame, &marks, caption).draw(frame);
+    label::Labels::new(frame, &marks, caption).draw(frame, &mut effort)
 }
 
 fn is_drawable(line: &[[f64; 2]]) -> bool {

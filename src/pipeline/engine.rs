@@ -154,6 +154,7 @@ impl Engine {
         rigs.dedup_by(|one, other| Arc::ptr_eq(one, other));
         let hides_nothing = observation.camera.rig.hides_nothing();
         Ok(Detected {
+            withdrawn: job.ticket.withdrawn.clone(),
             report,
             frame: observation.frame,
             encoded: hides_nothing.then(|| job.image.clone()),

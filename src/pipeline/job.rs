@@ -4,6 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use jiff::Timestamp;
+use tokio_util::sync::CancellationToken;
 
 use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
 use crate::{
@@ -76,6 +77,8 @@ pub struct Detected {
     pub frame: Arc<Frame>,
     /// What it was decoded from; `None` where masks hide some of that.
     pub encoded: Option<Bytes>,
+    /// Cancelled as soon as no client waits for the answer: drawing stops then.
+    pub withdrawn: CancellationToken,
     pub(super) rigs: Vec<Arc<CameraRig>>,
 }
 

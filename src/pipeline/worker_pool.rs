@@ -12,6 +12,7 @@ use std::{
 };
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio_util::sync::CancellationToken;
 
 use super::{
     DetectJob, Detected, Engine, PipelineError, Stage, Ticket, ViewsJob, error::internal,
@@ -135,15 +136,19 @@ impl WorkerPool {
     }
 
     /// Does other work that takes its time, such as drawing, in a place among the frames and in the middle of
-    /// their priorities: it is bounded as they are. Dropping the future withdraws what has not begun.
+    /// their priorities: it is bounded as they are. Dropping the future withdraws what has not begun, and
+    /// cancels the token that the work is given, so that long work can stop.
     ///
     /// # Errors
     /// As [`WorkerPool::detect`].
     pub async fn run<T: Send + 'static>(
         &self,
-        work: impl FnOnce() -> T + Send + 'static,
+        work: impl FnOnce(&CancellationToken) -> T + Send + 'static,
     ) -> Result<T, PipelineError> {
-        self.queue(Ticket::default(), |_: &Engine| Ok(work())).await
+        let ticket = Ticket::default();
+        let withdrawn = ticket.withdrawn.clone();
+        self.queue(ticket, move |_: &Engine| Ok(work(&withdrawn)))
+            .await
     }
 
     async fn queue<T: Send + 'static>(

@@ -184,7 +184,7 @@ async fn answered(
     plan: impl FnOnce(&Engine) -> Result<ViewPlanInfo, Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
     let workers = Arc::clone(&state.workers);
-    let planning = state.workers.run(move || {
+    let planning = state.workers.run(move |_| {
         let plan = plan(workers.engine())?;
         serde_json::to_vec(&plan).map_err(Problem::internal)
     });

@@ -83,7 +83,7 @@ pub(in crate::api) struct PictureQuery {
         pattern = "^(none|(boxes|oriented|scores|zones|views|timestamp)(,(boxes|oriented|scores|zones|views|timestamp))*)$"
     )]
     draw: Option<String>,
-    /// Width of a picture, pixels; a frame that is no wider stays as it is.
+    /// Width of a picture, pixels; a frame that is no wider stays as it is. 2048 by default.
     #[param(minimum = 64, maximum = 8192, example = 640)]
     width: Option<u32>,
     /// Quality of a JPEG; 88 by default.

@@ -75,7 +75,9 @@ pub(in crate::api) async fn get_picture(
         jpeg: kept.picture.frame.clone(),
         sketch: kept.picture.sketch.clone(),
     };
-    let drawing = state.workers.run(move || frame.annotated(&options));
+    let drawing = state
+        .workers
+        .run(move |withdrawn| frame.annotated(&options, &|| withdrawn.is_cancelled()));
     let drawn = deadline.wait("the picture was not drawn", drawing).await?;
     let picture = Bytes::from(drawn.map_err(Problem::internal)?);
     Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], picture).into_response())

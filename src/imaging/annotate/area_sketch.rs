@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Mark,
     canvas::{Rgb, Stroke},
+    effort::Effort,
     is_drawable,
     label::Labels,
     line_width,
@@ -41,12 +42,13 @@ impl ZoneOutline {
         }
     }
 
-    pub(super) fn draw(&self, frame: &mut Frame, width: f64) {
-        for line in self.lines.iter().filter(|line| is_drawable(line)) {
-            for pair in line.windows(2) {
-                Stroke::new(pair[0], pair[1], width).draw(frame, ZONE, 1.0);
-            }
-        }
+    /// Draws its border. Returns the number of painted pixels.
+    pub(super) fn draw(&self, frame: &mut Frame, width: f64) -> u64 {
+        let lines = self.lines.iter().filter(|line| is_drawable(line));
+        let pairs = lines.flat_map(|line| line.windows(2));
+        pairs
+            .map(|pair| Stroke::new(pair[0], pair[1], width).draw(frame, ZONE, 1.0))
+            .sum()
     }
 
     /// Its name at its bounding box; `None` when nothing of it is seen.
@@ -93,7 +95,9 @@ pub fn sketch_areas(
     }
     let names: Vec<_> = zones.iter().filter_map(ZoneOutline::mark).collect();
     let names: Vec<_> = names.iter().map(|name| (name, ZONE)).collect();
-    Labels::new(frame, &names, None).draw(frame);
+    let mut effort = Effort::new(frame.width(), frame.height(), &|| false);
+    // This drawing is never cancelled.
+    let _ = Labels::new(frame, &names, None).draw(frame, &mut effort);
 }
 
 #[cfg(test)]

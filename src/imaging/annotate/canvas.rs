@@ -55,8 +55,10 @@ impl Outline {
         }
     }
 
-    /// Paints it, each pixel once, so that see-through lines stay even at their joints.
-    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) {
+    /// Paints it, each pixel once, so that see-through lines stay even at their joints. Returns the
+    /// number of painted pixels.
+    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
+        let mut painted_pixels = 0;
         let reach = self.half_width + 0.5;
         let rows = self.corners.map(|corner| corner[1]);
         let top = rows.into_iter().fold(f64::INFINITY, f64::min) - reach;
@@ -74,9 +76,11 @@ impl Outline {
                     painted = x + 1;
                     let coverage = reach - self.distance([f64::from(x) + 0.5, row]);
                     blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+                    painted_pixels += 1;
                 }
             }
         }
+        painted_pixels
     }
 
     fn edges(&self) -> [[[f64; 2]; 2]; 4] {
@@ -86,9 +90,10 @@ impl Outline {
 
     fn distance(&self, point: [f64; 2]) -> f64 {
         self.edges()
-            .map(|edge| edge_distance(edge, point))
+            .map(|edge| squared_edge_distance(edge, point))
             .into_iter()
             .fold(f64::INFINITY, f64::min)
+            .sqrt()
     }
 }
 
@@ -107,18 +112,22 @@ impl Stroke {
         }
     }
 
-    /// Paints it.
-    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) {
+    /// Paints it. Returns the number of painted pixels.
+    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
+        let mut painted_pixels = 0;
         let reach = self.half_width + 0.5;
         let [[_, from], [_, to]] = self.edge;
         for y in pixels(from.min(to) - reach, from.max(to) + reach, frame.height()) {
             let row = f64::from(y) + 0.5;
             let [left, right] = edge_span(self.edge, row, reach);
             for x in pixels(left, right, frame.width()) {
-                let coverage = reach - edge_distance(self.edge, [f64::from(x) + 0.5, row]);
+                let distance = squared_edge_distance(self.edge, [f64::from(x) + 0.5, row]).sqrt();
+                let coverage = reach - distance;
                 blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+                painted_pixels += 1;
             }
         }
+        painted_pixels
     }
 }
 
@@ -139,7 +148,7 @@ fn edge_span([a, b]: [[f64; 2]; 2], row: f64, reach: f64) -> [f64; 2] {
     [first.min(last) - reach, first.max(last) + reach]
 }
 
-fn edge_distance([a, b]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {
+fn squared_edge_distance([a, b]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {
     let (along, to_point) = (minus(b, a), minus(point, a));
     let squared_length = dot(along, along);
     let part = if squared_length > 0.0 {
@@ -147,7 +156,8 @@ fn edge_distance([a, b]: [[f64; 2]; 2], point: [f64; 2]) -> f64 {
     } else {
         0.0
     };
-    (to_point[0] - part * along[0]).hypot(to_point[1] - part * along[1])
+    let from_edge = [to_point[0] - part * along[0], to_point[1] - part * along[1]];
+    dot(from_edge, from_edge)
 }
 
 fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
@@ -174,8 +184,9 @@ pub(super) struct Plate {
 }
 
 impl Plate {
-    /// Paints it.
-    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) {
+    /// Paints it. Returns the number of painted pixels.
+    pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
+        let mut painted_pixels = 0;
         let (right, bottom) = (self.left + self.width, self.top + self.height);
         let centre = [self.left + self.width / 2.0, self.top + self.height / 2.0];
         let straight = [
@@ -192,8 +203,10 @@ impl Plate {
                 let inside = from_corner[0].max(from_corner[1]).min(0.0);
                 let coverage = 0.5 + self.radius - outside - inside;
                 blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+                painted_pixels += 1;
             }
         }
+        painted_pixels
     }
 
     /// Left, top, right and bottom.

@@ -3,6 +3,7 @@
 use super::{
     INK, Mark,
     canvas::{Plate, Rgb},
+    effort::{Cancelled, Effort},
     line_width,
     text::Text,
     text_height,
@@ -48,9 +49,16 @@ impl<'a> Labels<'a> {
         }
     }
 
-    /// Draws the labels that are not empty.
-    pub(super) fn draw(mut self, frame: &mut Frame) {
+    /// Draws the labels that are not empty, the first ones if `effort` does not allow all.
+    pub(super) fn draw(
+        mut self,
+        frame: &mut Frame,
+        effort: &mut Effort<'_>,
+    ) -> Result<(), Cancelled> {
         for (mark, colour) in self.marks {
+            if !effort.allows_more()? {
+                break;
+            }
             let text_width = self.text.width(&mark.label);
             if text_width <= 0.0 {
                 continue;
@@ -59,12 +67,13 @@ impl<'a> Labels<'a> {
             let padding = 0.3 * line_height;
             let height = 1.15 * line_height;
             let plate = self.place(mark, [text_width + 2.0 * padding, height]);
-            plate.draw(frame, *colour, PLATE_OPACITY);
+            effort.spend(plate.draw(frame, *colour, PLATE_OPACITY));
             let text_top = plate.top + (height - line_height) / 2.0;
             let corner = [plate.left + padding, text_top];
             self.text.write(frame, &mark.label, corner, INK);
             self.placed.push(plate);
         }
+        Ok(())
     }
 
     /// The place at the boxes where the plate covers least: above them if all are alike.

@@ -70,9 +70,9 @@ async fn other_work_waits_for_its_turn_in_a_place_among_the_frames() {
     let first = spawn(&pool);
     begins.recv().unwrap();
     let others = Arc::clone(&pool);
-    let other = tokio::spawn(async move { others.run(|| 7).await });
+    let other = tokio::spawn(async move { others.run(|_| 7).await });
     until_pending(&pool, 2).await;
-    let refused = pool.run(|| 8).await.unwrap_err();
+    let refused = pool.run(|_| 8).await.unwrap_err();
     assert!(matches!(
         refused,
         PipelineError::Overloaded { capacity: 2, .. }
