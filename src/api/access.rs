@@ -120,6 +120,11 @@ impl Access {
         Err(Problem::new(ProblemKind::Forbidden, detail))
     }
 
+    /// Whether every request shows a key.
+    pub(super) fn needs_keys(&self) -> bool {
+        matches!(self, Self::Keys(_))
+    }
+
     /// Whose key the request with these headers shows, if it shows one that is known.
     pub(super) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
         match self {

@@ -17,6 +17,9 @@ use crate::{
     telemetry::Tracer,
 };
 
+/// Bodies whose key is not known yet may hold one part in so many of `max_upload_bytes`.
+const UNAUTHENTICATED_SHARE: usize = 8;
+
 /// Who may do what, and what a request may cost.
 #[derive(Debug, Clone)]
 pub struct ApiOptions {
@@ -61,6 +64,8 @@ pub struct Shared {
     pub(super) metrics: Arc<Metrics>,
     pub(super) readiness: Readiness,
     pub(super) uploads: UploadBudget,
+    /// The memory of bodies whose key is not known yet: they cannot take that of the others.
+    pub(super) unauthenticated_uploads: UploadBudget,
     pub(super) options: ApiOptions,
 }
 
@@ -87,7 +92,11 @@ impl ApiState {
             results,
             metrics,
             readiness,
-            uploads: UploadBudget::new(options.max_upload_bytes),
+            uploads: UploadBudget::new(options.max_upload_bytes, "send fewer at a time, or retry"),
+            unauthenticated_uploads: UploadBudget::new(
+                options.max_upload_bytes / UNAUTHENTICATED_SHARE,
+                "send the key in a header, X-API-Key: KEY, or retry",
+            ),
             options,
         }))
     }

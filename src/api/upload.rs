@@ -65,7 +65,7 @@ impl FromRequest<ApiState> for Upload {
         let access = &state.options.access;
         access.check(request.headers(), Scope::Detect)?;
         let uri = request.uri().clone();
-        let mut upload = Self::receive(request, state, names::use_of).await?;
+        let mut upload = Self::receive(request, state, &state.uploads, names::use_of).await?;
         let mut parameters = query_parameters(&uri)?;
         if let Some((name, _)) = parameters.iter().find(|(name, _)| !is_parameter(name)) {
             return Err(unknown_parameter(name));
@@ -83,11 +83,12 @@ impl Upload {
         DetectJob::sent(self.image, parameters, id, self.received_at, self.arrived)
     }
 
-    /// Reads a frame, alone or in a form whose fields are used as `use_of` says by their names. Who sent
-    /// it is not asked here.
+    /// Reads a frame, alone or in a form whose fields are used as `use_of` says by their names. The body
+    /// counts against `budget`. The key is not checked here.
     pub(super) async fn receive(
         request: Request,
         state: &ApiState,
+        budget: &UploadBudget,
         use_of: fn(&str) -> FieldUse,
     ) -> Result<Self, Problem> {
         let Arrival {
@@ -96,7 +97,7 @@ impl Upload {
             deadline,
             received_at,
             arrived,
-        } = Arrival::receive(request, state).await?;
+        } = Arrival::receive(request, state, budget).await?;
         let headers = parts.headers.clone();
         let (image, file_name, parameters) = if is_multipart(&headers) {
             let form = form::parse(parts, held.bytes(), use_of).await?;

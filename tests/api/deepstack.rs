@@ -8,10 +8,11 @@ use lookdown::{
     api::Access,
 };
 use serde_json::Value;
+use tower::ServiceExt;
 
 use crate::{
     log::Log,
-    service::{Answer, Bounds, FRAME_SIDE, Service, form, frame},
+    service::{Answer, Bounds, FRAME_SIDE, Service, form, frame, incompressible_frame},
 };
 
 const ANYWHERE: &str = "/v1/vision/detection";
@@ -42,11 +43,15 @@ fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
 
 /// A service with one key of this scope.
 fn guarded(scope: &str) -> Service {
+    guarded_within(scope, Bounds::default())
+}
+
+fn guarded_within(scope: &str, bounds: Bounds) -> Service {
     let digest = KeyDigest::of(KEY.as_bytes()).hexadecimal();
     let keys = format!("home:{scope}:{digest}").parse().unwrap();
     Service::within(&Bounds {
         access: Access::Keys(Arc::new(AccessKeys::open(keys, None).unwrap())),
-        ..Bounds::default()
+        ..bounds
     })
 }
 
@@ -319,6 +324,35 @@ async fn the_key_may_be_in_the_form_or_in_a_header_but_in_one_of_them_only() {
     let answer = post(&service, LOBBY, &[image, in_form, in_form]).await;
     assert_refused(&answer, 400, "repeated-parameter", "api_key");
     assert!(!log.text().contains(KEY), "{}", log.text());
+}
+
+#[tokio::test]
+async fn forms_without_a_known_key_leave_memory_to_others() {
+    let image = incompressible_frame();
+    let service = guarded_within(
+        "detect",
+        Bounds {
+            // The share of forms whose key is in the form takes one of them.
+            max_upload_bytes: 8 * image.len() * 3 / 2,
+            ..Bounds::default()
+        },
+    );
+    let parts = [("image", &image[..]), ("api_key", KEY.as_bytes())];
+    service.gate.close();
+    let router = service.router.clone();
+    let first = tokio::spawn(router.oneshot(form_to(LOBBY, &parts)));
+    service.gate.has_begun(1).await;
+    for parts in [&parts[..], &parts[..1]] {
+        let refused = post(&service, LOBBY, parts).await;
+        assert_refused(&refused, 429, "overloaded", "send the key in a header");
+    }
+    let mut request = form_to(LOBBY, &parts[..1]);
+    let key = KEY.parse().unwrap();
+    request.headers_mut().insert("x-api-key", key);
+    let with_header = tokio::spawn(service.router.clone().oneshot(request));
+    service.gate.open();
+    assert_eq!(first.await.unwrap().unwrap().status(), 200);
+    assert_eq!(with_header.await.unwrap().unwrap().status(), 200);
 }
 
 #[tokio::test]

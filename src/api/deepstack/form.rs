@@ -48,14 +48,18 @@ impl FromRequest<ApiState> for DeepStackUpload {
         let known = &state.options.access;
         let headers = request.headers();
         let is_form = is_multipart(headers);
-        // Who shows a key in the header is refused before anything is read; other keys are in the form.
+        // A key in a header is checked before anything is read. Other keys are in the form, which is read
+        // within a small budget of its own, so that clients without a key cannot crowd out the others.
+        let mut budget = &state.uploads;
         if !is_form || access::shows_key(headers) {
             known.check(headers, Scope::Detect)?;
+        } else if known.needs_keys() {
+            budget = &state.unauthenticated_uploads;
         }
         if !is_form {
             return Err(no_form());
         }
-        let mut upload = Upload::receive(request, state, use_of).await?;
+        let mut upload = Upload::receive(request, state, budget, use_of).await?;
         let mut keys = upload
             .parameters
             .extract_if(.., |(name, _)| name == API_KEY);

@@ -9,7 +9,10 @@ use axum::{
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::budget::Held;
+use super::{
+    BodyReader,
+    budget::{Held, UploadBudget},
+};
 use crate::{
     access::Scope,
     api::{ApiState, Phase, deadline::Deadline, problem::Problem},
@@ -34,15 +37,16 @@ impl FromRequest<ApiState> for Arrival {
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let access = &state.options.access;
         access.check(request.headers(), Scope::Detect)?;
-        Self::receive(request, state).await
+        Self::receive(request, state, &state.uploads).await
     }
 }
 
 impl Arrival {
-    /// Reads the request. Who sent it is not asked here.
+    /// Reads the request, whose body counts against `budget`. The key is not checked here.
     pub(in crate::api) async fn receive(
         request: Request,
         state: &ApiState,
+        budget: &UploadBudget,
     ) -> Result<Self, Problem> {
         let received_at = Timestamp::now();
         let (parts, body) = request.into_parts();
@@ -53,7 +57,10 @@ impl Arrival {
         state.workers.admits()?;
         let deadline = Deadline::of(&parts, state);
         let remedy = "send a smaller picture or raise server.max_body_bytes";
-        let reader = state.body_reader(state.options.max_body_bytes, remedy, deadline);
+        let reader = BodyReader {
+            budget,
+            ..state.body_reader(state.options.max_body_bytes, remedy, deadline)
+        };
         let body = reader.read(&parts.headers, body).await?;
         Ok(Self {
             parts,

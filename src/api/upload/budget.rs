@@ -10,18 +10,32 @@ use crate::api::problem::{Problem, ProblemKind};
 /// The memory that all bodies, and tensors unpacked from them, may hold together, counted in bytes. Clones
 /// share it.
 #[derive(Clone)]
-pub(in crate::api) struct UploadBudget(Arc<Semaphore>);
+pub(in crate::api) struct UploadBudget {
+    bytes: Arc<Semaphore>,
+    /// The advice to clients for whose bodies nothing is left.
+    remedy: &'static str,
+}
 
 impl UploadBudget {
-    pub(in crate::api) fn new(bytes: usize) -> Self {
-        Self(Arc::new(Semaphore::new(bytes.min(Semaphore::MAX_PERMITS))))
+    pub(in crate::api) fn new(bytes: usize, remedy: &'static str) -> Self {
+        let bytes = Semaphore::new(bytes.min(Semaphore::MAX_PERMITS));
+        Self {
+            bytes: Arc::new(bytes),
+            remedy,
+        }
     }
 
     /// A share of so many bytes, which is given back when it is dropped. Refused when fewer are free.
     pub(in crate::api) fn take(&self, bytes: usize) -> Result<OwnedSemaphorePermit, Problem> {
-        let bytes = u32::try_from(bytes).map_err(|_| no_memory())?;
-        let share = Arc::clone(&self.0).try_acquire_many_owned(bytes);
-        share.map_err(|_| no_memory())
+        let bytes = u32::try_from(bytes).map_err(|_| self.exhausted())?;
+        let share = Arc::clone(&self.bytes).try_acquire_many_owned(bytes);
+        share.map_err(|_| self.exhausted())
+    }
+
+    fn exhausted(&self) -> Problem {
+        let remedy = self.remedy;
+        let detail = format!("too many request bodies are in memory already: {remedy}");
+        Problem::new(ProblemKind::Overloaded, detail)
     }
 }
 
@@ -60,9 +74,4 @@ impl<T: AsRef<U>, U: ?Sized> AsRef<U> for Held<T> {
     fn as_ref(&self) -> &U {
         self.content.as_ref()
     }
-}
-
-fn no_memory() -> Problem {
-    let detail = "too many request bodies are in memory already: send fewer at a time, or retry";
-    Problem::new(ProblemKind::Overloaded, detail)
 }
