@@ -3,8 +3,8 @@
 
 mod accept;
 mod connection;
+mod connection_permits;
 mod pace;
-mod places;
 mod watched;
 
 use std::{convert::Infallible, num::NonZeroUsize, sync::Arc, time::Duration};
@@ -16,15 +16,20 @@ use hyper::{
 use tokio::{
     net::{TcpListener, TcpStream},
     task::JoinSet,
+    time::timeout,
 };
 use tower::{BoxError, Service};
 
 use self::{
     accept::Acceptor,
     connection::Rules,
-    places::{Place, Places},
+    connection_permits::{ConnectionPermit, ConnectionPermits},
 };
 use crate::{metrics::Metrics, shutdown::Shutdown, tls::Tls};
+
+/// Longest that the handshake and the head of a connection beyond the limit may take. A probe needs
+/// milliseconds.
+const HEADER_TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_millis(500);
 
 /// What connections may cost.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,31 +77,48 @@ pub async fn serve<S, B>(
     B: Body<Data: Send, Error: Into<BoxError>> + Send + Unpin + 'static,
 {
     let mut acceptor = Acceptor::new(listener);
-    let places = Places::new(limits.max_connections, metrics);
+    let permits = ConnectionPermits::new(limits.max_connections, metrics);
     let mut connections = JoinSet::new();
-    let serve_on = |stream: TcpStream, place: Place| {
-        let service = if place.is_regular {
-            services.regular.clone()
+    let serve_on = |stream: TcpStream, permit: ConnectionPermit| {
+        let is_regular = permit.is_regular();
+        let (service, header_timeout) = if is_regular {
+            (services.regular.clone(), limits.header_timeout)
         } else {
-            services.beyond_limit.clone()
+            let timeout = limits.header_timeout.min(HEADER_TIMEOUT_BEYOND_LIMIT);
+            (services.beyond_limit.clone(), timeout)
         };
         let rules = Rules {
-            limits: limits.clone(),
-            one_request_only: !place.is_regular,
+            limits: ConnectionLimits {
+                header_timeout,
+                ..limits.clone()
+            },
+            one_request_only: !is_regular,
             client: stream.peer_addr().ok(),
             shutdown: shutdown.clone(),
         };
         let tls = tls.cloned();
         async move {
-            match tls {
-                None => connection::serve(stream, service, rules).await,
-                Some(tls) => {
-                    if let Some(stream) = tls.accept(stream).await {
-                        connection::serve(stream, service, rules).await;
+            let served = async {
+                match tls {
+                    None => connection::serve(stream, service, rules).await,
+                    Some(tls) => {
+                        let handshake = tls.accept(stream);
+                        let stream = if is_regular {
+                            handshake.await
+                        } else {
+                            let within = HEADER_TIMEOUT_BEYOND_LIMIT;
+                            timeout(within, handshake).await.ok().flatten()
+                        };
+                        if let Some(stream) = stream {
+                            connection::serve(stream, service, rules).await;
+                        }
                     }
                 }
+            };
+            tokio::select! {
+                () = served => {}
+                () = permit.closed.cancelled() => {}
             }
-            drop(place);
         }
     };
     loop {
@@ -105,18 +127,10 @@ pub async fn serve<S, B>(
             Some(_ended) = connections.join_next() => continue,
             stream = acceptor.accept() => stream,
         };
-        let place = tokio::select! {
-            place = places.take() => Some(place),
-            () = shutdown.draining() => places.try_take(),
-        };
-        if let Some(place) = place {
-            connections.spawn(serve_on(stream, place));
-        }
+        connections.spawn(serve_on(stream, permits.take()));
     }
     for stream in acceptor.close() {
-        if let Some(place) = places.try_take() {
-            connections.spawn(serve_on(stream, place));
-        }
+        connections.spawn(serve_on(stream, permits.take()));
     }
     while connections.join_next().await.is_some() {}
 }

@@ -1,0 +1,104 @@
+//! The connection limit: permits for regular connections, and short-lived ones for connections beyond it.
+
+use std::{
+    collections::VecDeque,
+    num::NonZeroUsize,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio_util::sync::CancellationToken;
+
+use crate::metrics::Metrics;
+
+/// Connections beyond the limit that are open at the same time. They are answered with 503, and probes
+/// as ever.
+const MAX_BEYOND_LIMIT: usize = 256;
+
+/// Gives permits to connections.
+///
+/// A connection beyond the limit never waits for another one: when there are too many of them, the oldest
+/// is closed. So a probe is accepted at once, however many silent connections came before it.
+pub(super) struct ConnectionPermits {
+    regular: Arc<Semaphore>,
+    /// Closes the latest connections beyond the limit, the oldest first.
+    beyond_limit: Mutex<VecDeque<CancellationToken>>,
+    metrics: Arc<Metrics>,
+}
+
+/// The permit of a connection, which counts as open until this is dropped.
+pub(super) struct ConnectionPermit {
+    /// `None` beyond the limit.
+    regular: Option<OwnedSemaphorePermit>,
+    /// Cancelled when the connection has to make room for another one.
+    pub(super) closed: CancellationToken,
+    metrics: Arc<Metrics>,
+}
+
+impl ConnectionPermits {
+    pub(super) fn new(limit: NonZeroUsize, metrics: &Arc<Metrics>) -> Self {
+        Self {
+            regular: Arc::new(Semaphore::new(limit.get())),
+            beyond_limit: Mutex::default(),
+            metrics: Arc::clone(metrics),
+        }
+    }
+
+    /// A permit within the limit if one is free, else one beyond it, for which the oldest one beyond the
+    /// limit may be taken back.
+    pub(super) fn take(&self) -> ConnectionPermit {
+        let regular = Arc::clone(&self.regular).try_acquire_owned().ok();
+        let closed = CancellationToken::new();
+        if regular.is_none() {
+            let mut open = self
+                .beyond_limit
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            open.push_back(closed.clone());
+            if open.len() > MAX_BEYOND_LIMIT
+                && let Some(oldest) = open.pop_front()
+            {
+                oldest.cancel();
+            }
+        }
+        self.metrics.connections.inc();
+        ConnectionPermit {
+            regular,
+            closed,
+            metrics: Arc::clone(&self.metrics),
+        }
+    }
+}
+
+impl ConnectionPermit {
+    /// Whether the connection is within the limit.
+    pub(super) fn is_regular(&self) -> bool {
+        self.regular.is_some()
+    }
+}
+
+impl Drop for ConnectionPermit {
+    fn drop(&mut self) {
+        self.metrics.connections.dec();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oldest_connection_beyond_the_limit_makes_room() {
+        let metrics = Arc::new(Metrics::new().unwrap());
+        let permits = ConnectionPermits::new(NonZeroUsize::MIN, &metrics);
+        let regular = permits.take();
+        let beyond: Vec<_> = (0..=MAX_BEYOND_LIMIT).map(|_| permits.take()).collect();
+        assert!(regular.is_regular() && !regular.closed.is_cancelled());
+        assert!(beyond.iter().all(|permit| !permit.is_regular()));
+        let closed = beyond.iter().filter(|permit| permit.closed.is_cancelled());
+        assert_eq!(closed.count(), 1);
+        assert!(beyond[0].closed.is_cancelled());
+        drop(regular);
+        assert!(permits.take().is_regular());
+    }
+}
