@@ -1,0 +1,102 @@
+"""Lists sentences and names that break the rules of CONTRIBUTING.md, "How we write": `language.py [PATH...]`.
+
+It reads the tracked Rust, Python, JavaScript and Markdown files below the given paths, everything by default, and
+prints one line per finding. What a machine can hold is held here; the rest is for reviewers.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+LONGEST_TEST_NAME = 60
+LONGEST_SUMMARY_WORDS = 6
+QUESTION_WORDS = "What|Who|Whom|Whose|How|Whether|Where|Which|Of|Why|When"
+# Things are not persons.
+PERSONS = re.compile(r"\b(somebody|nobody|whoever|anybody|everybody|whomever)\b", re.IGNORECASE)
+FIRST_WORD = re.compile(rf"(?:{QUESTION_WORDS})\b(?!-)")
+RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")
+RUST_TEST = re.compile(r"#\[(?:tokio::)?test\b")
+RUST_FUNCTION = re.compile(r"\bfn (\w+)")
+PYTHON_TEST = re.compile(r"^\s*(?:async )?def (test_\w+)")
+# Files that hold the rules, and texts of others.
+EXEMPT = {"scripts/language.py", "scripts/tests/test_language.py", "CONTRIBUTING.md", "LICENSE", "NOTICE"}
+SUFFIXES = {".rs", ".py", ".js", ".mjs", ".md", ".html"}
+
+
+def tracked_files(paths):
+    """The tracked files below the paths, relative to the repository."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--", *paths], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    return [name for name in listed.stdout.splitlines() if name not in EXEMPT]
+
+
+def findings_in_text(name, lines):
+    """Words that make persons of things."""
+    for number, line in enumerate(lines, 1):
+        if found := PERSONS.search(line):
+            yield f"{name}:{number}: `{found.group()}`: name the client, the caller or the component"
+
+
+def findings_in_rust(name, lines):
+    """First words of doc comments, and the length of the names of tests."""
+    is_in_doc = is_test = False
+    for number, line in enumerate(lines, 1):
+        doc = RUST_DOC.match(line)
+        if doc and not is_in_doc and FIRST_WORD.match(doc.group(1)):
+            first = doc.group(1).split()[0]
+            yield f"{name}:{number}: a doc comment begins with `{first}`: begin with a verb or a noun phrase"
+        is_in_doc = bool(doc)
+        is_test = is_test or bool(RUST_TEST.search(line))
+        if is_test and (function := RUST_FUNCTION.search(line)):
+            is_test = False
+            yield from finding_of_test_name(name, number, function.group(1))
+
+
+def finding_of_test_name(name, number, test):
+    """The finding about the length of a test's name, if it is too long."""
+    if len(test) > LONGEST_TEST_NAME:
+        yield f"{name}:{number}: the test name `{test}` has {len(test)} characters, {LONGEST_TEST_NAME} are allowed"
+
+
+def findings_in_python(name, lines):
+    """The length of the names of tests."""
+    for number, line in enumerate(lines, 1):
+        if test := PYTHON_TEST.match(line):
+            yield from finding_of_test_name(name, number, test.group(1))
+
+
+def findings_in_openapi(name, text):
+    """Summaries that are questions or too long."""
+    for path, operations in json.loads(text)["paths"].items():
+        for method, operation in operations.items():
+            summary = operation.get("summary", "")
+            words = len(summary.split())
+            if summary.endswith("?") or not 1 <= words <= LONGEST_SUMMARY_WORDS:
+                yield f"{name}: {method.upper()} {path}: the summary `{summary}` is no imperative of 1 to 6 words"
+
+
+def findings(paths):
+    """All findings below the paths."""
+    for name in tracked_files(paths):
+        path = ROOT / name
+        if name == "openapi/openapi.json":
+            yield from findings_in_openapi(name, path.read_text("utf-8"))
+        if path.suffix not in SUFFIXES or not path.is_file():
+            continue
+        lines = path.read_text("utf-8").splitlines()
+        yield from findings_in_text(name, lines)
+        if path.suffix == ".rs":
+            yield from findings_in_rust(name, lines)
+        elif path.suffix == ".py":
+            yield from findings_in_python(name, lines)
+
+
+if __name__ == "__main__":
+    found = list(findings(sys.argv[1:]))
+    print("\n".join(found))
+    print(f"{len(found)} findings")
+    sys.exit(bool(found))
