@@ -198,6 +198,8 @@ async fn a_large_frame_is_kept_smaller() {
     let query = "profile=fast&camera=hall";
     let answer = service.post_raw(query, frame_of(3000, 1500)).await;
     assert_eq!(answer.status, 200, "{}", answer.text());
-    let kept = picture(&service.get(PATH).await);
-    assert_eq!((kept.width(), kept.height()), (2560, 1280));
+    for (query, width, height) in [("", 2048, 1024), ("?width=8192", 2560, 1280)] {
+        let kept = picture(&service.get(&format!("{PATH}{query}")).await);
+        assert_eq!((kept.width(), kept.height()), (width, height));
+    }
 }
