@@ -14,6 +14,7 @@ mod find;
 mod foreign_pages;
 mod head;
 mod health;
+mod host;
 mod incoming_trace;
 mod limit;
 mod openapi;
@@ -32,7 +33,7 @@ mod web_page;
 
 use axum::{
     Router,
-    middleware::{from_fn_with_state, map_response},
+    middleware::{from_fn, from_fn_with_state, map_response},
 };
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
@@ -163,7 +164,8 @@ fn surrounded(router: Router, state: ApiState) -> Router {
         .layer(option_layer(cors::layer(&state.options.cors_origins)))
         .layer(CatchPanicLayer::custom(envelope::of_panic))
         .layer(from_fn_with_state(state.clone(), unread::discard))
-        .layer(from_fn_with_state(state, head::within_bounds));
+        .layer(from_fn_with_state(state, head::within_bounds))
+        .layer(from_fn(host::require));
     router.layer(layers)
 }
 

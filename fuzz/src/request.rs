@@ -12,7 +12,10 @@ use std::{
 use axum::{
     Router,
     body::Body,
-    http::{HeaderName, HeaderValue, Method, Request, StatusCode, Uri, header::CONTENT_TYPE},
+    http::{
+        HeaderName, HeaderValue, Method, Request, StatusCode, Uri,
+        header::{CONTENT_TYPE, HOST},
+    },
 };
 use http_body_util::BodyExt;
 use lookdown::{
@@ -88,6 +91,9 @@ fn request(bytes: &[u8]) -> Option<Request<Body>> {
         let value = HeaderValue::from_bytes(header[colon + 1..].trim_ascii()).ok()?;
         request.headers_mut().append(name, value);
     }
+    // As every client sends it; what the corpus spells is kept.
+    let host = request.headers_mut().entry(HOST);
+    host.or_insert(HeaderValue::from_static("localhost"));
     *request.body_mut() = Body::from(rest.to_vec());
     Some(request)
 }

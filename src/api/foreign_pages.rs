@@ -5,26 +5,36 @@
 //!
 //! So a request that may change anything is refused when its `Origin` is neither the server itself
 //! nor in `access.cors_origins`; and a server that only its own machine reaches answers no request
-//! for a public host name. Keys make both unnecessary: no browser adds them by itself.
+//! for a public host name, nor any that a proxy passed on: the proxy's clients are not on this machine.
+//! Keys make all of this unnecessary: no browser adds them by itself.
 
 use std::{net::IpAddr, sync::Arc};
 
 use axum::{
     extract::{Request, State},
-    http::{
-        HeaderMap, Uri,
-        header::{HOST, ORIGIN},
-        uri::Authority,
-    },
+    http::{HeaderMap, Uri, header::ORIGIN, uri::Authority},
     middleware::Next,
     response::{IntoResponse, Response},
 };
 
 use super::{
     Access, ApiOptions,
+    host::host_of,
     problem::{Problem, ProblemKind},
 };
 
+/// The headers by which proxies say that they pass a request on (RFC 7239; RFC 9110, section 7.6.3;
+/// `X-Real-IP` and `X-Forwarded-…` by convention).
+const FORWARDING_HEADERS: [&str; 8] = [
+    "forwarded",
+    "via",
+    "x-forwarded-for",
+    "x-forwarded-host",
+    "x-forwarded-port",
+    "x-forwarded-proto",
+    "x-forwarded-server",
+    "x-real-ip",
+];
 /// Most characters of a header that are repeated to its sender.
 const MAX_SHOWN_CHARS: usize = 128;
 
@@ -66,7 +76,14 @@ fn check(request: &Request, own_pages: &OwnPages) -> Result<(), Problem> {
         own_machine_only,
         allowed,
     } = own_pages;
-    // Every browser names the host; what names none is no browser.
+    if *own_machine_only && let Some(header) = forwarding_header(request.headers()) {
+        let detail = format!(
+            "without keys (access.keys_file), this server answers clients on its own machine only, \
+             and {header} shows that a proxy passed this request on: set access.keys_file"
+        );
+        return Err(Problem::new(ProblemKind::Forbidden, detail));
+    }
+    // Every browser sends a host; a client that sends none is no browser.
     let host = host_of(request.uri(), request.headers());
     if let Some(host) = &host
         && *own_machine_only
@@ -97,10 +114,11 @@ fn check(request: &Request, own_pages: &OwnPages) -> Result<(), Problem> {
     Err(Problem::new(ProblemKind::Forbidden, detail))
 }
 
-/// Whom the request is meant for.
-fn host_of(uri: &Uri, headers: &HeaderMap) -> Option<Authority> {
-    let in_header = || headers.get(HOST)?.to_str().ok()?.parse().ok();
-    uri.authority().cloned().or_else(in_header)
+/// Returns the first header that a proxy adds to the requests which it passes on.
+fn forwarding_header(headers: &HeaderMap) -> Option<&'static str> {
+    FORWARDING_HEADERS
+        .into_iter()
+        .find(|name| headers.contains_key(*name))
 }
 
 /// Whether an origin is that of a host.

@@ -12,7 +12,7 @@ use tower::ServiceExt;
 
 use crate::{
     log::Log,
-    service::{Answer, Bounds, FRAME_SIDE, Service, form, frame, incompressible_frame},
+    service::{Answer, Bounds, FRAME_SIDE, Service, form, frame, incompressible_frame, with_host},
 };
 
 const ANYWHERE: &str = "/v1/vision/detection";
@@ -269,7 +269,7 @@ async fn frames_share_the_places_of_all_others() {
     let first = tokio::spawn({
         let router = service.router.clone();
         async move {
-            tower::ServiceExt::oneshot(router, waiting)
+            tower::ServiceExt::oneshot(router, with_host(waiting))
                 .await
                 .unwrap()
                 .status()
@@ -340,7 +340,7 @@ async fn forms_without_a_known_key_leave_memory_to_others() {
     let parts = [("image", &image[..]), ("api_key", KEY.as_bytes())];
     service.gate.close();
     let router = service.router.clone();
-    let first = tokio::spawn(router.oneshot(form_to(LOBBY, &parts)));
+    let first = tokio::spawn(router.oneshot(with_host(form_to(LOBBY, &parts))));
     service.gate.has_begun(1).await;
     for parts in [&parts[..], &parts[..1]] {
         let refused = post(&service, LOBBY, parts).await;
@@ -349,7 +349,7 @@ async fn forms_without_a_known_key_leave_memory_to_others() {
     let mut request = form_to(LOBBY, &parts[..1]);
     let key = KEY.parse().unwrap();
     request.headers_mut().insert("x-api-key", key);
-    let with_header = tokio::spawn(service.router.clone().oneshot(request));
+    let with_header = tokio::spawn(service.router.clone().oneshot(with_host(request)));
     service.gate.open();
     assert_eq!(first.await.unwrap().unwrap().status(), 200);
     assert_eq!(with_header.await.unwrap().unwrap().status(), 200);

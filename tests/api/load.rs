@@ -9,7 +9,7 @@ use axum::{
 use tokio::task::JoinHandle;
 use tower::ServiceExt;
 
-use crate::service::{Bounds, Service, frame, incompressible_frame};
+use crate::service::{Bounds, Service, frame, incompressible_frame, with_host};
 
 const FAST: &str = "calibration=lobby&profile=fast";
 const VIEWS: &str = "/calibrations/lobby/views?profile=fast";
@@ -21,7 +21,7 @@ fn begin(service: &Service, image: Vec<u8>) -> JoinHandle<StatusCode> {
 }
 
 fn send(service: &Service, request: Request<Body>) -> JoinHandle<StatusCode> {
-    let answer = service.router.clone().oneshot(request);
+    let answer = service.router.clone().oneshot(with_host(request));
     tokio::spawn(async { answer.await.unwrap().status() })
 }
 

@@ -6,7 +6,7 @@ use axum::http::StatusCode;
 use lookdown::api::Access;
 use serde_json::json;
 
-use crate::service::{Bounds, Service, frame};
+use crate::service::{Bounds, Service, frame, with_host};
 
 const INDEX: &str = "/v2/repository/index";
 
@@ -159,7 +159,7 @@ async fn one_model_is_loaded_at_a_time() {
     let first = tokio::spawn(async move {
         let request = axum::http::Request::post(path("eager", "load"));
         let request = request.body(axum::body::Body::empty()).unwrap();
-        tower::ServiceExt::oneshot(router, request)
+        tower::ServiceExt::oneshot(router, with_host(request))
             .await
             .unwrap()
             .status()

@@ -10,7 +10,7 @@ use tower::ServiceExt;
 
 use crate::{
     server::{Server, rest_of},
-    service::Service,
+    service::{Service, with_host},
 };
 
 const EVENTS: &str = "/results/lobby/events";
@@ -36,7 +36,12 @@ impl Stream {
             request = request.header(name, value);
         }
         let request = request.body(Body::empty()).unwrap();
-        let response = service.router.clone().oneshot(request).await.unwrap();
+        let response = service
+            .router
+            .clone()
+            .oneshot(with_host(request))
+            .await
+            .unwrap();
         assert_eq!(response.status(), 200);
         Self(response)
     }

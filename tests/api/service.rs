@@ -9,7 +9,10 @@ use std::{
 use axum::{
     Router,
     body::Body,
-    http::{HeaderMap, Request, StatusCode, header::CONTENT_TYPE},
+    http::{
+        HeaderMap, HeaderValue, Request, StatusCode,
+        header::{CONTENT_TYPE, HOST},
+    },
 };
 use http_body_util::BodyExt;
 use lookdown::{
@@ -268,7 +271,8 @@ impl Service {
     }
 
     pub(crate) async fn send(&self, request: Request<Body>) -> Answer {
-        let response = self.router.clone().oneshot(request).await.unwrap();
+        let response = self.router.clone().oneshot(with_host(request)).await;
+        let response = response.unwrap();
         let (parts, mut body) = response.into_parts();
         let content_type = parts.headers.get(CONTENT_TYPE);
         if content_type.is_some_and(|kind| kind == "text/event-stream") {
@@ -315,6 +319,13 @@ impl Service {
             .await;
         assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
     }
+}
+
+/// The request with the `Host` header that every HTTP client sends.
+pub(crate) fn with_host(mut request: Request<Body>) -> Request<Body> {
+    let host = request.headers_mut().entry(HOST);
+    host.or_insert(HeaderValue::from_static("localhost"));
+    request
 }
 
 /// A form for `/detect`.

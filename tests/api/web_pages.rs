@@ -63,6 +63,49 @@ async fn a_page_of_a_stranger_changes_nothing_and_finds_nobody_where_there_are_n
 }
 
 #[tokio::test]
+async fn requests_passed_on_by_a_proxy_are_refused_on_loopback() {
+    let service = open(true);
+    for header in [
+        "Forwarded",
+        "Via",
+        "X-Forwarded-For",
+        "X-Forwarded-Proto",
+        "X-Real-IP",
+    ] {
+        for (method, path) in [("GET", "/calibrations"), CHANGING[0], CHANGING[1]] {
+            let answer = service.ask(method, path, &[(header, "203.0.113.9")]).await;
+            assert_refused(&answer, "access.keys_file");
+        }
+        for path in ["/livez", "/readyz"] {
+            let answer = service.ask("GET", path, &[(header, "203.0.113.9")]).await;
+            assert_eq!(answer.status, 200, "{header} {path}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn requests_without_exactly_one_valid_host_are_refused() {
+    let server = crate::server::Server::start(&[]).await;
+    for hosts in [
+        "",
+        "Host: a{b.evil.example:18081\r\n",
+        "Host: evil.example, localhost\r\n",
+        "Host: localhost\r\nHost: localhost\r\n",
+        "Host:\r\n",
+    ] {
+        for path in ["/calibrations", "/livez", "/"] {
+            let request = format!("GET {path} HTTP/1.1\r\n{hosts}Connection: close\r\n\r\n");
+            let answer = crate::server::rest_of(server.connect(request.as_bytes())).await;
+            assert!(answer.starts_with("HTTP/1.1 400"), "{hosts:?}: {answer}");
+            assert!(answer.contains("malformed-request"), "{answer}");
+        }
+    }
+    let old = b"GET /livez HTTP/1.0\r\n\r\n";
+    let answer = crate::server::rest_of(server.connect(old)).await;
+    assert!(answer.contains(" 200 OK"), "{answer}");
+}
+
+#[tokio::test]
 async fn a_name_that_a_stranger_lets_lead_here_is_not_answered_on_the_own_machine() {
     let service = open(true);
     let rebound = [

@@ -103,7 +103,8 @@ fn service(folder: &Path) -> Router {
 }
 
 async fn post(router: &Router, path: &str, body: Vec<u8>) -> (StatusCode, Value) {
-    let request = Request::post(path).body(Body::from(body)).unwrap();
+    let request = Request::post(path).header("host", "localhost");
+    let request = request.body(Body::from(body)).unwrap();
     let response = router.clone().oneshot(request).await.unwrap();
     let status = response.status();
     let body = response.into_body().collect().await.unwrap().to_bytes();
