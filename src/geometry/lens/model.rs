@@ -125,7 +125,6 @@ macro_rules! lens_parameters {
                 [self.fx, self.fy, self.cx, self.cy]
             }
 
-            #[expect(clippy::unnecessary_wraps, reason = "other models have fields to check here")]
             pub(in $crate::geometry::lens) fn plane(
                 &self,
             ) -> Result<$crate::geometry::lens::ImagePlane, $crate::geometry::LensError> {
