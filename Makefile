@@ -31,6 +31,8 @@ serve: setup ## set up, then run the server
 test: ## set up, then everything that needs nothing but this repository: formatting, lints, tests, documentation
 	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server auditor
 	cargo fmt --check
+	@# Modules that a macro declares: cargo fmt does not find them.
+	rustfmt --check --edition 2024 src/geometry/lens/models/*.rs
 	cargo clippy --all-targets --locked -- -D warnings
 	@# The fuzzers have a lock file of their own, which is to follow the other.
 	cargo tree --quiet --locked --manifest-path fuzz/Cargo.toml > /dev/null

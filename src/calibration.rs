@@ -9,7 +9,6 @@ pub mod export;
 mod file;
 pub mod formats;
 mod id;
-mod lens_fields;
 pub mod native;
 mod plausibility;
 mod store;
@@ -24,7 +23,6 @@ pub use error::CalibrationError;
 pub use file::content as read_content;
 pub use formats::{CalibrationFile, FormatError};
 pub use id::CalibrationId;
-pub use lens_fields::LensFieldsError;
 pub use store::{
     BucketStore, CalibrationStore, FolderStore, MAX_FILES, READ_AT_ONCE, Replaces, StoreError,
     StoredFile,

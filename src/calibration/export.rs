@@ -7,7 +7,7 @@ mod kalibr;
 mod opencv;
 mod ros;
 
-use super::native::{NativeCalibration, NativeLens, NativeMount};
+use super::native::{NativeCalibration, NativeMount};
 
 /// A format that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +80,7 @@ impl Target {
         };
         let content = content.ok_or(NotExpressible {
             target: self.name(),
-            model: calibration.lens.model(),
+            model: calibration.lens.name(),
             holds: self.holds(),
         })?;
         Ok(Exported {
@@ -143,27 +143,4 @@ fn native(calibration: &NativeCalibration) -> String {
     let mut content = serde_json::to_string_pretty(calibration).unwrap_or_default();
     content.push('\n');
     content
-}
-
-impl NativeLens {
-    /// The name of the model, as in calibration files.
-    #[must_use]
-    pub fn model(&self) -> &'static str {
-        match self {
-            Self::Equidistant(_) => "equidistant",
-            Self::Equisolid(_) => "equisolid",
-            Self::Stereographic(_) => "stereographic",
-            Self::Orthographic(_) => "orthographic",
-            Self::Rectilinear(_) => "rectilinear",
-            Self::RadialPolynomial(_) => "radial_polynomial",
-            Self::KannalaBrandt(_) => "kannala_brandt",
-            Self::Ucm(_) => "ucm",
-            Self::Eucm(_) => "eucm",
-            Self::Mei(_) => "mei",
-            Self::DoubleSphere(_) => "double_sphere",
-            Self::Ocam(_) => "ocam",
-            Self::Fov(_) => "fov",
-            Self::FTheta(_) => "f_theta",
-        }
-    }
 }

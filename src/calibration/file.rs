@@ -10,7 +10,7 @@ use super::{
     native::{NativeImage, NativeMount},
     plausibility,
 };
-use crate::geometry::Mount;
+use crate::geometry::{Lens, Mount};
 
 /// Image sides accepted, pixels.
 const IMAGE_SIDE: std::ops::RangeInclusive<u32> = 16..=65_536;
@@ -111,8 +111,7 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
         return Err(invalid("image", problem));
     }
     let ends_explicitly = camera.lens.max_theta().is_some();
-    let lens = camera.lens.clone().into_lens();
-    let lens = lens.map_err(|error| invalid("lens", error.to_string()))?;
+    let lens = Lens::new(&camera.lens).map_err(|error| invalid("lens", error.to_string()))?;
     let mount = mount(&camera.mount).map_err(|problem| invalid("mount", problem))?;
     let image = NativeImage { width, height };
     let areas = Areas::checked(&camera.zones, &camera.masks, image, &mount)?;

@@ -16,7 +16,6 @@ mod error;
 mod fields;
 mod fisheye_calib_adapter;
 mod kalibr;
-mod lenses;
 mod moil;
 mod multicol;
 mod named_parameters;
@@ -38,7 +37,8 @@ use self::{
     fields::Fields,
     recognise::{recognise_lines, recognise_tree},
 };
-use super::native::{NativeImage, NativeLens, NativeMask, NativeMount, NativeZone};
+use super::native::{NativeImage, NativeMask, NativeMount, NativeZone};
+use crate::geometry::lens::LensModel;
 
 /// Most cameras taken from one file.
 const MAX_CAMERAS: usize = 256;
@@ -67,7 +67,7 @@ pub struct Camera {
     /// The size of the frames it was calibrated with; some formats do not tell.
     pub image: Option<NativeImage>,
     /// The lens.
-    pub lens: NativeLens,
+    pub lens: LensModel,
     /// How it hangs; only native files tell, others mean straight down.
     pub mount: NativeMount,
     /// Its zones; only native files have some.
@@ -79,10 +79,10 @@ pub struct Camera {
 }
 
 impl Camera {
-    fn new(image: Option<NativeImage>, lens: NativeLens) -> Self {
+    fn new(image: Option<NativeImage>, lens: impl Into<LensModel>) -> Self {
         Self {
             image,
-            lens,
+            lens: lens.into(),
             mount: NativeMount::default(),
             zones: Vec::new(),
             masks: Vec::new(),

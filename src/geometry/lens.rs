@@ -7,22 +7,24 @@
 
 use std::f64::consts::PI;
 
-mod closed_curve;
+mod check;
 mod continuation;
+mod curve;
 mod distortion;
 mod error;
 mod image_plane;
 mod inversion;
+#[macro_use]
 mod model;
+mod models;
 mod polynomial;
-mod radial_map;
 
 pub use distortion::RadialTangential;
 pub use error::LensError;
-pub use image_plane::ImagePlane;
-pub use model::{FThetaPolynomial, LensModel};
+pub use image_plane::{ImagePlane, Pinhole};
+pub use models::*;
 
-use self::{inversion::first_stationary_point, radial_map::RadialMap};
+use self::{curve::Curve, inversion::first_stationary_point, models::AnyCurve};
 use super::{Pixel, Ray};
 
 /// Rays this little beyond `max_theta` still count as on the rim: rounding, not geometry.
@@ -31,8 +33,7 @@ const RIM_TOLERANCE: f64 = 1e-12;
 /// A calibrated lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
-    model: &'static str,
-    radial: RadialMap,
+    curve: AnyCurve,
     distortion: Option<RadialTangential>,
     plane: ImagePlane,
     max_theta: f64,
@@ -41,40 +42,45 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// Builds a lens. Without `max_theta` the lens reaches as far as its model is one-to-one.
+    /// Builds the lens of `model`, whose parameters are checked here.
     ///
     /// # Errors
     /// [`LensError`] when a parameter is not finite or out of its range, the curve does not rise
     /// at the axis, or `max_theta` lies beyond the model's limit.
-    pub fn new(
-        model: LensModel,
+    pub fn new(model: &LensModel) -> Result<Self, LensError> {
+        Self::on_plane(model, model.plane()?, model.max_theta())
+    }
+
+    /// Builds the lens with the curve of `model` and another image plane and end than its own.
+    /// Without `max_theta` the lens reaches as far as its model is one-to-one.
+    pub(crate) fn on_plane(
+        model: &LensModel,
         plane: ImagePlane,
         max_theta: Option<f64>,
     ) -> Result<Self, LensError> {
-        let name = model.name();
-        let is_polynomial = model.is_polynomial();
-        let (radial, distortion) = model.into_parts()?;
+        let (curve, distortion) = model.curve()?;
         plane.check()?;
         let limit = match &distortion {
-            None => radial.limit(),
+            None => curve.limit(),
             Some(distortion) => first_stationary_point(
-                |theta| distortion.least_stretch(radial.radius(theta)),
-                radial.limit(),
+                |theta| distortion.least_stretch(curve.radius(theta)),
+                curve.limit(),
             ),
         };
         let max_theta = max_theta.unwrap_or(limit);
-        let max_radius = radial.radius(max_theta.min(limit));
+        let max_radius = curve.radius(max_theta.min(limit));
         let rises = limit > 0.0 && max_radius.is_finite();
         if !rises {
-            return Err(LensError::NotRising { model: name });
+            return Err(LensError::NotRising {
+                model: curve.model(),
+            });
         }
         let is_within = max_theta > 0.0 && max_theta <= limit + RIM_TOLERANCE;
         if !is_within {
-            return Err(beyond_limit(name, is_polynomial, max_theta, limit));
+            return Err(beyond_limit(&curve, max_theta, limit));
         }
         Ok(Self {
-            model: name,
-            radial,
+            curve,
             distortion,
             plane,
             max_theta: max_theta.min(limit),
@@ -93,15 +99,13 @@ impl Lens {
         radius: f64,
         max_theta: f64,
     ) -> Result<Self, LensError> {
-        let focal = radius / max_theta;
-        let plane = ImagePlane::new(focal, focal, cx, cy);
-        Self::new(LensModel::Equidistant, plane, Some(max_theta))
+        Self::new(&Equidistant::with_focal(radius / max_theta, cx, cy, max_theta).into())
     }
 
     /// The name of the model, as in calibration files.
     #[must_use]
     pub fn model(&self) -> &'static str {
-        self.model
+        self.curve.model()
     }
 
     /// Where the lens image ends: the largest angle from the optical axis, in radians.
@@ -128,10 +132,7 @@ impl Lens {
         if !(theta <= self.max_theta + RIM_TOLERANCE && off_axis.is_finite()) {
             return None;
         }
-        self.pixel_at(
-            ray,
-            self.radial.radius(theta.min(self.max_theta)) / off_axis,
-        )
+        self.pixel_at(ray, self.curve.radius(theta.min(self.max_theta)) / off_axis)
     }
 
     /// Like [`Lens::project`], but a ray beyond `max_theta` is pulled to the rim of the lens image
@@ -177,7 +178,7 @@ impl Lens {
         if !is_within {
             return None;
         }
-        let (sin, cos) = self.radial.angle(radius.min(self.max_radius)).sin_cos();
+        let (sin, cos) = self.curve.angle(radius.min(self.max_radius)).sin_cos();
         sin.is_finite()
             .then(|| Ray::new(sin * x / radius, sin * y / radius, cos))
     }
@@ -211,15 +212,16 @@ impl Lens {
         let max_theta = max_theta.min(self.max_theta);
         Self {
             max_theta,
-            max_radius: self.radial.radius(max_theta),
+            max_radius: self.curve.radius(max_theta),
             ..self.clone()
         }
     }
 }
 
 /// Why `max_theta` is refused. The limit is rounded down, so that it may be copied.
-fn beyond_limit(model: &'static str, is_polynomial: bool, value: f64, limit: f64) -> LensError {
-    let turns_back = is_polynomial && value > limit && limit < PI;
+fn beyond_limit(curve: &AnyCurve, value: f64, limit: f64) -> LensError {
+    let model = curve.model();
+    let turns_back = curve.is_polynomial() && value > limit && limit < PI;
     let limit = (limit * 1e4).floor() / 1e4;
     if turns_back {
         return LensError::TurnsBack {

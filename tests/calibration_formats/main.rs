@@ -45,7 +45,7 @@ fn refusal(content: &[u8]) -> String {
 }
 
 fn lens(camera: Camera) -> Lens {
-    camera.lens.into_lens().unwrap()
+    Lens::new(&camera.lens).unwrap()
 }
 
 fn ray(value: &Value) -> Ray {

@@ -1,6 +1,6 @@
 //! What is easily read wrong: each trap has its test.
 
-use lookdown::calibration::{CalibrationFile, native::NativeLens};
+use lookdown::{calibration::CalibrationFile, geometry::lens::LensModel};
 
 use crate::{camera, fixture, refusal};
 
@@ -20,7 +20,7 @@ fn ocamcalib_tells_row_before_column_and_height_before_width() {
     let camera = camera(content.as_bytes(), 0);
     let image = camera.image.unwrap();
     assert_eq!((image.width, image.height), (1600, 1200));
-    let NativeLens::Ocam(lens) = camera.lens else {
+    let LensModel::Ocam(lens) = camera.lens else {
         panic!("not an ocam lens");
     };
     assert_eq!((lens.cx, lens.cy), (798.175_741, 794.308_657));
@@ -38,7 +38,7 @@ fn ocamcalib_counts_its_coefficients() {
 #[test]
 fn colmap_loses_half_a_pixel() {
     let camera = camera(b"1 OPENCV_FISHEYE 512 400 190 191 255.5 200.5 0 0 0 0\n", 0);
-    let NativeLens::KannalaBrandt(lens) = camera.lens else {
+    let LensModel::KannalaBrandt(lens) = camera.lens else {
         panic!("not a Kannala-Brandt lens");
     };
     assert_eq!((lens.cx, lens.cy), (255.0, 200.0));
@@ -61,7 +61,7 @@ fn colmap_thin_prism_terms_have_no_lens_unless_they_are_zero() {
     );
     assert!(file.cameras[..3].iter().all(|camera| camera.camera.is_ok()));
     let plain = b"1 THIN_PRISM_FISHEYE 512 512 190 191 256 256 0.01 0.02 0 0 0.03 0.04 0 0\n";
-    let NativeLens::KannalaBrandt(lens) = camera(plain, 0).lens else {
+    let LensModel::KannalaBrandt(lens) = camera(plain, 0).lens else {
         panic!("not a Kannala-Brandt lens");
     };
     // k1 and k2, then the tangential terms, then k3 and k4.
@@ -77,15 +77,15 @@ fn kalibr_puts_the_sphere_before_the_focal_lengths() {
         );
         camera(content.as_bytes(), 0).lens
     };
-    let NativeLens::DoubleSphere(sphere) = camera("ds", "[-0.2, 0.6, 348, 347, 366, 249]") else {
+    let LensModel::DoubleSphere(sphere) = camera("ds", "[-0.2, 0.6, 348, 347, 366, 249]") else {
         panic!("not a double sphere");
     };
     assert_eq!((sphere.xi, sphere.alpha, sphere.fx), (-0.2, 0.6, 348.0));
-    let NativeLens::Eucm(eucm) = camera("eucm", "[0.6, 1.1, 460, 459, 366, 249]") else {
+    let LensModel::Eucm(eucm) = camera("eucm", "[0.6, 1.1, 460, 459, 366, 249]") else {
         panic!("not an EUCM lens");
     };
     assert_eq!((eucm.alpha, eucm.beta, eucm.fx), (0.6, 1.1, 460.0));
-    let NativeLens::Mei(mei) = camera("omni", "[0.8, 833, 830, 374, 254]") else {
+    let LensModel::Mei(mei) = camera("omni", "[0.8, 833, 830, 374, 254]") else {
         panic!("not a Mei lens");
     };
     assert_eq!((mei.xi, mei.fx, mei.k1), (0.8, 833.0, 0.0));
@@ -171,7 +171,7 @@ fn corner_points_are_not_a_calibration() {
 #[test]
 fn camodocal_counts_coefficients_by_their_power() {
     let camera = camera(&fixture("calibrations/camodocal_kannala_brandt.yaml"), 0);
-    let NativeLens::KannalaBrandt(lens) = camera.lens else {
+    let LensModel::KannalaBrandt(lens) = camera.lens else {
         panic!("not a Kannala-Brandt lens");
     };
     assert_eq!(lens.k[0], 0.003_482_389_402_249_343_4);
@@ -179,8 +179,7 @@ fn camodocal_counts_coefficients_by_their_power() {
 
 #[test]
 fn woodscape_offsets_count_from_the_middle_of_the_frame() {
-    let NativeLens::RadialPolynomial(lens) =
-        camera(&fixture("calibrations/woodscape.json"), 0).lens
+    let LensModel::RadialPolynomial(lens) = camera(&fixture("calibrations/woodscape.json"), 0).lens
     else {
         panic!("not a radial polynomial");
     };
@@ -192,7 +191,7 @@ fn nvidia_uses_the_polynomial_that_it_calls_exact() {
     let backward = text("nvidia_ftheta.json");
     let forward = backward.replace("PIXELDIST_TO_ANGLE", "ANGLE_TO_PIXELDIST");
     let polynomials = |content: &str| {
-        let NativeLens::FTheta(lens) = camera(content.as_bytes(), 0).lens else {
+        let LensModel::FTheta(lens) = camera(content.as_bytes(), 0).lens else {
             panic!("not an f-theta lens");
         };
         (lens.angle_to_pixel.is_some(), lens.pixel_to_angle.is_some())
@@ -203,7 +202,7 @@ fn nvidia_uses_the_polynomial_that_it_calls_exact() {
         .replace("1.0012,", "0,")
         .replace("0.0004,", "0,")
         .replace("-0.0003", "0");
-    let NativeLens::FTheta(lens) = camera(identity.as_bytes(), 0).lens else {
+    let LensModel::FTheta(lens) = camera(identity.as_bytes(), 0).lens else {
         panic!("not an f-theta lens");
     };
     assert_eq!((lens.c, lens.d, lens.e), (1.0, 0.0, 0.0));

@@ -1,9 +1,6 @@
 //! The common shape of all sets of known answers.
 
-use lookdown::{
-    calibration::native::NativeLens,
-    geometry::{Lens, Pixel, Ray},
-};
+use lookdown::geometry::{Lens, Pixel, Ray, lens::LensModel};
 use serde_json::Value;
 
 /// What one camera does to rays and pixels; `None` where it must refuse.
@@ -23,8 +20,8 @@ pub struct KnownAnswers {
 
 impl KnownAnswers {
     pub fn lens(&self) -> Lens {
-        let fields: NativeLens = serde_json::from_value(self.lens_fields.clone()).unwrap();
-        fields.into_lens().unwrap()
+        let model: LensModel = serde_json::from_value(self.lens_fields.clone()).unwrap();
+        Lens::new(&model).unwrap()
     }
 }
 

@@ -6,9 +6,10 @@ use super::{
     equivalents::{eucm, kannala_brandt, rectilinear},
 };
 use crate::{
-    calibration::native::{NativeCalibration, NativeLens},
+    calibration::native::NativeCalibration,
     geometry::{
         Pixel,
+        lens::LensModel,
         pixels::{PixelConvention, cross_half_pixel},
     },
 };
@@ -16,7 +17,7 @@ use crate::{
 pub(super) fn write(calibration: &NativeCalibration) -> Option<String> {
     let lens = &calibration.lens;
     let (model, [fx, fy, cx, cy], rest) = match lens {
-        NativeLens::Fov(fov) => ("FOV", [fov.fx, fov.fy, fov.cx, fov.cy], vec![fov.omega]),
+        LensModel::Fov(fov) => ("FOV", fov.pinhole(), vec![fov.omega]),
         _ => {
             if let Some((pinhole, k, skew)) = kannala_brandt(lens) {
                 (skew == 0.0).then_some(("OPENCV_FISHEYE", pinhole, k.to_vec()))?

@@ -4,7 +4,7 @@ use super::{
     decimal::join,
     equivalents::{eucm, kannala_brandt, mei, rectilinear},
 };
-use crate::calibration::native::{NativeCalibration, NativeLens};
+use crate::{calibration::native::NativeCalibration, geometry::lens::LensModel};
 
 pub(super) fn write(calibration: &NativeCalibration) -> Option<String> {
     let lens = &calibration.lens;
@@ -12,22 +12,16 @@ pub(super) fn write(calibration: &NativeCalibration) -> Option<String> {
         if let Some((pinhole, k, skew)) = kannala_brandt(lens) {
             without(skew)?;
             ("pinhole", pinhole.to_vec(), "equidistant", k.to_vec())
-        } else if let NativeLens::Mei(_) = lens {
+        } else if let LensModel::Mei(_) = lens {
             let ([fx, fy, cx, cy], xi, bent, skew) = mei(lens)?;
             without(skew)?;
             ("omni", vec![xi, fx, fy, cx, cy], "radtan", bent.to_vec())
-        } else if let NativeLens::DoubleSphere(sphere) = lens {
-            let parameters = [
-                sphere.xi,
-                sphere.alpha,
-                sphere.fx,
-                sphere.fy,
-                sphere.cx,
-                sphere.cy,
-            ];
-            ("ds", parameters.to_vec(), "none", Vec::new())
-        } else if let NativeLens::Fov(fov) = lens {
-            let pinhole = vec![fov.fx, fov.fy, fov.cx, fov.cy];
+        } else if let LensModel::DoubleSphere(sphere) = lens {
+            let [fx, fy, cx, cy] = sphere.pinhole();
+            let parameters = vec![sphere.xi, sphere.alpha, fx, fy, cx, cy];
+            ("ds", parameters, "none", Vec::new())
+        } else if let LensModel::Fov(fov) = lens {
+            let pinhole = fov.pinhole().to_vec();
             ("pinhole", pinhole, "fov", vec![fov.omega])
         } else if let Some(([fx, fy, cx, cy], alpha, beta)) = eucm(lens) {
             let parameters = vec![alpha, beta, fx, fy, cx, cy];

@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::{
     decimal::{Decimal, join},
-    equivalents::{Pinhole, kannala_brandt, mei, rectilinear},
+    equivalents::{kannala_brandt, mei, rectilinear},
 };
-use crate::calibration::native::NativeCalibration;
+use crate::{calibration::native::NativeCalibration, geometry::lens::Pinhole};
 
 pub(super) fn write(calibration: &NativeCalibration) -> Option<String> {
     let lens = &calibration.lens;

@@ -7,10 +7,9 @@ use super::{
     Camera, FileCamera, FormatError,
     distortion::not_a_fisheye,
     fields::{Fields, whole_pixels},
-    lenses::rectilinear,
     named_parameters::{self, NamedModel, pinhole},
 };
-use crate::calibration::native::NativeImage;
+use crate::{calibration::native::NativeImage, geometry::lens::Rectilinear};
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Vec<FileCamera>, FormatError> {
     let calibration = fields.child("value0")?;
@@ -35,7 +34,7 @@ fn read_camera(calibration: &Fields<'_>, index: usize) -> Result<Camera, FormatE
         "ucm" => NamedModel::Ucm,
         "kb4" => NamedModel::KannalaBrandt,
         "pinhole" => {
-            let lens = rectilinear(pinhole(&parameters)?);
+            let lens = Rectilinear::new(pinhole(&parameters)?);
             return Ok(Camera::new(Some(image(calibration, index)?), lens));
         }
         other @ "pinhole-radtan8" => {

@@ -5,9 +5,9 @@ use super::{
     Camera, FormatError,
     distortion::not_a_fisheye,
     fields::Fields,
-    lenses::fov,
     named_parameters::{self, NamedModel, pinhole},
 };
+use crate::geometry::lens::Fov;
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let model = fields.map().keys().next().map_or("", String::as_str);
@@ -16,7 +16,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
         "EUCM" => named_parameters::read(NamedModel::Eucm, &parameters)?,
         "UCM" => named_parameters::read(NamedModel::Ucm, &parameters)?,
         "KannalaBrandt4" => named_parameters::read(NamedModel::KannalaBrandt, &parameters)?,
-        "FovCamera" => fov(pinhole(&parameters)?, parameters.number("w")?),
+        "FovCamera" => Fov::new(pinhole(&parameters)?, parameters.number("w")?).into(),
         "OpenCVModel5" => return Err(fields.invalid(model, not_a_fisheye(model))),
         other => {
             return Err(FormatError::malformed(format!(

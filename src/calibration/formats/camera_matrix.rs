@@ -4,9 +4,8 @@ use super::{
     FormatError,
     distortion::{Distortion, are_all_zero, four, not_a_fisheye},
     fields::Fields,
-    lenses::{Pinhole, kannala_brandt, rectilinear},
 };
-use crate::calibration::native::NativeLens;
+use crate::geometry::lens::{KannalaBrandt, LensModel, Pinhole, Rectilinear};
 
 /// The 3×3 matrix, row by row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,14 +40,17 @@ impl CameraMatrix {
         values: &[f64],
         fields: &Fields<'_>,
         (model, coefficients): (&str, &str),
-    ) -> Result<NativeLens, FormatError> {
+    ) -> Result<LensModel, FormatError> {
         match distortion {
             Distortion::Fisheye => {
                 let k = four(values).map_err(|problem| fields.invalid(coefficients, problem))?;
-                Ok(kannala_brandt(self.pinhole, k, self.skew))
+                Ok(LensModel::from(KannalaBrandt {
+                    skew: self.skew,
+                    ..KannalaBrandt::new(self.pinhole, k)
+                }))
             }
             Distortion::None | Distortion::RadialTangential if are_all_zero(values) => {
-                Ok(rectilinear(self.pinhole))
+                Ok(Rectilinear::new(self.pinhole).into())
             }
             Distortion::None => {
                 Err(fields.invalid(model, "it says none, but there are coefficients"))

@@ -4,33 +4,25 @@
 //! Its coefficients of Kannala and Brandt are called `k2` to `k5`, after the index of their power:
 //! they are `k1` to `k4` everywhere else.
 
-use super::{
-    Camera, FormatError,
-    distortion::not_a_fisheye,
-    fields::Fields,
-    lenses::{kannala_brandt, mei},
-};
+use super::{Camera, FormatError, distortion::not_a_fisheye, fields::Fields};
+use crate::geometry::lens::{KannalaBrandt, LensModel, Mei};
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
-    let lens = match fields.text("model_type")? {
+    let lens: LensModel = match fields.text("model_type")? {
         "MEI" => {
             let projection = fields.child("projection_parameters")?;
             let distortion = fields.child("distortion_parameters")?;
             let mirror = fields.child("mirror_parameters")?;
-            mei(
-                numbers(&projection, ["gamma1", "gamma2", "u0", "v0"])?,
-                mirror.number("xi")?,
-                numbers(&distortion, ["k1", "k2", "p1", "p2"])?,
-                0.0,
-            )
+            let pinhole = numbers(&projection, ["gamma1", "gamma2", "u0", "v0"])?;
+            let xi = mirror.number("xi")?;
+            let [k1, k2, p1, p2] = numbers(&distortion, ["k1", "k2", "p1", "p2"])?;
+            Mei::new(pinhole, xi, k1, k2, p1, p2).into()
         }
         "KANNALA_BRANDT" => {
             let projection = fields.child("projection_parameters")?;
-            kannala_brandt(
-                numbers(&projection, ["mu", "mv", "u0", "v0"])?,
-                numbers(&projection, ["k2", "k3", "k4", "k5"])?,
-                0.0,
-            )
+            let pinhole = numbers(&projection, ["mu", "mv", "u0", "v0"])?;
+            let k = numbers(&projection, ["k2", "k3", "k4", "k5"])?;
+            KannalaBrandt::new(pinhole, k).into()
         }
         model @ ("PINHOLE" | "PINHOLE_FULL") => {
             return Err(fields.invalid("model_type", not_a_fisheye(model)));

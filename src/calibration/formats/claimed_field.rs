@@ -2,11 +2,8 @@
 
 use super::Camera;
 use crate::{
-    calibration::{
-        LensFieldsError,
-        native::{NativeImage, NativeLens},
-    },
-    geometry::LensError,
+    calibration::native::NativeImage,
+    geometry::{Lens, LensError, lens::LensModel},
 };
 
 /// A camera whose lens image is said to end at `max_theta` (radians); where the curve turns over
@@ -14,12 +11,11 @@ use crate::{
 pub(super) fn camera(
     image: NativeImage,
     max_theta: f64,
-    lens: impl Fn(f64) -> NativeLens,
+    lens: impl Fn(f64) -> LensModel,
 ) -> Camera {
     let claimed = lens(max_theta);
-    if let Err(LensFieldsError::Lens(
-        LensError::MaxThetaOutOfRange { limit, .. } | LensError::TurnsBack { limit, .. },
-    )) = claimed.clone().into_lens()
+    if let Err(LensError::MaxThetaOutOfRange { limit, .. } | LensError::TurnsBack { limit, .. }) =
+        Lens::new(&claimed)
         && max_theta > limit
     {
         let mut camera = Camera::new(Some(image), lens(limit));

@@ -8,12 +8,12 @@
 use super::{
     Camera, FileCamera, FormatError,
     distortion::{are_all_zero, not_a_fisheye},
-    lenses::{equidistant, eucm, fov, kannala_brandt, rectilinear},
 };
 use crate::{
-    calibration::native::{NativeImage, NativeLens},
+    calibration::native::NativeImage,
     geometry::{
         Pixel,
+        lens::{Equidistant, Eucm, Fov, KannalaBrandt, LensModel, Rectilinear},
         pixels::{PixelConvention, cross_half_pixel},
     },
 };
@@ -54,24 +54,24 @@ fn read_camera(words: &[&str]) -> Result<Camera, FormatError> {
     Ok(Camera::new(Some(image), lens(model, &numbers)?))
 }
 
-fn lens(model: &str, parameters: &[f64]) -> Result<NativeLens, FormatError> {
+fn lens(model: &str, parameters: &[f64]) -> Result<LensModel, FormatError> {
     let pinhole = |fx, fy, cx, cy| {
         let centre = cross_half_pixel(Pixel::new(cx, cy), PixelConvention::PixelCentre);
         [fx, fy, centre.x, centre.y]
     };
     Ok(match (model, parameters) {
-        ("SIMPLE_PINHOLE", &[f, cx, cy]) => rectilinear(pinhole(f, f, cx, cy)),
-        ("PINHOLE", &[fx, fy, cx, cy]) => rectilinear(pinhole(fx, fy, cx, cy)),
-        ("SIMPLE_FISHEYE", &[f, cx, cy]) => equidistant(pinhole(f, f, cx, cy)),
-        ("FISHEYE", &[fx, fy, cx, cy]) => equidistant(pinhole(fx, fy, cx, cy)),
+        ("SIMPLE_PINHOLE", &[f, cx, cy]) => Rectilinear::new(pinhole(f, f, cx, cy)).into(),
+        ("PINHOLE", &[fx, fy, cx, cy]) => Rectilinear::new(pinhole(fx, fy, cx, cy)).into(),
+        ("SIMPLE_FISHEYE", &[f, cx, cy]) => Equidistant::new(pinhole(f, f, cx, cy)).into(),
+        ("FISHEYE", &[fx, fy, cx, cy]) => Equidistant::new(pinhole(fx, fy, cx, cy)).into(),
         ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => {
-            kannala_brandt(pinhole(f, f, cx, cy), [k, 0.0, 0.0, 0.0], 0.0)
+            KannalaBrandt::new(pinhole(f, f, cx, cy), [k, 0.0, 0.0, 0.0]).into()
         }
         ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => {
-            kannala_brandt(pinhole(f, f, cx, cy), [k1, k2, 0.0, 0.0], 0.0)
+            KannalaBrandt::new(pinhole(f, f, cx, cy), [k1, k2, 0.0, 0.0]).into()
         }
         ("OPENCV_FISHEYE", &[fx, fy, cx, cy, k1, k2, k3, k4]) => {
-            kannala_brandt(pinhole(fx, fy, cx, cy), [k1, k2, k3, k4], 0.0)
+            KannalaBrandt::new(pinhole(fx, fy, cx, cy), [k1, k2, k3, k4]).into()
         }
         ("THIN_PRISM_FISHEYE", &[fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1]) => {
             if !are_all_zero(&[p1, p2, sx1, sy1]) {
@@ -83,10 +83,12 @@ fn lens(model: &str, parameters: &[f64]) -> Result<NativeLens, FormatError> {
                     ),
                 ));
             }
-            kannala_brandt(pinhole(fx, fy, cx, cy), [k1, k2, k3, k4], 0.0)
+            KannalaBrandt::new(pinhole(fx, fy, cx, cy), [k1, k2, k3, k4]).into()
         }
-        ("FOV", &[fx, fy, cx, cy, omega]) => fov(pinhole(fx, fy, cx, cy), omega),
-        ("EUCM", &[fx, fy, cx, cy, alpha, beta]) => eucm(pinhole(fx, fy, cx, cy), alpha, beta),
+        ("FOV", &[fx, fy, cx, cy, omega]) => Fov::new(pinhole(fx, fy, cx, cy), omega).into(),
+        ("EUCM", &[fx, fy, cx, cy, alpha, beta]) => {
+            Eucm::new(pinhole(fx, fy, cx, cy), alpha, beta).into()
+        }
         ("SIMPLE_RADIAL" | "RADIAL" | "OPENCV" | "FULL_OPENCV", _) => {
             return Err(FormatError::invalid("MODEL", not_a_fisheye(model)));
         }

@@ -2,7 +2,7 @@
 //! `u = c·x + d·y + cx`, `v = e·x + y + cy`.
 
 use super::FormatError;
-use crate::calibration::native::{NativeLens, NativeOcam};
+use crate::geometry::lens::Ocam;
 
 /// The model with its x axis along the columns.
 pub(super) struct ColumnFirst {
@@ -20,7 +20,7 @@ impl ColumnFirst {
     ///
     /// With `rho' = c·rho` the maps agree for `c' = 1/c`, `d' = e/c`, `e' = d/c`, and the
     /// polynomial for `a'_i = a_i·c^(1-i)`, because `theta = atan2(rho, -p(rho))` must stay.
-    pub(super) fn into_lens(self) -> Result<NativeLens, FormatError> {
+    pub(super) fn into_lens(self) -> Result<Ocam, FormatError> {
         let Self {
             c, d, e, cx, cy, ..
         } = self;
@@ -36,15 +36,12 @@ impl ColumnFirst {
             *coefficient *= factor;
             factor /= c;
         }
-        Ok(NativeLens::Ocam(NativeOcam {
-            polynomial,
+        Ok(Ocam {
             c: 1.0 / c,
             d: e / c,
             e: d / c,
-            cx,
-            cy,
-            max_theta: None,
-        }))
+            ..Ocam::new(polynomial, [cx, cy])
+        })
     }
 }
 

@@ -26,6 +26,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
             cy: parameters.number("cy")?,
         }
         .into_lens()?
+        .into()
     } else if has("p1") {
         return Err(fields.invalid(
             "parameter",

@@ -8,9 +8,8 @@ use super::{
     Camera, FileCamera, FormatError,
     distortion::{Distortion, are_all_zero, four, not_a_fisheye},
     fields::Fields,
-    lenses::{double_sphere, eucm, fov, kannala_brandt, mei, rectilinear},
 };
-use crate::calibration::native::NativeLens;
+use crate::geometry::lens::{DoubleSphere, Eucm, Fov, KannalaBrandt, LensModel, Mei, Rectilinear};
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
     let cameras = fields
@@ -31,7 +30,7 @@ fn read_camera(camera: &Fields<'_>) -> Result<Camera, FormatError> {
     Ok(Camera::new(Some(image), lens))
 }
 
-fn lens(camera: &Fields<'_>) -> Result<NativeLens, FormatError> {
+fn lens(camera: &Fields<'_>) -> Result<LensModel, FormatError> {
     let model = camera.text("camera_model")?;
     let (distortion, coefficients) = distortion(camera)?;
     let intrinsics = "intrinsics";
@@ -39,15 +38,15 @@ fn lens(camera: &Fields<'_>) -> Result<NativeLens, FormatError> {
         ("pinhole", _) => {
             let pinhole = camera.exactly(intrinsics, "fu, fv, pu, pv")?;
             match distortion {
-                Distortion::None => Ok(rectilinear(pinhole)),
+                Distortion::None => Ok(Rectilinear::new(pinhole).into()),
                 Distortion::Fisheye => {
                     let k = four(&coefficients)
                         .map_err(|problem| camera.invalid(COEFFICIENTS, problem))?;
-                    Ok(kannala_brandt(pinhole, k, 0.0))
+                    Ok(KannalaBrandt::new(pinhole, k).into())
                 }
                 Distortion::Fov => {
                     let [omega] = camera.exactly(COEFFICIENTS, "w")?;
-                    Ok(fov(pinhole, omega))
+                    Ok(Fov::new(pinhole, omega).into())
                 }
                 Distortion::RadialTangential => {
                     Err(camera.invalid(MODEL, not_a_fisheye("radtan on a pinhole camera")))
@@ -56,22 +55,22 @@ fn lens(camera: &Fields<'_>) -> Result<NativeLens, FormatError> {
         }
         ("omni", Distortion::None | Distortion::RadialTangential) => {
             let [xi, fu, fv, pu, pv] = camera.exactly(intrinsics, "xi, fu, fv, pu, pv")?;
-            let bent = if distortion == Distortion::None {
+            let [k1, k2, p1, p2] = if distortion == Distortion::None {
                 [0.0; 4]
             } else {
                 camera.exactly(COEFFICIENTS, "k1, k2, p1, p2")?
             };
-            Ok(mei([fu, fv, pu, pv], xi, bent, 0.0))
+            Ok(Mei::new([fu, fv, pu, pv], xi, k1, k2, p1, p2).into())
         }
         ("ds", Distortion::None) => {
             let [xi, alpha, fu, fv, pu, pv] =
                 camera.exactly(intrinsics, "xi, alpha, fu, fv, pu, pv")?;
-            Ok(double_sphere([fu, fv, pu, pv], xi, alpha))
+            Ok(DoubleSphere::new([fu, fv, pu, pv], xi, alpha).into())
         }
         ("eucm", Distortion::None) => {
             let [alpha, beta, fu, fv, pu, pv] =
                 camera.exactly(intrinsics, "alpha, beta, fu, fv, pu, pv")?;
-            Ok(eucm([fu, fv, pu, pv], alpha, beta))
+            Ok(Eucm::new([fu, fv, pu, pv], alpha, beta).into())
         }
         ("omni" | "ds" | "eucm", _) => Err(camera.invalid(
             MODEL,

@@ -5,7 +5,7 @@
 use serde_json::Value;
 
 use super::{Camera, FileCamera, FormatError, claimed_field, fields::Fields};
-use crate::calibration::native::{NativeLens, NativeRadialPolynomial};
+use crate::geometry::lens::RadialPolynomial;
 
 pub(super) fn read(fields: &Fields<'_>) -> Vec<FileCamera> {
     if fields.has("calibrationRatio") {
@@ -49,13 +49,11 @@ fn read_camera(camera: &Fields<'_>) -> Result<Camera, FormatError> {
         image,
         field_of_view / 2.0,
         |max_theta| {
-            NativeLens::RadialPolynomial(NativeRadialPolynomial {
-                coefficients: coefficients.clone(),
-                aspect: 1.0,
-                cx,
-                cy,
+            RadialPolynomial {
                 max_theta: Some(max_theta),
-            })
+                ..RadialPolynomial::new(coefficients.clone(), [cx, cy])
+            }
+            .into()
         },
     ))
 }

@@ -1,12 +1,8 @@
 //! Lenses whose parameters are named the same way by several programs: `fx fy cx cy` and then the
 //! letters of the model's own paper.
 
-use super::{
-    FormatError,
-    fields::Fields,
-    lenses::{Pinhole, double_sphere, eucm, kannala_brandt, ucm},
-};
-use crate::calibration::native::NativeLens;
+use super::{FormatError, fields::Fields};
+use crate::geometry::lens::{DoubleSphere, Eucm, KannalaBrandt, LensModel, Pinhole, Ucm};
 
 /// A model whose parameters have the same names everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,14 +14,16 @@ pub(super) enum NamedModel {
 }
 
 /// Reads the parameters of a model.
-pub(super) fn read(model: NamedModel, fields: &Fields<'_>) -> Result<NativeLens, FormatError> {
+pub(super) fn read(model: NamedModel, fields: &Fields<'_>) -> Result<LensModel, FormatError> {
     let pinhole = pinhole(fields)?;
     Ok(match model {
         NamedModel::DoubleSphere => {
-            double_sphere(pinhole, fields.number("xi")?, fields.number("alpha")?)
+            DoubleSphere::new(pinhole, fields.number("xi")?, fields.number("alpha")?).into()
         }
-        NamedModel::Eucm => eucm(pinhole, fields.number("alpha")?, fields.number("beta")?),
-        NamedModel::Ucm => ucm(pinhole, fields.number("alpha")?),
+        NamedModel::Eucm => {
+            Eucm::new(pinhole, fields.number("alpha")?, fields.number("beta")?).into()
+        }
+        NamedModel::Ucm => Ucm::new(pinhole, fields.number("alpha")?).into(),
         NamedModel::KannalaBrandt => {
             let k = [
                 fields.number("k1")?,
@@ -33,7 +31,7 @@ pub(super) fn read(model: NamedModel, fields: &Fields<'_>) -> Result<NativeLens,
                 fields.number("k3")?,
                 fields.number("k4")?,
             ];
-            kannala_brandt(pinhole, k, 0.0)
+            KannalaBrandt::new(pinhole, k).into()
         }
     })
 }

@@ -7,7 +7,7 @@
 use serde_json::Value;
 
 use super::{Camera, FormatError, claimed_field, fields::Fields};
-use crate::calibration::native::{NativeFTheta, NativeLens};
+use crate::geometry::lens::FTheta;
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let model = fields.text("camera_model_type")?;
@@ -47,7 +47,7 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let image = parameters.image_pair("resolution")?;
     let max_angle = parameters.number("max_angle")?;
     Ok(claimed_field::camera(image, max_angle, |max_theta| {
-        NativeLens::FTheta(NativeFTheta {
+        FTheta {
             angle_to_pixel: forward,
             pixel_to_angle: backward,
             c,
@@ -56,7 +56,8 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
             cx,
             cy,
             max_theta: Some(max_theta),
-        })
+        }
+        .into()
     }))
 }
 

@@ -6,7 +6,7 @@
 //! approximation and not used.
 
 use super::{Camera, FormatError, fields::whole_pixels};
-use crate::calibration::native::{NativeImage, NativeLens, NativeOcam};
+use crate::{calibration::native::NativeImage, geometry::lens::Ocam};
 
 /// Names of the blocks, in the file's order.
 const BLOCKS: [&str; 5] = [
@@ -55,15 +55,12 @@ pub(super) fn read(text: &str) -> Result<Camera, FormatError> {
         width: side(width)?,
         height: side(height)?,
     };
-    let lens = NativeLens::Ocam(NativeOcam {
-        polynomial,
+    let lens = Ocam {
         c,
         d,
         e,
-        cx: column,
-        cy: row,
-        max_theta: None,
-    });
+        ..Ocam::new(polynomial, [column, row])
+    };
     Ok(Camera::new(Some(image), lens))
 }
 

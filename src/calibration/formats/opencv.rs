@@ -11,9 +11,11 @@ use super::{
     camera_matrix::CameraMatrix,
     distortion::{Distortion, not_a_fisheye},
     fields::Fields,
-    lenses::mei,
 };
-use crate::calibration::native::{NativeImage, NativeLens};
+use crate::{
+    calibration::native::NativeImage,
+    geometry::lens::{LensModel, Mei},
+};
 
 /// Names of the camera matrix that programs choose.
 const MATRIX: [&str; 8] = [
@@ -66,8 +68,12 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let coefficients = present(fields, &COEFFICIENTS).unwrap_or(COEFFICIENTS[0]);
     let (lens, note) = if let Some(xi) = present(fields, &["xi", "Xi"]) {
         let [xi] = fields.exactly(xi, "xi alone")?;
-        let bent = fields.exactly(coefficients, "k1, k2, p1, p2")?;
-        (mei(matrix.pinhole, xi, bent, matrix.skew), None)
+        let [k1, k2, p1, p2] = fields.exactly(coefficients, "k1, k2, p1, p2")?;
+        let lens = Mei {
+            skew: matrix.skew,
+            ..Mei::new(matrix.pinhole, xi, k1, k2, p1, p2)
+        };
+        (lens.into(), None)
     } else {
         without_xi(fields, matrix, coefficients)?
     };
@@ -80,7 +86,7 @@ fn without_xi(
     fields: &Fields<'_>,
     matrix: CameraMatrix,
     coefficients: &str,
-) -> Result<(NativeLens, Option<String>), FormatError> {
+) -> Result<(LensModel, Option<String>), FormatError> {
     let values = fields.numbers(coefficients)?;
     let (said, distortion) = said_distortion(fields)?;
     let lens = |distortion| matrix.lens(distortion, &values, fields, (said, coefficients));

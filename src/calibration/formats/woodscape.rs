@@ -5,7 +5,7 @@
 //! `width / 2` because pixel centres are whole numbers.
 
 use super::{Camera, FormatError, fields::Fields};
-use crate::calibration::native::{NativeLens, NativeRadialPolynomial};
+use crate::geometry::lens::RadialPolynomial;
 
 pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     let intrinsic = fields.child("intrinsic")?;
@@ -17,18 +17,19 @@ pub(super) fn read(fields: &Fields<'_>) -> Result<Camera, FormatError> {
     }
     let image = intrinsic.image("width", "height")?;
     let centre = |side: u32| f64::from(side) / 2.0 - 0.5;
-    let lens = NativeLens::RadialPolynomial(NativeRadialPolynomial {
-        coefficients: vec![
-            0.0,
-            intrinsic.number("k1")?,
-            intrinsic.number("k2")?,
-            intrinsic.number("k3")?,
-            intrinsic.number("k4")?,
-        ],
-        aspect: intrinsic.number_or("aspect_ratio", 1.0)?,
-        cx: intrinsic.number("cx_offset")? + centre(image.width),
-        cy: intrinsic.number("cy_offset")? + centre(image.height),
-        max_theta: None,
-    });
+    let coefficients = vec![
+        0.0,
+        intrinsic.number("k1")?,
+        intrinsic.number("k2")?,
+        intrinsic.number("k3")?,
+        intrinsic.number("k4")?,
+    ];
+    let aspect = intrinsic.number_or("aspect_ratio", 1.0)?;
+    let cx = intrinsic.number("cx_offset")? + centre(image.width);
+    let cy = intrinsic.number("cy_offset")? + centre(image.height);
+    let lens = RadialPolynomial {
+        aspect,
+        ..RadialPolynomial::new(coefficients, [cx, cy])
+    };
     Ok(Camera::new(Some(image), lens))
 }

@@ -1,35 +1,15 @@
-//! Reading a lens: the model first, then its fields, so that an error names the field.
+//! Reading a lens: the model first, then its parameters, so that an error names the field.
 
-use serde::{
-    Deserialize, Deserializer,
-    de::{DeserializeOwned, Error},
-};
+use serde::{Deserialize, Deserializer, de::Error};
 use serde_json::{Map, Value};
 
-use super::NativeLens;
+use crate::geometry::lens::LensModel;
 
-const MODELS: [&str; 14] = [
-    "equidistant",
-    "equisolid",
-    "stereographic",
-    "orthographic",
-    "rectilinear",
-    "radial_polynomial",
-    "kannala_brandt",
-    "ucm",
-    "eucm",
-    "mei",
-    "double_sphere",
-    "ocam",
-    "fov",
-    "f_theta",
-];
-
-impl<'de> Deserialize<'de> for NativeLens {
+impl<'de> Deserialize<'de> for LensModel {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let mut fields = Map::deserialize(deserializer)?;
-        let model = match fields.remove("model") {
-            Some(Value::String(model)) => model,
+        let mut parameters = Map::deserialize(deserializer)?;
+        let name = match parameters.remove("model") {
+            Some(Value::String(name)) => name,
             Some(_) => {
                 return Err(D::Error::custom(
                     "lens.model: give the model's name as text",
@@ -37,38 +17,21 @@ impl<'de> Deserialize<'de> for NativeLens {
             }
             None => return Err(D::Error::custom("lens: missing field `model`")),
         };
-        let lens = match model.as_str() {
-            "equidistant" => read(fields).map(Self::Equidistant),
-            "equisolid" => read(fields).map(Self::Equisolid),
-            "stereographic" => read(fields).map(Self::Stereographic),
-            "orthographic" => read(fields).map(Self::Orthographic),
-            "rectilinear" => read(fields).map(Self::Rectilinear),
-            "radial_polynomial" => read(fields).map(Self::RadialPolynomial),
-            "kannala_brandt" => read(fields).map(Self::KannalaBrandt),
-            "ucm" => read(fields).map(Self::Ucm),
-            "eucm" => read(fields).map(Self::Eucm),
-            "mei" => read(fields).map(Self::Mei),
-            "double_sphere" => read(fields).map(Self::DoubleSphere),
-            "ocam" => read(fields).map(Self::Ocam),
-            "fov" => read(fields).map(Self::Fov),
-            "f_theta" => read(fields).map(Self::FTheta),
-            unknown => {
+        let mut track = serde_path_to_error::Track::new();
+        let parameters = Value::Object(parameters);
+        let parameters = serde_path_to_error::Deserializer::new(parameters, &mut track);
+        match Self::deserialize_named(&name, parameters) {
+            Some(lens) => lens.map_err(|error| match track.path().to_string() {
+                path if path == "." => D::Error::custom(format!("lens: {error}")),
+                path => D::Error::custom(format!("lens.{path}: {error}")),
+            }),
+            None => {
                 // Enough to recognise it by, not enough to fill a log.
-                let unknown: String = unknown.chars().take(64).collect();
-                let known = MODELS.join(", ");
-                Err(format!("lens.model: {unknown:?} is none of {known}"))
+                let name: String = name.chars().take(64).collect();
+                let known = Self::NAMES.join(", ");
+                let problem = format!("lens.model: {name:?} is none of {known}");
+                Err(D::Error::custom(problem))
             }
-        };
-        lens.map_err(D::Error::custom)
-    }
-}
-
-/// The fields of one model.
-fn read<Fields: DeserializeOwned>(fields: Map<String, Value>) -> Result<Fields, String> {
-    serde_path_to_error::deserialize(Value::Object(fields)).map_err(|error| {
-        match error.path().to_string() {
-            path if path == "." => format!("lens: {}", error.inner()),
-            path => format!("lens.{path}: {}", error.inner()),
         }
-    })
+    }
 }

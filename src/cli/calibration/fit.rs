@@ -15,9 +15,12 @@ use crate::{
     calibration::{
         CalibrationId,
         export::Target,
-        native::{NativeCalibration, NativeIdeal, NativeImage, NativeLens, NativeMount},
+        native::{NativeCalibration, NativeImage, NativeMount},
     },
-    geometry::Ray,
+    geometry::{
+        Lens, Ray,
+        lens::{Equidistant, Equisolid, LensModel, Orthographic, Stereographic},
+    },
     imaging::lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
 };
 
@@ -58,12 +61,12 @@ enum IdealLens {
 }
 
 impl IdealLens {
-    fn with(self, parameters: NativeIdeal) -> NativeLens {
+    fn with(self, focal: f64, cx: f64, cy: f64, max_theta: f64) -> LensModel {
         match self {
-            Self::Equidistant => NativeLens::Equidistant(parameters),
-            Self::Equisolid => NativeLens::Equisolid(parameters),
-            Self::Stereographic => NativeLens::Stereographic(parameters),
-            Self::Orthographic => NativeLens::Orthographic(parameters),
+            Self::Equidistant => Equidistant::with_focal(focal, cx, cy, max_theta).into(),
+            Self::Equisolid => Equisolid::with_focal(focal, cx, cy, max_theta).into(),
+            Self::Stereographic => Stereographic::with_focal(focal, cx, cy, max_theta).into(),
+            Self::Orthographic => Orthographic::with_focal(focal, cx, cy, max_theta).into(),
         }
     }
 }
@@ -118,17 +121,9 @@ fn calibration(
     let max_theta = (arguments.field_of_view.to_radians() / 2.0 * 1e6).floor() / 1e6;
     let circle = agreed.circle;
     let thousandths = |pixels: f64| (pixels * 1000.0).round() / 1000.0;
-    let lens = |focal: f64| {
-        arguments.lens.with(NativeIdeal {
-            focal: Some(focal),
-            fx: None,
-            fy: None,
-            cx: thousandths(circle.cx),
-            cy: thousandths(circle.cy),
-            max_theta: Some(max_theta),
-        })
-    };
-    let of_one_pixel = lens(1.0).into_lens().context(
+    let (cx, cy) = (thousandths(circle.cx), thousandths(circle.cy));
+    let lens = |focal: f64| arguments.lens.with(focal, cx, cy, max_theta);
+    let of_one_pixel = Lens::new(&lens(1.0)).context(
         "--field-of-view: no lens of this model sees so much; equidistant has no such limit",
     )?;
     let rim = Ray::new(max_theta.sin(), 0.0, max_theta.cos());

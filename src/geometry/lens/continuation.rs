@@ -1,6 +1,6 @@
 //! A lens continued beyond its rim, so that positions up to the rim can be interpolated.
 
-use super::Lens;
+use super::{Lens, curve::Curve};
 use crate::geometry::{Pixel, Ray};
 
 impl Lens {
@@ -16,9 +16,9 @@ impl Lens {
         }
         let theta = off_axis.atan2(ray.z);
         let radius = if theta <= self.max_theta {
-            self.radial.radius(theta)
+            self.curve.radius(theta)
         } else {
-            2.0 * self.max_radius - self.radial.radius((2.0 * self.max_theta - theta).max(0.0))
+            2.0 * self.max_radius - self.curve.radius((2.0 * self.max_theta - theta).max(0.0))
         };
         let scale = radius / off_axis;
         let (x, y) = self.distorted(ray.x * scale, ray.y * scale);
@@ -29,7 +29,12 @@ impl Lens {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::lens::{ImagePlane, LensModel};
+    use crate::geometry::lens::{ImagePlane, Stereographic};
+
+    fn stereographic(plane: ImagePlane) -> Lens {
+        let model = Stereographic::with_focal(1.0, 0.0, 0.0, 1.4);
+        Lens::on_plane(&model.into(), plane, Some(1.4)).unwrap()
+    }
 
     fn at(theta: f64) -> Ray {
         Ray::new(theta.sin() * 0.6, theta.sin() * 0.8, theta.cos())
@@ -38,7 +43,7 @@ mod tests {
     #[test]
     fn within_the_rim_it_is_the_lens_itself() {
         let plane = ImagePlane::new(210.0, 205.0, 299.5, 301.25);
-        let lens = Lens::new(LensModel::Stereographic, plane, Some(1.4)).unwrap();
+        let lens = stereographic(plane);
         for theta in [0.0, 0.3, 1.399] {
             let normalised = lens.continued_beyond_rim(&at(theta)).unwrap();
             let pixel = plane.pixel_from_normalised(normalised.x, normalised.y);
@@ -49,7 +54,7 @@ mod tests {
     #[test]
     fn the_continuation_leaves_the_rim_as_steeply_as_the_curve_reaches_it() {
         let plane = ImagePlane::new(1.0, 1.0, 0.0, 0.0);
-        let lens = Lens::new(LensModel::Stereographic, plane, Some(1.4)).unwrap();
+        let lens = stereographic(plane);
         let radius = |theta: f64| lens.continued_beyond_rim(&at(theta)).unwrap().coords.norm();
         let rim = radius(1.4);
         assert!((radius(1.5) - rim - (rim - radius(1.3))).abs() < 1e-12);

@@ -1,6 +1,6 @@
 //! Radial and tangential distortion in the normalised image plane.
 
-use super::{LensError, inversion::rising_root};
+use super::{LensError, check::finite, inversion::rising_root};
 
 /// Bound on Newton steps in the plane; a handful suffice from the radial solution.
 const MAX_STEPS: usize = 32;
@@ -26,10 +26,9 @@ impl RadialTangential {
             ("p1", self.p1),
             ("p2", self.p2),
         ];
-        match named.into_iter().find(|(_, value)| !value.is_finite()) {
-            Some((name, value)) => Err(LensError::NotFinite { name, value }),
-            None => Ok(()),
-        }
+        named
+            .into_iter()
+            .try_for_each(|(name, value)| finite(name, value).map(drop))
     }
 
     /// Whether every azimuth is distorted alike.

@@ -19,6 +19,12 @@ pub enum LensError {
         /// Its value.
         value: f64,
     },
+    /// Of two ways to give the same thing both or none were chosen.
+    #[error("give either {choice}")]
+    EitherOr {
+        /// The two ways, in words.
+        choice: &'static str,
+    },
     /// A parameter lies outside the range in which its model is defined.
     #[error("{name} is {value}: this {model} parameter must be {range}")]
     OutOfRange {

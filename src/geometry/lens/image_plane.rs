@@ -1,7 +1,13 @@
 //! The affine map from normalised image coordinates to pixels.
 
-use super::LensError;
+use super::{
+    LensError,
+    check::{finite, positive},
+};
 use crate::geometry::Pixel;
+
+/// `fx, fy, cx, cy`: focal lengths and principal point in pixels, pixel centres.
+pub type Pinhole = [f64; 4];
 
 /// `u = fx·x + skew·y + cx`, `v = row_skew·x + fy·y + cy`: normalised coordinates to pixel centres.
 ///
@@ -46,14 +52,10 @@ impl ImagePlane {
             ("cx", self.cx),
             ("cy", self.cy),
         ] {
-            if !value.is_finite() {
-                return Err(LensError::NotFinite { name, value });
-            }
+            finite(name, value)?;
         }
         for (name, value) in [("fx", self.fx), ("fy", self.fy)] {
-            if value <= 0.0 {
-                return Err(LensError::NotPositive { name, value });
-            }
+            positive(name, value)?;
         }
         let is_orienting = self.determinant() > 0.0;
         if !is_orienting {

@@ -1,263 +1,303 @@
-//! The lens models and their parameters, named as in calibration files.
+//! The pieces that every lens model is made of: [`Model`], and the macros that declare the
+//! parameters of one model ([`lens_parameters`]) and the list of all models ([`lens_models`]).
 
-use std::f64::consts::PI;
+use super::{ImagePlane, LensError, check::positive, curve::Curve, distortion::RadialTangential};
 
-use super::{
-    LensError,
-    closed_curve::ClosedCurve,
-    distortion::RadialTangential,
-    polynomial::{OcamAngle, Polynomial},
-    radial_map::RadialMap,
-};
+/// The path from the parameters in a calibration file to a checked curve.
+pub(super) trait Model {
+    type Curve: Curve;
 
-/// Most coefficients a polynomial may have; real calibrations have at most a dozen.
-const MAX_COEFFICIENTS: usize = 64;
+    /// Returns the curve, or an error that names the first parameter outside its range.
+    fn curve(&self) -> Result<Self::Curve, LensError>;
 
-/// A lens model: where a ray at the angle `theta` from the optical axis meets the image.
+    /// Returns the distortion that follows the curve, in the normalised image plane.
+    fn distortion(&self) -> Result<Option<RadialTangential>, LensError> {
+        Ok(None)
+    }
+}
+
+/// Declares the struct of a model: its own parameters, and those of its image plane.
 ///
-/// `r` is the distance from the principal point in units of the focal length, or in pixels where
-/// the model says so; the formulas' domains and sources are in `docs/geometry.md`.
-#[derive(Debug, Clone, PartialEq)]
-pub enum LensModel {
-    /// `r = theta`: what most ceiling fisheyes approximate. Valid to 180°.
-    Equidistant,
-    /// `r = 2 sin(theta / 2)`. Valid to 180°.
-    Equisolid,
-    /// `r = 2 tan(theta / 2)`. Valid below 180°.
-    Stereographic,
-    /// `r = sin(theta)`. Valid to 90°.
-    Orthographic,
-    /// `r = tan(theta)`: the pinhole camera. Valid below 90°.
-    Rectilinear,
-    /// `r = c0 + c1 theta + c2 theta² + …` in pixels, valid up to the first angle at which it
-    /// stops rising.
-    RadialPolynomial {
-        /// `c0 … cn`; `c0` is 0.
-        coefficients: Vec<f64>,
-    },
-    /// `r = theta (1 + k1 theta² + k2 theta⁴ + k3 theta⁶ + k4 theta⁸)`, valid up to the first
-    /// angle at which it stops rising (Kannala and Brandt 2006, eq. 6, as used by OpenCV's
-    /// fisheye module).
-    KannalaBrandt {
-        /// `k1 … k4`.
-        k: [f64; 4],
-    },
-    /// Unified camera model: [`LensModel::Eucm`] with `beta` 1 (Geyer and Daniilidis 2000, in the
-    /// parameters of Usenko, Demmel and Cremers 2018, section 2.2).
-    Ucm {
-        /// 0 (pinhole) to 1 (orthographic).
-        alpha: f64,
-    },
-    /// Enhanced unified camera model: `r = sin(theta) / (alpha d + (1 − alpha) cos(theta))`,
-    /// `d = √(beta sin²(theta) + cos²(theta))` (Khomutenko, Garcia and Martinet 2016). Valid while
-    /// `cos(theta) > −w d`, `w` being the smaller of `alpha / (1 − alpha)` and its inverse.
-    Eucm {
-        /// 0 to 1.
-        alpha: f64,
-        /// Above 0.
-        beta: f64,
-    },
-    /// `r = sin(theta) / (cos(theta) + xi)`, then radial and tangential distortion (Mei and Rives
-    /// 2007; OpenCV's `omnidir`, Kalibr's `omni-radtan`). Valid while `cos(theta) > −xi`
-    /// (`−1 / xi` for `xi > 1`) and the distortion is one-to-one.
-    Mei {
-        /// Distance of the projection centre from the sphere's centre, above −1.
-        xi: f64,
-        /// What happens to the point in the normalised plane.
-        distortion: RadialTangential,
-    },
-    /// Double sphere: `r = sin(theta) / (alpha d + (1 − alpha) g)`, `g = xi + cos(theta)`,
-    /// `d = √(sin²(theta) + g²)` (Usenko, Demmel and Cremers 2018, eq. 40 to 45, also for the
-    /// valid range).
-    DoubleSphere {
-        /// Distance between the two spheres' centres, above −1.
-        xi: f64,
-        /// 0 to 1.
-        alpha: f64,
-    },
-    /// The angle is that of the vector (`r`, `−(a0 + a1 r + a2 r² + …)`), `r` in pixels
-    /// (Scaramuzza, Martinelli and Siegwart 2006, with `OCamCalib`'s signs). Valid while the angle
-    /// rises, up to a radius of 16 `|a0|`.
-    Ocam {
-        /// `a0 … an`; `a0` is negative.
-        polynomial: Vec<f64>,
-    },
-    /// `r = atan(2 tan(omega / 2) tan(theta)) / omega` (Devernay and Faugeras 2001), continued
-    /// beyond 90° to 180°.
-    Fov {
-        /// Radians, above 0 and below π.
-        omega: f64,
-    },
-    /// The radius in pixels is a polynomial of the angle, or the angle one of the radius (NVIDIA's
-    /// f-theta camera). Valid while the polynomial rises.
-    FTheta(FThetaPolynomial),
-}
-
-/// The polynomial by which an f-theta lens is defined, lowest power first; its constant is 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FThetaPolynomial {
-    /// From radians to pixels.
-    AngleToPixel([f64; 6]),
-    /// From pixels to radians.
-    PixelToAngle([f64; 6]),
-}
-
-impl LensModel {
-    /// The model's name in calibration files.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Equidistant => "equidistant",
-            Self::Equisolid => "equisolid",
-            Self::Stereographic => "stereographic",
-            Self::Orthographic => "orthographic",
-            Self::Rectilinear => "rectilinear",
-            Self::RadialPolynomial { .. } => "radial_polynomial",
-            Self::KannalaBrandt { .. } => "kannala_brandt",
-            Self::Ucm { .. } => "ucm",
-            Self::Eucm { .. } => "eucm",
-            Self::Mei { .. } => "mei",
-            Self::DoubleSphere { .. } => "double_sphere",
-            Self::Ocam { .. } => "ocam",
-            Self::Fov { .. } => "fov",
-            Self::FTheta(_) => "f_theta",
+/// The struct has the shape of the `lens` table of native calibration files. The word after the
+/// colon chooses the fields of the image plane:
+/// * `Ideal`: `focal`, or `fx` and `fy`, for a curve without parameters;
+/// * `Pinhole`: `fx` and `fy`;
+/// * `SkewedPinhole`: `fx`, `fy` and `skew`;
+/// * `Centred`: none but `cx` and `cy`; the model's file has a `plane` function for the rest.
+macro_rules! lens_parameters {
+    ($(#[$doc:meta])* pub struct $Model:ident: Ideal with $Curve:ident;) => {
+        lens_parameters! {
+            @struct $(#[$doc])* $Model {
+                /// Focal length, pixels; stands for equal `fx` and `fy`.
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub focal: Option<f64>,
+                /// Horizontal focal length, pixels.
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub fx: Option<f64>,
+                /// Vertical focal length, pixels.
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub fy: Option<f64>,
+            } {}
         }
-    }
 
-    /// Whether the parameters are a fitted polynomial, which may turn back anywhere.
-    pub(super) fn is_polynomial(&self) -> bool {
-        matches!(
-            self,
-            Self::RadialPolynomial { .. }
-                | Self::KannalaBrandt { .. }
-                | Self::Ocam { .. }
-                | Self::FTheta(_)
-        )
-    }
+        impl $Model {
+            /// Creates the lens with these focal lengths and centre.
+            #[must_use]
+            pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole) -> Self {
+                Self { focal: None, fx: Some(fx), fy: Some(fy), cx, cy, max_theta: None }
+            }
 
-    /// The checked curve of the model, and its distortion.
-    pub(super) fn into_parts(self) -> Result<(RadialMap, Option<RadialTangential>), LensError> {
-        let model = self.name();
-        let in_unit = |name, value: f64| {
-            let accepted = (0.0..=1.0).contains(&value);
-            let range = "from 0 to 1";
-            in_range(model, name, value, accepted, range)
-        };
-        let above_minus_one =
-            |name, value: f64| in_range(model, name, value, value > -1.0, "above -1");
-        let closed = match self {
-            Self::Equidistant => ClosedCurve::Equidistant,
-            Self::Equisolid => ClosedCurve::Equisolid,
-            Self::Stereographic => ClosedCurve::Stereographic,
-            Self::Orthographic => ClosedCurve::Orthographic,
-            Self::Rectilinear => ClosedCurve::Rectilinear,
-            Self::Ucm { alpha } => {
-                in_unit("alpha", alpha)?;
-                ClosedCurve::Unified { alpha, beta: 1.0 }
+            /// Creates the lens with one focal length (pixels) that sees up to `max_theta` radians
+            /// off its axis.
+            #[must_use]
+            pub fn with_focal(focal: f64, cx: f64, cy: f64, max_theta: f64) -> Self {
+                let max_theta = Some(max_theta);
+                Self { focal: Some(focal), fx: None, fy: None, cx, cy, max_theta }
             }
-            Self::Eucm { alpha, beta } => {
-                in_unit("alpha", alpha)?;
-                in_range(model, "beta", beta, beta > 0.0, "above 0")?;
-                ClosedCurve::Unified { alpha, beta }
+
+            /// Returns the focal lengths and the centre, unless a focal length is missing.
+            #[must_use]
+            pub fn pinhole(&self) -> Option<$crate::geometry::lens::Pinhole> {
+                Some([self.fx.or(self.focal)?, self.fy.or(self.focal)?, self.cx, self.cy])
             }
-            Self::DoubleSphere { xi, alpha } => {
-                above_minus_one("xi", xi)?;
-                in_unit("alpha", alpha)?;
-                ClosedCurve::DoubleSphere { xi, alpha }
+
+            pub(in $crate::geometry::lens) fn plane(
+                &self,
+            ) -> Result<$crate::geometry::lens::ImagePlane, $crate::geometry::LensError> {
+                let focal_lengths = (self.focal, self.fx, self.fy);
+                $crate::geometry::lens::model::ideal_plane(focal_lengths, self.cx, self.cy)
             }
-            Self::Fov { omega } => {
-                let accepted = omega > 0.0 && omega < PI;
-                let range = "radians above 0 and below 3.1416";
-                in_range(model, "omega", omega, accepted, range)?;
-                ClosedCurve::Fov { omega }
+        }
+
+        /// The curve of the model, which has no parameters.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct $Curve;
+
+        impl $crate::geometry::lens::model::Model for $Model {
+            type Curve = $Curve;
+
+            fn curve(&self) -> Result<$Curve, $crate::geometry::LensError> {
+                Ok($Curve)
             }
-            Self::Mei { xi, distortion } => {
-                above_minus_one("xi", xi)?;
-                distortion.check()?;
-                return Ok((
-                    RadialMap::Closed(ClosedCurve::Sphere { xi }),
-                    Some(distortion),
-                ));
+        }
+    };
+    ($(#[$doc:meta])* pub struct $Model:ident: Pinhole { $($own:tt)* }) => {
+        lens_parameters! { @pinhole $(#[$doc])* $Model { $($own)* } {} {} }
+    };
+    ($(#[$doc:meta])* pub struct $Model:ident: SkewedPinhole { $($own:tt)* }) => {
+        lens_parameters! {
+            @pinhole $(#[$doc])* $Model { $($own)* } {
+                /// Horizontal shift per unit of normalised `y`, pixels.
+                #[serde(default)]
+                pub skew: f64,
+            } { skew }
+        }
+    };
+    ($(#[$doc:meta])* pub struct $Model:ident: Centred { $($own:tt)* }) => {
+        lens_parameters! { @struct $(#[$doc])* $Model { $($own)* } {} }
+    };
+    (
+        @pinhole $(#[$doc:meta])* $Model:ident
+        { $($(#[$own_doc:meta])* pub $own:ident: $Own:ty,)* } { $($after:tt)* } { $($skew:ident)? }
+    ) => {
+        lens_parameters! {
+            @struct $(#[$doc])* $Model {
+                /// Horizontal focal length, pixels.
+                pub fx: f64,
+                /// Vertical focal length, pixels.
+                pub fy: f64,
+            } {
+                $($(#[$own_doc])* pub $own: $Own,)*
+                $($after)*
             }
-            Self::RadialPolynomial { coefficients } => {
-                let polynomial = from_axis("coefficients", coefficients)?;
-                return Ok((RadialMap::radius_from(polynomial), None));
+        }
+
+        impl $Model {
+            /// Creates the lens with these focal lengths, centre and parameters, without skew.
+            #[must_use]
+            pub fn new([fx, fy, cx, cy]: $crate::geometry::lens::Pinhole, $($own: $Own),*) -> Self {
+                Self { fx, fy, cx, cy, $($own,)* $($skew: 0.0,)? max_theta: None }
             }
-            Self::KannalaBrandt { k } => {
-                all_finite("k", &k)?;
-                let odd_powers = k.into_iter().flat_map(|k| [0.0, k]);
-                let coefficients = [0.0, 1.0].into_iter().chain(odd_powers).collect();
-                return Ok((RadialMap::radius_from(Polynomial(coefficients)), None));
+
+            /// Returns the focal lengths and the centre.
+            #[must_use]
+            pub fn pinhole(&self) -> $crate::geometry::lens::Pinhole {
+                [self.fx, self.fy, self.cx, self.cy]
             }
-            Self::FTheta(FThetaPolynomial::AngleToPixel(coefficients)) => {
-                let polynomial = from_axis("angle_to_pixel", coefficients.to_vec())?;
-                return Ok((RadialMap::radius_from(polynomial), None));
+
+            pub(in $crate::geometry::lens) fn plane(
+                &self,
+            ) -> Result<$crate::geometry::lens::ImagePlane, $crate::geometry::LensError> {
+                Ok($crate::geometry::lens::ImagePlane {
+                    $($skew: self.$skew,)?
+                    ..$crate::geometry::lens::ImagePlane::new(self.fx, self.fy, self.cx, self.cy)
+                })
             }
-            Self::FTheta(FThetaPolynomial::PixelToAngle(coefficients)) => {
-                let polynomial = from_axis("pixel_to_angle", coefficients.to_vec())?;
-                return Ok((RadialMap::angle_from(polynomial), None));
-            }
-            Self::Ocam { polynomial } => {
-                count("polynomial", &polynomial, 1)?;
-                all_finite("polynomial", &polynomial)?;
-                let first = polynomial[0];
-                let range = "below 0; OCamCalib's z axis points into the camera";
-                in_range(model, "polynomial[0]", first, first < 0.0, range)?;
-                let angle = OcamAngle(Polynomial(polynomial));
-                return Ok((RadialMap::ocam(angle), None));
-            }
-        };
-        Ok((RadialMap::Closed(closed), None))
-    }
+        }
+    };
+    (
+        @struct $(#[$doc:meta])* $Model:ident { $($before:tt)* } { $($after:tt)* }
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $Model {
+            $($before)*
+            /// Principal point, horizontal, pixel centres.
+            pub cx: f64,
+            /// Principal point, vertical, pixel centres.
+            pub cy: f64,
+            $($after)*
+            /// The largest angle from the optical axis in the lens image, radians. Without it the
+            /// lens reaches as far as its model is one-to-one.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub max_theta: Option<f64>,
+        }
+    };
 }
 
-fn in_range(
-    model: &'static str,
-    name: &'static str,
-    value: f64,
-    accepted: bool,
-    range: &'static str,
-) -> Result<(), LensError> {
-    if !value.is_finite() {
-        return Err(LensError::NotFinite { name, value });
-    }
-    if accepted {
-        return Ok(());
-    }
-    Err(LensError::OutOfRange {
-        model,
-        name,
-        value,
-        range,
-    })
+/// Returns the image plane of an ideal lens, which has `focal`, or `fx` and `fy`.
+pub(super) fn ideal_plane(
+    focal_lengths: (Option<f64>, Option<f64>, Option<f64>),
+    cx: f64,
+    cy: f64,
+) -> Result<ImagePlane, LensError> {
+    let (fx, fy) = match focal_lengths {
+        (Some(focal), None, None) => {
+            let focal = positive("focal", focal)?;
+            (focal, focal)
+        }
+        (None, Some(fx), Some(fy)) => (fx, fy),
+        _ => {
+            return Err(LensError::EitherOr {
+                choice: "focal, or both fx and fy",
+            });
+        }
+    };
+    Ok(ImagePlane::new(fx, fy, cx, cy))
 }
 
-fn all_finite(name: &'static str, values: &[f64]) -> Result<(), LensError> {
-    match values.iter().find(|value| !value.is_finite()) {
-        Some(&value) => Err(LensError::NotFinite { name, value }),
-        None => Ok(()),
-    }
-}
+/// Declares the list of all models: `module::Struct`, where the module's name is that of the model
+/// in calibration files. Makes of it the modules, [`LensModel`](super::LensModel), and its curve.
+macro_rules! lens_models {
+    ($($module:ident::$Model:ident,)+) => {
+        $(
+            mod $module;
+            pub use self::$module::$Model;
 
-fn count(name: &'static str, coefficients: &[f64], least: usize) -> Result<(), LensError> {
-    if (least..=MAX_COEFFICIENTS).contains(&coefficients.len()) {
-        return Ok(());
-    }
-    Err(LensError::CoefficientCount {
-        name,
-        count: coefficients.len(),
-        least,
-        most: MAX_COEFFICIENTS,
-    })
-}
+            impl $Model {
+                /// The model's name in calibration files.
+                pub const NAME: &'static str = stringify!($module);
+            }
 
-/// The polynomial, which must be 0 at the optical axis.
-fn from_axis(name: &'static str, coefficients: Vec<f64>) -> Result<Polynomial, LensError> {
-    count(name, &coefficients, 2)?;
-    all_finite(name, &coefficients)?;
-    let value = coefficients[0];
-    if value != 0.0 {
-        return Err(LensError::TornAtAxis { name, value });
-    }
-    Ok(Polynomial(coefficients))
+            impl From<$Model> for LensModel {
+                fn from(model: $Model) -> Self {
+                    Self::$Model(model)
+                }
+            }
+        )+
+
+        /// A lens: its model and that model's parameters, not checked yet.
+        ///
+        /// It has the shape of the `lens` table of native calibration files. In the formulas of the
+        /// models `theta` is the angle of a ray from the optical axis in radians. `r` is its
+        /// distance from the principal point in units of the focal length, or in pixels where the
+        /// model says so.
+        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+        #[serde(tag = "model", rename_all = "snake_case")]
+        pub enum LensModel {
+            $(#[doc = concat!("The model [`", stringify!($Model), "`].")] $Model($Model),)+
+        }
+
+        impl LensModel {
+            /// The names of all models, in the order in which they are listed to users.
+            pub const NAMES: &'static [&'static str] = &[$($Model::NAME),+];
+
+            /// Returns the model's name in calibration files.
+            #[must_use]
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$Model(_) => $Model::NAME,)+
+                }
+            }
+
+            /// Returns the end of the lens image that the file states, radians.
+            #[must_use]
+            pub fn max_theta(&self) -> Option<f64> {
+                match self {
+                    $(Self::$Model(model) => model.max_theta,)+
+                }
+            }
+
+            /// Reads the parameters of the model called `name`; `None` without such a model.
+            ///
+            /// # Errors
+            /// Errors of the deserializer: a field of another type, a missing or an unknown field.
+            pub fn deserialize_named<'de, D: serde::Deserializer<'de>>(
+                name: &str,
+                parameters: D,
+            ) -> Option<Result<Self, D::Error>> {
+                $(if name == $Model::NAME {
+                    return Some(serde::Deserialize::deserialize(parameters).map(Self::$Model));
+                })+
+                None
+            }
+
+            /// Returns the checked curve of the model and the distortion that follows it.
+            pub(super) fn curve(
+                &self,
+            ) -> Result<(AnyCurve, Option<RadialTangential>), LensError> {
+                Ok(match self {
+                    $(Self::$Model(model) => (AnyCurve::$Model(model.curve()?), model.distortion()?),)+
+                })
+            }
+
+            /// Returns the image plane, whose values are not all checked yet.
+            pub(super) fn plane(&self) -> Result<ImagePlane, LensError> {
+                match self {
+                    $(Self::$Model(model) => model.plane(),)+
+                }
+            }
+        }
+
+        /// The curve of one of the models.
+        #[derive(Debug, Clone, PartialEq)]
+        pub(super) enum AnyCurve {
+            $($Model(<$Model as Model>::Curve),)+
+        }
+
+        impl AnyCurve {
+            pub(super) fn model(&self) -> &'static str {
+                match self {
+                    $(Self::$Model(_) => $Model::NAME,)+
+                }
+            }
+        }
+
+        impl Curve for AnyCurve {
+            fn limit(&self) -> f64 {
+                match self {
+                    $(Self::$Model(curve) => curve.limit(),)+
+                }
+            }
+
+            fn radius(&self, theta: f64) -> f64 {
+                match self {
+                    $(Self::$Model(curve) => curve.radius(theta),)+
+                }
+            }
+
+            fn angle(&self, radius: f64) -> f64 {
+                match self {
+                    $(Self::$Model(curve) => curve.angle(radius),)+
+                }
+            }
+
+            fn is_polynomial(&self) -> bool {
+                match self {
+                    $(Self::$Model(curve) => curve.is_polynomial(),)+
+                }
+            }
+        }
+    };
 }

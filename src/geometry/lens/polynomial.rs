@@ -1,4 +1,9 @@
-//! Curves that are given in one direction only and inverted numerically.
+//! Functions that models give in one direction only and that are inverted numerically.
+
+use super::{LensError, check::all_finite};
+
+/// Most coefficients a polynomial may have; real calibrations have at most a dozen.
+const MAX_COEFFICIENTS: usize = 64;
 
 /// A function from 0 that rises as far as it is used.
 pub(super) trait Rising {
@@ -10,6 +15,36 @@ pub(super) trait Rising {
 /// `c0 + c1 x + c2 x² + …`
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Polynomial(pub(super) Vec<f64>);
+
+impl Polynomial {
+    /// Checks the coefficients called `name`, of which the first must be 0: the principal point.
+    pub(super) fn from_axis(name: &'static str, coefficients: &[f64]) -> Result<Self, LensError> {
+        let polynomial = Self::checked(name, coefficients, 2)?;
+        let value = coefficients[0];
+        if value != 0.0 {
+            return Err(LensError::TornAtAxis { name, value });
+        }
+        Ok(polynomial)
+    }
+
+    /// Checks the coefficients called `name`: at least `least`, all finite.
+    pub(super) fn checked(
+        name: &'static str,
+        coefficients: &[f64],
+        least: usize,
+    ) -> Result<Self, LensError> {
+        if !(least..=MAX_COEFFICIENTS).contains(&coefficients.len()) {
+            return Err(LensError::CoefficientCount {
+                name,
+                count: coefficients.len(),
+                least,
+                most: MAX_COEFFICIENTS,
+            });
+        }
+        all_finite(name, coefficients)?;
+        Ok(Self(coefficients.to_vec()))
+    }
+}
 
 impl Rising for Polynomial {
     fn value(&self, x: f64) -> f64 {
@@ -24,27 +59,5 @@ impl Rising for Polynomial {
             let factor = power as f64;
             sum * x + factor * self.0[power]
         })
-    }
-}
-
-/// The angle of the vector (`r`, `−p(r)`) from the optical axis.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct OcamAngle(pub(super) Polynomial);
-
-impl OcamAngle {
-    /// Pixels per radian at the axis.
-    pub(super) fn focal(&self) -> f64 {
-        -self.0.value(0.0)
-    }
-}
-
-impl Rising for OcamAngle {
-    fn value(&self, radius: f64) -> f64 {
-        radius.atan2(-self.0.value(radius))
-    }
-
-    fn slope(&self, radius: f64) -> f64 {
-        let depth = self.0.value(radius);
-        (radius * self.0.slope(radius) - depth) / (radius * radius + depth * depth)
     }
 }

@@ -12,35 +12,74 @@ fn plane() -> ImagePlane {
     }
 }
 
+/// Replaced by [`plane`].
+const ANY_PINHOLE: Pinhole = [1.0, 1.0, 0.0, 0.0];
+const CENTRE: [f64; 2] = [0.0, 0.0];
+
+fn lens_of(
+    model: impl Into<LensModel>,
+    plane: ImagePlane,
+    max_theta: Option<f64>,
+) -> Result<Lens, LensError> {
+    Lens::on_plane(&model.into(), plane, max_theta)
+}
+
+fn kannala_brandt(k: [f64; 4]) -> LensModel {
+    KannalaBrandt::new(ANY_PINHOLE, k).into()
+}
+
+fn radial_polynomial(coefficients: Vec<f64>) -> LensModel {
+    RadialPolynomial::new(coefficients, CENTRE).into()
+}
+
+fn ocam(polynomial: Vec<f64>) -> LensModel {
+    Ocam::new(polynomial, CENTRE).into()
+}
+
+fn mei(xi: f64, [k1, k2, p1, p2]: [f64; 4]) -> LensModel {
+    Mei::new(ANY_PINHOLE, xi, k1, k2, p1, p2).into()
+}
+
+fn f_theta(angle_to_pixel: Option<[f64; 6]>, pixel_to_angle: Option<[f64; 6]>) -> LensModel {
+    let [cx, cy] = CENTRE;
+    LensModel::FTheta(FTheta {
+        angle_to_pixel,
+        pixel_to_angle,
+        c: 1.0,
+        d: 0.0,
+        e: 0.0,
+        cx,
+        cy,
+        max_theta: None,
+    })
+}
+
 /// Every lens model with plausible and not so plausible parameters.
 fn every_model() -> impl Strategy<Value = LensModel> {
     let ideal = prop::sample::select(vec![
-        LensModel::Equidistant,
-        LensModel::Equisolid,
-        LensModel::Stereographic,
-        LensModel::Orthographic,
-        LensModel::Rectilinear,
+        Equidistant::new(ANY_PINHOLE).into(),
+        Equisolid::new(ANY_PINHOLE).into(),
+        Stereographic::new(ANY_PINHOLE).into(),
+        Orthographic::new(ANY_PINHOLE).into(),
+        Rectilinear::new(ANY_PINHOLE).into(),
     ]);
-    let kannala_brandt =
-        prop::array::uniform4(-0.02..0.02).prop_map(|k| LensModel::KannalaBrandt { k });
+    let kannala_brandt = prop::array::uniform4(-0.02..0.02).prop_map(kannala_brandt);
     let polynomial = (200.0..400.0, -30.0..30.0, -30.0..30.0);
-    let radial_polynomial =
-        polynomial
-            .clone()
-            .prop_map(|(c1, c2, c3)| LensModel::RadialPolynomial {
-                coefficients: vec![0.0, c1, c2, c3],
-            });
-    let angle_to_pixel = polynomial.prop_map(|(c1, c2, c3)| {
-        LensModel::FTheta(FThetaPolynomial::AngleToPixel([0.0, c1, c2, c3, 2.0, -0.4]))
-    });
-    let pixel_to_angle = (0.002..0.02, -1e-6..1e-6, -1e-9..1e-9).prop_map(|(c1, c2, c3)| {
-        LensModel::FTheta(FThetaPolynomial::PixelToAngle([0.0, c1, c2, c3, 0.0, 0.0]))
-    });
+    let radial_polynomial = polynomial
+        .clone()
+        .prop_map(|(c1, c2, c3)| radial_polynomial(vec![0.0, c1, c2, c3]));
+    let angle_to_pixel =
+        polynomial.prop_map(|(c1, c2, c3)| f_theta(Some([0.0, c1, c2, c3, 2.0, -0.4]), None));
+    let pixel_to_angle = (0.002..0.02, -1e-6..1e-6, -1e-9..1e-9)
+        .prop_map(|(c1, c2, c3)| f_theta(None, Some([0.0, c1, c2, c3, 0.0, 0.0])));
     let unit = 0.0..=1.0;
-    let ucm = unit.clone().prop_map(|alpha| LensModel::Ucm { alpha });
-    let eucm = (unit.clone(), 0.2..4.0).prop_map(|(alpha, beta)| LensModel::Eucm { alpha, beta });
+    let ucm = unit
+        .clone()
+        .prop_map(|alpha| Ucm::new(ANY_PINHOLE, alpha).into());
+    let eucm = (unit.clone(), 0.2..4.0)
+        .prop_map(|(alpha, beta)| Eucm::new(ANY_PINHOLE, alpha, beta).into());
     let double_sphere =
-        (-0.9..1.5, unit).prop_map(|(xi, alpha)| LensModel::DoubleSphere { xi, alpha });
+        (-0.9..1.5, unit).prop_map(|(xi, alpha)| DoubleSphere::new(ANY_PINHOLE, xi, alpha).into());
     let tangential = -0.01..0.01;
     let mei = (
         -0.5..4.0,
@@ -49,17 +88,10 @@ fn every_model() -> impl Strategy<Value = LensModel> {
         tangential.clone(),
         tangential,
     )
-        .prop_map(|(xi, k1, k2, p1, p2)| LensModel::Mei {
-            xi,
-            distortion: RadialTangential { k1, k2, p1, p2 },
-        });
-    let ocam =
-        (-800.0..-100.0, -1e-3..1e-3, -1e-6..1e-6, -1e-9..1e-8).prop_map(|(a0, a2, a3, a4)| {
-            LensModel::Ocam {
-                polynomial: vec![a0, 0.0, a2, a3, a4],
-            }
-        });
-    let fov = (0.01..3.1).prop_map(|omega| LensModel::Fov { omega });
+        .prop_map(|(xi, k1, k2, p1, p2)| mei(xi, [k1, k2, p1, p2]));
+    let ocam = (-800.0..-100.0, -1e-3..1e-3, -1e-6..1e-6, -1e-9..1e-8)
+        .prop_map(|(a0, a2, a3, a4)| ocam(vec![a0, 0.0, a2, a3, a4]));
+    let fov = (0.01..3.1).prop_map(|omega| Fov::new(ANY_PINHOLE, omega).into());
     prop_oneof![
         ideal,
         kannala_brandt,
@@ -78,7 +110,7 @@ fn every_model() -> impl Strategy<Value = LensModel> {
 /// Every lens model, each reaching as far as it can.
 fn every_lens() -> impl Strategy<Value = Lens> {
     every_model()
-        .prop_map(|model| Lens::new(model, plane(), None).expect("the parameters make a lens"))
+        .prop_map(|model| lens_of(model, plane(), None).expect("the parameters make a lens"))
 }
 
 fn ray_at(theta: f64, azimuth: f64) -> Ray {
@@ -188,7 +220,7 @@ proptest! {
 
 #[test]
 fn the_optical_axis_meets_the_principal_point() {
-    let lens = Lens::new(LensModel::Equidistant, plane(), None).expect("plausible");
+    let lens = lens_of(Equidistant::new(ANY_PINHOLE), plane(), None).expect("plausible");
     assert_eq!(lens.project(&Ray::z()), Some(Pixel::new(299.5, 301.25)));
     assert_eq!(lens.project(&-Ray::z()), None);
     assert_eq!(lens.project(&Ray::zeros()), None);
@@ -197,10 +229,8 @@ fn the_optical_axis_meets_the_principal_point() {
 
 #[test]
 fn a_max_theta_beyond_the_turning_point_is_refused_with_the_limit() {
-    let curve = LensModel::KannalaBrandt {
-        k: [-0.3, 0.0, 0.0, 0.0],
-    };
-    let error = Lens::new(curve, plane(), Some(1.5)).expect_err("turns over at 1.054 rad");
+    let curve = kannala_brandt([-0.3, 0.0, 0.0, 0.0]);
+    let error = lens_of(curve, plane(), Some(1.5)).expect_err("turns over at 1.054 rad");
     assert_eq!(
         error.to_string(),
         "max_theta is 1.5 rad, but the curve of this kannala_brandt lens turns back at 1.054 rad: \
@@ -210,15 +240,15 @@ fn a_max_theta_beyond_the_turning_point_is_refused_with_the_limit() {
 
 #[test]
 fn parameters_that_make_no_lens_are_refused_by_name() {
-    let build = |curve, plane| {
-        Lens::new(curve, plane, None)
+    let build = |curve: LensModel, plane| {
+        lens_of(curve, plane, None)
             .map(|_| ())
             .unwrap_err()
             .to_string()
     };
     let flat = ImagePlane { fx: 0.0, ..plane() };
     assert_eq!(
-        build(LensModel::Equidistant, flat),
+        build(Equidistant::new(ANY_PINHOLE).into(), flat),
         "fx is 0: it must be greater than 0"
     );
     let lost = ImagePlane {
@@ -226,82 +256,57 @@ fn parameters_that_make_no_lens_are_refused_by_name() {
         ..plane()
     };
     assert_eq!(
-        build(LensModel::Equidistant, lost),
+        build(Equidistant::new(ANY_PINHOLE).into(), lost),
         "cy is NaN: a finite number is needed"
     );
-    let falling = LensModel::RadialPolynomial {
-        coefficients: vec![0.0, -3.0],
-    };
+    let falling = radial_polynomial(vec![0.0, -3.0]);
     assert!(build(falling, plane()).contains("does not rise"));
-    let torn = LensModel::RadialPolynomial {
-        coefficients: vec![4.0, 3.0],
-    };
+    let torn = radial_polynomial(vec![4.0, 3.0]);
     assert!(build(torn, plane()).contains("coefficients[0] is 4"));
-    let constant = LensModel::RadialPolynomial {
-        coefficients: vec![0.0],
-    };
+    let constant = radial_polynomial(vec![0.0]);
     assert!(build(constant, plane()).contains("1 entries"));
 }
 
 #[test]
 fn a_parameter_outside_its_range_is_refused_with_the_range() {
-    let build = |model| {
-        Lens::new(model, plane(), None)
+    let build = |model: LensModel| {
+        lens_of(model, plane(), None)
             .map(|_| ())
             .unwrap_err()
             .to_string()
     };
-    let distortion = RadialTangential {
-        k1: 0.1,
-        k2: f64::INFINITY,
-        p1: 0.0,
-        p2: 0.0,
-    };
     for (model, expected) in [
         (
-            LensModel::Ucm { alpha: 1.2 },
+            Ucm::new(ANY_PINHOLE, 1.2).into(),
             "alpha is 1.2: this ucm parameter must be from 0 to 1",
         ),
         (
-            LensModel::Eucm {
-                alpha: 0.5,
-                beta: 0.0,
-            },
+            Eucm::new(ANY_PINHOLE, 0.5, 0.0).into(),
             "beta is 0: this eucm parameter must be above 0",
         ),
         (
-            LensModel::DoubleSphere {
-                xi: -1.0,
-                alpha: 0.5,
-            },
+            DoubleSphere::new(ANY_PINHOLE, -1.0, 0.5).into(),
             "xi is -1: this double_sphere parameter must be above -1",
         ),
         (
-            LensModel::Fov { omega: 3.5 },
+            Fov::new(ANY_PINHOLE, 3.5).into(),
             "omega is 3.5: this fov parameter must be radians above 0 and below 3.1416",
         ),
         (
-            LensModel::Mei {
-                xi: 0.8,
-                distortion,
-            },
+            mei(0.8, [0.1, f64::INFINITY, 0.0, 0.0]),
             "k2 is inf: a finite number is needed",
         ),
         (
-            LensModel::Ocam {
-                polynomial: vec![471.0, 0.0, -7e-4],
-            },
+            ocam(vec![471.0, 0.0, -7e-4]),
             "polynomial[0] is 471: this ocam parameter must be below 0; OCamCalib's z axis points \
              into the camera",
         ),
         (
-            LensModel::Ocam { polynomial: vec![] },
+            ocam(vec![]),
             "polynomial has 0 entries: between 1 and 64 are accepted",
         ),
         (
-            LensModel::FTheta(FThetaPolynomial::PixelToAngle([
-                1e-3, 2e-3, 0.0, 0.0, 0.0, 0.0,
-            ])),
+            f_theta(None, Some([1e-3, 2e-3, 0.0, 0.0, 0.0, 0.0])),
             "pixel_to_angle[0] is 0.001: the radius at the optical axis must be 0",
         ),
     ] {
@@ -316,26 +321,13 @@ fn an_affine_part_that_mirrors_the_image_is_refused() {
         row_skew: 200.0,
         ..plane()
     };
-    let error = Lens::new(LensModel::Equidistant, mirroring, None).expect_err("mirrors");
+    let error = lens_of(Equidistant::new(ANY_PINHOLE), mirroring, None).expect_err("mirrors");
     assert!(error.to_string().contains("flattens or mirrors"), "{error}");
 }
 
 #[test]
 fn the_lens_ends_where_the_distortion_folds() {
-    let distortion = RadialTangential {
-        k1: -0.3,
-        k2: 0.0,
-        p1: 0.0,
-        p2: 0.0,
-    };
-    let lens = Lens::new(
-        LensModel::Mei {
-            xi: 1.0,
-            distortion,
-        },
-        plane(),
-        None,
-    );
+    let lens = lens_of(mei(1.0, [-0.3, 0.0, 0.0, 0.0]), plane(), None);
     // r (1 − 0.3 r²) turns back at r = 1/√0.9, and with xi 1 r is tan(theta / 2).
     let expected = 2.0 * (1.0 / 0.9_f64.sqrt()).atan();
     let found = lens.expect("plausible").max_theta();
@@ -344,17 +336,9 @@ fn the_lens_ends_where_the_distortion_folds() {
 
 #[test]
 fn the_rim_of_a_folding_distortion_still_belongs_to_the_lens() {
-    let distortion = RadialTangential {
-        k1: 0.0,
-        k2: 0.0,
-        p1: 0.009_583_660_270_634_51,
-        p2: -0.008_671_048_736_876_826,
-    };
-    let model = LensModel::Mei {
-        xi: 0.0,
-        distortion,
-    };
-    let lens = Lens::new(model, plane(), None).expect("plausible");
+    let tangential = [0.009_583_660_270_634_51, -0.008_671_048_736_876_826];
+    let model = mei(0.0, [0.0, 0.0, tangential[0], tangential[1]]);
+    let lens = lens_of(model, plane(), None).expect("plausible");
     for step in 0..1000 {
         let ray = ray_at(3.0, f64::from(step) * 1e-3 * 2.0 * PI);
         let rim = lens.project_to_rim(&ray).expect("has an azimuth");

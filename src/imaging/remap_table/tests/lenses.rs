@@ -2,83 +2,57 @@
 
 use crate::geometry::{
     Lens,
-    lens::{FThetaPolynomial, ImagePlane, LensModel, RadialTangential},
+    lens::{
+        DoubleSphere, Equidistant, Equisolid, Eucm, FTheta, Fov, ImagePlane, KannalaBrandt,
+        LensModel, Mei, Ocam, Orthographic, Pinhole, RadialPolynomial, Rectilinear, Stereographic,
+        Ucm,
+    },
 };
 
 pub(super) const FRAME_SIDE: u32 = 1680;
+/// Replaced by the image plane of [`every_lens`].
+const ANY_PINHOLE: Pinhole = [1.0, 1.0, 0.0, 0.0];
+const CENTRE: [f64; 2] = [0.0, 0.0];
 
 /// Lenses of all fourteen models, by name, with the tangential distortion that only `mei` has.
 pub(super) fn every_lens() -> Vec<Lens> {
-    let distortion = RadialTangential {
-        k1: -0.05,
-        k2: 0.005,
-        p1: 1e-3,
-        p2: -5e-4,
-    };
-    let lenses = [
-        (LensModel::Equidistant, 534.76, 1.57),
-        (LensModel::Equisolid, 594.0, 1.57),
-        (LensModel::Stereographic, 420.0, 1.57),
-        (LensModel::Orthographic, 840.0, 1.5),
-        (LensModel::Rectilinear, 300.0, 1.2),
+    let lenses: [(LensModel, f64, f64); 15] = [
+        (Equidistant::new(ANY_PINHOLE).into(), 534.76, 1.57),
+        (Equisolid::new(ANY_PINHOLE).into(), 594.0, 1.57),
+        (Stereographic::new(ANY_PINHOLE).into(), 420.0, 1.57),
+        (Orthographic::new(ANY_PINHOLE).into(), 840.0, 1.5),
+        (Rectilinear::new(ANY_PINHOLE).into(), 300.0, 1.2),
         (
-            LensModel::RadialPolynomial {
-                coefficients: vec![0.0, 560.0, 8.0, -15.0, 2.0],
-            },
+            RadialPolynomial::new(vec![0.0, 560.0, 8.0, -15.0, 2.0], CENTRE).into(),
             1.0,
             1.65,
         ),
         (
-            LensModel::KannalaBrandt {
-                k: [0.01, -0.005, 0.001, -0.0003],
-            },
+            KannalaBrandt::new(ANY_PINHOLE, [0.01, -0.005, 0.001, -0.0003]).into(),
             530.0,
             1.6,
         ),
-        (LensModel::Ucm { alpha: 0.6 }, 500.0, 1.6),
+        (Ucm::new(ANY_PINHOLE, 0.6).into(), 500.0, 1.6),
+        (Eucm::new(ANY_PINHOLE, 0.6, 1.1).into(), 520.0, 1.6),
         (
-            LensModel::Eucm {
-                alpha: 0.6,
-                beta: 1.1,
-            },
-            520.0,
-            1.6,
-        ),
-        (
-            LensModel::Mei {
-                xi: 1.2,
-                distortion,
-            },
+            Mei::new(ANY_PINHOLE, 1.2, -0.05, 0.005, 1e-3, -5e-4).into(),
             1000.0,
             1.5,
         ),
+        (DoubleSphere::new(ANY_PINHOLE, -0.2, 0.6).into(), 420.0, 1.6),
         (
-            LensModel::DoubleSphere {
-                xi: -0.2,
-                alpha: 0.6,
-            },
-            420.0,
-            1.6,
-        ),
-        (
-            LensModel::Ocam {
-                polynomial: vec![-530.0, 0.0, 6e-4, -2e-7, 4e-10],
-            },
+            Ocam::new(vec![-530.0, 0.0, 6e-4, -2e-7, 4e-10], CENTRE).into(),
             1.0,
             1.6,
         ),
-        (LensModel::Fov { omega: 0.93 }, 540.0, 1.57),
+        (Fov::new(ANY_PINHOLE, 0.93).into(), 540.0, 1.57),
         (
-            LensModel::FTheta(FThetaPolynomial::AngleToPixel([
-                0.0, 545.0, 6.0, -12.0, 2.0, -0.4,
-            ])),
+            f_theta(Some([0.0, 545.0, 6.0, -12.0, 2.0, -0.4]), None),
             1.0,
             1.65,
         ),
         (
-            LensModel::FTheta(FThetaPolynomial::PixelToAngle([
-                0.0, 1.8e-3, 2e-8, 1e-10, 0.0, 0.0,
-            ])),
+            f_theta(None, Some([0.0, 1.8e-3, 2e-8, 1e-10, 0.0, 0.0])),
             1.0,
             1.6,
         ),
@@ -89,7 +63,21 @@ pub(super) fn every_lens() -> Vec<Lens> {
             row_skew: focal * -2e-4,
             ..ImagePlane::new(focal, focal * 0.998, 838.0, 842.25)
         };
-        Lens::new(model, plane, Some(max_theta)).unwrap()
+        Lens::on_plane(&model, plane, Some(max_theta)).unwrap()
     });
     made.into()
+}
+
+fn f_theta(angle_to_pixel: Option<[f64; 6]>, pixel_to_angle: Option<[f64; 6]>) -> LensModel {
+    let [cx, cy] = CENTRE;
+    LensModel::FTheta(FTheta {
+        angle_to_pixel,
+        pixel_to_angle,
+        c: 1.0,
+        d: 0.0,
+        e: 0.0,
+        cx,
+        cy,
+        max_theta: None,
+    })
 }
