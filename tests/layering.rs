@@ -162,7 +162,6 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 27] = [
     ("indicatif", &["cli"]),
     ("plotters", &["evaluation"]),
     ("rumqttc", &["mqtt"]),
-    ("config", &["settings"]),
     ("object_store", &["calibration"]),
     (
         "rustls",
