@@ -6,7 +6,6 @@
 use std::{
     num::NonZeroUsize,
     sync::{Arc, LazyLock},
-    time::Duration,
 };
 
 use axum::{
@@ -16,18 +15,16 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, Access, ApiOptions, ApiState, Readiness},
+    api::{self, ApiOptions, ApiState, Readiness},
     calibration::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
-    geometry::FieldOfViewReading,
     imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
     inference::{
         Detector, HeadOutput, InferenceError, Model, ModelFolder, ModelRepository,
         RepositoryOptions,
     },
     metrics::Metrics,
-    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, ResultLimits, ResultStore},
-    telemetry::Tracer,
 };
 use tokio::runtime::{self, Runtime};
 use tower::ServiceExt;
@@ -118,6 +115,7 @@ fn router() -> Router {
             max_height: MAX_IMAGE_SIDE,
             ..DecodeLimits::default()
         },
+        rig_cache_bytes: 1 << 24,
         ..EngineOptions::for_testing("nobody")
     };
     let registry = Arc::clone(models.registry());

@@ -5,6 +5,13 @@ use super::{SettingsError, form::Form, values::Values};
 
 /// A setting as the reference shows it.
 #[derive(Debug, Clone)]
+#[cfg_attr(
+    not(test),
+    expect(
+        dead_code,
+        reason = "only the tests that generate the reference read all of it"
+    )
+)]
 pub(super) struct Entry {
     /// The key with its table, such as `server.tls.certificate`.
     pub(super) key: &'static str,

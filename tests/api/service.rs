@@ -16,10 +16,10 @@ use lookdown::{
     api::{self, Access, ApiOptions, ApiState, Readiness, RequestRate},
     app::Assembly,
     calibration::{Calibrations, FolderStore},
-    imaging::{Frame, NetworkInput, annotate::encode_png, decode::DecodeLimits},
+    imaging::{Frame, NetworkInput, annotate::encode_png},
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
     telemetry::Tracer,
 };

@@ -19,15 +19,12 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, Access, ApiOptions, ApiState, Readiness},
+    api::{self, ApiOptions, ApiState, Readiness},
     calibration::{Calibrations, FolderStore},
-    geometry::FieldOfViewReading,
-    imaging::decode::DecodeLimits,
     inference::{ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, ResultLimits},
-    telemetry::Tracer,
 };
 use serde_json::Value;
 use tempfile::TempDir;
