@@ -97,7 +97,7 @@ ci: ## all that the continuous integration runs
 fuzz: ## run every fuzzer RUNS times, an hour or more; needs cargo-fuzz and a C++ compiler: docs/reliability.md
 	$(PYTHON) scripts/fuzz.py --runs $(RUNS)
 
-bless: ## regenerate the checked-in generated files: openapi/openapi.json and the snapshots
+bless: ## regenerate the checked-in generated files: openapi/openapi.json, settings, their reference and the snapshots
 	@$(PYTHON) scripts/setup.py
 	mkdir -p openapi
 	cargo run --release --locked -- openapi > openapi/openapi.json.new || { rm -f openapi/openapi.json.new; exit 1; }

@@ -1,5 +1,6 @@
 //! Where everything is put together: settings → engine → workers → service.
 
+mod check;
 mod models;
 mod serving;
 mod sockets;
@@ -12,6 +13,7 @@ use crate::{
     access::AccessKeys,
     api::{Access, ApiOptions, ApiState, Readiness, RequestRate},
     calibration::{BucketStore, CalibrationStore, Calibrations, FolderStore},
+    geometry::FieldOfViewReading,
     imaging::decode::DecodeLimits,
     inference::ModelRepository,
     metrics::Metrics,
@@ -49,17 +51,24 @@ pub struct Assembly {
 /// # Errors
 /// One sentence that names the setting: a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
+    assemble_with(settings, FieldOfViewReading::default())
+}
+
+fn assemble_with(
+    settings: &Settings,
+    paper_field_of_view: FieldOfViewReading,
+) -> anyhow::Result<Assembly> {
     let (models, default_models) = models::open(settings)?;
     let options = EngineOptions {
         decode_limits: decode_limits(&settings.limits),
         default_models,
         batches: BatchOptions {
-            max_views: settings.inference.max_batch_views,
+            max_views: settings.threads.batch_views,
             max_delay: settings.inference.max_queue_delay,
         },
         sessions: settings.threads.sessions,
         remap_threads: settings.threads.remapping,
-        paper_field_of_view: settings.paper.field_of_view,
+        paper_field_of_view,
         rig_cache_bytes: settings.calibrations.cache_bytes,
         remembered_frames: settings.inference.remembered_frames,
     };
@@ -90,7 +99,19 @@ pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
 /// # Errors
 /// One sentence that names the setting: a file that is missing or cannot be used.
 pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow::Result<Engine> {
-    let Assembly { engine, models, .. } = assemble(settings)?;
+    evaluation_engine(settings, requests, FieldOfViewReading::default())
+}
+
+/// [`engine_for`], with a reading of the paper's field of view.
+///
+/// # Errors
+/// Those of [`engine_for`].
+pub fn evaluation_engine(
+    settings: &Settings,
+    requests: &[DetectParameters],
+    paper_field_of_view: FieldOfViewReading,
+) -> anyhow::Result<Engine> {
+    let Assembly { engine, models, .. } = assemble_with(settings, paper_field_of_view)?;
     for request in requests {
         let defaults = engine.default_models();
         let needed = match &request.model {
@@ -157,7 +178,7 @@ impl App {
         let results = open_results(&settings.results);
         let readiness = Readiness::default();
         let keys = open_keys(&settings.access)?;
-        let tls = match settings.server.tls.clone() {
+        let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
             None => None,
         };
@@ -175,17 +196,20 @@ impl App {
         let options = ApiOptions {
             max_body_bytes: settings.server.max_body_bytes,
             max_upload_bytes: settings.limits.max_upload_bytes,
-            max_header_bytes: settings.server.connections.max_header_bytes,
-            max_headers: settings.server.connections.max_headers,
+            max_header_bytes: settings.connections.max_header_bytes,
+            max_headers: settings.connections.max_headers,
             zone_metrics: settings.calibrations.zone_metrics,
             pictures_of: Arc::new(settings.results.pictures_of.clone()),
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
             min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
-            request_rate: settings.limits.request_rate.map(|rate| RequestRate {
-                per_second: rate.per_second,
-                burst: rate.burst,
-            }),
+            request_rate: settings
+                .limits
+                .requests_per_second
+                .map(|per_second| RequestRate {
+                    per_second,
+                    burst: settings.limits.request_burst,
+                }),
             access,
             cors_origins: settings.access.cors_origins.clone(),
             tracer: tracer.clone(),
@@ -226,22 +250,6 @@ impl App {
     #[must_use]
     pub fn tracer(&self) -> Tracer {
         self.tracer.clone()
-    }
-
-    /// Loads every model that is served, and says what is there. Blocks.
-    ///
-    /// # Errors
-    /// When a model cannot be loaded.
-    pub fn check(&self) -> anyhow::Result<String> {
-        for name in &self.to_load {
-            self.models.load(name)?;
-        }
-        let health = self.calibrations.health();
-        Ok(format!(
-            "the models {} and {} calibrations can be used",
-            self.to_load.join(", "),
-            health.serving
-        ))
     }
 
     /// The threads that look for changed models, calibrations, keys and certificates.

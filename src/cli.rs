@@ -78,6 +78,10 @@ impl SettingsFile {
     fn load(&self) -> anyhow::Result<Settings> {
         let settings = settings::load(self.config.as_deref(), settings::environment())?;
         telemetry::start_logs(&settings.log)?;
+        let names = settings::environment().map(|(name, _)| name);
+        if let Some(warning) = settings::ignored_variables(names) {
+            tracing::warn!("{warning}");
+        }
         Ok(settings)
     }
 }

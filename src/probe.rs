@@ -7,7 +7,7 @@ use std::{
 
 use reqwest::{Client, StatusCode, redirect};
 
-use crate::settings::ServerSettings;
+use crate::settings::Settings;
 
 /// Longest that the answer may take, the connection included: less than container engines wait.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -58,8 +58,8 @@ pub enum ProbeError {
 ///
 /// # Errors
 /// [`ProbeError`] when the answer is no, or there is none.
-pub async fn ask(server: &ServerSettings, probe: Probe) -> Result<String, ProbeError> {
-    let url = url(server, probe)?;
+pub async fn ask(settings: &Settings, probe: Probe) -> Result<String, ProbeError> {
+    let url = url(settings, probe)?;
     // Fails when there is one already, which is as good.
     let _ = rustls::crypto::ring::default_provider().install_default();
     let client = Client::builder()
@@ -78,7 +78,7 @@ pub async fn ask(server: &ServerSettings, probe: Probe) -> Result<String, ProbeE
         }),
         Err(error) => Err(ProbeError::Silent {
             url,
-            hint: hint(server),
+            hint: hint(settings),
             source: error.without_url(),
         }),
     }
@@ -86,11 +86,11 @@ pub async fn ask(server: &ServerSettings, probe: Probe) -> Result<String, ProbeE
 
 /// Where the server answers probes: on the port of metrics if there is one, as that speaks plain HTTP
 /// and asks nobody for a certificate.
-fn url(server: &ServerSettings, probe: Probe) -> Result<String, ProbeError> {
-    let (scheme, address) = match (server.metrics_listen, &server.tls) {
+fn url(settings: &Settings, probe: Probe) -> Result<String, ProbeError> {
+    let (scheme, address) = match (settings.server.metrics_listen, &settings.tls) {
         (Some(address), _) => ("http", address),
-        (None, Some(_)) => ("https", server.listen),
-        (None, None) => ("http", server.listen),
+        (None, Some(_)) => ("https", settings.server.listen),
+        (None, None) => ("http", settings.server.listen),
     };
     if address.port() == 0 {
         return Err(ProbeError::PortOfTheSystem);
@@ -113,12 +113,12 @@ fn reachable(address: SocketAddr) -> SocketAddr {
 }
 
 /// What else may be the matter with a server that does not answer.
-fn hint(server: &ServerSettings) -> &'static str {
-    let asks_for_certificates = server
+fn hint(settings: &Settings) -> &'static str {
+    let asks_for_certificates = settings
         .tls
         .as_ref()
         .is_some_and(|tls| tls.client_certificates.is_some());
-    if asks_for_certificates && server.metrics_listen.is_none() {
+    if asks_for_certificates && settings.server.metrics_listen.is_none() {
         " It asks for certificates of clients: set server.metrics_listen, where probes need none"
     } else {
         ""

@@ -49,6 +49,18 @@ pub struct ConnectionLimits {
     pub max_headers: usize,
 }
 
+impl Default for ConnectionLimits {
+    fn default() -> Self {
+        Self {
+            max_connections: NonZeroUsize::new(512).unwrap_or(NonZeroUsize::MIN),
+            header_timeout: Duration::from_secs(10),
+            idle_timeout: Duration::from_secs(75),
+            max_header_bytes: 16 * 1024,
+            max_headers: 100,
+        }
+    }
+}
+
 /// What answers. Each request carries the address of its client, a [`std::net::SocketAddr`], among its
 /// extensions.
 #[derive(Debug, Clone)]

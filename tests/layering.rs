@@ -31,15 +31,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     ("mqtt", &["metrics", "results", "tls"]),
     (
         "settings",
-        &[
-            "access",
-            "geometry",
-            "inference",
-            "mqtt",
-            "results",
-            "server",
-            "tls",
-        ],
+        &["access", "inference", "mqtt", "results", "server", "tls"],
     ),
     ("telemetry", &["settings"]),
     ("probe", &["settings"]),
@@ -162,7 +154,7 @@ const ONLY_KNOWN_TO: [(&str, &[&str]); 27] = [
     ("indicatif", &["cli"]),
     ("plotters", &["evaluation"]),
     ("rumqttc", &["mqtt"]),
-    ("config", &["settings"]),
+    ("secrecy", &["settings"]),
     ("object_store", &["calibration"]),
     (
         "rustls",

@@ -135,25 +135,34 @@ fn every_setting_that_cannot_be_used_ends_the_start_with_a_sentence() {
 }
 
 #[test]
-fn a_check_says_in_a_line_that_the_server_could_start_and_serves_nobody() {
+fn a_check_reports_models_and_access_and_serves_no_client() {
     let address = TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
         .unwrap();
     let listen = address.to_string();
-    let output = run(
-        &["serve", "--check"],
-        &[("LOOKDOWN__SERVER__LISTEN", &listen)],
-    );
-    assert!(output.status.success(), "{output:?}");
-    assert!(output.stderr.is_empty(), "{output:?}");
-    let line = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(line.lines().count(), 1, "{line}");
+    let check = |variables: &[(&str, &str)]| {
+        let mut variables = variables.to_vec();
+        variables.push(("LOOKDOWN__SERVER__LISTEN", &listen));
+        let output = run(&["serve", "--check"], &variables);
+        assert!(output.status.success(), "{output:?}");
+        assert!(output.stderr.is_empty(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let open = check(&[]);
     assert!(
-        line.starts_with(&format!("ready to serve on {listen}: ")),
-        "{line}"
+        open.starts_with(&format!("ready to serve on {listen}: ")),
+        "{open}"
     );
-    assert!(line.contains("ssdlite_mobilenet_v2"), "{line}");
+    assert!(open.contains("ssdlite_mobilenet_v2"), "{open}");
+    assert!(open.contains("access: open, without API keys"), "{open}");
+    let keys = format!("gate:detect+read:{:064}", 7);
+    let keyed = check(&[("LOOKDOWN__ACCESS__KEYS", &keys)]);
+    assert!(
+        keyed.contains(&format!("access: {listen} needs an API key; 1 known")),
+        "{keyed}"
+    );
+    assert!(keyed.contains("\n  gate: detect, read\n"), "{keyed}");
 }
 
 /// A running server.

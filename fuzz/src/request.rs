@@ -6,7 +6,6 @@
 use std::{
     num::NonZeroUsize,
     sync::{Arc, LazyLock},
-    time::Duration,
 };
 
 use axum::{
@@ -19,18 +18,16 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, Access, ApiOptions, ApiState, Readiness},
+    api::{self, ApiOptions, ApiState, Readiness},
     calibration::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
-    geometry::FieldOfViewReading,
     imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
     inference::{
         Detector, HeadOutput, InferenceError, Model, ModelFolder, ModelRepository,
         RepositoryOptions,
     },
     metrics::Metrics,
-    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, ResultLimits, ResultStore},
-    telemetry::Tracer,
 };
 use tokio::runtime::{self, Runtime};
 use tower::ServiceExt;
@@ -124,16 +121,8 @@ fn router() -> Router {
             max_height: MAX_IMAGE_SIDE,
             ..DecodeLimits::default()
         },
-        default_models: DefaultModels::One("nobody".to_owned()),
-        batches: BatchOptions {
-            max_views: one,
-            max_delay: Duration::ZERO,
-        },
-        sessions: one,
-        remap_threads: one,
-        paper_field_of_view: FieldOfViewReading::default(),
         rig_cache_bytes: 1 << 24,
-        remembered_frames: 4,
+        ..EngineOptions::for_testing("nobody")
     };
     let registry = Arc::clone(models.registry());
     let engine = Engine::new(registry, Some(Arc::clone(&calibrations)), options).unwrap();
@@ -155,17 +144,7 @@ fn router() -> Router {
             max_upload_bytes: 1 << 20,
             max_header_bytes: 1 << 14,
             max_headers: 100,
-            zone_metrics: false,
-            pictures_of: Arc::default(),
-            metrics_elsewhere: false,
-            request_timeout: Duration::from_secs(20),
-            min_upload_bytes_per_second: None,
-            request_rate: None,
-            access: Access::Open {
-                own_machine_only: true,
-            },
-            cors_origins: Vec::new(),
-            tracer: Tracer::default(),
+            ..ApiOptions::for_testing()
         },
     ))
 }

@@ -74,6 +74,11 @@ impl KeyList {
         self.0.is_empty()
     }
 
+    /// The names and scopes of all keys.
+    pub fn holders(&self) -> impl Iterator<Item = &Holder> {
+        self.0.iter().map(|(_, holder)| holder)
+    }
+
     /// Whose this key is; `None` when it is nobody's. The time that takes depends on how many keys
     /// there are alone: all are compared, and none until its first difference.
     #[must_use]

@@ -68,7 +68,9 @@ impl AccessKeys {
         self.known().holder_of(key).cloned()
     }
 
-    fn known(&self) -> Arc<KeyList> {
+    /// The keys that are known now.
+    #[must_use]
+    pub fn known(&self) -> Arc<KeyList> {
         let known = self.known.read().unwrap_or_else(PoisonError::into_inner);
         Arc::clone(&known)
     }

@@ -51,6 +51,30 @@ pub struct ApiOptions {
     pub tracer: Tracer,
 }
 
+impl ApiOptions {
+    /// Options for tests: small bodies, and every client may do everything.
+    #[must_use]
+    pub fn for_testing() -> Self {
+        Self {
+            max_body_bytes: 1 << 20,
+            max_upload_bytes: 1 << 24,
+            max_header_bytes: 4096,
+            max_headers: 32,
+            zone_metrics: false,
+            pictures_of: Arc::default(),
+            metrics_elsewhere: false,
+            request_timeout: Duration::from_secs(20),
+            min_upload_bytes_per_second: None,
+            request_rate: None,
+            access: Access::Open {
+                own_machine_only: true,
+            },
+            cors_origins: Vec::new(),
+            tracer: Tracer::default(),
+        }
+    }
+}
+
 /// What the handlers share. Every layer of every request clones it: one count goes up, whatever is in it.
 #[derive(Clone)]
 pub struct ApiState(Arc<Shared>);

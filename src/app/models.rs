@@ -19,7 +19,7 @@ use crate::{
 pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, DefaultModels)> {
     let path = settings.model.find_repository()?;
     let mut one = settings.model.find_one()?;
-    let remote = settings.inference.remote.as_ref();
+    let remote = settings.remote.as_ref();
     if let (None, Some(model)) = (&one, remote.and_then(|remote| remote.model.as_ref())) {
         one = Some(path.join(model));
     }
@@ -34,7 +34,7 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
     let called = defaults.of(Profile::default()).to_owned();
     let options = RepositoryOptions {
         folder: ModelFolder { path, elsewhere },
-        warm_up_views: settings.inference.max_batch_views,
+        warm_up_views: settings.threads.batch_views,
         kept: defaults
             .names()
             .into_iter()
@@ -86,7 +86,7 @@ fn remote_options(remote: &RemoteSettings, called: String) -> RemoteOptions {
         token: remote.token.clone(),
         model: remote.model.clone().unwrap_or_else(|| called.clone()),
         called,
-        patience: remote.patience,
+        patience: remote.timeout,
     }
 }
 

@@ -13,7 +13,7 @@ use super::{App, Sockets};
 use crate::{
     api::{self, Phase},
     server::{self, Services},
-    settings::{Settings, ShutdownSettings},
+    settings::Settings,
     shutdown::Shutdown,
 };
 
@@ -48,7 +48,7 @@ impl App {
             regular: api::router(self.state.clone()),
             beyond_limit: api::crowded_router(self.state.clone()),
         };
-        let limits = &self.settings.server.connections;
+        let limits = &self.settings.connections;
         let tls = self.tls.as_ref();
         let connections = server::serve(
             sockets.main,
@@ -103,7 +103,7 @@ impl App {
             regular: router.clone(),
             beyond_limit: router,
         };
-        let limits = &self.settings.server.connections;
+        let limits = &self.settings.connections;
         server::serve(
             listener,
             None,
@@ -118,10 +118,8 @@ impl App {
     /// Waits to be told to stop, says so for the grace period, and ends when draining has taken too
     /// long.
     async fn wind_up(&self, shutdown: &Shutdown) {
-        let ShutdownSettings {
-            grace,
-            drain_timeout,
-        } = self.settings.shutdown;
+        let grace = self.settings.shutdown.grace;
+        let drain_timeout = self.settings.drain_timeout();
         shutdown.requested().await;
         self.readiness.stopping();
         tracing::info!("told to stop");

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use anyhow::Context;
 use tokio::net::TcpListener;
 
-use crate::settings::ServerSettings;
+use crate::settings::{ServerSettings, variable_of};
 
 /// What the service listens on.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ impl Sockets {
 
 async fn bind(key: &str, address: SocketAddr) -> anyhow::Result<TcpListener> {
     TcpListener::bind(address).await.with_context(|| {
-        let variable = key.to_uppercase().replace('.', "__");
-        format!("{key}: cannot listen on {address}: set LOOKDOWN__{variable} to a free address")
+        let variable = variable_of(key);
+        format!("{key}: cannot listen on {address}: set {variable} to a free address")
     })
 }

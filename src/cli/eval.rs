@@ -13,13 +13,17 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use clap::Args;
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 
 use self::{output::Output, plot_file::PlotFile, truth::TruthFlags};
 use super::{SettingsFile, progress::Progress};
 use crate::{
-    app::engine_for,
+    app::evaluation_engine,
     evaluation::{DataSet, DetectedRow, EvaluationError, detect},
+    geometry::FieldOfViewReading,
     pipeline::{DetectParameters, Engine},
     settings::Settings,
 };
@@ -64,6 +68,16 @@ pub(super) struct Arguments {
     /// Width of Gaussian Soft-NMS [default: 0.3]
     #[arg(long, value_name = "NUMBER")]
     sigma: Option<String>,
+    /// The reading of the paper's field of view, for the profile paper: 53° across, 53° from corner to
+    /// corner, or its formula taken literally, 90°
+    #[arg(
+        long,
+        value_name = "READING",
+        default_value = "horizontal",
+        value_parser = PossibleValuesParser::new(["horizontal", "diagonal", "literal"])
+            .map(|name| reading(&name))
+    )]
+    field_of_view: FieldOfViewReading,
     /// Print one JSON object per row instead of a table
     #[arg(long)]
     json: bool,
@@ -85,6 +99,14 @@ pub(super) struct Arguments {
     from_detections: Vec<PathBuf>,
     #[command(flatten)]
     settings_file: SettingsFile,
+}
+
+fn reading(name: &str) -> FieldOfViewReading {
+    match name {
+        "diagonal" => FieldOfViewReading::Diagonal,
+        "literal" => FieldOfViewReading::Literal,
+        _ => FieldOfViewReading::Horizontal,
+    }
 }
 
 /// Scores every profile with every refinement.
@@ -111,7 +133,7 @@ fn look(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
     let groups = variants::groups(arguments)?;
     let settings = arguments.settings_file.load()?;
     let data_set = arguments.truth.open(&arguments.settings_file)?;
-    let engine = engine_for(&settings, &groups.concat())?;
+    let engine = evaluation_engine(&settings, &groups.concat(), arguments.field_of_view)?;
     for group in groups {
         for row in detect_group(&engine, &data_set, &group, &settings)? {
             if let Some(folder) = &arguments.save_detections {

@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         .enable_all()
         .build()
         .context("the operating system gives no runtime")?;
-    let url = runtime.block_on(probe::ask(&settings.server, probe))?;
+    let url = runtime.block_on(probe::ask(&settings, probe))?;
     writeln!(io::stdout(), "{url} answered yes").context("standard output cannot be written")?;
     Ok(ExitCode::SUCCESS)
 }

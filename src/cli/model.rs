@@ -65,7 +65,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     let mut out = io::stdout().lock();
     write!(out, "{}", description::Lines(detector.description())).context(UNWRITABLE)?;
     writeln!(out, "loaded in    {}", millis(loaded)).context(UNWRITABLE)?;
-    let most = settings.inference.max_batch_views.get().max(BATCH_VIEWS);
+    let most = settings.threads.batch_views.get().max(BATCH_VIEWS);
     let one_view = millis(time(&mut detector, 1)?);
     let most_views = millis(time(&mut detector, most)?);
     let (device, threads) = (settings.inference.device, settings.threads.per_session);

@@ -27,8 +27,8 @@ const LONGEST_LOAD: Duration = Duration::from_secs(10);
 /// Arguments of `lookdown serve`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Only check that the server could start: settings, library, models, calibrations, keys and
-    /// addresses
+    /// Check that the server could start (settings, library, models, calibrations, keys and
+    /// addresses), print the clients that would have access, and end
     #[arg(long)]
     check: bool,
     #[command(flatten)]
@@ -78,11 +78,9 @@ async fn serve(settings: Settings) -> anyhow::Result<()> {
 async fn check(settings: Settings) -> anyhow::Result<()> {
     // Nobody is listened to: the addresses are free again in a moment.
     drop(Sockets::bind(&settings.server).await?);
-    let address = settings.server.listen;
     let app = start(settings).await?;
-    let found = spawn_blocking(move || app.check()).await??;
-    writeln!(io::stdout(), "ready to serve on {address}: {found}")
-        .context("standard output cannot be written")
+    let report = spawn_blocking(move || app.check()).await??;
+    writeln!(io::stdout(), "{report}").context("standard output cannot be written")
 }
 
 async fn start(settings: Settings) -> anyhow::Result<App> {

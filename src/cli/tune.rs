@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let present = Choice {
         sessions: settings.threads.sessions,
         threads: settings.threads.per_session,
-        batch_views: settings.inference.max_batch_views,
+        batch_views: settings.threads.batch_views,
     };
     let mut out = io::stdout().lock();
     let mut say =
@@ -134,11 +134,10 @@ fn toml(choice: Choice) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::RawSettings;
 
     #[test]
     fn every_choice_uses_all_cores_and_the_present_one_is_among_them() {
-        let settings: Settings = RawSettings::default().try_into().unwrap();
+        let settings = crate::settings::load(None, []).unwrap();
         let choices = choices(&settings);
         let cores = settings.threads.remapping.get();
         assert!(choices.iter().all(|choice| {
@@ -148,7 +147,7 @@ mod tests {
         assert!(choices.contains(&Choice {
             sessions: settings.threads.sessions,
             threads: settings.threads.per_session,
-            batch_views: settings.inference.max_batch_views,
+            batch_views: settings.threads.batch_views,
         }));
     }
 
@@ -163,9 +162,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("tuned.toml");
         std::fs::write(&file, told).unwrap();
-        let settings =
-            crate::settings::load(Some(&file), std::collections::HashMap::new()).unwrap();
+        let settings = crate::settings::load(Some(&file), []).unwrap();
         assert_eq!(settings.threads.sessions, three);
-        assert_eq!(settings.inference.max_batch_views, three);
+        assert_eq!(settings.threads.batch_views, three);
     }
 }

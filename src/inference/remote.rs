@@ -23,7 +23,7 @@ use super::{
 use crate::imaging::{NetworkInput, ViewBatch};
 
 pub use server::{RemoteCounts, RemoteOptions, RemoteServer};
-pub use token::{BearerToken, NoToken};
+pub use token::{BearerToken, InvalidToken};
 
 /// A model on an inference server.
 pub struct RemoteDetector {

@@ -9,7 +9,7 @@ mod observation;
 use std::{
     num::NonZeroUsize,
     sync::{Arc, atomic::AtomicUsize},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -58,6 +58,26 @@ pub struct EngineOptions {
     pub rig_cache_bytes: usize,
     /// Most frames of which is remembered what was found in them, for requests that want it.
     pub remembered_frames: usize,
+}
+
+impl EngineOptions {
+    /// Small options for tests: `model` for all profiles, one session, little memory.
+    #[must_use]
+    pub fn for_testing(model: &str) -> Self {
+        Self {
+            decode_limits: DecodeLimits::default(),
+            default_models: DefaultModels::One(model.to_owned()),
+            batches: BatchOptions {
+                max_views: NonZeroUsize::MIN.saturating_add(127),
+                max_delay: Duration::ZERO,
+            },
+            sessions: NonZeroUsize::MIN,
+            remap_threads: NonZeroUsize::MIN,
+            paper_field_of_view: FieldOfViewReading::default(),
+            rig_cache_bytes: 256 << 20,
+            remembered_frames: 4,
+        }
+    }
 }
 
 /// Finds persons in frames.

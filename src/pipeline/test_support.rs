@@ -10,14 +10,11 @@ use std::{
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{
-    BatchOptions, DefaultModels, DetectJob, DetectParameters, Engine, EngineOptions, Ticket,
-};
+use super::{BatchOptions, DetectJob, DetectParameters, Engine, EngineOptions, Ticket};
 use crate::{
     calibration::Calibrations,
     detection::{BBox, ViewPixels},
-    geometry::FieldOfViewReading,
-    imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png, decode::DecodeLimits},
+    imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png},
     inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},
 };
 
@@ -98,17 +95,12 @@ impl BlobDetector {
 
 pub(super) fn engine(detector: BlobDetector, calibrations: Option<Arc<Calibrations>>) -> Engine {
     let options = EngineOptions {
-        decode_limits: DecodeLimits::default(),
-        default_models: DefaultModels::One("blob".to_owned()),
         batches: BatchOptions {
             max_views: NonZeroUsize::new(5).unwrap(),
             max_delay: Duration::ZERO,
         },
-        sessions: NonZeroUsize::MIN,
         remap_threads: NonZeroUsize::new(2).unwrap(),
-        paper_field_of_view: FieldOfViewReading::Horizontal,
-        rig_cache_bytes: 1 << 26,
-        remembered_frames: 2,
+        ..EngineOptions::for_testing("blob")
     };
     let models = ModelRegistry::default();
     models

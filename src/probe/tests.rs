@@ -3,11 +3,11 @@ use std::net::TcpListener;
 use super::*;
 use crate::settings;
 
-fn server(variables: &[(&str, &str)]) -> ServerSettings {
+fn server(variables: &[(&str, &str)]) -> Settings {
     let variables = variables
         .iter()
         .map(|(key, value)| (format!("LOOKDOWN__SERVER__{key}"), (*value).to_owned()));
-    settings::load(None, variables).unwrap().server
+    settings::load(None, variables).unwrap()
 }
 
 const CERTIFICATE: [(&str, &str); 2] = [

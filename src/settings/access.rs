@@ -1,67 +1,67 @@
-//! Who may do what, as it is written and checked.
+//! API keys, and the web pages that may call the server.
 
-use std::path::PathBuf;
+use std::{num::NonZeroU64, path::PathBuf};
 
-use serde::Deserialize;
 use url::{Origin, Url};
 
-use super::{AccessSettings, SettingsError, check::poll_seconds, unshown::Unshown};
+use super::{
+    declare::settings,
+    form::{Form, Refusal, given_path, list, poll_seconds},
+};
 use crate::access::{KeyError, KeyList};
 
-/// Table `access`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub(super) struct RawAccess {
-    keys: Unshown,
-    keys_file: String,
-    poll_seconds: u64,
-    cors_origins: String,
-}
-
-impl Default for RawAccess {
-    fn default() -> Self {
-        Self {
-            keys: Unshown::default(),
-            keys_file: String::new(),
-            poll_seconds: 2,
-            cors_origins: String::new(),
-        }
+settings! {
+    /// API keys, and the web pages that may call the server.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct AccessSettings in "access" {
+        /// The file of API keys, one line each as `lookdown key new` prints it (docs/operations.md). With
+        /// keys, every request except health checks, metrics and the API page needs one. Without keys,
+        /// only clients on the same machine should reach the server. Leave it out for none: an empty
+        /// value is refused.
+        keys_file: Option<PathBuf> = None => given_path("/etc/lookdown/keys.toml");
+        /// The interval in seconds at which that file is checked for changes. 0: never. An invalid new
+        /// version leaves the old keys in use and shows in the log.
+        poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
+        /// Keys in addition to those of the file, each as `name:scope+scope:sha256`.
+        keys: KeyList = KeyList::default() => keys();
+        /// Origins of web pages that may call the server from a browser, such as
+        /// `https://dashboard.example`.
+        cors_origins: Vec<String> = Vec::new() => origins();
     }
 }
 
-impl TryFrom<RawAccess> for AccessSettings {
-    type Error = SettingsError;
-
-    fn try_from(raw: RawAccess) -> Result<Self, SettingsError> {
-        let keys: Result<KeyList, KeyError> = raw.keys.0.parse();
-        let origins = raw.cors_origins.split(',').map(str::trim);
-        let origins = origins.filter(|origin| !origin.is_empty());
-        Ok(Self {
-            keys: keys.map_err(|error| SettingsError::Refused {
-                key: "access.keys".to_owned(),
-                problem: error.to_string(),
-            })?,
-            keys_file: (!raw.keys_file.is_empty()).then(|| PathBuf::from(raw.keys_file)),
-            poll_seconds: poll_seconds("access.poll_seconds", raw.poll_seconds)?,
-            cors_origins: origins.map(origin).collect::<Result<_, _>>()?,
-        })
-    }
+fn keys() -> Form<KeyList> {
+    list(
+        "API keys",
+        |entries| {
+            let keys = entries.join(",").parse();
+            keys.map_err(|error: KeyError| Refusal::Hidden(error.to_string()))
+        },
+        // No key is a default.
+        |_| Vec::new(),
+    )
 }
 
-/// An origin as browsers write it, or nothing that any browser would send.
-fn origin(text: &str) -> Result<String, SettingsError> {
+/// Origins as browsers write them: any other text would never match.
+fn origins() -> Form<Vec<String>> {
+    list(
+        "origins",
+        |texts| texts.iter().map(|&text| origin(text)).collect(),
+        Vec::clone,
+    )
+}
+
+fn origin(text: &str) -> Result<String, Refusal> {
     let url = Url::parse(text).ok();
-    let origin = url.map(|url| url.origin());
-    match origin {
+    match url.map(|url| url.origin()) {
         Some(origin @ Origin::Tuple(..)) if origin.ascii_serialization() == text => {
             Ok(text.to_owned())
         }
-        _ => Err(SettingsError::Value {
-            key: "access.cors_origins".to_owned(),
-            value: format!("{text:?}"),
-            remedy: "give scheme, host and, unless it is the usual one, port, such as \
-                     https://dashboard.example, with nothing behind them"
+        _ => Err(Refusal::Part(
+            format!("{text:?}"),
+            "give scheme, host and, unless it is the usual one, port, such as \
+             https://dashboard.example, with nothing behind them"
                 .to_owned(),
-        }),
+        )),
     }
 }

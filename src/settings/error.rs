@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-/// Settings that cannot be used: each message names the key, its value and what to do.
+use super::form::Refusal;
+
+/// Settings that cannot be used: each message names the key, its value and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsError {
     /// The settings file cannot be read.
@@ -10,7 +12,7 @@ pub enum SettingsError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The settings file is not TOML.
@@ -18,25 +20,45 @@ pub enum SettingsError {
     NotToml {
         /// The file.
         path: PathBuf,
-        /// Where, and what was expected there.
+        /// The line, and what was expected there.
         problem: String,
     },
-    /// A key that does not exist, or a value of another shape than its key's.
-    #[error("{key}: {problem}; check the settings file and the LOOKDOWN__ variables")]
-    Refused {
-        /// The key, or the table it was expected in.
-        key: String,
-        /// What is wrong, with the keys there are.
+    /// A key or a table that does not exist.
+    #[error("{place}: there is no `{name}` {parent}; use one of {known}")]
+    Unknown {
+        /// The key or the variable.
+        place: String,
+        /// The part that is unknown.
+        name: String,
+        /// The table it was expected in.
+        parent: String,
+        /// The names that exist.
+        known: String,
+    },
+    /// A variable whose name is a setting's but for the number of underscores.
+    #[error("the variable {name} is not read: rename it to {right}")]
+    MisnamedVariable {
+        /// The variable.
+        name: String,
+        /// The name of the setting's variable.
+        right: String,
+    },
+    /// A value that cannot be used and may hold a secret, so that it is not repeated.
+    #[error("{key}: {problem}")]
+    Hidden {
+        /// The key.
+        key: &'static str,
+        /// The problem and the remedy.
         problem: String,
     },
     /// A value that cannot be used.
     #[error("{key} is {value}: {remedy}")]
     Value {
         /// The key.
-        key: String,
+        key: &'static str,
         /// The value as given.
         value: String,
-        /// What would be right.
+        /// The remedy.
         remedy: String,
     },
     /// A file or folder that is not there.
@@ -44,11 +66,35 @@ pub enum SettingsError {
     Missing {
         /// The key.
         key: &'static str,
-        /// What was looked for.
+        /// The kind of file or folder.
         what: &'static str,
-        /// Where it was looked for.
+        /// The path.
         path: PathBuf,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
+}
+
+impl SettingsError {
+    /// The refusal of the value of `key`, which is `shown` where the refusal lets it be repeated.
+    pub(super) fn of(key: &'static str, shown: impl FnOnce() -> String, refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Shown(remedy) => Self::value(key, shown(), remedy),
+            Refusal::Part(value, remedy) => Self::value(key, value, remedy),
+            Refusal::Hidden(problem) => Self::Hidden { key, problem },
+        }
+    }
+
+    /// A value that cannot be used.
+    pub(super) fn value(
+        key: &'static str,
+        value: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self::Value {
+            key,
+            value: value.into(),
+            remedy: remedy.into(),
+        }
+    }
 }

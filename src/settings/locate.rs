@@ -1,4 +1,4 @@
-//! Finding the files that settings name, and those whose place nobody set.
+//! Finding the files that settings name, and those at their default places.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,10 @@ pub(super) const DEFAULT_REPOSITORY: &str = "models";
 /// Default ONNX Runtime library, where `make setup` puts it.
 pub(super) const DEFAULT_LIBRARY: &str = "runtime/libonnxruntime.so";
 
-/// The folder of calibrations; `None` when nobody set one and there is none at the default place.
+/// The folder of calibrations; `None` when none is set and there is none at the default place.
 ///
 /// # Errors
-/// [`SettingsError::Missing`] when somebody set one that is not there.
+/// [`SettingsError::Missing`] when one is set that is not there.
 pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError> {
     let found = locate(folder, DEFAULT_CALIBRATIONS);
     if found.is_none() && folder != Path::new(DEFAULT_CALIBRATIONS) {
@@ -29,7 +29,7 @@ pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError
 }
 
 impl ModelSettings {
-    /// The folder or file of the one model for all profiles, when somebody set one.
+    /// The folder or file of the one model for all profiles, when one is set.
     ///
     /// # Errors
     /// [`SettingsError::Missing`] when it is not there.
@@ -97,9 +97,9 @@ pub fn find_beside_executable(path: &Path) -> Option<PathBuf> {
 
 /// The existing file or folder that `path` means.
 ///
-/// A path somebody set is taken as it is. The default one is looked for in the current directory
+/// A path that is set is taken as it is. The default one is looked for in the current directory
 /// and then beside the executable and in the folders above it, so that
-/// `/anywhere/lookdown/target/release/lookdown` finds what belongs to it wherever it is called.
+/// `/anywhere/lookdown/target/release/lookdown` finds what belongs to it from any current directory.
 fn locate(path: &Path, default: &str) -> Option<PathBuf> {
     if path == Path::new(default) {
         return find_beside_executable(path);

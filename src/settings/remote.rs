@@ -1,108 +1,141 @@
-//! Networks on another server, as they are asked for and checked.
+//! The inference server that runs the models, if they do not run in this process.
 
 use std::time::Duration;
 
+use secrecy::{ExposeSecret, SecretString};
 use url::Url;
 
 use super::{
-    SettingsError,
-    check::{MAX_TIMEOUT_MILLIS, choice, millis},
-    raw::{RawInference, RawModel},
-    unshown::Unshown,
+    ModelSettings, SettingsError,
+    declare::settings,
+    form::{Form, MAX_TIMEOUT_MILLIS, Refusal, choice, millis, optional, parsed, secret, text},
 };
-use crate::inference::{BearerToken, NoToken};
+use crate::inference::{BearerToken, InvalidToken};
 
-/// The backend that runs networks here.
-pub(super) const ONNX: &str = "onnx";
-/// The backend that has a server of the Open Inference Protocol (KServe V2) run them.
-const V2: &str = "v2";
+/// The remedy for an address that cannot be used, or that is missing.
+const ADDRESS: &str = "give the address of the inference server, such as http://127.0.0.1:8000, without \
+                       a password and without /v2";
 
-/// What is shown instead of something secret.
-const HIDDEN: &str = "***";
+/// The program that runs the models.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Backend {
+    /// ONNX Runtime in this process.
+    Onnx,
+    /// A server of the Open Inference Protocol (KServe V2).
+    V2,
+}
 
-/// A server that networks run on.
+settings! {
+    /// The inference server as it is written.
+    #[derive(Debug, Clone)]
+    pub(super) struct RemoteKeys in "inference" {
+        /// The program that runs models: `onnx` is ONNX Runtime in this process, `v2` a server of the
+        /// Open Inference Protocol, also called KServe V2 (docs/open-inference-protocol.md).
+        backend: Backend = Backend::Onnx => choice(&[("onnx", Backend::Onnx), ("v2", Backend::V2)]);
+        /// The address of that server, `http://` or `https://`.
+        url: Option<Url> = None => optional(address());
+        /// The token for that server, if it needs one, sent as `Authorization: Bearer …`. It is better
+        /// kept in the variable than in a file.
+        bearer_token: Option<SecretString> = None => secret("token");
+        /// The name of the model on that server. Its manifest is `model.path`, or the folder of that
+        /// name in `model.repository`. Empty: the name in the manifest at `model.path`.
+        model: Option<String> = None => optional(text("a name", |_| true));
+        /// The longest time for one request to that server.
+        timeout as "timeout_millis": Duration = Duration::from_secs(10) => millis(1..=MAX_TIMEOUT_MILLIS);
+    }
+}
+
+/// An inference server.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RemoteSettings {
     /// Its address, without `/v2`.
     pub url: Url,
-    /// What it wants to see.
+    /// The token that it needs.
     pub token: Option<BearerToken>,
-    /// What the model is called there; by default as its manifest calls it.
+    /// The name of the model on it; by default the name in its manifest.
     pub model: Option<String>,
-    /// Longest that one request to it may take.
-    pub patience: Duration,
+    /// The longest time for one request to it.
+    pub timeout: Duration,
 }
 
-impl RemoteSettings {
-    /// What is asked for; `None` when networks run here.
+impl RemoteKeys {
+    /// The server; `None` when models run in this process.
     pub(super) fn checked(
-        raw: &RawInference,
-        model: &RawModel,
-    ) -> Result<Option<Self>, SettingsError> {
-        let backends = [(ONNX, false), (V2, true)];
-        let is_remote = choice("inference.backend", &raw.backend, &backends)?;
-        let patience = millis(
-            "inference.timeout_millis",
-            raw.timeout_millis,
-            1..=MAX_TIMEOUT_MILLIS,
-        )?;
-        if !is_remote {
-            let hidden = if raw.bearer_token.0.is_empty() {
-                ""
-            } else {
-                HIDDEN
-            };
-            let all = [
-                ("inference.url", raw.url.as_str()),
-                ("inference.bearer_token", hidden),
-                ("inference.model", &raw.model),
-            ];
-            let unused = all.into_iter().find(|(_, value)| !value.is_empty());
-            return unused.map_or(Ok(None), |(key, value)| {
-                let remedy =
-                    "it is of use with inference.backend = \"v2\": set that too, or leave it out";
-                Err(refused(key, value, remedy))
-            });
+        self,
+        model: &ModelSettings,
+    ) -> Result<Option<RemoteSettings>, SettingsError> {
+        if self.backend == Backend::Onnx {
+            return self.refuse_unused().map(|()| None);
         }
-        if raw.model.is_empty() && model.path.is_empty() {
-            let remedy = "give the name of the server's model, whose manifest is in the folder of that \
-                          name in model.repository, or set model.path to its manifest";
-            return Err(refused("inference.model", &raw.model, remedy));
+        if self.model.is_none() && model.path.is_none() {
+            return Err(SettingsError::value(
+                "inference.model",
+                "empty",
+                "give the name of the server's model, whose manifest is in the folder of that name in \
+                 model.repository, or set model.path to its manifest",
+            ));
         }
-        Ok(Some(Self {
-            url: address(&raw.url)?,
-            token: token(&raw.bearer_token)?,
-            model: (!raw.model.is_empty()).then(|| raw.model.clone()),
-            patience,
+        let url = self.url;
+        let token = self.bearer_token.map(|token| token.expose_secret().parse());
+        Ok(Some(RemoteSettings {
+            url: url.ok_or_else(|| SettingsError::value("inference.url", "empty", ADDRESS))?,
+            token: token
+                .transpose()
+                .map_err(|error: InvalidToken| SettingsError::Hidden {
+                    key: "inference.bearer_token",
+                    problem: error.to_string(),
+                })?,
+            model: self.model,
+            timeout: self.timeout,
         }))
+    }
+
+    fn refuse_unused(self) -> Result<(), SettingsError> {
+        const REMEDY: &str = "has an effect with inference.backend = \"v2\" only: set that too, or \
+                              leave it out";
+        if let Some(url) = self.url {
+            return Err(SettingsError::value(
+                "inference.url",
+                url,
+                format!("it {REMEDY}"),
+            ));
+        }
+        if let Some(model) = self.model {
+            return Err(SettingsError::value(
+                "inference.model",
+                model,
+                format!("it {REMEDY}"),
+            ));
+        }
+        self.bearer_token.map_or(Ok(()), |_| {
+            Err(SettingsError::Hidden {
+                key: "inference.bearer_token",
+                problem: format!("it {REMEDY}"),
+            })
+        })
     }
 }
 
 /// The server's address. One with a password is refused: addresses are shown.
-fn address(told: &str) -> Result<Url, SettingsError> {
-    let remedy = "give the address of the inference server, such as http://127.0.0.1:8000, without a \
-                  password and without /v2";
-    let url = told.parse::<Url>().ok().filter(|url| {
-        let is_http = matches!(url.scheme(), "http" | "https");
-        let is_plain = url.query().is_none() && url.fragment().is_none();
-        let is_open = url.username().is_empty() && url.password().is_none();
-        is_http && is_plain && is_open
-    });
-    // A password in it is not repeated.
-    let shown = if told.contains('@') { HIDDEN } else { told };
-    url.ok_or_else(|| refused("inference.url", shown, remedy))
-}
-
-fn token(written: &Unshown) -> Result<Option<BearerToken>, SettingsError> {
-    let Unshown(written) = written;
-    let token = (!written.is_empty()).then(|| written.parse()).transpose();
-    token.map_err(|remedy: NoToken| refused("inference.bearer_token", HIDDEN, &remedy.to_string()))
-}
-
-fn refused(key: &str, value: &str, remedy: &str) -> SettingsError {
-    SettingsError::Value {
-        key: key.to_owned(),
-        value: format!("{value:?}"),
-        remedy: remedy.to_owned(),
-    }
+fn address() -> Form<Url> {
+    parsed(
+        "URL",
+        |text| {
+            let url = text.parse::<Url>().ok().filter(|url| {
+                let is_http = matches!(url.scheme(), "http" | "https");
+                let is_plain = url.query().is_none() && url.fragment().is_none();
+                let is_open = url.username().is_empty() && url.password().is_none();
+                is_http && is_plain && is_open
+            });
+            url.ok_or_else(|| {
+                // A password in it is not repeated.
+                if text.contains('@') {
+                    Refusal::Hidden(ADDRESS.to_owned())
+                } else {
+                    Refusal::Shown(ADDRESS.to_owned())
+                }
+            })
+        },
+        Url::to_string,
+    )
 }

@@ -1,105 +1,110 @@
-//! What is kept of reports, as it is written and checked.
+//! The result store: the memory of this process, or a Redis that several servers share.
 
-use std::time::Duration;
+use std::{collections::BTreeSet, ops::RangeInclusive, time::Duration};
 
-use serde::Deserialize;
+use secrecy::{ExposeSecret, SecretString};
 
 use super::{
-    ResultSettings, SettingsError,
-    check::{MAX_BYTES, count, size, within},
+    SettingsError,
+    declare::settings,
+    form::{Form, MAX_BYTES, count, list, seconds, secret, text, whole},
 };
 use crate::results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
 
 /// 8 MiB: any one report has room.
 const MIN_BYTES: u64 = 8 << 20;
 /// A minute to a year.
-const AGES: std::ops::RangeInclusive<u64> = 60..=366 * 86_400;
+const AGES: RangeInclusive<u64> = 60..=366 * 86_400;
 
-/// Table `results`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub(super) struct RawResults {
-    url: String,
-    key_prefix: String,
-    max_age_seconds: u64,
-    max_cameras: u64,
-    history_per_camera: u64,
-    max_reports: u64,
-    max_bytes: u64,
-    pictures: String,
-    max_pictures: u64,
-    max_listeners: u64,
+/// The result store.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResultSettings {
+    /// The Redis that servers share; `None` for the memory of this process.
+    pub redis: Option<RedisOptions>,
+    /// The cameras whose latest image is kept as well.
+    pub pictures_of: PicturesOf,
+    /// The limits of the store.
+    pub limits: ResultLimits,
 }
 
-impl Default for RawResults {
-    fn default() -> Self {
-        let limits = ResultLimits::default();
-        Self {
-            url: String::new(),
-            key_prefix: "lookdown".to_owned(),
-            max_age_seconds: 86_400,
-            max_cameras: limits.max_cameras.get() as u64,
-            history_per_camera: limits.history_per_camera.get() as u64,
-            max_reports: limits.max_reports.get() as u64,
-            max_bytes: limits.max_bytes as u64,
-            pictures: String::new(),
-            max_pictures: limits.max_pictures.get() as u64,
-            max_listeners: limits.max_listeners.get() as u64,
-        }
+settings! {
+    /// The result store as it is written, beside its limits.
+    #[derive(Debug, Clone)]
+    pub(super) struct ResultKeys in "results" {
+        /// The Redis in which several servers keep their reports (docs/results-api.md), as
+        /// `redis://user:password@host:6379/0`, or `rediss://` for TLS. Empty: reports are kept in
+        /// memory. A URL with a password is better kept in the variable than in a file.
+        url: Option<SecretString> = None => secret("URL of a Redis");
+        /// The prefix of all keys in that Redis. Servers with the same prefix share their reports.
+        key_prefix: String = "lookdown".to_owned() => key_prefix();
+        /// The longest time that a report is kept in that Redis.
+        max_age as "max_age_seconds": Duration = Duration::from_secs(86_400) => seconds(AGES);
+        /// The cameras whose latest image is kept for `/results/{camera}/latest.jpg`, by name; `"*"` is
+        /// all. Images show persons. Each takes 4 MiB at most.
+        pictures: PicturesOf = PicturesOf::default() => pictures();
     }
 }
 
-impl TryFrom<RawResults> for ResultSettings {
-    type Error = SettingsError;
+settings! {
+    in "results" fill ResultLimits {
+        /// The most cameras whose reports are kept. The one without reports for longest goes first.
+        max_cameras => count();
+        /// The most reports of one camera, its latest included.
+        history_per_camera => count();
+        /// The most reports of all cameras. The oldest that is not its camera's latest goes first.
+        max_reports => count();
+        /// The most bytes of all reports. The oldest that is not its camera's latest goes first.
+        max_bytes => whole(MIN_BYTES..=MAX_BYTES);
+        /// The most cameras whose latest image is kept. The one without reports for longest goes first.
+        max_pictures => count();
+        /// The most event streams and requests that wait for a newer report. Further ones are answered
+        /// with 429.
+        max_listeners => count();
+    }
+}
 
-    fn try_from(raw: RawResults) -> Result<Self, SettingsError> {
-        Ok(Self {
-            redis: redis(&raw)?,
-            pictures_of: pictures_of(&raw.pictures),
-            limits: ResultLimits {
-                max_cameras: count("results.max_cameras", raw.max_cameras)?,
-                history_per_camera: count("results.history_per_camera", raw.history_per_camera)?,
-                max_reports: count("results.max_reports", raw.max_reports)?,
-                max_bytes: size("results.max_bytes", raw.max_bytes, MIN_BYTES..=MAX_BYTES)?,
-                max_pictures: count("results.max_pictures", raw.max_pictures)?,
-                max_listeners: count("results.max_listeners", raw.max_listeners)?,
-            },
+impl ResultKeys {
+    /// The store, within `limits`.
+    pub(super) fn checked(self, limits: ResultLimits) -> Result<ResultSettings, SettingsError> {
+        let address = self
+            .url
+            .map(|url| url.expose_secret().parse::<RedisAddress>());
+        let address = address.transpose().map_err(|error: RedisAddressError| {
+            SettingsError::value("results.url", "no URL of a Redis", error.to_string())
+        })?;
+        Ok(ResultSettings {
+            redis: address.map(|address| RedisOptions {
+                address,
+                key_prefix: self.key_prefix,
+                max_age: self.max_age,
+            }),
+            pictures_of: self.pictures,
+            limits,
         })
     }
 }
 
-/// `*` is every camera.
-fn pictures_of(list: &str) -> PicturesOf {
-    let cameras = || list.split(',').map(str::trim);
-    if cameras().any(|camera| camera == "*") {
-        return PicturesOf::All;
-    }
-    let named = cameras().filter(|camera| !camera.is_empty());
-    PicturesOf::Some(named.map(ToOwned::to_owned).collect())
+fn key_prefix() -> Form<String> {
+    text("1 to 64 of a-z, A-Z, 0-9, '_', '.' and '-'", |prefix| {
+        let is_word = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
+        (1..=64).contains(&prefix.len()) && prefix.chars().all(is_word)
+    })
 }
 
-fn redis(raw: &RawResults) -> Result<Option<RedisOptions>, SettingsError> {
-    let is_word = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
-    if !(1..=64).contains(&raw.key_prefix.len()) || !raw.key_prefix.chars().all(is_word) {
-        return Err(SettingsError::Value {
-            key: "results.key_prefix".to_owned(),
-            value: format!("{:?}", raw.key_prefix),
-            remedy: "give 1 to 64 of a-z, A-Z, 0-9, '_', '.' and '-'".to_owned(),
-        });
-    }
-    let max_age = within("results.max_age_seconds", raw.max_age_seconds, AGES)?;
-    if raw.url.is_empty() {
-        return Ok(None);
-    }
-    let address: Result<RedisAddress, _> = raw.url.parse();
-    let address = address.map_err(|error: RedisAddressError| SettingsError::Value {
-        key: "results.url".to_owned(),
-        value: "no URL of a Redis".to_owned(),
-        remedy: error.to_string(),
-    })?;
-    Ok(Some(RedisOptions {
-        address,
-        key_prefix: raw.key_prefix.clone(),
-        max_age: Duration::from_secs(max_age),
-    }))
+/// `*` is every camera.
+fn pictures() -> Form<PicturesOf> {
+    list(
+        "names of cameras",
+        |cameras| {
+            Ok(if cameras.contains(&"*") {
+                PicturesOf::All
+            } else {
+                PicturesOf::Some(cameras.iter().map(|&camera| camera.to_owned()).collect())
+            })
+        },
+        |pictures| match pictures {
+            PicturesOf::All => vec!["*".to_owned()],
+            PicturesOf::Some(cameras) => BTreeSet::clone(cameras).into_iter().collect(),
+        },
+    )
 }

@@ -13,24 +13,50 @@
 
 use std::num::NonZeroUsize;
 
+use super::{declare::settings, form::count};
 use crate::inference::Device;
 
 /// One session uploads and renders while the other one computes.
 const SESSIONS_ELSEWHERE: NonZeroUsize = NonZeroUsize::new(2).unwrap();
-/// Views that a GPU or another server looks at in one run.
+/// Views in one run on a GPU or another server.
 const BATCH_VIEWS_ELSEWHERE: NonZeroUsize = NonZeroUsize::new(8).unwrap();
 
-/// Where networks compute.
+settings! {
+    /// The use of the cores as it is written.
+    #[derive(Debug, Clone)]
+    pub(super) struct ThreadKeys in "inference" {
+        /// The sessions of each model, which run side by side. 0: on a CPU one for each core that the
+        /// machine or the container's CPU limit gives, on a GPU or another server two. `lookdown tune`
+        /// measures the best number.
+        sessions: Option<NonZeroUsize> = None => count();
+        /// The threads of each session. 0: one; where `inference.sessions` is set, their share of the
+        /// cores.
+        threads: Option<NonZeroUsize> = None => count();
+        /// The most views in one run of the network, of one or several frames. 0: one on a CPU, where
+        /// more is not faster, eight on a GPU or another server.
+        max_batch_views: Option<NonZeroUsize> = None => count();
+    }
+}
+
+impl ThreadKeys {
+    /// The plan for this process.
+    pub(super) fn plan(&self, device: Device, is_remote: bool) -> ThreadPlan {
+        let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        ThreadPlan::of(cores, Computing::of(device, is_remote), self)
+    }
+}
+
+/// The processor that runs the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Computing {
-    /// On the cores of this process.
+enum Computing {
+    /// The cores of this process.
     Here,
-    /// On a GPU or another server: the processor only hands over and takes back.
+    /// A GPU or another server: the processor only sends views and receives boxes.
     Elsewhere,
 }
 
 impl Computing {
-    pub(super) fn of(device: Device, is_remote: bool) -> Self {
+    fn of(device: Device, is_remote: bool) -> Self {
         match device {
             Device::Cpu if !is_remote => Self::Here,
             _ => Self::Elsewhere,
@@ -38,7 +64,7 @@ impl Computing {
     }
 }
 
-/// How many threads each stage has.
+/// The numbers of threads of each stage, and of views in a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ThreadPlan {
     /// Frames worked on at once; each is decoded and merged on one thread. One more than there are
@@ -50,37 +76,26 @@ pub struct ThreadPlan {
     pub sessions: NonZeroUsize,
     /// Threads within one run of the network.
     pub per_session: NonZeroUsize,
+    /// Most views in one run of the network.
+    pub batch_views: NonZeroUsize,
 }
 
 impl ThreadPlan {
-    /// The plan for this process, with what the operator wants, if anything.
-    #[must_use]
-    pub fn for_this_process(
-        computing: Computing,
-        sessions: Option<NonZeroUsize>,
-        per_session: Option<NonZeroUsize>,
-    ) -> Self {
-        let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-        Self::of(cores, computing, sessions, per_session)
-    }
-
-    fn of(
-        cores: NonZeroUsize,
-        computing: Computing,
-        sessions: Option<NonZeroUsize>,
-        per_session: Option<NonZeroUsize>,
-    ) -> Self {
+    fn of(cores: NonZeroUsize, computing: Computing, keys: &ThreadKeys) -> Self {
         let share = |count: NonZeroUsize| {
             NonZeroUsize::new(cores.get() / count.get()).unwrap_or(NonZeroUsize::MIN)
         };
-        let (sessions, per_session) = match computing {
+        let (sessions, per_session) = (keys.sessions, keys.threads);
+        let (sessions, per_session, batch_views) = match computing {
             Computing::Here => (
                 sessions.unwrap_or_else(|| per_session.map_or(cores, share)),
                 per_session.unwrap_or_else(|| sessions.map_or(NonZeroUsize::MIN, share)),
+                NonZeroUsize::MIN,
             ),
             Computing::Elsewhere => (
                 sessions.unwrap_or(SESSIONS_ELSEWHERE),
                 per_session.unwrap_or(NonZeroUsize::MIN),
+                BATCH_VIEWS_ELSEWHERE,
             ),
         };
         Self {
@@ -88,15 +103,8 @@ impl ThreadPlan {
             remapping: cores,
             sessions,
             per_session,
+            batch_views: keys.max_batch_views.unwrap_or(batch_views),
         }
-    }
-}
-
-/// Most views in one run of the network, where the operator leaves the choice.
-pub(super) fn batch_views(computing: Computing) -> NonZeroUsize {
-    match computing {
-        Computing::Here => NonZeroUsize::MIN,
-        Computing::Elsewhere => BATCH_VIEWS_ELSEWHERE,
     }
 }
 
@@ -105,20 +113,19 @@ mod tests {
     use super::*;
 
     /// Sessions, and threads in each, on eight cores.
-    fn plan(
-        device: Device,
-        is_remote: bool,
-        sessions: usize,
-        per_session: usize,
-    ) -> (usize, usize) {
-        let (cores, wanted) = (NonZeroUsize::new(8).unwrap(), NonZeroUsize::new);
+    fn plan(device: Device, is_remote: bool, sessions: usize, threads: usize) -> (usize, usize) {
+        let keys = ThreadKeys {
+            sessions: NonZeroUsize::new(sessions),
+            threads: NonZeroUsize::new(threads),
+            ..ThreadKeys::default()
+        };
         let computing = Computing::of(device, is_remote);
-        let plan = ThreadPlan::of(cores, computing, wanted(sessions), wanted(per_session));
+        let plan = ThreadPlan::of(NonZeroUsize::new(8).unwrap(), computing, &keys);
         (plan.sessions.get(), plan.per_session.get())
     }
 
     #[test]
-    fn each_core_has_a_session_of_its_own_unless_somebody_says_otherwise() {
+    fn each_core_has_a_session_of_its_own_by_default() {
         assert_eq!(plan(Device::Cpu, false, 0, 0), (8, 1));
         assert_eq!(plan(Device::Cpu, false, 2, 0), (2, 4));
         assert_eq!(plan(Device::Cpu, false, 0, 3), (2, 3));
@@ -131,12 +138,14 @@ mod tests {
         assert_eq!(plan(Device::Cuda(0), false, 0, 0), (2, 1));
         assert_eq!(plan(Device::TensorRt(0), false, 1, 2), (1, 2));
         assert_eq!(plan(Device::Cpu, true, 0, 0), (2, 1));
-        assert_eq!(batch_views(Computing::Elsewhere).get(), 8);
+        let eight_cores = NonZeroUsize::new(8).unwrap();
+        let plan = ThreadPlan::of(eight_cores, Computing::Elsewhere, &ThreadKeys::default());
+        assert_eq!(plan.batch_views.get(), 8);
     }
 
     #[test]
     fn one_core_is_enough() {
-        let plan = ThreadPlan::of(NonZeroUsize::MIN, Computing::Here, None, None);
+        let plan = ThreadPlan::of(NonZeroUsize::MIN, Computing::Here, &ThreadKeys::default());
         assert_eq!((plan.sessions.get(), plan.per_session.get()), (1, 1));
         assert_eq!((plan.remapping.get(), plan.frame_workers.get()), (1, 2));
     }

@@ -1,96 +1,64 @@
-//! TLS, as it is written and checked.
+//! TLS: a certificate and its private key, given together or not at all.
 
-use std::path::PathBuf;
-
-use serde::Deserialize;
+use std::{num::NonZeroU64, path::PathBuf, time::Duration};
 
 use super::{
     SettingsError,
-    check::{millis, poll_seconds},
+    declare::settings,
+    form::{millis, optional, path, poll_seconds},
 };
 use crate::tls::TlsOptions;
 
-/// A minute: nobody shakes hands for longer.
+/// A minute: no client needs longer for a handshake.
 const MAX_HANDSHAKE_MILLIS: u64 = 60_000;
-/// What PEM begins with: here it is a secret in the wrong place.
-const PEM: &str = "-----BEGIN";
 
-/// Table `server.tls`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub(super) struct RawTls {
-    certificate: String,
-    private_key: String,
-    client_certificates: String,
-    poll_seconds: u64,
-    handshake_timeout_millis: u64,
-}
-
-impl Default for RawTls {
-    fn default() -> Self {
-        Self {
-            certificate: String::new(),
-            private_key: String::new(),
-            client_certificates: String::new(),
-            poll_seconds: 2,
-            handshake_timeout_millis: 10_000,
-        }
+settings! {
+    /// TLS as it is written.
+    #[derive(Debug, Clone)]
+    pub(super) struct TlsKeys in "server.tls" {
+        /// The PEM file of the server's certificate, followed by the intermediate certificates. With a
+        /// certificate and a private key the server speaks HTTPS, without them plain HTTP.
+        certificate: Option<PathBuf> = None => optional(path());
+        /// The PEM file of the certificate's private key.
+        private_key: Option<PathBuf> = None => optional(path());
+        /// The PEM file of certificate authorities. Each client must then show a certificate of one of
+        /// them.
+        client_certificates: Option<PathBuf> = None => optional(path());
+        /// The interval in seconds at which these files are checked for changes. 0: never. An invalid
+        /// new version leaves the old one in use and shows in the metrics and in the log.
+        poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
+        /// The longest time for a TLS handshake.
+        handshake_timeout as "handshake_timeout_millis": Duration = Duration::from_secs(10)
+            => millis(1..=MAX_HANDSHAKE_MILLIS);
     }
 }
 
-impl RawTls {
-    /// What is asked for; `None` for no TLS.
-    pub(super) fn checked(&self) -> Result<Option<TlsOptions>, SettingsError> {
-        let poll_seconds = poll_seconds("server.tls.poll_seconds", self.poll_seconds)?;
-        let handshake_timeout = millis(
-            "server.tls.handshake_timeout_millis",
-            self.handshake_timeout_millis,
-            1..=MAX_HANDSHAKE_MILLIS,
-        )?;
-        let certificate = file("server.tls.certificate", &self.certificate)?;
-        let private_key = file("server.tls.private_key", &self.private_key)?;
-        let client_certificates =
-            file("server.tls.client_certificates", &self.client_certificates)?;
-        let missing = |key: &str, remedy: &str| SettingsError::Value {
-            key: key.to_owned(),
-            value: "empty".to_owned(),
-            remedy: remedy.to_owned(),
-        };
-        match (certificate, private_key) {
+impl TlsKeys {
+    /// The options of TLS; `None` for plain HTTP.
+    pub(super) fn checked(self) -> Result<Option<TlsOptions>, SettingsError> {
+        let missing = |key, remedy| Err(SettingsError::value(key, "empty", remedy));
+        match (self.certificate, self.private_key) {
             (Some(certificate), Some(private_key)) => Ok(Some(TlsOptions {
                 certificate,
                 private_key,
-                client_certificates,
-                poll_seconds,
-                handshake_timeout,
+                client_certificates: self.client_certificates,
+                poll_seconds: self.poll_seconds,
+                handshake_timeout: self.handshake_timeout,
             })),
-            (Some(_), None) => Err(missing(
+            (Some(_), None) => missing(
                 "server.tls.private_key",
                 "give the file of the certificate's private key, or leave the certificate out",
-            )),
-            (None, Some(_)) => Err(missing(
+            ),
+            (None, Some(_)) => missing(
                 "server.tls.certificate",
                 "give the file of the private key's certificate, or leave the private key out",
-            )),
-            (None, None) if client_certificates.is_some() => Err(missing(
+            ),
+            (None, None) if self.client_certificates.is_some() => missing(
                 "server.tls.certificate",
                 "clients show certificates over TLS only: give the server's certificate and private \
                  key, or leave client_certificates out",
-            )),
+            ),
             (None, None) => Ok(None),
         }
     }
-}
-
-/// The path that is written; `None` for none.
-fn file(key: &str, value: &str) -> Result<Option<PathBuf>, SettingsError> {
-    if value.contains(PEM) {
-        // It may be the private key: it is not repeated.
-        return Err(SettingsError::Value {
-            key: key.to_owned(),
-            value: "PEM itself".to_owned(),
-            remedy: "write it into a file and give the path of that".to_owned(),
-        });
-    }
-    Ok((!value.is_empty()).then(|| PathBuf::from(value)))
 }

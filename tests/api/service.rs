@@ -19,11 +19,10 @@ use lookdown::{
     api::{self, Access, ApiOptions, ApiState, Readiness, RequestRate},
     app::Assembly,
     calibration::{Calibrations, FolderStore},
-    geometry::FieldOfViewReading,
-    imaging::{Frame, NetworkInput, annotate::encode_png, decode::DecodeLimits},
+    imaging::{Frame, NetworkInput, annotate::encode_png},
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
     telemetry::Tracer,
 };
@@ -166,19 +165,7 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
             Ok(Model::new(Box::new(detector)))
         }),
     );
-    let options = EngineOptions {
-        decode_limits: DecodeLimits::default(),
-        default_models: DefaultModels::One("eager".to_owned()),
-        batches: BatchOptions {
-            max_views: NonZeroUsize::new(128).unwrap(),
-            max_delay: Duration::ZERO,
-        },
-        sessions: NonZeroUsize::MIN,
-        remap_threads: one_view,
-        paper_field_of_view: FieldOfViewReading::default(),
-        rig_cache_bytes: 1 << 28,
-        remembered_frames: 4,
-    };
+    let options = EngineOptions::for_testing("eager");
     let store = Box::new(FolderStore::new(folder.path()));
     let calibrations = Arc::new(Calibrations::open(store, true).unwrap());
     let registry = Arc::clone(models.registry());
@@ -237,13 +224,13 @@ impl Service {
                 max_headers: 32,
                 zone_metrics: bounds.zone_metrics,
                 pictures_of: Arc::new(bounds.pictures_of.clone()),
-                metrics_elsewhere: false,
                 request_timeout: bounds.request_timeout,
                 min_upload_bytes_per_second: bounds.min_upload_bytes_per_second,
                 request_rate: bounds.request_rate,
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),
                 tracer: bounds.tracer.clone(),
+                ..ApiOptions::for_testing()
             },
         );
         Self {

@@ -9,7 +9,7 @@ use lookdown::{
     detection::{BBox, FramePixels},
     inference::is_fetched,
     pipeline::{DetectJob, DetectParameters, DetectionReport, Ticket},
-    settings::{RawSettings, Settings},
+    settings,
 };
 use serde_json::Value;
 
@@ -17,7 +17,7 @@ use crate::folder::of_repository;
 
 /// Looks at the office with a model, for whatever looks a little like a person.
 fn detect(model: &str) -> DetectionReport {
-    let settings = Settings::try_from(RawSettings::default()).unwrap();
+    let settings = settings::load(None, []).unwrap();
     let parameters = DetectParameters::parse([("model", model)], 0.05).unwrap();
     let engine = engine_for(&settings, std::slice::from_ref(&parameters)).unwrap();
     let calibration = of_repository("samples/calibrations/office.json");

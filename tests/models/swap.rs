@@ -19,15 +19,12 @@ use axum::{
 };
 use http_body_util::BodyExt;
 use lookdown::{
-    api::{self, Access, ApiOptions, ApiState, Readiness},
+    api::{self, ApiOptions, ApiState, Readiness},
     calibration::{Calibrations, FolderStore},
-    geometry::FieldOfViewReading,
-    imaging::decode::DecodeLimits,
     inference::{ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+    pipeline::{Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, ResultLimits},
-    telemetry::Tracer,
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -54,17 +51,9 @@ fn service(folder: &Path) -> Router {
     );
     models.load("person").unwrap();
     let engine = EngineOptions {
-        decode_limits: DecodeLimits::default(),
-        default_models: DefaultModels::One("person".to_owned()),
-        batches: BatchOptions {
-            max_views: NonZeroUsize::new(8).unwrap(),
-            max_delay: Duration::ZERO,
-        },
         sessions: two,
         remap_threads: two,
-        paper_field_of_view: FieldOfViewReading::default(),
-        rig_cache_bytes: 1 << 28,
-        remembered_frames: 4,
+        ..EngineOptions::for_testing("person")
     };
     let engine = Engine::new(Arc::clone(models.registry()), None, engine).unwrap();
     let workers = WorkerPool::start(&Arc::new(engine), two, NonZeroUsize::new(16).unwrap());
@@ -73,19 +62,8 @@ fn service(folder: &Path) -> Router {
     let options = ApiOptions {
         max_body_bytes: 1 << 24,
         max_upload_bytes: 1 << 27,
-        max_header_bytes: 1 << 14,
-        max_headers: 100,
-        zone_metrics: false,
-        pictures_of: Arc::default(),
-        metrics_elsewhere: false,
         request_timeout: Duration::from_mins(2),
-        min_upload_bytes_per_second: None,
-        request_rate: None,
-        access: Access::Open {
-            own_machine_only: true,
-        },
-        cors_origins: Vec::new(),
-        tracer: Tracer::default(),
+        ..ApiOptions::for_testing()
     };
     let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
     let calibrations = Calibrations::open(Box::new(store), false).unwrap();

@@ -1,4 +1,4 @@
-//! Settings: layers, limits and what is said about mistakes.
+//! Settings: layers, limits and refusals.
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 mod places;
@@ -6,7 +6,7 @@ mod refusals;
 
 use std::{collections::HashMap, fs, path::Path};
 
-use lookdown::settings::{RawSettings, Settings, SettingsError, load};
+use lookdown::settings::{Settings, SettingsError, ignored_variables, load};
 
 pub(crate) fn environment(variables: &[(&str, &str)]) -> HashMap<String, String> {
     let owned = |&(name, value): &(&str, &str)| (name.to_owned(), value.to_owned());
@@ -25,7 +25,7 @@ pub(crate) fn from_file(text: &str) -> Result<Settings, SettingsError> {
 }
 
 pub(crate) fn defaults() -> Settings {
-    RawSettings::default().try_into().unwrap()
+    load(None, HashMap::new()).unwrap()
 }
 
 /// The message of a refusal, which must be one line.
@@ -36,20 +36,7 @@ pub(crate) fn refusal(result: Result<Settings, SettingsError>) -> String {
 }
 
 #[test]
-fn the_example_file_states_every_key_at_its_default() {
-    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/config/lookdown.toml");
-    let settings = load(Some(Path::new(example)), HashMap::new()).unwrap();
-    assert_eq!(settings, defaults());
-    let text = fs::read_to_string(example).unwrap();
-    let stated = text.lines().filter(|line| {
-        let key = line.split(" = ").next().unwrap_or_default();
-        !line.starts_with('#') && line.contains(" = ") && !key.is_empty()
-    });
-    assert_eq!(stated.count(), 72, "a key is missing from {example}");
-}
-
-#[test]
-fn the_environment_overrules_the_file_and_the_file_the_defaults() {
+fn variables_come_before_the_file_and_that_before_defaults() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lookdown.toml");
     fs::write(
@@ -72,18 +59,21 @@ fn every_kind_of_value_can_be_given_in_the_environment() {
             ("LOOKDOWN__INFERENCE__THREADS", "3"),
             ("LOOKDOWN__INFERENCE__SCORE_FLOOR", "0.25"),
             ("LOOKDOWN__MODEL__PATH", "123"),
-            ("LOOKDOWN__PAPER__FIELD_OF_VIEW", "diagonal"),
+            ("LOOKDOWN__CALIBRATIONS__WRITABLE", "false"),
+            ("lookdown__limits__request_burst", "7"),
         ]),
     )
     .unwrap();
     assert_eq!(settings.threads.per_session.get(), 3);
     assert!((settings.inference.score_floor - 0.25).abs() < f64::EPSILON);
     assert_eq!(settings.model.path.as_deref(), Some(Path::new("123")));
+    assert!(!settings.calibrations.writable);
+    assert_eq!(settings.limits.request_burst.get(), 7);
 }
 
 #[test]
 fn tls_is_on_with_a_certificate_and_its_key_and_off_without() {
-    assert_eq!(defaults().server.tls, None);
+    assert_eq!(defaults().tls, None);
     let settings = load(
         None,
         environment(&[
@@ -91,7 +81,7 @@ fn tls_is_on_with_a_certificate_and_its_key_and_off_without() {
             ("LOOKDOWN__SERVER__TLS__PRIVATE_KEY", "/tls/server.key"),
         ]),
     );
-    let tls = settings.unwrap().server.tls.unwrap();
+    let tls = settings.unwrap().tls.unwrap();
     assert_eq!(tls.certificate, Path::new("/tls/server.pem"));
     assert_eq!(tls.private_key, Path::new("/tls/server.key"));
     assert_eq!(tls.client_certificates, None);
@@ -112,24 +102,93 @@ fn half_of_what_tls_needs_is_refused_with_the_other_half() {
 }
 
 #[test]
-fn a_private_key_where_its_path_belongs_is_refused_and_not_repeated() {
+fn a_private_key_in_place_of_its_path_is_not_repeated() {
     let key = "-----BEGIN PRIVATE KEY-----\nc2VjcmV0\n-----END PRIVATE KEY-----";
     let message = refusal(from_environment("LOOKDOWN__SERVER__TLS__PRIVATE_KEY", key));
     assert!(
-        message.contains("server.tls.private_key is PEM itself"),
+        message.contains("server.tls.private_key: it is PEM text"),
         "{message}"
     );
     assert!(!message.contains("c2VjcmV0"), "{message}");
 }
 
 #[test]
-fn the_variables_kubernetes_sets_for_a_service_are_ignored() {
-    let variables = environment(&[
+fn variables_of_a_kubernetes_service_are_ignored_with_a_warning() {
+    let variables = [
         ("LOOKDOWN_PORT", "tcp://10.0.0.1:8080"),
         ("LOOKDOWN_SERVICE_HOST", "10.0.0.1"),
         ("LOOKDOWN_PORT_8080_TCP_ADDR", "10.0.0.1"),
-    ]);
-    assert_eq!(load(None, variables).unwrap(), defaults());
+    ];
+    assert_eq!(load(None, environment(&variables)).unwrap(), defaults());
+    let names = variables.map(|(name, _)| name.to_owned());
+    let warning = ignored_variables(names).unwrap();
+    for (name, _) in variables {
+        assert!(warning.contains(name), "{warning}");
+    }
+}
+
+#[test]
+fn a_warning_names_the_setting_that_was_meant() {
+    let single = "LOOKDOWN_ACCESS_KEYS_FILE".to_owned();
+    let warning = ignored_variables([single]).unwrap();
+    assert!(warning.contains("LOOKDOWN__ACCESS__KEYS_FILE"), "{warning}");
+    let settings = ["LOOKDOWN__ACCESS__KEYS_FILE", "PATH"].map(str::to_owned);
+    assert_eq!(ignored_variables(settings), None);
+}
+
+#[test]
+fn a_variable_with_one_underscore_for_two_is_refused() {
+    let message = refusal(from_environment("LOOKDOWN_ACCESS__KEYS_FILE", "keys.toml"));
+    assert!(message.contains("LOOKDOWN_ACCESS__KEYS_FILE "), "{message}");
+    assert!(message.contains("LOOKDOWN__ACCESS__KEYS_FILE"), "{message}");
+    let message = refusal(from_environment("LOOKDOWN_ACCESS__KEY_FILE", "keys.toml"));
+    assert!(
+        message.contains("`key_file`") && message.contains("`keys_file`"),
+        "{message}"
+    );
+}
+
+#[test]
+fn an_empty_keys_file_is_refused_wherever_it_is_given() {
+    for refused in [
+        from_environment("LOOKDOWN__ACCESS__KEYS_FILE", ""),
+        from_file("[access]\nkeys_file = \"\"\n"),
+    ] {
+        let message = refusal(refused);
+        assert!(message.contains("access.keys_file is empty"), "{message}");
+        assert!(message.contains("leave the key out"), "{message}");
+    }
+}
+
+#[test]
+fn lists_are_arrays_in_the_file() {
+    let settings = from_file(
+        "[access]\ncors_origins = [\"https://a.example\", \"http://localhost:3000\"]\n\
+         [model]\nalso_load = [\"a\", \"b\"]\n[results]\npictures = [\"hall\"]\n",
+    )
+    .unwrap();
+    let origins = ["https://a.example", "http://localhost:3000"];
+    assert_eq!(settings.access.cors_origins, origins);
+    assert_eq!(settings.model.also_load, ["a", "b"]);
+    assert!(settings.results.pictures_of.include("hall"));
+}
+
+#[test]
+fn a_list_in_one_string_of_the_file_is_refused() {
+    for (key, value) in [
+        ("[access]\ncors_origins", "\"https://a.example\""),
+        ("[access]\nkeys", "\"do-not-show-me\""),
+        ("[model]\nalso_load", "\"a,b\""),
+        ("[results]\npictures", "[1, 2]"),
+    ] {
+        let message = refusal(from_file(&format!("{key} = {value}\n")));
+        let (_, key) = key.split_once('\n').unwrap();
+        assert!(
+            message.contains(key) && message.contains("array"),
+            "{message}"
+        );
+        assert!(!message.contains("do-not-show-me"), "{message}");
+    }
 }
 
 #[test]
@@ -139,12 +198,12 @@ fn a_variable_set_to_nothing_counts_as_not_set() {
 }
 
 #[test]
-fn draining_takes_as_long_as_a_request_may_unless_somebody_says_otherwise() {
+fn draining_takes_as_long_as_a_request_by_default() {
     let request_timeout = ("LOOKDOWN__SERVER__REQUEST_TIMEOUT_MILLIS", "7000");
     let own = ("LOOKDOWN__SHUTDOWN__DRAIN_TIMEOUT_MILLIS", "200");
     let drain_millis = |variables: &[_]| {
         let settings = load(None, environment(variables)).unwrap();
-        settings.shutdown.drain_timeout.as_millis()
+        settings.drain_timeout().as_millis()
     };
     assert_eq!(drain_millis(&[request_timeout]), 7000);
     assert_eq!(drain_millis(&[request_timeout, own]), 200);
@@ -157,7 +216,7 @@ fn without_a_number_of_sessions_the_machine_decides() {
 }
 
 #[test]
-fn pictures_are_kept_of_the_cameras_that_are_named_and_of_nobody_else() {
+fn pictures_are_kept_of_the_named_cameras_alone() {
     for (named, hall, stairs) in [
         ("", false, false),
         ("hall", true, false),

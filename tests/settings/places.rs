@@ -1,13 +1,13 @@
-//! Folders, addresses and keys: where things are, and who may have them.
+//! Folders, addresses, API keys and origins.
 
 use std::{fs, path::Path};
 
 use lookdown::settings::{CalibrationPlace, SettingsError, find_calibrations};
 
-use crate::{defaults, from_environment, refusal};
+use crate::{defaults, from_environment, from_file, refusal};
 
 #[test]
-fn a_path_somebody_chose_must_exist() {
+fn a_path_that_is_set_must_exist() {
     let model = from_environment("LOOKDOWN__MODEL__PATH", "no/such/model").unwrap();
     let repository = from_environment("LOOKDOWN__MODEL__REPOSITORY", "no/such/models").unwrap();
     let library = from_environment("LOOKDOWN__INFERENCE__LIBRARY_PATH", "no/such.so").unwrap();
@@ -70,7 +70,7 @@ fn calibrations_are_in_a_folder_or_in_the_bucket_of_a_url() {
 }
 
 #[test]
-fn a_url_that_holds_credentials_is_refused_without_repeating_them() {
+fn credentials_in_the_url_of_a_bucket_are_not_repeated() {
     for (path, part) in [
         ("s3://key:hidden@bucket/prefix", "AWS_SECRET_ACCESS_KEY"),
         ("s3://hidden@bucket/prefix", "AWS_SECRET_ACCESS_KEY"),
@@ -87,7 +87,7 @@ fn a_url_that_holds_credentials_is_refused_without_repeating_them() {
         ("file://elsewhere/srv", "file:///srv/calibrations"),
         ("", "calibrations.path is empty"),
     ] {
-        let message = path.parse::<CalibrationPlace>().unwrap_err().to_string();
+        let message = refusal(from_file(&format!("[calibrations]\npath = {path:?}\n")));
         assert!(
             message.contains("calibrations.path") && message.contains(part),
             "{message}"
@@ -105,7 +105,7 @@ fn what_belongs_to_the_executable_is_found_from_anywhere() {
 }
 
 #[test]
-fn keys_and_origins_are_checked_and_a_key_in_the_wrong_place_is_not_repeated() {
+fn keys_and_origins_are_checked_and_keys_are_not_repeated() {
     let leak = "lookdown_do-not-show-me";
     for (name, value, part) in [
         ("LOOKDOWN__ACCESS__KEYS", leak, "access.keys: key 1"),
@@ -136,7 +136,7 @@ fn keys_and_origins_are_checked_and_a_key_in_the_wrong_place_is_not_repeated() {
 }
 
 #[test]
-fn what_is_no_address_of_a_redis_is_refused_without_repeating_it() {
+fn an_invalid_address_of_a_redis_is_not_repeated() {
     let message = refusal(from_environment(
         "LOOKDOWN__RESULTS__URL",
         "http://:do-not-show-me@localhost:6379",
@@ -147,7 +147,7 @@ fn what_is_no_address_of_a_redis_is_refused_without_repeating_it() {
 }
 
 #[test]
-fn a_collector_s_address_with_credentials_is_refused_without_repeating_them() {
+fn credentials_in_a_collector_s_address_are_not_repeated() {
     let endpoint = "LOOKDOWN__TELEMETRY__OTLP_ENDPOINT";
     let message = refusal(from_environment(
         endpoint,

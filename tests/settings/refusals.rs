@@ -1,4 +1,4 @@
-//! What is said about settings that cannot be used.
+//! Refusals of settings that cannot be used.
 
 use std::{collections::HashMap, path::Path};
 
@@ -26,8 +26,8 @@ fn an_unknown_key_is_refused_by_name() {
     );
 }
 
-/// Variable, value, and what the refusal has to say: the key and a remedy.
-const UNUSABLE: [(&str, &str, &str, &str); 49] = [
+/// Variable, value, and parts of the refusal: the key and a remedy.
+const UNUSABLE: [(&str, &str, &str, &str); 48] = [
     (
         "RESULTS__KEY_PREFIX",
         "a:b",
@@ -70,13 +70,13 @@ const UNUSABLE: [(&str, &str, &str, &str); 49] = [
         "SERVER__MAX_BODY_BYTES",
         "many",
         "server.max_body_bytes",
-        "integer",
+        "from 1024",
     ),
     (
         "SERVER__MAX_BODY_BYTES",
         "-1",
         "server.max_body_bytes",
-        "integer",
+        "from 1024",
     ),
     (
         "SERVER__REQUEST_TIMEOUT_MILLIS",
@@ -130,13 +130,13 @@ const UNUSABLE: [(&str, &str, &str, &str); 49] = [
         "SHUTDOWN__GRACE_MILLIS",
         "5s",
         "shutdown.grace_millis",
-        "integer",
+        "from 0",
     ),
     (
         "SHUTDOWN__DRAIN_TIMEOUT_MILLIS",
         "-1",
         "shutdown.drain_timeout_millis",
-        "integer",
+        "from 0",
     ),
     (
         "SERVER__TLS__HANDSHAKE_TIMEOUT_MILLIS",
@@ -204,7 +204,7 @@ const UNUSABLE: [(&str, &str, &str, &str); 49] = [
         "inference.max_batch_views",
         "from 0 to",
     ),
-    ("INFERENCE__SESSIONS", "-1", "inference.sessions", "integer"),
+    ("INFERENCE__SESSIONS", "-1", "inference.sessions", "from 0"),
     (
         "INFERENCE__MAX_QUEUE_DELAY_MILLIS",
         "1001",
@@ -233,7 +233,7 @@ const UNUSABLE: [(&str, &str, &str, &str); 49] = [
         "LIMITS__MIN_UPLOAD_BYTES_PER_SECOND",
         "-1",
         "limits.min_upload_bytes_per_second",
-        "integer",
+        "from 0",
     ),
     (
         "LIMITS__REQUESTS_PER_SECOND",
@@ -252,12 +252,6 @@ const UNUSABLE: [(&str, &str, &str, &str); 49] = [
         "0",
         "limits.request_burst",
         "from 1",
-    ),
-    (
-        "PAPER__FIELD_OF_VIEW",
-        "wide",
-        "paper.field_of_view",
-        "horizontal, diagonal, literal",
     ),
     ("LOG__FORMAT", "xml", "log.format", "text, json"),
     (
@@ -305,11 +299,37 @@ const UNUSABLE: [(&str, &str, &str, &str); 49] = [
 ];
 
 #[test]
-fn a_value_that_cannot_be_used_is_refused_with_key_value_and_remedy() {
+fn an_invalid_value_is_refused_with_key_value_and_remedy() {
     for (variable, value, key, remedy) in UNUSABLE {
         let message = refusal(from_environment(&format!("LOOKDOWN__{variable}"), value));
         for part in [key, value, remedy] {
             assert!(message.contains(part), "{message:?} does not say {part:?}");
+        }
+    }
+}
+
+#[test]
+fn a_value_of_the_wrong_toml_type_is_refused() {
+    for (line, parts) in [
+        (
+            "[server]\nlisten = 8080",
+            ["server.listen is 8080", "IP address"],
+        ),
+        (
+            "[calibrations]\nwritable = 3",
+            ["calibrations.writable is 3", "true or false"],
+        ),
+        ("[results]\nurl = 3", ["results.url", "string"]),
+        ("server = 3", ["server", "`shutdown`"]),
+        ("[server.listen]\nport = 1", ["server.listen", "IP address"]),
+        (
+            "[server]\nmax_headers = 16.5",
+            ["server.max_headers is 16.5", "from 16"],
+        ),
+    ] {
+        let message = refusal(from_file(line));
+        for part in parts {
+            assert!(message.contains(part), "{message:?} lacks {part:?}");
         }
     }
 }
@@ -368,7 +388,7 @@ fn an_inference_server_is_an_address_without_a_password() {
             "[inference]\n{rest}\nbearer_token = \"{token}\"\n"
         ))
     };
-    let remote = with_token("s3cret.+/=").unwrap().inference.remote.unwrap();
+    let remote = with_token("s3cret.+/=").unwrap().remote.unwrap();
     assert_eq!(remote.token, Some("s3cret.+/=".parse().unwrap()));
     assert!(!format!("{remote:?}").contains("s3cret"), "{remote:?}");
     let unused = from_environment("LOOKDOWN__INFERENCE__BEARER_TOKEN", "s3cret");
@@ -382,8 +402,8 @@ fn an_inference_server_is_an_address_without_a_password() {
         "{nameless}"
     );
     let settings = with_url("https://host:8000/prefix").unwrap();
-    let remote = settings.inference.remote.unwrap();
+    let remote = settings.remote.unwrap();
     assert_eq!(remote.url.as_str(), "https://host:8000/prefix");
-    assert_eq!(settings.inference.max_batch_views.get(), 8);
+    assert_eq!(settings.threads.batch_views.get(), 8);
     assert_eq!(settings.threads.sessions.get(), 2);
 }

@@ -14,7 +14,7 @@ use super::{
     variants,
 };
 use crate::{
-    app::{decode_limits, engine_for},
+    app::{decode_limits, evaluation_engine},
     evaluation::{DataSet, DetectedRow, EvaluatedRow, sweep},
     imaging::{Frame, annotate::encode_jpeg, decode::decode},
     settings::LimitSettings,
@@ -31,7 +31,11 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     let settings = arguments.settings_file.load()?;
     let data_set = arguments.truth.open(&arguments.settings_file)?;
     fs::create_dir_all(folder).with_context(|| unwritable(folder))?;
-    let engine = engine_for(&settings, std::slice::from_ref(&base))?;
+    let engine = evaluation_engine(
+        &settings,
+        std::slice::from_ref(&base),
+        arguments.field_of_view,
+    )?;
     let detected = detect_group(&engine, &data_set, &sweep::cells(&base), &settings)?;
     let cells = detected.into_iter().map(|row| {
         let evaluated = row.evaluate(&data_set)?;

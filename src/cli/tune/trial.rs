@@ -44,7 +44,7 @@ impl Trial {
         let mut settings = settings.clone();
         settings.threads.sessions = choice.sessions;
         settings.threads.per_session = choice.threads;
-        settings.inference.max_batch_views = choice.batch_views;
+        settings.threads.batch_views = choice.batch_views;
         let Assembly { engine, models, .. } = assemble(&settings)?;
         let model = models.load(engine.default_models().of(profile))?;
         Ok(Self { model, choice })

@@ -14,7 +14,7 @@ pub struct BearerToken(HeaderValue);
     "give the token alone, as the inference server's operator gave it out: letters, digits and signs \
      without spaces"
 )]
-pub struct NoToken;
+pub struct InvalidToken;
 
 impl BearerToken {
     /// The header `Authorization` that shows it (RFC 6750, section 2.1).
@@ -24,12 +24,12 @@ impl BearerToken {
 }
 
 impl FromStr for BearerToken {
-    type Err = NoToken;
+    type Err = InvalidToken;
 
-    fn from_str(text: &str) -> Result<Self, NoToken> {
+    fn from_str(text: &str) -> Result<Self, InvalidToken> {
         let is_token = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic());
         let header = HeaderValue::try_from(format!("Bearer {text}"));
-        let mut header = header.ok().filter(|_| is_token).ok_or(NoToken)?;
+        let mut header = header.ok().filter(|_| is_token).ok_or(InvalidToken)?;
         header.set_sensitive(true);
         Ok(Self(header))
     }

@@ -1,0 +1,59 @@
+//! The report of `lookdown serve --check`.
+
+use std::fmt::Write as _;
+
+use super::App;
+
+impl App {
+    /// Loads every model that is served, and describes the server that could start: a line on models
+    /// and calibrations, and lines on the clients that have access. Blocks.
+    ///
+    /// # Errors
+    /// When a model cannot be loaded.
+    pub fn check(&self) -> anyhow::Result<String> {
+        for name in &self.to_load {
+            self.models.load(name)?;
+        }
+        let health = self.calibrations.health();
+        Ok(format!(
+            "ready to serve on {}: the models {} and {} calibrations can be used\n{}",
+            self.settings.server.listen,
+            self.to_load.join(", "),
+            health.serving,
+            self.access_report(),
+        ))
+    }
+
+    fn access_report(&self) -> String {
+        let address = self.settings.server.listen;
+        let mut report = match &self.keys {
+            None if address.ip().is_loopback() => format!(
+                "access: open, without API keys: every client on this machine may send frames, read \
+                 and change everything at {address}"
+            ),
+            None => format!(
+                "access: open, without API keys: every client that reaches {address} may send frames \
+                 and read calibrations and reports; changes are refused; set access.keys_file to need \
+                 keys"
+            ),
+            Some(keys) => {
+                let keys = keys.known();
+                let mut report =
+                    format!("access: {address} needs an API key; {} known", keys.len());
+                for holder in keys.holders() {
+                    let scopes = holder.scopes.joined(", ");
+                    let _ = write!(report, "\n  {}: {scopes}", holder.name);
+                }
+                report
+            }
+        };
+        let public = match self.settings.server.metrics_listen {
+            Some(address) => {
+                format!("\nwithout a key: health checks and the API page, and metrics at {address}")
+            }
+            None => "\nwithout a key: health checks, metrics and the API page".to_owned(),
+        };
+        report.push_str(&public);
+        report
+    }
+}

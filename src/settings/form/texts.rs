@@ -1,0 +1,171 @@
+//! Texts, addresses, paths, choices, lists and secrets.
+
+use std::{net::SocketAddr, path::PathBuf};
+
+use secrecy::SecretString;
+use toml::Value;
+
+use super::{Form, Refusal, Written};
+
+/// A text that `read` makes a value of.
+pub(in crate::settings) fn parsed<T: 'static>(
+    kind: impl Into<String>,
+    read: impl Fn(&str) -> Result<T, Refusal> + 'static,
+    write: impl Fn(&T) -> String + 'static,
+) -> Form<T> {
+    let kind = kind.into();
+    let remedy = format!("give a string: {kind}");
+    Form::new(
+        kind,
+        move |written| match written.text() {
+            Some(text) => read(text),
+            None => Err(Refusal::Shown(remedy.clone())),
+        },
+        move |value| Value::String(write(value)),
+    )
+}
+
+/// A text for which `check` is true.
+pub(in crate::settings) fn text(
+    kind: &'static str,
+    check: impl Fn(&str) -> bool + 'static,
+) -> Form<String> {
+    parsed(
+        kind,
+        move |text| {
+            let text = check(text).then(|| text.to_owned());
+            text.ok_or_else(|| Refusal::Shown(format!("give {kind}")))
+        },
+        String::clone,
+    )
+}
+
+/// A value of which the empty text stands for none.
+pub(in crate::settings) fn optional<T: 'static>(form: Form<T>) -> Form<Option<T>> {
+    let (read, write) = (form.read, form.write);
+    Form {
+        kind: format!("{}, or empty", form.kind),
+        read: Box::new(move |written| match written.text() {
+            Some("") => Ok(None),
+            _ => read(written).map(Some),
+        }),
+        write: Box::new(move |value| match value {
+            Some(value) => write(value),
+            None => Value::String(String::new()),
+        }),
+        example: form.example,
+    }
+}
+
+/// An address with a port.
+pub(in crate::settings) fn address() -> Form<SocketAddr> {
+    parsed(
+        "IP address and port",
+        |text| {
+            text.parse().map_err(|_| {
+                let remedy = "give an IP address and a port, such as 127.0.0.1:8080 or [::]:8080";
+                Refusal::Shown(remedy.to_owned())
+            })
+        },
+        SocketAddr::to_string,
+    )
+}
+
+/// The path of a file or folder.
+pub(in crate::settings) fn path() -> Form<PathBuf> {
+    parsed(
+        "path",
+        |text| {
+            if text.contains("-----BEGIN") {
+                // It may be a private key.
+                let problem = "it is PEM text: write that to a file and give the path of the file";
+                return Err(Refusal::Hidden(problem.to_owned()));
+            }
+            if text.is_empty() {
+                let remedy = "give a path, or leave the key out";
+                return Err(Refusal::Shown(remedy.to_owned()));
+            }
+            Ok(PathBuf::from(text))
+        },
+        |path| path.display().to_string(),
+    )
+}
+
+/// A path, or none where the key is left out: an empty one is refused, since it is a mistake that would
+/// switch something off. `example` stands in the settings file.
+pub(in crate::settings) fn given_path(example: &'static str) -> Form<Option<PathBuf>> {
+    let mut form = path().map(Some, |path| path.clone().unwrap_or_default());
+    form.example = Some(example);
+    form
+}
+
+/// One of several names.
+pub(in crate::settings) fn choice<T: Copy + PartialEq + 'static>(
+    choices: &'static [(&'static str, T)],
+) -> Form<T> {
+    let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+    let remedy = format!("use one of {}", names.join(", "));
+    let kind: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+    parsed(
+        kind.join(" or "),
+        move |text| {
+            let chosen = choices.iter().find(|(name, _)| *name == text);
+            chosen
+                .map(|(_, choice)| *choice)
+                .ok_or_else(|| Refusal::Shown(remedy.clone()))
+        },
+        |value| {
+            let mut choices = choices.iter();
+            let name = choices.find_map(|(name, choice)| (choice == value).then_some(*name));
+            name.unwrap_or_default().to_owned()
+        },
+    )
+}
+
+/// A list of texts that `read` makes a value of: an array in TOML, separated by commas in a variable.
+pub(in crate::settings) fn list<T: 'static>(
+    items: &'static str,
+    read: impl Fn(&[&str]) -> Result<T, Refusal> + 'static,
+    write: impl Fn(&T) -> Vec<String> + 'static,
+) -> Form<T> {
+    Form::new(
+        format!("array of {items}"),
+        move |written| {
+            let texts: Option<Vec<&str>> = match written {
+                Written::Variable(text) => {
+                    let texts = text.split(',').map(str::trim);
+                    Some(texts.filter(|text| !text.is_empty()).collect())
+                }
+                Written::Toml(Value::Array(values)) => values.iter().map(Value::as_str).collect(),
+                Written::Toml(_) => None,
+            };
+            // Not repeated: it may hold an API key.
+            let texts = texts.ok_or_else(|| {
+                let remedy =
+                    format!("it must be an array of {items}, such as [\"a\", \"b\"] or []");
+                Refusal::Hidden(remedy)
+            })?;
+            read(&texts)
+        },
+        move |value| Value::Array(write(value).into_iter().map(Value::String).collect()),
+    )
+}
+
+/// A list of names.
+pub(in crate::settings) fn names() -> Form<Vec<String>> {
+    let owned = |names: &[&str]| Ok(names.iter().map(|&name| name.to_owned()).collect());
+    list("names", owned, Vec::clone)
+}
+
+/// A text that no message and no log line shows; the empty text stands for none.
+pub(in crate::settings) fn secret(kind: &'static str) -> Form<Option<SecretString>> {
+    Form::new(
+        format!("{kind}, or empty"),
+        move |written| match written.text() {
+            Some(text) => Ok((!text.is_empty()).then(|| SecretString::from(text))),
+            None => Err(Refusal::Hidden(format!("it must be a string: {kind}"))),
+        },
+        // A default is never a secret.
+        |_| Value::String(String::new()),
+    )
+}

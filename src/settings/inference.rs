@@ -1,0 +1,47 @@
+//! ONNX Runtime and the candidates of a view.
+
+use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
+
+use super::{
+    declare::settings,
+    form::{Form, Refusal, count, millis, parsed, path, share},
+    locate::DEFAULT_LIBRARY,
+};
+use crate::inference::{Device, UnknownDevice};
+
+/// A second: a server whose batches take longer to fill has no traffic to fill them.
+const MAX_QUEUE_DELAY_MILLIS: u64 = 1_000;
+
+settings! {
+    /// ONNX Runtime and the candidates of a view.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct InferenceSettings in "inference" {
+        /// The longest time that a view waits for others to fill its batch. 0: none.
+        max_queue_delay as "max_queue_delay_millis": Duration = Duration::ZERO
+            => millis(0..=MAX_QUEUE_DELAY_MILLIS);
+        /// The ONNX Runtime library. The default path is also searched for in the folders above the
+        /// executable.
+        library_path: PathBuf = DEFAULT_LIBRARY.into() => path();
+        /// The device that runs models: `cpu`, or a GPU by its number as `cuda:0` or `tensorrt:0`. For a
+        /// GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
+        /// `onnxruntime-gpu`.
+        device: Device = Device::Cpu => device();
+        /// The least score of a candidate. Candidates below it are dropped first of all.
+        score_floor: f64 = 0.05 => share();
+        /// The most candidates kept of one view, best first.
+        max_detections_per_view: NonZeroUsize = NonZeroUsize::new(300).unwrap_or(NonZeroUsize::MIN)
+            => count();
+        /// The most frames whose candidates are kept for requests with `remember=true`: with another
+        /// refinement these need no new inference. They hold 32 MiB at most.
+        remembered_frames: usize = 32 => count();
+    }
+}
+
+fn device() -> Form<Device> {
+    let parse = |name: &str| name.parse();
+    parsed(
+        "`cpu`, `cuda:N` or `tensorrt:N`",
+        move |name| parse(name).map_err(|error: UnknownDevice| Refusal::Shown(error.to_string())),
+        Device::to_string,
+    )
+}

@@ -1,0 +1,138 @@
+//! Values by their keys: those of the settings file, and the environment variables that take precedence.
+
+use std::{collections::BTreeMap, path::Path};
+
+use toml::{Table, Value};
+
+use super::{
+    SettingsError,
+    declare::Entry,
+    form::{Form, Written},
+    variables,
+};
+
+/// The values that were given.
+#[derive(Default)]
+pub(super) struct Values {
+    /// Those of the settings file, by their keys.
+    file: BTreeMap<String, Value>,
+    /// Those of the environment, by their keys.
+    variables: BTreeMap<String, String>,
+}
+
+impl Values {
+    /// The values of `file` and of `environment`; each must be the value of one of the `entries`.
+    pub(super) fn read(
+        file: Option<&Path>,
+        environment: impl IntoIterator<Item = (String, String)>,
+        entries: &[Entry],
+    ) -> Result<Self, SettingsError> {
+        let mut values = Self::default();
+        if let Some(path) = file {
+            values.add_table("", read(path)?, entries)?;
+        }
+        for (name, value) in environment {
+            if let Some(key) = variables::key_of(&name, entries)? {
+                values.variables.insert(key, value);
+            }
+        }
+        Ok(values)
+    }
+
+    fn add_table(
+        &mut self,
+        parent: &str,
+        table: Table,
+        entries: &[Entry],
+    ) -> Result<(), SettingsError> {
+        for (name, value) in table {
+            let key = match parent {
+                "" => name,
+                _ => format!("{parent}.{name}"),
+            };
+            let is_table = entries.iter().any(|entry| {
+                let (above, _) = entry.split();
+                above == key || above.starts_with(&format!("{key}."))
+            });
+            match value {
+                Value::Table(table) if is_table => self.add_table(&key, table, entries)?,
+                value if entries.iter().any(|entry| entry.key == key) => {
+                    self.file.insert(key, value);
+                }
+                _ => return Err(unknown(&key, &key, entries)),
+            }
+        }
+        Ok(())
+    }
+
+    /// The value of `key`; `None` where none was given. A variable that is set to nothing counts as not
+    /// given, unless the form refuses an empty value.
+    pub(super) fn get<T>(
+        &self,
+        key: &'static str,
+        form: &Form<T>,
+    ) -> Result<Option<T>, SettingsError> {
+        let variable = self.variables.get(key).map(String::as_str);
+        let variable = variable.filter(|text| !text.is_empty() || form.example.is_some());
+        let written = match (variable, self.file.get(key)) {
+            (Some(text), _) => Written::Variable(text),
+            (None, Some(value)) => Written::Toml(value),
+            (None, None) => return Ok(None),
+        };
+        (form.read)(written)
+            .map(Some)
+            .map_err(|refusal| SettingsError::of(key, || written.shown(), refusal))
+    }
+}
+
+/// The refusal of a key that does not exist, which stands at `place`.
+pub(super) fn unknown(place: &str, key: &str, entries: &[Entry]) -> SettingsError {
+    let (above, name) = key.rsplit_once('.').unwrap_or(("", key));
+    let is_table = entries.iter().any(|entry| entry.split().0 == above);
+    let (parent, mut known): (String, Vec<_>) = if is_table {
+        let inside = entries.iter().filter(|entry| entry.split().0 == above);
+        (
+            format!("in the table `{above}`"),
+            inside.map(|entry| entry.split().1).collect(),
+        )
+    } else {
+        (
+            "among the tables".to_owned(),
+            entries.iter().map(|entry| entry.split().0).collect(),
+        )
+    };
+    known.dedup();
+    SettingsError::Unknown {
+        place: place.to_owned(),
+        name: if is_table || above.is_empty() {
+            name
+        } else {
+            above
+        }
+        .to_owned(),
+        parent,
+        known: known
+            .iter()
+            .map(|name| format!("`{name}`"))
+            .collect::<Vec<_>>()
+            .join(", "),
+    }
+}
+
+fn read(path: &Path) -> Result<Table, SettingsError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SettingsError::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    text.parse()
+        .map_err(|error: toml::de::Error| SettingsError::NotToml {
+            path: path.to_owned(),
+            problem: on_one_line(&error.to_string()),
+        })
+}
+
+/// Drops the quoted source lines of a TOML error, which may hold a secret.
+fn on_one_line(message: &str) -> String {
+    let lines = message.lines().filter(|line| !line.contains('|'));
+    lines.collect::<Vec<_>>().join(": ")
+}

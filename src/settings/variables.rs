@@ -1,0 +1,76 @@
+//! Names of environment variables: `LOOKDOWN__SERVER__LISTEN` is the key `server.listen`.
+
+use super::{SettingsError, declare::Entry, entries, values::unknown};
+
+const PREFIX: &str = "LOOKDOWN__";
+/// Variables that begin like this but with one underscore are no settings, such as the
+/// `LOOKDOWN_PORT=tcp://…` that Kubernetes sets for a Service called `lookdown`.
+const NEARLY: &str = "LOOKDOWN_";
+/// The separator of tables and keys.
+const SEPARATOR: &str = "__";
+
+/// The variables of this process that are text.
+pub fn environment() -> impl Iterator<Item = (String, String)> {
+    std::env::vars_os()
+        .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)))
+}
+
+/// The variable of a key.
+pub(crate) fn variable_of(key: &str) -> String {
+    format!("{PREFIX}{}", key.replace('.', SEPARATOR).to_uppercase())
+}
+
+/// The key that a variable sets; `None` for a variable that is no setting.
+///
+/// # Errors
+/// When there is no such key, or when the name has a single underscore after `LOOKDOWN` and two
+/// underscores later: then it was meant for a setting.
+pub(super) fn key_of(name: &str, entries: &[Entry]) -> Result<Option<String>, SettingsError> {
+    let upper = name.to_uppercase();
+    let key = |rest: &str| rest.to_lowercase().replace(SEPARATOR, ".");
+    let is_known = |key: &str| entries.iter().any(|entry| entry.key == key);
+    if let Some(rest) = upper.strip_prefix(PREFIX) {
+        let key = key(rest);
+        return match is_known(&key) {
+            true => Ok(Some(key)),
+            false => Err(unknown(name, &key, entries)),
+        };
+    }
+    match upper.strip_prefix(NEARLY) {
+        Some(rest) if rest.contains(SEPARATOR) => {
+            let key = key(rest);
+            Err(if is_known(&key) {
+                let (name, right) = (name.to_owned(), variable_of(&key));
+                SettingsError::MisnamedVariable { name, right }
+            } else {
+                unknown(name, &key, entries)
+            })
+        }
+        _ => Ok(None),
+    }
+}
+
+/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with the
+/// setting that each may have been meant for; `None` when there are none.
+pub fn ignored_variables(names: impl IntoIterator<Item = String>) -> Option<String> {
+    let entries = entries();
+    let ignored = names.into_iter().filter(|name| {
+        let upper = name.to_uppercase();
+        upper.starts_with(NEARLY) && !upper.starts_with(PREFIX)
+    });
+    let mut ignored: Vec<_> = ignored
+        .map(|name| {
+            let mut known = entries.iter().map(|entry| variable_of(entry.key));
+            let meant = known.find(|known| known.replace(SEPARATOR, "_") == name.to_uppercase());
+            match meant {
+                Some(meant) => format!("{name} (for the setting, use {meant})"),
+                None => name,
+            }
+        })
+        .collect();
+    ignored.sort();
+    (!ignored.is_empty()).then(|| {
+        let names = ignored.join(", ");
+        format!("these variables are no settings and are ignored: {names}")
+    })
+}
