@@ -1,7 +1,6 @@
 //! What a frame is answered with: the report as JSON, the frame with boxes drawn into it, or a file
 //! for annotation tools.
 
-mod accept;
 mod format;
 
 use axum::http::HeaderMap;
@@ -90,4 +89,5 @@ impl AnswerOptions {
 #[expect(clippy::needless_pass_by_value, reason = "the shape map_err needs")]
 fn too_large(error: EncodeError) -> Problem {
     Problem::new(ProblemKind::UnfitImage, format!("{error}: ask for a width"))
+        .with_parameter("width")
 }

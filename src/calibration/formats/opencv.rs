@@ -13,7 +13,10 @@ use super::{
     fields::Fields,
     lenses::mei,
 };
-use crate::calibration::native::{NativeImage, NativeLens};
+use crate::{
+    calibration::native::{NativeImage, NativeLens},
+    warning::{Warning, WarningCode},
+};
 
 /// Names of the camera matrix that programs choose.
 const MATRIX: [&str; 8] = [
@@ -80,7 +83,7 @@ fn without_xi(
     fields: &Fields<'_>,
     matrix: CameraMatrix,
     coefficients: &str,
-) -> Result<(NativeLens, Option<String>), FormatError> {
+) -> Result<(NativeLens, Option<Warning>), FormatError> {
     let values = fields.numbers(coefficients)?;
     let (said, distortion) = said_distortion(fields)?;
     let lens = |distortion| matrix.lens(distortion, &values, fields, (said, coefficients));
@@ -91,6 +94,7 @@ fn without_xi(
                 "the file does not say which model {coefficients} belong to: its 4 numbers were \
                  taken for cv::fisheye"
             );
+            let note = Warning::new(WarningCode::LensModelAssumed, note);
             Ok((lens(Distortion::Fisheye)?, Some(note)))
         }
         None => {
