@@ -1,5 +1,6 @@
 //! The only place that knows HTTP. One page of routes; every failure leaves as one envelope.
 
+mod accept;
 mod access;
 mod answer;
 mod calibrations;
@@ -47,6 +48,7 @@ use rate_limit::RateLimiter;
 pub use access::Access;
 pub use health::{Phase, Readiness};
 pub use openapi::document as openapi_document;
+pub use problem::pages::problem_table;
 pub use rate_limit::RequestRate;
 pub use report::Report;
 pub use state::{ApiOptions, ApiState};
@@ -54,6 +56,7 @@ pub use state::{ApiOptions, ApiState};
 /// Every route, with its entry in the OpenAPI document.
 fn routes() -> OpenApiRouter<ApiState> {
     client_routes()
+        .merge(deepstack_routes())
         .merge(description())
         .merge(probes())
         .merge(metrics())
@@ -63,9 +66,6 @@ fn routes() -> OpenApiRouter<ApiState> {
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
         .routes(routes!(detect::detect_persons))
-        .routes(routes!(deepstack::detect_as_deepstack))
-        .routes(routes!(deepstack::detect_as_deepstack_with))
-        .routes(routes!(deepstack::list_as_deepstack))
         .routes(routes!(calibrations::list))
         .routes(routes!(
             calibrations::get,
@@ -93,9 +93,19 @@ fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(repository::unload))
 }
 
+/// The routes that serve clients of DeepStack.
+fn deepstack_routes() -> OpenApiRouter<ApiState> {
+    OpenApiRouter::new()
+        .routes(routes!(deepstack::detect_as_deepstack))
+        .routes(routes!(deepstack::detect_as_deepstack_with))
+        .routes(routes!(deepstack::list_as_deepstack))
+}
+
 fn description() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(openapi::openapi_json))
+        .routes(routes!(problem::pages::list_problems))
+        .routes(routes!(problem::pages::get_problem))
         .routes(routes!(v2::describe::server))
 }
 
@@ -119,8 +129,10 @@ pub fn router(state: ApiState) -> Router {
     let guards = ServiceBuilder::new()
         .layer(option_layer(own_pages))
         .layer(option_layer(limiter));
-    let clients = Router::from(client_routes()).route_layer(guards);
+    let clients = Router::from(client_routes()).route_layer(guards.clone());
+    let deepstack = Router::from(deepstack_routes()).route_layer(guards);
     let router = clients
+        .merge(deepstack::with_failures(deepstack))
         .merge(Router::from(description()))
         .merge(operation(state.options.metrics_elsewhere));
     surrounded(router.with_state(state.clone()).merge(pages()), state)

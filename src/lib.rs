@@ -30,4 +30,5 @@ pub mod settings;
 pub mod shutdown;
 pub mod telemetry;
 pub mod tls;
+pub mod warning;
 pub mod watched_file;

@@ -8,11 +8,12 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 27] = [
+const MAY_USE: [(&str, &[&str]); 28] = [
     ("plain_name", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
     ("revision", &[]),
+    ("warning", &[]),
     ("geometry", &[]),
     ("detection", &[]),
     ("metrics", &[]),
@@ -21,7 +22,10 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     ("results", &[]),
     ("open_inference", &[]),
     ("imaging", &["geometry"]),
-    ("calibration", &["geometry", "plain_name", "revision"]),
+    (
+        "calibration",
+        &["geometry", "plain_name", "revision", "warning"],
+    ),
     (
         "inference",
         &["detection", "imaging", "open_inference", "revision"],
@@ -44,6 +48,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "calibration",
             "inference",
             "revision",
+            "warning",
         ],
     ),
     (
@@ -76,6 +81,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "results",
             "revision",
             "telemetry",
+            "warning",
         ],
     ),
     (

@@ -36,7 +36,7 @@ function begin() {
     circle = null;
   }
   const { width, height } = frame;
-  if (!circle) setCircle(assumedCircle(report ?? { image: { width, height }, warnings: [] }));
+  if (!circle) setCircle(assumedCircle(report ?? { image: { width, height } }));
   if (isVisible) lookShown();
 }
 
@@ -101,9 +101,9 @@ async function look() {
   find("#previews").replaceChildren(...views);
 }
 
-/** Whoever asks for the size of frames is told that of this one, and asked again. */
+/** Repeats a request that lacked the size of frames with that of the current frame. */
 const sizeOr = (again) => (problem) => {
-  if (!imported || imported.needsSize || !/\bsize\b/.test(problem.message)) throw problem;
+  if (!imported || imported.needsSize || problem.parameter !== "size") throw problem;
   imported.needsSize = true;
   return again();
 };
@@ -120,7 +120,7 @@ async function save() {
   const answer = await withProgress(find("#save-progress"), "Saving", () => ask(path, options));
   const { warnings = [] } = await answer.json();
   await loadCalibrations();
-  find("#saved").textContent = [`${name} is saved and serves.`, ...warnings].join(" ");
+  find("#saved").textContent = [`${name} is saved and serves.`, ...warnings.map(({ message }) => message)].join(" ");
   find("#calibration").value = name;
   find("#parameters").dispatchEvent(new Event("input"));
   drawn();

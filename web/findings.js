@@ -27,7 +27,7 @@ export function showFindings(report) {
   find("#persons").replaceChildren(...persons.map(row));
   find("#nobody").hidden = persons.length > 0;
   showTimings(timings);
-  find("#warnings").replaceChildren(...report.warnings.map((text) => element("li", {}, text)));
+  find("#warnings").replaceChildren(...report.warnings.map(({ message }) => element("li", {}, message)));
 }
 
 function row(person, index) {

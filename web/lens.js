@@ -45,10 +45,10 @@ export function circleOf({ lens, mount, image, zones, masks }) {
   };
 }
 
-/** The lens that the server assumed for a frame: its report tells the circle in a warning. */
-export function assumedCircle(report) {
-  const { width, height } = report.image;
-  const told = /centre ([\d.-]+), ([\d.-]+), radius ([\d.]+)/.exec(report.warnings.join(" "));
-  const [cx, cy, radius] = told ? told.slice(1).map(Number) : [width / 2, height / 2, Math.min(width, height) / 2];
+/** The lens that the server assumed for a frame; without one in the report, the largest circle in the middle. */
+export function assumedCircle({ image, calibration }) {
+  const { width, height } = image;
+  const middle = { cx: width / 2, cy: height / 2, radius: Math.min(width, height) / 2 };
+  const { cx, cy, radius } = calibration?.assumed_circle ?? middle;
   return { width, height, model: "equidistant", cx, cy, radius, fieldOfView: 180, cameraHeight: null };
 }

@@ -7,11 +7,12 @@ export const key = {
   set: (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY)),
 };
 
-/** What the server says is wrong (RFC 9457). */
+/** A problem document of the server (RFC 9457); `parameter` is the one at fault, if there is one. */
 export class Problem extends Error {
-  constructor(status, text) {
+  constructor(status, text, parameter) {
     super(text);
     this.status = status;
+    this.parameter = parameter;
   }
 }
 
@@ -29,7 +30,7 @@ export async function ask(path, options = {}) {
   if (answer.ok) return answer;
   const told = await answer.json().catch(() => ({}));
   if (answer.status === 401) document.dispatchEvent(new Event("key-wanted"));
-  throw new Problem(answer.status, told.detail ?? `The server answered ${answer.status}.`);
+  throw new Problem(answer.status, told.detail ?? `The server answered ${answer.status}.`, told.parameter);
 }
 
 export const askJson = async (path, options) => (await ask(path, options)).json();

@@ -12,7 +12,10 @@ impl AnnotatedImage {
             file_name,
             width: report.image_width,
             height: report.image_height,
-            calibration: (!calibration.assumed).then(|| calibration.id.clone()),
+            calibration: calibration
+                .assumed_circle
+                .is_none()
+                .then(|| calibration.id.clone()),
             persons: report.persons.iter().map(AnnotatedBox::from).collect(),
         }
     }

@@ -1,7 +1,6 @@
 //! What a frame is answered with: the report as JSON, the frame with boxes drawn into it, or a file
 //! for annotation tools.
 
-mod accept;
 mod format;
 
 use axum::http::HeaderMap;
@@ -91,6 +90,7 @@ fn not_drawn(error: PictureError) -> Problem {
         PictureError::Cancelled(_) => PipelineError::Withdrawn.into(),
         PictureError::Encode(error) => {
             Problem::new(ProblemKind::UnfitImage, format!("{error}: ask for a width"))
+                .with_parameter("width")
         }
     }
 }

@@ -27,7 +27,7 @@ use super::{
     access::{Administrator, Reader},
     deadline::Deadline,
     entity_tags::{entity_tag, is_unmodified},
-    openapi::{ChangeProblems, DeleteProblems, RawBytes, ReadProblems, UnknownCalibrationProblem},
+    openapi::RawBytes,
     problem::{Problem, ProblemKind},
 };
 use crate::calibration::ChangeError;
@@ -40,7 +40,6 @@ use crate::calibration::ChangeError;
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "By ID.", body = Vec<CalibrationInfo>),
-        ReadProblems,
     )
 )]
 pub(super) async fn list(
@@ -63,7 +62,6 @@ pub(super) async fn list(
         (status = OK, description = "The native file.", body = Object,
          headers(("ETag" = String, description = "The revision, as in reports."))),
         (status = NOT_MODIFIED, description = "The revision is the one asked with."),
-        UnknownCalibrationProblem,
     )
 )]
 pub(super) async fn get(
@@ -112,7 +110,6 @@ pub(super) async fn get(
          headers(("ETag" = String, description = "The revision, as in reports."))),
         (status = CREATED, description = "Created.", body = CalibrationInfo,
          headers(("ETag" = String, description = "The revision, as in reports."))),
-        ChangeProblems,
     )
 )]
 pub(super) async fn put(
@@ -150,7 +147,7 @@ pub(super) async fn put(
             description = "The revision to delete, or `*`."),
     ),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
-    responses((status = NO_CONTENT, description = "It is gone."), DeleteProblems)
+    responses((status = NO_CONTENT, description = "It is gone."))
 )]
 pub(super) async fn delete(
     State(state): State<ApiState>,

@@ -3,8 +3,8 @@
 //! `server/server.go`) and its clients `deepstack-python` and `deepstack-sdk` do.
 
 mod answer;
+mod failures;
 mod form;
-mod status;
 
 use axum::{
     Extension, Json,
@@ -19,13 +19,12 @@ use super::{
     ApiState,
     access::Reader,
     find::find,
-    openapi::{DeepStackCustomProblems, DeepStackProblems, ReadProblems},
     problem::{Problem, ProblemKind},
     request_id::RequestId,
 };
 use crate::{calibration::CalibrationId, telemetry::RequestTrace};
 
-pub(super) use status::{speaks_at, status_of};
+pub(super) use failures::with_failures;
 
 /// Find the persons in a frame, as DeepStack answers.
 ///
@@ -37,7 +36,6 @@ pub(super) use status::{speaks_at, status_of};
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "The persons found, possibly none.", body = DeepStackAnswer),
-        DeepStackProblems,
     )
 )]
 pub(super) async fn detect_as_deepstack(
@@ -60,7 +58,6 @@ pub(super) async fn detect_as_deepstack(
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "The persons found, possibly none.", body = DeepStackAnswer),
-        DeepStackCustomProblems,
     )
 )]
 pub(super) async fn detect_as_deepstack_with(
@@ -102,7 +99,6 @@ async fn answer(
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "The IDs of the calibrations that serve.", body = DeepStackModels),
-        ReadProblems,
     )
 )]
 pub(super) async fn list_as_deepstack(

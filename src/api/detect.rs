@@ -11,7 +11,7 @@ use super::{
     ApiState,
     answer::AnswerOptions,
     find::{Found, find},
-    openapi::{DetectForm, DetectProblems, DetectQuery, PictureQuery, RawBytes},
+    openapi::{DetectForm, DetectQuery, PictureQuery, RawBytes},
     problem::Problem,
     report::{Report, ReportTimings},
     request_id::RequestId,
@@ -66,7 +66,6 @@ pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-co
             ("X-Inference-Time" = f64, description = "How long the network ran, milliseconds."),
             ("X-Total-Time" = f64, description = "From the frame's arrival to its report, milliseconds."),
          )),
-        DetectProblems,
     )
 )]
 pub(super) async fn detect_persons(

@@ -10,10 +10,11 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use tracing::Instrument;
+use uuid::Uuid;
 
 use super::{
     incoming_trace, page_headers,
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     request_id::{self, RequestId},
 };
 use crate::{
@@ -31,6 +32,14 @@ const ACCESS_LOG: &str = "lookdown::access";
 pub(super) struct Surroundings {
     pub(super) metrics: Arc<Metrics>,
     pub(super) tracer: Tracer,
+}
+
+/// The problem of a failed request, as the log names it.
+struct Failure {
+    /// The name of its kind.
+    reason: &'static str,
+    /// Identifies the occurrence: the `instance` of the problem document.
+    occurrence: Uuid,
 }
 
 /// The answer to a request whose handler has panicked.
@@ -64,15 +73,15 @@ pub(super) async fn wrap(
     );
     let mut response = next.run(request).instrument(span.clone()).await;
     let _in_request = span.enter();
-    let mut reason = None;
-    if let Some(problem) = problem_in(&mut response, method, &path) {
-        let name = problem.kind().name();
-        reason = Some(name);
-        metrics.failures.with_label_values(&[name]).inc();
+    let mut failure = None;
+    if let Some(problem) = Problem::take_from(&mut response, method, &path) {
+        let (reason, occurrence) = (problem.kind().name(), Uuid::now_v7());
+        failure = Some(Failure { reason, occurrence });
+        metrics.failures.with_label_values(&[reason]).inc();
         if let Some(cause) = problem.cause() {
-            tracing::error!("{cause:#}");
+            tracing::error!(instance = %occurrence, "{cause:#}");
         }
-        response = write_problem(response, problem, &path, &request_id);
+        response = write_problem(response, problem, &occurrence, &request_id);
     }
     let status = response.status();
     let class = status_class(status);
@@ -85,13 +94,13 @@ pub(super) async fn wrap(
         .http_request_duration
         .with_label_values(&[route, method])
         .observe(elapsed);
-    log_answer(status, elapsed, reason);
+    log_answer(status, elapsed, failure.as_ref());
     trace.note("http.request.method", method);
     trace.note("http.route", route.to_owned());
     trace.note("http.response.status_code", i64::from(status.as_u16()));
     trace.note("url.path", path);
     trace.note("lookdown.request_id", request_id.as_str().to_owned());
-    end(&trace, status, reason);
+    end(&trace, status, failure.map(|failure| failure.reason));
     let headers = response.headers_mut();
     headers.insert(request_id::HEADER, request_id.header_value());
     page_headers::complete(headers);
@@ -99,12 +108,14 @@ pub(super) async fn wrap(
 }
 
 /// The line that each request gets: on our failures wherever anything is logged, else for who asks.
-fn log_answer(status: StatusCode, seconds: f64, reason: Option<&str>) {
+fn log_answer(status: StatusCode, seconds: f64, failure: Option<&Failure>) {
     let code = status.as_u16();
+    let reason = failure.map(|failure| failure.reason);
+    let instance = failure.map(|failure| tracing::field::display(failure.occurrence));
     if status.is_server_error() {
-        tracing::info!(target: ACCESS_LOG, status = code, seconds, reason, "answered");
+        tracing::info!(target: ACCESS_LOG, status = code, seconds, reason, instance, "answered");
     } else {
-        tracing::debug!(target: ACCESS_LOG, status = code, seconds, reason, "answered");
+        tracing::debug!(target: ACCESS_LOG, status = code, seconds, reason, instance, "answered");
     }
 }
 
@@ -117,38 +128,15 @@ fn end(trace: &RequestTrace, status: StatusCode, reason: Option<&'static str>) {
     trace.end(fault);
 }
 
-/// The problem a response stands for; failures that the framework answered by itself get one, too.
-fn problem_in(response: &mut Response, method: &str, path: &str) -> Option<Problem> {
-    if let Some(problem) = response.extensions_mut().remove::<Problem>() {
-        return Some(problem);
-    }
-    match response.status() {
-        StatusCode::NOT_FOUND => Some(Problem::new(
-            ProblemKind::NotFound,
-            format!("there is nothing at {path}: GET /docs shows what there is"),
-        )),
-        StatusCode::METHOD_NOT_ALLOWED => Some(Problem::new(
-            ProblemKind::MethodNotAllowed,
-            format!("{path} does not offer {method}: the Allow header names what it offers"),
-        )),
-        status if status.is_client_error() => Some(Problem::new(
-            ProblemKind::MalformedRequest,
-            "the request cannot be understood: GET /docs shows how to ask",
-        )),
-        status if status.is_server_error() => Some(Problem::fault()),
-        _ => None,
-    }
-}
-
 /// The same response (`Allow`, `Retry-After` …) with the problem as its body.
 fn write_problem(
     response: Response,
     problem: Problem,
-    path: &str,
+    occurrence: &Uuid,
     request_id: &RequestId,
 ) -> Response {
-    let status = problem.status_at(path);
-    let body = Json(problem.body(path, request_id.as_str())).into_response();
+    let status = problem.status();
+    let body = Json(problem.body(occurrence, request_id.as_str())).into_response();
     let (mut parts, _) = response.into_parts();
     parts.status = status;
     parts.headers.remove(header::CONTENT_LENGTH);
@@ -213,7 +201,7 @@ mod tests {
         assert_eq!(media_type, "application/problem+json");
         let body = response.into_body().collect().await.unwrap().to_bytes();
         let body = String::from_utf8_lossy(&body);
-        assert!(body.contains("urn:lookdown:problem:internal"), "{body}");
+        assert!(body.contains("/problems/internal"), "{body}");
         assert!(!body.contains("secret"), "{body}");
         assert_eq!(metrics.failures.with_label_values(&["internal"]).get(), 1);
 

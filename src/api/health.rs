@@ -6,11 +6,7 @@ use axum::{Json, extract::State, http::header::CONTENT_TYPE, response::IntoRespo
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-use super::{
-    ApiState,
-    openapi::{FaultProblem, NotReadyProblems},
-    problem::Problem,
-};
+use super::{ApiState, problem::Problem};
 use crate::{
     calibration::{CalibrationId, CalibrationsHealth},
     pipeline::PipelineError,
@@ -160,7 +156,6 @@ pub(super) async fn livez() -> Json<Health> {
     get, path = "/readyz", tag = "operation", operation_id = "get_readiness",
     responses(
         (status = OK, description = "Frames can be sent.", body = Ready),
-        NotReadyProblems
     )
 )]
 pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>, Problem> {
@@ -190,7 +185,6 @@ pub(super) fn require_ready(state: &ApiState) -> Result<(), Problem> {
     get, path = "/metrics", tag = "operation", operation_id = "get_metrics",
     responses(
         (status = OK, description = "All metrics.", body = String, content_type = "text/plain"),
-        FaultProblem
     )
 )]
 pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoResponse, Problem> {

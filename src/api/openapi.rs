@@ -1,8 +1,8 @@
 //! The API's own description. What a route takes and answers stands with the route; here is what
 //! they share.
 
+mod failures;
 mod parameters;
-mod problems;
 mod security;
 
 use axum::Json;
@@ -10,24 +10,15 @@ use utoipa::{OpenApi, openapi};
 
 use security::Keys;
 
-pub(super) use parameters::{DetectForm, DetectQuery, PictureQuery, RawBytes, fields};
-pub(super) use problems::{
-    CameraEventsProblems, ChangeProblems, DeepStackCustomProblems, DeepStackProblems,
-    DeleteProblems, DetectProblems, EventsProblems, FaultProblem, HistoryProblems, IndexProblems,
-    InferProblems, LatestProblems, LoadProblems, ModelProblems, ModelReadyProblems,
-    NotReadyProblems, PictureProblems, ReadProblems, ResultsProblems, TrialProblems,
-    UnknownCalibrationProblem, ViewsProblems,
-};
-
 use super::problem::ProblemBody;
+pub(super) use parameters::{DetectForm, DetectQuery, PictureQuery, RawBytes, fields};
 
 #[derive(OpenApi)]
 #[openapi(
     info(
         title = "Lookdown",
-        description = "Finds people in the pictures of ceiling fisheye cameras. Any request may also \
-                       be answered 431 when its headers are too large, and 503 when too many \
-                       connections are open."
+        description = "Finds people in the frames of ceiling fisheye cameras. Every failure is a \
+                       problem document (RFC 9457)."
     ),
     servers((url = "/", description = "This server")),
     tags(
@@ -37,7 +28,7 @@ use super::problem::ProblemBody;
         (name = "results", description = "What was found last, for dashboards. Kept within limits, in memory or in a Redis that servers share."),
         (name = "calibrations", description = "The cameras. Changes are for administrators."),
         (name = "models", description = "Which models answer. Changes are for administrators."),
-        (name = "operation", description = "Probes, metrics and this document."),
+        (name = "operation", description = "Probes, metrics and documentation."),
     ),
     components(schemas(ProblemBody)),
     modifiers(&Keys)
@@ -47,7 +38,9 @@ pub(super) struct Common;
 /// The OpenAPI document of every route.
 #[must_use]
 pub fn document() -> openapi::OpenApi {
-    super::routes().into_openapi()
+    let mut document = super::routes().into_openapi();
+    failures::describe(&mut document);
+    document
 }
 
 /// This document.

@@ -1,20 +1,14 @@
-//! The one error envelope: RFC 9457 problem details.
+//! Failures as problem documents (RFC 9457).
 //!
-//! A handler returns a [`Problem`]; the [envelope](super::envelope) writes it down with the path
-//! and the request ID, logs its cause and counts it. Statuses: 400 malformed, 401 no known key, 403 not
-//! allowed, 404
-//! unknown calibration, camera or model, 406 nothing that is accepted, 408 slow upload, 409 not while the models or
-//! calibrations are as they are,
-//! 412 outdated, 413 too
-//! many bytes or pixels, 415 not a picture that can be read, 422 understood but unusable, 429 no
-//! place in the queue or among the listeners, or another model is being loaded, 503 no place at all (not ready or shutting
-//! down), 504 deadline.
+//! A handler returns a [`Problem`]. The [envelope](super::envelope) writes it with a request ID and an ID of the
+//! occurrence, logs its cause and counts it. The [table](kind) declares the kinds.
 
 mod calibration;
 mod kind;
+pub(super) mod pages;
 mod pipeline;
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use axum::{
     http::{
@@ -24,38 +18,51 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use serde::Serialize;
+use serde_json::Value;
 use utoipa::ToSchema;
-
-use super::deepstack;
+use uuid::Uuid;
 
 pub(super) use kind::ProblemKind;
 
-/// Whoever is told to wait longer than this has been forgotten.
+/// The longest `Retry-After`.
 const MAX_RETRY_AFTER_SECONDS: u64 = 60;
 
-/// A request that got no result.
+/// The reason why a request failed.
 #[derive(Debug, Clone)]
 pub(super) struct Problem {
     kind: ProblemKind,
+    status: StatusCode,
     detail: String,
-    /// When to come again, if that is known better than from the kind.
+    /// The parameter or form field at fault.
+    parameter: Option<String>,
+    /// A better `Retry-After` than that of the kind.
     retry_after: Option<Duration>,
-    /// What really happened; logged, never shown.
+    /// Members that a protocol adds to the document.
+    members: BTreeMap<&'static str, Value>,
+    /// The internal error: logged, never sent.
     cause: Option<Arc<anyhow::Error>>,
 }
 
 impl Problem {
-    /// A problem that is told to the client in one sentence.
+    /// Creates a problem with a detail of one sentence.
     pub(super) fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         Self {
             kind,
+            status: kind.status(),
             detail: detail.into(),
+            parameter: None,
             retry_after: None,
+            members: BTreeMap::new(),
             cause: None,
         }
     }
 
-    /// A fault of ours: the client learns nothing but that.
+    /// Creates a problem of one parameter or form field: the detail is `parameter: fault`.
+    pub(super) fn of_parameter(kind: ProblemKind, parameter: &str, fault: &str) -> Self {
+        Self::new(kind, format!("{parameter}: {fault}")).with_parameter(parameter)
+    }
+
+    /// An internal error; only the log has its cause.
     pub(super) fn internal(cause: impl Into<anyhow::Error>) -> Self {
         Self {
             cause: Some(Arc::new(cause.into())),
@@ -63,16 +70,15 @@ impl Problem {
         }
     }
 
-    /// A fault of ours that was logged where it happened.
+    /// An internal error that was logged where it occurred.
     pub(super) fn fault() -> Self {
         Self::new(
             ProblemKind::Internal,
-            "the request could not be answered because of a fault in the server, which has \
-             logged it under this request_id",
+            "the server failed to process the request: its log has the reason under this request_id",
         )
     }
 
-    /// The network has not run yet.
+    /// The models are not ready yet.
     pub(super) fn warming_up() -> Self {
         Self::new(
             ProblemKind::WarmingUp,
@@ -80,13 +86,37 @@ impl Problem {
         )
     }
 
-    /// The server was told to stop.
+    /// The server is shutting down.
     pub(super) fn shutting_down() -> Self {
         let detail = "the server is shutting down: send the request to another one";
         Self::new(ProblemKind::ShuttingDown, detail)
     }
 
-    /// The same, with the time after which another try is worth while.
+    /// Returns the problem of a failed response: the one that the handler returned, or one for a failure of the
+    /// framework.
+    pub(super) fn take_from(response: &mut Response, method: &str, path: &str) -> Option<Self> {
+        if let Some(problem) = response.extensions_mut().remove::<Self>() {
+            return Some(problem);
+        }
+        match response.status() {
+            StatusCode::NOT_FOUND => Some(Self::new(
+                ProblemKind::NotFound,
+                format!("there is nothing at {path}: GET /docs lists all paths"),
+            )),
+            StatusCode::METHOD_NOT_ALLOWED => Some(Self::new(
+                ProblemKind::MethodNotAllowed,
+                format!("{path} does not support {method}: use a method of the header Allow"),
+            )),
+            status if status.is_client_error() => Some(Self::new(
+                ProblemKind::MalformedRequest,
+                "the request is malformed: compare it with GET /docs",
+            )),
+            status if status.is_server_error() => Some(Self::fault()),
+            _ => None,
+        }
+    }
+
+    /// Sets the least time before a retry.
     pub(super) fn with_retry_after(self, retry_after: Duration) -> Self {
         Self {
             retry_after: Some(retry_after),
@@ -94,34 +124,49 @@ impl Problem {
         }
     }
 
+    /// Sets the parameter or form field at fault.
+    pub(super) fn with_parameter(self, parameter: impl Into<String>) -> Self {
+        Self {
+            parameter: Some(parameter.into()),
+            ..self
+        }
+    }
+
+    /// Sets another status than that of the kind.
+    pub(super) fn with_status(self, status: StatusCode) -> Self {
+        Self { status, ..self }
+    }
+
+    /// Adds a member to the document.
+    pub(super) fn with_member(mut self, name: &'static str, value: impl Into<Value>) -> Self {
+        self.members.insert(name, value.into());
+        self
+    }
+
     pub(super) fn kind(&self) -> ProblemKind {
         self.kind
+    }
+
+    pub(super) fn status(&self) -> StatusCode {
+        self.status
     }
 
     pub(super) fn cause(&self) -> Option<&anyhow::Error> {
         self.cause.as_deref()
     }
 
-    /// The status with which a request for this path is answered.
-    pub(super) fn status_at(&self, path: &str) -> StatusCode {
-        if deepstack::speaks_at(path) {
-            deepstack::status_of(self.kind)
-        } else {
-            self.kind.status()
-        }
-    }
-
-    /// As it is written to a client.
-    pub(super) fn body(self, path: &str, request_id: &str) -> ProblemBody {
+    /// The document that the client gets.
+    pub(super) fn body(self, occurrence: &Uuid, request_id: &str) -> ProblemBody {
         ProblemBody {
-            r#type: self.kind.urn(),
+            r#type: self.kind.path(),
             title: self.kind.title(),
-            status: self.status_at(path).as_u16(),
+            status: self.status.as_u16(),
             error: self.detail.clone(),
             detail: self.detail,
-            instance: path.to_owned(),
+            instance: occurrence.urn().to_string(),
             request_id: request_id.to_owned(),
-            success: deepstack::speaks_at(path).then_some(false),
+            parameter: self.parameter,
+            members: self.members,
         }
     }
 }
@@ -129,7 +174,7 @@ impl Problem {
 /// Status and headers; the envelope writes the body.
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let mut response = self.kind.status().into_response();
+        let mut response = self.status.into_response();
         if let Some(least) = self.kind.retry_after_seconds() {
             let wanted = self.retry_after.map_or(0, |after| after.as_secs() + 1);
             let seconds = HeaderValue::from(wanted.clamp(least, MAX_RETRY_AFTER_SECONDS));
@@ -144,34 +189,40 @@ impl IntoResponse for Problem {
     }
 }
 
-/// Why a request got no result (RFC 9457).
+/// The reason why a request failed (RFC 9457).
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Problem, example = json!({
-    "type": "urn:lookdown:problem:invalid-parameter",
-    "title": "A parameter cannot be used",
+    "type": "/problems/invalid-parameter",
+    "title": "Invalid parameter",
     "status": 422,
     "detail": "score_threshold: 1.5 is outside 0 to 1",
-    "instance": "/detect",
+    "instance": "urn:uuid:0197a3c5-8f0e-7c3e-9a55-2f8e4b1d6c71",
     "error": "score_threshold: 1.5 is outside 0 to 1",
+    "parameter": "score_threshold",
     "request_id": "0197a3c5-8f0e-7c3e-9a55-2f8e4b1d6c70"
 }))]
 pub(super) struct ProblemBody {
-    /// Identifies the kind of problem; stable.
+    /// Identifies the kind of problem: the path of its documentation on this server. Stable.
+    #[schema(format = "uri-reference")]
     r#type: String,
     /// The kind of problem in words.
     title: &'static str,
     /// The HTTP status.
     status: u16,
-    /// What is wrong with this request and what would be right; names the field, if it is one.
+    /// The fault of this request and its remedy, as one sentence.
     detail: String,
-    /// The path of the request.
+    /// Identifies this occurrence, also in the server's log.
+    #[schema(format = "uri")]
     instance: String,
-    /// The same as `detail`, for clients that look for it here.
+    /// The same as `detail`, for clients that expect it here.
     error: String,
-    /// Identifies the request in the server's log.
+    /// Identifies the request: the client's own `X-Request-Id`, or a generated one.
     request_id: String,
-    /// Always false; only below `/v1/vision`, whose clients look for it.
+    /// The parameter, form field or field of the calibration at fault; absent where none is.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    success: Option<bool>,
+    parameter: Option<String>,
+    #[serde(flatten)]
+    #[schema(ignore)]
+    members: BTreeMap<&'static str, Value>,
 }

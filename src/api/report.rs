@@ -79,8 +79,8 @@ pub struct Report {
     /// Where the time went. The stages are disjoint; together they make the total but for
     /// scheduling gaps.
     pub timings_ms: ReportTimings,
-    /// What the sender should know, one sentence each.
-    pub warnings: Vec<String>,
+    /// Circumstances that the client should consider.
+    pub warnings: Vec<ReportWarning>,
 }
 
 /// The calibration used.
@@ -90,8 +90,37 @@ pub struct ReportCalibration {
     pub id: String,
     /// Changes whenever its content does.
     pub revision: String,
-    /// Whether the lens was assumed from the circle found in the frame.
+    /// Whether the lens was assumed because the request named no calibration.
     pub assumed: bool,
+    /// The lens circle of the frame, from which the lens was assumed; absent with a calibration.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub assumed_circle: Option<ReportCircle>,
+}
+
+/// A lens circle, in pixels of the frame: the corner of the top-left pixel is (0, 0), as in boxes.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+#[schema(as = LensCircle)]
+pub struct ReportCircle {
+    /// Column of the centre.
+    pub cx: f64,
+    /// Row of the centre.
+    pub cy: f64,
+    /// Radius; the circle may reach beyond the frame.
+    pub radius: f64,
+}
+
+/// A circumstance that the client should consider.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+#[schema(example = json!({
+    "code": "frame-rotated",
+    "message": "the frame was rotated according to its EXIF orientation; boxes are in pixels of the rotated frame"
+}))]
+pub struct ReportWarning {
+    /// The code for programs; stable. Later versions may add codes.
+    pub code: &'static str,
+    /// The circumstance with its values, as one sentence for people.
+    pub message: String,
 }
 
 /// The frame.

@@ -14,7 +14,6 @@ use super::{
     ApiState,
     access::{Administrator, ModelReader},
     deadline::Deadline,
-    openapi::{IndexProblems, LoadProblems},
     problem::{Problem, ProblemKind},
 };
 use crate::inference::{InferenceError, Model, RepositoryError, RepositoryRow};
@@ -70,7 +69,6 @@ impl From<&Model> for RepositoryEntry {
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "The models, by name.", body = Vec<RepositoryEntry>),
-        IndexProblems,
     )
 )]
 pub(super) async fn index(
@@ -99,7 +97,6 @@ pub(super) async fn index(
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(
         (status = OK, description = "The model answers.", body = RepositoryEntry),
-        LoadProblems,
     )
 )]
 pub(super) async fn load(
@@ -124,7 +121,6 @@ pub(super) async fn load(
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(
         (status = OK, description = "The model answers no more.", body = RepositoryEntry),
-        LoadProblems,
     )
 )]
 pub(super) async fn unload(

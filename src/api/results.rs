@@ -21,7 +21,6 @@ use self::row::CameraRow;
 use super::{
     ApiState,
     access::Reader,
-    openapi::ResultsProblems,
     problem::{Problem, ProblemKind},
 };
 use crate::{
@@ -38,7 +37,7 @@ const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 #[utoipa::path(
     get, path = "/results", tag = "results", operation_id = "list_results",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    responses((status = OK, description = "By name.", body = Vec<CameraRow>), ResultsProblems)
+    responses((status = OK, description = "By name.", body = Vec<CameraRow>))
 )]
 pub(super) async fn list(
     State(state): State<ApiState>,

@@ -98,12 +98,7 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
         .parse()
         .map_err(|error| invalid("id", format!("{error}")))?;
     let Some(NativeImage { width, height }) = camera.image else {
-        return Err(invalid(
-            "image",
-            "the file does not tell the frame size it was made for: convert it with `lookdown \
-             calibration convert --size WIDTHxHEIGHT`, or PUT it with ?size=WIDTHxHEIGHT"
-                .to_owned(),
-        ));
+        return Err(FormatError::MissingSize);
     };
     if !(IMAGE_SIDE.contains(&width) && IMAGE_SIDE.contains(&height)) {
         let (least, most) = IMAGE_SIDE.into_inner();

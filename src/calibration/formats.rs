@@ -39,6 +39,7 @@ use self::{
 };
 use super::native::{NativeImage, NativeMask, NativeMount, NativeZone};
 use crate::geometry::lens::LensModel;
+use crate::warning::Warning;
 
 /// Most cameras taken from one file.
 const MAX_CAMERAS: usize = 256;
@@ -74,8 +75,8 @@ pub struct Camera {
     pub zones: Vec<NativeZone>,
     /// Its masks; only native files have some.
     pub masks: Vec<NativeMask>,
-    /// What had to be assumed, a sentence each.
-    pub notes: Vec<String>,
+    /// The assumptions of the reader.
+    pub notes: Vec<Warning>,
 }
 
 impl Camera {

@@ -34,6 +34,7 @@ use crate::{
     },
     inference::{Model, ModelRegistry},
     revision::sha256_of,
+    warning::{Warning, WarningCode},
 };
 
 /// The smallest frame side that can hold a lens image, pixels.
@@ -198,11 +199,11 @@ impl Engine {
 
         let mut warnings = Vec::new();
         if decoded.orientation_applied {
-            warnings.push(
-                "the frame was turned as its EXIF orientation says; boxes are in pixels of the \
-                 turned frame"
-                    .to_owned(),
-            );
+            warnings.push(Warning::new(
+                WarningCode::FrameRotated,
+                "the frame was rotated according to its EXIF orientation; boxes are in pixels of the \
+                 rotated frame",
+            ));
         }
         let camera = self.camera(job, &frame, &model, &mut warnings)?;
         camera.rig.blank(&mut frame);

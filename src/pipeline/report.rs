@@ -11,7 +11,9 @@ use crate::{
         OrientedBox, Pixel, Zone,
         floor::{Bearing, FloorPosition},
     },
+    imaging::lens_circle::LensCircle,
     inference::Model,
+    warning::Warning,
 };
 
 /// The persons in one frame.
@@ -51,8 +53,8 @@ pub struct DetectionReport {
     pub non_finite: usize,
     /// Where the time went.
     pub timings: StageTimings,
-    /// What the caller should know: one sentence each.
-    pub warnings: Vec<String>,
+    /// Circumstances that the caller should consider.
+    pub warnings: Vec<Warning>,
 }
 
 /// What became of the views of one frame.
@@ -69,14 +71,14 @@ pub struct ViewCounts {
 }
 
 /// Which calibration a report is based on.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationUsed {
     /// The calibration's ID; `assumed` when none was named.
     pub id: String,
     /// Changes whenever the calibration's content does.
     pub revision: String,
-    /// Whether the lens was assumed from the circle found in the frame.
-    pub assumed: bool,
+    /// The lens circle from which the lens was assumed; `None` with a calibration.
+    pub assumed_circle: Option<LensCircle>,
 }
 
 /// How many persons are in a zone.

@@ -93,7 +93,7 @@ async fn every_guarded_route_needs_a_key_of_its_scope_and_admin_opens_all() {
         let none = service.ask(method, path, &[]).await;
         assert_eq!(none.status, 401, "{method} {path}");
         assert_eq!(none.header("www-authenticate"), "Bearer");
-        assert_eq!(none.problem()["type"], "urn:lookdown:problem:key-required");
+        assert_eq!(none.problem()["type"], "/problems/key-required");
 
         for (key, scopes) in [
             (FINDER, &["detect"][..]),
@@ -112,7 +112,7 @@ async fn every_guarded_route_needs_a_key_of_its_scope_and_admin_opens_all() {
             } else {
                 assert_eq!(status, 403, "{method} {path}");
                 let problem = answer.problem();
-                assert_eq!(problem["type"], "urn:lookdown:problem:forbidden");
+                assert_eq!(problem["type"], "/problems/forbidden");
                 assert!(
                     problem["detail"].as_str().unwrap().contains(scope),
                     "{problem}"

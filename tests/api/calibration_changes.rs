@@ -97,7 +97,7 @@ async fn a_change_made_for_another_revision_is_refused() {
         let answer = change(&service, method, header, body()).await;
         assert_eq!(answer.status, status, "{method} {header:?}");
         if status == 412 {
-            assert_eq!(answer.problem()["type"], "urn:lookdown:problem:outdated");
+            assert_eq!(answer.problem()["type"], "/problems/precondition-failed");
         }
     }
 }
@@ -151,7 +151,7 @@ async fn files_of_other_programs_are_taken_and_one_of_several_cameras_is_chosen_
     let several = service.put("/calibrations/hall", KALIBR).await;
     assert_eq!(several.status, 422);
     let problem = several.problem();
-    assert_eq!(problem["type"], "urn:lookdown:problem:invalid-calibration");
+    assert_eq!(problem["type"], "/problems/invalid-calibration");
     let detail = problem["detail"].as_str().unwrap();
     assert!(
         detail.contains("?camera=") && detail.contains("cam0, cam1"),
@@ -195,7 +195,7 @@ async fn what_makes_no_calibration_is_refused_with_the_field_and_changes_nothing
         let answer = service.put(&format!("/calibrations/{id}"), &content).await;
         assert_eq!(answer.status, 422, "{content}");
         let problem = answer.problem();
-        assert_eq!(problem["type"], "urn:lookdown:problem:invalid-calibration");
+        assert_eq!(problem["type"], "/problems/invalid-calibration");
         assert!(
             problem["detail"].as_str().unwrap().contains(part),
             "{problem}"

@@ -63,7 +63,7 @@ async fn what_is_not_there_is_404_and_says_where_to_look() {
         let answer = service.get(path).await;
         assert_eq!(answer.status, 404, "{path}");
         let problem = answer.problem();
-        assert_eq!(problem["type"], "urn:lookdown:problem:unknown-calibration");
+        assert_eq!(problem["type"], "/problems/unknown-calibration");
     }
 }
 
@@ -83,7 +83,7 @@ async fn a_frame_for_a_file_that_gives_no_calibration_is_told_what_to_name() {
             .await;
         assert_eq!(answer.status, 404);
         let problem = answer.problem();
-        assert_eq!(problem["type"], "urn:lookdown:problem:unknown-calibration");
+        assert_eq!(problem["type"], "/problems/unknown-calibration");
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains(told), "{detail}");
     }
@@ -248,7 +248,7 @@ async fn a_plan_for_the_frame_itself_has_no_views_and_odd_requests_are_refused()
     ] {
         let answer = service.get(&format!("{PATH}/views?{query}")).await;
         assert_eq!(answer.status, status, "{query}");
-        let urn = format!("urn:lookdown:problem:{kind}");
+        let urn = format!("/problems/{kind}");
         assert_eq!(answer.problem()["type"], urn, "{query}");
     }
 }
@@ -288,7 +288,7 @@ async fn a_calibration_is_tried_before_it_is_stored() {
             "unknown-parameter",
         ),
     ] {
-        let urn = format!("urn:lookdown:problem:{kind}");
+        let urn = format!("/problems/{kind}");
         assert_eq!(
             service.post(path, body).await.problem()["type"],
             urn,

@@ -32,7 +32,7 @@ async fn heads_that_are_too_large_are_refused_with_a_problem_and_much_larger_one
         let status = "431 Request Header Fields Too Large";
         assert!(answer.contains(status), "{count} × {bytes}: {answer}");
         assert!(
-            answer.contains("urn:lookdown:problem:headers-too-large"),
+            answer.contains("/problems/headers-too-large"),
             "{count} × {bytes}: {answer}"
         );
     }
@@ -56,7 +56,7 @@ async fn beyond_the_limit_of_connections_probes_are_answered_and_everything_else
     let refused = server.detect().await.unwrap().unwrap();
     for part in [
         "503 Service Unavailable",
-        "urn:lookdown:problem:too-many-connections",
+        "/problems/too-many-connections",
         "\r\nretry-after: 1\r\n",
         "\r\nconnection: close\r\n",
     ] {
@@ -100,7 +100,7 @@ async fn metrics_on_a_port_of_their_own_are_there_with_the_probes_and_nowhere_el
     for path in ["/detect", "/calibrations", "/openapi.json", "/docs/", "/"] {
         let answer = get(path).await;
         assert!(answer.contains("404 Not Found"), "{path}: {answer}");
-        assert!(answer.contains("urn:lookdown:problem:not-found"), "{path}");
+        assert!(answer.contains("/problems/not-found"), "{path}");
     }
     assert!(server.get("/metrics").await.contains("404 Not Found"));
     for path in ["/livez", "/readyz", "/calibrations", "/openapi.json"] {

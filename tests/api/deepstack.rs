@@ -36,7 +36,7 @@ fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
     assert_eq!(answer.status, status, "{}", answer.text());
     let problem = answer.problem();
     assert_eq!(problem["success"], false);
-    assert_eq!(problem["type"], format!("urn:lookdown:problem:{kind}"));
+    assert_eq!(problem["type"], format!("/problems/{kind}"));
     let error = problem["error"].as_str().unwrap();
     assert!(error.contains(part), "{error}");
 }

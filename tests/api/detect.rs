@@ -2,7 +2,7 @@
 
 use axum::{body::Body, http::Request};
 
-use crate::service::{Service, form, frame};
+use crate::service::{FRAME_SIDE, Service, form, frame};
 
 #[tokio::test]
 async fn a_form_and_a_raw_body_get_the_same_persons() {
@@ -74,14 +74,19 @@ async fn a_person_carries_its_box_direction_and_place() {
 }
 
 #[tokio::test]
-async fn without_a_calibration_the_assumption_is_told() {
+async fn an_assumed_lens_is_reported_with_its_circle() {
     let report = Service::start()
         .post_raw("profile=fast", frame())
         .await
         .json();
     assert_eq!(report["calibration"]["assumed"], true);
     assert_eq!(report["camera"], "assumed");
-    assert!(!report["warnings"].as_array().unwrap().is_empty());
+    assert_eq!(report["warnings"][0]["code"], "lens-assumed");
+    let circle = &report["calibration"]["assumed_circle"];
+    for coordinate in ["cx", "cy", "radius"] {
+        let pixels = circle[coordinate].as_f64().unwrap();
+        assert!((0.0..=f64::from(FRAME_SIDE)).contains(&pixels), "{circle}");
+    }
 }
 
 #[tokio::test]

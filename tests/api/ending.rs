@@ -33,7 +33,7 @@ async fn in_its_grace_period_the_server_is_not_ready_but_serves_everybody_once_m
     server.is_told_to_stop().await;
     let probe = server.get("/readyz").await;
     assert!(probe.contains("503 Service Unavailable"), "{probe}");
-    assert!(probe.contains("urn:lookdown:problem:shutting-down"));
+    assert!(probe.contains("/problems/shutting-down"));
     assert!(server.get("/livez").await.contains("200 OK"));
     assert!(server.detect().await.unwrap().unwrap().contains("200 OK"));
 

@@ -124,7 +124,7 @@ async fn values_and_names_of_a_form_are_bounded_to_the_byte() {
     };
     for (count, kind) in [(24, "repeated-parameter"), (25, "malformed-request")] {
         let answer = service.post_form(&fields(count)).await;
-        let urn = format!("urn:lookdown:problem:{kind}");
+        let urn = format!("/problems/{kind}");
         assert_eq!(answer.problem()["type"], urn, "{count} fields");
     }
 }
@@ -137,10 +137,7 @@ async fn a_compressed_body_is_not_unpacked() {
         .unwrap();
     let answer = Service::start().send(request).await;
     assert_eq!(answer.status, 415);
-    assert_eq!(
-        answer.problem()["type"],
-        "urn:lookdown:problem:unsupported-image"
-    );
+    assert_eq!(answer.problem()["type"], "/problems/unsupported-image");
 }
 
 #[tokio::test]

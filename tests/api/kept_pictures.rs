@@ -60,12 +60,12 @@ async fn no_picture_is_kept_unless_the_settings_name_its_camera() {
         let answer = service.get(&path).await;
         assert_eq!(answer.status, 404);
         let problem = answer.problem();
-        assert_eq!(problem["type"], "urn:lookdown:problem:picture-not-kept");
+        assert_eq!(problem["type"], "/problems/picture-not-kept");
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains("results.pictures"), "{detail}");
     }
     let nobody = keeping().get(PATH).await.problem();
-    assert_eq!(nobody["type"], "urn:lookdown:problem:unknown-camera");
+    assert_eq!(nobody["type"], "/problems/unknown-camera");
 }
 
 #[tokio::test]

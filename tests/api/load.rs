@@ -53,7 +53,7 @@ async fn a_frame_without_a_place_is_refused_at_once_and_may_retry() {
     let refused = service.post_raw(FAST, frame()).await;
     assert_eq!(refused.status, 429);
     assert_eq!(refused.header("retry-after"), "1");
-    assert_eq!(refused.problem()["type"], "urn:lookdown:problem:overloaded");
+    assert_eq!(refused.problem()["type"], "/problems/overloaded");
     service.gate.open();
     assert_eq!(first.await.unwrap(), 200);
     service.still_works().await;
@@ -95,7 +95,7 @@ async fn a_view_plan_has_a_place_among_the_frames_or_may_retry() {
     for refused in [service.get(VIEWS).await, service.post(VIEWS, &trial).await] {
         assert_eq!(refused.status, 429);
         assert_eq!(refused.header("retry-after"), "1");
-        assert_eq!(refused.problem()["type"], "urn:lookdown:problem:overloaded");
+        assert_eq!(refused.problem()["type"], "/problems/overloaded");
     }
     service.gate.open();
     assert_eq!(first.await.unwrap(), 200);
@@ -153,7 +153,7 @@ async fn a_frame_that_takes_too_long_is_given_up() {
     service.gate.close();
     let answer = service.post_raw(FAST, frame()).await;
     assert_eq!(answer.status, 504);
-    assert_eq!(answer.problem()["type"], "urn:lookdown:problem:timeout");
+    assert_eq!(answer.problem()["type"], "/problems/timeout");
     service.gate.open();
 }
 
@@ -176,7 +176,7 @@ async fn a_panic_in_the_detector_costs_one_answer_and_reveals_nothing() {
     service.gate.panic_once();
     let answer = service.post_raw(FAST, frame()).await;
     assert_eq!(answer.status, 500);
-    assert_eq!(answer.problem()["type"], "urn:lookdown:problem:internal");
+    assert_eq!(answer.problem()["type"], "/problems/internal");
     assert!(!answer.text().contains("secret"));
     service.still_works().await;
 }

@@ -130,3 +130,23 @@ async fn a_request_of_no_trace_has_no_trace_id() {
     assert_eq!(lines[0]["status"], 200);
     assert_eq!(lines[0].get("reason"), None);
 }
+
+#[tokio::test]
+async fn each_occurrence_has_its_own_instance_that_is_logged() {
+    let log = Log::start();
+    let service = Service::start();
+    let mut instances = Vec::new();
+    for _ in 0..2 {
+        let request = Request::get("/nothing").header("x-request-id", "the-same");
+        let answer = service.send(request.body(Body::empty()).unwrap()).await;
+        let problem = answer.problem();
+        assert_eq!(problem["request_id"], "the-same");
+        let instance = problem["instance"].as_str().unwrap();
+        instances.push(instance.strip_prefix("urn:uuid:").unwrap().to_owned());
+    }
+    assert_ne!(instances[0], instances[1]);
+    let lines = log.of("the-same");
+    let logged: Vec<_> = lines.iter().map(|line| &line["instance"]).collect();
+    let expected: Vec<_> = instances.into_iter().map(Value::from).collect();
+    assert_eq!(logged, expected.iter().collect::<Vec<_>>());
+}

@@ -18,6 +18,7 @@ mod logs;
 mod metrics_table;
 mod operation;
 mod picture;
+mod problems;
 mod rate_limit;
 mod refusals;
 mod remote;

@@ -11,10 +11,7 @@ async fn readiness_follows_the_life_of_the_server_and_liveness_does_not() {
     service.readiness.stopping();
     let answer = service.get("/readyz").await;
     assert_eq!(answer.status, 503);
-    assert_eq!(
-        answer.problem()["type"],
-        "urn:lookdown:problem:shutting-down"
-    );
+    assert_eq!(answer.problem()["type"], "/problems/shutting-down");
     assert_eq!(answer.header("retry-after"), "1");
     assert_eq!(service.get("/livez").await.status, 200);
 }

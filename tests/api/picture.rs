@@ -240,11 +240,7 @@ async fn bad_options_are_problems_that_name_them() {
         let answer = accepting(&service, "image/png", query).await;
         assert_eq!(answer.status, status, "{query}");
         let problem = answer.problem();
-        assert_eq!(
-            problem["type"],
-            format!("urn:lookdown:problem:{kind}"),
-            "{query}"
-        );
+        assert_eq!(problem["type"], format!("/problems/{kind}"), "{query}");
         let told = problem["detail"].as_str().unwrap();
         assert!(told.contains(detail), "{query}: {told}");
     }
@@ -262,7 +258,7 @@ async fn what_nobody_offers_is_not_acceptable_and_costs_no_inference() {
         let answer = accepting(&service, accept, "").await;
         assert_eq!(answer.status, 406, "{accept}");
         let problem = answer.problem();
-        assert_eq!(problem["type"], "urn:lookdown:problem:not-acceptable");
+        assert_eq!(problem["type"], "/problems/not-acceptable");
         assert!(problem["detail"].as_str().unwrap().contains("image/jpeg"));
     }
     assert_eq!(service.gate.runs(), 0);

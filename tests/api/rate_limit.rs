@@ -55,10 +55,7 @@ async fn a_client_that_asks_too_fast_is_told_when_to_come_again() {
     }
     let refused = ask(&service, "/calibrations", "192.0.2.1:2000", None).await;
     assert_eq!(refused.status, 429);
-    assert_eq!(
-        refused.problem()["type"],
-        "urn:lookdown:problem:rate-limited"
-    );
+    assert_eq!(refused.problem()["type"], "/problems/rate-limited");
     assert_eq!(refused.header("retry-after"), "50");
     assert_eq!(refused.header("ratelimit"), "\"default\";r=0;t=50");
     let other = ask(&service, "/calibrations", "192.0.2.2:1000", None).await;

@@ -17,7 +17,7 @@ const HUGE_PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\x01\x86\xa0\0\x01\x86\
 fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
     assert_eq!(answer.status, status, "{}", answer.text());
     let problem = answer.problem();
-    assert_eq!(problem["type"], format!("urn:lookdown:problem:{kind}"));
+    assert_eq!(problem["type"], format!("/problems/{kind}"));
     let detail = problem["detail"].as_str().unwrap();
     assert!(detail.contains(part), "{detail:?} does not say {part:?}");
     assert!(!detail.contains('\n'), "{detail:?} is more than a line");

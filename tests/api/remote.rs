@@ -19,7 +19,7 @@ async fn an_inference_server_without_a_place_is_ours_without_a_place() {
     assert_eq!(answer.status, 429);
     assert_eq!(answer.header("retry-after"), "7");
     let problem = answer.problem();
-    assert_eq!(problem["type"], "urn:lookdown:problem:overloaded");
+    assert_eq!(problem["type"], "/problems/overloaded");
     assert!(
         problem["detail"]
             .as_str()
@@ -49,10 +49,7 @@ async fn an_inference_server_that_is_away_is_no_fault_of_ours_and_its_address_is
         assert_eq!(answer.status, 503, "{path}: {}", answer.text());
         assert_eq!(answer.header("retry-after"), "1");
         let problem = answer.problem();
-        assert_eq!(
-            problem["type"],
-            "urn:lookdown:problem:inference-unavailable"
-        );
+        assert_eq!(problem["type"], "/problems/inference-unavailable");
         let text = answer.text();
         assert!(
             !text.contains("10.1.2.3") && !text.contains("secret"),

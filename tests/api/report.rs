@@ -14,6 +14,7 @@ use lookdown::{
         CalibrationUsed, DetectionReport, ModelUsed, Person, Profile, StageTimings, ViewCounts,
         ZoneCount,
     },
+    warning::{Warning, WarningCode},
 };
 
 fn person() -> Person {
@@ -56,7 +57,7 @@ fn report() -> DetectionReport {
         calibration: CalibrationUsed {
             id: "lobby".to_owned(),
             revision: "9f86d081884c".to_owned(),
-            assumed: false,
+            assumed_circle: None,
         },
         image_width: 1680,
         image_height: 1680,
@@ -98,7 +99,10 @@ fn report() -> DetectionReport {
             refine: micros(412),
             total: micros(614_122),
         },
-        warnings: vec!["the frame was turned".to_owned()],
+        warnings: vec![Warning::new(
+            WarningCode::FrameRotated,
+            "the frame was rotated",
+        )],
     }
 }
 

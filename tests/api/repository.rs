@@ -31,7 +31,7 @@ async fn a_model_can_be_loaded_used_by_name_and_unloaded() {
     let answer = service.post_raw(query, frame()).await;
     assert_eq!(answer.status, 404);
     let problem = answer.problem();
-    assert_eq!(problem["type"], "urn:lookdown:problem:unknown-model");
+    assert_eq!(problem["type"], "/problems/unknown-model");
     let detail = problem["detail"].as_str().unwrap();
     assert!(
         detail.contains("\"other\"") && detail.contains("eager"),
@@ -84,7 +84,7 @@ async fn a_model_that_fails_its_check_is_told_about_and_the_old_one_goes_on() {
     let answer = service.post(&path("other", "load"), "").await;
     assert_eq!(answer.status, 422);
     let problem = answer.problem();
-    assert_eq!(problem["type"], "urn:lookdown:problem:model-refused");
+    assert_eq!(problem["type"], "/problems/model-refused");
     assert!(problem["detail"].as_str().unwrap().contains("it is broken"));
     let query = "calibration=lobby&profile=fast&model=other";
     assert_eq!(service.post_raw(query, frame()).await.status, 200);
@@ -136,7 +136,7 @@ async fn what_cannot_be_done_is_refused_with_the_reason() {
     ] {
         let answer = service.post(&path, body).await;
         assert_eq!(answer.status, status, "{path} {body}");
-        let urn = format!("urn:lookdown:problem:{kind}");
+        let urn = format!("/problems/{kind}");
         assert_eq!(answer.problem()["type"], urn, "{path} {body}");
     }
     for nothing in ["", "null", "{}"] {
@@ -145,10 +145,7 @@ async fn what_cannot_be_done_is_refused_with_the_reason() {
     let long = " ".repeat(100_000);
     let answer = service.post(INDEX, &long).await;
     assert_eq!(answer.status, 413);
-    assert_eq!(
-        answer.problem()["type"],
-        "urn:lookdown:problem:body-too-large"
-    );
+    assert_eq!(answer.problem()["type"], "/problems/body-too-large");
 }
 
 #[tokio::test]
@@ -170,7 +167,7 @@ async fn one_model_is_loaded_at_a_time() {
         (second.status.as_u16(), second.header("retry-after")),
         (429, "1")
     );
-    assert_eq!(second.problem()["type"], "urn:lookdown:problem:model-busy");
+    assert_eq!(second.problem()["type"], "/problems/model-busy");
     service.gate.open();
     assert_eq!(first.await.unwrap(), 200);
 }
@@ -190,7 +187,7 @@ async fn a_server_that_others_can_reach_changes_no_models() {
     ] {
         let answer = service.post(&path, "").await;
         assert_eq!(answer.status, 403);
-        assert_eq!(answer.problem()["type"], "urn:lookdown:problem:forbidden");
+        assert_eq!(answer.problem()["type"], "/problems/forbidden");
     }
     service.still_works().await;
 }

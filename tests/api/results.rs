@@ -106,7 +106,7 @@ async fn a_camera_without_reports_is_404_and_says_where_to_look() {
         let answer = service.get(path).await;
         assert_eq!(answer.status, 404, "{path}");
         let problem = answer.problem();
-        assert_eq!(problem["type"], "urn:lookdown:problem:unknown-camera");
+        assert_eq!(problem["type"], "/problems/unknown-camera");
         assert!(problem["detail"].as_str().unwrap().contains("/results"));
     }
 }

@@ -24,10 +24,7 @@ async fn frames_are_answered_while_the_place_of_the_results_does_not_answer() {
         let answer = server.get(path).await;
         assert!(answer.starts_with("HTTP/1.1 503 "), "{answer}");
         assert!(answer.contains("\r\nretry-after: 1\r\n"), "{answer}");
-        assert!(
-            answer.contains("urn:lookdown:problem:results-unreachable"),
-            "{answer}"
-        );
+        assert!(answer.contains("/problems/results-unreachable"), "{answer}");
     }
     let ready = server.get("/readyz").await;
     assert!(ready.starts_with("HTTP/1.1 200 "), "{ready}");

@@ -98,7 +98,7 @@ async fn a_wait_whose_key_goes_is_answered_no_report() {
     for (by, status, kind) in [("", 401, "key-required"), (&*detect, 403, "forbidden")] {
         let answer = Keyed::start().wait_while_replaced(by).await;
         assert_eq!(answer.status, status, "{}", answer.text());
-        let kind = format!("urn:lookdown:problem:{kind}");
+        let kind = format!("/problems/{kind}");
         assert_eq!(answer.problem()["type"], kind);
     }
 }

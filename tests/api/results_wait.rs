@@ -144,7 +144,7 @@ async fn no_more_wait_than_there_are_places_and_the_others_are_told_so() {
             (429, "1")
         );
         let problem = answer.problem();
-        assert_eq!(problem["type"], "urn:lookdown:problem:too-many-listeners");
+        assert_eq!(problem["type"], "/problems/too-many-listeners");
         assert!(
             problem["detail"]
                 .as_str()

@@ -126,10 +126,11 @@ impl Answer {
         assert_eq!(problem["status"], self.status.as_u16());
         assert_eq!(problem["error"], problem["detail"]);
         assert_eq!(problem["request_id"], self.header("x-request-id"));
-        assert!(problem["instance"].as_str().unwrap().starts_with('/'));
+        let instance = problem["instance"].as_str().unwrap();
+        assert!(instance.starts_with("urn:uuid:"), "{instance}");
         assert!(!problem["title"].as_str().unwrap().is_empty());
         let kind = problem["type"].as_str().unwrap();
-        assert!(kind.starts_with("urn:lookdown:problem:"), "{kind}");
+        assert!(kind.starts_with("/problems/"), "{kind}");
         problem
     }
 }

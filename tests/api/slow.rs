@@ -38,7 +38,7 @@ fn request(method: &str, path: &str) -> (Request<Body>, Sender<Bytes, axum::Erro
 fn assert_too_slow(answer: &Answer, part: &str) {
     assert_eq!(answer.status, 408);
     let problem = answer.problem();
-    assert_eq!(problem["type"], "urn:lookdown:problem:slow-upload");
+    assert_eq!(problem["type"], "/problems/slow-upload");
     let detail = problem["detail"].as_str().unwrap();
     assert!(detail.contains(part), "{detail}");
     assert_eq!(answer.header("connection"), "close");
@@ -120,7 +120,7 @@ async fn work_that_takes_too_long_is_given_up_on_every_route_that_waits() {
     assert_eq!(answer.status, 504);
     assert!(began.elapsed() < Duration::from_secs(10));
     let problem = answer.problem();
-    assert_eq!(problem["type"], "urn:lookdown:problem:timeout");
+    assert_eq!(problem["type"], "/problems/timeout");
     let detail = problem["detail"].as_str().unwrap();
     assert!(
         detail.contains("0.05 s") && detail.contains("goes on"),

@@ -174,7 +174,7 @@ async fn a_client_that_sends_everything_before_it_looks_reads_why_it_was_refused
             answer.starts_with(&format!("HTTP/1.1 {status}")),
             "{line}: {answer}"
         );
-        assert!(answer.contains("urn:lookdown:problem:"), "{answer}");
+        assert!(answer.contains("/problems/"), "{answer}");
     }
 }
 

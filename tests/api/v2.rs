@@ -104,7 +104,7 @@ fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
     let problem = answer.problem();
     assert_eq!(
         problem["type"],
-        format!("urn:lookdown:problem:{kind}"),
+        format!("/problems/{kind}"),
         "{part}: {problem}"
     );
     let told = problem["error"].as_str().unwrap();

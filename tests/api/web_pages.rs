@@ -26,7 +26,7 @@ fn open(own_machine_only: bool) -> Service {
 fn assert_refused(answer: &Answer, part: &str) {
     assert_eq!(answer.status, 403, "{}", answer.text());
     let problem = answer.problem();
-    assert_eq!(problem["type"], "urn:lookdown:problem:forbidden");
+    assert_eq!(problem["type"], "/problems/forbidden");
     assert!(problem["detail"].as_str().unwrap().contains(part));
 }
 
@@ -233,7 +233,7 @@ async fn the_web_page_is_whole_and_its_styles_and_scripts_are_files() {
     }
     let missing = service.get("/assets/nothing.js").await;
     assert_eq!(missing.status, 404);
-    assert_eq!(missing.problem()["type"], "urn:lookdown:problem:not-found");
+    assert_eq!(missing.problem()["type"], "/problems/not-found");
 }
 
 #[tokio::test]

@@ -147,7 +147,7 @@ fn an_ordinary_lens_is_refused_whatever_it_is_called() {
 fn four_coefficients_without_a_model_are_taken_for_a_fisheye_with_a_note() {
     let camera = camera(&fixture("calibrations/opencv_nameless_model.yml"), 0);
     assert_eq!(camera.notes.len(), 1);
-    assert!(camera.notes[0].contains("taken for cv::fisheye"));
+    assert!(camera.notes[0].message.contains("taken for cv::fisheye"));
 }
 
 #[test]
@@ -218,7 +218,9 @@ fn a_field_of_view_beyond_the_curve_ends_with_the_curve_and_a_note() {
     };
     let bent = by_name("Bent").unwrap();
     assert!(
-        bent.notes[0].contains("claims a field of view of 220.0°"),
+        bent.notes[0]
+            .message
+            .contains("claims a field of view of 220.0°"),
         "{:?}",
         bent.notes
     );
@@ -241,7 +243,7 @@ fn formats_that_do_not_tell_the_frame_size_say_so() {
     assert_eq!(id, "hall");
     assert_eq!(
         calibration.unwrap_err().to_string(),
-        "image: the file does not tell the frame size it was made for: convert it with `lookdown \
+        "size: the file has no frame size: convert it with `lookdown \
          calibration convert --size WIDTHxHEIGHT`, or PUT it with ?size=WIDTHxHEIGHT"
     );
 }

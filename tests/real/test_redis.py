@@ -222,7 +222,7 @@ class Away(unittest.TestCase):
                     answer = get(server, path)
                     self.assertEqual(answer.status, 503, path)
                     self.assertEqual(answer.headers["retry-after"], "1")
-                    self.assertEqual(answer.json()["type"], "urn:lookdown:problem:results-unreachable")
+                    self.assertEqual(answer.json()["type"], "/problems/results-unreachable")
                 ready = get(server, "/readyz")
                 self.assertEqual(ready.status, 200)
                 self.assertIn("store_problem", ready.json()["results"])
@@ -338,7 +338,7 @@ class Bounds(unittest.TestCase):
                 self.assertEqual([picture.headers["etag"] for picture in pictures], [latest, latest])
                 self.assertEqual(get(other, path, If_None_Match=latest).status, 304)
                 problem = get(other, "/results/stairs/latest.jpg").json()
-                self.assertEqual(problem["type"], "urn:lookdown:problem:picture-not-kept")
+                self.assertEqual(problem["type"], "/problems/picture-not-kept")
                 self.assertIn(redis.ask("TTL", "lookdown:picture:hall"), range(80_000, 86_401))
                 self.assertLess(redis.ask("MEMORY", "USAGE", "lookdown:picture:hall"), 4 << 20)
                 # A server that keeps none takes the one before away.

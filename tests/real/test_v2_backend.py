@@ -113,10 +113,10 @@ class RemoteInference(unittest.TestCase):
             remote.process.send_signal(signal.SIGKILL)
             remote.process.wait()
             status, headers, problem = answer(server, FAST, FRAME)
-            self.assertEqual((status, problem["type"]), (503, "urn:lookdown:problem:inference-unavailable"))
+            self.assertEqual((status, problem["type"]), (503, "/problems/inference-unavailable"))
             self.assertGreaterEqual(int(headers["Retry-After"]), 1)
             self.assertNotIn(str(port), problem["error"])
-            self.assertEqual(when_ready_is(server, 503)["type"], "urn:lookdown:problem:inference-unavailable")
+            self.assertEqual(when_ready_is(server, 503)["type"], "/problems/inference-unavailable")
             began = time.monotonic()
             self.assertEqual(answer(server, FAST, FRAME)[0], 503)
             self.assertLess(time.monotonic() - began, 1.0, "an open breaker answers at once")
@@ -136,7 +136,7 @@ class RemoteInference(unittest.TestCase):
         environment = {f"LOOKDOWN__{name}": value for name, value in variables.items()}
         with running("lookdown", command, own, "/livez", environment) as server:
             status, _, problem = answer(server, FAST, FRAME)
-            self.assertEqual((status, problem["type"]), (503, "urn:lookdown:problem:warming-up"))
+            self.assertEqual((status, problem["type"]), (503, "/problems/warming-up"))
             with mlserver(port):
                 when_ready_is(server, 200)
                 self.assertEqual(answer(server, FAST, FRAME)[0], 200)

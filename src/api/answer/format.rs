@@ -2,11 +2,13 @@
 
 use axum::http::HeaderMap;
 
-use super::accept::Accepted;
 use crate::{
     annotated_picture::PictureFormat,
     annotation_formats::AnnotationFormat,
-    api::problem::{Problem, ProblemKind},
+    api::{
+        accept::Accepted,
+        problem::{Problem, ProblemKind},
+    },
 };
 
 /// A form of an answer.
@@ -88,8 +90,7 @@ fn not_acceptable() -> Problem {
 fn unknown(name: &str) -> Problem {
     let known = AnnotationFormat::ALL.map(AnnotationFormat::name).join(", ");
     let name: String = name.chars().take(MAX_NAME_CHARS).collect();
-    let detail = format!(
-        "format: {name:?} is not a form of an answer; use one of {REPORT}, {PICTURE}, {known}"
-    );
-    Problem::new(ProblemKind::InvalidParameter, detail)
+    let detail =
+        format!("{name:?} is not a form of an answer; use one of {REPORT}, {PICTURE}, {known}");
+    Problem::of_parameter(ProblemKind::InvalidParameter, "format", &detail)
 }

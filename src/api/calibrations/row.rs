@@ -3,7 +3,10 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::calibration::{CalibrationEntry, CalibrationRow};
+use crate::{
+    api::report::ReportWarning,
+    calibration::{CalibrationEntry, CalibrationRow},
+};
 
 /// A calibration.
 #[derive(Serialize, ToSchema)]
@@ -28,9 +31,9 @@ pub(in crate::api) struct CalibrationInfo {
     /// Why the newest version of its file is not used.
     #[serde(skip_serializing_if = "Option::is_none")]
     problem: Option<String>,
-    /// What had to be assumed, and what is odd about it.
+    /// Assumptions of the reader, and implausible properties.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    warnings: Vec<String>,
+    warnings: Vec<ReportWarning>,
 }
 
 /// A frame size.
@@ -46,8 +49,8 @@ impl From<&CalibrationEntry> for CalibrationInfo {
     fn from(entry: &CalibrationEntry) -> Self {
         let calibration = &entry.calibration;
         let (width, height) = calibration.image_size();
-        let mut warnings = entry.notes.clone();
-        warnings.extend(calibration.doubts());
+        let mut warnings: Vec<_> = entry.notes.iter().map(Into::into).collect();
+        warnings.extend(calibration.warnings().iter().map(ReportWarning::from));
         Self {
             id: calibration.id().to_string(),
             revision: Some(calibration.revision().to_owned()),

@@ -63,7 +63,7 @@ impl CalibrationUpload {
     fn new(content: Bytes, camera: Option<String>, size: Option<String>) -> Result<Self, Problem> {
         let size = size.map(|text| text.parse()).transpose();
         let size = size.map_err(|error: NotAFrameSize| {
-            Problem::new(ProblemKind::InvalidParameter, format!("size: {error}"))
+            Problem::of_parameter(ProblemKind::InvalidParameter, "size", &error.to_string())
         })?;
         Ok(Self {
             content,

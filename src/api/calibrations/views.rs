@@ -17,13 +17,8 @@ use super::{
 };
 use crate::{
     api::{
-        ApiState,
-        access::Reader,
-        deadline::Deadline,
-        openapi::{RawBytes, TrialProblems, ViewsProblems},
-        problem::Problem,
-        report::pixels,
-        upload::parameters_named,
+        ApiState, access::Reader, deadline::Deadline, openapi::RawBytes, problem::Problem,
+        report::pixels, upload::parameters_named,
     },
     calibration::{Calibration, Calibrations},
     pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},
@@ -123,7 +118,7 @@ struct LookQuery {
         LookQuery,
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    responses((status = OK, description = "The view plan.", body = ViewPlanInfo), ViewsProblems)
+    responses((status = OK, description = "The view plan.", body = ViewPlanInfo))
 )]
 pub(in crate::api) async fn get_views(
     State(state): State<ApiState>,
@@ -159,7 +154,7 @@ pub(in crate::api) async fn get_views(
         content((Object = "application/json"), (inline(RawBytes) = "application/octet-stream")),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
-    responses((status = OK, description = "The view plan.", body = ViewPlanInfo), TrialProblems)
+    responses((status = OK, description = "The view plan.", body = ViewPlanInfo))
 )]
 pub(in crate::api) async fn try_views(
     State(state): State<ApiState>,

@@ -85,9 +85,9 @@ fn use_of(name: &str) -> FieldUse {
 }
 
 fn no_form() -> Problem {
-    let detail = "image: the frame is to be sent in a form (multipart/form-data), as in curl -F \
-                  image=@frame.jpg";
-    Problem::new(ProblemKind::MissingImage, detail)
+    let fault = "the frame is to be sent in a form (multipart/form-data), as in curl -F \
+                 image=@frame.jpg";
+    Problem::of_parameter(ProblemKind::MissingImage, "image", fault)
 }
 
 /// What is to be done.

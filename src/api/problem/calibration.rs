@@ -1,17 +1,18 @@
-//! Changes of calibrations that came to nothing as problems: the only place that decides their status.
+//! Failed changes of calibrations as problems: the only place that decides their kind.
 
 use super::{Problem, ProblemKind};
 use crate::calibration::{ChangeError, StoreError};
 
 impl From<ChangeError> for Problem {
     fn from(error: ChangeError) -> Self {
+        let parameter = parameter_of(&error).map(ToOwned::to_owned);
         let kind = match error {
             ChangeError::NotWritable => ProblemKind::Forbidden,
             ChangeError::Unknown { .. } => ProblemKind::UnknownCalibration,
             ChangeError::Content(_)
             | ChangeError::SeveralCameras { .. }
             | ChangeError::UnknownCamera { .. } => ProblemKind::InvalidCalibration,
-            ChangeError::Outdated { .. } => ProblemKind::Outdated,
+            ChangeError::Outdated { .. } => ProblemKind::PreconditionFailed,
             ChangeError::Shared { .. } => ProblemKind::CalibrationConflict,
             ChangeError::Unseen(_) => {
                 tracing::warn!("{error}");
@@ -37,6 +38,19 @@ impl From<ChangeError> for Problem {
             }
             ChangeError::Store(_) => return Self::internal(error),
         };
-        Self::new(kind, error.to_string())
+        let problem = Self::new(kind, error.to_string());
+        match parameter {
+            Some(parameter) => problem.with_parameter(parameter),
+            None => problem,
+        }
+    }
+}
+
+/// The parameter of the request, or the field of the calibration, at fault.
+fn parameter_of(error: &ChangeError) -> Option<&str> {
+    match error {
+        ChangeError::Content(error) => error.parameter(),
+        ChangeError::SeveralCameras { .. } | ChangeError::UnknownCamera { .. } => Some("camera"),
+        _ => None,
     }
 }

@@ -1,270 +1,219 @@
-//! Kinds of problems: a stable name, a status and a title each.
+//! The table of problem kinds. A new kind is one entry here and nothing else: its OpenAPI description, its documentation
+//! page, its metric label and its row in docs/operations.md follow from the entry.
 
 use axum::http::StatusCode;
 
-/// A kind of problem.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::api) enum ProblemKind {
-    /// The request does not keep to its own format.
-    MalformedRequest,
-    /// There is no such parameter or form field.
-    UnknownParameter,
-    /// A parameter or the frame was given more than once.
-    RepeatedParameter,
-    /// No frame was sent.
-    MissingImage,
-    /// No key was sent, or one that nobody has.
-    KeyRequired,
-    /// The sender may not do this.
-    Forbidden,
-    /// Nothing is at this path.
-    NotFound,
-    /// The calibration does not exist.
-    UnknownCalibration,
-    /// No report of the camera is kept.
-    UnknownCamera,
-    /// No picture of the camera is kept.
-    PictureNotKept,
-    /// The content makes no calibration.
-    InvalidCalibration,
-    /// The calibration's file does not allow it.
-    CalibrationConflict,
-    /// The place of the calibrations does not answer.
-    CalibrationsUnreachable,
-    /// The place of the results does not answer.
-    ResultsUnreachable,
-    /// What the request is about has changed.
-    Outdated,
+/// Declares the kinds: a description, then
+/// `Variant = STATUS "name" "Title" [retry_after_seconds N] => "Remedy.";`.
+macro_rules! problems {
+    ($(
+        $(#[doc = $description:literal])+
+        $kind:ident = $status:ident $name:literal $title:literal
+            $(retry_after_seconds $seconds:literal)? => $remedy:literal;
+    )+) => {
+        /// A kind of problem.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub(in crate::api) enum ProblemKind {
+            $($(#[doc = $description])+ $kind,)+
+        }
+
+        impl ProblemKind {
+            /// Every kind, in the order of the table.
+            pub(in crate::api) const ALL: &[Self] = &[$(Self::$kind),+];
+
+            /// The entry of the table.
+            fn entry(self) -> Entry {
+                match self {
+                    $(Self::$kind => Entry {
+                        name: $name,
+                        status: StatusCode::$status,
+                        title: $title,
+                        description: concat!($($description),+).trim_ascii_start(),
+                        remedy: $remedy,
+                        retry_after_seconds: None $(.or(Some($seconds)))?,
+                    },)+
+                }
+            }
+        }
+    };
+}
+
+/// One row of the table.
+struct Entry {
+    name: &'static str,
+    status: StatusCode,
+    title: &'static str,
+    description: &'static str,
+    remedy: &'static str,
+    retry_after_seconds: Option<u64>,
+}
+
+problems! {
+    /// The request does not follow the format of its endpoint.
+    MalformedRequest = BAD_REQUEST "malformed-request" "Malformed request"
+        => "Compare the request with `/docs`.";
+    /// The request has a parameter or form field that the endpoint does not have.
+    UnknownParameter = BAD_REQUEST "unknown-parameter" "Unknown parameter"
+        => "Check the spelling: `detail` lists the known names.";
+    /// The request has a parameter or the frame more than once.
+    RepeatedParameter = BAD_REQUEST "repeated-parameter" "Repeated parameter"
+        => "Send it once, either as a form field or in the query.";
+    /// The request has no frame.
+    MissingImage = BAD_REQUEST "missing-image" "Missing image"
+        => "Send the frame as the form field `img` or as the request body.";
+    /// The request has no API key, or one that is not valid.
+    KeyRequired = UNAUTHORIZED "key-required" "Authentication required"
+        => "Send one key that `access.keys_file` lists.";
+    /// The client is not allowed to do this.
+    Forbidden = FORBIDDEN "forbidden" "Permission denied"
+        => "Use a key with the scope that `detail` names; check `server.cors_origins` for web pages and \
+            `calibrations.writable` for changes of calibrations.";
+    /// The path has no resource.
+    NotFound = NOT_FOUND "not-found" "Not found"
+        => "Check the path: `/docs` lists all of them.";
+    /// The calibration does not exist, or its file cannot be used.
+    UnknownCalibration = NOT_FOUND "unknown-calibration" "Unknown calibration"
+        => "`GET /calibrations` lists all calibrations, and the reason for each that cannot be used.";
+    /// The result store has no report of the camera.
+    UnknownCamera = NOT_FOUND "unknown-camera" "Unknown camera"
+        => "`GET /results` lists the cameras that have reports.";
+    /// The result store has no image of the camera.
+    PictureNotKept = NOT_FOUND "picture-not-kept" "Image not stored"
+        => "Add the camera to `results.pictures`.";
     /// The model is not loaded.
-    UnknownModel,
-    /// The models that are loaded do not allow it.
-    ModelConflict,
-    /// The model failed its check.
-    ModelRefused,
-    /// Another model is being loaded.
-    ModelBusy,
-    /// The path does not offer this method.
-    MethodNotAllowed,
-    /// Nothing that the client accepts is offered.
-    NotAcceptable,
-    /// The request has too many headers, or too long ones.
-    HeadersTooLarge,
-    /// The body took too long to arrive.
-    SlowUpload,
-    /// The body has too many bytes.
-    BodyTooLarge,
+    UnknownModel = NOT_FOUND "unknown-model" "Unknown model"
+        => "`POST /v2/repository/index` lists the models.";
+    /// The path does not support the method.
+    MethodNotAllowed = METHOD_NOT_ALLOWED "method-not-allowed" "Method not allowed"
+        => "Use a method that the header `Allow` lists.";
+    /// The response has no format that the header `Accept` allows.
+    NotAcceptable = NOT_ACCEPTABLE "not-acceptable" "Not acceptable"
+        => "Send an `Accept` header with a format that `detail` lists, omit the header, or set the parameter \
+            `format`.";
+    /// The request body took too long to arrive.
+    SlowUpload = REQUEST_TIMEOUT "slow-upload" "Request timeout"
+        => "Send smaller frames; see `limits.min_upload_bytes_per_second` and `server.request_timeout_millis`.";
+    /// The calibration shares its file with other calibrations.
+    CalibrationConflict = CONFLICT "calibration-conflict" "Calibration conflict"
+        => "Change the file itself.";
+    /// The models that are loaded do not allow the change.
+    ModelConflict = CONFLICT "model-conflict" "Model conflict"
+        => "Unload another model first; the models of the profiles cannot be unloaded.";
+    /// The resource has another revision than the request requires.
+    PreconditionFailed = PRECONDITION_FAILED "precondition-failed" "Precondition failed"
+        => "Get the resource again, and send its new `ETag` as `If-Match`.";
+    /// The request body has too many bytes.
+    BodyTooLarge = PAYLOAD_TOO_LARGE "body-too-large" "Request body too large"
+        => "Send a smaller frame, or raise `server.max_body_bytes`.";
     /// The frame has too many pixels.
-    ImageTooLarge,
-    /// The frame is in no format that can be read.
-    UnsupportedImage,
-    /// A parameter's value cannot be used.
-    InvalidParameter,
-    /// A tensor is not what the model takes.
-    InvalidTensor,
-    /// The frame cannot be decoded to its end.
-    DamagedImage,
-    /// The frame does not belong to the calibration, or is too small.
-    UnfitImage,
-    /// No place in the queue.
-    Overloaded,
-    /// No place for another connection.
-    TooManyConnections,
-    /// No place for another listener.
-    TooManyListeners,
-    /// The client sends more often than it may.
-    RateLimited,
-    /// A fault of ours.
-    Internal,
-    /// The server that networks run on does not answer.
-    InferenceUnavailable,
-    /// The network has not run yet.
-    WarmingUp,
-    /// The server was told to stop.
-    ShuttingDown,
-    /// The deadline has passed.
-    Timeout,
+    ImageTooLarge = PAYLOAD_TOO_LARGE "image-too-large" "Image too large"
+        => "Scale the frame down, or raise `limits.max_image_pixels`.";
+    /// The frame has a format that the server cannot decode.
+    UnsupportedImage = UNSUPPORTED_MEDIA_TYPE "unsupported-image" "Unsupported media type"
+        => "Send JPEG, PNG or WebP.";
+    /// The content is not a valid calibration.
+    InvalidCalibration = UNPROCESSABLE_ENTITY "invalid-calibration" "Invalid calibration"
+        => "`lookdown calibration check FILE` explains the reason.";
+    /// The model failed its check.
+    ModelRefused = UNPROCESSABLE_ENTITY "model-refused" "Invalid model"
+        => "`lookdown model check FOLDER` explains the reason.";
+    /// A parameter or form field has a value that cannot be used.
+    InvalidParameter = UNPROCESSABLE_ENTITY "invalid-parameter" "Invalid parameter"
+        => "Send a value that `detail` allows.";
+    /// A tensor does not match the metadata of the model.
+    InvalidTensor = UNPROCESSABLE_ENTITY "invalid-tensor" "Invalid tensor"
+        => "Compare the tensor with `GET /v2/models/NAME` and `detail`.";
+    /// The frame is truncated or corrupt.
+    DamagedImage = UNPROCESSABLE_ENTITY "damaged-image" "Corrupt image"
+        => "Send the complete file.";
+    /// The frame does not match the calibration, or its size cannot be processed.
+    UnfitImage = UNPROCESSABLE_ENTITY "unfit-image" "Image does not match"
+        => "Use the calibration of this camera, and frames of its aspect ratio.";
+    /// Another model is being loaded.
+    ModelBusy = TOO_MANY_REQUESTS "model-busy" "Another model is being loaded" retry_after_seconds 1
+        => "Retry after `Retry-After`.";
+    /// The queue of frames, or the memory for request bodies, is full.
+    Overloaded = TOO_MANY_REQUESTS "overloaded" "Server overloaded" retry_after_seconds 1
+        => "Retry after `Retry-After`; send fewer frames at a time, or use a faster profile.";
+    /// The server has too many event streams and waiting requests.
+    TooManyListeners = TOO_MANY_REQUESTS "too-many-listeners" "Too many subscribers" retry_after_seconds 1
+        => "Retry after `Retry-After`, omit `wait`, or raise `results.max_listeners`.";
+    /// The client sends more requests than its rate limit allows.
+    RateLimited = TOO_MANY_REQUESTS "rate-limited" "Too many requests" retry_after_seconds 1
+        => "Retry after `Retry-After`, or raise `limits.requests_per_second`.";
+    /// The request has too many headers, or too long ones.
+    HeadersTooLarge = REQUEST_HEADER_FIELDS_TOO_LARGE "headers-too-large" "Request header fields too large"
+        => "Send fewer and shorter headers and a shorter path, or raise `server.max_headers` and \
+            `server.max_header_bytes`.";
+    /// The server failed to process the request.
+    Internal = INTERNAL_SERVER_ERROR "internal" "Internal server error"
+        => "Search the log for the ID in `instance`, and report the error.";
+    /// The server has too many open connections.
+    TooManyConnections = SERVICE_UNAVAILABLE "too-many-connections" "Too many connections" retry_after_seconds 1
+        => "Retry after `Retry-After`; close connections that are not needed, or raise \
+            `server.max_connections`.";
+    /// The result store does not respond.
+    ResultsUnreachable = SERVICE_UNAVAILABLE "results-unreachable" "Result store unavailable" retry_after_seconds 1
+        => "Retry after `Retry-After`; the log and `/readyz` report the error of Redis.";
+    /// The calibration store does not respond.
+    CalibrationsUnreachable = SERVICE_UNAVAILABLE "calibrations-unreachable" "Calibration store unavailable"
+        retry_after_seconds 1
+        => "Retry after `Retry-After`; check the bucket or the folder, and its credentials.";
+    /// The inference server does not respond.
+    InferenceUnavailable = SERVICE_UNAVAILABLE "inference-unavailable" "Inference server unavailable"
+        retry_after_seconds 1
+        => "Retry after `Retry-After`; check the server at `inference.url`.";
+    /// The server is starting, and its models are not ready yet.
+    WarmingUp = SERVICE_UNAVAILABLE "warming-up" "Service unavailable" retry_after_seconds 1
+        => "Wait until `/readyz` responds with 200.";
+    /// The server is shutting down.
+    ShuttingDown = SERVICE_UNAVAILABLE "shutting-down" "Server shutting down" retry_after_seconds 1
+        => "Send the request to another server.";
+    /// The deadline of the request has passed.
+    Timeout = GATEWAY_TIMEOUT "timeout" "Gateway timeout"
+        => "Use a faster profile, send fewer frames at a time, or raise `timeout_millis`.";
 }
 
 impl ProblemKind {
-    /// Every kind.
-    pub(in crate::api) const ALL: [Self; 39] = [
-        Self::MalformedRequest,
-        Self::UnknownParameter,
-        Self::RepeatedParameter,
-        Self::MissingImage,
-        Self::KeyRequired,
-        Self::Forbidden,
-        Self::NotFound,
-        Self::UnknownCalibration,
-        Self::UnknownCamera,
-        Self::PictureNotKept,
-        Self::InvalidCalibration,
-        Self::CalibrationConflict,
-        Self::CalibrationsUnreachable,
-        Self::ResultsUnreachable,
-        Self::Outdated,
-        Self::UnknownModel,
-        Self::ModelConflict,
-        Self::ModelRefused,
-        Self::ModelBusy,
-        Self::MethodNotAllowed,
-        Self::NotAcceptable,
-        Self::HeadersTooLarge,
-        Self::SlowUpload,
-        Self::BodyTooLarge,
-        Self::ImageTooLarge,
-        Self::UnsupportedImage,
-        Self::InvalidParameter,
-        Self::InvalidTensor,
-        Self::DamagedImage,
-        Self::UnfitImage,
-        Self::Overloaded,
-        Self::TooManyConnections,
-        Self::TooManyListeners,
-        Self::RateLimited,
-        Self::Internal,
-        Self::InferenceUnavailable,
-        Self::WarmingUp,
-        Self::ShuttingDown,
-        Self::Timeout,
-    ];
-
-    /// Name and title.
-    fn texts(self) -> (&'static str, &'static str) {
-        match self {
-            Self::MalformedRequest => ("malformed-request", "The request is malformed"),
-            Self::UnknownParameter => ("unknown-parameter", "There is no such parameter"),
-            Self::RepeatedParameter => ("repeated-parameter", "A parameter is given twice"),
-            Self::MissingImage => ("missing-image", "No frame was sent"),
-            Self::KeyRequired => ("key-required", "A key that is known here is needed"),
-            Self::Forbidden => ("forbidden", "That is not allowed"),
-            Self::NotFound => ("not-found", "There is nothing here"),
-            Self::UnknownCalibration => ("unknown-calibration", "There is no such calibration"),
-            Self::UnknownCamera => ("unknown-camera", "No report of this camera is kept"),
-            Self::PictureNotKept => ("picture-not-kept", "No picture of this camera is kept"),
-            Self::InvalidCalibration => ("invalid-calibration", "The calibration cannot be used"),
-            Self::CalibrationConflict => (
-                "calibration-conflict",
-                "The calibration shares its file with others",
-            ),
-            Self::CalibrationsUnreachable => (
-                "calibrations-unreachable",
-                "The place of the calibrations does not answer",
-            ),
-            Self::ResultsUnreachable => (
-                "results-unreachable",
-                "The place of the results does not answer",
-            ),
-            Self::Outdated => ("outdated", "What is there now is not what was meant"),
-            Self::UnknownModel => ("unknown-model", "There is no such model"),
-            Self::ModelConflict => (
-                "model-conflict",
-                "The models that are loaded do not allow that",
-            ),
-            Self::ModelRefused => ("model-refused", "The model cannot be used"),
-            Self::ModelBusy => ("model-busy", "Another model is being loaded"),
-            Self::MethodNotAllowed => ("method-not-allowed", "The method is not offered"),
-            Self::NotAcceptable => ("not-acceptable", "Nothing that is accepted is offered"),
-            Self::HeadersTooLarge => ("headers-too-large", "The headers are too large"),
-            Self::SlowUpload => ("slow-upload", "The body took too long to arrive"),
-            Self::BodyTooLarge => ("body-too-large", "The body is too large"),
-            Self::ImageTooLarge => ("image-too-large", "The frame has too many pixels"),
-            Self::UnsupportedImage => (
-                "unsupported-image",
-                "The frame is not in a format that can be read",
-            ),
-            Self::InvalidParameter => ("invalid-parameter", "A parameter cannot be used"),
-            Self::InvalidTensor => ("invalid-tensor", "A tensor cannot be used"),
-            Self::DamagedImage => ("damaged-image", "The frame is damaged or cut off"),
-            Self::UnfitImage => ("unfit-image", "The frame does not fit"),
-            Self::Overloaded => ("overloaded", "Too many frames are waiting"),
-            Self::TooManyConnections => ("too-many-connections", "Too many connections are open"),
-            Self::TooManyListeners => ("too-many-listeners", "Too many listen already"),
-            Self::RateLimited => ("rate-limited", "The requests come too fast"),
-            Self::Internal => ("internal", "There is a fault in the server"),
-            Self::InferenceUnavailable => (
-                "inference-unavailable",
-                "The inference server does not answer",
-            ),
-            Self::WarmingUp => ("warming-up", "The server is warming up"),
-            Self::ShuttingDown => ("shutting-down", "The server is shutting down"),
-            Self::Timeout => ("timeout", "The deadline has passed"),
-        }
+    /// Returns the kind of this name.
+    pub(in crate::api) fn from_name(name: &str) -> Option<Self> {
+        let mut kinds = Self::ALL.iter().copied();
+        kinds.find(|kind| kind.name() == name)
     }
 
-    /// The short name: the end of the URN, and the metrics' label.
+    /// The stable name: the end of the path, and the label of metrics.
     pub(in crate::api) fn name(self) -> &'static str {
-        self.texts().0
+        self.entry().name
     }
 
-    /// Identifies the kind to programs.
-    pub(in crate::api) fn urn(self) -> String {
-        format!("urn:lookdown:problem:{}", self.name())
+    /// The path of the documentation, which identifies the kind to programs: `type` of a problem document.
+    pub(in crate::api) fn path(self) -> String {
+        format!("/problems/{}", self.name())
     }
 
     /// The HTTP status.
     pub(in crate::api) fn status(self) -> StatusCode {
-        match self {
-            Self::MalformedRequest
-            | Self::UnknownParameter
-            | Self::RepeatedParameter
-            | Self::MissingImage => StatusCode::BAD_REQUEST,
-            Self::KeyRequired => StatusCode::UNAUTHORIZED,
-            Self::Forbidden => StatusCode::FORBIDDEN,
-            Self::NotFound
-            | Self::UnknownCalibration
-            | Self::UnknownCamera
-            | Self::PictureNotKept
-            | Self::UnknownModel => StatusCode::NOT_FOUND,
-            Self::ModelConflict | Self::CalibrationConflict => StatusCode::CONFLICT,
-            Self::Outdated => StatusCode::PRECONDITION_FAILED,
-            Self::InvalidCalibration
-            | Self::ModelRefused
-            | Self::InvalidParameter
-            | Self::InvalidTensor
-            | Self::DamagedImage
-            | Self::UnfitImage => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::ModelBusy | Self::Overloaded | Self::TooManyListeners | Self::RateLimited => {
-                StatusCode::TOO_MANY_REQUESTS
-            }
-            Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
-            Self::NotAcceptable => StatusCode::NOT_ACCEPTABLE,
-            Self::HeadersTooLarge => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
-            Self::SlowUpload => StatusCode::REQUEST_TIMEOUT,
-            Self::BodyTooLarge | Self::ImageTooLarge => StatusCode::PAYLOAD_TOO_LARGE,
-            Self::UnsupportedImage => StatusCode::UNSUPPORTED_MEDIA_TYPE,
-            Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
-            Self::TooManyConnections
-            | Self::CalibrationsUnreachable
-            | Self::ResultsUnreachable
-            | Self::InferenceUnavailable
-            | Self::WarmingUp
-            | Self::ShuttingDown => StatusCode::SERVICE_UNAVAILABLE,
-            Self::Timeout => StatusCode::GATEWAY_TIMEOUT,
-        }
+        self.entry().status
     }
 
-    /// The kind in words.
+    /// The usual phrase for the kind.
     pub(in crate::api) fn title(self) -> &'static str {
-        self.texts().1
+        self.entry().title
     }
 
-    /// How long to wait at least before trying again, where that helps, seconds.
+    /// The cause, as one sentence.
+    pub(in crate::api) fn description(self) -> &'static str {
+        self.entry().description
+    }
+
+    /// The remedy, as one sentence.
+    pub(in crate::api) fn remedy(self) -> &'static str {
+        self.entry().remedy
+    }
+
+    /// The least `Retry-After`, seconds; `None` where a retry does not help.
     pub(in crate::api) fn retry_after_seconds(self) -> Option<u64> {
-        matches!(
-            self,
-            Self::Overloaded
-                | Self::TooManyListeners
-                | Self::RateLimited
-                | Self::ModelBusy
-                | Self::TooManyConnections
-                | Self::CalibrationsUnreachable
-                | Self::ResultsUnreachable
-                | Self::InferenceUnavailable
-                | Self::WarmingUp
-                | Self::ShuttingDown
-        )
-        .then_some(1)
+        self.entry().retry_after_seconds
     }
 }
 
@@ -275,27 +224,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_operators_table_has_every_kind_with_its_status_and_title_and_no_other() {
-        let text = include_str!("../../../docs/operations.md");
-        let (_, section) = text.split_once("\n## Problems\n").unwrap();
-        let (section, _) = section.split_once("\n## ").unwrap();
-        let rows = section.lines().filter(|line| line.starts_with("| `"));
-        let told: Vec<_> = rows
-            .map(|row| {
-                let cells: Vec<_> = row.trim_matches('|').split('|').map(str::trim).collect();
-                assert_eq!(cells.len(), 4, "{row}");
-                assert!(!cells[3].is_empty(), "{row} has no remedy");
-                [cells[0].trim_matches('`'), cells[1], cells[2]].map(ToOwned::to_owned)
-            })
-            .collect();
-        let kinds = ProblemKind::ALL.map(|kind| {
-            [
-                kind.name().to_owned(),
-                kind.status().as_u16().to_string(),
-                kind.title().to_owned(),
-            ]
-        });
-        assert_eq!(told.len(), kinds.len());
-        assert_eq!(BTreeSet::from_iter(told), BTreeSet::from(kinds));
+    fn names_are_unique_and_fit_into_a_path() {
+        let names: BTreeSet<_> = ProblemKind::ALL.iter().map(|kind| kind.name()).collect();
+        assert_eq!(names.len(), ProblemKind::ALL.len());
+        for name in names {
+            let fits = |c: char| c.is_ascii_lowercase() || c == '-';
+            assert!(name.chars().all(fits), "{name}");
+            let found = ProblemKind::from_name(name).unwrap();
+            assert_eq!(found.path(), format!("/problems/{name}"));
+        }
+    }
+
+    #[test]
+    fn every_kind_has_an_error_status_and_full_sentences() {
+        for kind in ProblemKind::ALL {
+            let status = kind.status();
+            assert!(
+                status.is_client_error() || status.is_server_error(),
+                "{kind:?}"
+            );
+            for sentence in [kind.description(), kind.remedy()] {
+                assert!(sentence.ends_with('.'), "{sentence}");
+                // Cells of a table and HTML text need no escapes.
+                assert!(!sentence.contains(['|', '<', '>', '&']), "{sentence}");
+            }
+        }
     }
 }

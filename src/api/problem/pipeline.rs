@@ -1,4 +1,4 @@
-//! The pipeline's errors as problems: the only place that decides their status.
+//! The pipeline's errors as problems: the only place that decides their kind.
 
 use super::{Problem, ProblemKind};
 use crate::{
@@ -26,20 +26,41 @@ impl From<PipelineError> for Problem {
             PipelineError::Withdrawn => ProblemKind::Timeout,
             PipelineError::Internal(_) => ProblemKind::Internal,
         };
-        match error {
+        let parameter = parameter_of(&error).map(ToOwned::to_owned);
+        let problem = match error {
             PipelineError::Internal(cause) => Self::internal(cause),
             PipelineError::Overloaded { retry_after, .. }
             | PipelineError::InferenceBusy { retry_after } => {
                 Self::new(kind, error.to_string()).with_retry_after(retry_after)
             }
-            told => Self::new(kind, told.to_string()),
+            other => Self::new(kind, other.to_string()),
+        };
+        match parameter {
+            Some(parameter) => problem.with_parameter(parameter),
+            None => problem,
         }
+    }
+}
+
+/// The parameter of the request at fault.
+fn parameter_of(error: &PipelineError) -> Option<&str> {
+    match error {
+        PipelineError::Parameter(error) => Some(&error.name),
+        PipelineError::Image(_)
+        | PipelineError::AspectMismatch { .. }
+        | PipelineError::FrameTooSmall { .. } => Some("image"),
+        PipelineError::UnknownCalibration { .. } | PipelineError::UnusableCalibration { .. } => {
+            Some("calibration")
+        }
+        PipelineError::UnknownModel { .. } => Some("model"),
+        _ => None,
     }
 }
 
 impl From<ParameterError> for Problem {
     fn from(error: ParameterError) -> Self {
-        Self::new(kind_of_parameter_error(&error), error.to_string())
+        let kind = kind_of_parameter_error(&error);
+        Self::new(kind, error.to_string()).with_parameter(error.name)
     }
 }
 

@@ -1,11 +1,16 @@
 //! The pipeline's report in the units and digits of the sent one.
 
 use super::{
-    Report, ReportBearing, ReportBox, ReportCalibration, ReportFloor, ReportImage, ReportModel,
-    ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews, ReportZone,
+    Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportFloor, ReportImage,
+    ReportModel, ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews,
+    ReportWarning, ReportZone,
     rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
 };
-use crate::pipeline::{self, DetectionReport, ModelUsed};
+use crate::{
+    imaging::lens_circle::LensCircle,
+    pipeline::{self, DetectionReport, ModelUsed},
+    warning::Warning,
+};
 
 impl From<&DetectionReport> for Report {
     fn from(report: &DetectionReport) -> Self {
@@ -18,7 +23,8 @@ impl From<&DetectionReport> for Report {
             calibration: ReportCalibration {
                 id: report.calibration.id.clone(),
                 revision: report.calibration.revision.clone(),
-                assumed: report.calibration.assumed,
+                assumed: report.calibration.assumed_circle.is_some(),
+                assumed_circle: report.calibration.assumed_circle.map(ReportCircle::from),
             },
             image: ReportImage {
                 width: report.image_width,
@@ -46,7 +52,27 @@ impl From<&DetectionReport> for Report {
                 zones.map(ReportZone::from).collect()
             }),
             timings_ms: ReportTimings::from(&report.timings),
-            warnings: report.warnings.clone(),
+            warnings: report.warnings.iter().map(ReportWarning::from).collect(),
+        }
+    }
+}
+
+impl From<LensCircle> for ReportCircle {
+    /// From pixel centres to the corner-origin pixels of reports.
+    fn from(circle: LensCircle) -> Self {
+        Self {
+            cx: pixels(circle.cx + 0.5),
+            cy: pixels(circle.cy + 0.5),
+            radius: pixels(circle.radius),
+        }
+    }
+}
+
+impl From<&Warning> for ReportWarning {
+    fn from(warning: &Warning) -> Self {
+        Self {
+            code: warning.code.name(),
+            message: warning.message.clone(),
         }
     }
 }

@@ -15,12 +15,7 @@ use futures_util::stream::unfold;
 
 use super::{NO_CACHE, address::CameraAddress, feed::Feed};
 use crate::{
-    api::{
-        ApiState,
-        access::Reader,
-        openapi::{CameraEventsProblems, EventsProblems},
-        problem::Problem,
-    },
+    api::{ApiState, access::Reader, problem::Problem},
     results::Cameras,
 };
 
@@ -43,7 +38,6 @@ const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering")
     responses(
         (status = OK, description = "A stream without an end; the data of each event is a report.",
          body = String, content_type = "text/event-stream"),
-        CameraEventsProblems,
     )
 )]
 pub(in crate::api) async fn of_camera(
@@ -68,7 +62,6 @@ pub(in crate::api) async fn of_camera(
     responses(
         (status = OK, description = "A stream without an end; the data of each event is a report.",
          body = String, content_type = "text/event-stream"),
-        EventsProblems,
     )
 )]
 pub(in crate::api) async fn of_all(

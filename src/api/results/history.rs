@@ -16,10 +16,7 @@ use utoipa::ToSchema;
 
 use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
-    api::{
-        ApiState, access::Reader, openapi::HistoryProblems, problem::Problem, report::Report,
-        upload::parameters_named,
-    },
+    api::{ApiState, access::Reader, problem::Problem, report::Report, upload::parameters_named},
     pipeline::{ParameterError, whole_number},
     results::{Cameras, ReportId, StoredReport},
 };
@@ -58,7 +55,6 @@ pub(in crate::api) struct PastReport {
     responses(
         (status = OK, description = "Oldest first.", body = Vec<PastReport>,
          headers(("Cache-Control" = String, description = "`no-cache`."))),
-        HistoryProblems,
     )
 )]
 pub(in crate::api) async fn get_history(

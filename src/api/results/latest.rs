@@ -19,7 +19,6 @@ use crate::{
         access::Reader,
         deadline::Deadline,
         entity_tags::{entity_tag, is_unmodified},
-        openapi::LatestProblems,
         problem::Problem,
         report::Report,
         upload::parameters_named,
@@ -53,7 +52,6 @@ const MAX_WAIT_SECONDS: u64 = 600;
             ("Cache-Control" = String, description = "`no-cache`."),
          )),
         (status = NOT_MODIFIED, description = "There is none newer than the one asked with."),
-        LatestProblems,
     )
 )]
 pub(in crate::api) async fn get_latest(

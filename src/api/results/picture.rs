@@ -18,7 +18,7 @@ use crate::{
         access::Reader,
         deadline::Deadline,
         entity_tags::{entity_tag, is_unmodified},
-        openapi::{PictureProblems, PictureQuery, RawBytes},
+        openapi::{PictureQuery, RawBytes},
         problem::{Problem, ProblemKind},
         upload::parameters_named,
     },
@@ -49,7 +49,6 @@ const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
             ("Cache-Control" = String, description = "`private, no-cache`."),
          )),
         (status = NOT_MODIFIED, description = "There is none newer than the one asked with."),
-        PictureProblems,
     )
 )]
 pub(in crate::api) async fn get_picture(

@@ -92,25 +92,26 @@ pub(super) async fn parse(
 async fn value_of(name: &str, field: Field<'_>) -> Result<String, Problem> {
     let bytes = field.bytes().await.map_err(broken)?;
     if bytes.len() > MAX_VALUE_BYTES {
-        let detail = format!("{name}: the value is longer than {MAX_VALUE_BYTES} bytes");
-        return Err(Problem::new(ProblemKind::InvalidParameter, detail));
+        let fault = format!("the value is longer than {MAX_VALUE_BYTES} bytes");
+        return Err(invalid(name, &fault));
     }
-    let text = str::from_utf8(&bytes).map_err(|_| {
-        let detail = format!("{name}: the value is not UTF-8 text");
-        Problem::new(ProblemKind::InvalidParameter, detail)
-    })?;
+    let text = str::from_utf8(&bytes).map_err(|_| invalid(name, "the value is not UTF-8 text"))?;
     Ok(text.to_owned())
 }
 
+fn invalid(name: &str, fault: &str) -> Problem {
+    Problem::of_parameter(ProblemKind::InvalidParameter, name, fault)
+}
+
 fn missing_image() -> Problem {
-    let detail = "img: the form has no frame: send one in the field `img` or `image`, as in curl \
-                  -F img=@frame.jpg";
-    Problem::new(ProblemKind::MissingImage, detail)
+    let fault = "the form has no frame: send one in the field `img` or `image`, as in curl -F \
+                 img=@frame.jpg";
+    Problem::of_parameter(ProblemKind::MissingImage, "img", fault)
 }
 
 fn second_image(name: &str) -> Problem {
-    let detail = format!("{name}: the form has two frames: send one frame per request");
-    Problem::new(ProblemKind::RepeatedParameter, detail)
+    let fault = "the form has two frames: send one frame per request";
+    Problem::of_parameter(ProblemKind::RepeatedParameter, name, fault)
 }
 
 /// The last part of a path, of whichever system, as far as it is a name.

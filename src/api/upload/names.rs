@@ -35,10 +35,10 @@ pub(super) fn unknown_parameter(name: &str) -> Problem {
     let shown: String = name.chars().take(MAX_NAME_CHARS).collect();
     let known = names().collect::<Vec<_>>().join(", ");
     let detail = format!(
-        "{shown}: there is no such field or parameter: send the frame as `img` or `image`; the \
-         parameters are {known}"
+        "there is no such field or parameter: send the frame as `img` or `image`; the parameters are \
+         {known}"
     );
-    Problem::new(ProblemKind::UnknownParameter, detail)
+    Problem::of_parameter(ProblemKind::UnknownParameter, &shown, &detail)
 }
 
 fn names() -> impl Iterator<Item = &'static str> {

@@ -9,13 +9,7 @@ use super::{
     Asked,
     metadata::{ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady},
 };
-use crate::api::{
-    ApiState,
-    access::Finder,
-    health::require_ready,
-    openapi::{ModelProblems, ModelReadyProblems, NotReadyProblems},
-    problem::Problem,
-};
+use crate::api::{ApiState, access::Finder, health::require_ready, problem::Problem};
 
 /// What is this server?
 #[utoipa::path(
@@ -40,7 +34,6 @@ pub(in crate::api) async fn live() -> Json<ServerLive> {
     get, path = "/v2/health/ready", tag = "operation", operation_id = "get_server_readiness",
     responses(
         (status = OK, description = "Frames can be sent.", body = ServerReady),
-        NotReadyProblems
     )
 )]
 pub(in crate::api) async fn ready(
@@ -59,7 +52,6 @@ pub(in crate::api) async fn ready(
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "Its inputs and outputs.", body = ModelMetadata),
-        ModelProblems,
     )
 )]
 pub(in crate::api) async fn model(
@@ -81,7 +73,6 @@ pub(in crate::api) async fn model(
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "Its inputs and outputs.", body = ModelMetadata),
-        ModelProblems,
     )
 )]
 pub(in crate::api) async fn model_version(
@@ -99,7 +90,6 @@ pub(in crate::api) async fn model_version(
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "It can.", body = ModelReady),
-        ModelReadyProblems,
     )
 )]
 pub(in crate::api) async fn model_ready(
@@ -123,7 +113,6 @@ pub(in crate::api) async fn model_ready(
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "It can.", body = ModelReady),
-        ModelReadyProblems,
     )
 )]
 pub(in crate::api) async fn model_version_ready(

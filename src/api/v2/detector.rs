@@ -105,9 +105,9 @@ fn view_parameters(request: &InferRequest) -> Result<DetectParameters, Problem> 
     let mut names = request.parameters.iter().map(|(name, _)| name.as_str());
     if let Some(other) = names.find(|name| !PARAMETERS.contains(name)) {
         let (other, known) = (shown(other), PARAMETERS.join(", "));
-        let detail =
-            format!("{other}: a detector has no such parameter; the parameters are {known}");
-        return Err(Problem::new(ProblemKind::UnknownParameter, detail));
+        let fault = format!("a detector has no such parameter; the parameters are {known}");
+        let problem = Problem::of_parameter(ProblemKind::UnknownParameter, &other, &fault);
+        return Err(problem);
     }
     Ok(parameters(&request.parameters)?)
 }

@@ -15,13 +15,7 @@ use super::{
     request::InferRequest,
 };
 use crate::{
-    api::{
-        ApiState,
-        openapi::{InferProblems, RawBytes},
-        problem::Problem,
-        request_id::RequestId,
-        upload::Arrival,
-    },
+    api::{ApiState, openapi::RawBytes, problem::Problem, request_id::RequestId, upload::Arrival},
     telemetry::RequestTrace,
 };
 
@@ -47,7 +41,6 @@ use crate::{
     responses(
         (status = OK, description = "The outputs.",
          content((InferResponseBody = "application/json"), ("application/octet-stream"))),
-        InferProblems,
     )
 )]
 pub(in crate::api) async fn infer(
@@ -81,7 +74,6 @@ pub(in crate::api) async fn infer(
     responses(
         (status = OK, description = "The outputs.",
          content((InferResponseBody = "application/json"), ("application/octet-stream"))),
-        InferProblems,
     )
 )]
 pub(in crate::api) async fn infer_version(

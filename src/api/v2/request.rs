@@ -66,8 +66,9 @@ impl InferRequest {
         if let Some(id) = &head.id
             && id.chars().count() > MAX_ID_CHARS
         {
-            let detail = format!("id: it has more than {MAX_ID_CHARS} characters");
-            return Err(Problem::new(ProblemKind::InvalidParameter, detail));
+            let fault = format!("it has more than {MAX_ID_CHARS} characters");
+            let problem = Problem::of_parameter(ProblemKind::InvalidParameter, "id", &fault);
+            return Err(problem);
         }
         let outputs = head.outputs.map_or_else(Vec::new, |outputs| outputs.0);
         let outputs = outputs.into_iter().map(|Table(output)| output);

@@ -117,6 +117,5 @@ impl Sent<'_> {
 
 /// What the sender of a tensor that cannot be used is told.
 pub(super) fn misfit(name: &str, wrong: &str) -> Problem {
-    let name = shown(name);
-    Problem::new(ProblemKind::InvalidTensor, format!("{name}: {wrong}"))
+    Problem::of_parameter(ProblemKind::InvalidTensor, &shown(name), wrong)
 }

@@ -28,8 +28,7 @@ impl Wanted {
         outputs: impl Iterator<Item = OutputHead>,
     ) -> Result<Self, Problem> {
         let all_binary = flag(parameters, ALL_BINARY).map_err(|wrong| {
-            let detail = format!("{ALL_BINARY}: {wrong}");
-            Problem::new(ProblemKind::InvalidParameter, detail)
+            Problem::of_parameter(ProblemKind::InvalidParameter, ALL_BINARY, &wrong)
         })?;
         let mut named: Vec<(String, Option<bool>)> = Vec::new();
         for OutputHead {

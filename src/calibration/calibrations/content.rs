@@ -3,11 +3,14 @@
 use std::sync::Arc;
 
 use super::ChangeError;
-use crate::calibration::{
-    Calibration, CalibrationFile, CalibrationId, FormatError,
-    export::Target,
-    formats::FileCamera,
-    native::{NativeCalibration, NativeImage},
+use crate::{
+    calibration::{
+        Calibration, CalibrationFile, CalibrationId, FormatError,
+        export::Target,
+        formats::FileCamera,
+        native::{NativeCalibration, NativeImage},
+    },
+    warning::Warning,
 };
 
 /// Most characters of a camera's name that are repeated to its sender.
@@ -20,8 +23,8 @@ pub struct CalibrationEntry {
     pub calibration: Arc<Calibration>,
     /// The same in the native format, whatever format its file has.
     pub native: NativeCalibration,
-    /// What had to be assumed to read it, a sentence each.
-    pub notes: Vec<String>,
+    /// The assumptions of the reader.
+    pub notes: Vec<Warning>,
     /// The name of its file in the store.
     pub file: String,
 }

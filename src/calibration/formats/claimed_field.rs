@@ -4,6 +4,7 @@ use super::Camera;
 use crate::{
     calibration::native::NativeImage,
     geometry::{Lens, LensError, lens::LensModel},
+    warning::{Warning, WarningCode},
 };
 
 /// A camera whose lens image is said to end at `max_theta` (radians); where the curve turns over
@@ -19,12 +20,14 @@ pub(super) fn camera(
         && max_theta > limit
     {
         let mut camera = Camera::new(Some(image), lens(limit));
-        camera.notes.push(format!(
+        let message = format!(
             "the file claims a field of view of {:.1}°, but its curve turns over at {:.1}°: the \
              lens image ends there",
             2.0 * max_theta.to_degrees(),
             2.0 * limit.to_degrees()
-        ));
+        );
+        let note = Warning::new(WarningCode::FieldOfViewReduced, message);
+        camera.notes.push(note);
         return camera;
     }
     Camera::new(Some(image), claimed)

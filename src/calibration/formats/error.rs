@@ -15,6 +15,24 @@ pub enum FormatError {
         /// The value and what would be right.
         problem: String,
     },
+    /// The file has no frame size, and neither has the request.
+    #[error(
+        "size: the file has no frame size: convert it with `lookdown calibration convert --size \
+         WIDTHxHEIGHT`, or PUT it with ?size=WIDTHxHEIGHT"
+    )]
+    MissingSize,
+}
+
+impl FormatError {
+    /// The parameter that the client should send, or the field of the file at fault.
+    #[must_use]
+    pub fn parameter(&self) -> Option<&str> {
+        match self {
+            Self::Malformed(_) => None,
+            Self::Invalid { field, .. } => Some(field),
+            Self::MissingSize => Some("size"),
+        }
+    }
 }
 
 /// Most characters of a part of a message: files of a mebibyte are quoted in it.

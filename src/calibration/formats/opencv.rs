@@ -15,6 +15,7 @@ use super::{
 use crate::{
     calibration::native::NativeImage,
     geometry::lens::{LensModel, Mei},
+    warning::{Warning, WarningCode},
 };
 
 /// Names of the camera matrix that programs choose.
@@ -86,7 +87,7 @@ fn without_xi(
     fields: &Fields<'_>,
     matrix: CameraMatrix,
     coefficients: &str,
-) -> Result<(LensModel, Option<String>), FormatError> {
+) -> Result<(LensModel, Option<Warning>), FormatError> {
     let values = fields.numbers(coefficients)?;
     let (said, distortion) = said_distortion(fields)?;
     let lens = |distortion| matrix.lens(distortion, &values, fields, (said, coefficients));
@@ -97,6 +98,7 @@ fn without_xi(
                 "the file does not say which model {coefficients} belong to: its 4 numbers were \
                  taken for cv::fisheye"
             );
+            let note = Warning::new(WarningCode::LensModelAssumed, note);
             Ok((lens(Distortion::Fisheye)?, Some(note)))
         }
         None => {

@@ -115,13 +115,8 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
     ];
     lines.extend(areas(calibration));
     let notes = told.into_iter().flat_map(|told| told.notes.iter().cloned());
-    lines.extend(notes.map(|note| ("  note", note)));
-    lines.extend(
-        calibration
-            .doubts()
-            .into_iter()
-            .map(|doubt| ("  doubt", doubt)),
-    );
+    let warnings = notes.chain(calibration.warnings());
+    lines.extend(warnings.map(|warning| ("  warning", warning.to_string())));
     lines
 }
 

@@ -53,7 +53,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         zones: told.zones,
         masks: told.masks,
     })?;
-    for note in told.notes.iter().chain(&exported.lost) {
+    let notes = told.notes.iter().map(ToString::to_string);
+    for note in notes.chain(exported.lost) {
         eprintln!("lookdown: {path}: {note}");
     }
     match &arguments.out {

@@ -18,6 +18,7 @@ use crate::{
         report::CalibrationUsed,
         rig_cache::{RigCacheUse, RigCamera, RigKey},
     },
+    warning::{Warning, WarningCode},
 };
 
 /// Circles are rounded to this share of the radius, so that the jitter of one camera's frames
@@ -58,7 +59,7 @@ impl Engine {
         job: &DetectJob,
         frame: &Frame,
         model: &Model,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) -> Result<FrameCamera, PipelineError> {
         let profile = job.parameters.profile;
         let calibration = match (&job.calibration, &job.parameters.calibration) {
@@ -78,7 +79,7 @@ impl Engine {
         let used = CalibrationUsed {
             id: calibration.id().to_string(),
             revision: calibration.revision().to_owned(),
-            assumed: false,
+            assumed_circle: None,
         };
         let camera = RigCamera::Calibrated {
             id: used.id.clone(),
@@ -107,25 +108,25 @@ impl Engine {
         frame: &Frame,
         profile: Profile,
         model: &Model,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) -> Result<FrameCamera, PipelineError> {
-        let (circle, how) = match find_lens_circle(frame) {
-            Some(circle) => (circle, "found in the frame"),
-            None => (
-                assumed_circle(frame.width(), frame.height()),
-                "taken to be as large as the frame, as none was found",
-            ),
-        };
+        let found = find_lens_circle(frame);
+        let circle = found.unwrap_or_else(|| assumed_circle(frame.width(), frame.height()));
         let camera = rounded(&circle);
         let lens = Lens::equidistant_circle(circle.cx, circle.cy, circle.radius, FRAC_PI_2)
             .map_err(|error| internal(anyhow::Error::new(error)))?;
-        warnings.push(format!(
-            "no calibration was named: an equidistant lens of 180° looking straight down was \
-             assumed, its circle {how} (centre {:.1}, {:.1}, radius {:.1} pixels)",
-            circle.cx + 0.5,
-            circle.cy + 0.5,
-            circle.radius
+        warnings.push(Warning::new(
+            WarningCode::LensAssumed,
+            "no calibration was named: an equidistant lens of 180° that looks straight down was \
+             assumed, with the lens circle calibration.assumed_circle",
         ));
+        if found.is_none() {
+            warnings.push(Warning::new(
+                WarningCode::LensCircleNotFound,
+                "the frame shows no lens circle: the largest circle in the middle of the frame was \
+                 assumed, name a calibration instead",
+            ));
+        }
         let geometry = CameraGeometry {
             lens,
             mount: Mount::default(),
@@ -134,7 +135,7 @@ impl Engine {
         let used = CalibrationUsed {
             id: "assumed".to_owned(),
             revision: format!("{:.0}-{:.0}-{:.0}", circle.cx, circle.cy, circle.radius),
-            assumed: true,
+            assumed_circle: Some(circle),
         };
         let rig = self.rig(camera, geometry, frame, profile, model.input());
         Ok(FrameCamera { used, rig })

@@ -11,6 +11,7 @@ use crate::{
         look::Look,
         network::{LookTask, Work},
     },
+    warning::Warning,
 };
 
 /// A frame after the network has seen it: all that refinement needs, so that other refinements
@@ -26,7 +27,7 @@ pub struct Observation {
     pub(super) batch_count: usize,
     pub(super) non_finite: usize,
     pub(super) timeline: Timeline,
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<Warning>,
 }
 
 impl Observation {

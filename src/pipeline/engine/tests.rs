@@ -65,18 +65,16 @@ fn a_report_says_what_it_is_based_on() {
         .report;
     assert_eq!(named.camera, "north");
     assert_eq!(named.calibration.id, "lobby");
-    assert!(!named.calibration.assumed && named.warnings.is_empty());
+    assert!(named.calibration.assumed_circle.is_none() && named.warnings.is_empty());
     assert_eq!((named.views.inferred, named.batch_count), (24, 5));
     assert_eq!(named.model.name, "blob");
 
     let assumed = engine.detect(&job(image, &[])).unwrap().report;
-    assert!(assumed.calibration.assumed);
+    let circle = assumed.calibration.assumed_circle.unwrap();
+    let revision = format!("{:.0}-{:.0}-{:.0}", circle.cx, circle.cy, circle.radius);
+    assert_eq!(assumed.calibration.revision, revision);
     assert_eq!(assumed.camera, "assumed");
-    assert!(
-        assumed.warnings[0].starts_with("no calibration was named"),
-        "{:?}",
-        assumed.warnings
-    );
+    assert_eq!(assumed.warnings[0].code, WarningCode::LensAssumed);
     assert_eq!(assumed.persons[0].floor, None);
 }
 

@@ -51,8 +51,14 @@ test("what no circle makes is left as it is", () => {
 });
 
 test("a frame in which no circle was found has the largest that fits", () => {
-  const { cx, cy, radius } = assumedCircle({ image: { width: 800, height: 600 }, warnings: [] });
+  const { cx, cy, radius } = assumedCircle({ image: { width: 800, height: 600 } });
   assert.deepEqual([cx, cy, radius], [400, 300, 300]);
+});
+
+test("the assumed circle of a report is taken over", () => {
+  const assumed_circle = { cx: 401.5, cy: 299, radius: 280.25 };
+  const { cx, cy, radius } = assumedCircle({ image: { width: 800, height: 600 }, calibration: { assumed_circle } });
+  assert.deepEqual({ cx, cy, radius }, assumed_circle);
 });
 
 test("straightening through a grid of the frame itself gives the frame", () => {

@@ -1,7 +1,10 @@
-//! What is odd about a calibration that can be used all the same.
+//! Warnings about calibrations that can be used, but are implausible.
 
 use super::Calibration;
-use crate::geometry::{Lens, Ray};
+use crate::{
+    geometry::{Lens, Ray},
+    warning::{Warning, WarningCode},
+};
 
 /// A lens centre farther than this from the frame's, as a share of the side, is rare.
 const OFF_CENTRE: f64 = 0.1;
@@ -13,30 +16,32 @@ const NARROW: f64 = 1.0;
 const NEAR_AXIS: f64 = 0.01;
 
 impl Calibration {
-    /// What is odd, a sentence each: the field, its value, and what it usually means.
+    /// Returns the implausible properties: the field, its value, and its usual cause.
     #[must_use]
-    pub fn doubts(&self) -> Vec<String> {
+    pub fn warnings(&self) -> Vec<Warning> {
         let lens = self.lens();
-        let mut doubts = self.off_centre();
+        let mut warnings = self.off_center();
         if let Some((across, down)) = scales_at_axis(lens)
             && (across / down - 1.0).abs() > SQUARE_PIXELS
         {
-            doubts.push(format!(
+            let message = format!(
                 "the lens has {across:.1} pixels per radian across and {down:.1} down at its axis: \
                  frames are rarely squeezed, check the focal lengths and the frame size"
-            ));
+            );
+            warnings.push(Warning::new(WarningCode::FocalLengthsDiffer, message));
         }
         if lens.max_theta() < NARROW {
-            doubts.push(format!(
+            let message = format!(
                 "the lens sees only {:.0}°: for a fisheye of a ceiling camera 160° to 220° are \
                  usual, check the model and its coefficients",
                 2.0 * lens.max_theta().to_degrees()
-            ));
+            );
+            warnings.push(Warning::new(WarningCode::FieldOfViewNarrow, message));
         }
-        doubts
+        warnings
     }
 
-    fn off_centre(&self) -> Vec<String> {
+    fn off_center(&self) -> Vec<Warning> {
         let centre = self.lens().principal_point();
         let (width, height) = self.image_size();
         let (middle_x, middle_y) = (f64::from(width - 1) / 2.0, f64::from(height - 1) / 2.0);
@@ -51,11 +56,12 @@ impl Calibration {
         } else {
             "the frame size is not the one it was calibrated with, or the frame was cropped"
         };
-        vec![format!(
+        let message = format!(
             "cx, cy is {:.1}, {:.1}, far from the middle of the frame ({middle_x:.1}, \
              {middle_y:.1}): perhaps {cause}",
             centre.x, centre.y
-        )]
+        );
+        vec![Warning::new(WarningCode::PrincipalPointOffCenter, message)]
     }
 }
 
@@ -72,9 +78,12 @@ fn scales_at_axis(lens: &Lens) -> Option<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::CalibrationFile;
+    use crate::{
+        calibration::CalibrationFile,
+        warning::{Warning, WarningCode},
+    };
 
-    fn doubts(cx: f64, cy: f64, fx: f64, max_theta: f64) -> Vec<String> {
+    fn warnings(cx: f64, cy: f64, fx: f64, max_theta: f64) -> Vec<Warning> {
         let content = format!(
             r#"{{"id":"hall","image":{{"width":1000,"height":600}},"lens":{{"model":"equidistant",
                 "fx":{fx},"fy":300,"cx":{cx},"cy":{cy},"max_theta":{max_theta}}}}}"#
@@ -82,34 +91,42 @@ mod tests {
         let file = CalibrationFile::parse(content.as_bytes()).expect("a whole file");
         let mut cameras = file.calibrations("hall", content.as_bytes());
         let (_, calibration) = cameras.remove(0);
-        calibration.expect("a plausible camera").doubts()
+        calibration.expect("a plausible camera").warnings()
     }
 
     #[test]
-    fn an_ordinary_camera_raises_no_doubt() {
-        assert!(doubts(498.0, 303.0, 301.0, 1.6).is_empty());
+    fn an_ordinary_camera_has_no_warning() {
+        assert!(warnings(498.0, 303.0, 301.0, 1.6).is_empty());
     }
 
     #[test]
-    fn each_oddity_is_told_with_its_value() {
-        for (doubts, expected) in [
+    fn each_warning_has_a_code_and_the_value() {
+        for (warnings, code, expected) in [
             (
-                doubts(299.5, 499.5, 300.0, 1.6),
+                warnings(299.5, 499.5, 300.0, 1.6),
+                WarningCode::PrincipalPointOffCenter,
                 "cx, cy is 299.5, 499.5, far from the middle of the frame (499.5, 299.5): perhaps \
                  row and column are swapped",
             ),
             (
-                doubts(299.5, 299.5, 300.0, 1.6),
+                warnings(299.5, 299.5, 300.0, 1.6),
+                WarningCode::PrincipalPointOffCenter,
                 "perhaps the frame size is not the one",
             ),
             (
-                doubts(499.5, 299.5, 400.0, 1.6),
+                warnings(499.5, 299.5, 400.0, 1.6),
+                WarningCode::FocalLengthsDiffer,
                 "400.0 pixels per radian across and 300.0 down",
             ),
-            (doubts(499.5, 299.5, 300.0, 0.5), "the lens sees only 57°"),
+            (
+                warnings(499.5, 299.5, 300.0, 0.5),
+                WarningCode::FieldOfViewNarrow,
+                "the lens sees only 57°",
+            ),
         ] {
-            assert_eq!(doubts.len(), 1, "{doubts:?}");
-            assert!(doubts[0].contains(expected), "{doubts:?}");
+            assert_eq!(warnings.len(), 1, "{warnings:?}");
+            assert_eq!(warnings[0].code, code);
+            assert!(warnings[0].message.contains(expected), "{warnings:?}");
         }
     }
 }
