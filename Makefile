@@ -95,12 +95,12 @@ ci: ## all that the continuous integration runs
 fuzz: ## run every fuzzer RUNS times, an hour or more; needs cargo-fuzz and a C++ compiler: docs/reliability.md
 	$(PYTHON) scripts/fuzz.py --runs $(RUNS)
 
-bless: ## regenerate the checked-in generated files: openapi/openapi.json and the snapshots
+bless: ## regenerate the checked-in generated files: openapi/openapi.json, docs/parameters.md and the snapshots
 	@$(PYTHON) scripts/setup.py
 	mkdir -p openapi
 	cargo run --release --locked -- openapi > openapi/openapi.json.new || { rm -f openapi/openapi.json.new; exit 1; }
 	mv openapi/openapi.json.new openapi/openapi.json
-	INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --locked
+	BLESS=1 INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --locked
 
 bench-remap: ## time remap tables and the rendering of views, the latter beside OpenCV's
 	@$(PYTHON) scripts/setup.py benches

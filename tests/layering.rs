@@ -8,8 +8,9 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 27] = [
+const MAY_USE: [(&str, &[&str]); 28] = [
     ("plain_name", &[]),
+    ("quoted", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
     ("revision", &[]),
@@ -21,7 +22,10 @@ const MAY_USE: [(&str, &[&str]); 27] = [
     ("results", &[]),
     ("open_inference", &[]),
     ("imaging", &["geometry"]),
-    ("calibration", &["geometry", "plain_name", "revision"]),
+    (
+        "calibration",
+        &["geometry", "plain_name", "quoted", "revision"],
+    ),
     (
         "inference",
         &["detection", "imaging", "open_inference", "revision"],
@@ -51,6 +55,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "imaging",
             "calibration",
             "inference",
+            "quoted",
             "revision",
         ],
     ),
@@ -81,6 +86,7 @@ const MAY_USE: [(&str, &[&str]); 27] = [
             "open_inference",
             "pipeline",
             "metrics",
+            "quoted",
             "results",
             "revision",
             "telemetry",
