@@ -11,6 +11,7 @@ mod times;
 use std::{error::Error, hint::black_box};
 
 use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
+use strum::VariantArray;
 
 use self::times::times;
 
@@ -29,7 +30,7 @@ fn main() -> Outcome<()> {
         ("random", random(0.07)?),
         ("strong", random(0.7)?),
     ] {
-        for refinement in Refinement::ALL {
+        for &refinement in Refinement::VARIANTS {
             let parameters = RefinementParameters {
                 refinement,
                 iou_threshold: 0.5,

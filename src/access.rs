@@ -12,4 +12,4 @@ pub use error::KeyError;
 pub use key_list::{Holder, KeyList};
 pub use key_name::{InvalidKeyName, KeyName};
 pub use keys::AccessKeys;
-pub use scope::{Scope, Scopes, UnknownScope};
+pub use scope::{Scope, Scopes};

@@ -9,7 +9,7 @@ mod voc;
 mod xml;
 mod yolo;
 
-use std::{fmt, str::FromStr};
+use strum::{Display, EnumString, VariantArray};
 
 use crate::{
     detection::{BBox, FramePixels},
@@ -20,7 +20,10 @@ use crate::{
 const LABEL: &str = "person";
 
 /// A file format of annotation tools.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Display, EnumString, VariantArray, strum::VariantNames,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum AnnotationFormat {
     /// COCO detection: one JSON file.
     Coco,
@@ -82,21 +85,6 @@ pub struct AnnotationFile {
 }
 
 impl AnnotationFormat {
-    /// Every format, in the order in which they are listed to users.
-    pub const ALL: [Self; 5] = [Self::Coco, Self::Cvat, Self::Yolo, Self::Voc, Self::GeoJson];
-
-    /// The name, as on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Coco => "coco",
-            Self::Cvat => "cvat",
-            Self::Yolo => "yolo",
-            Self::Voc => "voc",
-            Self::GeoJson => "geojson",
-        }
-    }
-
     /// Whether the format has turned boxes beside others, so that there is something to choose.
     #[must_use]
     pub fn has_oriented_boxes(self) -> bool {
@@ -138,28 +126,6 @@ impl AnnotationFormat {
             Self::Voc => Some(voc::path(image_file_name)),
             Self::GeoJson => Some(geojson::path(image_file_name)),
         }
-    }
-}
-
-impl fmt::Display for AnnotationFormat {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.pad(self.name())
-    }
-}
-
-/// A name that is no format's.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not a format; use one of coco, cvat, yolo, voc, geojson")]
-pub struct UnknownFormat(String);
-
-impl FromStr for AnnotationFormat {
-    type Err = UnknownFormat;
-
-    fn from_str(name: &str) -> Result<Self, UnknownFormat> {
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == name)
-            .ok_or_else(|| UnknownFormat(name.to_owned()))
     }
 }
 

@@ -20,6 +20,7 @@ mod incoming_trace;
 mod limit;
 mod openapi;
 mod page_headers;
+mod parameters;
 mod problem;
 mod rate_limit;
 mod report;

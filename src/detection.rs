@@ -17,4 +17,4 @@ mod properties;
 
 pub use bbox::{BBox, BBoxError, FramePixels, ViewPixels};
 pub use candidate::{Candidate, MergedDetection};
-pub use refinement::{Refinement, RefinementParameters, UnknownRefinement, refine};
+pub use refinement::{Refinement, RefinementParameters, refine};

@@ -29,5 +29,5 @@ pub use rotated_box::RotatedBox;
 pub use row::{DetectedRow, EvaluatedRow, FoundPerson, RowCost, RowName};
 pub use run::{EvaluationError, detect};
 pub use saved::SavedDetectionsError;
-pub use strata::{NoStrata, Stratification, Stratum, StratumFigures, UnknownStratification};
+pub use strata::{NoStrata, Stratification, Stratum, StratumFigures};
 pub use summary::{NoPersons, Summary};

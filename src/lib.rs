@@ -23,6 +23,7 @@ pub mod pipeline;
 pub mod plain_name;
 pub mod poller;
 pub mod probe;
+pub mod quoted;
 pub mod results;
 pub mod revision;
 pub mod server;

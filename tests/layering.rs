@@ -10,6 +10,7 @@ use std::{
 /// Every module, and the modules of this crate it may use.
 const MAY_USE: [(&str, &[&str]); 28] = [
     ("plain_name", &[]),
+    ("quoted", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
     ("revision", &[]),
@@ -24,7 +25,7 @@ const MAY_USE: [(&str, &[&str]); 28] = [
     ("imaging", &["geometry"]),
     (
         "calibration",
-        &["geometry", "plain_name", "revision", "warning"],
+        &["geometry", "plain_name", "quoted", "revision", "warning"],
     ),
     (
         "inference",
@@ -47,6 +48,7 @@ const MAY_USE: [(&str, &[&str]); 28] = [
             "imaging",
             "calibration",
             "inference",
+            "quoted",
             "revision",
             "warning",
         ],
@@ -78,6 +80,7 @@ const MAY_USE: [(&str, &[&str]); 28] = [
             "open_inference",
             "pipeline",
             "metrics",
+            "quoted",
             "results",
             "revision",
             "telemetry",

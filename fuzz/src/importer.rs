@@ -9,6 +9,7 @@ use lookdown::{
     },
     geometry::Pixel,
 };
+use strum::VariantArray;
 
 /// The importers, under the names of their folders of seeds and finds.
 pub const IMPORTERS: [(&str, Format); 15] = [
@@ -66,7 +67,7 @@ fn check(refusal: &FormatError) {
 /// Writes the camera in one format, chosen by the size of its file, and reads it back: all formats
 /// would take five times as long.
 fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
-    let target = Target::ALL[choice % Target::ALL.len()];
+    let target = Target::VARIANTS[choice % Target::VARIANTS.len()];
     let (width, height) = calibration.image_size();
     let written = target.write(&NativeCalibration {
         id: calibration.id().to_string(),

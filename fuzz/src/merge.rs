@@ -1,6 +1,7 @@
 //! Candidates of any shape, merged every way: what comes out is finite, in range and in order.
 
 use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
+use strum::VariantArray;
 
 /// A number is two bytes, in eighths; this one says that the eight bytes after it are a float of
 /// any kind.
@@ -35,7 +36,7 @@ pub fn read(bytes: &[u8]) -> bool {
             });
         }
     }
-    for refinement in Refinement::ALL {
+    for &refinement in Refinement::VARIANTS {
         let parameters = RefinementParameters {
             refinement,
             ..parameters

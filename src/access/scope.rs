@@ -1,9 +1,21 @@
 //! What a key opens.
 
-use std::{fmt, str::FromStr};
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 /// What a key opens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    strum::VariantNames,
+)]
+#[strum(serialize_all = "snake_case")]
 pub enum Scope {
     /// Finding the persons in frames.
     Detect,
@@ -14,41 +26,14 @@ pub enum Scope {
 }
 
 impl Scope {
-    /// Every scope.
-    pub const ALL: [Self; 3] = [Self::Detect, Self::Read, Self::Admin];
-
-    /// As it is written in files and commands.
+    /// Returns the name, as in files and commands.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Detect => "detect",
-            Self::Read => "read",
-            Self::Admin => "admin",
-        }
+        self.into()
     }
 }
 
-impl fmt::Display for Scope {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
-    }
-}
-
-/// There is no such scope.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a scope is detect, read or admin")]
-pub struct UnknownScope;
-
-impl FromStr for Scope {
-    type Err = UnknownScope;
-
-    fn from_str(name: &str) -> Result<Self, UnknownScope> {
-        let mut all = Self::ALL.into_iter();
-        all.find(|scope| scope.name() == name).ok_or(UnknownScope)
-    }
-}
-
-/// The scopes of one key, in the order of [`Scope::ALL`]; never none.
+/// The scopes of one key, in the order of the declaration of [`Scope`]; never none.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Scopes(Vec<Scope>);
 
@@ -56,8 +41,8 @@ impl Scopes {
     /// These scopes; `None` when there is none.
     #[must_use]
     pub fn new(given: &[Scope]) -> Option<Self> {
-        let given = Scope::ALL.into_iter().filter(|scope| given.contains(scope));
-        let given: Vec<_> = given.collect();
+        let given = Scope::VARIANTS.iter().filter(|scope| given.contains(scope));
+        let given: Vec<_> = given.copied().collect();
         (!given.is_empty()).then_some(Self(given))
     }
 
@@ -81,8 +66,8 @@ mod tests {
 
     #[test]
     fn a_scope_opens_itself_and_admin_opens_all() {
-        for own in Scope::ALL {
-            for wanted in Scope::ALL {
+        for &own in Scope::VARIANTS {
+            for &wanted in Scope::VARIANTS {
                 let opens = Scopes::new(&[own]).unwrap().allow(wanted);
                 assert_eq!(opens, own == wanted || own == Scope::Admin);
             }

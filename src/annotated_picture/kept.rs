@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
+use strum::VariantArray;
 
 use super::{Layer, PictureError, PictureFormat, PictureOptions, drawn, sketch::Sketch};
 use crate::{
@@ -64,7 +65,7 @@ impl KeptFrame {
     /// # Errors
     /// [`KeptFrameError`] for a frame that cannot be kept.
     pub fn of(detected: &Detected) -> Result<Self, KeptFrameError> {
-        let sketch = Sketch::of(detected, &Layer::ALL).rounded();
+        let sketch = Sketch::of(detected, Layer::VARIANTS).rounded();
         let sketch = serde_json::to_vec(&sketch)?.into();
         let jpeg = match &detected.encoded {
             Some(encoded) if is_kept_as_it_is(encoded, &detected.frame) => {

@@ -1,18 +1,54 @@
-//! What a picture shows and how large it is, from parameters by name.
+//! The drawings and the size of an annotated image: the table of parameters, and the checked values.
 
-use std::ops::RangeInclusive;
+use std::str::FromStr;
 
-use crate::pipeline::{ParameterError, shown, whole_number};
+use strum::{EnumString, VariantArray, VariantNames};
 
-/// Widths that may be asked for, pixels.
-const WIDTHS: RangeInclusive<u32> = 64..=8192;
-const QUALITIES: RangeInclusive<u8> = 1..=100;
-/// Hardly to be told from the original.
-const DEFAULT_QUALITY: u8 = 88;
-const NOTHING: &str = "none";
+use crate::pipeline::{
+    GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+    parameter_table,
+};
+
+const NO_LAYER: &str = "none";
+const INTERFACES: &[Interface] = &[Interface::Http, Interface::CommandLine];
+
+parameter_table! {
+    /// The parameters of an annotated image.
+    const TABLE;
+
+    DRAW = ParameterSpec {
+        name: "draw",
+        kind: ParameterKind::Choices {
+            names: <Layer as VariantNames>::VARIANTS,
+            none: NO_LAYER,
+        },
+        default: ParameterDefault::Value("oriented,scores"),
+        help: "Layers that are drawn into an annotated image, separated by commas.",
+        example: None,
+        interfaces: INTERFACES,
+    };
+    WIDTH = ParameterSpec {
+        name: "width",
+        kind: ParameterKind::Whole { min: 64, max: 8192 },
+        default: ParameterDefault::Described("the width of the frame, 2048 at most"),
+        help: "Maximum width of an annotated image, pixels. A narrower frame is not enlarged.",
+        example: Some("640"),
+        interfaces: INTERFACES,
+    };
+    // Hardly distinguishable from the original.
+    QUALITY = ParameterSpec {
+        name: "quality",
+        kind: ParameterKind::Whole { min: 1, max: 100 },
+        default: ParameterDefault::Value("88"),
+        help: "Quality of a JPEG.",
+        example: None,
+        interfaces: INTERFACES,
+    };
+}
 
 /// Something that can be drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, EnumString, VariantArray, VariantNames)]
+#[strum(serialize_all = "snake_case")]
 pub enum Layer {
     /// Axis-parallel boxes.
     Boxes,
@@ -24,14 +60,14 @@ pub enum Layer {
     Zones,
     /// The borders of the views through which the frame was seen.
     Views,
-    /// When the frame was taken, or came when nobody said that.
+    /// The time at which the frame was captured, or else at which it arrived.
     Timestamp,
 }
 
-/// What a picture shows and how large it is.
+/// The drawings and the size of an annotated image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PictureOptions {
-    /// What is drawn.
+    /// The layers, each once.
     pub layers: Vec<Layer>,
     /// Width in pixels, 2048 if none is given; a frame that is no wider stays as it is.
     pub width: Option<u32>,
@@ -39,83 +75,46 @@ pub struct PictureOptions {
     pub quality: u8,
 }
 
-impl Layer {
-    /// Everything that can be drawn.
-    pub const ALL: [Self; 6] = [
-        Self::Boxes,
-        Self::Oriented,
-        Self::Scores,
-        Self::Zones,
-        Self::Views,
-        Self::Timestamp,
-    ];
-
-    /// The name in requests.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Boxes => "boxes",
-            Self::Oriented => "oriented",
-            Self::Scores => "scores",
-            Self::Zones => "zones",
-            Self::Views => "views",
-            Self::Timestamp => "timestamp",
-        }
-    }
-}
-
-impl Default for PictureOptions {
-    fn default() -> Self {
-        Self {
-            layers: vec![Layer::Oriented, Layer::Scores],
-            width: None,
-            quality: DEFAULT_QUALITY,
-        }
-    }
-}
-
 impl PictureOptions {
-    /// The names of the options.
-    pub const NAMES: [&'static str; 3] = ["draw", "width", "quality"];
+    /// The specifications, in the order in which they are listed to users.
+    pub const TABLE: &'static [ParameterSpec] = TABLE;
 
-    /// Reads the values of [`PictureOptions::NAMES`].
+    /// Checks `(name, value)` pairs.
     ///
     /// # Errors
-    /// [`ParameterError`] for a value that is no such value or out of range.
-    pub fn parse([draw, width, quality]: [Option<&str>; 3]) -> Result<Self, ParameterError> {
-        let default = Self::default();
+    /// [`ParameterError`] for an unknown or repeated name and for a value out of range.
+    pub fn parse<'a>(
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self, ParameterError> {
+        let given = GivenParameters::read(TABLE, pairs)?;
+        let Layers(layers) = given.value(&DRAW)?;
         Ok(Self {
-            layers: draw.map_or(Ok(default.layers), parse_layers)?,
-            width: width
-                .map(|value| whole_number("width", value, WIDTHS))
-                .transpose()?,
-            quality: quality.map_or(Ok(default.quality), |value| {
-                whole_number("quality", value, QUALITIES)
-            })?,
+            layers,
+            width: given.optional(&WIDTH)?,
+            quality: given.value(&QUALITY)?,
         })
     }
 }
 
-fn parse_layers(value: &str) -> Result<Vec<Layer>, ParameterError> {
-    if value == NOTHING {
-        return Ok(Vec::new());
-    }
-    let mut layers = Vec::new();
-    for name in value.split(',') {
-        let layer = Layer::ALL.into_iter().find(|layer| layer.name() == name);
-        let layer = layer.ok_or_else(|| {
-            let known = Layer::ALL.map(Layer::name).join(", ");
-            let name = shown(name);
-            ParameterError::bad_value(
-                "draw",
-                format!("{name:?} cannot be drawn; use {NOTHING}, or some of {known}, with commas"),
-            )
-        })?;
-        if !layers.contains(&layer) {
-            layers.push(layer);
+/// The value of `draw`.
+struct Layers(Vec<Layer>);
+
+impl FromStr for Layers {
+    type Err = strum::ParseError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let mut layers = Vec::new();
+        if text == NO_LAYER {
+            return Ok(Self(layers));
         }
+        for name in text.split(',') {
+            let layer = name.parse()?;
+            if !layers.contains(&layer) {
+                layers.push(layer);
+            }
+        }
+        Ok(Self(layers))
     }
-    Ok(layers)
 }
 
 #[cfg(test)]
@@ -125,37 +124,45 @@ mod tests {
 
     #[test]
     fn every_layer_is_read_by_its_name_once() {
-        let names = Layer::ALL.map(Layer::name).join(",") + ",boxes";
-        let options = PictureOptions::parse([Some(&names), Some("640"), Some("100")]).unwrap();
-        assert_eq!(options.layers, Layer::ALL);
+        let names = <Layer as VariantNames>::VARIANTS.join(",") + ",boxes";
+        let pairs = [("draw", &*names), ("width", "640"), ("quality", "100")];
+        let options = PictureOptions::parse(pairs).unwrap();
+        assert_eq!(options.layers, <Layer as VariantArray>::VARIANTS);
         assert_eq!((options.width, options.quality), (Some(640), 100));
     }
 
     #[test]
-    fn nothing_named_is_the_default_and_none_draws_nothing() {
-        let default = PictureOptions::parse([None; 3]).unwrap();
-        assert_eq!(default, PictureOptions::default());
-        let none = PictureOptions::parse([Some("none"), None, None]).unwrap();
+    fn defaults_are_those_of_the_table() {
+        let default = PictureOptions::parse([]).unwrap();
+        assert_eq!(default.layers, [Layer::Oriented, Layer::Scores]);
+        assert_eq!((default.width, default.quality), (None, 88));
+        let none = PictureOptions::parse([("draw", "none")]).unwrap();
         assert!(none.layers.is_empty());
     }
 
     #[test]
     fn values_out_of_range_are_refused_by_name() {
-        for (values, name) in [
-            ([Some("hats"), None, None], "draw"),
-            ([Some(""), None, None], "draw"),
-            ([Some("none,boxes"), None, None], "draw"),
-            ([None, Some("63"), None], "width"),
-            ([None, Some("8193"), None], "width"),
-            ([None, Some("-1"), None], "width"),
-            ([None, None, Some("0")], "quality"),
-            ([None, None, Some("101")], "quality"),
-            ([None, None, Some("1000")], "quality"),
-            ([None, None, Some("high")], "quality"),
+        for (name, value) in [
+            ("draw", "hats"),
+            ("draw", ""),
+            ("draw", "none,boxes"),
+            ("width", "63"),
+            ("width", "8193"),
+            ("width", "-1"),
+            ("quality", "0"),
+            ("quality", "101"),
+            ("quality", "1000"),
+            ("quality", "high"),
         ] {
-            let error = PictureOptions::parse(values).unwrap_err();
-            assert_eq!(error.name, name, "{values:?}");
+            let error = PictureOptions::parse([(name, value)]).unwrap_err();
+            assert_eq!(error.name, name, "{value:?}");
             assert_eq!(error.fault, ParameterFault::BadValue);
         }
+        let error = PictureOptions::parse([("draw", "hats")]).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "draw: \"hats\" is not none or a comma-separated list of boxes, oriented, scores, zones, views, \
+             timestamp"
+        );
     }
 }

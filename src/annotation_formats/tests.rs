@@ -134,7 +134,7 @@ fn geojson_has_the_turned_box_as_a_ring_and_the_floor_as_a_property() {
 
 #[test]
 fn the_document_of_an_image_is_its_file_in_a_folder_of_one() {
-    for format in AnnotationFormat::ALL {
+    for &format in AnnotationFormat::VARIANTS {
         let image = image("a.jpg");
         let document = format.document(&image, BoxKind::Oriented);
         let files = format.files(&[image], BoxKind::Oriented);
@@ -147,7 +147,7 @@ fn the_document_of_an_image_is_its_file_in_a_folder_of_one() {
 
 #[test]
 fn the_own_file_of_an_image_is_among_the_files() {
-    for format in AnnotationFormat::ALL {
+    for &format in AnnotationFormat::VARIANTS {
         let image = image("hall.2/left");
         let own = format.own_file(&image.file_name);
         let files = format.files(&[image], BoxKind::AxisParallel);
@@ -166,7 +166,7 @@ fn a_picture_without_persons_has_its_place_in_every_format() {
         calibration: None,
         ..image("a.jpg")
     };
-    for format in AnnotationFormat::ALL {
+    for &format in AnnotationFormat::VARIANTS {
         let files = format.files(std::slice::from_ref(&empty), BoxKind::Oriented);
         let named =
             |file: &AnnotationFile| file.path.contains("/a.") || file.content.contains("a.jpg");

@@ -7,11 +7,15 @@ use axum::http::HeaderMap;
 use bytes::Bytes;
 
 use self::format::AnswerFormat;
-use super::problem::{Problem, ProblemKind};
+pub(super) use self::format::TABLE;
+use super::{
+    parameters::{self, pairs},
+    problem::{Problem, ProblemKind},
+};
 use crate::{
     annotated_picture::{PictureError, PictureOptions, annotated_picture},
     annotation_formats::{AnnotatedImage, BoxKind},
-    pipeline::{Detected, ParameterError, PipelineError},
+    pipeline::{Detected, PipelineError},
 };
 
 /// What a frame is called whose sender gave it no name.
@@ -32,32 +36,17 @@ pub(super) struct Content {
 }
 
 impl AnswerOptions {
-    /// The parameters about the answer.
-    pub(super) const NAMES: [&'static str; 4] = [
-        "format",
-        PictureOptions::NAMES[0],
-        PictureOptions::NAMES[1],
-        PictureOptions::NAMES[2],
-    ];
-
-    /// Takes the parameters about the answer out of a request's.
+    /// Takes the parameters about the answer out of those of a request.
     pub(super) fn take_from(
-        parameters: &mut Vec<(String, String)>,
+        given: &mut Vec<(String, String)>,
         headers: &HeaderMap,
         file_name: Option<String>,
     ) -> Result<Self, Problem> {
-        let mut given: [Option<String>; Self::NAMES.len()] = [const { None }; _];
-        let own = |name: &str| Self::NAMES.iter().position(|known| *known == name);
-        for (name, value) in parameters.extract_if(.., |(name, _)| own(name).is_some()) {
-            let place = own(&name).and_then(|index| given.get_mut(index));
-            if place.is_some_and(|place| place.replace(value).is_some()) {
-                return Err(ParameterError::repeated(&name).into());
-            }
-        }
-        let [format, draw, width, quality] = given.each_ref().map(Option::as_deref);
+        let format = parameters::take(given, TABLE);
+        let picture = parameters::take(given, PictureOptions::TABLE);
         Ok(Self {
-            format: AnswerFormat::of(format, headers)?,
-            picture: PictureOptions::parse([draw, width, quality])?,
+            format: AnswerFormat::read(pairs(&format), headers)?,
+            picture: PictureOptions::parse(pairs(&picture))?,
             file_name,
         })
     }

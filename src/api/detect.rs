@@ -11,7 +11,8 @@ use super::{
     ApiState,
     answer::AnswerOptions,
     find::{Found, find},
-    openapi::{DetectForm, DetectQuery, PictureQuery, RawBytes},
+    openapi::{DetectForm, DetectQuery, RawBytes},
+    parameters::pairs,
     problem::Problem,
     report::{Report, ReportTimings},
     request_id::RequestId,
@@ -22,8 +23,6 @@ use crate::{
     telemetry::RequestTrace,
 };
 
-/// `C_t` of requests that name none.
-pub(super) const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
 pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 pub(super) const QUEUE_TIME: HeaderName = HeaderName::from_static("x-queue-time");
 pub(super) const INFERENCE_TIME: HeaderName = HeaderName::from_static("x-inference-time");
@@ -41,7 +40,7 @@ pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-co
 /// drawn into it, or a file for annotation tools.
 #[utoipa::path(
     post, path = "/detect", tag = "detection", operation_id = "detect_persons",
-    params(DetectQuery, PictureQuery),
+    params(DetectQuery),
     request_body(
         description = "The frame: a form, or the file alone (JPEG, PNG or WebP, with any other content type).",
         content(
@@ -93,9 +92,7 @@ pub(super) fn facts(report: &DetectionReport) -> [(HeaderName, HeaderValue); 5] 
 fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {
     let parameters = &mut upload.parameters;
     let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
-    let pairs = parameters.iter();
-    let pairs = pairs.map(|(name, value)| (name.as_str(), value.as_str()));
-    let parameters = DetectParameters::parse(pairs, DEFAULT_SCORE_THRESHOLD)?;
+    let parameters = DetectParameters::parse(pairs(parameters))?;
     Ok((upload.job(parameters, request_id), answer))
 }
 

@@ -24,7 +24,7 @@ use super::{
     problem::{Problem, ProblemKind},
 };
 use crate::{
-    pipeline::shown,
+    quoted::Quoted,
     results::{ListenError, Unreachable},
 };
 
@@ -55,9 +55,9 @@ pub(super) async fn list(
 
 /// No report of that camera is kept.
 fn unknown(camera: &str) -> Problem {
-    let camera = shown(camera);
+    let camera = Quoted(camera);
     let detail = format!(
-        "no report of the camera {camera:?} is kept: GET /results lists the cameras, and a frame sent to \
+        "no report of the camera {camera} is kept: GET /results lists the cameras, and a frame sent to \
          /detect with this name as the parameter camera makes it one of them"
     );
     Problem::new(ProblemKind::UnknownCamera, detail)

@@ -117,7 +117,8 @@ impl Upload {
     }
 }
 
-fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Problem> {
+/// The parameters of a query, names and values.
+pub(super) fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Problem> {
     let pairs = Query::try_from_uri(uri).ok().map(|Query(pairs)| pairs);
     // Bytes that are not UTF-8 come out of the decoder as this character.
     let is_text = |text: &String| !text.contains(char::REPLACEMENT_CHARACTER);

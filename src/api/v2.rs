@@ -23,7 +23,7 @@ use super::{
     ApiState,
     problem::{Problem, ProblemKind},
 };
-use crate::{inference::Model, pipeline::shown};
+use crate::{inference::Model, quoted::Quoted};
 use metadata::ModelMetadata;
 
 /// The model that finds the persons in frames.
@@ -48,18 +48,18 @@ impl Asked {
             Self::Views(model.ok_or_else(|| {
                 let loaded = state.models.registry().all();
                 let loaded: Vec<_> = loaded.iter().map(|model| model.name()).collect();
-                let (name, loaded) = (shown(name), loaded.join(", "));
+                let (name, loaded) = (Quoted(name), loaded.join(", "));
                 unknown(format!(
-                    "model: {name:?} is not there; there are {FRAME_MODEL}, which takes frames, and \
+                    "model: {name} is not there; there are {FRAME_MODEL}, which takes frames, and \
                      the detectors that are loaded: {loaded}"
                 ))
             })?)
         };
         match version {
             Some(wanted) if wanted != found.version() => {
-                let (wanted, version) = (shown(wanted), found.version());
+                let (wanted, version) = (Quoted(wanted), found.version());
                 Err(unknown(format!(
-                    "model: {name} has the version {version}, and no {wanted:?}"
+                    "model: {name} has the version {version}, and no {wanted}"
                 )))
             }
             _ => Ok(found),

@@ -7,10 +7,15 @@ mod kalibr;
 mod opencv;
 mod ros;
 
+use strum::{EnumString, IntoStaticStr, VariantArray};
+
 use super::native::{NativeCalibration, NativeMount};
 
 /// A format that is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray, strum::VariantNames,
+)]
+#[strum(serialize_all = "lowercase")]
 #[expect(missing_docs, reason = "the formats' own names")]
 pub enum Target {
     Native,
@@ -39,31 +44,10 @@ pub struct NotExpressible {
 }
 
 impl Target {
-    /// Every target, in the order in which they are listed to users.
-    pub const ALL: [Self; 5] = [
-        Self::Native,
-        Self::OpenCv,
-        Self::Kalibr,
-        Self::Ros,
-        Self::Colmap,
-    ];
-
-    /// The name, as on the command line.
+    /// Returns the name, as on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Native => "native",
-            Self::OpenCv => "opencv",
-            Self::Kalibr => "kalibr",
-            Self::Ros => "ros",
-            Self::Colmap => "colmap",
-        }
-    }
-
-    /// The target of that name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|target| target.name() == name)
+        self.into()
     }
 
     /// Writes a calibration in this format.

@@ -2,7 +2,10 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::plain_name::{MAX_CHARS, is_plain};
+use crate::{
+    plain_name::{MAX_CHARS, is_plain},
+    quoted::{Quoted, shortened},
+};
 
 /// The ID of a calibration: `[a-z0-9][a-z0-9_-]{0,63}`. Safe in file names and URLs.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -10,13 +13,16 @@ pub struct CalibrationId(String);
 
 /// A text that is no calibration ID.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{0:?} is not a calibration ID: use 1 to 64 of a-z, 0-9, _ and -, beginning with a letter or \
-     digit"
-)]
+#[error("{} is not {}", Quoted(.0), CalibrationId::RULE)]
 pub struct InvalidCalibrationId(String);
 
 impl CalibrationId {
+    /// A regular expression that IDs match.
+    pub const PATTERN: &'static str = "^[a-z0-9][a-z0-9_-]{0,63}$";
+    /// Completes "… is not" where an ID is needed.
+    pub const RULE: &'static str = "a calibration ID: use 1 to 64 of a-z, 0-9, _ and -, beginning \
+                                    with a letter or digit";
+
     /// The ID as text.
     #[must_use]
     pub fn as_str(&self) -> &str {
@@ -53,10 +59,7 @@ impl FromStr for CalibrationId {
         if is_plain(text) {
             Ok(Self(text.to_owned()))
         } else {
-            // Enough to recognise it by, not enough to fill a log.
-            Err(InvalidCalibrationId(
-                text.chars().take(MAX_CHARS + 1).collect(),
-            ))
+            Err(InvalidCalibrationId(shortened(text).to_owned()))
         }
     }
 }

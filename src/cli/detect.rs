@@ -21,9 +21,8 @@ use self::{
     pictures::{Picture, pictures},
 };
 use super::{
-    SettingsFile,
-    annotate::{self, PictureFlags},
-    parameters::ParameterFlags,
+    SettingsFile, annotate,
+    parameters::{ParameterFlags, PictureFlags, one_of},
     progress::Progress,
 };
 use crate::{
@@ -33,9 +32,6 @@ use crate::{
     calibration::{Calibration, CalibrationId},
     pipeline::{DetectJob, DetectParameters, Detected, Engine, Ticket},
 };
-
-/// `C_t` without `--score-threshold`.
-const DEFAULT_SCORE_THRESHOLD: f64 = 0.3;
 
 /// Arguments of `lookdown detect`.
 #[derive(Debug, Args)]
@@ -58,7 +54,7 @@ pub(super) struct Arguments {
     /// Write annotations to be corrected in the usual tools, into the folder --out, instead of
     /// reports: `coco` (annotations.json), `cvat` (annotations.xml, CVAT for images 1.1), `yolo`
     /// (labels/, data.yaml, classes.txt), `voc` (Annotations/) or `geojson` (features/)
-    #[arg(long, value_name = "FORMAT", requires = "out")]
+    #[arg(long, value_name = "FORMAT", requires = "out", value_parser = one_of::<AnnotationFormat>())]
     format: Option<AnnotationFormat>,
     /// The folder for --format
     #[arg(long, value_name = "FOLDER", requires = "format")]
@@ -134,7 +130,7 @@ fn labels(arguments: &Arguments, pictures: &[Picture]) -> anyhow::Result<Option<
 fn parameters(
     arguments: &Arguments,
 ) -> anyhow::Result<(DetectParameters, Option<Arc<Calibration>>)> {
-    let check = |id| arguments.parameters.check(id, DEFAULT_SCORE_THRESHOLD);
+    let check = |id| arguments.parameters.check(id);
     let Some(named) = arguments.calibration.as_deref() else {
         return Ok((check(None)?, None));
     };

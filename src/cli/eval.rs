@@ -19,12 +19,13 @@ use clap::{
 };
 
 use self::{output::Output, plot_file::PlotFile, truth::TruthFlags};
-use super::{SettingsFile, progress::Progress};
+use super::{SettingsFile, parameters::one_of, progress::Progress};
 use crate::{
     app::evaluation_engine,
+    detection::Refinement,
     evaluation::{DataSet, DetectedRow, EvaluationError, detect},
     geometry::FieldOfViewReading,
-    pipeline::{DetectParameters, Engine},
+    pipeline::{DetectParameters, Engine, Profile},
     settings::Settings,
 };
 
@@ -36,13 +37,12 @@ const DEFAULT_SCORE_THRESHOLD: &str = "0.01";
 pub(super) struct Arguments {
     #[command(flatten)]
     truth: TruthFlags,
-    /// How thoroughly to look: paper, fast, balanced, quality or direct; may be repeated
-    /// [default: balanced; with --sweep: paper]
-    #[arg(long, value_name = "NAME")]
-    profile: Vec<String>,
-    /// How overlapping boxes become persons; may be repeated [default: all refinements]
-    #[arg(long, value_name = "NAME")]
-    refine: Vec<String>,
+    /// Trade-off between accuracy and cost; may be repeated [default: balanced; with --sweep: paper]
+    #[arg(long, value_name = "NAME", value_parser = one_of::<Profile>())]
+    profile: Vec<Profile>,
+    /// Method that merges overlapping boxes into persons; may be repeated [default: all of them]
+    #[arg(long, value_name = "NAME", value_parser = one_of::<Refinement>())]
+    refine: Vec<Refinement>,
     /// The rows of the paper's table: its three refinements, and the detector without views
     #[arg(long, conflicts_with_all = ["profile", "refine"])]
     paper: bool,

@@ -8,6 +8,7 @@ use std::{
 use anyhow::Context;
 use clap::{Args, Subcommand};
 
+use super::parameters::one_of;
 use crate::access::{KeyDigest, KeyName, Scope, Scopes, new_key};
 
 #[derive(Debug, Subcommand)]
@@ -21,8 +22,8 @@ pub(super) struct Arguments {
     /// What people call the key: 1 to 64 of a-z, 0-9, _ and -
     #[arg(long)]
     name: KeyName,
-    /// What it opens: detect, read or admin; may be given several times
-    #[arg(long = "scope", required = true, value_name = "SCOPE")]
+    /// A scope of the key; may be given several times
+    #[arg(long = "scope", required = true, value_name = "SCOPE", value_parser = one_of::<Scope>())]
     scopes: Vec<Scope>,
 }
 

@@ -25,7 +25,6 @@ use crate::{
 
 /// The picture that models are tried on when no other is given: a fisheye frame.
 const SAMPLE: &str = "samples/office.jpg";
-const SCORE_THRESHOLD: f64 = 0.3;
 /// Views in a run that is timed beside that of one view.
 const BATCH_VIEWS: usize = 8;
 /// Timed runs of the network; their median is told.
@@ -107,7 +106,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         .context(UNWRITABLE)?;
     }
     if let Some(path) = &arguments.annotate {
-        annotate::write(detected, &PictureOptions::default(), path)?;
+        annotate::write(detected, &PictureOptions::parse([])?, path)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -144,7 +143,7 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
 
 /// Looks at the sample with the model of the settings.
 fn look(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
-    let parameters = DetectParameters::parse([("profile", profile)], SCORE_THRESHOLD)?;
+    let parameters = DetectParameters::parse([("profile", profile)])?;
     let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
     let image = std::fs::read(sample)
         .with_context(|| format!("--sample: {} cannot be read", sample.display()))?;

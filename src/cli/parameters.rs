@@ -1,70 +1,225 @@
-//! Request parameters as flags: the same names, checked by the same code.
+//! Request parameters as flags: the same names in kebab-case and the same checks, from the tables of their
+//! specifications.
 
-use clap::Args;
+use std::str::FromStr;
 
-use crate::pipeline::{DetectParameters, ParameterError};
+use clap::{
+    Arg, ArgMatches, Args, Command, FromArgMatches,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
+use strum::VariantNames;
+
+use crate::{
+    annotated_picture::PictureOptions,
+    pipeline::{
+        DetectParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+    },
+};
+
+/// The flag that the flags of an annotated image need.
+const ANNOTATE: &str = "annotate";
 
 /// The parameters that every detection takes, but the calibration.
-#[derive(Debug, Args)]
-pub(super) struct ParameterFlags {
-    /// The name under which results are kept [default: the calibration's ID]
-    #[arg(long, value_name = "NAME")]
-    camera: Option<String>,
-    /// How thoroughly to look: `paper`, `fast`, `balanced`, `quality` or `direct`
-    /// [default: balanced]
-    #[arg(long, value_name = "NAME")]
-    profile: Option<String>,
-    /// How overlapping boxes become persons: `nms`, `soft_nms_linear`, `soft_nms_gaussian` or
-    /// `fusion`
-    /// [default: the profile's]
-    #[arg(long, value_name = "NAME")]
-    refine: Option<String>,
-    /// Look with this model [default: the profile's]
-    #[arg(long, value_name = "NAME")]
-    model: Option<String>,
-    /// Leave out persons with a lower score, 0 to 1 [default: 0.3]
-    #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
-    score_threshold: Option<String>,
-    /// Boxes that overlap at least this much are the same person, 0 to 1 [default: the
-    /// refinement's]
-    #[arg(long, value_name = "IOU", allow_hyphen_values = true)]
-    iou_threshold: Option<String>,
-    /// Width of Gaussian Soft-NMS, above 0 [default: 0.3]
-    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
-    sigma: Option<String>,
-    /// Most persons in a report, best first [default: 1000]
-    #[arg(long, value_name = "COUNT", allow_hyphen_values = true)]
-    max_detections: Option<String>,
-    /// When the picture was taken (RFC 3339)
-    #[arg(long, value_name = "TIME")]
-    captured_at: Option<String>,
-}
+#[derive(Debug)]
+pub(super) struct ParameterFlags(Given);
+
+/// The parameters of the annotated image that `--annotate` writes.
+#[derive(Debug)]
+pub(super) struct PictureFlags(Given);
+
+/// Names and values of parameters.
+type Given = Vec<(&'static str, String)>;
 
 impl ParameterFlags {
-    /// The checked parameters.
+    /// Checks the parameters.
     ///
     /// # Errors
     /// [`ParameterError`] when a value cannot be used.
     pub(super) fn check(
         &self,
         calibration: Option<&str>,
-        default_score_threshold: f64,
     ) -> Result<DetectParameters, ParameterError> {
-        let given = [
-            ("calibration", calibration),
-            ("camera", self.camera.as_deref()),
-            ("profile", self.profile.as_deref()),
-            ("refine", self.refine.as_deref()),
-            ("model", self.model.as_deref()),
-            ("score_threshold", self.score_threshold.as_deref()),
-            ("iou_threshold", self.iou_threshold.as_deref()),
-            ("sigma", self.sigma.as_deref()),
-            ("max_detections", self.max_detections.as_deref()),
-            ("captured_at", self.captured_at.as_deref()),
-        ];
-        let pairs = given
-            .into_iter()
-            .filter_map(|(name, value)| Some((name, value?)));
-        DetectParameters::parse(pairs, default_score_threshold)
+        let calibration = calibration.map(|id| ("calibration", id));
+        DetectParameters::parse(pairs(&self.0).chain(calibration))
+    }
+}
+
+impl PictureFlags {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when a value cannot be used.
+    pub(super) fn check(&self) -> Result<PictureOptions, ParameterError> {
+        PictureOptions::parse(pairs(&self.0))
+    }
+}
+
+impl Args for ParameterFlags {
+    fn augment_args(command: Command) -> Command {
+        command.args(offered(DetectParameters::TABLE).map(flag))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for ParameterFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self(given(DetectParameters::TABLE, matches)))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for PictureFlags {
+    fn augment_args(command: Command) -> Command {
+        let flags = offered(PictureOptions::TABLE).map(flag);
+        command.args(flags.map(|flag| flag.requires(ANNOTATE)))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for PictureFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self(given(PictureOptions::TABLE, matches)))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+/// Parses the names of an enum, and lists them in the help and in completions.
+pub(super) fn one_of<T>() -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err = strum::ParseError> + VariantNames + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(T::VARIANTS).try_map(|name| name.parse::<T>())
+}
+
+fn offered(table: &'static [ParameterSpec]) -> impl Iterator<Item = &'static ParameterSpec> {
+    let table = table.iter();
+    table.filter(|spec| spec.is_offered_by(Interface::CommandLine))
+}
+
+fn flag(spec: &ParameterSpec) -> Arg {
+    let summary = spec.help.split_once(". ");
+    let summary = summary.map_or(spec.help.trim_end_matches('.'), |(summary, _)| summary);
+    let default = match spec.default {
+        ParameterDefault::Value(default) | ParameterDefault::Described(default) => {
+            format!(" [default: {default}]")
+        }
+        ParameterDefault::None => String::new(),
+    };
+    let flag = Arg::new(spec.name)
+        .long(spec.name.replace('_', "-"))
+        .allow_hyphen_values(true)
+        .help(format!("{summary}{default}"))
+        .long_help(format!("{}{default}", spec.help));
+    match spec.kind {
+        ParameterKind::Choice(names) => flag
+            .value_name("NAME")
+            .value_parser(PossibleValuesParser::new(names)),
+        ParameterKind::Choices { names, none } => {
+            let names = names.iter().copied().chain([none]);
+            flag.value_name("NAME,NAME")
+                .value_delimiter(',')
+                .value_parser(PossibleValuesParser::new(names))
+        }
+        ParameterKind::Text | ParameterKind::Name { .. } | ParameterKind::Pattern { .. } => {
+            flag.value_name("NAME")
+        }
+        ParameterKind::Switch => flag
+            .value_name("BOOL")
+            .value_parser(PossibleValuesParser::new(["true", "false"])),
+        ParameterKind::Whole { .. } | ParameterKind::Fraction | ParameterKind::Positive => {
+            flag.value_name("NUMBER")
+        }
+        ParameterKind::Time => flag.value_name("TIME"),
+    }
+}
+
+fn given(table: &'static [ParameterSpec], matches: &ArgMatches) -> Given {
+    let given = offered(table).filter_map(|spec| {
+        let values: Vec<_> = matches.get_many::<String>(spec.name)?.cloned().collect();
+        Some((spec.name, values.join(",")))
+    });
+    given.collect()
+}
+
+fn pairs<'a>(given: &'a [(&'static str, String)]) -> impl Iterator<Item = (&'a str, &'a str)> {
+    given.iter().map(|(name, value)| (*name, value.as_str()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed<F: Args>(words: &[String]) -> Result<F, clap::Error> {
+        let annotate = Arg::new(ANNOTATE).long(ANNOTATE);
+        let command = F::augment_args(Command::new("lookdown").arg(annotate));
+        let words = ["lookdown".to_owned()].into_iter().chain(words.to_vec());
+        F::from_arg_matches(&command.try_get_matches_from(words)?)
+    }
+
+    /// A value that the parameter takes.
+    fn value_of(spec: &ParameterSpec) -> &'static str {
+        match spec.kind {
+            ParameterKind::Choice(names) => names[0],
+            ParameterKind::Choices { none, .. } => none,
+            ParameterKind::Switch => "true",
+            ParameterKind::Whole { .. } => "64",
+            ParameterKind::Fraction | ParameterKind::Positive => "0.25",
+            _ => spec.example.unwrap_or_default(),
+        }
+    }
+
+    fn words(table: &'static [ParameterSpec]) -> (Vec<String>, Given) {
+        let given: Given = offered(table)
+            .map(|spec| (spec.name, value_of(spec).to_owned()))
+            .collect();
+        let words = given
+            .iter()
+            .flat_map(|(name, value)| [format!("--{}", name.replace('_', "-")), value.clone()]);
+        (words.collect(), given)
+    }
+
+    #[test]
+    fn every_offered_parameter_is_a_flag_in_kebab_case() {
+        let (flags, expected) = words(DetectParameters::TABLE);
+        let read = parsed::<ParameterFlags>(&flags).unwrap();
+        assert_eq!(read.0, expected);
+        assert!(read.check(Some("lobby")).is_ok());
+
+        let (mut flags, expected) = words(PictureOptions::TABLE);
+        flags.extend(["--annotate", "out.jpg"].map(ToOwned::to_owned));
+        let read = parsed::<PictureFlags>(&flags).unwrap();
+        assert_eq!(read.0, expected);
+        assert!(read.check().is_ok());
+    }
+
+    #[test]
+    fn unknown_choices_are_refused_with_the_possible_values() {
+        for (name, values) in [("--profile", "paper, fast"), ("--refine", "nms, soft_nms")] {
+            let words = [name.to_owned(), "best".to_owned()];
+            let error = parsed::<ParameterFlags>(&words).unwrap_err().to_string();
+            let expected = format!("[possible values: {values}");
+            assert!(error.contains(&expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn layers_are_given_as_one_comma_separated_value() {
+        let words = ["--draw", "boxes,views", "--annotate", "out.jpg"].map(ToOwned::to_owned);
+        let read = parsed::<PictureFlags>(&words).unwrap();
+        assert_eq!(read.0, [("draw", "boxes,views".to_owned())]);
     }
 }

@@ -12,12 +12,8 @@ use anyhow::Context;
 use clap::Args;
 
 use self::trial::{Choice, Trial};
-use super::SettingsFile;
-use crate::{
-    inference::Device,
-    pipeline::{DetectParameters, Profile},
-    settings::Settings,
-};
+use super::{SettingsFile, parameters::one_of};
+use crate::{inference::Device, pipeline::Profile, settings::Settings};
 
 /// A choice must be faster than the present one by this factor: less may be chance.
 const WORTH_WHILE: f64 = 1.03;
@@ -28,8 +24,8 @@ const TURNS: usize = 5;
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Tune for this profile's model
-    #[arg(long, value_name = "NAME", default_value = "balanced")]
-    profile: String,
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = one_of::<Profile>())]
+    profile: Profile,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
@@ -37,8 +33,7 @@ pub(super) struct Arguments {
 /// Does what the command asks for.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
-    let profile = [("profile", arguments.profile.as_str())];
-    let profile = DetectParameters::parse(profile, 0.3)?.profile;
+    let profile = arguments.profile;
     let present = Choice {
         sessions: settings.threads.sessions,
         threads: settings.threads.per_session,

@@ -1,11 +1,24 @@
 //! Which way overlapping candidates become persons, and with which numbers.
 
-use std::{fmt, str::FromStr};
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 use super::{Candidate, MergedDetection, fusion, suppression};
 
 /// How overlapping candidates are refined into one detection per person.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    strum::VariantNames,
+)]
+#[strum(serialize_all = "snake_case")]
 pub enum Refinement {
     /// Hard non-maximum suppression.
     Nms,
@@ -18,45 +31,10 @@ pub enum Refinement {
 }
 
 impl Refinement {
-    /// Every refinement, in the order in which they are listed to users.
-    pub const ALL: [Self; 4] = [
-        Self::Nms,
-        Self::SoftNmsLinear,
-        Self::SoftNmsGaussian,
-        Self::Fusion,
-    ];
-
-    /// The name, as in requests and reports.
+    /// Returns the name, as in requests and reports.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Nms => "nms",
-            Self::SoftNmsLinear => "soft_nms_linear",
-            Self::SoftNmsGaussian => "soft_nms_gaussian",
-            Self::Fusion => "fusion",
-        }
-    }
-}
-
-impl fmt::Display for Refinement {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.pad(self.name())
-    }
-}
-
-/// A name that is no refinement's.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not a refinement; use one of nms, soft_nms_linear, soft_nms_gaussian, fusion")]
-pub struct UnknownRefinement(String);
-
-impl FromStr for Refinement {
-    type Err = UnknownRefinement;
-
-    fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|refinement| refinement.name() == name)
-            .ok_or_else(|| UnknownRefinement(name.to_owned()))
+        self.into()
     }
 }
 

@@ -15,7 +15,6 @@ use super::{DataSet, DetectedRow, FoundPerson, ImageId, RowName};
 use crate::{
     detection::BBox,
     geometry::{OrientedBox, Pixel},
-    pipeline::Profile,
 };
 
 /// `person` in COCO; detections of other things are passed over.
@@ -77,7 +76,7 @@ impl RowName {
         let (profile, rest) = stem.split_once('.')?;
         let (refinement, model) = rest.split_once('.')?;
         Some(Self {
-            profile: Some(Profile::from_name(profile)?),
+            profile: Some(profile.parse().ok()?),
             refinement: Some(refinement.parse().ok()?),
             model: model.to_owned(),
         })

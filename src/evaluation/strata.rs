@@ -4,6 +4,8 @@
 //! and finding them is no fault; a detection that finds nobody is wrong in the stratum it lies in
 //! itself.
 
+use strum::{EnumString, IntoStaticStr, VariantArray};
+
 use super::{
     AnnotatedPerson, AveragePrecision, DataSetImage, EvaluatedImage, GroundTruth, MatchingRule,
     Outcome, Outline, PrecisionRecallCurve, ScoredBox,
@@ -13,7 +15,10 @@ use super::{
 const MIN_IOU: f64 = 0.5;
 
 /// What persons are told apart by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray, strum::VariantNames,
+)]
+#[strum(serialize_all = "snake_case")]
 pub enum Stratification {
     /// Distance from the centre: the angle between the optical axis and the ray to the middle of
     /// the box, through the calibrated lens, or else through the equidistant lens of 180° whose
@@ -26,11 +31,6 @@ pub enum Stratification {
     /// nobody is wrong in every stratum.
     Visibility,
 }
-
-/// A name that is no stratification.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("\"{0}\" tells no persons apart; use one of distance, size, visibility")]
-pub struct UnknownStratification(String);
 
 /// The persons whose value lies in `from..until`.
 struct Range {
@@ -68,17 +68,10 @@ pub struct NoStrata {
 }
 
 impl Stratification {
-    /// Every stratification.
-    pub const ALL: [Self; 3] = [Self::Distance, Self::Size, Self::Visibility];
-
-    /// The name of the stratification, as in a flag.
+    /// Returns the name, as in a flag.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Distance => "distance",
-            Self::Size => "size",
-            Self::Visibility => "visibility",
-        }
+        self.into()
     }
 
     /// The figures of each stratum. `images` are those of a data set with what was found in each.
@@ -161,17 +154,6 @@ impl Stratification {
             }
             Self::Visibility => None,
         }
-    }
-}
-
-impl std::str::FromStr for Stratification {
-    type Err = UnknownStratification;
-
-    fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|by| by.name() == name)
-            .ok_or_else(|| UnknownStratification(name.to_owned()))
     }
 }
 

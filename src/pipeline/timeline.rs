@@ -6,10 +6,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use strum::IntoStaticStr;
+
 use super::StageTimings;
 
 /// A stage of a frame's way to its report.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Stage {
     /// Bytes to pixels.
     Decode,
@@ -26,17 +29,10 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Its name, as in reports.
+    /// Returns the name, as in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Decode => "decode",
-            Self::Calibrate => "calibrate",
-            Self::Queue => "queue",
-            Self::Remap => "remap",
-            Self::Inference => "inference",
-            Self::Refine => "refine",
-        }
+        self.into()
     }
 }
 

@@ -6,6 +6,7 @@ use lookdown::{
     calibration::{CalibrationFile, export::Target, native::NativeCalibration},
     geometry::{Lens, Ray},
 };
+use strum::VariantArray;
 
 use crate::{camera, fixture, lens};
 
@@ -81,7 +82,7 @@ fn every_target_holds_its_lenses_and_refuses_the_others() {
     for (text, holding) in LENSES {
         let calibration = calibration(text);
         let original = Lens::new(&calibration.lens).unwrap();
-        for target in Target::ALL {
+        for &target in Target::VARIANTS {
             let written = target.write(&calibration);
             if target == Target::Native || holding.contains(&target.name()) {
                 let content = written.unwrap().content;

@@ -30,6 +30,42 @@ pub(crate) fn assert_fails_with(output: &Output, parts: &[&str]) {
     }
 }
 
+/// Asserts that the command line refuses a value and lists the possible ones.
+fn assert_lists_values(output: &Output, value: &str, possible: &str) {
+    let message = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    let expected = format!("[possible values: {possible}");
+    assert!(
+        message.contains(value) && message.contains(&expected),
+        "{message}"
+    );
+}
+
+#[test]
+fn unknown_choices_are_refused_with_the_possible_values() {
+    for (arguments, possible) in [
+        (
+            ["detect", "a.jpg", "--profile", "best"],
+            "paper, fast, balanced",
+        ),
+        (
+            ["detect", "a.jpg", "--refine", "best"],
+            "nms, soft_nms_linear",
+        ),
+        (
+            ["eval", "folder", "--refine", "best"],
+            "nms, soft_nms_linear",
+        ),
+        (
+            ["eval", "folder", "--by", "best"],
+            "distance, size, visibility",
+        ),
+        (["key", "new", "--scope", "best"], "detect, read, admin"),
+    ] {
+        assert_lists_values(&lookdown(&arguments, &[]), "best", possible);
+    }
+}
+
 #[test]
 fn the_api_description_goes_to_standard_output() {
     let output = lookdown(&["openapi"], &[]);
@@ -41,7 +77,10 @@ fn the_api_description_goes_to_standard_output() {
 #[test]
 fn a_parameter_out_of_range_is_refused_as_over_http() {
     let output = lookdown(&["detect", "frame.jpg", "--score-threshold", "-1"], &[]);
-    assert_fails_with(&output, &["score_threshold: -1 is outside 0 to 1"]);
+    assert_fails_with(
+        &output,
+        &["score_threshold: \"-1\" is not a number from 0 to 1"],
+    );
 }
 
 #[test]
@@ -121,7 +160,12 @@ fn a_person_is_drawn_into_the_picture_on_request() {
 fn options_of_pictures_are_checked_and_need_a_picture() {
     let annotate = ["detect", "a.jpg", "--annotate", "out.jpg"];
     let output = lookdown(&[&annotate[..], &["--draw", "hats"]].concat(), &[]);
-    assert_fails_with(&output, &["draw", "hats", "oriented"]);
+    assert_lists_values(&output, "hats", "boxes, oriented, scores");
+    let output = lookdown(&[&annotate[..], &["--quality", "101"]].concat(), &[]);
+    assert_fails_with(
+        &output,
+        &["quality: \"101\" is not a whole number from 1 to 100"],
+    );
     let output = lookdown(&["detect", "a.jpg", "--width", "300"], &[]);
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(!output.status.success() && message.contains("--annotate"));

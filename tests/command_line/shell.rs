@@ -9,7 +9,9 @@ fn shells_are_told_the_commands() {
     for shell in ["bash", "zsh", "fish"] {
         let output = lookdown(&["completions", shell], &[]);
         let script = String::from_utf8(output.stdout).unwrap();
-        assert!(script.contains("calibration"), "{shell}: {script}");
+        for word in ["calibration", "score-threshold", "soft_nms_gaussian"] {
+            assert!(script.contains(word), "{shell}: {word}: {script}");
+        }
     }
 }
 

@@ -18,7 +18,8 @@ use crate::folder::of_repository;
 /// Looks at the office with a model, for whatever looks a little like a person.
 fn detect(model: &str) -> DetectionReport {
     let settings = settings::load(None, []).unwrap();
-    let parameters = DetectParameters::parse([("model", model)], 0.05).unwrap();
+    let parameters =
+        DetectParameters::parse([("model", model), ("score_threshold", "0.05")]).unwrap();
     let engine = engine_for(&settings, std::slice::from_ref(&parameters)).unwrap();
     let calibration = of_repository("samples/calibrations/office.json");
     let image = fs::read(of_repository("samples/office.jpg")).unwrap();

@@ -1,6 +1,7 @@
 //! Which form an answer takes: the parameter `format`, or what the client accepts.
 
 use axum::http::HeaderMap;
+use strum::VariantNames;
 
 use crate::{
     annotated_picture::PictureFormat,
@@ -8,6 +9,9 @@ use crate::{
     api::{
         accept::Accepted,
         problem::{Problem, ProblemKind},
+    },
+    pipeline::{
+        GivenParameters, Interface, ParameterDefault, ParameterKind, ParameterSpec, parameter_table,
     },
 };
 
@@ -25,6 +29,32 @@ pub(super) enum AnswerFormat {
 /// The names of the report and of pictures.
 const REPORT: &str = "json";
 const PICTURE: &str = "image";
+const ANNOTATIONS: &[&str] = <AnnotationFormat as VariantNames>::VARIANTS;
+const NAMES: [&str; 2 + ANNOTATIONS.len()] = {
+    let mut names = [REPORT; 2 + ANNOTATIONS.len()];
+    names[1] = PICTURE;
+    let (_, annotations) = names.split_at_mut(2);
+    annotations.copy_from_slice(ANNOTATIONS);
+    names
+};
+
+parameter_table! {
+    /// The parameter of the answer's format.
+    pub(in crate::api) const TABLE;
+
+    FORMAT = ParameterSpec {
+        name: "format",
+        kind: ParameterKind::Choice(&NAMES),
+        default: ParameterDefault::Described(
+            "the preference of the header `Accept` among JSON, JPEG, PNG and GeoJSON; otherwise `json`",
+        ),
+        help: "Format of the answer: the report (`json`), the annotated image (`image`: JPEG, or PNG if \
+               `Accept` prefers it), or the persons in the format of an annotation tool, in pixels.",
+        example: None,
+        interfaces: &[Interface::Http],
+    };
+}
+
 const PICTURES: [(AnswerFormat, &str); 2] = [
     of_picture(PictureFormat::Jpeg),
     of_picture(PictureFormat::Png),
@@ -39,8 +69,6 @@ const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
         AnswerFormat::Annotations(AnnotationFormat::GeoJson).media_type(),
     ),
 ];
-/// Most characters of an unknown name that are repeated to its sender.
-const MAX_NAME_CHARS: usize = 64;
 
 const fn of_picture(format: PictureFormat) -> (AnswerFormat, &'static str) {
     let format = AnswerFormat::Picture(format);
@@ -48,18 +76,18 @@ const fn of_picture(format: PictureFormat) -> (AnswerFormat, &'static str) {
 }
 
 impl AnswerFormat {
-    /// The form that was named; without a name, the one that is accepted best. A name overrules
-    /// `Accept`, which then only chooses between pictures.
-    pub(super) fn of(name: Option<&str>, headers: &HeaderMap) -> Result<Self, Problem> {
+    /// Reads the parameter `format`; without it, chooses the format that `Accept` prefers. The parameter
+    /// overrules `Accept`, which then only chooses between JPEG and PNG.
+    pub(super) fn read<'a>(
+        given: impl IntoIterator<Item = (&'a str, &'a str)>,
+        headers: &HeaderMap,
+    ) -> Result<Self, Problem> {
         let accepted = Accepted::of(headers);
-        match name {
+        match GivenParameters::read(TABLE, given)?.text(&FORMAT) {
             None => accepted.best_of(&NEGOTIABLE).ok_or_else(not_acceptable),
             Some(REPORT) => Ok(Self::Report),
             Some(PICTURE) => Ok(accepted.best_of(&PICTURES).unwrap_or(PICTURES[0].0)),
-            Some(name) => match name.parse() {
-                Ok(format) => Ok(Self::Annotations(format)),
-                Err(_) => Err(unknown(name)),
-            },
+            Some(name) => Ok(Self::Annotations(FORMAT.parse(name)?)),
         }
     }
 
@@ -85,12 +113,4 @@ fn not_acceptable() -> Problem {
          with the parameter format"
     );
     Problem::new(ProblemKind::NotAcceptable, detail)
-}
-
-fn unknown(name: &str) -> Problem {
-    let known = AnnotationFormat::ALL.map(AnnotationFormat::name).join(", ");
-    let name: String = name.chars().take(MAX_NAME_CHARS).collect();
-    let detail =
-        format!("{name:?} is not a form of an answer; use one of {REPORT}, {PICTURE}, {known}");
-    Problem::of_parameter(ProblemKind::InvalidParameter, "format", &detail)
 }

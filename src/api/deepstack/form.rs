@@ -18,7 +18,7 @@ use crate::{
 const MIN_CONFIDENCE: &str = "min_confidence";
 const API_KEY: &str = "api_key";
 /// That of DeepStack's server for requests that name none.
-const DEFAULT_MIN_CONFIDENCE: f64 = 0.4;
+const DEFAULT_MIN_CONFIDENCE: &str = "0.4";
 /// What `min_confidence` is called here.
 const SCORE_THRESHOLD: &str = "score_threshold";
 
@@ -101,9 +101,13 @@ pub(super) fn job(
         .parameters
         .iter()
         .filter(|(_, value)| !value.is_empty());
-    let thresholds = thresholds.map(|(_, value)| (SCORE_THRESHOLD, value.as_str()));
-    let parameters =
-        DetectParameters::parse(thresholds, DEFAULT_MIN_CONFIDENCE).map_err(renamed)?;
+    let mut thresholds: Vec<_> = thresholds
+        .map(|(_, value)| (SCORE_THRESHOLD, value.as_str()))
+        .collect();
+    if thresholds.is_empty() {
+        thresholds.push((SCORE_THRESHOLD, DEFAULT_MIN_CONFIDENCE));
+    }
+    let parameters = DetectParameters::parse(thresholds).map_err(renamed)?;
     let parameters = DetectParameters {
         calibration,
         ..parameters

@@ -1,94 +1,39 @@
-//! The request parameters as they are described. `pipeline::DetectParameters` and `api::answer` read
-//! and check them; a test holds them together. Defaults are told in words: clients that are generated
-//! would send them, in the query and in the form, and what is given twice is refused.
+//! The OpenAPI descriptions of the request parameters, from the tables of their specifications. Defaults are
+//! in the descriptions alone: generated clients would send a `default`, in the query and in the form, and a
+//! repeated parameter is refused.
 
+use serde_json::Value;
 use utoipa::{
     IntoParams, PartialSchema, ToSchema,
     openapi::{
-        KnownFormat, Object, ObjectBuilder, RefOr, Schema, SchemaFormat,
+        KnownFormat, Object, ObjectBuilder, RefOr, Required, Schema, SchemaFormat,
+        path::{Parameter, ParameterBuilder, ParameterIn},
         schema::{AdditionalProperties, Type},
     },
 };
 
-/// Parameters in the query, beside those of pictures.
-#[derive(IntoParams)]
-#[into_params(parameter_in = Query)]
-#[expect(dead_code, reason = "describes what pipeline::DetectParameters reads")]
-pub(in crate::api) struct DetectQuery {
-    /// The calibration's ID. Without it an ideal lens is assumed.
-    #[param(example = "lobby", pattern = "^[a-z0-9][a-z0-9_-]{0,63}$")]
-    calibration: Option<String>,
-    /// The name under which results are kept; the calibration's ID by default.
-    #[param(example = "lobby-north", max_length = 128)]
-    camera: Option<String>,
-    /// How thoroughly to look: `balanced` by default; `paper` is the published method with its 128
-    /// views, `direct` runs the detector on the frame itself.
-    #[param(inline)]
-    profile: Option<ProfileName>,
-    /// How overlapping boxes become persons; `fusion` by default, in `paper` `soft_nms_gaussian`,
-    /// in `direct` `nms`.
-    #[param(inline)]
-    refine: Option<RefinementName>,
-    /// Look with this model; the profile's by default.
-    #[param(example = "ssdlite_mobilenet_v2")]
-    model: Option<String>,
-    /// Leave out persons with a lower score (`C_t`); 0.3 by default.
-    #[param(minimum = 0, maximum = 1)]
-    score_threshold: Option<f64>,
-    /// Boxes that overlap at least this much are the same person (`N_t`); 0.5 by default.
-    #[param(minimum = 0, maximum = 1)]
-    iou_threshold: Option<f64>,
-    /// σ of `soft_nms_gaussian`; 0.3 by default.
-    #[param(exclusive_minimum = 0)]
-    sigma: Option<f64>,
-    /// Most persons in the report, best first; 1000 by default.
-    #[param(minimum = 1, maximum = 10000)]
-    max_detections: Option<u32>,
-    /// When the frame was taken.
-    #[param(value_type = Option<String>, format = DateTime, example = "2026-11-21T09:30:00Z")]
-    captured_at: Option<String>,
-    /// Do not look again at views in which nothing has moved since the last frame of this camera
-    /// that this server saw; the report counts them. Needs `camera` or `calibration`.
-    motion: Option<bool>,
-    /// Remember what is found in the views of this frame; and if the same file was sent before with
-    /// this, do not look again: another refinement or threshold needs no new inference. The report
-    /// counts all its views as unchanged then.
-    remember: Option<bool>,
-    /// Whose turn comes first when frames wait: 1 before 9, 5 by default. Frames of one priority are served in
-    /// the order of their arrival.
-    #[param(minimum = 1, maximum = 9)]
-    priority: Option<u32>,
-    /// How long the report is of use, counted from the arrival of the request: a frame that has
-    /// none by then is given up and answered 504. The server's own limit holds, too.
-    #[param(minimum = 1, maximum = 600_000, example = 2000)]
-    timeout_millis: Option<u32>,
-    /// What the answer is: the report (`json`), the frame with boxes drawn into it (`image`: JPEG, or
-    /// PNG if `Accept` prefers it), or the persons as a file of COCO, CVAT, YOLO, Pascal VOC or as
-    /// GeoJSON, in pixels. By default what `Accept` prefers of JSON, JPEG, PNG and GeoJSON.
-    #[param(inline)]
-    format: Option<FormatName>,
+use crate::{
+    annotated_picture::PictureOptions,
+    api::parameters,
+    pipeline::{Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec},
+};
+
+/// The parameters of `POST /detect` in the query.
+pub(in crate::api) struct DetectQuery;
+
+impl IntoParams for DetectQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        parameters::all().map(in_query).collect()
+    }
 }
 
-/// How a picture is drawn, in the query.
-#[derive(IntoParams)]
-#[into_params(parameter_in = Query)]
-#[expect(
-    dead_code,
-    reason = "describes what annotated_picture::PictureOptions reads"
-)]
-pub(in crate::api) struct PictureQuery {
-    /// What is drawn into a picture: some of `boxes`, `oriented`, `scores`, `zones`, `views` and `timestamp`, with
-    /// commas, or `none`; `oriented,scores` by default.
-    #[param(
-        pattern = "^(none|(boxes|oriented|scores|zones|views|timestamp)(,(boxes|oriented|scores|zones|views|timestamp))*)$"
-    )]
-    draw: Option<String>,
-    /// Width of a picture, pixels; a frame that is no wider stays as it is. 2048 by default.
-    #[param(minimum = 64, maximum = 8192, example = 640)]
-    width: Option<u32>,
-    /// Quality of a JPEG; 88 by default.
-    #[param(minimum = 1, maximum = 100)]
-    quality: Option<u8>,
+/// The parameters of an annotated image in the query.
+pub(in crate::api) struct PictureQuery;
+
+impl IntoParams for PictureQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        PictureOptions::TABLE.iter().map(in_query).collect()
+    }
 }
 
 /// The frame and parameters in a form: what `upload::form` reads.
@@ -110,22 +55,75 @@ impl PartialSchema for DetectForm {
             .property("img", frame)
             .required("img")
             .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        let form = fields().fold(form, |form, (name, field)| form.property(name, field));
+        let form =
+            fields(Interface::Http).fold(form, |form, (name, field)| form.property(name, field));
         form.into()
     }
 }
 
-/// The parameters of `/detect` as fields of an object.
-pub(in crate::api) fn fields() -> impl Iterator<Item = (String, Object)> {
-    let parameters = DetectQuery::into_params(|| None).into_iter();
-    let parameters = parameters.chain(PictureQuery::into_params(|| None));
-    parameters.filter_map(|parameter| {
-        let Some(RefOr::T(Schema::Object(mut field))) = parameter.schema else {
-            return None;
-        };
-        field.description = parameter.description;
-        Some((parameter.name, field))
+/// The parameters that an interface offers, as fields of an object.
+pub(in crate::api) fn fields(interface: Interface) -> impl Iterator<Item = (&'static str, Object)> {
+    let offered = parameters::all().filter(move |spec| spec.is_offered_by(interface));
+    offered.map(|spec| {
+        let field = schema(spec.kind).description(Some(description(spec)));
+        (spec.name, field.build())
     })
+}
+
+fn in_query(spec: &ParameterSpec) -> Parameter {
+    ParameterBuilder::new()
+        .name(spec.name)
+        .parameter_in(ParameterIn::Query)
+        .required(Required::False)
+        .description(Some(description(spec)))
+        .schema(Some(schema(spec.kind)))
+        .example(spec.example.map(|example| json(spec.kind, example)))
+        .build()
+}
+
+fn description(spec: &ParameterSpec) -> String {
+    let help = spec.help;
+    match spec.default {
+        ParameterDefault::Value(default) => format!("{help} Default: `{default}`."),
+        ParameterDefault::Described(default) => format!("{help} Default: {default}."),
+        ParameterDefault::None => help.to_owned(),
+    }
+}
+
+/// A value as JSON has it.
+fn json(kind: ParameterKind, value: &str) -> Value {
+    let text = || Value::from(value);
+    match kind.json_type() {
+        JsonType::Text => text(),
+        JsonType::Switch | JsonType::Number => value.parse().unwrap_or_else(|_| text()),
+    }
+}
+
+fn schema(kind: ParameterKind) -> ObjectBuilder {
+    let of_type = |schema_type| ObjectBuilder::new().schema_type(schema_type);
+    let format = |format| Some(SchemaFormat::KnownFormat(format));
+    let number = || of_type(Type::Number).format(format(KnownFormat::Double));
+    match kind {
+        ParameterKind::Text => of_type(Type::String),
+        ParameterKind::Name { max_chars } => of_type(Type::String).max_length(Some(max_chars)),
+        ParameterKind::Pattern { regex, .. } => of_type(Type::String).pattern(Some(regex)),
+        ParameterKind::Choice(names) => {
+            of_type(Type::String).enum_values(Some(names.iter().copied()))
+        }
+        ParameterKind::Choices { names, none } => {
+            let names = names.join("|");
+            let list = format!("^({none}|({names})(,({names}))*)$");
+            of_type(Type::String).pattern(Some(list))
+        }
+        ParameterKind::Switch => of_type(Type::Boolean),
+        ParameterKind::Whole { min, max } => of_type(Type::Integer)
+            .format(format(KnownFormat::Int32))
+            .minimum(Some(min))
+            .maximum(Some(max)),
+        ParameterKind::Fraction => number().minimum(Some(0)).maximum(Some(1)),
+        ParameterKind::Positive => number().exclusive_minimum(Some(0)),
+        ParameterKind::Time => of_type(Type::String).format(format(KnownFormat::DateTime)),
+    }
 }
 
 /// Bytes as they are, in a body of their own.
@@ -147,39 +145,39 @@ fn binary() -> ObjectBuilder {
         .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
 }
 
-/// A form of the answer.
-#[derive(ToSchema)]
-#[schema(rename_all = "lowercase")]
-#[expect(dead_code, reason = "describes what api::answer reads")]
-enum FormatName {
-    Json,
-    Image,
-    Coco,
-    Cvat,
-    Yolo,
-    Voc,
-    GeoJson,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// A profile.
-#[derive(ToSchema)]
-#[schema(rename_all = "snake_case")]
-#[expect(dead_code, reason = "describes what pipeline::DetectParameters reads")]
-enum ProfileName {
-    Paper,
-    Fast,
-    Balanced,
-    Quality,
-    Direct,
-}
+    fn names(parameters: &[Parameter]) -> Vec<&str> {
+        parameters
+            .iter()
+            .map(|parameter| &*parameter.name)
+            .collect()
+    }
 
-/// A refinement.
-#[derive(ToSchema)]
-#[schema(rename_all = "snake_case")]
-#[expect(dead_code, reason = "describes what pipeline::DetectParameters reads")]
-enum RefinementName {
-    Nms,
-    SoftNmsLinear,
-    SoftNmsGaussian,
-    Fusion,
+    #[test]
+    fn query_and_form_describe_every_parameter_once() {
+        let expected: Vec<_> = parameters::all().map(|spec| spec.name).collect();
+        assert_eq!(names(&DetectQuery::into_params(|| None)), expected);
+        let form: Vec<_> = fields(Interface::Http).map(|(name, _)| name).collect();
+        assert_eq!(form, expected);
+        let mut distinct = expected.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        assert_eq!(distinct.len(), expected.len());
+    }
+
+    #[test]
+    fn examples_are_values_that_are_accepted() {
+        for spec in parameters::all() {
+            let Some(example) = spec.example else {
+                continue;
+            };
+            let accepted: Result<String, _> = spec.parse(example);
+            assert!(accepted.is_ok(), "{}: {example}", spec.name);
+            let is_text = spec.kind.json_type() == JsonType::Text;
+            assert_eq!(json(spec.kind, example).is_string(), is_text);
+        }
+    }
 }

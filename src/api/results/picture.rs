@@ -19,10 +19,11 @@ use crate::{
         deadline::Deadline,
         entity_tags::{entity_tag, is_unmodified},
         openapi::{PictureQuery, RawBytes},
+        parameters::pairs,
         problem::{Problem, ProblemKind},
-        upload::parameters_named,
+        upload::query_parameters,
     },
-    pipeline::shown,
+    quoted::Quoted,
 };
 
 /// For the eyes of who has asked, who may keep it, but must ask each time whether it is still right.
@@ -59,8 +60,7 @@ pub(in crate::api) async fn get_picture(
     headers: HeaderMap,
     uri: Uri,
 ) -> Result<Response, Problem> {
-    let options = parameters_named(&uri, PictureOptions::NAMES)?;
-    let options = PictureOptions::parse(options.each_ref().map(Option::as_deref))?;
+    let options = PictureOptions::parse(pairs(&query_parameters(&uri)?))?;
     let latest = state.results.latest(&camera).await?;
     let latest = latest.ok_or_else(|| unknown(&camera))?.id;
     // Who has the latest report's picture needs no other, and Redis need not send it.
@@ -87,9 +87,9 @@ fn about(id: &str) -> [(HeaderName, HeaderValue); 2] {
 }
 
 fn none_kept(camera: &str) -> Problem {
-    let camera = shown(camera);
+    let camera = Quoted(camera);
     let detail = format!(
-        "no picture of the camera {camera:?} is kept: pictures are kept from the next frame on of the cameras that \
+        "no picture of the camera {camera} is kept: pictures are kept from the next frame on of the cameras that \
          the setting results.pictures names (* is all of them), but of no more than results.max_pictures"
     );
     Problem::new(ProblemKind::PictureNotKept, detail)

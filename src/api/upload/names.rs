@@ -2,24 +2,19 @@
 
 use super::form::FieldUse;
 use crate::{
-    api::{
-        answer::AnswerOptions,
-        problem::{Problem, ProblemKind},
-    },
-    pipeline::DetectParameters,
+    api::{parameters, problem::Problem},
+    pipeline::ParameterError,
 };
 
 /// The names of the frame's field.
 const FRAME_NAMES: [&str; 2] = ["img", "image"];
-/// Most characters of an unknown name that are repeated to its sender.
-const MAX_NAME_CHARS: usize = 64;
 
-/// Whether there is a parameter of this name.
+/// Returns whether there is a parameter of this name.
 pub(super) fn is_parameter(name: &str) -> bool {
-    names().any(|known| known == name)
+    parameters::all().any(|known| known.name == name)
 }
 
-/// What a field of the form is for.
+/// Returns the use of a field of the form.
 pub(super) fn use_of(name: &str) -> FieldUse {
     if FRAME_NAMES.contains(&name) {
         FieldUse::Frame
@@ -30,19 +25,12 @@ pub(super) fn use_of(name: &str) -> FieldUse {
     }
 }
 
-/// What the sender of another name is told.
+/// The refusal of any other name.
 pub(super) fn unknown_parameter(name: &str) -> Problem {
-    let shown: String = name.chars().take(MAX_NAME_CHARS).collect();
-    let known = names().collect::<Vec<_>>().join(", ");
-    let detail = format!(
-        "there is no such field or parameter: send the frame as `img` or `image`; the parameters are \
-         {known}"
+    let known: Vec<_> = parameters::all().map(|spec| spec.name).collect();
+    let problem = format!(
+        "there is no such field or parameter: send the frame as `img` or `image`; the parameters are {}",
+        known.join(", ")
     );
-    Problem::of_parameter(ProblemKind::UnknownParameter, &shown, &detail)
-}
-
-fn names() -> impl Iterator<Item = &'static str> {
-    DetectParameters::NAMES
-        .into_iter()
-        .chain(AnswerOptions::NAMES)
+    ParameterError::unknown(name, problem).into()
 }

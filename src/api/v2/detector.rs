@@ -7,29 +7,20 @@ use jiff::Timestamp;
 use super::{
     answer::{Answerer, InferAnswer, Output, OutputValues},
     metadata::{ModelMetadata, tensor},
-    persons::parameters,
+    persons::{self, TIMEOUT},
     request::InferRequest,
-    shown,
     tensor::{Tensor, Values, misfit},
 };
 use crate::{
-    api::{
-        ApiState,
-        deadline::Deadline,
-        limit::Limit,
-        problem::{Problem, ProblemKind},
-        upload::Held,
-    },
+    api::{ApiState, deadline::Deadline, limit::Limit, problem::Problem, upload::Held},
     inference::{HeadOutput, Model},
     open_inference::Datatype,
-    pipeline::{DetectParameters, Ticket, ViewsJob},
+    pipeline::{DetectParameters, Interface, ParameterError, Ticket, ViewsJob},
     telemetry::RequestTrace,
 };
 
 const INPUT: &str = "views";
 const OUTPUTS: [&str; 2] = ["boxes", "scores"];
-/// What a request may say about views.
-const PARAMETERS: [&str; 3] = ["priority", "timeout", "timeout_millis"];
 
 /// What a detector takes and answers.
 pub(super) fn metadata(model: &Model) -> ModelMetadata {
@@ -100,16 +91,18 @@ fn pixels(views: Tensor, model: &Model) -> Result<Held<Vec<f32>>, Problem> {
     }
 }
 
-/// Turn and patience of a request: nothing else can be chosen about views.
+/// Checks the parameters of a request: a detector takes few of them.
 fn view_parameters(request: &InferRequest) -> Result<DetectParameters, Problem> {
+    let offered = DetectParameters::TABLE.iter();
+    let offered = offered.filter(|spec| spec.is_offered_by(Interface::Detector));
+    let known: Vec<_> = offered.map(|spec| spec.name).chain([TIMEOUT]).collect();
     let mut names = request.parameters.iter().map(|(name, _)| name.as_str());
-    if let Some(other) = names.find(|name| !PARAMETERS.contains(name)) {
-        let (other, known) = (shown(other), PARAMETERS.join(", "));
-        let fault = format!("a detector has no such parameter; the parameters are {known}");
-        let problem = Problem::of_parameter(ProblemKind::UnknownParameter, &other, &fault);
-        return Err(problem);
+    if let Some(other) = names.find(|name| !known.contains(name)) {
+        let known = known.join(", ");
+        let problem = format!("a detector has no such parameter; the parameters are {known}");
+        return Err(ParameterError::unknown(other, problem).into());
     }
-    Ok(parameters(&request.parameters)?)
+    Ok(persons::parameters(&request.parameters)?)
 }
 
 /// `[views, candidates, 4]` and `[views, candidates]`, as many candidates as the fullest view has.

@@ -9,7 +9,7 @@ use utoipa::{
 };
 
 use super::answer::BinarySize;
-use crate::{api::openapi::fields, pipeline::DetectParameters};
+use crate::{api::openapi::fields, pipeline::Interface};
 
 /// A request to infer, its tensors in it. Where they come as bytes behind it, `binary_data_size` is a
 /// parameter of theirs instead of `data`.
@@ -87,8 +87,6 @@ impl PartialSchema for InferParameters {
     fn schema() -> RefOr<Schema> {
         let description = "Parameters of `/detect`, and of the protocol. Detectors take the protocol's \
                            and `timeout_millis`.";
-        let known = DetectParameters::NAMES;
-        let fields = fields().filter(|(name, _)| known.contains(&name.as_str()));
         let timeout = ObjectBuilder::new()
             .schema_type(Type::Integer)
             .minimum(Some(1))
@@ -102,7 +100,7 @@ impl PartialSchema for InferParameters {
             .property("timeout", timeout)
             .property("binary_data_output", binary)
             .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        let parameters = fields.fold(parameters, |object, (name, field)| {
+        let parameters = fields(Interface::FrameModel).fold(parameters, |object, (name, field)| {
             object.property(name, field)
         });
         parameters.into()

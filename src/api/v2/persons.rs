@@ -16,21 +16,23 @@ use crate::{
     api::{
         ApiState,
         deadline::Deadline,
-        detect::{DEFAULT_SCORE_THRESHOLD, facts},
+        detect::facts,
         find::{Found, find},
+        parameters::pairs,
         problem::Problem,
         report::ReportPerson,
         request_id::RequestId,
     },
     open_inference::Datatype,
-    pipeline::{DetectJob, DetectParameters, ParameterError},
+    pipeline::{DetectJob, DetectParameters, JsonType, ParameterError},
     telemetry::RequestTrace,
 };
 
 const INPUT: &str = "image";
 const OUTPUTS: [&str; 5] = ["boxes", "scores", "oriented_boxes", "views", "report"];
-/// The protocol's own name of `timeout_millis`; it counts microseconds.
-const TIMEOUT: &str = "timeout";
+/// The protocol's own name of [`TIMEOUT_MILLIS`]; it counts microseconds.
+pub(super) const TIMEOUT: &str = "timeout";
+const TIMEOUT_MILLIS: &str = "timeout_millis";
 const MICROS_PER_MILLI: u64 = 1000;
 
 /// What it takes and answers.
@@ -120,41 +122,79 @@ fn outputs(persons: &[ReportPerson], report: OutputValues) -> Vec<Output> {
 pub(super) fn parameters(
     given: &[(String, Parameter)],
 ) -> Result<DetectParameters, ParameterError> {
-    let texts = given.iter().map(|(name, value)| as_text(name, value));
+    let texts = given.iter().map(|(name, value)| match name.as_str() {
+        TIMEOUT => timeout(value),
+        _ => as_text(name, value),
+    });
     let texts = texts.collect::<Result<Vec<_>, _>>()?;
-    let pairs = texts.iter().map(|(name, value)| (*name, value.as_str()));
-    DetectParameters::parse(pairs, DEFAULT_SCORE_THRESHOLD)
+    DetectParameters::parse(pairs(&texts))
 }
 
-/// A parameter as it would be written in a query.
-fn as_text<'a>(name: &'a str, value: &Parameter) -> Result<(&'a str, String), ParameterError> {
-    let wanted = match name {
-        "calibration" | "camera" | "profile" | "refine" | "model" | "captured_at" => "a text",
-        "motion" | "remember" => "true or false",
-        _ => "a number",
+/// A parameter as it would be written in a query. The value of an unknown one is left out: its name is refused.
+fn as_text(name: &str, value: &Parameter) -> Result<(String, String), ParameterError> {
+    let spec = DetectParameters::TABLE
+        .iter()
+        .find(|spec| spec.name == name);
+    let text = match spec {
+        Some(spec) => text_of(name, value, spec.kind.json_type())?,
+        None => "",
     };
-    let text = match (value, wanted) {
-        (Parameter::Text(text), "a text") => text.clone(),
-        (Parameter::Flag(flag), "true or false") => flag.to_string(),
-        (Parameter::Number(number), "a number") => number.clone(),
-        // Who asks for what is not there hears that first.
-        _ if name != TIMEOUT && !DetectParameters::NAMES.contains(&name) => String::new(),
-        _ => {
-            return Err(ParameterError::bad_value(
-                name,
-                format!("{wanted} is needed"),
-            ));
+    Ok((name.to_owned(), text.to_owned()))
+}
+
+/// The protocol's `timeout` as `timeout_millis`.
+fn timeout(value: &Parameter) -> Result<(String, String), ParameterError> {
+    let text = text_of(TIMEOUT, value, JsonType::Number)?;
+    let micros: u64 = text
+        .parse()
+        .map_err(|_| ParameterError::is_not(TIMEOUT, text, "a whole number of microseconds"))?;
+    let millis = micros.div_ceil(MICROS_PER_MILLI);
+    Ok((TIMEOUT_MILLIS.to_owned(), millis.to_string()))
+}
+
+/// The text of a value of a JSON type.
+fn text_of<'a>(
+    name: &str,
+    value: &'a Parameter,
+    wanted: JsonType,
+) -> Result<&'a str, ParameterError> {
+    match (value, wanted) {
+        (Parameter::Text(text), JsonType::Text) | (Parameter::Number(text), JsonType::Number) => {
+            Ok(text)
         }
-    };
-    if name != TIMEOUT {
-        return Ok((name, text));
+        (Parameter::Flag(true), JsonType::Switch) => Ok("true"),
+        (Parameter::Flag(false), JsonType::Switch) => Ok("false"),
+        _ => {
+            let problem = format!("{} is needed", wanted.described());
+            Err(ParameterError::bad_value(name, problem))
+        }
     }
-    let micros = text.parse::<u64>();
-    let micros = micros.map_err(|_| {
-        ParameterError::bad_value(name, format!("{text} is no whole number of microseconds"))
-    });
-    Ok((
-        "timeout_millis",
-        micros?.div_ceil(MICROS_PER_MILLI).to_string(),
-    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_parameter_is_read_as_its_json_type() {
+        for spec in DetectParameters::TABLE {
+            let values = [
+                (JsonType::Text, Parameter::Text("1".to_owned())),
+                (JsonType::Number, Parameter::Number("1".to_owned())),
+                (JsonType::Switch, Parameter::Flag(true)),
+            ];
+            for (json_type, value) in values {
+                let read = as_text(spec.name, &value);
+                let is_right = json_type == spec.kind.json_type();
+                assert_eq!(read.is_ok(), is_right, "{}: {value:?}", spec.name);
+            }
+        }
+    }
+
+    #[test]
+    fn timeout_in_microseconds_is_rounded_up() {
+        let given = [("timeout".to_owned(), Parameter::Number("1500".to_owned()))];
+        let timeout = parameters(&given).unwrap().timeout;
+        assert_eq!(timeout, Some(std::time::Duration::from_millis(2)));
+    }
 }

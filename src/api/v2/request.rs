@@ -5,7 +5,6 @@ use bytes::Bytes;
 
 use super::{
     request_head::{self, InputHead, Parameter, Parameters, Table},
-    shown,
     tensor::{Sent, Tensor, misfit},
     wanted::Wanted,
 };
@@ -15,6 +14,7 @@ use crate::{
         upload::UploadBudget,
     },
     open_inference::HEAD_LENGTH,
+    quoted::{Quoted, shortened},
 };
 
 /// Longest ID of a request, characters.
@@ -105,9 +105,10 @@ fn head_length(headers: &HeaderMap, body: &Bytes) -> Result<usize, Problem> {
     };
     let length = told.to_str().ok().and_then(|told| told.parse().ok());
     length.filter(|length| *length <= body.len()).ok_or_else(|| {
-        let (told, sent) = (shown(&String::from_utf8_lossy(told.as_bytes())), body.len());
+        let (told, sent) = (String::from_utf8_lossy(told.as_bytes()), body.len());
+        let told = Quoted(&told);
         malformed(&format!(
-            "{HEAD_LENGTH} is {told:?}, and the body has {sent} bytes: it is the length of the JSON \
+            "{HEAD_LENGTH} is {told}, and the body has {sent} bytes: it is the length of the JSON \
              in it"
         ))
     })
@@ -152,7 +153,7 @@ fn binary_size(tensor: &str, parameters: &mut Parameters) -> Result<Option<usize
     let size = size.map_err(|told| {
         let wrong = format!(
             "its {BINARY_SIZE} is {}: give a number of bytes",
-            shown(&told)
+            shortened(&told)
         );
         misfit(tensor, &wrong)
     })?;
@@ -172,8 +173,8 @@ pub(super) fn refuse_others(
     let wrong = if name.starts_with(SHARED_MEMORY) {
         "shared memory is not offered: send tensors in the body".to_owned()
     } else {
-        let name = shown(name);
-        format!("there is no parameter {name:?} of a tensor: there is {known}")
+        let name = Quoted(name);
+        format!("there is no parameter {name} of a tensor: there is {known}")
     };
     Err(misfit(tensor, &wrong))
 }

@@ -3,13 +3,13 @@
 use bytes::Bytes;
 use tokio::sync::OwnedSemaphorePermit;
 
-use super::shown;
 use crate::{
     api::{
         problem::{Problem, ProblemKind},
         upload::{Held, UploadBudget},
     },
     open_inference::{Datatype, binary_data, json_data},
+    quoted::{Quoted, shortened},
 };
 
 /// An input as it was sent.
@@ -60,10 +60,11 @@ impl Tensor {
 
 /// What the elements of a tensor are, and how many.
 fn elements(datatype: &str, shape: &[u32]) -> Result<(Datatype, usize), String> {
-    let known = Datatype::named(datatype).filter(|datatype| *datatype != Datatype::Int32);
+    let known = datatype.parse().ok();
+    let known = known.filter(|datatype| *datatype != Datatype::Int32);
     let datatype = known.ok_or_else(|| {
-        let datatype = shown(datatype);
-        format!("its datatype is {datatype:?}: BYTES, FP32 and UINT8 are read")
+        let datatype = Quoted(datatype);
+        format!("its datatype is {datatype}: BYTES, FP32 and UINT8 are read")
     })?;
     let mut sides = shape.iter().map(|side| *side as usize);
     let count = sides.try_fold(1_usize, usize::checked_mul);
@@ -117,5 +118,5 @@ impl Sent<'_> {
 
 /// What the sender of a tensor that cannot be used is told.
 pub(super) fn misfit(name: &str, wrong: &str) -> Problem {
-    Problem::of_parameter(ProblemKind::InvalidTensor, &shown(name), wrong)
+    Problem::of_parameter(ProblemKind::InvalidTensor, shortened(name), wrong)
 }

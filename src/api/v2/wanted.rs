@@ -3,10 +3,12 @@
 use super::{
     request::refuse_others,
     request_head::{OutputHead, Parameter, Parameters},
-    shown,
     tensor::misfit,
 };
-use crate::api::problem::{Problem, ProblemKind};
+use crate::{
+    api::problem::{Problem, ProblemKind},
+    quoted::Quoted,
+};
 
 /// Makes all outputs come as bytes.
 const ALL_BINARY: &str = "binary_data_output";
@@ -82,7 +84,7 @@ fn flag(parameters: &mut Parameters, name: &str) -> Result<Option<bool>, String>
         None => Ok(None),
         Some(Parameter::Flag(value)) => Ok(Some(value)),
         Some(Parameter::Number(other) | Parameter::Text(other)) => {
-            Err(format!("{:?} is not true or false", shown(&other)))
+            Err(format!("{} is not true or false", Quoted(&other)))
         }
     }
 }

@@ -1,49 +1,50 @@
 //! Which format a file is in, judged by its content alone.
 
+use strum::IntoStaticStr;
+
 use super::fields::Fields;
 
 /// A format that is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr)]
 #[expect(missing_docs, reason = "the formats' own names")]
 pub enum Format {
+    #[strum(serialize = "native")]
     Native,
+    #[strum(serialize = "Kalibr camchain")]
     Kalibr,
+    #[strum(serialize = "OpenCV FileStorage")]
     OpenCv,
+    #[strum(serialize = "ROS camera_info")]
     Ros,
+    #[strum(serialize = "OCamCalib")]
     OCamCalib,
+    #[strum(serialize = "py-OCamCalib")]
     PyOCamCalib,
+    #[strum(serialize = "MultiCol-SLAM")]
     MultiCol,
+    #[strum(serialize = "COLMAP cameras.txt")]
     Colmap,
+    #[strum(serialize = "camodocal")]
     Camodocal,
+    #[strum(serialize = "Basalt")]
     Basalt,
+    #[strum(serialize = "WoodScape")]
     WoodScape,
+    #[strum(serialize = "NVIDIA f-theta")]
     NvidiaFTheta,
+    #[strum(serialize = "MOIL")]
     Moil,
+    #[strum(serialize = "fisheye-calib-adapter")]
     FisheyeCalibAdapter,
+    #[strum(serialize = "camera-intrinsic-model")]
     CameraIntrinsicModel,
 }
 
 impl Format {
-    /// The name under which its users know it.
+    /// Returns the name under which its users know it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Native => "native",
-            Self::Kalibr => "Kalibr camchain",
-            Self::OpenCv => "OpenCV FileStorage",
-            Self::Ros => "ROS camera_info",
-            Self::OCamCalib => "OCamCalib",
-            Self::PyOCamCalib => "py-OCamCalib",
-            Self::MultiCol => "MultiCol-SLAM",
-            Self::Colmap => "COLMAP cameras.txt",
-            Self::Camodocal => "camodocal",
-            Self::Basalt => "Basalt",
-            Self::WoodScape => "WoodScape",
-            Self::NvidiaFTheta => "NVIDIA f-theta",
-            Self::Moil => "MOIL",
-            Self::FisheyeCalibAdapter => "fisheye-calib-adapter",
-            Self::CameraIntrinsicModel => "camera-intrinsic-model",
-        }
+        self.into()
     }
 }
 

@@ -11,9 +11,12 @@ use anyhow::Context;
 use clap::Args;
 
 use super::source::Source;
-use crate::calibration::{
-    export::Target,
-    native::{NativeCalibration, NativeImage},
+use crate::{
+    calibration::{
+        export::Target,
+        native::{NativeCalibration, NativeImage},
+    },
+    cli::parameters::one_of,
 };
 
 /// Arguments of `lookdown calibration convert`.
@@ -21,8 +24,8 @@ use crate::calibration::{
 pub(in super::super) struct Arguments {
     #[command(flatten)]
     source: Source,
-    /// The format to write: native, opencv, kalibr, ros or colmap
-    #[arg(long, value_name = "FORMAT", default_value = "native", value_parser = target)]
+    /// The format to write
+    #[arg(long, value_name = "FORMAT", default_value = "native", value_parser = one_of::<Target>())]
     to: Target,
     /// The ID to write into a native file [default: the file's name, with the camera's]
     #[arg(long, value_name = "ID")]
@@ -64,11 +67,4 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             .context("standard output cannot be written")?,
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn target(name: &str) -> Result<Target, String> {
-    Target::from_name(name).ok_or_else(|| {
-        let names: Vec<_> = Target::ALL.iter().map(|target| target.name()).collect();
-        format!("give one of {}", names.join(", "))
-    })
 }

@@ -11,7 +11,7 @@ use clap::Args;
 use crate::{
     app::open_calibrations,
     calibration::{Calibration, CalibrationId},
-    cli::SettingsFile,
+    cli::{SettingsFile, parameters::one_of},
     evaluation::{DataSet, Scoring, Stratification},
 };
 
@@ -29,9 +29,9 @@ pub(super) struct TruthFlags {
     /// Score rotated truth by the bounds of the ellipses in it, with axis-parallel detections
     #[arg(long)]
     axis_parallel: bool,
-    /// Also score the persons of each stratum: by distance (from the optical axis), size or
+    /// Also score the persons of each stratum: by distance from the optical axis, size or
     /// visibility; may be repeated
-    #[arg(long, value_name = "NAME", conflicts_with = "sweep")]
+    #[arg(long, value_name = "NAME", conflicts_with = "sweep", value_parser = one_of::<Stratification>())]
     pub(super) by: Vec<Stratification>,
 }
 

@@ -1,6 +1,7 @@
 //! What is to be looked at with: groups of parameters that share an inference per image.
 
 use anyhow::{Context, bail};
+use strum::VariantArray;
 
 use super::Arguments;
 use crate::{
@@ -25,61 +26,50 @@ const PAPER: [(Profile, &[Refinement]); 2] = [
 /// One group per profile.
 pub(super) fn groups(arguments: &Arguments) -> Result<Vec<Vec<DetectParameters>>, ParameterError> {
     if arguments.paper {
-        let groups = PAPER.iter().map(|(profile, refinements)| {
-            let names = refinements.iter().map(|refinement| refinement.name());
-            group(arguments, profile.name(), names)
-        });
+        let groups = PAPER.iter();
+        let groups = groups.map(|(profile, refinements)| group(arguments, *profile, refinements));
         return groups.collect();
     }
-    let default = [Profile::default().name().to_owned()];
     let profiles = match &arguments.profile[..] {
-        [] => &default,
+        [] => &[Profile::default()],
         given => given,
     };
-    let groups = profiles.iter().map(|profile| {
-        if arguments.refine.is_empty() {
-            group(arguments, profile, Refinement::ALL.map(Refinement::name))
-        } else {
-            group(
-                arguments,
-                profile,
-                arguments.refine.iter().map(String::as_str),
-            )
-        }
-    });
+    let refinements = match &arguments.refine[..] {
+        [] => Refinement::VARIANTS,
+        given => given,
+    };
+    let groups = profiles.iter();
+    let groups = groups.map(|profile| group(arguments, *profile, refinements));
     groups.collect()
 }
 
 /// The profile of a sweep with NMS, for the sweep to vary.
 pub(super) fn base_of_sweep(arguments: &Arguments) -> anyhow::Result<DetectParameters> {
-    let profile = match &arguments.profile[..] {
-        [] => Profile::Paper.name(),
+    let profile = match arguments.profile[..] {
+        [] => Profile::Paper,
         [one] => one,
         _ => bail!("--sweep: takes one --profile"),
     };
-    let mut group = group(arguments, profile, [Refinement::Nms.name()])?;
+    let mut group = group(arguments, profile, &[Refinement::Nms])?;
     group.pop().context("--sweep: no refinement")
 }
 
-fn group<'a>(
+fn group(
     arguments: &Arguments,
-    profile: &str,
-    refinements: impl IntoIterator<Item = &'a str>,
+    profile: Profile,
+    refinements: &[Refinement],
 ) -> Result<Vec<DetectParameters>, ParameterError> {
-    let parse = |refinement| {
+    let parse = |refinement: &Refinement| {
         let given = [
-            ("profile", Some(profile)),
-            ("refine", Some(refinement)),
+            ("profile", Some(profile.name())),
+            ("refine", Some(refinement.name())),
             ("model", arguments.model.as_deref()),
             ("score_threshold", Some(arguments.score_threshold.as_str())),
             ("iou_threshold", arguments.iou_threshold.as_deref()),
             ("sigma", arguments.sigma.as_deref()),
         ];
-        let pairs = given
-            .into_iter()
-            .filter_map(|(name, value)| Some((name, value?)));
-        // The threshold is always among the pairs, so the default is never used.
-        DetectParameters::parse(pairs, 0.0)
+        let pairs = given.into_iter();
+        DetectParameters::parse(pairs.filter_map(|(name, value)| Some((name, value?))))
     };
-    refinements.into_iter().map(parse).collect()
+    refinements.iter().map(parse).collect()
 }

@@ -55,11 +55,7 @@ impl fmt::Display for Lines<'_> {
         writeln!(
             f,
             "pixels       {}×{}, {}, {order}, 0..255 × {:?} + {:?}",
-            input.width,
-            input.height,
-            model.layout.name(),
-            input.scale,
-            input.offset
+            input.width, input.height, model.layout, input.scale, input.offset
         )?;
         writeln!(f, "views        {views}")?;
         writeln!(f, "head         {}", head(&manifest.output))

@@ -110,9 +110,8 @@ fn strata_that_the_data_knows_nothing_of_are_refused() {
 
 #[test]
 fn stratifications_are_known_by_their_names() {
-    for by in Stratification::ALL {
+    for &by in Stratification::VARIANTS {
         assert_eq!(by.name().parse(), Ok(by));
     }
-    let error = "colour".parse::<Stratification>().unwrap_err().to_string();
-    assert!(error.contains("\"colour\"") && error.contains("distance, size, visibility"));
+    assert!("colour".parse::<Stratification>().is_err());
 }

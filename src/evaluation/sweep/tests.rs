@@ -9,7 +9,8 @@ use crate::{
 };
 
 fn cells_of_paper() -> Vec<DetectParameters> {
-    let base = DetectParameters::parse([("profile", "paper")], 0.01).unwrap();
+    let base =
+        DetectParameters::parse([("profile", "paper"), ("score_threshold", "0.01")]).unwrap();
     cells(&base)
 }
 

@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 
 use serde::Deserialize;
+use strum::Display;
 
 use crate::imaging::ChannelOrder;
 
@@ -52,24 +53,14 @@ pub struct ManifestInput {
 }
 
 /// The order of an input's axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Display)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Layout {
     /// `[views, 3, height, width]`
     Nchw,
     /// `[views, height, width, 3]`
     Nhwc,
-}
-
-impl Layout {
-    /// As it is written in a manifest.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Nchw => "nchw",
-            Self::Nhwc => "nhwc",
-        }
-    }
 }
 
 impl ManifestInput {

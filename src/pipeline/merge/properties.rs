@@ -3,6 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use proptest::prelude::*;
+use strum::VariantArray;
 
 use super::*;
 use crate::{
@@ -26,7 +27,7 @@ static LOOKS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(||
         (190.0, [0.1, 0.4, -1.0]),
         (190.0, [0.0, -1.0, 0.0]),
     ] {
-        for profile in Profile::ALL {
+        for &profile in Profile::VARIANTS {
             let up = nalgebra::Unit::new_normalize(up.into());
             let geometry = CameraGeometry {
                 lens: Lens::equidistant_circle(159.5, 119.5, radius, 1.57).unwrap(),
@@ -72,7 +73,7 @@ fn finds_in_two_orders() -> impl Strategy<Value = [Vec<(usize, ViewDetection)>; 
 }
 
 fn parameters() -> impl Strategy<Value = RefinementParameters> {
-    let refinement = prop::sample::select(Refinement::ALL.to_vec());
+    let refinement = prop::sample::select(Refinement::VARIANTS);
     (refinement, 0.0..=1.0, 0.05..1.0, 0.0..0.5).prop_map(
         |(refinement, iou_threshold, sigma, score_threshold)| RefinementParameters {
             refinement,

@@ -134,7 +134,7 @@ fn an_urgent_frame_overtakes_one_that_has_not_begun() {
     let before = bench.look(1, Ticket::default());
     bench.next_run();
     let usual = bench.look(10, Ticket::default());
-    let urgent = bench.look(20, Ticket::of(Priority::new(1).unwrap()));
+    let urgent = bench.look(20, Ticket::of(Priority::High));
     bench.let_go(3);
     assert_eq!(bench.next_run(), (4, 20.0));
     assert_eq!(bench.next_run(), (4, 10.0));

@@ -2,16 +2,18 @@ use super::*;
 use crate::pipeline::ParameterFault;
 
 fn parse(pairs: &[(&str, &str)]) -> Result<DetectParameters, ParameterError> {
-    DetectParameters::parse(pairs.iter().copied(), 0.3)
+    DetectParameters::parse(pairs.iter().copied())
 }
 
 #[test]
-fn defaults_are_the_contract_s() {
+fn defaults_are_those_of_the_contract() {
     let parameters = parse(&[]).unwrap();
     assert_eq!(parameters.profile, Profile::Balanced);
     assert_eq!(parameters.refinement.refinement, Refinement::Fusion);
     assert_eq!(parameters.refinement.score_threshold, 0.3);
     assert_eq!(parameters.calibration, None);
+    assert_eq!(parameters.profile, Profile::default());
+    assert_eq!(parameters.priority, Priority::default());
 
     let paper = parse(&[("profile", "paper")]).unwrap();
     assert_eq!(paper.refinement.refinement, Refinement::SoftNmsGaussian);
@@ -38,7 +40,7 @@ fn every_parameter_is_taken_over() {
     ])
     .unwrap();
     assert!(parameters.motion && parameters.remember);
-    assert_eq!(Some(parameters.priority), Priority::new(2));
+    assert_eq!(parameters.priority, Priority::High);
     assert_eq!(parameters.timeout, Some(Duration::from_millis(1500)));
     assert_eq!(parameters.calibration.unwrap().as_str(), "lobby");
     assert_eq!(parameters.camera.unwrap(), "Lobby, north");
@@ -59,25 +61,29 @@ fn bad_values_are_refused_with_name_value_and_rule() {
         (
             "score_threshold",
             "1.5",
-            "score_threshold: 1.5 is outside 0 to 1",
+            "score_threshold: \"1.5\" is not a number from 0 to 1",
         ),
         (
             "score_threshold",
             "NaN",
-            "score_threshold: NaN is outside 0 to 1",
+            "score_threshold: \"NaN\" is not a number from 0 to 1",
         ),
         (
             "score_threshold",
             "high",
-            "score_threshold: \"high\" is not a number",
+            "score_threshold: \"high\" is not a number from 0 to 1",
         ),
         (
             "iou_threshold",
             "-0.1",
-            "iou_threshold: -0.1 is outside 0 to 1",
+            "iou_threshold: \"-0.1\" is not a number from 0 to 1",
         ),
-        ("sigma", "0", "sigma: 0 is not a finite number above 0"),
-        ("sigma", "inf", "sigma: inf is not a finite number above 0"),
+        ("sigma", "0", "sigma: \"0\" is not a finite number above 0"),
+        (
+            "sigma",
+            "inf",
+            "sigma: \"inf\" is not a finite number above 0",
+        ),
         (
             "max_detections",
             "0",
@@ -103,13 +109,12 @@ fn bad_values_are_refused_with_name_value_and_rule() {
         (
             "profile",
             "best",
-            "profile: \"best\" is not a profile; use one of paper, fast, balanced, quality, direct",
+            "profile: \"best\" is not one of paper, fast, balanced, quality, direct",
         ),
         (
             "refine",
             "soft",
-            "refine: \"soft\" is not a refinement; use one of nms, soft_nms_linear, \
-             soft_nms_gaussian, fusion",
+            "refine: \"soft\" is not one of nms, soft_nms_linear, soft_nms_gaussian, fusion",
         ),
         (
             "captured_at",
@@ -119,7 +124,7 @@ fn bad_values_are_refused_with_name_value_and_rule() {
         (
             "camera",
             "",
-            "camera: the name cannot be used; use 1 to 128 characters without control characters",
+            "camera: \"\" is not a name of 1 to 128 characters without control characters",
         ),
     ] {
         let error = parse(&[(name, value)]).unwrap_err();
@@ -154,4 +159,25 @@ fn endless_names_and_values_are_not_repeated_in_full() {
     let endless = "x".repeat(100_000);
     assert!(parse(&[(&endless, "1")]).unwrap_err().to_string().len() < 400);
     assert!(parse(&[("sigma", &endless)]).unwrap_err().to_string().len() < 400);
+}
+
+#[test]
+fn defaults_of_the_table_are_values_that_are_accepted() {
+    for spec in DetectParameters::TABLE {
+        if let ParameterDefault::Value(default) = spec.default {
+            let accepted: Result<String, _> = spec.parse(default);
+            assert!(accepted.is_ok(), "{}: {default}", spec.name);
+        }
+        assert!(spec.help.ends_with('.'), "{}", spec.name);
+    }
+}
+
+#[test]
+fn nine_priority_levels_map_to_three_priorities() {
+    let priorities = (1..=9).map(|level: u32| {
+        let level = level.to_string();
+        parse(&[("priority", &level)]).unwrap().priority
+    });
+    let expected = [Priority::High, Priority::Normal, Priority::Low].map(|priority| [priority; 3]);
+    assert_eq!(priorities.collect::<Vec<_>>(), expected.concat());
 }

@@ -1,0 +1,34 @@
+//! The parameters of `POST /detect`: those of the detection, and those of its answer.
+
+use super::answer;
+use crate::{
+    annotated_picture::PictureOptions,
+    pipeline::{DetectParameters, ParameterSpec},
+};
+
+/// Lists every parameter, in the order in which they are listed to users.
+pub(super) fn all() -> impl Iterator<Item = &'static ParameterSpec> {
+    let tables = [
+        DetectParameters::TABLE,
+        answer::TABLE,
+        PictureOptions::TABLE,
+    ];
+    tables.into_iter().flatten()
+}
+
+/// Takes the parameters of a table out of those of a request.
+pub(super) fn take(
+    given: &mut Vec<(String, String)>,
+    table: &[ParameterSpec],
+) -> Vec<(String, String)> {
+    let is_known = |name: &str| table.iter().any(|spec| spec.name == name);
+    let taken = given.extract_if(.., |(name, _)| is_known(name));
+    taken.collect()
+}
+
+/// Borrows the parameters of a request as a parser takes them.
+pub(super) fn pairs(given: &[(String, String)]) -> impl Iterator<Item = (&str, &str)> {
+    given
+        .iter()
+        .map(|(name, value)| (name.as_str(), value.as_str()))
+}

@@ -1,0 +1,45 @@
+//! Text that a client sent, as problems and log lines repeat it.
+
+use std::fmt;
+
+/// Most characters of a client's text that are repeated.
+const MAX_CHARS: usize = 64;
+
+/// Shows a text in quotation marks with its control characters escaped, cut after 64 characters: enough to
+/// recognise it, not enough to fill a log.
+#[derive(Debug, Clone, Copy)]
+pub struct Quoted<'a>(pub &'a str);
+
+impl fmt::Display for Quoted<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kept = shortened(self.0);
+        let ellipsis = if kept.len() < self.0.len() { "…" } else { "" };
+        write!(formatter, "{kept:?}{ellipsis}")
+    }
+}
+
+/// Returns the first 64 characters of a text.
+#[must_use]
+pub fn shortened(text: &str) -> &str {
+    let end = text.char_indices().nth(MAX_CHARS);
+    end.map_or(text, |(end, _)| &text[..end])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_text_is_quoted_whole() {
+        assert_eq!(Quoted("1.5").to_string(), "\"1.5\"");
+        assert_eq!(Quoted("").to_string(), "\"\"");
+        assert_eq!(Quoted("a\n\"b").to_string(), r#""a\n\"b""#);
+    }
+
+    #[test]
+    fn long_text_is_cut_between_characters() {
+        let quoted = Quoted(&"ä".repeat(65)).to_string();
+        assert_eq!(quoted, format!("\"{}\"…", "ä".repeat(64)));
+        assert!(!Quoted(&"ä".repeat(64)).to_string().contains('…'));
+    }
+}
