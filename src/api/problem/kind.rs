@@ -66,7 +66,7 @@ problems! {
         => "Send one key that `access.keys_file` lists.";
     /// The client is not allowed to do this.
     Forbidden = FORBIDDEN "forbidden" "Permission denied"
-        => "Use a key with the scope that `detail` names; check `server.cors_origins` for web pages and \
+        => "Use a key with the scope that `detail` names; check `access.cors_origins` for web pages and \
             `calibrations.writable` for changes of calibrations.";
     /// The path has no resource.
     NotFound = NOT_FOUND "not-found" "Not found"
@@ -130,7 +130,7 @@ problems! {
     UnfitImage = UNPROCESSABLE_ENTITY "unfit-image" "Image does not match"
         => "Use the calibration of this camera, and frames of its aspect ratio.";
     /// Another model is being loaded.
-    ModelBusy = TOO_MANY_REQUESTS "model-busy" "Another model is being loaded" retry_after_seconds 1
+    ModelBusy = TOO_MANY_REQUESTS "model-busy" "Model change in progress" retry_after_seconds 1
         => "Retry after `Retry-After`.";
     /// The queue of frames, or the memory for request bodies, is full.
     Overloaded = TOO_MANY_REQUESTS "overloaded" "Server overloaded" retry_after_seconds 1
@@ -147,7 +147,7 @@ problems! {
             `server.max_header_bytes`.";
     /// The server failed to process the request.
     Internal = INTERNAL_SERVER_ERROR "internal" "Internal server error"
-        => "Search the log for the ID in `instance`, and report the error.";
+        => "Search the log for the `request_id`, and report the error.";
     /// The server has too many open connections.
     TooManyConnections = SERVICE_UNAVAILABLE "too-many-connections" "Too many connections" retry_after_seconds 1
         => "Retry after `Retry-After`; close connections that are not needed, or raise \

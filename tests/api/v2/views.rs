@@ -124,7 +124,7 @@ async fn views_have_places_like_frames_and_bodies_have_limits() {
     assert_refused(&answer, 413, "body-too-large", "100000");
     service.gate.panic_once();
     let answer = send(&service, VIEWS, &head, &[0; 12288]).await;
-    assert_refused(&answer, 500, "internal", "fault");
+    assert_refused(&answer, 500, "internal", "failed");
     let answer = send(&service, VIEWS, &head, &[0; 12288]).await;
     assert_eq!(answer.status, 200, "the place is free again");
 }
