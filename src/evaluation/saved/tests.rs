@@ -1,6 +1,7 @@
 use serde_json::json;
 
 use super::*;
+use crate::pipeline::Profile;
 use crate::detection::Refinement;
 
 /// Two images, 7 and 8.
