@@ -14,12 +14,14 @@ pub(super) use texts::{
 };
 pub(super) use written::{Refusal, Written};
 
+type Read<T> = Box<dyn Fn(Written<'_>) -> Result<T, Refusal>>;
+
 /// The form of a setting's value.
 pub(super) struct Form<T> {
     /// The values that are accepted, as a phrase that follows "give a" or stands alone.
     pub(super) kind: String,
     /// Reads a value.
-    pub(super) read: Box<dyn Fn(Written<'_>) -> Result<T, Refusal>>,
+    pub(super) read: Read<T>,
     /// Writes a value as TOML.
     pub(super) write: Box<dyn Fn(&T) -> toml::Value>,
     /// The value that the settings file shows in a comment, where an empty value is refused.

@@ -38,7 +38,7 @@ settings! {
         /// The prefix of all keys in that Redis. Servers with the same prefix share their reports.
         key_prefix: String = "lookdown".to_owned() => key_prefix();
         /// The longest time that a report is kept in that Redis.
-        max_age as "max_age_seconds": Duration = Duration::from_secs(86_400) => seconds(AGES);
+        max_age as "max_age_seconds": Duration = Duration::from_hours(24) => seconds(AGES);
         /// The cameras whose latest image is kept for `/results/{camera}/latest.jpg`, by name; `"*"` is
         /// all. Images show persons. Each takes 4 MiB at most.
         pictures: PicturesOf = PicturesOf::default() => pictures();

@@ -31,9 +31,10 @@ pub(super) fn key_of(name: &str, entries: &[Entry]) -> Result<Option<String>, Se
     let is_known = |key: &str| entries.iter().any(|entry| entry.key == key);
     if let Some(rest) = upper.strip_prefix(PREFIX) {
         let key = key(rest);
-        return match is_known(&key) {
-            true => Ok(Some(key)),
-            false => Err(unknown(name, &key, entries)),
+        return if is_known(&key) {
+            Ok(Some(key))
+        } else {
+            Err(unknown(name, &key, entries))
         };
     }
     match upper.strip_prefix(NEARLY) {
