@@ -1,5 +1,8 @@
 //! The parameters of `POST /detect`: those of the detection, and those of its answer.
 
+#[cfg(test)]
+mod reference;
+
 use super::answer;
 use crate::{
     annotated_picture::PictureOptions,

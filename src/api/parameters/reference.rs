@@ -24,7 +24,9 @@ fn row(spec: &ParameterSpec) -> String {
         ParameterDefault::Described(default) => default.to_owned(),
         ParameterDefault::None => "–".to_owned(),
     };
-    let example = spec.example.map(|example| format!(" Example: `{example}`."));
+    let example = spec
+        .example
+        .map(|example| format!(" Example: `{example}`."));
     let (name, values, help) = (spec.name, values(spec.kind), spec.help);
     let example = example.unwrap_or_default();
     let interfaces = interfaces(spec);
