@@ -20,7 +20,7 @@ fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
     }
 }
 
-/// Topic and payload of all that is no announcement, and how many announcements there are.
+/// Topic and payload of all messages that are no announcements, and the number of announcements.
 fn told(messages: &[Message]) -> (Vec<(String, String)>, usize) {
     let is_announcement = |message: &&Message| message.topic.starts_with("homeassistant/");
     let told = messages.iter().filter(|message| !is_announcement(message));
@@ -80,7 +80,7 @@ fn zones_come_and_go_with_the_calibration() {
 }
 
 #[test]
-fn all_that_is_kept_is_told_again_without_reports() {
+fn retained_messages_are_repeated_without_reports() {
     let mut cameras = cameras(10);
     cameras.hear(&report("lobby", 1, ""));
     cameras.hear(&report("gate", 3, ""));
@@ -96,7 +96,7 @@ fn all_that_is_kept_is_told_again_without_reports() {
 }
 
 #[test]
-fn of_too_many_cameras_the_first_are_published() {
+fn only_the_first_cameras_up_to_the_limit_are_published() {
     let mut cameras = cameras(2);
     for camera in ["a", "b", "c"] {
         let published = !cameras.hear(&report(camera, 1, "")).is_empty();
