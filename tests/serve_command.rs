@@ -222,7 +222,7 @@ impl Drop for Server {
 fn a_termination_signal_ends_the_server_in_order() {
     let mut server = Server::start("", &[NO_GRACE]);
     server.signal("TERM");
-    server.says("told to stop");
+    server.says("stopping");
     let rest = server.has_ended();
     assert!(rest.last().unwrap().contains("stopped"), "{rest:?}");
 }
@@ -238,7 +238,7 @@ fn an_interruption_ends_the_server_without_a_pause() {
 fn a_second_signal_ends_the_server_at_once() {
     let mut server = Server::start("", &[LONG_GRACE]);
     server.signal("TERM");
-    server.says("told to stop");
+    server.says("stopping");
     // A model is being loaded still, and must not bring the process down.
     server.signal("TERM");
     // Not after the grace period.

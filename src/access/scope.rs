@@ -1,15 +1,15 @@
-//! What a key opens.
+//! The operations that a key permits.
 
 use std::{fmt, str::FromStr};
 
-/// What a key opens.
+/// A group of operations that a key permits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// Finding the persons in frames.
+    /// Detect persons in frames.
     Detect,
-    /// Reading calibrations, view plans and the list of models.
+    /// Read calibrations, view plans and the list of models.
     Read,
-    /// Everything, changes of calibrations and models included.
+    /// Everything, including changes of calibrations and models.
     Admin,
 }
 
@@ -17,7 +17,7 @@ impl Scope {
     /// Every scope.
     pub const ALL: [Self; 3] = [Self::Detect, Self::Read, Self::Admin];
 
-    /// As it is written in files and commands.
+    /// The name in files and commands.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -34,7 +34,7 @@ impl fmt::Display for Scope {
     }
 }
 
-/// There is no such scope.
+/// The scope is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a scope is detect, read or admin")]
 pub struct UnknownScope;
@@ -48,12 +48,12 @@ impl FromStr for Scope {
     }
 }
 
-/// The scopes of one key, in the order of [`Scope::ALL`]; never none.
+/// The scopes of one key, in the order of [`Scope::ALL`], at least one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Scopes(Vec<Scope>);
 
 impl Scopes {
-    /// These scopes; `None` when there is none.
+    /// Creates a set of these scopes. Returns `None` if there is none.
     #[must_use]
     pub fn new(given: &[Scope]) -> Option<Self> {
         let given = Scope::ALL.into_iter().filter(|scope| given.contains(scope));
@@ -61,13 +61,13 @@ impl Scopes {
         (!given.is_empty()).then_some(Self(given))
     }
 
-    /// Whether `wanted` is among them; `admin` includes all.
+    /// Returns true if `wanted` is among them. `admin` includes all.
     #[must_use]
     pub fn allow(&self, wanted: Scope) -> bool {
         self.0.contains(&wanted) || self.0.contains(&Scope::Admin)
     }
 
-    /// Their names, with `separator` between them.
+    /// Their names, separated by `separator`.
     #[must_use]
     pub fn joined(&self, separator: &str) -> String {
         let names: Vec<_> = self.0.iter().map(|scope| scope.name()).collect();
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scope_opens_itself_and_admin_opens_all() {
+    fn a_scope_permits_itself_and_admin_permits_all() {
         for own in Scope::ALL {
             for wanted in Scope::ALL {
                 let opens = Scopes::new(&[own]).unwrap().allow(wanted);

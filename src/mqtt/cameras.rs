@@ -60,7 +60,7 @@ impl Cameras {
             if !self.has_warned {
                 tracing::warn!(
                     most = self.most,
-                    "only the first cameras are published: more than mqtt.max_cameras have sent frames"
+                    "more cameras than mqtt.max_cameras have sent frames: only the first are published"
                 );
             }
             self.has_warned = true;
@@ -89,7 +89,7 @@ impl Cameras {
             }
             messages.extend(counts.announced(&self.topics, camera));
         }
-        messages.extend(counts.told(&self.topics, camera));
+        messages.extend(counts.count_messages(&self.topics, camera));
         let json = report.json.clone();
         messages.push(Message::passing(self.topics.report(camera), json));
         messages
@@ -100,7 +100,7 @@ impl Cameras {
         let known = self.known.iter();
         let messages = known.flat_map(|(camera, counts)| {
             let mut messages = counts.announced(&self.topics, camera);
-            messages.extend(counts.told(&self.topics, camera));
+            messages.extend(counts.count_messages(&self.topics, camera));
             messages
         });
         messages.collect()
@@ -118,7 +118,7 @@ impl Counts {
         announcements(topics, camera, zones)
     }
 
-    fn told(&self, topics: &Topics, camera: &str) -> Vec<Message> {
+    fn count_messages(&self, topics: &Topics, camera: &str) -> Vec<Message> {
         let count = |topic, persons: usize| Message::retained(topic, persons.to_string());
         let zones = self.zones.iter();
         let zones = zones.map(|zone| count(topics.zone(camera, &zone.name), zone.persons));

@@ -37,7 +37,7 @@ pub(super) enum SessionError {
     Failed(#[from] io::Error),
     #[error("it violates MQTT 3.1.1: {0}")]
     Protocol(#[from] rumqttc::mqttbytes::Error),
-    #[error("it refuses the login ({0:?}): check user and password in mqtt.url, and the access rules of the broker")]
+    #[error("it refuses the login ({0:?}): check the user, the password and the broker's access rules")]
     Refused(ConnectReturnCode),
     #[error("it has closed the connection")]
     Closed,

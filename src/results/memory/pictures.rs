@@ -4,7 +4,7 @@ use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
 use crate::results::{NewPicture, ReportId, StoredPicture};
 
-/// When there are too many cameras, the one that was silent for longest is evicted.
+/// The images, at most `most`: the camera that was silent for longest is evicted first.
 #[derive(Debug)]
 pub(super) struct Pictures {
     most: NonZeroUsize,

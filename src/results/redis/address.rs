@@ -15,7 +15,8 @@ pub struct RedisAddress {
 /// The text is no address of a Redis. The text is not repeated, as it may hold a password.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "give redis://host:port/database, or rediss:// for TLS, with user:password@ before the host where a login is needed"
+    "give redis://host:port/database, or rediss:// for TLS, with user:password@ before \
+     the host where a login is needed"
 )]
 pub struct RedisAddressError;
 
@@ -80,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_address_of_a_redis_is_refused_without_being_repeated() {
+    fn other_texts_are_refused_without_being_repeated() {
         for text in [
             "",
             "localhost:6379",
