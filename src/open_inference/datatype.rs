@@ -1,34 +1,34 @@
-//! What the elements of a tensor are.
+//! The datatypes of tensors.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// What the elements of a tensor are, of all that the protocol has those that are used here.
+/// The datatype of a tensor's elements. Only those of the protocol that Lookdown uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub enum Datatype {
-    /// Texts, or bytes of any kind.
+    /// Text or any bytes.
     Bytes,
-    /// Numbers of 32 bits, IEEE 754.
+    /// 32-bit floating-point numbers, IEEE 754.
     Fp32,
-    /// Whole numbers of 32 bits.
+    /// 32-bit signed integers.
     Int32,
-    /// Whole numbers 0 to 255.
+    /// Integers from 0 to 255.
     Uint8,
 }
 
 impl Datatype {
     const ALL: [Self; 4] = [Self::Bytes, Self::Fp32, Self::Int32, Self::Uint8];
 
-    /// The one of that name.
+    /// Returns the datatype of this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         let mut all = Self::ALL.into_iter();
         all.find(|datatype| datatype.name() == name)
     }
 
-    /// As the protocol writes it.
+    /// The name in the protocol.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
