@@ -92,7 +92,7 @@ mod tests {
         let empty = view(100.0, [0, 0], 0, 0.0);
         for corner in [[0, 0], [10, 10], [34, 27], [36, 0]] {
             let person = view(100.0, corner, 6, 160.0);
-            assert!(empty.differs_from(&person) && somebody.differs_from(&empty));
+            assert!(empty.differs_from(&person) && person.differs_from(&empty));
         }
     }
 
