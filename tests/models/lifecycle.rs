@@ -112,7 +112,7 @@ fn only_what_is_in_the_folder_can_be_loaded() {
         &fixture("any_batch"),
     );
     let error = models.repository.load("c").err().unwrap().to_string();
-    assert!(error.contains("calls itself \"a\""), "{error}");
+    assert!(error.contains("has the name \"a\""), "{error}");
 }
 
 #[test]

@@ -173,7 +173,7 @@ fn what_is_no_onnx_file_is_refused() {
         let error = OnnxDetector::load(&library(), &file, &options())
             .err()
             .unwrap();
-        assert_says(&error.to_string(), &["model.onnx", "no ONNX model"]);
+        assert_says(&error.to_string(), &["model.onnx", "not an ONNX model"]);
     }
     fs::write(&file, []).unwrap();
     fs::File::options()
