@@ -1,6 +1,6 @@
 //! Output heads against a reference implementation in another language
 //! (`tests/fixtures/heads/make_head_vectors.py`).
-#![expect(clippy::unwrap_used, reason = "a broken fixture should stop the test")]
+#![expect(clippy::unwrap_used, reason = "an invalid fixture fails the test")]
 
 use lookdown::{
     imaging::NetworkInput,

@@ -1,5 +1,5 @@
-//! The checked-in API description, and what it promises.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! The checked-in API description: completeness and agreement with the code.
+#![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -29,17 +29,17 @@ fn operations(document: &Value) -> Vec<(String, Value)> {
 }
 
 #[test]
-fn the_checked_in_document_is_that_of_the_code() {
+fn the_checked_in_document_matches_the_code() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");
     let checked_in: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     assert!(
         checked_in == document(),
-        "run `make bless` and look at the difference"
+        "run `make bless` and review the difference"
     );
 }
 
 #[test]
-fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
+fn every_operation_has_name_summary_tag_and_own_responses() {
     let document = document();
     let mut names = BTreeSet::new();
     for (path, operation) in operations(&document) {
@@ -48,7 +48,7 @@ fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
             name.contains('_'),
             "{path}: {name} is not <verb>_<resource>"
         );
-        assert!(names.insert(name.to_owned()), "{name} is there twice");
+        assert!(names.insert(name.to_owned()), "{name} is not unique");
         assert!(operation["summary"].is_string(), "{path} has no summary");
         assert!(operation["tags"][0].is_string(), "{path} has no tag");
         let statuses = operation["responses"].as_object().unwrap();
@@ -116,7 +116,7 @@ fn detection_describes_every_status_and_every_parameter() {
     for media_type in ["application/json", "image/jpeg", "image/png"] {
         assert!(
             answers.contains_key(media_type),
-            "{media_type} is not answered"
+            "{media_type} is not among the responses"
         );
     }
     let report = &answers["application/json"]["schema"]["$ref"];
@@ -124,7 +124,7 @@ fn detection_describes_every_status_and_every_parameter() {
 }
 
 #[test]
-fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
+fn bodies_have_a_schema_and_no_parameter_is_sent_twice() {
     let document = document();
     for (path, operation) in operations(&document) {
         let bodies = operation["requestBody"]["content"].as_object();
@@ -132,7 +132,7 @@ fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
             assert!(body["schema"].is_object(), "{path} {media_type}");
         }
     }
-    // What has a default is sent by itself, in the query and in the form.
+    // Generated clients send defaults by themselves, in the query and in the form.
     let query = &document["paths"]["/detect"]["post"]["parameters"];
     let form = &document["components"]["schemas"]["DetectForm"];
     for described in [query, form] {
@@ -144,7 +144,7 @@ fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
 }
 
 #[test]
-fn the_forms_and_layers_that_are_described_are_those_that_are_read() {
+fn the_described_formats_and_layers_match_the_parser() {
     let document = document();
     let parameters = document["paths"]["/detect"]["post"]["parameters"].clone();
     let of = |name: &str| {
@@ -165,8 +165,8 @@ fn the_forms_and_layers_that_are_described_are_those_that_are_read() {
 }
 
 #[test]
-fn every_operation_says_how_it_can_fail() {
-    let told: BTreeMap<_, _> = operations(&document())
+fn every_operation_lists_its_error_statuses() {
+    let listed: BTreeMap<_, _> = operations(&document())
         .into_iter()
         .map(|(_, operation)| {
             let statuses = operation["responses"].as_object().unwrap().keys();
@@ -226,7 +226,7 @@ fn every_operation_says_how_it_can_fail() {
         ("get_openapi", ""),
     ];
     let expected = expected.map(|(name, failures)| (name.to_owned(), failures.to_owned()));
-    assert_eq!(told, BTreeMap::from(expected));
+    assert_eq!(listed, BTreeMap::from(expected));
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn the_example_report_has_the_fields_of_the_schema() {
 }
 
 #[test]
-fn what_a_key_opens_says_so_and_how_it_is_refused() {
+fn protected_operations_declare_security_and_its_errors() {
     let document = document();
     let schemes = &document["components"]["securitySchemes"];
     assert_eq!(schemes["bearer"]["scheme"], "bearer");

@@ -41,7 +41,7 @@ fn load(server: &Arc<RemoteServer>, model: &Path) -> Result<RemoteDetector, Infe
     RemoteDetector::load_sessions(server, model, options, NonZeroUsize::MIN).map(|(first, _)| first)
 }
 
-fn look(detector: &mut RemoteDetector, views: usize) -> Result<HeadOutput, InferenceError> {
+fn detect(detector: &mut RemoteDetector, views: usize) -> Result<HeadOutput, InferenceError> {
     let mut batch = ViewBatch::default();
     for slot in batch.prepare(views, &detector.input().clone()) {
         slot.fill(7.0);
@@ -61,7 +61,7 @@ fn views_are_sent_as_bytes_or_as_lists_as_the_server_supports() {
             first_axis == 2,
             "the metadata gives the number"
         );
-        let found = look(&mut detector, 3).unwrap();
+        let found = detect(&mut detector, 3).unwrap();
         let scores: Vec<_> = found.per_view.iter().map(|view| view[0].score).collect();
         assert_eq!(scores, [0.5; 3], "{as_bytes}");
         assert_eq!(found.per_view[2][0].bbox.corners(), [1.0, 2.0, 3.0, 4.0]);
@@ -82,7 +82,7 @@ fn every_request_carries_the_token_if_one_is_set() {
         let fake = FakeServer::start(true, -1);
         let folder = manifest();
         let server = server_with_token(&fake, token);
-        look(&mut load(&server, folder.path()).unwrap(), 1).unwrap();
+        detect(&mut load(&server, folder.path()).unwrap(), 1).unwrap();
         let shown = fake.authorizations();
         // The server's metadata, the model's metadata and a view.
         assert!(shown.len() >= 3, "{shown:?}");
@@ -118,20 +118,20 @@ fn an_overloaded_server_is_busy_and_an_unready_one_unavailable() {
     let server = server(&fake);
     let mut detector = load(&server, folder.path()).unwrap();
     fake.queue(ScriptedReply::status(429).header("Retry-After", "7"));
-    let error = look(&mut detector, 1).unwrap_err();
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(
         matches!(error, InferenceError::RemoteBusy { retry_after } if retry_after.as_secs() == 7),
         "{error}"
     );
     fake.queue(ScriptedReply::status(503));
-    let error = look(&mut detector, 1).unwrap_err();
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(
         matches!(error, InferenceError::RemoteBusy { .. }),
         "{error}"
     );
     fake.be_ready(false);
     fake.queue(ScriptedReply::status(503));
-    let error = look(&mut detector, 1).unwrap_err();
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(matches!(error, InferenceError::Remote { .. }), "{error}");
     let counts = server.counts();
     assert_eq!((counts.busy, counts.failed, counts.answered), (2, 1, 0));
@@ -146,17 +146,17 @@ fn a_failing_server_gets_no_requests_until_it_is_ready() {
     for _ in 0..3 {
         fake.queue(ScriptedReply::status(500));
         assert!(server.is_available());
-        let message = look(&mut detector, 1).unwrap_err().to_string();
+        let message = detect(&mut detector, 1).unwrap_err().to_string();
         assert!(message.contains("answered 500"), "{message}");
     }
     assert!(!server.is_available());
-    look(&mut detector, 1).unwrap_err();
+    detect(&mut detector, 1).unwrap_err();
     assert_eq!((fake.inferred().len(), server.counts().not_sent), (3, 1));
     fake.be_ready(false);
     assert!(!server.look_after());
     fake.be_ready(true);
     assert!(server.look_after());
-    look(&mut detector, 1).unwrap();
+    detect(&mut detector, 1).unwrap();
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn an_idle_server_is_probed_and_an_answering_one_is_not() {
     assert!(server.look_after() && server.look_after() && !server.look_after());
     fake.be_ready(true);
     assert!(server.look_after());
-    look(&mut detector, 1).unwrap();
+    detect(&mut detector, 1).unwrap();
     fake.be_ready(false);
     assert!((0..5).all(|_| server.look_after()), "it has just responded");
 }
@@ -181,7 +181,7 @@ fn a_request_on_a_closed_connection_is_retried() {
     let mut detector = load(&server(&fake), folder.path()).unwrap();
     for _ in 0..3 {
         fake.queue(ScriptedReply::closed());
-        look(&mut detector, 1).unwrap();
+        detect(&mut detector, 1).unwrap();
     }
 }
 
@@ -204,14 +204,14 @@ fn invalid_responses_are_reported_and_slow_ones_time_out() {
         let server = server(&fake);
         let mut detector = load(&server, folder.path()).unwrap();
         fake.queue(reply);
-        let error = look(&mut detector, 1).unwrap_err();
+        let error = detect(&mut detector, 1).unwrap_err();
         assert!(matches!(error, InferenceError::Remote { .. }), "{error}");
         assert!(error.to_string().contains(part), "{error}");
     }
     let server = server(&fake);
     let mut detector = load(&server, folder.path()).unwrap();
     fake.queue(ScriptedReply::status(200).body("{\"outputs\":[]}"));
-    let error = look(&mut detector, 1).unwrap_err();
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(error.to_string().contains("no output \"boxes\""), "{error}");
 }
 
