@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn every_picture_is_whole_and_stands_in_its_row_and_column() {
+    fn every_image_is_complete_and_in_its_row_and_column() {
         let grid = PictureGrid {
             title: "title".to_owned(),
             columns: vec!["a".to_owned(), "b".to_owned()],
