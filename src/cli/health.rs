@@ -15,14 +15,14 @@ use crate::probe::{self, Probe};
 /// Arguments of `lookdown health`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Only ask whether the process answers (/livez), not whether frames can be sent (/readyz)
+    /// Check liveness (/livez) instead of readiness (/readyz)
     #[arg(long)]
     live: bool,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
 
-/// Asks the server that runs with these settings.
+/// Checks the server that runs with these settings.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let probe = if arguments.live {
@@ -33,8 +33,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let runtime = runtime::Builder::new_current_thread()
         .enable_all()
         .build()
-        .context("the operating system gives no runtime")?;
+        .context("the async runtime cannot be started")?;
     let url = runtime.block_on(probe::ask(&settings.server, probe))?;
-    writeln!(io::stdout(), "{url} answered yes").context("standard output cannot be written")?;
+    writeln!(io::stdout(), "{url} answered 200").context("standard output cannot be written")?;
     Ok(ExitCode::SUCCESS)
 }

@@ -17,8 +17,8 @@ pub enum DataSetError {
     },
     /// The format was not recognised.
     #[error(
-        "{path}: holds no data set in a known format; expected annotations.json, annotations/*.json, \
-         *.json, *.xml or Ground_Truth_Annotations/groundTruth_*.csv"
+        "{path}: holds no data set in a known format; expected annotations.json, \
+         annotations/*.json, *.json, *.xml or Ground_Truth_Annotations/groundTruth_*.csv"
     )]
     Unrecognised {
         /// The path given.

@@ -47,7 +47,7 @@ pub(super) fn read_files(
         Some(first) if is_anything_annotated && !is_somebody_there => {
             Err(DataSetError::Annotations {
                 path: first.clone(),
-                problem: "no object in this or the other files is named person; name persons that way"
+                problem: "no object in any file is named person; give the persons that name"
                     .to_owned(),
             })
         }
