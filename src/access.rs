@@ -1,4 +1,4 @@
-//! Who may do what: API keys with a name and scopes, of which only digests are kept.
+//! Access control: API keys with a name and scopes. Only the digests of keys are stored.
 
 mod digest;
 mod error;

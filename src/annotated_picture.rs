@@ -1,5 +1,5 @@
-//! Found persons drawn into their frame, as a picture to send or to save: what is drawn, how large
-//! and in which file format; and frames that are kept to be drawn into later.
+//! Annotated images: detected persons drawn into their frame, with options for layers, size and
+//! file format. Frames can also be kept to be drawn into later.
 
 mod kept;
 mod marks;
@@ -21,20 +21,20 @@ pub use kept::{KeptFrame, KeptFrameError};
 pub use options::{Layer, PictureOptions};
 use sketch::Sketch;
 
-/// The width of a wider frame's picture when none is asked for, pixels: more than a screen shows, and
-/// little enough that drawing never costs more than decoding.
+/// Default width of the image of a wider frame, pixels: more than a screen shows, and small enough
+/// that drawing costs no more than decoding.
 const DEFAULT_MAX_WIDTH: u32 = 2048;
 
-/// A file format of pictures.
+/// A file format of images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureFormat {
     /// JPEG, in the quality of the options.
     Jpeg,
-    /// PNG, without loss.
+    /// PNG, lossless.
     Png,
 }
 
-/// The reason why there is no picture.
+/// The reason why there is no annotated image.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// The client no longer waits for it.
@@ -48,8 +48,9 @@ pub enum PictureError {
 /// Draws the persons into their frame. Takes tens of milliseconds for a large frame: keep it off
 /// the async runtime. Stops when the job is withdrawn.
 ///
+///
 /// # Errors
-/// [`PictureError`] when the frame is larger than the format allows, or the job was withdrawn.
+/// [`PictureError`] if the frame is larger than the format allows, or the job was withdrawn.
 pub fn annotated_picture(
     detected: Detected,
     format: PictureFormat,

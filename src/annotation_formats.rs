@@ -1,5 +1,6 @@
-//! Found persons in the file formats of annotation tools, ready to be corrected there: COCO,
-//! CVAT, YOLO, Pascal VOC; and as GeoJSON. Text in memory; whoever asks for it writes or sends it.
+//! Exports detected persons in the file formats of annotation tools, for correction there: COCO,
+//! CVAT, YOLO, Pascal VOC, and GeoJSON. The output is text in memory, which the caller writes or
+//! sends.
 
 mod coco;
 mod cvat;
@@ -16,7 +17,7 @@ use crate::{
     geometry::{OrientedBox, floor::FloorPosition},
 };
 
-/// What every box is a box of.
+/// The class of every box.
 const LABEL: &str = "person";
 
 /// A file format of annotation tools.
@@ -33,20 +34,20 @@ pub enum AnnotationFormat {
     Yolo,
     /// Pascal VOC: an XML file per image.
     Voc,
-    /// GeoJSON: a JSON file per image, the turned boxes as polygons in pixels.
+    /// GeoJSON: a JSON file per image, with the oriented boxes as polygons in pixels.
     GeoJson,
 }
 
-/// One picture and who is in it.
+/// One image and its persons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnnotatedImage {
-    /// The picture's file: its path from the folder of pictures, with `/` between its parts.
+    /// The path of the image's file from the folder of images, with `/` between its parts.
     pub file_name: String,
     /// Pixels.
     pub width: u32,
     /// Pixels.
     pub height: u32,
-    /// The ID of its calibration; `None` where the lens was assumed.
+    /// The ID of its calibration. `None` if the lens was assumed.
     pub calibration: Option<String>,
     /// The persons.
     pub persons: Vec<AnnotatedBox>,
@@ -55,23 +56,23 @@ pub struct AnnotatedImage {
 /// One person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AnnotatedBox {
-    /// Axis-parallel box, corner-origin pixels; what lies outside the picture is cut off.
+    /// Axis-parallel box, corner-origin pixels. It is clipped to the image.
     pub bbox: BBox<FramePixels>,
-    /// The box turned along the person.
+    /// The box aligned with the person.
     pub oriented_box: OrientedBox,
     /// Confidence, 0 to 1.
     pub score: f64,
-    /// Where the person stands, when the camera's height is known.
+    /// The person's position on the floor, if the camera's height is known.
     pub floor: Option<FloorPosition>,
 }
 
-/// Which box of a person is written where a format has both kinds.
+/// The box that is written if a format supports both kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BoxKind {
     /// The axis-parallel box.
     #[default]
     AxisParallel,
-    /// The box turned along the person.
+    /// The box aligned with the person.
     Oriented,
 }
 
@@ -80,20 +81,20 @@ pub enum BoxKind {
 pub struct AnnotationFile {
     /// Its path from the folder of annotations, with `/` between its parts.
     pub path: String,
-    /// What is in it.
+    /// Its content.
     pub content: String,
 }
 
 impl AnnotationFormat {
-    /// Whether the format has turned boxes beside others, so that there is something to choose.
+    /// Returns whether the format offers oriented boxes beside axis-parallel ones.
     #[must_use]
     pub fn has_oriented_boxes(self) -> bool {
         self == Self::Cvat
     }
 
-    /// The files that describe `images`. `boxes` counts only where the format
-    /// [has oriented boxes](Self::has_oriented_boxes). Images whose names differ in their endings
-    /// alone share a file in YOLO and VOC: the last has it.
+    /// Returns the files that describe `images`. `boxes` applies only if the format [has oriented
+    /// boxes](Self::has_oriented_boxes). Images whose names differ only in their extensions share a
+    /// file in YOLO and VOC: the last one is written.
     #[must_use]
     pub fn files(self, images: &[AnnotatedImage], boxes: BoxKind) -> Vec<AnnotationFile> {
         match self {
@@ -105,7 +106,7 @@ impl AnnotationFormat {
         }
     }
 
-    /// What describes one image: its own file, or that of a folder in which it is alone.
+    /// Returns the document of one image: its own file, or that of a folder with this image only.
     #[must_use]
     pub fn document(self, image: &AnnotatedImage, boxes: BoxKind) -> String {
         match self {
@@ -117,7 +118,7 @@ impl AnnotationFormat {
         }
     }
 
-    /// The path of the file that is the image's own, if the format has one.
+    /// The path of the image's own file, if the format has one.
     #[must_use]
     pub fn own_file(self, image_file_name: &str) -> Option<String> {
         match self {
@@ -130,7 +131,7 @@ impl AnnotationFormat {
 }
 
 impl AnnotatedImage {
-    /// The axis-parallel boxes, `[left, top, right, bottom]`, cut to the picture; those outside
+    /// The axis-parallel boxes, `[left, top, right, bottom]`, clipped to the image. Those outside
     /// it are left out.
     fn boxes(&self) -> impl Iterator<Item = ([f64; 4], &AnnotatedBox)> {
         let picture = BBox::new([0.0, 0.0, self.width.into(), self.height.into()]).ok();
@@ -160,7 +161,7 @@ fn file(path: &str, content: String) -> AnnotationFile {
     }
 }
 
-/// The name without its last ending.
+/// The name without its last extension.
 fn stem(file_name: &str) -> &str {
     match file_name.rsplit_once('.') {
         Some((stem, ending)) if !stem.is_empty() && !ending.contains('/') => stem,
@@ -168,12 +169,12 @@ fn stem(file_name: &str) -> &str {
     }
 }
 
-/// Two decimals: far below what a detector can tell.
+/// Rounds to two decimals: far below the accuracy of a detector.
 fn pixels(value: f64) -> f64 {
     rounded(value, 100.0)
 }
 
-/// Four decimals of a share of 1.
+/// Rounds a fraction of 1 to four decimals.
 fn share(value: f64) -> f64 {
     rounded(value, 10_000.0)
 }

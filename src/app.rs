@@ -1,4 +1,4 @@
-//! Where everything is put together: settings → engine → workers → service.
+//! The composition root: settings → engine → workers → service.
 
 mod check;
 mod models;
@@ -33,10 +33,10 @@ pub use sockets::Sockets;
 
 pub(crate) use models::onnx_options;
 
-/// How often the inference server is looked after, seconds.
+/// Interval of the checks of the inference server, seconds.
 const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
-/// An engine with the calibrations and the models it looks with.
+/// An engine with its calibrations and models.
 pub struct Assembly {
     /// The engine.
     pub engine: Engine,
@@ -46,10 +46,11 @@ pub struct Assembly {
     pub models: Arc<ModelRepository>,
 }
 
-/// The engine that the settings describe, with no model loaded yet.
+/// Creates the engine that the settings describe, with no model loaded yet.
+///
 ///
 /// # Errors
-/// One sentence that names the setting: a file that is missing or cannot be used.
+/// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
     assemble_with(settings, FieldOfViewReading::default())
 }
@@ -83,7 +84,7 @@ fn assemble_with(
     })
 }
 
-/// What the settings let a picture cost.
+/// The decoding limits of the settings.
 pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
     DecodeLimits {
         max_width: limits.max_image_side,
@@ -93,11 +94,12 @@ pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
     }
 }
 
-/// The engine that the settings describe, with the models that requests with any of these
+/// Creates the engine that the settings describe, with the models that requests with any of these
 /// parameters need.
 ///
+///
 /// # Errors
-/// One sentence that names the setting: a file that is missing or cannot be used.
+/// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow::Result<Engine> {
     evaluation_engine(settings, requests, FieldOfViewReading::default())
 }
@@ -135,7 +137,7 @@ pub fn evaluation_engine(
 
 /// A running service without its socket.
 pub struct App {
-    /// Names of the models to load, the one that readiness waits for first.
+    /// Names of the models to load. Readiness waits for the first.
     to_load: Vec<String>,
     models: Arc<ModelRepository>,
     calibrations: Arc<Calibrations>,
@@ -143,11 +145,11 @@ pub struct App {
     results: Arc<dyn ResultStore>,
     readiness: Readiness,
     metrics: Arc<Metrics>,
-    /// The keys, if there are some.
+    /// The API keys, if there are any.
     keys: Option<Arc<AccessKeys>>,
-    /// The certificate, if there is one.
+    /// The certificate, if TLS is configured.
     tls: Option<Arc<Tls>>,
-    /// Who publishes reports, if somebody does.
+    /// The MQTT publisher, if a broker is configured.
     publisher: Option<Publisher>,
     tracer: Tracer,
     state: ApiState,
@@ -157,9 +159,10 @@ pub struct App {
 impl App {
     /// Starts the workers. No model is loaded yet: [`App::serve`] does that. Needs a tokio runtime.
     ///
+    ///
     /// # Errors
-    /// When the operating system gives no thread, or the keys, the certificate or the collector cannot
-    /// be used.
+    /// If the operating system creates no thread, or the keys, the certificate or the collector
+    /// cannot be used.
     pub fn start(assembly: Assembly, settings: Settings) -> anyhow::Result<Self> {
         let Assembly {
             engine,
@@ -172,7 +175,7 @@ impl App {
             settings.limits.max_frames_in_flight,
         );
         let workers = WorkerPool::start(&Arc::new(engine), workers, capacity)
-            .context("the operating system gives no thread for a worker")?;
+            .context("the operating system creates no thread for a worker")?;
         let workers = Arc::new(workers);
         let metrics = Arc::new(Metrics::new()?);
         let results = open_results(&settings.results);
@@ -240,13 +243,13 @@ impl App {
         })
     }
 
-    /// Whether frames are welcome: clones follow the app.
+    /// The readiness of the app. Clones share its state.
     #[must_use]
     pub fn readiness(&self) -> Readiness {
         self.readiness.clone()
     }
 
-    /// What the requests' spans are made with; whoever ends the process shuts it down.
+    /// The tracer of the requests. The caller shuts it down at the end of the process.
     #[must_use]
     pub fn tracer(&self) -> Tracer {
         self.tracer.clone()
@@ -283,7 +286,7 @@ impl App {
             .chain(tls);
         pollers
             .collect::<Result<_, _>>()
-            .context("the operating system gives no thread to watch files with")
+            .context("the operating system creates no thread to watch files")
     }
 }
 
@@ -305,7 +308,7 @@ pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrati
     let settings = &settings.calibrations;
     let store: Box<dyn CalibrationStore> = match &settings.path {
         CalibrationPlace::Bucket(url) => {
-            // Names and values that are no text are meant for others.
+            // Variables that are no UTF-8 are not for this program.
             let variables = std::env::vars_os();
             let variables = variables.filter_map(|(name, value)| {
                 Some((name.into_string().ok()?, value.into_string().ok()?))
@@ -320,7 +323,7 @@ pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrati
     Calibrations::open(store, settings.writable).context("calibrations.path")
 }
 
-/// Where the settings have reports kept. A Redis that is away is waited for in the background.
+/// Opens the result store of the settings. It connects to a Redis in the background.
 fn open_results(settings: &ResultSettings) -> Arc<dyn ResultStore> {
     match settings.redis.clone() {
         Some(redis) => Arc::new(RedisResults::start(redis, settings.limits)),
@@ -328,8 +331,8 @@ fn open_results(settings: &ResultSettings) -> Arc<dyn ResultStore> {
     }
 }
 
-/// The keys that the settings describe; `None` when they describe none. A file without keys still
-/// shuts the server: somebody wants keys to be needed.
+/// Opens the API keys of the settings. `None` if the settings name neither keys nor a file. With a
+/// file, keys are required even while it holds none.
 fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>>> {
     let file = settings.keys_file.as_deref();
     if settings.keys.is_empty() && file.is_none() {

@@ -28,7 +28,7 @@ use crate::{
     telemetry,
 };
 
-/// Finds people in the pictures of ceiling fisheye cameras.
+/// Detects persons in the images of ceiling fisheye cameras.
 #[derive(Debug, Parser)]
 #[command(name = "lookdown", propagate_version = true)]
 struct CommandLine {
@@ -40,41 +40,41 @@ struct CommandLine {
 enum Command {
     /// Start the HTTP server
     Serve(serve::Arguments),
-    /// Ask the server that runs on this machine with these settings whether it is ready: ends with 0 or 1
+    /// Check that the server with these settings on this machine is ready: exits with 0 or 1
     Health(health::Arguments),
-    /// Find the persons in pictures: one JSON report per line on standard output
+    /// Detect the persons in images: one JSON report per line on standard output
     Detect(Box<detect::Arguments>),
-    /// Measure how good detections are on a data set: average precision and speed
+    /// Measure the quality of detections on a data set: average precision and speed
     Eval(Box<eval::Arguments>),
-    /// Look into calibrations and convert them
+    /// Check, convert and fit calibrations
     #[command(subcommand)]
     Calibration(calibration::Command),
-    /// Look into person models
+    /// Check person models
     #[command(subcommand)]
     Model(model::Command),
-    /// Make API keys
+    /// Create API keys
     #[command(subcommand)]
     Key(key::Command),
     /// Measure which sessions, threads and batches are fastest on this machine
     Tune(tune::Arguments),
     /// Print the OpenAPI document
     Openapi,
-    /// Print what lets a shell complete commands
+    /// Print shell completions
     Completions(shell::CompletionArguments),
     /// Write the manual pages
     Manual(shell::ManualArguments),
 }
 
-/// Where the settings come from.
+/// The source of the settings.
 #[derive(Debug, Args)]
 struct SettingsFile {
-    /// Settings file (TOML); variables such as `LOOKDOWN__SERVER__LISTEN` overrule it
+    /// Settings file (TOML); variables such as `LOOKDOWN__SERVER__LISTEN` override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
 
 impl SettingsFile {
-    /// The checked settings, with logging started as they say.
+    /// Loads and validates the settings, and starts logging as they say.
     fn load(&self) -> anyhow::Result<Settings> {
         let settings = settings::load(self.config.as_deref(), settings::environment())?;
         telemetry::start_logs(&settings.log)?;
@@ -86,8 +86,8 @@ impl SettingsFile {
     }
 }
 
-/// Does what the command line of this process asks for. `commit` is the source's the binary was built from,
-/// if that was known.
+/// Runs the command line of this process. `commit` is the commit from which the binary was built,
+/// if it is known.
 #[must_use]
 pub fn run(commit: Option<&str>) -> ExitCode {
     let outcome = match parse(commit).command {
@@ -106,14 +106,14 @@ pub fn run(commit: Option<&str>) -> ExitCode {
     match outcome {
         Ok(code) => code,
         Err(error) => {
-            // Not through the log: it may not have been started, or not show this.
+            // Printed directly: the log may not be started, or may filter this out.
             eprintln!("lookdown: {error:#}");
             ExitCode::FAILURE
         }
     }
 }
 
-/// The command line, which ends the process with an explanation when it is not understood.
+/// Parses the command line. Ends the process with an explanation if it is invalid.
 fn parse(commit: Option<&str>) -> CommandLine {
     let matches = command(commit).get_matches();
     CommandLine::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())

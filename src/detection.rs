@@ -1,9 +1,8 @@
-//! Boxes, and how many overlapping boxes of the same person become one. Pure: no image, no I/O,
-//! and nothing else of this crate.
+//! Merging of overlapping boxes into one detection per person. Pure functions: no image, no I/O and
+//! no other module of this crate.
 //!
-//! Boxes are corner-origin with continuous coordinates (pixel `i` covers `[i, i + 1)`); the space
-//! they live in is part of their type, so a box that was never mapped to the frame cannot be
-//! merged.
+//! Boxes are corner-origin with continuous coordinates: pixel `i` covers `[i, i + 1)`. The pixel
+//! space is part of the box type, so a box that was never mapped to the frame cannot be merged.
 
 mod bbox;
 mod candidate;

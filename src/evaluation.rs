@@ -1,4 +1,4 @@
-//! How good detections are: matching with the truth, precision and recall, average precision.
+//! Evaluates detections: matching with the ground truth, precision and recall, average precision.
 
 mod average_precision;
 mod data_set;

@@ -1,4 +1,4 @@
-//! Pixels: decoding with limits, finding the lens circle, privacy masks, remap tables, network input,
+//! Pixels: decoding with limits, lens circle detection, privacy masks, remap tables, network input,
 //! drawing.
 
 pub mod annotate;

@@ -1,4 +1,4 @@
-//! Person detectors: views in, boxes with scores out.
+//! Person detectors: boxes with scores from rendered views.
 
 mod detector;
 mod device;

@@ -1,8 +1,9 @@
-//! Lookdown finds people in the pictures of ceiling fisheye cameras.
+//! Lookdown detects persons in the images of ceiling fisheye cameras.
 //!
-//! A frame becomes upright perspective views, a person detector trained on ordinary photographs
-//! runs on them, and its boxes are mapped back to the frame and merged. `ARCHITECTURE.md` has the
-//! map and the walk of one frame; dependencies between the modules point one way.
+//! A frame is rendered into upright perspective views. A person detector trained on ordinary
+//! photographs runs on them, and its boxes are mapped back to the frame and merged.
+//! `ARCHITECTURE.md` describes the modules and the processing of one frame. Dependencies between
+//! the modules point in one direction.
 
 pub mod access;
 pub mod annotated_picture;

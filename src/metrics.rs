@@ -1,6 +1,6 @@
-//! Every metric the server exposes: one struct with a registry of its own. A field's doc comment
-//! is its help text. Labels come from short fixed lists, never from what a client sends; those of
-//! zones, which administrators name, are shown only when asked for, and a thousand at most.
+//! Every metric of the server: one struct with its own registry. The doc comment of a field is its
+//! help text. Label values come from short fixed lists, never from clients. The labels of zones,
+//! which administrators name, are optional and limited to a thousand.
 
 mod kind;
 mod process;
@@ -17,16 +17,16 @@ use prometheus::{
 use kind::Kind;
 use process::Process;
 
-/// Zones shown at most.
+/// Most zones that are published.
 const MAX_ZONE_ROWS: usize = 1000;
 
-/// Declares the struct, and registers each field under `lookdown_` and its name.
+/// Declares the struct, and registers each field as `lookdown_` followed by its name.
 macro_rules! metrics {
     ($($(#[doc = $help:literal])+ $field:ident: $kind:ty = $name:literal [$($label:literal),*];)+) => {
         /// The metrics of one server.
         pub struct Metrics {
             registry: Registry,
-            /// Apart, as its names have no prefix.
+            /// Separate, as its names have no prefix.
             process: Registry,
             shown: Mutex<Shown>,
             $($(#[doc = $help])+ pub $field: $kind,)+
@@ -48,109 +48,111 @@ macro_rules! metrics {
 }
 
 metrics! {
-    /// Connections that are open, those of the metrics port included.
+    /// Open connections, including those of the metrics port.
     connections: IntGauge = "connections" [];
     /// HTTP requests answered.
     http_requests: IntCounterVec = "http_requests_total" ["route", "method", "status"];
-    /// From the head of an HTTP request to the head of its answer.
+    /// Time from the head of an HTTP request to the head of its response.
     http_request_duration: HistogramVec = "http_request_duration_seconds" ["route", "method"];
-    /// From a whole frame in memory to its report; counts the frames that got one.
+    /// Time from a complete frame in memory to its report, for frames that got a report.
     request_duration: HistogramVec = "request_duration_seconds" ["model", "profile"];
-    /// Waiting for a worker and for the network.
+    /// Time spent waiting for a worker and for the network.
     queue_duration: HistogramVec = "queue_duration_seconds" ["model", "profile"];
-    /// From a frame's bytes to the input of the network.
+    /// Time from a frame's bytes to the input of the network.
     compute_input_duration: HistogramVec = "compute_input_duration_seconds" ["model", "profile"];
-    /// The network.
+    /// Time in the network.
     compute_infer_duration: HistogramVec = "compute_infer_duration_seconds" ["model", "profile"];
-    /// From the output of the network to persons in the frame.
+    /// Time from the output of the network to persons in the frame.
     compute_output_duration: HistogramVec = "compute_output_duration_seconds" ["model", "profile"];
-    /// Views the network has seen of frames that got a report.
+    /// Views that ran through the network, of frames that got a report.
     views: IntCounter = "views_total" [];
-    /// Views not looked at because nothing had moved in them, of frames that got a report.
+    /// Views skipped because nothing had moved in them, of frames that got a report.
     unchanged_views: IntCounter = "unchanged_views_total" [];
     /// Runs of the network for frames that got a report.
     batches: IntCounter = "batches_total" [];
-    /// Candidates of the network dropped because a number of theirs was not finite.
+    /// Candidates of the network that were dropped because they hold a number that is not finite.
     non_finite: IntCounter = "non_finite_candidates_total" [];
     /// Persons reported.
     persons: IntCounter = "persons_total" [];
-    /// Persons in a zone (`calibration/zone`), in its latest frame; shown only with `calibrations.zone_metrics`.
+    /// Persons in a zone (`calibration/zone`), latest frame; only with `calibrations.zone_metrics`.
     zone_persons: IntGaugeVec = "zone_persons" ["zone"];
-    /// Requests that were answered with a problem, by its kind.
+    /// Requests answered with a problem, by its kind.
     failures: IntCounterVec = "request_failures_total" ["reason"];
-    /// Frames that wait for a worker or are worked on.
+    /// Frames that wait for a worker or are being processed.
     pending_frames: IntGauge = "pending_frames" [];
-    /// Frames given up because nobody waited for their report any more.
+    /// Frames dropped because their client had disconnected.
     withdrawn_frames: IntCounter = "withdrawn_frames_total" [];
-    /// Always 1; says which models answer.
+    /// Always 1; the labels are the loaded models.
     model_info: IntGaugeVec = "model_info" ["model", "revision"];
-    /// Models loaded, and models that were refused when they were to be.
+    /// Model loads, by result.
     model_loads: IntCounterVec = "model_loads_total" ["result"];
-    /// 1 when requests are sent to the inference server, 0 while it does not answer; shown only with one.
+    /// 1 while the inference server answers, else 0; only with an inference server.
     remote_up: IntGaugeVec = "remote_up" [];
-    /// Requests to the inference server by how they came out; shown only with one.
+    /// Requests to the inference server, by result; only with an inference server.
     remote_requests: IntCounterVec = "remote_requests_total" ["result"];
-    /// Calibrations that serve.
+    /// Calibrations in use.
     calibrations: IntGauge = "calibrations" [];
-    /// Always 1; says which calibrations serve, all of them together: equal where equal ones do.
+    /// Always 1; the label identifies the set of calibrations in use, and is equal for equal sets.
     calibrations_info: IntGaugeVec = "calibrations_info" ["revision"];
-    /// Calibration files whose newest version, or a camera of it, cannot be used.
+    /// Calibration files whose newest version, or a camera of it, is invalid.
     calibration_files_broken: IntGauge = "calibration_files_broken" [];
-    /// Calibration files read, by whether all of it could be used.
+    /// Calibration files read, by result.
     calibration_loads: IntCounterVec = "calibration_loads_total" ["result"];
-    /// 1 when the place of the calibrations could be looked at, else 0.
+    /// 1 when the calibration store can be read, else 0.
     calibration_store_up: IntGauge = "calibration_store_up" [];
-    /// Cameras whose remap tables are in memory, one per profile and frame size.
+    /// Cameras with remap tables in memory, one per profile and frame size.
     rig_cache_rigs: IntGauge = "rig_cache_rigs" [];
-    /// Memory that remap tables hold, bytes.
+    /// Memory of remap tables, bytes.
     rig_cache_bytes: IntGauge = "rig_cache_bytes" [];
-    /// Times that remap tables were built.
+    /// Builds of remap tables.
     rig_cache_builds: IntCounter = "rig_cache_builds_total" [];
-    /// Times that remap tables were dropped to make room for others.
+    /// Remap tables evicted from memory.
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
-    /// Frames that were not looked at again, as what was found in them was remembered.
+    /// Frames answered from the inference cache.
     recalled_frames: IntCounter = "recalled_frames_total" [];
-    /// Cameras of which a report is kept.
+    /// Cameras with a stored report.
     results_cameras: IntGauge = "results_cameras" [];
-    /// Reports that are kept.
+    /// Stored reports.
     results_reports: IntGauge = "results_reports" [];
-    /// Memory that kept reports take, bytes.
+    /// Memory of stored reports, bytes.
     results_bytes: IntGauge = "results_bytes" [];
-    /// Cameras of which a picture is kept.
+    /// Cameras with a stored image.
     results_pictures: IntGauge = "results_pictures" [];
     /// Reports of this server that were stored.
     results_stored: IntCounter = "results_stored_total" [];
     /// Reports of this server that wait to be stored.
     results_waiting: IntGauge = "results_waiting" [];
-    /// Reports of this server that will not be stored: too many waited, or their place refused them.
+    /// Reports of this server that were not stored: too many waited, or the result store refused
+    /// them.
     results_dropped: IntCounter = "results_dropped_total" [];
-    /// 1 when the place of the results can be reached, else 0.
+    /// 1 when the result store can be reached, else 0.
     results_store_up: IntGauge = "results_store_up" [];
-    /// Who listens to reports: event streams, and requests that wait for a newer report.
+    /// Listeners to reports: event streams, and requests that wait for a newer report.
     results_listeners: IntGauge = "results_listeners" [];
-    /// Listeners given up because they did not keep up.
+    /// Listeners dropped because they did not keep up.
     results_listeners_dropped: IntCounter = "results_listeners_dropped_total" [];
     /// 1 while there is a connection to the MQTT broker, else 0.
     mqtt_connected: IntGauge = "mqtt_connected" [];
     /// Reports published to the MQTT broker.
     mqtt_reports_sent: IntCounter = "mqtt_reports_sent_total" [];
-    /// Reports not published because the MQTT broker was away or too slow, or their camera one too many.
+    /// Reports not published: the MQTT broker was unreachable or too slow, or the camera exceeds
+    /// the limit.
     mqtt_reports_dropped: IntCounter = "mqtt_reports_dropped_total" [];
-    /// When the server's TLS certificate ends, seconds since 1970; shown only with TLS.
+    /// Expiry of the server's TLS certificate, seconds since 1970; only with TLS.
     tls_certificate_expiry: IntGaugeVec = "tls_certificate_expiry_timestamp_seconds" [];
-    /// Times that the files of TLS were found changed, by whether what they hold can be used.
+    /// Changes of the TLS files, by result.
     tls_certificate_loads: IntCounterVec = "tls_certificate_loads_total" ["result"];
-    /// TLS handshakes that came to an end, by how.
+    /// Finished TLS handshakes, by result.
     tls_handshakes: IntCounterVec = "tls_handshakes_total" ["result"];
-    /// Always 1; says which version runs.
+    /// Always 1; the label is the version of the server.
     build_info: IntGaugeVec = "build_info" ["version"];
 }
 
-/// Rows of info metrics, which go when they are true no more. Its lock is held for as long as one
-/// scrape shows something: another one would add the same.
+/// The rows of info metrics, which are removed when they are no longer true. The lock is held while
+/// a scrape updates them: a concurrent one would add the same.
 #[derive(Default)]
 struct Shown {
-    /// Name and revision.
+    /// Model name and revision.
     models: BTreeSet<(String, String)>,
     calibrations: String,
     /// Calibration and zone.
@@ -158,10 +160,11 @@ struct Shown {
 }
 
 impl Metrics {
-    /// Fresh metrics, all zero.
+    /// Creates metrics that are all zero.
+    ///
     ///
     /// # Errors
-    /// When a name or a label is not one that Prometheus accepts.
+    /// If Prometheus does not accept a name or a label.
     pub fn new() -> Result<Self, prometheus::Error> {
         let metrics = Self::registered()?;
         let version = [env!("CARGO_PKG_VERSION")];
@@ -170,21 +173,22 @@ impl Metrics {
         Ok(metrics)
     }
 
-    /// Shows how many frames wait for a worker or are worked on, and how many were given up since the start.
+    /// Sets the number of frames that wait or are processed, and the number dropped since the
+    /// start.
     pub fn show_frames(&self, pending: usize, withdrawn: u64) {
         let _one_scrape = self.one_scrape();
         self.pending_frames.set(count(pending));
         raise_to(&self.withdrawn_frames, withdrawn);
     }
 
-    /// Shows these models, each by name and revision, and no others, and how many loads came out
-    /// how since the start.
+    /// Sets the loaded models, each by name and revision, and the number of loads since the start,
+    /// by result.
     pub fn show_models(&self, models: &[(&str, &str)], loads: &[(&str, u64)]) {
         let mut shown = self.one_scrape();
         shown.models.retain(|(name, revision)| {
             let stays = models.contains(&(name, revision));
             if !stays {
-                // It was there, so it can be removed.
+                // The row exists, so it can be removed.
                 let _ = self.model_info.remove_label_values(&[name, revision]);
             }
             stays
@@ -198,8 +202,8 @@ impl Metrics {
         raise(&self.model_loads, loads);
     }
 
-    /// Shows whether requests are sent to the inference server, and how many came out how since the
-    /// start.
+    /// Sets the state of the inference server, and the number of requests since the start, by
+    /// result.
     pub fn show_remote(&self, up: bool, requests: &[(&str, u64)]) {
         let _one_scrape = self.one_scrape();
         let none: [&str; 0] = [];
@@ -207,8 +211,8 @@ impl Metrics {
         raise(&self.remote_requests, requests);
     }
 
-    /// Shows how many calibrations serve and the revision of all of them, how many files are broken,
-    /// whether their store can be looked at, and how many loads came out how since the start.
+    /// Sets the number of calibrations in use, the revision of all of them, the number of invalid
+    /// files, the state of their store, and the number of loads since the start, by result.
     pub fn show_calibrations(
         &self,
         serving: usize,
@@ -219,7 +223,7 @@ impl Metrics {
     ) {
         let mut shown = self.one_scrape();
         if shown.calibrations != revision {
-            // Nothing is shown before the first scrape.
+            // There is no row before the first scrape.
             let _ = self
                 .calibrations_info
                 .remove_label_values(&[&shown.calibrations]);
@@ -232,8 +236,8 @@ impl Metrics {
         raise(&self.calibration_loads, loads);
     }
 
-    /// Shows how many persons were in the zones (each by its name) of a calibration's latest frame.
-    /// A thousand zones are shown, further ones are not.
+    /// Sets the number of persons in the zones (each by its name) of a calibration's latest frame.
+    /// At most a thousand zones are published.
     pub fn show_zones<'a>(
         &self,
         calibration: &str,
@@ -251,13 +255,13 @@ impl Metrics {
         }
     }
 
-    /// Shows those zones no more that are not `there`, by calibration and name.
+    /// Removes the zones that are not `there`, by calibration and name.
     pub fn retain_zones(&self, there: impl Fn(&str, &str) -> bool) {
         let mut shown = self.one_scrape();
         shown.zones.retain(|(calibration, zone)| {
             let stays = there(calibration, zone);
             if !stays {
-                // It was there, so it can be removed.
+                // The row exists, so it can be removed.
                 let label = zone_label(calibration, zone);
                 let _ = self.zone_persons.remove_label_values(&[label]);
             }
@@ -265,8 +269,8 @@ impl Metrics {
         });
     }
 
-    /// Shows how many rigs of how many bytes are in memory, and how many were built and evicted
-    /// since the start.
+    /// Sets the number and the bytes of rigs in memory, and the numbers built and evicted since the
+    /// start.
     pub fn show_rig_cache(&self, rigs: usize, bytes: usize, builds: u64, evictions: u64) {
         let _one_scrape = self.one_scrape();
         self.rig_cache_rigs.set(count(rigs));
@@ -275,13 +279,13 @@ impl Metrics {
         raise_to(&self.rig_cache_evictions, evictions);
     }
 
-    /// Shows how many frames were recalled since the start.
+    /// Sets the number of frames answered from the inference cache since the start.
     pub fn show_recalled(&self, frames: u64) {
         let _one_scrape = self.one_scrape();
         raise_to(&self.recalled_frames, frames);
     }
 
-    /// Shows how many reports of how many cameras and bytes are kept, and how many pictures.
+    /// Sets the numbers of stored cameras, reports, bytes and images.
     pub fn show_results(&self, cameras: usize, reports: usize, bytes: usize, pictures: usize) {
         let _one_scrape = self.one_scrape();
         self.results_cameras.set(count(cameras));
@@ -290,8 +294,8 @@ impl Metrics {
         self.results_pictures.set(count(pictures));
     }
 
-    /// Shows whether reports can be stored, how many wait for it, and how many were stored and dropped
-    /// since the start.
+    /// Sets the state of the result store, the number of reports that wait, and the numbers stored
+    /// and dropped since the start.
     pub fn show_result_store(&self, up: bool, waiting: usize, stored: u64, dropped: u64) {
         let _one_scrape = self.one_scrape();
         self.results_store_up.set(i64::from(up));
@@ -300,17 +304,18 @@ impl Metrics {
         raise_to(&self.results_dropped, dropped);
     }
 
-    /// Shows how many listen, and how many were given up since the start.
+    /// Sets the number of listeners, and the number dropped since the start.
     pub fn show_listeners(&self, listeners: usize, dropped: u64) {
         let _one_scrape = self.one_scrape();
         self.results_listeners.set(count(listeners));
         raise_to(&self.results_listeners_dropped, dropped);
     }
 
-    /// All metrics in the Prometheus text format.
+    /// Returns all metrics in the Prometheus text format.
+    ///
     ///
     /// # Errors
-    /// When a metric cannot be written.
+    /// If a metric cannot be written.
     pub fn render(&self) -> Result<String, prometheus::Error> {
         let mut text = Vec::new();
         for registry in [&self.registry, &self.process] {
@@ -320,13 +325,13 @@ impl Metrics {
     }
 
     fn one_scrape(&self) -> MutexGuard<'_, Shown> {
-        // What is shown is put right by the next scrape.
+        // The next scrape corrects the rows.
         self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// One label for both: the registry tells rows apart by a hash of all their labels put together, in
-/// which `a` and `bc` are `ab` and `c`. Neither name may have a slash.
+/// One label for both names: the registry identifies rows by a hash of their concatenated labels,
+/// in which `a` and `bc` equal `ab` and `c`. Neither name may contain a slash.
 fn zone_label(calibration: &str, zone: &str) -> String {
     format!("{calibration}/{zone}")
 }

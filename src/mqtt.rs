@@ -1,7 +1,8 @@
-//! Counts and reports for an MQTT broker, and what Home Assistant needs to find them there by itself.
+//! Publishes counts and reports to an MQTT broker, with the discovery messages of Home Assistant.
 //!
-//! MQTT 3.1.1. Everything is published with `QoS` 0, as what counts is how things are now: a connection
-//! begins with all that is to be retained, so that whatever was lost with the last one does not matter.
+//! The protocol is MQTT 3.1.1. Everything is published with `QoS` 0, as only the current state
+//! matters: each connection begins with all retained messages, so messages lost with the last
+//! connection do not matter.
 
 mod broker;
 mod cameras;

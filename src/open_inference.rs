@@ -1,5 +1,6 @@
-//! How tensors are written in the Open Inference Protocol (KServe V2) over HTTP: as lists in JSON, or as
-//! bytes behind it (the extension `binary_tensor_data`). Pure; who serves it and who asks others share it.
+//! The encoding of tensors in the Open Inference Protocol (KServe V2) over HTTP: as lists in JSON,
+//! or as bytes after it (the extension `binary_tensor_data`). Without I/O; shared by the server and
+//! the client of the protocol.
 
 pub mod binary_data;
 mod datatype;
@@ -7,7 +8,7 @@ pub mod json_data;
 
 pub use datatype::Datatype;
 
-/// The header with the length of the JSON, where bytes follow it.
+/// The header with the length of the JSON, when bytes follow it.
 pub const HEAD_LENGTH: &str = "inference-header-content-length";
-/// The extension of servers that take and answer tensors as bytes.
+/// The extension of servers that accept and return tensors as bytes.
 pub const BINARY_EXTENSION: &str = "binary_tensor_data";

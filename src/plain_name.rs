@@ -1,9 +1,9 @@
-//! Plain names, `[a-z0-9][a-z0-9_-]{0,63}`: safe in file names, URLs, labels and as keys of TOML.
+//! Plain names, `[a-z0-9][a-z0-9_-]{0,63}`: safe in file names, URLs, labels and TOML keys.
 
 /// Most characters of a plain name.
 pub const MAX_CHARS: usize = 64;
 
-/// Whether a name is plain.
+/// Returns true if the name is plain.
 #[must_use]
 pub fn is_plain(name: &str) -> bool {
     let letter_or_digit = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
@@ -19,7 +19,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plain_name_hides_nothing_and_leads_nowhere() {
+    fn only_plain_names_are_accepted() {
         for plain in ["lobby", "0", "a-b_c", &"x".repeat(MAX_CHARS)] {
             assert!(is_plain(plain), "{plain}");
         }

@@ -1,4 +1,4 @@
-//! A thread that does something every few seconds until nobody needs it any more.
+//! A thread that runs a task every few seconds until it is dropped.
 
 use std::{
     io,
@@ -8,18 +8,19 @@ use std::{
     time::Duration,
 };
 
-/// A named thread with a task; its end is the thread's.
+/// A named thread that runs a task. Dropping it ends the thread.
 pub struct Poller {
-    /// Its end ends the thread.
+    /// Dropping it ends the thread.
     alive: Option<SyncSender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Poller {
-    /// Starts the thread; it does `task` every so many seconds.
+    /// Starts the thread, which runs `task` at this interval.
+    ///
     ///
     /// # Errors
-    /// When the operating system gives no thread.
+    /// If the operating system creates no thread.
     pub fn start(
         name: &str,
         seconds: NonZeroU64,
@@ -45,7 +46,7 @@ impl Drop for Poller {
     fn drop(&mut self) {
         drop(self.alive.take());
         if let Some(thread) = self.thread.take() {
-            // A task that panicked has nothing left to tell.
+            // The panic of a task was already logged.
             let _ = thread.join();
         }
     }

@@ -1,4 +1,4 @@
-//! A question to a running server, asked on its own machine: does it live, is it ready?
+//! Health checks of a running server on the same machine: liveness and readiness.
 
 use std::{
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
@@ -9,52 +9,54 @@ use reqwest::{Client, StatusCode, redirect};
 
 use crate::settings::Settings;
 
-/// Longest that the answer may take, the connection included: less than container engines wait.
+/// Longest time for the answer, including the connection: shorter than the timeouts of container
+/// engines.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// What is asked.
+/// The kind of health check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Probe {
-    /// Does the process answer?
+    /// The process answers.
     Liveness,
-    /// Can frames be sent?
+    /// The server accepts frames.
     Readiness,
 }
 
-/// Why a server did not say yes.
+/// The reason why a health check failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeError {
-    /// Nobody but the server knows its port.
+    /// The port is chosen by the system and not known here.
     #[error(
-        "server.listen: port 0 is a port of the system's choice, which only the log tells: name one"
+        "server.listen: with port 0 the system chooses the port: set a fixed port for health checks"
     )]
     PortOfTheSystem,
-    /// The HTTP client cannot be made.
-    #[error("no request can be sent")]
+    /// The HTTP client cannot be created.
+    #[error("the HTTP client cannot be created")]
     Client(#[source] reqwest::Error),
     /// There was no answer.
     #[error("{url} does not answer: is `lookdown serve` running with these settings?{hint}")]
     Silent {
-        /// Where it was asked.
+        /// The URL of the request.
         url: String,
-        /// What else may be the matter.
+        /// An additional hint.
         hint: &'static str,
-        /// Why not.
+        /// The cause.
         #[source]
         source: reqwest::Error,
     },
-    /// The answer was no.
-    #[error("{url} answered {status}: its body and the server's log say why")]
+    /// The server answered with another status than 200.
+    #[error("{url} answered {status}: see its body and the server's log")]
     Refused {
-        /// Where it was asked.
+        /// The URL of the request.
         url: String,
-        /// The answer.
+        /// The status of the answer.
         status: StatusCode,
     },
 }
 
-/// Asks the server with these settings and returns the URL that answered yes. Ends within three
+/// Checks the server with these settings. Returns the URL that answered 200. Ends within three
 /// seconds.
+///
 ///
 /// # Errors
 /// [`ProbeError`] when the answer is no, or there is none.
@@ -66,7 +68,8 @@ pub async fn ask(settings: &Settings, probe: Probe) -> Result<String, ProbeError
         .timeout(PATIENCE)
         .redirect(redirect::Policy::none())
         .no_proxy()
-        // The certificate is for the names that clients use, not for this address. Nothing secret is sent.
+        // The certificate is for the names that clients use, not for this address. Nothing secret
+        // is sent.
         .tls_danger_accept_invalid_certs(true)
         .build()
         .map_err(ProbeError::Client)?;
@@ -84,8 +87,8 @@ pub async fn ask(settings: &Settings, probe: Probe) -> Result<String, ProbeError
     }
 }
 
-/// Where the server answers probes: on the port of metrics if there is one, as that speaks plain HTTP
-/// and asks nobody for a certificate.
+/// Returns the URL of a probe: on the metrics port if there is one, because that port speaks plain
+/// HTTP and requests no client certificate.
 fn url(settings: &Settings, probe: Probe) -> Result<String, ProbeError> {
     let (scheme, address) = match (settings.server.metrics_listen, &settings.tls) {
         (Some(address), _) => ("http", address),
@@ -102,7 +105,7 @@ fn url(settings: &Settings, probe: Probe) -> Result<String, ProbeError> {
     Ok(format!("{scheme}://{}/{path}", reachable(address)))
 }
 
-/// An address to connect to, for one to listen on.
+/// The address to connect to for a listening address.
 fn reachable(address: SocketAddr) -> SocketAddr {
     let ip = match address.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
@@ -112,7 +115,7 @@ fn reachable(address: SocketAddr) -> SocketAddr {
     SocketAddr::new(ip, address.port())
 }
 
-/// What else may be the matter with a server that does not answer.
+/// Returns a further cause why a server may not answer.
 fn hint(settings: &Settings) -> &'static str {
     let asks_for_certificates = settings
         .tls

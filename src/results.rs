@@ -1,5 +1,5 @@
-//! What was found last: the latest report of each camera and some before it, for whoever asks later
-//! or listens. A report is the bytes that its sender was answered, whatever they say.
+//! The result store: the latest report of each camera and some earlier ones, for later queries and
+//! for live streams. A report is stored as the exact bytes that answered its frame.
 
 mod listeners;
 mod memory;

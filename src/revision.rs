@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-/// Digits of the hash that are shown: enough to tell the versions of one thing apart.
+/// Digits of the hash that are shown: enough to distinguish the versions of one file.
 const SHOWN_DIGITS: usize = 12;
 
-/// The SHA-256 of `content`, hexadecimal.
+/// Returns the SHA-256 of `content`, hexadecimal.
 #[must_use]
 pub fn sha256_of(content: &[u8]) -> String {
     let digest = Sha256::digest(content);
@@ -18,7 +18,8 @@ pub fn sha256_of(content: &[u8]) -> String {
     })
 }
 
-/// The revision of `content`: twelve hexadecimal digits that change whenever the content does.
+/// Returns the revision of `content`: twelve hexadecimal digits that change whenever the content
+/// does.
 #[must_use]
 pub fn revision_of(content: &[u8]) -> String {
     let mut digits = sha256_of(content);
@@ -31,8 +32,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_revision_is_the_beginning_of_the_content_s_sha256() {
-        // sha256 of nothing, as in FIPS 180-4's test vectors.
+    fn a_revision_is_the_beginning_of_the_sha256() {
+        // The SHA-256 of the empty input, as in the test vectors of FIPS 180-4.
         assert_eq!(revision_of(b""), "e3b0c44298fc");
         assert_ne!(revision_of(b"a"), revision_of(b"b"));
     }

@@ -1,5 +1,5 @@
-//! Sockets: connections are accepted within limits, served over HTTP/1.1 and brought to an end in
-//! order. Knows nothing of what is asked and answered on them.
+//! The HTTP/1.1 server: it accepts connections within limits and closes them in order. It is
+//! independent of the service that answers the requests.
 
 mod accept;
 mod connection;
@@ -27,25 +27,25 @@ use self::{
 };
 use crate::{metrics::Metrics, shutdown::Shutdown, tls::Tls};
 
-/// Longest that the handshake and the head of a connection beyond the limit may take. A probe needs
+/// Longest time for the handshake and the head on a connection beyond the limit. A probe needs
 /// milliseconds.
 const HEADER_TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_millis(500);
 
-/// What connections may cost.
+/// The limits of connections.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConnectionLimits {
     /// Most connections that are served at the same time.
     pub max_connections: NonZeroUsize,
-    /// Longest that the head of a request may take: on a new connection from the start, on one
-    /// that has served requests from the head's first byte.
+    /// Longest time for the head of a request. On a new connection it includes the time before the
+    /// first byte. Later it begins with the head's first byte.
     pub header_timeout: Duration,
-    /// Longest that a connection may stand still between two requests, or because its client does
-    /// not take what it is sent.
+    /// Longest time that a connection may be idle between two requests, or blocked because its
+    /// client does not read the response.
     pub idle_timeout: Duration,
-    /// Most bytes of a request's head. More than this is the service's to refuse; a head of more
-    /// than twice as many never reaches it.
+    /// Most bytes of a request's head. The service refuses a longer head, and a head of more than
+    /// twice as many bytes never reaches it.
     pub max_header_bytes: usize,
-    /// Most headers of a request, in the same way.
+    /// Most headers of a request, under the same rule.
     pub max_headers: usize,
 }
 
@@ -61,20 +61,20 @@ impl Default for ConnectionLimits {
     }
 }
 
-/// What answers. Each request carries the address of its client, a [`std::net::SocketAddr`], among its
+/// The services that answer. Each request carries the address of its client, a [`std::net::SocketAddr`], among its
 /// extensions.
 #[derive(Debug, Clone)]
 pub struct Services<S> {
-    /// What answers within the limit of connections.
+    /// The service for connections within the limit.
     pub regular: S,
-    /// What answers the one request of a connection beyond it.
+    /// The service for the single request of a connection beyond the limit.
     pub beyond_limit: S,
 }
 
-/// Serves until `shutdown` has come to draining. Then what has connected by then is accepted, idle
-/// connections are closed, and those with a request in flight when it is answered; when none is
-/// left, this ends. Dropped, it closes all of them at once. With `tls`, every connection begins with
-/// a handshake.
+/// Serves until `shutdown` reaches draining. Then connections in the backlog are accepted, idle
+/// ones are closed, and those with a request in flight are closed after its response. The function
+/// returns when none is left. Dropping it closes all connections at once. With `tls`, every
+/// connection begins with a handshake.
 pub async fn serve<S, B>(
     listener: TcpListener,
     tls: Option<&Arc<Tls>>,

@@ -1,4 +1,4 @@
-//! Being told to stop: announced, then drained; a second time, at once.
+//! The request to stop: it is announced, then the server drains. A second request ends it at once.
 
 use std::io;
 
@@ -7,20 +7,20 @@ use tokio::{
     sync::watch,
 };
 
-/// How far the end has come.
+/// The stage of the shutdown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Stage {
-    /// Nobody asked for it.
+    /// No stop was requested.
     Running,
-    /// It is announced, and everything is still served.
+    /// The stop is announced, and requests are still served.
     Announced,
-    /// What is in flight is finished, and nothing new begun.
+    /// Requests in flight are finished, and no new ones are accepted.
     Draining,
-    /// Nothing is finished any more.
+    /// Requests in flight are aborted.
     AtOnce,
 }
 
-/// Carries the request to stop to whoever must know. Clones share it.
+/// Passes the request to stop to all components. Clones share it.
 #[derive(Debug, Clone)]
 pub struct Shutdown(watch::Sender<Stage>);
 
@@ -31,11 +31,12 @@ impl Default for Shutdown {
 }
 
 impl Shutdown {
-    /// A shutdown that SIGTERM and SIGINT ask for, the latter without a pause; from here on they no
-    /// longer end the process by themselves. Needs a tokio runtime.
+    /// Creates a shutdown that SIGTERM and SIGINT request, the latter without a grace period. From
+    /// now on these signals no longer end the process by themselves. Needs a tokio runtime.
+    ///
     ///
     /// # Errors
-    /// When the operating system refuses a handler.
+    /// If the operating system refuses a handler.
     pub fn on_signals() -> io::Result<Self> {
         let shutdown = Self::default();
         let mut terminate = signal(SignalKind::terminate())?;
@@ -52,12 +53,12 @@ impl Shutdown {
         Ok(shutdown)
     }
 
-    /// Asks for an orderly end, and when one was asked for already, for an end at once.
+    /// Requests a graceful shutdown. A second request ends the server at once.
     pub fn request(&self) {
         self.ask_for(Stage::Announced);
     }
 
-    /// The same, with nobody to whom the end must be announced first.
+    /// Requests a graceful shutdown without a grace period.
     pub fn request_without_pause(&self) {
         self.ask_for(Stage::Draining);
     }
@@ -71,7 +72,7 @@ impl Shutdown {
         });
     }
 
-    /// The end was announced long enough.
+    /// Ends the grace period.
     pub fn drain(&self) {
         self.0.send_modify(|now| *now = (*now).max(Stage::Draining));
     }
@@ -80,29 +81,29 @@ impl Shutdown {
         *self.0.borrow()
     }
 
-    /// Whether an end was asked for.
+    /// Returns true if a stop was requested.
     #[must_use]
     pub fn is_requested(&self) -> bool {
         self.stage() >= Stage::Announced
     }
 
-    /// Waits until an end was asked for.
+    /// Waits until a stop is requested.
     pub async fn requested(&self) {
         self.reached(Stage::Announced).await;
     }
 
-    /// Waits until nothing new is to be begun.
+    /// Waits until the server drains.
     pub async fn draining(&self) {
         self.reached(Stage::Draining).await;
     }
 
-    /// Waits until an end at once was asked for.
+    /// Waits until an immediate stop is requested.
     pub async fn requested_at_once(&self) {
         self.reached(Stage::AtOnce).await;
     }
 
     async fn reached(&self, stage: Stage) {
-        // The sender is `self`, so the channel cannot close meanwhile.
+        // The sender is `self`, so the channel cannot close during the wait.
         let _ = self.0.subscribe().wait_for(|now| *now >= stage).await;
     }
 }
@@ -112,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_end_is_announced_then_drained_and_at_the_second_request_at_once() {
+    fn a_stop_is_announced_then_drained_then_immediate() {
         let shutdown = Shutdown::default();
         assert!(!shutdown.is_requested());
         shutdown.request();
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_waits_in_person_gets_no_pause_and_the_second_time_no_patience() {
+    fn interrupt_skips_the_grace_period_and_a_second_ends_at_once() {
         let shutdown = Shutdown::default();
         shutdown.request_without_pause();
         assert_eq!(shutdown.stage(), Stage::Draining);

@@ -1,4 +1,4 @@
-//! What operators get to see of a running server beside its metrics: logs and traces.
+//! Logs and traces. Metrics are in `metrics`.
 
 mod collector;
 mod incoming;

@@ -1,5 +1,5 @@
-//! TLS: the server's certificate and private key, read again when their files change, and the
-//! handshakes made with them; and TLS towards others.
+//! TLS: the server's certificate and private key, reloaded when their files change, the handshakes,
+//! and TLS for outgoing connections.
 
 mod client;
 mod error;
@@ -25,20 +25,21 @@ pub use options::TlsOptions;
 use self::{files::TlsFiles, handshake::shake_hands, identity::Identity};
 use crate::{metrics::Metrics, watched_file::Complaint};
 
-/// The certificate and the private key that serve now.
+/// The current certificate and private key.
 pub struct Tls {
     options: TlsOptions,
     metrics: Arc<Metrics>,
     serving: RwLock<Arc<Identity>>,
-    /// About the newest files. Held for as long as they are read.
+    /// The last logged problem of the files. Locked while the files are read.
     complaint: Mutex<Complaint>,
 }
 
 impl Tls {
-    /// Reads the files that `options` name.
+    /// Reads the files that `options` names.
+    ///
     ///
     /// # Errors
-    /// [`TlsError`] when they cannot be used.
+    /// [`TlsError`] if they cannot be used.
     pub fn open(options: TlsOptions, metrics: Arc<Metrics>) -> Result<Self, TlsError> {
         let files = TlsFiles::read(&options)?;
         let identity = Identity::new(&files, &options)?;
@@ -51,14 +52,14 @@ impl Tls {
         })
     }
 
-    /// How often the files are to be read again, seconds; `None` for never.
+    /// Interval between two reads of the files, seconds. `None` disables the reload.
     #[must_use]
     pub fn poll_seconds(&self) -> Option<NonZeroU64> {
         self.options.poll_seconds
     }
 
-    /// Reads the files again. If they cannot be used, what serves stays what it was, and the log
-    /// says why, once for each reason. Connections that are there stay as they are.
+    /// Reads the files again. If they cannot be used, the current certificate stays in use, and the
+    /// reason is logged once. Open connections are not affected.
     pub fn refresh(&self) {
         let complaint = self.complaint.lock();
         let mut complaint = complaint.unwrap_or_else(PoisonError::into_inner);
@@ -74,7 +75,7 @@ impl Tls {
             Err(error) => {
                 let problem = error.to_string();
                 if complaint.is_news(&problem) {
-                    tracing::error!("{problem}; the certificate that serves stays what it was");
+                    tracing::error!("{problem}; the previous certificate stays in use");
                     let loads = &self.metrics.tls_certificate_loads;
                     loads.with_label_values(&["failure"]).inc();
                 }
@@ -82,15 +83,15 @@ impl Tls {
         }
     }
 
-    /// Makes an encrypted connection of a plain one; `None` when the other end cannot, will not or
-    /// must not, or takes too long.
+    /// Performs the TLS handshake of a connection. Returns `None` if it fails, is refused, or takes
+    /// too long.
     pub async fn accept(&self, connection: TcpStream) -> Option<TlsStream<TcpStream>> {
         let config = Arc::clone(&self.serving().config);
         let handshake = shake_hands(connection, config);
         let (result, encrypted) = match timeout(self.options.handshake_timeout, handshake).await {
             Ok(Ok(encrypted)) => ("success", Some(encrypted)),
             Ok(Err(error)) => {
-                tracing::debug!("no TLS handshake: {error}");
+                tracing::debug!("a TLS handshake failed: {error}");
                 ("failure", None)
             }
             Err(_) => {
@@ -103,7 +104,7 @@ impl Tls {
         encrypted
     }
 
-    /// What the files hold now, if it is not what serves.
+    /// The identity in the files, if it differs from the current one.
     fn newer(&self) -> Result<Option<Identity>, TlsError> {
         let files = TlsFiles::read(&self.options)?;
         if files.digest() == self.serving().digest {
@@ -118,12 +119,12 @@ impl Tls {
     }
 }
 
-/// Shows what serves from now on in the metrics, and in the log what somebody should look at.
+/// Publishes the current certificate in the metrics, and logs warnings about it.
 fn show(identity: &Identity, options: &TlsOptions, metrics: &Metrics) {
     identity.warn(Timestamp::now(), options);
     let loads = &metrics.tls_certificate_loads;
     loads.with_label_values(&["success"]).inc();
-    // An alert must see the first failure, too: its counter is there from the start.
+    // An alert needs the first failure, too: its counter exists from the start.
     loads.with_label_values(&["failure"]);
     let expiry = &metrics.tls_certificate_expiry;
     match identity.validity {

@@ -1,5 +1,5 @@
-//! Small files that operators change while the server runs: they are read again and again, and what is
-//! wrong with them is told once.
+//! Small files that operators change while the server runs. They are polled, and each problem with
+//! them is reported once.
 
 use std::{
     fs::File,
@@ -7,13 +7,14 @@ use std::{
     path::Path,
 };
 
-/// A hundred certificates take a tenth of it, a thousand keys a fifth.
+/// Most bytes of a file. A hundred certificates take a tenth of it, a thousand keys a fifth.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Reads a file of at most 1 MiB.
 ///
+///
 /// # Errors
-/// When it cannot be read, or is larger.
+/// If it cannot be read, or is larger.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut content = Vec::new();
     let read = File::open(path)?
@@ -25,17 +26,17 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(content)
 }
 
-/// Why the newest version of a file is not used, as it was last told.
+/// The last reported reason why the newest version of a file is not used.
 #[derive(Debug, Default)]
 pub struct Complaint(Option<String>);
 
 impl Complaint {
-    /// Nothing is wrong any more: the next problem is to be told, whatever it is.
+    /// Clears the problem: the next one is reported, even if it is the same.
     pub fn settle(&mut self) {
         self.0 = None;
     }
 
-    /// Whether this problem is to be told: it is not the one that was told last.
+    /// Returns true if this problem is to be reported: it is not the last one reported.
     pub fn is_news(&mut self, problem: &str) -> bool {
         let is_news = self.0.as_deref() != Some(problem);
         if is_news {
@@ -50,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_problem_is_told_once_until_it_changes_or_goes() {
+    fn a_problem_is_reported_once_until_it_changes_or_ends() {
         let mut complaint = Complaint::default();
         let told = ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_news(problem));
         assert_eq!(told, [true, false, true, true]);

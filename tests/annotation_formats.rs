@@ -1,5 +1,5 @@
-//! What is written for annotation tools is read back as a data set.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! Files for annotation tools are read back as a data set.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::{fs, path::Path};
 
@@ -34,7 +34,7 @@ fn write(format: AnnotationFormat, images: &[AnnotatedImage], folder: &Path) {
 }
 
 #[test]
-fn coco_with_calibrations_beside_it_is_a_data_set() {
+fn coco_with_calibrations_is_read_back_as_a_data_set() {
     let folder = tempfile::tempdir().unwrap();
     let calibrations = folder.path().join("calibrations");
     fs::create_dir(&calibrations).unwrap();
@@ -58,7 +58,7 @@ fn coco_with_calibrations_beside_it_is_a_data_set() {
 }
 
 #[test]
-fn voc_with_pictures_beside_it_is_a_data_set() {
+fn voc_with_images_is_read_back_as_a_data_set() {
     let folder = tempfile::tempdir().unwrap();
     let images = [image("a & b.jpg", 10.25), image("hall/c.jpg", 300.0)];
     for image in &images {

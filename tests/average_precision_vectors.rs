@@ -1,11 +1,11 @@
 //! Known answers for matching, precision and recall, and average precision.
 //!
 //! `fixtures/pipeline_ap.json` comes from an independent Python implementation, itself compared
-//! with `pycocotools`; `fixtures/average_precision_with_ignore_regions.json` holds what
-//! `pycocotools` says. See `fixtures/make_detection_vectors.py`.
+//! with `pycocotools`. `fixtures/average_precision_with_ignore_regions.json` holds the results of
+//! `pycocotools`. See `fixtures/make_detection_vectors.py`.
 #![expect(
     clippy::unwrap_used,
-    reason = "a fixture that does not read is a failed test"
+    reason = "a fixture that cannot be parsed fails the test"
 )]
 
 use std::collections::BTreeMap;
@@ -114,7 +114,7 @@ fn assert_close(actual: f64, known: f64, what: &str) {
 }
 
 #[test]
-fn curves_and_average_precisions_are_the_known_ones() {
+fn curves_and_average_precisions_match_known_answers() {
     let fixture: Fixture = serde_json::from_str(include_str!("fixtures/pipeline_ap.json")).unwrap();
     let images = images(&fixture.gt, &BTreeMap::new(), &fixture.detections);
     for (name, rule, min_iou) in [

@@ -1,11 +1,8 @@
 //! Known answers for hard NMS and both Soft-NMS variants.
 //!
-//! `fixtures/pipeline_nms.json` comes from an independent Python implementation, itself compared
-//! with `OpenCV`'s Soft-NMS; see `fixtures/make_detection_vectors.py`.
-#![expect(
-    clippy::unwrap_used,
-    reason = "a fixture that does not read is a failed test"
-)]
+//! `fixtures/pipeline_nms.json` comes from an independent Python implementation that was itself
+//! compared with `OpenCV`'s Soft-NMS: see `fixtures/make_detection_vectors.py`.
+#![expect(clippy::unwrap_used, reason = "an unreadable fixture fails the test")]
 
 use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
 use serde::Deserialize;
@@ -38,7 +35,7 @@ struct Kept {
 }
 
 impl Answer {
-    /// The fixture leaves out the number a method does not use; any will do.
+    /// The fixture omits the parameter that a method does not use. Any value works for it.
     fn parameters(&self) -> RefinementParameters {
         RefinementParameters {
             refinement: match self.method.as_str() {
@@ -75,7 +72,7 @@ fn candidates(fixture: &Fixture) -> Vec<Candidate> {
 }
 
 #[test]
-fn every_iou_is_the_known_one() {
+fn every_iou_equals_the_known_value() {
     let fixture = fixture();
     let candidates = candidates(&fixture);
     for (a, row) in candidates.iter().zip(&fixture.iou) {

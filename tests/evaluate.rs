@@ -1,6 +1,6 @@
-//! `lookdown eval` on data sets of every form, made of what `lookdown detect` finds in a sample:
-//! whoever is asked twice must agree with the first answer, angles and all.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! `lookdown eval` on data sets of every format, made from the detections of `lookdown detect` in a
+//! sample. A second run must agree with the first, including angles.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::{
     path::Path,
@@ -30,7 +30,7 @@ fn lookdown(arguments: &[&str]) -> Output {
     output
 }
 
-/// The persons found in the sample, without a calibration.
+/// The persons detected in the sample, without a calibration.
 fn found() -> Vec<Value> {
     let output = lookdown(&["detect", "samples/office.jpg"]);
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -47,7 +47,7 @@ fn corners(person: &Value) -> [f64; 4] {
     numbers(&person["box"], ["x_min", "y_min", "x_max", "y_max"])
 }
 
-/// The row that `lookdown eval` prints of a folder with the sample and these files.
+/// The row that `lookdown eval` prints for a folder with the sample and these files.
 fn evaluated(picture: &str, files: &[(&str, String)]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| {
@@ -65,7 +65,7 @@ fn evaluated(picture: &str, files: &[(&str, String)]) -> Value {
 }
 
 #[track_caller]
-fn assert_everybody_was_found(row: &Value, persons: usize) {
+fn assert_all_were_detected(row: &Value, persons: usize) {
     assert_eq!(row["persons"], persons);
     for figure in ["ap50", "ap75", "recall"] {
         assert_eq!(row[figure], 1.0, "{figure} in {row}");
@@ -82,7 +82,7 @@ fn coco_file(boxes: impl Iterator<Item = Vec<f64>>) -> String {
 }
 
 #[test]
-fn rotated_boxes_are_found_by_the_oriented_boxes_they_were_made_of() {
+fn rotated_boxes_match_their_oriented_boxes() {
     let found = found();
     let boxes = found.iter().map(|person| {
         let names = ["cx", "cy", "width", "height", "angle_deg"];
@@ -90,22 +90,22 @@ fn rotated_boxes_are_found_by_the_oriented_boxes_they_were_made_of() {
     });
     let file = ("annotations/office.json", coco_file(boxes));
     let row = evaluated("office/o.jpg", &[file]);
-    assert_everybody_was_found(&row, found.len());
+    assert_all_were_detected(&row, found.len());
 }
 
 #[test]
-fn boxes_of_a_coco_file_are_found() {
+fn boxes_of_a_coco_file_are_matched() {
     let found = found();
     let boxes = found.iter().map(|person| {
         let [x_min, y_min, x_max, y_max] = corners(person);
         vec![x_min, y_min, x_max - x_min, y_max - y_min]
     });
     let row = evaluated("images/o.jpg", &[("annotations.json", coco_file(boxes))]);
-    assert_everybody_was_found(&row, found.len());
+    assert_all_were_detected(&row, found.len());
 }
 
 #[test]
-fn boxes_of_voc_files_are_found() {
+fn boxes_of_voc_files_are_matched() {
     let found = found();
     let objects = found.iter().map(|person| {
         let [x_min, y_min, x_max, y_max] = corners(person);
@@ -117,11 +117,11 @@ fn boxes_of_voc_files_are_found() {
     let objects: Vec<_> = objects.collect();
     let xml = format!("<annotation>{}</annotation>", objects.concat());
     let row = evaluated("JPEGImages/o.jpg", &[("Annotations/o.xml", xml)]);
-    assert_everybody_was_found(&row, found.len());
+    assert_all_were_detected(&row, found.len());
 }
 
 #[test]
-fn heads_are_found_by_the_boxes_they_lie_in() {
+fn heads_match_the_boxes_that_contain_them() {
     let found = found();
     let heads = found.iter().map(|person| {
         let [x_min, y_min, x_max, y_max] = corners(person);
@@ -134,5 +134,5 @@ fn heads_are_found_by_the_boxes_they_lie_in() {
         "omni1A_test1/o.jpg",
         &[(csv, format!("1{}\n", heads.concat()))],
     );
-    assert_everybody_was_found(&row, found.len());
+    assert_all_were_detected(&row, found.len());
 }

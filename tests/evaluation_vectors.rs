@@ -1,8 +1,8 @@
-//! Known answers for rotated boxes and for the figures by stratum, from masks tested pixel by
-//! pixel and from `pycocotools`: see `fixtures/make_evaluation_vectors.py`.
+//! Known answers for rotated boxes and for the figures by stratum, from masks tested pixel by pixel
+//! and from `pycocotools`: see `fixtures/make_evaluation_vectors.py`.
 #![expect(
     clippy::unwrap_used,
-    reason = "a fixture that does not read is a failed test"
+    reason = "a fixture that cannot be parsed fails the test"
 )]
 
 use std::{collections::BTreeMap, path::PathBuf};
@@ -17,8 +17,8 @@ use lookdown::{
 use serde::Deserialize;
 
 const TOLERANCE: f64 = 1e-12;
-/// What pixels may differ from the exact polygons, and from the polygons as `pycocotools` draws
-/// them: boxes are 15 pixels wide and more.
+/// The tolerance between pixel masks and exact polygons, and the polygons as `pycocotools` draws
+/// them: boxes are at least 15 pixels wide.
 const RASTER_TOLERANCE: f64 = 0.02;
 
 #[track_caller]
@@ -56,7 +56,7 @@ fn rotated_boxes() -> RotatedBoxes {
 }
 
 #[test]
-fn rotated_boxes_overlap_by_the_pixels_whose_centres_they_share() {
+fn rotated_boxes_overlap_by_shared_pixel_centres() {
     let RotatedBoxes { frame, pairs } = rotated_boxes();
     assert_eq!(pairs.len(), 150);
     for pair in pairs {
@@ -69,7 +69,7 @@ fn rotated_boxes_overlap_by_the_pixels_whose_centres_they_share() {
 }
 
 #[test]
-fn rotated_boxes_overlap_as_their_exact_polygons_do_to_the_pixel() {
+fn overlaps_of_rotated_boxes_agree_with_exact_polygons() {
     let RotatedBoxes { frame, pairs } = rotated_boxes();
     for pair in pairs {
         let iou = rotated(pair.a, frame).iou(&rotated(pair.b, frame));
@@ -79,7 +79,7 @@ fn rotated_boxes_overlap_as_their_exact_polygons_do_to_the_pixel() {
 }
 
 #[test]
-fn a_rotated_box_becomes_the_bounds_of_the_ellipse_in_it() {
+fn rotated_boxes_convert_to_bounds_of_their_ellipses() {
     let RotatedBoxes { frame, pairs } = rotated_boxes();
     for pair in pairs {
         let bounds = rotated(pair.a, frame).inscribed_ellipse_bounds().unwrap();
@@ -115,7 +115,7 @@ struct CocoAnswer {
 }
 
 #[test]
-fn average_precision_of_rotated_boxes_and_ignore_regions_is_that_of_pycocotools() {
+fn average_precision_of_rotated_boxes_agrees_with_pycocotools() {
     let text = include_str!("fixtures/rotated_average_precision.json");
     let fixture: RotatedSet = serde_json::from_str(text).unwrap();
     let outline = |numbers: &[f64; 5]| Outline::Rotated(rotated(*numbers, fixture.frame));
@@ -180,7 +180,7 @@ impl Placed {
 }
 
 #[test]
-fn strata_have_the_figures_that_pycocotools_gives_area_ranges() {
+fn strata_agree_with_area_ranges_of_pycocotools() {
     let fixture: StrataSet = serde_json::from_str(include_str!("fixtures/strata.json")).unwrap();
     let of_image = |all: &[Placed], id: u64| -> Vec<Outline> {
         let here = all.iter().filter(|placed| placed.image_id == id);

@@ -1,6 +1,6 @@
-//! Everything the fuzzers began with or found worth keeping is survived; `docs/reliability.md` says
-//! how they are run.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! Replays the seeds of the fuzzers and the inputs that they kept. `docs/reliability.md` describes
+//! how the fuzzers are run.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 #[path = "../fuzz/src/lib.rs"]
 mod targets;
@@ -9,7 +9,8 @@ use std::{fs, path::Path};
 
 use targets::{importer, merge, picture, request, settings};
 
-/// Feeds every file below `folder` to `read`; how many were taken for what it is for.
+/// Passes every file below `folder` to `read`. Returns the number of files that were accepted as
+/// valid.
 fn replay(folder: &str, read: impl Fn(&[u8]) -> bool) -> usize {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let Ok(entries) = fs::read_dir(&folder) else {
@@ -19,7 +20,7 @@ fn replay(folder: &str, read: impl Fn(&[u8]) -> bool) -> usize {
     files.filter(|file| read(&fs::read(file).unwrap())).count()
 }
 
-/// Replays the seeds and finds of one target, and those that `folders` hold besides.
+/// Replays the seeds and the corpus of one target, and the files of `folders`.
 fn replay_all(name: &str, folders: &[&str], read: impl Fn(&[u8]) -> bool) {
     let own = [format!("fuzz/seeds/{name}"), format!("fuzz/corpus/{name}")];
     let folders = own
@@ -27,7 +28,7 @@ fn replay_all(name: &str, folders: &[&str], read: impl Fn(&[u8]) -> bool) {
         .map(String::as_str)
         .chain(folders.iter().copied());
     let taken: usize = folders.map(|folder| replay(folder, &read)).sum();
-    assert!(taken > 0, "{name}: nothing got as far as what is fuzzed");
+    assert!(taken > 0, "{name}: no input reached the fuzzed code");
 }
 
 #[test]

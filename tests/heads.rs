@@ -1,6 +1,6 @@
-//! Output heads against a dense reference in another language
+//! Output heads against a reference implementation in another language
 //! (`tests/fixtures/heads/make_head_vectors.py`).
-#![expect(clippy::unwrap_used, reason = "a broken fixture should stop the test")]
+#![expect(clippy::unwrap_used, reason = "an invalid fixture fails the test")]
 
 use lookdown::{
     imaging::NetworkInput,
@@ -9,7 +9,7 @@ use lookdown::{
 use serde::Deserialize;
 
 /// Both sides compute in 64-bit floats from the same 32-bit values, so only the order of a few
-/// roundings differs. Sides in pixels, of boxes up to some hundred pixels.
+/// roundings differs. Unit: pixels, for boxes up to some hundred pixels.
 const SIDE_TOLERANCE: f64 = 1e-9;
 const SCORE_TOLERANCE: f64 = 1e-12;
 
@@ -30,7 +30,7 @@ struct Fixture {
 struct Output {
     name: String,
     shape: Vec<usize>,
-    /// `null` stands for NaN.
+    /// `null` represents NaN.
     values: Vec<Option<f32>>,
 }
 
@@ -123,7 +123,7 @@ agree! {
     rows_of_seven_columns_agree_with_the_reference: "end_to_end_seven"
 }
 
-/// The outputs as a model with a free batch axis declares them.
+/// The outputs as declared by a model with a free batch axis.
 fn declared(fixture: &Fixture) -> Vec<Vec<i64>> {
     let dimensions = |output: &Output| {
         let mut shape: Vec<i64> = output
@@ -165,7 +165,7 @@ fn every_head_accepts_its_model_with_an_open_batch_axis() {
 }
 
 #[test]
-fn every_head_refuses_a_model_whose_outputs_have_an_axis_too_many() {
+fn every_head_refuses_outputs_with_an_additional_axis() {
     for name in ALL.iter().filter(|&&name| name != "end_to_end_seven") {
         let fixture = load(name);
         let mut shapes = declared(&fixture);

@@ -1,5 +1,5 @@
-//! Annotated frames: what is painted where, and how they become bytes.
-#![expect(clippy::unwrap_used, reason = "a failed encoding is a failed test")]
+//! Annotated frames: painted pixels and encoding.
+#![expect(clippy::unwrap_used, reason = "a failed encoding fails the test")]
 
 use lookdown::imaging::Frame;
 use lookdown::imaging::annotate::{
@@ -178,7 +178,7 @@ fn an_oriented_box_turns_clockwise_from_image_up() {
     assert!(is_painted(&upright, 100, 40) && !is_painted(&upright, 160, 100));
     let lying = annotated(200, 200, &[mark(90.0)]);
     assert!(is_painted(&lying, 160, 100) && !is_painted(&lying, 100, 40));
-    // Up and to the right: the upper end of a box turned by 45° clockwise.
+    // The box is rotated by 45° clockwise, so its upper end points up and to the right.
     let leaning = annotated(200, 200, &[mark(45.0)]);
     assert!(is_painted(&leaning, 142, 57) && !is_painted(&leaning, 57, 57));
 }
@@ -198,7 +198,7 @@ fn lines_and_text_grow_with_the_frame() {
     assert!((medium / large - 1.0).abs() < 0.1, "{medium} and {large}");
 }
 
-/// What a label paints, apart from its box: left, top, right and bottom of it, in whole pixels.
+/// The rectangle painted by a label, apart from its box: left, top, right, bottom, in whole pixels.
 fn painted_by_label(width: u32, height: u32, mark: &Mark) -> [u32; 4] {
     let labelled = annotated(width, height, std::slice::from_ref(mark));
     let bare = Mark {
@@ -248,7 +248,8 @@ fn a_label_stays_whole_wherever_its_box_is() {
         }
         for bbox in borders {
             let here = size(bbox);
-            // Where it lies on its own outline, which has its colour, a line's width is not seen.
+            // Where the plate lies on its own outline of the same colour, a line's width is not
+            // visible.
             let unseen = 3 + width.min(height) / 300;
             let mut sides = here.into_iter().zip(whole);
             let is_whole = sides.all(|(here, whole)| here.abs_diff(whole) <= unseen);
@@ -262,7 +263,7 @@ fn a_label_stays_whole_wherever_its_box_is() {
 
 #[test]
 fn a_label_keeps_clear_of_heads() {
-    // Someone stands right above: the places above the box are on that one's head.
+    // A head right above the box blocks the positions above it.
     let head = Head {
         cx: 200.0,
         cy: 95.0,
@@ -289,7 +290,7 @@ fn a_label_keeps_clear_of_heads() {
 }
 
 #[test]
-fn a_caption_is_written_whole_into_the_corner_and_labels_keep_clear_of_it() {
+fn a_caption_is_complete_and_labels_keep_clear_of_it() {
     let caption = "2026-11-21 09:30:00 UTC";
     for (width, height) in [(64, 64), (300, 300), (2000, 1000)] {
         let mut frame = grey_frame(width, height);

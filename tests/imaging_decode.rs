@@ -1,8 +1,8 @@
-//! Decoding: every accepted format, upright and in RGB; everything else refused in one sentence.
+//! Decoding of every accepted format, upright and in RGB, and refusal of everything else.
 #![expect(
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "a failed read is a failed test"
+    reason = "a failed read fails the test"
 )]
 
 use lookdown::imaging::decode::{DecodeError, DecodeLimits, DecodedFrame, ExceededLimit, decode};
@@ -21,7 +21,7 @@ fn refused(bytes: &[u8]) -> DecodeError {
     decode(bytes, &DecodeLimits::default()).unwrap_err()
 }
 
-const PICTURES: [&str; 21] = [
+const IMAGES: [&str; 21] = [
     "alpha.png",
     "alpha.webp",
     "alpha_lossy.webp",
@@ -45,7 +45,7 @@ const PICTURES: [&str; 21] = [
     "thumbnail.jpg",
 ];
 
-/// Centres of the quarters of the picture that every fixture shows.
+/// Centres of the quarters of the image in every fixture.
 const QUARTERS: [((u32, u32), [u8; 3]); 4] = [
     ((40, 8), [0, 255, 0]),
     ((8, 8), [255, 0, 0]),
@@ -61,8 +61,8 @@ fn assert_close(name: &str, actual: [u8; 3], expected: [u8; 3], tolerance: u8) {
     assert!(near, "{name}: {actual:?} is not about {expected:?}");
 }
 
-fn assert_shows_the_quarters(name: &str, picture: &DecodedFrame, tolerance: u8) {
-    let frame = &picture.frame;
+fn assert_shows_the_quarters(name: &str, image: &DecodedFrame, tolerance: u8) {
+    let frame = &image.frame;
     assert_eq!((frame.width(), frame.height()), (64, 32), "{name}");
     for ((x, y), colour) in QUARTERS {
         assert_close(name, frame.pixel(x, y), colour, tolerance);
@@ -70,7 +70,7 @@ fn assert_shows_the_quarters(name: &str, picture: &DecodedFrame, tolerance: u8) 
 }
 
 #[test]
-fn every_colour_format_decodes_to_the_same_picture() {
+fn every_colour_format_decodes_to_the_same_image() {
     for name in [
         "rgb.png",
         "rgb_16_bit.png",
@@ -89,54 +89,54 @@ fn every_colour_format_decodes_to_the_same_picture() {
 fn all_eight_exif_orientations_are_turned_upright() {
     for orientation in 1..=8 {
         let name = format!("orientation_{orientation}.jpg");
-        let picture = decoded(&name);
-        assert_shows_the_quarters(&name, &picture, 4);
-        assert_eq!(picture.orientation_applied, orientation != 1, "{name}");
+        let image = decoded(&name);
+        assert_shows_the_quarters(&name, &image, 4);
+        assert_eq!(image.orientation_applied, orientation != 1, "{name}");
     }
 }
 
 #[test]
 fn png_and_webp_orientations_are_honoured_too() {
     for name in ["orientation_6.png", "orientation_6.webp"] {
-        let picture = decoded(name);
-        assert_shows_the_quarters(name, &picture, 0);
-        assert!(picture.orientation_applied, "{name}");
+        let image = decoded(name);
+        assert_shows_the_quarters(name, &image, 0);
+        assert!(image.orientation_applied, "{name}");
     }
 }
 
 #[test]
-fn grey_pictures_become_rgb_and_sixteen_bits_become_eight() {
+fn grey_images_become_rgb_and_sixteen_bits_become_eight() {
     for (name, tolerance) in [("grey.png", 0), ("grey.jpg", 4), ("grey_16_bit.png", 1)] {
-        let picture = decoded(name);
+        let image = decoded(name);
         for x in [0, 20, 63] {
             let level = u8::try_from(x * 4).unwrap();
-            assert_close(name, picture.frame.pixel(x, 9), [level; 3], tolerance);
+            assert_close(name, image.frame.pixel(x, 9), [level; 3], tolerance);
         }
     }
-    let picture = decoded("one_bit.png");
-    assert_eq!(picture.frame.pixel(31, 0), [0; 3]);
-    assert_eq!(picture.frame.pixel(32, 0), [255; 3]);
+    let image = decoded("one_bit.png");
+    assert_eq!(image.frame.pixel(31, 0), [0; 3]);
+    assert_eq!(image.frame.pixel(32, 0), [255; 3]);
 }
 
 #[test]
-fn transparent_pixels_are_laid_over_black() {
+fn transparent_pixels_are_blended_over_black() {
     for (name, tolerance) in [
         ("alpha.png", 0),
         ("alpha.webp", 0),
         ("alpha_lossy.webp", 12),
     ] {
-        let picture = decoded(name);
-        assert_close(name, picture.frame.pixel(4, 4), [0, 0, 0], tolerance);
-        assert_close(name, picture.frame.pixel(24, 4), [128, 0, 0], tolerance);
-        assert_close(name, picture.frame.pixel(60, 4), [0, 255, 0], tolerance);
+        let image = decoded(name);
+        assert_close(name, image.frame.pixel(4, 4), [0, 0, 0], tolerance);
+        assert_close(name, image.frame.pixel(24, 4), [128, 0, 0], tolerance);
+        assert_close(name, image.frame.pixel(60, 4), [0, 255, 0], tolerance);
     }
-    let picture = decoded("palette_alpha.png");
-    assert_eq!(picture.frame.pixel(4, 4), [0; 3]);
-    assert_eq!(picture.frame.pixel(60, 4), [0, 255, 0]);
+    let image = decoded("palette_alpha.png");
+    assert_eq!(image.frame.pixel(4, 4), [0; 3]);
+    assert_eq!(image.frame.pixel(60, 4), [0, 255, 0]);
 }
 
 #[test]
-fn zero_bytes_are_called_empty() {
+fn zero_bytes_are_reported_as_empty() {
     assert_eq!(refused(b""), DecodeError::Empty);
 }
 
@@ -147,7 +147,7 @@ fn fifty_bytes_that_claim_ten_thousand_megapixels_are_too_large() {
     assert_eq!(
         refused(&bytes).to_string(),
         "the image is 100000×100000 pixels; at most 8192×8192 is accepted: \
-         send a smaller picture or raise limits.max_image_side"
+         send a smaller image or raise limits.max_image_side"
     );
 }
 
@@ -203,7 +203,7 @@ fn each_limit_holds_on_its_own_for_every_container() {
 }
 
 #[test]
-fn a_picture_exactly_at_its_limits_is_accepted() {
+fn an_image_exactly_at_its_limits_is_accepted() {
     let limits = DecodeLimits {
         max_width: 64,
         max_height: 32,
@@ -214,7 +214,7 @@ fn a_picture_exactly_at_its_limits_is_accepted() {
 }
 
 #[test]
-fn the_format_is_told_from_the_content_and_others_are_named() {
+fn the_format_is_detected_from_content_and_others_are_named() {
     let found = |bytes: &[u8]| match refused(bytes) {
         DecodeError::UnsupportedFormat { found } => found,
         other => panic!("{other}"),
@@ -227,17 +227,17 @@ fn the_format_is_told_from_the_content_and_others_are_named() {
     );
     assert_eq!(
         found(b"{\"img\": \"frame.jpg\"}"),
-        "not in a known picture format"
+        "not in a known image format"
     );
     assert_eq!(
         refused(b"<html>").to_string(),
-        "the image is not in a known picture format: send a JPEG, PNG or WebP picture"
+        "the image is not in a known image format: send a JPEG, PNG or WebP image"
     );
 }
 
 #[test]
-fn a_file_cut_off_anywhere_is_an_error_and_never_grey_rows() {
-    for name in PICTURES {
+fn a_truncated_file_is_an_error_and_never_grey_rows() {
+    for name in IMAGES {
         let bytes = fixture(name);
         for length in 0..bytes.len() {
             let error = refused(&bytes[..length]);
@@ -250,7 +250,7 @@ fn a_file_cut_off_anywhere_is_an_error_and_never_grey_rows() {
 }
 
 #[test]
-fn a_cut_off_picture_says_so() {
+fn a_truncated_image_has_a_clear_error() {
     let bytes = fixture("thumbnail.jpg");
     assert_eq!(
         refused(&bytes[..bytes.len() - 40]).to_string(),
@@ -259,8 +259,8 @@ fn a_cut_off_picture_says_so() {
 }
 
 #[test]
-fn bytes_after_the_end_of_a_picture_do_no_harm() {
-    for name in PICTURES {
+fn bytes_after_the_end_of_an_image_are_ignored() {
+    for name in IMAGES {
         let mut bytes = fixture(name);
         bytes.extend_from_slice(b"\0\0\0\0 trailing \xFF");
         assert!(decode(&bytes, &DecodeLimits::default()).is_ok(), "{name}");
@@ -268,29 +268,29 @@ fn bytes_after_the_end_of_a_picture_do_no_harm() {
 }
 
 #[test]
-fn a_webp_whose_inner_frame_outgrows_its_canvas_is_refused_unread() {
+fn a_webp_frame_larger_than_its_canvas_is_refused() {
     let mut bytes = fixture("alpha_lossy.webp");
     let frame = bytes.windows(4).position(|name| name == b"VP8 ").unwrap();
     bytes[frame + 14..frame + 18].copy_from_slice(&[0xFF, 0x3F, 0xFF, 0x3F]);
     assert!(
         refused(&bytes)
             .to_string()
-            .contains("a frame is larger than the picture")
+            .contains("a frame is larger than the image")
     );
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
-    /// A decoder that panics takes a worker with it.
+    /// A panic in a decoder would terminate its worker thread.
     #[test]
-    fn damaged_pictures_never_panic(
-        picture in 0..PICTURES.len(),
+    fn damaged_images_never_panic(
+        image in 0..IMAGES.len(),
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12),
         keep in any::<prop::sample::Index>(),
         cut in any::<bool>(),
     ) {
-        let mut bytes = fixture(PICTURES[picture]);
+        let mut bytes = fixture(IMAGES[image]);
         for (at, value) in flips {
             let at = at.index(bytes.len());
             bytes[at] = value;
@@ -299,14 +299,14 @@ proptest! {
             bytes.truncate(keep.index(bytes.len()));
         }
         let limits = DecodeLimits { max_pixels: 1 << 20, ..DecodeLimits::default() };
-        if let Ok(picture) = decode(&bytes, &limits) {
-            let size = u64::from(picture.frame.width()) * u64::from(picture.frame.height());
+        if let Ok(image) = decode(&bytes, &limits) {
+            let size = u64::from(image.frame.width()) * u64::from(image.frame.height());
             prop_assert!(size <= limits.max_pixels);
         }
     }
 
     #[test]
-    fn noise_behind_a_picture_signature_never_panics(
+    fn noise_behind_an_image_signature_never_panics(
         signature in prop::sample::select(vec![
             &b"\xFF\xD8\xFF"[..], b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"RIFF\x40\0\0\0WEBPVP8 ", b"RIFF\x40\0\0\0WEBPVP8X", b"",
         ]),

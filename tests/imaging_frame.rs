@@ -1,4 +1,4 @@
-//! A frame is a size and exactly the bytes for it.
+//! Construction and access of frames.
 
 use lookdown::imaging::Frame;
 use lookdown::imaging::frame::FrameError;
@@ -33,6 +33,6 @@ fn bytes_that_do_not_fit_the_size_are_refused_in_one_sentence() {
 
 #[test]
 #[should_panic(expected = "pixel (2, 0) lies outside a frame of 2×1")]
-fn a_pixel_outside_the_frame_is_never_another_pixel() {
+fn a_pixel_outside_the_frame_panics() {
     let _ = Frame::new(2, 1, vec![0; 6]).unwrap().pixel(2, 0);
 }

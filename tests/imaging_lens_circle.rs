@@ -1,17 +1,17 @@
-//! The lens circle of painted rooms, whose circle is known: found within half a percent.
-#![expect(clippy::unwrap_used, reason = "a failed read is a failed test")]
+//! The lens circle of synthetic rooms with a known circle is found within half a percent.
+#![expect(clippy::unwrap_used, reason = "a failed read fails the test")]
 
 use lookdown::imaging::Frame;
 use lookdown::imaging::lens_circle::{LensCircle, assumed_circle, find_lens_circle};
 use proptest::prelude::*;
 
-/// A room seen through a fisheye lens, painted from formulas.
+/// A room seen through a fisheye lens, rendered from formulas.
 #[derive(Debug, Clone)]
 struct Room {
     width: u32,
     height: u32,
     circle: LensCircle,
-    /// Brightness of the walls, 0 to 255; the texture varies it by half.
+    /// Brightness of the walls, 0 to 255. The texture varies it by half.
     light: f64,
     /// Brightness of the surround, 0 to 255.
     surround: f64,
@@ -54,7 +54,7 @@ impl Room {
             } else {
                 self.light
             };
-            // Bands of furniture and windows, sharp like the rim.
+            // Bands of furniture and windows with edges as sharp as the rim.
             let bands = (23.0 * x / width).sin() * (17.0 * y / height + 0.3).cos();
             let texture =
                 1.0 + 0.2 * (9.0 * x / height).sin() + if bands > 0.4 { 0.3 } else { -0.1 };
@@ -72,11 +72,11 @@ fn paint(width: u32, height: u32, mut colour: impl FnMut(f64, f64) -> [f64; 3]) 
     let mut pixels = Vec::new();
     for y in 0..height {
         for x in 0..width {
-            // `as` saturates, which is what exposure does.
+            // `as` saturates, like overexposure.
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
-                reason = "see above"
+                reason = "saturation is intended"
             )]
             pixels.extend(colour(f64::from(x), f64::from(y)).map(|value| value as u8));
         }
@@ -84,7 +84,7 @@ fn paint(width: u32, height: u32, mut colour: impl FnMut(f64, f64) -> [f64; 3]) 
     Frame::new(width, height, pixels).unwrap()
 }
 
-/// White bars like the strokes of a burnt-in date, three strokes to a glyph.
+/// White bars like the strokes of a burnt-in date, three strokes per glyph.
 fn burn_in_caption(frame: &mut Frame, left: u32, top: u32, glyphs: u32, size: u32) {
     let stroke = (size / 7).max(1);
     let width = frame.width();
@@ -130,13 +130,13 @@ fn a_circle_that_touches_all_four_borders_is_found() {
 }
 
 #[test]
-fn a_circle_cut_off_at_the_top_and_bottom_is_found_beyond_the_frame() {
+fn a_circle_cut_off_at_the_top_and_bottom_is_found() {
     let room = Room::new(800, 450, [404.0, 220.0, 300.0]);
     assert_found(&room.paint(), &room.circle);
 }
 
 #[test]
-fn a_circle_of_which_only_the_corners_show_is_found() {
+fn a_circle_visible_only_in_the_corners_is_found() {
     let room = Room::new(600, 600, [299.0, 302.0, 360.0]);
     assert_found(&room.paint(), &room.circle);
 }
@@ -171,7 +171,7 @@ fn a_soft_rim_is_found_in_its_middle() {
 }
 
 #[test]
-fn captions_in_the_corners_do_not_count_as_picture() {
+fn captions_in_the_corners_are_ignored() {
     let room = Room::new(720, 576, [360.0, 288.0, 280.0]);
     let mut frame = room.paint();
     burn_in_caption(&mut frame, 8, 8, 9, 22);
@@ -194,7 +194,7 @@ fn the_same_pixels_give_the_same_circle() {
 }
 
 #[test]
-fn a_frame_that_the_picture_fills_has_no_circle() {
+fn a_frame_filled_by_the_lens_image_has_no_circle() {
     let room = Room::new(500, 400, [250.0, 200.0, 900.0]);
     assert_eq!(find_lens_circle(&room.paint()), None);
     let dim = Room {
@@ -264,7 +264,7 @@ proptest! {
     }
 
     #[test]
-    fn no_frame_is_too_small_or_too_wild(
+    fn any_frame_is_handled_without_a_panic(
         width in 1..80_u32,
         height in 1..80_u32,
         noise in prop::collection::vec(any::<u8>(), 1..64),

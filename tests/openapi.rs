@@ -1,5 +1,5 @@
-//! The checked-in API description, and what it promises.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! The checked-in API description: completeness and agreement with the code.
+#![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
 
 use std::{collections::BTreeSet, fs};
 
@@ -23,17 +23,17 @@ fn operations(document: &Value) -> Vec<(String, Value)> {
 }
 
 #[test]
-fn the_checked_in_document_is_that_of_the_code() {
+fn the_checked_in_document_matches_the_code() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");
     let checked_in: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     assert!(
         checked_in == document(),
-        "run `make bless` and look at the difference"
+        "run `make bless` and review the difference"
     );
 }
 
 #[test]
-fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
+fn every_operation_has_name_summary_tag_and_own_responses() {
     let document = document();
     let mut names = BTreeSet::new();
     for (path, operation) in operations(&document) {
@@ -42,7 +42,7 @@ fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
             name.contains('_'),
             "{path}: {name} is not <verb>_<resource>"
         );
-        assert!(names.insert(name.to_owned()), "{name} is there twice");
+        assert!(names.insert(name.to_owned()), "{name} is not unique");
         assert!(operation["summary"].is_string(), "{path} has no summary");
         assert!(operation["tags"][0].is_string(), "{path} has no tag");
         let statuses = operation["responses"].as_object().unwrap();
@@ -109,7 +109,7 @@ fn detection_describes_every_status_and_every_parameter() {
     for media_type in ["application/json", "image/jpeg", "image/png"] {
         assert!(
             answers.contains_key(media_type),
-            "{media_type} is not answered"
+            "{media_type} is not among the responses"
         );
     }
     let report = &answers["application/json"]["schema"]["$ref"];
@@ -117,7 +117,7 @@ fn detection_describes_every_status_and_every_parameter() {
 }
 
 #[test]
-fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
+fn bodies_have_a_schema_and_no_parameter_is_sent_twice() {
     let document = document();
     for (path, operation) in operations(&document) {
         let bodies = operation["requestBody"]["content"].as_object();
@@ -125,7 +125,7 @@ fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
             assert!(body["schema"].is_object(), "{path} {media_type}");
         }
     }
-    // What has a default is sent by itself, in the query and in the form.
+    // Generated clients send defaults by themselves, in the query and in the form.
     let query = &document["paths"]["/detect"]["post"]["parameters"];
     let form = &document["components"]["schemas"]["DetectForm"];
     for described in [query, form] {

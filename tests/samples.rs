@@ -1,5 +1,5 @@
-//! The shipped samples through the real binary with the real models, as a newcomer runs them.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! The shipped samples with the real binary and the real models, as in the quick start.
+#![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
 
 use std::{path::Path, process::Command};
 
@@ -14,7 +14,7 @@ struct Annotated {
     on_their_feet: bool,
 }
 
-/// What `lookdown detect samples/NAME.jpg FLAGS...` reports.
+/// The report of `lookdown detect samples/NAME.jpg FLAGS...`.
 fn detect(name: &str, flags: &[&str]) -> Value {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let output = Command::new(env!("CARGO_BIN_EXE_lookdown"))
@@ -75,11 +75,11 @@ fn iou(a: Corners, b: Corners) -> f64 {
 }
 
 #[test]
-fn everybody_in_the_office_is_found_without_a_calibration_and_nobody_else() {
+fn the_office_persons_are_found_exactly_without_a_calibration() {
     let report = detect("office", &[]);
     assert_eq!(report["calibration"]["assumed"], true);
-    let everybody = annotated("office");
-    for person in &everybody {
+    let expected = annotated("office");
+    for person in &expected {
         let best = persons(&report)
             .iter()
             .map(|found| iou(corners(found), person.corners))
@@ -90,7 +90,7 @@ fn everybody_in_the_office_is_found_without_a_calibration_and_nobody_else() {
             person.corners
         );
     }
-    assert_eq!(persons(&report).len(), everybody.len());
+    assert_eq!(persons(&report).len(), expected.len());
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn floor_positions_are_where_people_stand() {
     for name in ["office", "lounge"] {
         let calibration = format!("samples/calibrations/{name}.json");
         let report = detect(name, &["--calibration", &calibration]);
-        // Sitting people have no feet where they are.
+        // The feet of sitting people are not at their floor position.
         for person in annotated(name).iter().filter(|person| person.on_their_feet) {
             let found = persons(&report)
                 .iter()
@@ -119,7 +119,7 @@ fn floor_positions_are_where_people_stand() {
 }
 
 #[test]
-fn the_paper_s_three_refinements_of_the_same_boxes_differ_as_the_method_says() {
+fn the_paper_s_refinements_differ_as_their_formulas_require() {
     let scores = |refinement: &str| -> Vec<f64> {
         let flags = [
             "--profile",
@@ -137,23 +137,23 @@ fn the_paper_s_three_refinements_of_the_same_boxes_differ_as_the_method_says() {
             .collect()
     };
     let [hard, linear, gaussian] = ["nms", "soft_nms_linear", "soft_nms_gaussian"].map(scores);
-    // Nothing overlaps the best box before it is picked, so all three agree on its score.
+    // No box is selected before the best one, so all three refinements keep its score.
     assert_eq!(hard[0], linear[0]);
     assert_eq!(hard[0], gaussian[0]);
-    // Linear Soft-NMS lowers what hard NMS removes, so it keeps that and more.
+    // Linear Soft-NMS lowers scores that hard NMS removes, so it keeps more detections.
     assert!(
         linear.len() > hard.len(),
         "{} and {}",
         linear.len(),
         hard.len()
     );
-    // The Gaussian lowers every overlapping score, also below N_t = 0.5, where linear leaves it.
+    // The Gaussian lowers every overlapping score, also below N_t = 0.5, where linear does not.
     let sum = |scores: &[f64]| scores.iter().sum::<f64>();
     assert!(sum(&gaussian) < sum(&linear), "{gaussian:?} and {linear:?}");
 }
 
 #[test]
-fn quality_names_both_models_that_looked_and_the_other_profiles_one() {
+fn quality_reports_both_models_and_other_profiles_report_one() {
     let report = detect("office", &["--profile", "quality"]);
     let names = ["model", "second_opinion"].map(|part| report[part]["name"].as_str().unwrap());
     assert_eq!(names, ["nanodet_g_416", "ssdlite_mobilenet_v2_int8"]);

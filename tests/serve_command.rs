@@ -1,5 +1,5 @@
-//! `lookdown serve` as a process: how it refuses to start, and how it ends.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! `lookdown serve` as a process: the errors at its start, and its shutdown.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::{
     fs,
@@ -17,14 +17,14 @@ const LONG_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "600000");
 fn run(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
     Command::new(LOOKDOWN)
         .args(arguments)
-        // The log may tell more of it, such as of a model that cannot be loaded.
+        // The log may hold more about the same error, for example of a model that cannot be loaded.
         .envs([FREE_ADDRESS, ("LOOKDOWN__LOG__FILTER", "off")])
         .envs(environment.iter().copied())
         .output()
         .unwrap()
 }
 
-/// The sentence that the start was refused with; there must be nothing else.
+/// The error sentence of the start. There must be no other output.
 #[track_caller]
 fn refusal(output: &Output) -> String {
     let message = String::from_utf8(output.stderr.clone()).unwrap();
@@ -35,7 +35,7 @@ fn refusal(output: &Output) -> String {
 }
 
 #[test]
-fn every_setting_that_cannot_be_used_ends_the_start_with_a_sentence() {
+fn every_invalid_setting_ends_the_start_with_a_sentence() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let taken = taken.local_addr().unwrap().to_string();
     let folder = tempfile::tempdir().unwrap();
@@ -173,7 +173,7 @@ struct Server {
 }
 
 impl Server {
-    /// A server that is ready, started by a shell after `preparation`.
+    /// Starts a server by a shell after `preparation`, and waits until it is ready.
     fn start(preparation: &str, environment: &[(&str, &str)]) -> Self {
         let mut process = Command::new("sh")
             .args(["-c", &format!("{preparation}\nexec {LOOKDOWN} serve")])
@@ -195,7 +195,7 @@ impl Server {
         server
     }
 
-    /// The next log line with this in it.
+    /// The next log line that contains this text.
     fn says(&mut self, part: &str) -> String {
         let mut lines = self.log.by_ref().map(Result::unwrap);
         let line = lines.find(|line| line.contains(part));
@@ -212,7 +212,7 @@ impl Server {
         assert!(sent.unwrap().success());
     }
 
-    /// Waits for the end, which is a good one, and gives the rest of the log.
+    /// Waits for a successful exit, and returns the rest of the log.
     fn has_ended(mut self) -> Vec<String> {
         let rest = self.log.by_ref().map(Result::unwrap).collect();
         assert!(self.process.wait().unwrap().success());
@@ -222,22 +222,22 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        // Only one that a failed test has left runs still.
+        // It still runs only if a test has failed.
         let _ = self.process.kill();
     }
 }
 
 #[test]
-fn a_termination_signal_ends_the_server_in_order() {
+fn sigterm_shuts_down_gracefully() {
     let mut server = Server::start("", &[NO_GRACE]);
     server.signal("TERM");
-    server.says("told to stop");
+    server.says("stopping");
     let rest = server.has_ended();
     assert!(rest.last().unwrap().contains("stopped"), "{rest:?}");
 }
 
 #[test]
-fn an_interruption_ends_the_server_without_a_pause() {
+fn sigint_shuts_down_without_a_grace_period() {
     let server = Server::start("", &[LONG_GRACE]);
     server.signal("INT");
     server.has_ended();
@@ -247,16 +247,16 @@ fn an_interruption_ends_the_server_without_a_pause() {
 fn a_second_signal_ends_the_server_at_once() {
     let mut server = Server::start("", &[LONG_GRACE]);
     server.signal("TERM");
-    server.says("told to stop");
-    // A model is being loaded still, and must not bring the process down.
+    server.says("stopping");
+    // A model is still being loaded, which must not crash the process.
     server.signal("TERM");
-    // Not after the grace period.
+    // The process ends before the grace period is over.
     server.has_ended();
 }
 
 #[test]
-fn a_server_out_of_file_descriptors_says_so_once_and_serves_when_there_are_some() {
-    // With one model, a server that is ready needs no file any more.
+fn lack_of_file_descriptors_is_logged_once_and_recovered_from() {
+    // With a single model, a ready server opens no more files.
     let model = ("LOOKDOWN__MODEL__PATH", "models/ssdlite_mobilenet_v2");
     let mut server = Server::start("ulimit -n 64", &[NO_GRACE, model]);
     let held: Vec<_> = (0..100).map(|_| server.connect()).collect();
@@ -279,7 +279,7 @@ fn a_server_out_of_file_descriptors_says_so_once_and_serves_when_there_are_some(
 }
 
 #[test]
-fn a_health_check_asks_a_server_over_tls_whatever_names_its_certificate_is_for() {
+fn health_check_over_tls_accepts_any_certificate_name() {
     let pair = rcgen::generate_simple_self_signed(["lookdown.example".to_owned()]).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let written = |name: &str, content: String| {

@@ -1,11 +1,11 @@
-//! The paper's virtual views against known answers
-//! (`tests/fixtures/vectors/pipeline_views.json`; agrees with OpenCV's undistortion maps).
+//! The paper's virtual views against known answers (`tests/fixtures/vectors/pipeline_views.json`,
+//! which agree with OpenCV's undistortion maps).
 
 use lookdown::geometry::{FieldOfViewReading, Lens, Mount, Pixel, ViewPlan};
 use serde_json::Value;
 
 #[test]
-fn the_paper_plan_places_every_view_pixel_as_the_known_answers_say() {
+fn the_paper_plan_maps_every_view_pixel_to_the_known_position() {
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/tests/fixtures/vectors/pipeline_views.json"

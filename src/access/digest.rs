@@ -1,39 +1,40 @@
-//! Keys, and what is kept of them.
+//! API keys, and their digests.
 //!
-//! A key is 256 random bits: nobody can try them all, so a plain SHA-256 keeps it safe in a stolen
-//! file, and checking it costs a microsecond (docs/adr/0004-api-keys.md).
+//! A key is 256 random bits and cannot be guessed. A plain SHA-256 therefore keeps it safe in a
+//! stolen file, and its check takes a microsecond (docs/adr/0004-api-keys.md).
 
 use std::fmt;
 
 use sha2::{Digest, Sha256};
 use subtle::{Choice, ConstantTimeEq};
 
-/// What keys begin with, so that programs that look for leaked secrets know them.
+/// The prefix of keys, by which secret scanners recognise them.
 const PREFIX: &str = "lookdown_";
 const BYTES: usize = 32;
 
-/// A new random key: `lookdown_` and 64 hexadecimal digits.
+/// Returns a new random key: `lookdown_` and 64 hexadecimal digits.
+///
 ///
 /// # Errors
-/// When the operating system gives no random numbers.
+/// If the operating system returns no random numbers.
 pub fn new_key() -> Result<String, getrandom::Error> {
     let mut bytes = [0; BYTES];
     getrandom::fill(&mut bytes)?;
     Ok(format!("{PREFIX}{}", hexadecimal(&bytes)))
 }
 
-/// The SHA-256 of a key. Its `Debug` shows nothing of it.
+/// The SHA-256 of a key. Its `Debug` output shows nothing of it.
 #[derive(Clone)]
 pub struct KeyDigest([u8; BYTES]);
 
 impl KeyDigest {
-    /// The digest of a key as it is sent.
+    /// Computes the digest of a key as it was sent.
     #[must_use]
     pub fn of(key: &[u8]) -> Self {
         Self(Sha256::digest(key).into())
     }
 
-    /// The digest that 64 hexadecimal digits state.
+    /// Parses a digest of 64 hexadecimal digits.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let digits: Option<Vec<_>> = text.chars().map(|digit| digit.to_digit(16)).collect();
@@ -46,13 +47,13 @@ impl KeyDigest {
         Some(Self(bytes?.try_into().ok()?))
     }
 
-    /// As 64 hexadecimal digits.
+    /// Returns the digest as 64 hexadecimal digits.
     #[must_use]
     pub fn hexadecimal(&self) -> String {
         hexadecimal(&self.0)
     }
 
-    /// Whether they are equal, in a time that does not tell how much of them is.
+    /// Compares in constant time.
     pub(super) fn equals(&self, other: &Self) -> Choice {
         self.0.ct_eq(&other.0)
     }
@@ -81,7 +82,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    /// FIPS 180-4's example.
+    /// The example of FIPS 180-4.
     const OF_ABC: &str = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
 
     #[test]

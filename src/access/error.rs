@@ -1,17 +1,16 @@
-//! Keys that cannot be used.
+//! Errors of keys that cannot be used.
 
 use std::{io, path::PathBuf};
 
-/// Keys that cannot be used. No message repeats what was given: somebody may have written a key
-/// where something else belongs.
+/// Keys that cannot be used. No message repeats the input: it may be a key in the wrong position.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file cannot be read.
-    #[error("access.keys_file: {} cannot be read ({cause}): check its path and who may read it", path.display())]
+    #[error("access.keys_file: {} cannot be read ({cause}): check its path and its permissions", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         cause: io::Error,
     },
     /// The file has keys that cannot be used.
@@ -19,10 +18,10 @@ pub enum KeyError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         problem: Box<KeyError>,
     },
-    /// The text has another shape.
+    /// The text has another form.
     #[error(
         "line {line}: a key is a line of the form name = {{ scopes = [\"detect\"], sha256 = \
          \"64 hexadecimal digits\" }}, as `lookdown key new` prints it"
@@ -31,45 +30,45 @@ pub enum KeyError {
         /// The line, from 1.
         line: usize,
     },
-    /// An entry of the environment has another shape.
+    /// An entry of the environment has another form.
     #[error(
         "key {position} is not of the form name:scope+scope:sha256, as `lookdown key new` prints it"
     )]
     Entry {
-        /// Which it is, from 1.
+        /// The position of the key, from 1.
         position: usize,
     },
-    /// A name that is none.
+    /// The name is invalid.
     #[error("key {position}: {}", super::InvalidKeyName)]
     Name {
-        /// Which key it is, from 1.
+        /// The position of the key, from 1.
         position: usize,
     },
-    /// A scope that is none, or no scope.
+    /// A scope is unknown, or there is none.
     #[error("key {position}: give one or more of the scopes detect, read and admin")]
     Scopes {
-        /// Which key it is, from 1.
+        /// The position of the key, from 1.
         position: usize,
     },
-    /// A digest that is none.
+    /// The digest is invalid.
     #[error(
         "key {position}: sha256 must be the 64 hexadecimal digits that `lookdown key new` prints, \
          never the key itself"
     )]
     Digest {
-        /// Which key it is, from 1.
+        /// The position of the key, from 1.
         position: usize,
     },
-    /// Two keys of the same name.
-    #[error("key {position}: its name is another key's, too: give each key its own")]
+    /// Two keys have the same name.
+    #[error("key {position}: its name is used twice: give each key its own name")]
     Repeated {
-        /// Which key it is, from 1.
+        /// The position of the key, from 1.
         position: usize,
     },
-    /// More keys than anybody needs.
-    #[error("there are more than {most} keys: remove those that nobody uses")]
+    /// There are too many keys.
+    #[error("there are more than {most} keys: remove unused ones")]
     TooMany {
-        /// Most there may be.
+        /// The maximum number.
         most: usize,
     },
 }

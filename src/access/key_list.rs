@@ -7,15 +7,15 @@ use subtle::{Choice, ConditionallySelectable};
 
 use super::{KeyDigest, KeyError, KeyName, Scope, Scopes};
 
-/// Every request is compared with all keys.
+/// Most keys: every request is compared with all of them.
 const MAX_KEYS: usize = 1000;
 
-/// Whose a key is, and what it opens.
+/// The holder of a key: its name and its scopes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Holder {
-    /// What people call the key.
+    /// The name of the key.
     pub name: KeyName,
-    /// What it opens.
+    /// The operations that the key permits.
     pub scopes: Scopes,
 }
 
@@ -23,7 +23,7 @@ pub struct Holder {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct KeyList(Vec<(KeyDigest, Holder)>);
 
-/// A key as a file writes it, under its name.
+/// A key in a file, stored under its name.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
@@ -32,13 +32,15 @@ struct Row {
 }
 
 impl KeyList {
-    /// The keys of a file: TOML, a line `name = { scopes = ["detect"], sha256 = "…" }` each.
+    /// Parses the keys of a TOML file: a line `name = { scopes = ["detect"], sha256 = "…" }` for
+    /// each.
+    ///
     ///
     /// # Errors
-    /// [`KeyError`] that says which line or key cannot be used.
+    /// [`KeyError`] with the line or the key that cannot be used.
     pub fn from_toml(text: &str) -> Result<Self, KeyError> {
         let rows: BTreeMap<String, Row> = toml::from_str(text).map_err(|error| {
-            // The library's own message would quote the line.
+            // The message of the TOML library would quote the line.
             let before = error.span().and_then(|span| text.get(..span.start));
             let line = 1 + before.map_or(0, |before| before.matches('\n').count());
             KeyError::Shape { line }
@@ -51,10 +53,11 @@ impl KeyList {
         Ok(list)
     }
 
-    /// Both lists as one.
+    /// Merges two lists.
+    ///
     ///
     /// # Errors
-    /// When they share a name, or have too many keys together.
+    /// If they share a name, or have too many keys together.
     pub fn with(mut self, other: &Self) -> Result<Self, KeyError> {
         for (digest, holder) in &other.0 {
             self.push(digest.clone(), holder.clone())?;
@@ -62,13 +65,13 @@ impl KeyList {
         Ok(self)
     }
 
-    /// How many keys there are.
+    /// The number of keys.
     #[must_use]
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there is no key.
+    /// Returns true if there is no key.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
@@ -79,8 +82,8 @@ impl KeyList {
         self.0.iter().map(|(_, holder)| holder)
     }
 
-    /// Whose this key is; `None` when it is nobody's. The time that takes depends on how many keys
-    /// there are alone: all are compared, and none until its first difference.
+    /// Returns the holder of this key, or `None` if the key is unknown. The time depends only on
+    /// the number of keys: all are compared in constant time.
     #[must_use]
     pub fn holder_of(&self, key: &[u8]) -> Option<&Holder> {
         let digest = KeyDigest::of(key);

@@ -1,14 +1,14 @@
-//! What people call a key.
+//! The name of a key.
 
 use std::{fmt, str::FromStr};
 
 use crate::plain_name::is_plain;
 
-/// What people call a key: 1 to 64 of a-z, 0-9, `_` and `-`, which TOML takes without quotes.
+/// The name of a key: 1 to 64 of a-z, 0-9, `_` and `-`, a bare key in TOML.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyName(String);
 
-/// No name of a key.
+/// The text is not a valid name of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a name is 1 to 64 of a-z, 0-9, _ and -, and begins with a-z or 0-9")]
 pub struct InvalidKeyName;

@@ -1,4 +1,4 @@
-//! The keys that are known now: those of the environment, and those of a file that may change.
+//! The current keys: those of the environment, and those of a file that may change.
 
 use std::{
     io,
@@ -9,22 +9,23 @@ use std::{
 use super::{Holder, KeyError, KeyList};
 use crate::watched_file::{self, Complaint};
 
-/// The keys that are known now.
+/// The current keys.
 #[derive(Debug)]
 pub struct AccessKeys {
-    /// Known whatever the file says.
+    /// The keys that do not depend on the file.
     lasting: KeyList,
     file: Option<PathBuf>,
     known: RwLock<Arc<KeyList>>,
-    /// About the file's newest version. Held for as long as it is read.
+    /// The last logged problem of the file. Locked while the file is read.
     complaint: Mutex<Complaint>,
 }
 
 impl AccessKeys {
-    /// The keys of `lasting` and of `file`, if there is one.
+    /// Creates the keys of `lasting` and of `file`, if one is given.
+    ///
     ///
     /// # Errors
-    /// [`KeyError`] when the file cannot be used.
+    /// [`KeyError`] if the file cannot be used.
     pub fn open(lasting: KeyList, file: Option<&Path>) -> Result<Self, KeyError> {
         let known = match file {
             Some(file) => read(file, &lasting)?,
@@ -38,8 +39,8 @@ impl AccessKeys {
         })
     }
 
-    /// Reads the file again. If it cannot be used, the keys stay what they were, and the log says
-    /// why, once for each reason.
+    /// Reads the file again. If it cannot be used, the keys stay unchanged, and the reason is
+    /// logged once.
     pub fn refresh(&self) {
         let Some(file) = &self.file else { return };
         let complaint = self.complaint.lock();
@@ -56,13 +57,13 @@ impl AccessKeys {
             Err(error) => {
                 let problem = error.to_string();
                 if complaint.is_news(&problem) {
-                    tracing::error!("{problem}; the keys stay as they were");
+                    tracing::error!("{problem}; the previous keys stay in use");
                 }
             }
         }
     }
 
-    /// Whose this key is; `None` when it is nobody's.
+    /// Returns the holder of this key, or `None` if the key is unknown.
     #[must_use]
     pub fn holder_of(&self, key: &[u8]) -> Option<Holder> {
         self.known().holder_of(key).cloned()

@@ -1,8 +1,8 @@
-//! What a key opens.
+//! The operations that a key permits.
 
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
-/// What a key opens.
+/// A group of operations that a key permits.
 #[derive(
     Debug,
     Clone,
@@ -17,11 +17,11 @@ use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 )]
 #[strum(serialize_all = "snake_case")]
 pub enum Scope {
-    /// Finding the persons in frames.
+    /// Detect persons in frames.
     Detect,
-    /// Reading calibrations, view plans and the list of models.
+    /// Read calibrations, view plans and the list of models.
     Read,
-    /// Everything, changes of calibrations and models included.
+    /// Everything, including changes of calibrations and models.
     Admin,
 }
 
@@ -38,7 +38,7 @@ impl Scope {
 pub struct Scopes(Vec<Scope>);
 
 impl Scopes {
-    /// These scopes; `None` when there is none.
+    /// Creates a set of these scopes. Returns `None` if there is none.
     #[must_use]
     pub fn new(given: &[Scope]) -> Option<Self> {
         let given = Scope::VARIANTS.iter().filter(|scope| given.contains(scope));
@@ -46,13 +46,13 @@ impl Scopes {
         (!given.is_empty()).then_some(Self(given))
     }
 
-    /// Whether `wanted` is among them; `admin` includes all.
+    /// Returns true if `wanted` is among them. `admin` includes all.
     #[must_use]
     pub fn allow(&self, wanted: Scope) -> bool {
         self.0.contains(&wanted) || self.0.contains(&Scope::Admin)
     }
 
-    /// Their names, with `separator` between them.
+    /// Their names, separated by `separator`.
     #[must_use]
     pub fn joined(&self, separator: &str) -> String {
         let names: Vec<_> = self.0.iter().map(|scope| scope.name()).collect();

@@ -1,5 +1,5 @@
-//! A frame that is kept with what can be drawn into it, so that it can be drawn later, elsewhere and
-//! as whoever asks wants it.
+//! A frame that is kept with its sketch, so that it can be drawn later with other options, also on
+//! another server.
 
 use std::sync::Arc;
 
@@ -17,50 +17,50 @@ use crate::{
     pipeline::Detected,
 };
 
-/// Frames that are wider are made as narrow as the first of these; as the next one if their files are too
-/// large then.
+/// Wider frames are scaled down to the first of these widths, and to the next one while their files
+/// are too large.
 const WIDTHS: [u32; 3] = [2560, 1280, 640];
-/// Hardly to be told from the original, also when it was drawn into and encoded again.
+/// High enough that the loss is hardly visible, even after a second encoding.
 const QUALITY: u8 = 92;
-/// 4 MiB: a frame that no camera delivers.
+/// 4 MiB: cameras deliver smaller frames.
 const MAX_BYTES: usize = 4 << 20;
 
-/// How a JPEG begins (ITU-T T.81, B.2.1).
+/// The first bytes of a JPEG (ITU-T T.81, B.2.1).
 const JPEG_START: [u8; 2] = [0xFF, 0xD8];
 
-/// A frame as it was looked at: masked where the calibration says so.
+/// A kept frame. Areas that the calibration masks are masked in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeptFrame {
-    /// The frame, 4 MiB at most.
+    /// The frame, at most 4 MiB.
     pub jpeg: Bytes,
-    /// What can be drawn into it, JSON.
+    /// The drawings that can be added to it, JSON.
     pub sketch: Bytes,
 }
 
-/// A kept frame that is none.
+/// The reason why a frame cannot be kept or drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum KeptFrameError {
-    /// What can be drawn cannot be read or written.
-    #[error("what can be drawn into a kept frame is no such thing: {0}")]
+    /// The sketch cannot be serialised or parsed.
+    #[error("the sketch of a kept frame is invalid: {0}")]
     Sketch(#[from] serde_json::Error),
-    /// The frame cannot be read.
-    #[error("a kept frame cannot be read: {0}")]
+    /// The frame cannot be decoded.
+    #[error("a kept frame cannot be decoded: {0}")]
     Frame(#[from] DecodeError),
-    /// The frame cannot be written.
+    /// The frame cannot be encoded.
     #[error(transparent)]
     Encode(#[from] EncodeError),
-    /// The picture cannot be drawn.
+    /// The image cannot be drawn.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// The frame is too large however narrow it is made.
+    /// The frame is too large at every width.
     #[error("a frame takes more than {MAX_BYTES} bytes as a JPEG of {} pixels across", WIDTHS[2])]
     TooLarge,
 }
 
 impl KeptFrame {
-    /// What is kept of a frame: the JPEG it came as, if that is small enough and nothing of it is hidden,
-    /// or else one that is made of it. That takes tens of milliseconds for a large one: keep it off the
-    /// async runtime.
+    /// Keeps a frame: its original JPEG, if that is small enough and nothing is masked, else a new
+    /// one. A new one takes tens of milliseconds for a large frame: keep it off the async runtime.
+    ///
     ///
     /// # Errors
     /// [`KeptFrameError`] for a frame that cannot be kept.
@@ -69,7 +69,7 @@ impl KeptFrame {
         let sketch = serde_json::to_vec(&sketch)?.into();
         let jpeg = match &detected.encoded {
             Some(encoded) if is_kept_as_it_is(encoded, &detected.frame) => {
-                // Not with all of the body that it was part of.
+                // A copy, so that the rest of the request body can be freed.
                 Bytes::copy_from_slice(encoded)
             }
             _ => jpeg_of(&detected.frame)?,
@@ -77,11 +77,12 @@ impl KeptFrame {
         Ok(Self { jpeg, sketch })
     }
 
-    /// The frame with what the options want drawn into it, as JPEG. Takes as long as keeping it, and
-    /// stops when `is_cancelled` returns true.
+    /// Returns the frame as JPEG with the drawings that the options select. Takes as long as
+    /// keeping it, and stops when `is_cancelled` returns true.
+    ///
     ///
     /// # Errors
-    /// [`KeptFrameError`] for what was not made by [`KeptFrame::of`].
+    /// [`KeptFrameError`] for data that [`KeptFrame::of`] has not made.
     pub fn annotated(
         &self,
         options: &PictureOptions,
@@ -103,7 +104,7 @@ fn is_kept_as_it_is(encoded: &[u8], frame: &Frame) -> bool {
     encoded.starts_with(&JPEG_START) && encoded.len() <= MAX_BYTES && frame.width() <= WIDTHS[0]
 }
 
-/// A frame as a JPEG, as narrow as it must be.
+/// Encodes a frame as JPEG, scaled down until it is small enough.
 fn jpeg_of(frame: &Frame) -> Result<Bytes, KeptFrameError> {
     for width in WIDTHS {
         let jpeg = if frame.width() > width {

@@ -1,4 +1,4 @@
-//! A person as a mark in the frame.
+//! The mark of a person in the frame.
 
 use crate::{
     geometry::OrientedBox,
@@ -23,7 +23,7 @@ pub(super) fn mark(person: &Person) -> Mark {
     }
 }
 
-/// The circle that touches the upper short side of the box and both long ones.
+/// The circle that touches the upper short side and both long sides of the box.
 fn head(oriented: &OrientedBox) -> Head {
     let radius = oriented.width.min(oriented.height) / 2.0;
     let center = oriented.center + oriented.up * (oriented.height / 2.0 - radius);

@@ -1,4 +1,4 @@
-//! What can be drawn into a frame, apart from the frame.
+//! The drawings for a frame, stored separately from the frame.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::{
     pipeline::{Detected, DetectionReport},
 };
 
-/// What can be drawn into a frame; all places are corner-origin pixels of it.
+/// The drawings for a frame. All positions are corner-origin pixels of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Sketch {
     frame_width: u32,
@@ -20,7 +20,7 @@ pub(super) struct Sketch {
 }
 
 impl Sketch {
-    /// What these layers need of what was found.
+    /// Selects what these layers need from a detection.
     pub(super) fn of(detected: &Detected, layers: &[Layer]) -> Self {
         let report = &detected.report;
         let views = layers.contains(&Layer::Views);
@@ -39,7 +39,8 @@ impl Sketch {
         }
     }
 
-    /// The same with lines to a tenth of a pixel, which nobody sees and which take a third of the room.
+    /// Rounds lines to a tenth of a pixel: the error is invisible, and the text takes a third of
+    /// the space.
     pub(super) fn rounded(mut self) -> Self {
         for coordinate in self.lines().flatten().flatten() {
             *coordinate = (*coordinate * 10.0).round() / 10.0;
@@ -47,7 +48,7 @@ impl Sketch {
         self
     }
 
-    /// What is drawn of these layers, in pixels of a picture that is as wide as this.
+    /// The drawing of these layers, in pixels of an image of this width.
     pub(super) fn drawing(&self, picture_width: u32, layers: &[Layer]) -> Drawing {
         let factor = f64::from(picture_width) / f64::from(self.frame_width.max(1));
         let draws = |layer| layers.contains(&layer);
@@ -84,7 +85,7 @@ fn wanted<T: Default>(is_wanted: bool, what: T) -> T {
     if is_wanted { what } else { T::default() }
 }
 
-/// When the frame was taken, or came, to the second.
+/// The time at which the frame was taken, or else received, to the second.
 fn timestamp(report: &DetectionReport) -> String {
     let time = report.captured_at.unwrap_or(report.received_at);
     time.strftime("%Y-%m-%d %H:%M:%S UTC").to_string()

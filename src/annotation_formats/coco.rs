@@ -1,11 +1,11 @@
-//! COCO detection: one JSON document. Beside COCO's keys, `score` and `oriented_box` of each
-//! annotation and the `calibration` of each image, which `lookdown eval` reads.
+//! COCO detection: one JSON document. Besides COCO's keys it has `score` and `oriented_box` for
+//! each annotation and `calibration` for each image, which `lookdown eval` reads.
 
 use serde::Serialize;
 
 use super::{AnnotatedBox, AnnotatedImage, LABEL, pixels, share};
 
-/// `person` in COCO.
+/// The category ID of `person` in COCO.
 const PERSON: u64 = 1;
 
 #[derive(Serialize)]
@@ -33,7 +33,7 @@ struct Annotation {
     bbox: [f64; 4],
     area: f64,
     iscrowd: u8,
-    /// Asked for by some tools, though there are no masks.
+    /// Required by some tools, though there are no masks.
     segmentation: [f64; 0],
     score: f64,
     oriented_box: Oriented,
@@ -79,7 +79,7 @@ pub(super) fn document(images: &[AnnotatedImage]) -> String {
             document.annotations.push(annotation);
         }
     }
-    // Numbers and texts in fixed places always have a JSON form.
+    // Serialising numbers and strings in a fixed structure cannot fail.
     serde_json::to_string_pretty(&document).unwrap_or_default()
 }
 

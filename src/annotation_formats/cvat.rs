@@ -1,5 +1,5 @@
-//! CVAT for images 1.1: one XML document. A turned box is written as it lies before it is turned
-//! about its centre, with its clockwise `rotation` in degrees, 0 to below 360.
+//! CVAT for images 1.1: one XML document. An oriented box is written unrotated, with its clockwise
+//! `rotation` about its centre in degrees, from 0 to below 360.
 
 use super::{AnnotatedImage, BoxKind, LABEL, pixels, share, xml::Xml};
 use crate::geometry::OrientedBox;
@@ -32,7 +32,7 @@ pub(super) fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
     xml.finish()
 }
 
-/// The label, so that the file tells by itself what its boxes are.
+/// The label, which makes the classes of the file explicit.
 fn label(xml: &mut Xml) {
     for name in ["meta", "job", "labels", "label"] {
         xml.open(name, &[]);
@@ -77,7 +77,7 @@ fn shape(xml: &mut Xml, corners: [f64; 4], rotation: Option<f64>, score: f64) {
     xml.close("box");
 }
 
-/// The corners of the box before it is turned, and by how many degrees it is.
+/// The corners of the unrotated box, and its rotation in degrees.
 fn unturned(oriented: &OrientedBox) -> ([f64; 4], Option<f64>) {
     let (x, y) = (oriented.center.x, oriented.center.y);
     let (half_width, half_height) = (oriented.width / 2.0, oriented.height / 2.0);

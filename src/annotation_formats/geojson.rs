@@ -1,7 +1,7 @@
-//! GeoJSON (RFC 7946): a feature collection per image. The geometry of a person is the box turned
-//! along it. Positions are corner-origin frame pixels, x to the right and y down, not longitude and
-//! latitude, as programs for pictures read them; RFC 7946 leaves that to those who agree on it
-//! (section 4). Where a person stands on the floor, in metres, is a property.
+//! GeoJSON (RFC 7946): a feature collection per image. The geometry of a person is its oriented
+//! box. Positions are corner-origin frame pixels, x to the right and y down, as image tools read
+//! them, not longitude and latitude. RFC 7946 permits this by prior agreement (section 4). The
+//! person's position on the floor, in metres, is a property.
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use crate::geometry::OrientedBox;
 #[derive(Serialize)]
 struct FeatureCollection<'a> {
     r#type: &'static str,
-    /// Beside GeoJSON's own members: the picture that positions are in.
+    /// An addition to the members of GeoJSON: the image to which positions refer.
     image: Image<'a>,
     features: Vec<Feature>,
 }
@@ -75,7 +75,7 @@ pub(super) fn document(image: &AnnotatedImage) -> String {
             .map(|((corners, person), id)| feature(id, corners, person))
             .collect(),
     };
-    // Numbers and texts in fixed places always have a JSON form.
+    // Serialising numbers and strings in a fixed structure cannot fail.
     serde_json::to_string_pretty(&document).unwrap_or_default()
 }
 
@@ -103,8 +103,8 @@ fn feature(id: usize, corners: [f64; 4], person: &AnnotatedBox) -> Feature {
     }
 }
 
-/// The corners, the first one twice; counterclockwise where y grows upward, as RFC 7946 (section
-/// 3.1.6) has it, and so clockwise as seen in the picture.
+/// The corners, with the first repeated at the end. They are counterclockwise with y upward, as RFC
+/// 7946 requires (section 3.1.6), and therefore clockwise in the image.
 fn ring(oriented: &OrientedBox) -> [[f64; 2]; 5] {
     let (up, center) = (oriented.up, oriented.center);
     let right = nalgebra::Vector2::new(-up.y, up.x);

@@ -1,10 +1,10 @@
-//! A report as an annotated image.
+//! Converts a report to an annotated image.
 
 use super::{AnnotatedBox, AnnotatedImage};
 use crate::pipeline::{DetectionReport, Person};
 
 impl AnnotatedImage {
-    /// The persons of a report, in the picture of this name.
+    /// Returns the persons of a report as annotations of the image with this file name.
     #[must_use]
     pub fn of(report: &DetectionReport, file_name: String) -> Self {
         let calibration = &report.calibration;

@@ -15,7 +15,7 @@ fn person(corners: [f64; 4], angle_deg: f64) -> AnnotatedBox {
     }
 }
 
-/// A picture of 200×100 pixels with one person in it, one half outside and one outside.
+/// An image of 200×100 pixels with one person inside, one half outside and one outside.
 fn image(file_name: &str) -> AnnotatedImage {
     AnnotatedImage {
         file_name: file_name.to_owned(),
@@ -38,7 +38,7 @@ fn content(format: AnnotationFormat, path: &str) -> String {
 }
 
 #[test]
-fn coco_numbers_images_and_boxes_and_keeps_what_only_we_know() {
+fn coco_has_ids_and_the_additional_keys() {
     let text = content(AnnotationFormat::Coco, "annotations.json");
     let document: serde_json::Value = serde_json::from_str(&text).unwrap();
     let expected = serde_json::json!({
@@ -71,7 +71,7 @@ fn cvat_has_a_box_element_per_person_and_escaped_names() {
 }
 
 #[test]
-fn cvat_turns_boxes_clockwise_about_their_centre_on_request() {
+fn cvat_rotates_boxes_clockwise_about_their_centre() {
     let files = AnnotationFormat::Cvat.files(&[image("a.jpg")], BoxKind::Oriented);
     let expected =
         r#"xtl="50.00" ytl="30.00" xbr="70.00" ybr="70.00" z_order="0" rotation="330.00""#;
@@ -81,7 +81,7 @@ fn cvat_turns_boxes_clockwise_about_their_centre_on_request() {
 }
 
 #[test]
-fn yolo_has_shares_of_the_picture_a_file_per_picture_and_the_class() {
+fn yolo_has_relative_boxes_a_file_per_image_and_the_class() {
     assert_eq!(
         content(AnnotationFormat::Yolo, "labels/hall/a & b.txt"),
         "0 0.300000 0.500000 0.200000 0.400000\n0 0.975000 0.050000 0.050000 0.100000\n"
@@ -91,7 +91,7 @@ fn yolo_has_shares_of_the_picture_a_file_per_picture_and_the_class() {
 }
 
 #[test]
-fn voc_has_corners_in_a_file_per_picture() {
+fn voc_has_corners_in_a_file_per_image() {
     let text = content(AnnotationFormat::Voc, "Annotations/hall/a & b.xml");
     assert!(text.contains("<folder>hall</folder>\n  <filename>a &amp; b.jpg</filename>"));
     let corners = "<xmin>190.00</xmin>\n      <ymin>0.00</ymin>\n      <xmax>200.00</xmax>\n      \
@@ -101,7 +101,7 @@ fn voc_has_corners_in_a_file_per_picture() {
 }
 
 #[test]
-fn geojson_has_the_turned_box_as_a_ring_and_the_floor_as_a_property() {
+fn geojson_has_the_oriented_box_and_the_floor_position() {
     let mut image = image("hall/a.jpg");
     image.persons[1].floor = Some(FloorPosition {
         x_m: 1.873_49,
@@ -120,7 +120,7 @@ fn geojson_has_the_turned_box_as_a_ring_and_the_floor_as_a_property() {
             "angle_deg": 0.0, "foot": [60.0, 70.0], "floor": {"x_m": 1.873, "y_m": -0.5}},
     });
     assert_eq!(document["features"][1], expected);
-    // The shoelace formula: positive where the ring is counterclockwise with y upward.
+    // The shoelace formula: positive if the ring is counterclockwise with y upward.
     for feature in document["features"].as_array().unwrap() {
         let ring: Vec<[f64; 2]> =
             serde_json::from_value(feature["geometry"]["coordinates"][0].clone()).unwrap();
@@ -160,7 +160,7 @@ fn the_own_file_of_an_image_is_among_the_files() {
 }
 
 #[test]
-fn a_picture_without_persons_has_its_place_in_every_format() {
+fn an_image_without_persons_is_listed_in_every_format() {
     let empty = AnnotatedImage {
         persons: Vec::new(),
         calibration: None,
@@ -175,7 +175,7 @@ fn a_picture_without_persons_has_its_place_in_every_format() {
 }
 
 #[test]
-fn no_name_breaks_the_xml() {
+fn any_file_name_gives_well_formed_xml() {
     let nasty = "<a> \"b\" 'c' &amp; \t\n\r\u{1}\u{ffff}.jpg";
     for format in [AnnotationFormat::Cvat, AnnotationFormat::Voc] {
         let text = &format.files(&[image(nasty)], BoxKind::AxisParallel)[0].content;

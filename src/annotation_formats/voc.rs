@@ -1,5 +1,5 @@
 //! Pascal VOC: an XML file per image, in `Annotations/`. Boxes are corner-origin pixels with two
-//! decimals, as today's annotation tools write and read them.
+//! decimals, as current annotation tools write and read them.
 
 use super::{AnnotatedImage, LABEL, stem, xml::Xml};
 

@@ -1,17 +1,17 @@
-//! As much XML as annotation files need, always well-formed text.
+//! A minimal writer of XML for annotation files. Its output is always well-formed.
 
 use std::{borrow::Cow, fmt::Write};
 
 const INDENT: &str = "  ";
 
-/// A document that grows element by element.
+/// A document to which elements are appended.
 pub(super) struct Xml {
     text: String,
     depth: usize,
 }
 
 impl Xml {
-    /// A document with nothing in it.
+    /// Creates an empty document.
     pub(super) fn document() -> Self {
         Self {
             text: "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n".to_owned(),
@@ -19,21 +19,21 @@ impl Xml {
         }
     }
 
-    /// Begins an element that holds others.
+    /// Opens an element that contains others.
     pub(super) fn open(&mut self, name: &str, attributes: &[(&str, &str)]) {
         self.begin(name, attributes);
         self.text.push_str(">\n");
         self.depth += 1;
     }
 
-    /// Ends the element begun last.
+    /// Closes the element that was opened last.
     pub(super) fn close(&mut self, name: &str) {
         self.depth = self.depth.saturating_sub(1);
         self.indent();
         self.end(name);
     }
 
-    /// An element with a text in it.
+    /// Appends an element with text and attributes.
     pub(super) fn element(&mut self, name: &str, attributes: &[(&str, &str)], text: &str) {
         self.begin(name, attributes);
         self.text.push('>');
@@ -41,12 +41,12 @@ impl Xml {
         self.end(name);
     }
 
-    /// An element with nothing but a text in it.
+    /// Appends an element with text only.
     pub(super) fn text(&mut self, name: &str, text: &str) {
         self.element(name, &[], text);
     }
 
-    /// The whole document.
+    /// Returns the complete document.
     pub(super) fn finish(self) -> String {
         self.text
     }
@@ -71,8 +71,8 @@ impl Xml {
     }
 }
 
-/// Characters with a meaning as references, and those that XML cannot hold (XML 1.0, section 2.2)
-/// as U+FFFD.
+/// Escapes characters that have a meaning in XML, and replaces those that XML cannot contain (XML
+/// 1.0, section 2.2) by U+FFFD.
 fn escaped(text: &str) -> Cow<'_, str> {
     let is_plain = |c: char| c >= ' ' && !"&<>\"'\u{fffe}\u{ffff}".contains(c);
     if text.chars().all(is_plain) {
@@ -86,7 +86,7 @@ fn escaped(text: &str) -> Cow<'_, str> {
             '>' => result.push_str("&gt;"),
             '"' => result.push_str("&quot;"),
             '\'' => result.push_str("&apos;"),
-            // A reader would turn them into spaces.
+            // A parser would normalise them to spaces.
             '\t' => result.push_str("&#9;"),
             '\n' => result.push_str("&#10;"),
             '\r' => result.push_str("&#13;"),

@@ -1,6 +1,6 @@
-//! YOLO: a text file per image in `labels/`, each line `class cx cy width height` in shares of the
-//! image's sides, with `data.yaml` (Ultralytics) and `classes.txt` (Label Studio) beside them. The
-//! pictures belong in `images/`.
+//! YOLO: a text file per image in `labels/`, each line `class cx cy width height` relative to the
+//! image's sides, with `data.yaml` (Ultralytics) and `classes.txt` (Label Studio) next to them. The
+//! images belong in `images/`.
 
 use std::fmt::Write;
 

@@ -12,10 +12,11 @@ use crate::{
     settings::{RemoteSettings, Settings, SettingsError},
 };
 
-/// The repository, none of its models loaded, and which of them answer by default.
+/// Opens the repository without loading a model. Also returns the default models.
+///
 ///
 /// # Errors
-/// One sentence that names the setting: a file that is missing or cannot be used.
+/// One sentence that names the setting, for a file that is missing or cannot be used.
 pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, DefaultModels)> {
     let path = settings.model.find_repository()?;
     let mut one = settings.model.find_one()?;
@@ -52,7 +53,7 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
     Ok((repository, defaults))
 }
 
-/// Makes models that run here.
+/// Returns the loader of models that run in this process.
 fn onnx_loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
     let library = settings.inference.find_library()?;
     let options = onnx_options(settings);
@@ -63,7 +64,7 @@ fn onnx_loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
     }))
 }
 
-/// Makes models that run on another server.
+/// Returns the loader of models that run on an inference server.
 fn remote_loader(settings: &Settings, server: Arc<RemoteServer>) -> ModelLoader {
     let options = candidate_options(settings);
     let sessions = settings.threads.sessions;
@@ -79,7 +80,7 @@ fn model_of<D: Detector + 'static>(first: D, others: Vec<D>) -> Model {
     Model::of_sessions(Box::new(first), others.collect())
 }
 
-/// The server that the settings name; `called` is its model here.
+/// The inference server of the settings. `called` is the model's name in this process.
 fn remote_options(remote: &RemoteSettings, called: String) -> RemoteOptions {
     RemoteOptions {
         url: remote.url.clone(),
@@ -90,7 +91,7 @@ fn remote_options(remote: &RemoteSettings, called: String) -> RemoteOptions {
     }
 }
 
-/// How the settings want networks to be run.
+/// The settings of the ONNX runtime.
 pub(crate) fn onnx_options(settings: &Settings) -> OnnxOptions {
     OnnxOptions {
         device: settings.inference.device,
@@ -110,7 +111,7 @@ fn per_profile(folder: &Path, device: Device) -> DefaultModels {
     let defaults = DefaultModels::per_profile(device, |name| is_fetched(&folder.join(name)));
     if let DefaultModels::PerProfile { missing, .. } = &defaults {
         for name in missing {
-            tracing::warn!("{name} is not there, so another model stands in: run `make setup`");
+            tracing::warn!("{name} is missing, so another model is used: run `make setup`");
         }
     }
     defaults

@@ -1,4 +1,4 @@
-//! From the sockets to the last answer.
+//! The life of the server, from the sockets to the last answer.
 
 use std::{future::pending, net::SocketAddr, sync::Arc, time::Duration};
 
@@ -17,26 +17,28 @@ use crate::{
     shutdown::Shutdown,
 };
 
-/// Longest that the end waits for the MQTT broker.
+/// Longest time that the shutdown waits for the MQTT broker.
 const FAREWELL: Duration = Duration::from_secs(3);
-/// How long to wait before a model is loaded that could not be for a reason that passes.
+/// Pause before a model is loaded again after a transient failure.
 const BEFORE_ANOTHER_LOAD: Duration = Duration::from_secs(1);
 
 impl App {
-    /// Serves until `shutdown` asks for an end. Then readiness goes, and everything is served on for
-    /// the grace period; after that, no more connections are accepted, and what has arrived is
-    /// answered, for as long as draining may take. A second request to stop ends all that at once.
+    /// Serves until `shutdown` is requested. Then readiness ends, and requests are served for the
+    /// grace period. After that, no more connections are accepted, and requests in flight are
+    /// answered within the drain timeout. A second request to stop ends all at once.
+    ///
     ///
     /// # Errors
-    /// When a model cannot be loaded or a socket fails.
+    /// If a model cannot be loaded or a socket fails.
     pub async fn serve(mut self, sockets: Sockets, shutdown: Shutdown) -> anyhow::Result<()> {
         let address = sockets.main.local_addr()?;
         let scheme = if self.tls.is_some() { "https" } else { "http" };
         log_start(&self.settings, scheme, address);
         if self.keys.is_none() && !address.ip().is_loopback() {
             tracing::warn!(
-                "others reach this server, and there are no keys: whoever does may send frames and \
-                 read calibrations and reports; set access.keys_file, or listen on 127.0.0.1 (server.listen)"
+                "other machines can reach this server without a key: any client may send frames and \
+                 read calibrations and reports; set access.keys_file, or set server.listen to \
+                 127.0.0.1"
             );
         }
         let _pollers = self.start_pollers()?;
@@ -58,7 +60,7 @@ impl App {
             &self.metrics,
             &shutdown,
         );
-        // Both must end: the process must not exit while a model is still being loaded.
+        // Waits for both: the process must not exit while a model is being loaded.
         let finished = async {
             let connections = async {
                 connections.await;
@@ -68,7 +70,7 @@ impl App {
             let workers = Arc::clone(&self.workers);
             spawn_blocking(move || workers.shut_down()).await?;
             if let Some(publishing) = publishing {
-                // The results have ended, and a broker that takes too long has our will.
+                // The results have ended. If the broker takes too long, it publishes the will.
                 let _ = timeout(FAREWELL, publishing).await;
             }
             self.results.flush().await;
@@ -90,13 +92,13 @@ impl App {
             outcome = finished => outcome,
             () = operation => Ok(()),
             () = self.wind_up(&shutdown) => {
-                tracing::warn!("stopped, although some requests had not ended");
+                tracing::warn!("stopped before all requests had ended");
                 Ok(())
             }
         }
     }
 
-    /// Serves metrics and probes on a port of their own, to the very end.
+    /// Serves metrics and probes on their own port until the process ends.
     async fn serve_operation(&self, listener: TcpListener) {
         let router = api::operation_router(self.state.clone());
         let services = Services {
@@ -115,26 +117,27 @@ impl App {
         .await;
     }
 
-    /// Waits to be told to stop, says so for the grace period, and ends when draining has taken too
-    /// long.
+    /// Waits for the request to stop, announces it for the grace period, and ends when the drain
+    /// timeout is over.
     async fn wind_up(&self, shutdown: &Shutdown) {
         let grace = self.settings.shutdown.grace;
         let drain_timeout = self.settings.drain_timeout();
         shutdown.requested().await;
         self.readiness.stopping();
-        tracing::info!("told to stop");
+        tracing::info!("stopping");
         tokio::select! {
             () = sleep(grace) => {}
             () = shutdown.draining() => {}
         }
-        tracing::info!("finishing what has arrived");
-        // Listeners would stay for ever.
+        tracing::info!("draining: requests in flight are finished");
+        // Streams of results would never end by themselves.
         self.results.listeners().end();
         shutdown.drain();
         sleep(drain_timeout).await;
     }
 
-    /// Loads a model, when the server that it runs on is there and has a place, and no other is being loaded.
+    /// Loads a model when its server is available and has capacity, and no other model is being
+    /// loaded.
     async fn load(&self, name: String, shutdown: &Shutdown) -> anyhow::Result<()> {
         loop {
             let loaded = if self.models.is_remote_available() {
@@ -156,7 +159,7 @@ impl App {
         }
     }
 
-    /// Loads the models, as long as the server is not told to stop. It is ready when it has the first.
+    /// Loads the models until a stop is requested. The server is ready when the first is loaded.
     async fn load_models(
         &self,
         scheme: &str,
@@ -180,7 +183,7 @@ impl App {
     }
 }
 
-/// Says what runs, and where.
+/// Logs the configuration and the address.
 fn log_start(settings: &Settings, scheme: &str, address: SocketAddr) {
     tracing::info!(
         version = env!("CARGO_PKG_VERSION"),

@@ -7,20 +7,22 @@ use tokio::net::TcpListener;
 
 use crate::settings::{ServerSettings, variable_of};
 
-/// What the service listens on.
+/// The sockets of the service.
 #[derive(Debug)]
 pub struct Sockets {
-    /// For everything, or everything but metrics.
+    /// All endpoints, or all except metrics.
     pub main: TcpListener,
-    /// For metrics and probes alone, if the settings want that.
+    /// Metrics and probes only, if the settings ask for a separate port.
     pub metrics: Option<TcpListener>,
 }
 
 impl Sockets {
-    /// Takes the addresses that the settings name.
+    /// Binds the addresses of the settings.
+    ///
     ///
     /// # Errors
-    /// One sentence that names the setting: an address that is in use or not this machine's.
+    /// One sentence that names the setting, for an address that is in use or not one of this
+    /// machine.
     pub async fn bind(settings: &ServerSettings) -> anyhow::Result<Self> {
         let main = bind("server.listen", settings.listen).await?;
         let metrics = match settings.metrics_listen {

@@ -15,18 +15,18 @@ use crate::imaging::{
     decode::{DecodeLimits, decode},
 };
 
-/// What to do with a calibration.
+/// The subcommands for calibrations.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Say what is understood of a calibration file of any format, and draw it into a frame
+    /// Show the content of a calibration file of any format, and draw it into a frame
     Check(check::Arguments),
     /// Write a calibration in the native format, or in that of another program
     Convert(convert::Arguments),
-    /// Make a calibration from frames: the lens circle is found, an ideal lens assumed
+    /// Fit a calibration to frames: the lens circle is detected, an ideal lens assumed
     Fit(fit::Arguments),
 }
 
-/// Does what the command asks for.
+/// Runs the subcommand.
 pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Check(arguments) => check::run(arguments),
@@ -35,7 +35,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// A frame from a picture file.
+/// Decodes a frame from an image file.
 fn read_frame(path: &Path) -> anyhow::Result<Frame> {
     let encoded = fs::read(path).context("the file cannot be read")?;
     Ok(decode(&encoded, &DecodeLimits::default())?.frame)

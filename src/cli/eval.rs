@@ -29,7 +29,7 @@ use crate::{
     settings::Settings,
 };
 
-/// C_t without `--score-threshold`: low, since average precision looks at all scores.
+/// C_t without `--score-threshold`: low, as average precision considers all scores.
 const DEFAULT_SCORE_THRESHOLD: &str = "0.01";
 
 /// Arguments of `lookdown eval`.
@@ -46,9 +46,9 @@ pub(super) struct Arguments {
     /// The rows of the paper's table: its three refinements, and the detector without views
     #[arg(long, conflicts_with_all = ["profile", "refine"])]
     paper: bool,
-    /// The paper's sweeps, into this folder: `cells.csv` (AP of NMS and Soft-NMS over N_t from 0
+    /// Write the paper's sweeps to this folder: `cells.csv` (AP of NMS and Soft-NMS over N_t from 0
     /// to 1, of Gaussian Soft-NMS over C_t and sigma), `iou_threshold.svg` (AP over N_t) and
-    /// `matrix.jpg` (what each C_t and sigma finds in the image with the most persons)
+    /// `matrix.jpg` (detections at each C_t and sigma in the image with the most persons)
     #[arg(
         long,
         value_name = "FOLDER",
@@ -56,10 +56,10 @@ pub(super) struct Arguments {
                               "save_detections", "from_detections"]
     )]
     sweep: Option<PathBuf>,
-    /// Look with this model [default: the profile's]
+    /// Model [default: the profile's]
     #[arg(long, value_name = "NAME")]
     model: Option<String>,
-    /// Leave out persons with a lower score, 0 to 1
+    /// Ignore persons with a lower score, 0 to 1
     #[arg(long, value_name = "SCORE", default_value = DEFAULT_SCORE_THRESHOLD)]
     score_threshold: String,
     /// Boxes that overlap at least this much are the same person [default: the refinement's]
@@ -81,15 +81,15 @@ pub(super) struct Arguments {
     /// Print one JSON object per row instead of a table
     #[arg(long)]
     json: bool,
-    /// Also draw the precision-recall curves of all rows into one picture
+    /// Also plot the precision-recall curves of all rows into one image
     #[arg(long, value_name = "OUT.svg|OUT.png")]
     plot: Option<PlotFile>,
-    /// Also write what was found, as COCO results: a file per row, named
+    /// Also write the detections as COCO results: a file per row, named
     /// PROFILE.REFINEMENT.MODEL.json
     #[arg(long, value_name = "FOLDER")]
     save_detections: Option<PathBuf>,
-    /// Score these COCO results instead of looking: a file, or all .json files of a folder; may
-    /// be repeated
+    /// Score these COCO results instead of running a model: a file, or all .json files of a folder;
+    /// may be repeated
     #[arg(
         long,
         value_name = "FILE|FOLDER",
@@ -128,7 +128,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Looks at the data set with every profile.
+/// Runs every profile on the data set.
 fn look(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
     let groups = variants::groups(arguments)?;
     let settings = arguments.settings_file.load()?;
@@ -159,7 +159,7 @@ fn detect_group(
     rows
 }
 
-/// The files that `--from-detections` means, those of a folder in the order of their names.
+/// The files of `--from-detections`, those of a folder ordered by name.
 fn saved_rows(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {

@@ -15,14 +15,14 @@ use crate::probe::{self, Probe};
 /// Arguments of `lookdown health`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Only ask whether the process answers (/livez), not whether frames can be sent (/readyz)
+    /// Check liveness (/livez) instead of readiness (/readyz)
     #[arg(long)]
     live: bool,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
 
-/// Asks the server that runs with these settings.
+/// Checks the server that runs with these settings.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let probe = if arguments.live {

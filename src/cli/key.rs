@@ -13,13 +13,13 @@ use crate::access::{KeyDigest, KeyName, Scope, Scopes, new_key};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Make an API key, and the line for `access.keys_file` that makes it known
+    /// Create an API key, and the line for `access.keys_file` that registers it
     New(Arguments),
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// What people call the key: 1 to 64 of a-z, 0-9, _ and -
+    /// Name of the key: 1 to 64 of a-z, 0-9, _ and -
     #[arg(long)]
     name: KeyName,
     /// A scope of the key; may be given several times
@@ -27,18 +27,18 @@ pub(super) struct Arguments {
     scopes: Vec<Scope>,
 }
 
-/// Does what the command asks for.
+/// Runs the subcommand.
 pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     let Command::New(Arguments { name, scopes }) = command;
-    let key = new_key().context("the operating system gives no random numbers")?;
+    let key = new_key().context("the operating system returns no random numbers")?;
     let scopes = Scopes::new(scopes).context("--scope: give one")?;
     let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
     let quoted = scopes.joined("\", \"");
     let written = writeln!(
         io::stdout(),
-        "# The key. It is shown this once; who has it sends it as Authorization: Bearer KEY.\n\
+        "# The key. It is shown only once. Clients send it as Authorization: Bearer KEY.\n\
          {key}\n\
-         # The line for access.keys_file, which holds no key:\n\
+         # The line for access.keys_file, which does not contain the key:\n\
          {name} = {{ scopes = [\"{quoted}\"], sha256 = \"{digest}\" }}\n\
          # The same for LOOKDOWN__ACCESS__KEYS:\n\
          {name}:{}:{digest}",

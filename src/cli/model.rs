@@ -23,17 +23,17 @@ use crate::{
     settings::{Settings, find_beside_executable},
 };
 
-/// The picture that models are tried on when no other is given: a fisheye frame.
+/// The default sample image: a fisheye frame.
 const SAMPLE: &str = "samples/office.jpg";
 /// Views in a run that is timed beside that of one view.
 const BATCH_VIEWS: usize = 8;
-/// Timed runs of the network; their median is told.
+/// Timed runs of the network. The median is printed.
 const RUNS: usize = 5;
 
-/// What to do with a model.
+/// The subcommands for models.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Say what is understood of a model, run it on a sample and draw what it finds
+    /// Show the properties of a model, run it on a sample and draw the detections
     Check(Arguments),
 }
 
@@ -43,17 +43,17 @@ pub(super) struct Arguments {
     /// A model folder (with a model.toml) or an ONNX file
     #[arg(value_name = "FILE|FOLDER")]
     model: PathBuf,
-    /// Try it on this picture, seen as it is [default: a fisheye sample, seen through views]
+    /// Test image, used without views [default: a fisheye sample, seen through views]
     #[arg(long, value_name = "IMAGE")]
     sample: Option<PathBuf>,
-    /// Draw the persons found into the sample
+    /// Draw the detected persons into the sample
     #[arg(long, value_name = "OUT.jpg")]
     annotate: Option<PathBuf>,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
 
-/// Does what the command asks for.
+/// Runs the subcommand.
 pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     let Command::Check(arguments) = command;
     let mut settings = arguments.settings_file.load()?;
@@ -124,7 +124,7 @@ fn millis(time: Duration) -> String {
     format!("{:.1} ms", time.as_secs_f64() * 1e3)
 }
 
-/// The median time of a run on blank views, the first one left out.
+/// The median time of a run on blank views, without the first run.
 fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, InferenceError> {
     let mut batch = ViewBatch::default();
     for slot in batch.prepare(views, detector.input()) {
@@ -141,7 +141,7 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
     Ok(times[RUNS / 2])
 }
 
-/// Looks at the sample with the model of the settings.
+/// Detects persons in the sample with the model of the settings.
 fn look(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
     let parameters = DetectParameters::parse([("profile", profile)])?;
     let engine = engine_for(settings, std::slice::from_ref(&parameters))?;

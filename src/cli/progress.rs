@@ -1,4 +1,4 @@
-//! How far a long run is: a bar on a terminal, now and then a line elsewhere.
+//! The progress of a long run: a bar on a terminal, otherwise occasional lines.
 
 use std::{
     io::{self, IsTerminal, Write},
@@ -8,7 +8,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// About so many lines per run where there is no terminal.
+/// Approximate number of lines per run without a terminal.
 const LINES: usize = 10;
 const BAR: &str = "{prefix} {wide_bar} {pos} of {len} images, {eta} left";
 
@@ -16,12 +16,12 @@ const BAR: &str = "{prefix} {wide_bar} {pos} of {len} images, {eta} left";
 pub(super) enum Progress {
     /// On a terminal.
     Bar(ProgressBar),
-    /// Elsewhere.
+    /// Without a terminal.
     Lines(Mutex<Lines>),
 }
 
 impl Progress {
-    /// Nothing is done yet of `total` images.
+    /// Starts with no image done of `total`.
     pub(super) fn start(name: &str, total: usize) -> Self {
         if !io::stderr().is_terminal() {
             return Self::Lines(Mutex::new(Lines {
@@ -38,7 +38,7 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// Another image is done. May be called from any thread.
+    /// Counts another image. May be called from any thread.
     pub(super) fn advance(&self) {
         match self {
             Self::Bar(bar) => bar.inc(1),
@@ -46,14 +46,14 @@ impl Progress {
                 let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
                 lines.done += 1;
                 if let Some(line) = lines.due(lines.started.elapsed()) {
-                    // Progress that nobody can read is no reason to stop.
+                    // A failure to print the progress does not stop the run.
                     let _ = writeln!(io::stderr(), "{line}");
                 }
             }
         }
     }
 
-    /// The run has ended; the bar stays as it is.
+    /// Ends the run. The bar stays visible.
     pub(super) fn finish(&self) {
         if let Self::Bar(bar) = self {
             bar.abandon();
@@ -61,7 +61,7 @@ impl Progress {
     }
 }
 
-/// Lines so rare that they fill no log.
+/// Progress lines, limited in number so that they do not flood a log.
 pub(super) struct Lines {
     name: String,
     total: usize,
@@ -70,7 +70,7 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    /// The line for the image just done, if it is time for one.
+    /// Returns the line for the last image, if one is due.
     fn due(&self, elapsed: Duration) -> Option<String> {
         let Self {
             name, total, done, ..
@@ -78,7 +78,10 @@ impl Lines {
         if !done.is_multiple_of(total.div_ceil(LINES).max(1)) && done != total {
             return None;
         }
-        #[expect(clippy::cast_precision_loss, reason = "a rough figure")]
+        #[expect(
+            clippy::cast_precision_loss,
+            reason = "an approximate value is sufficient"
+        )]
         let to_go = total.saturating_sub(*done) as f64 / (*done).max(1) as f64;
         let seconds = elapsed.as_secs_f64() * to_go;
         Some(format!(
@@ -105,14 +108,14 @@ mod tests {
     }
 
     #[test]
-    fn a_long_run_says_about_ten_times_how_far_it_is_and_how_long_it_will_take() {
+    fn a_long_run_prints_about_ten_progress_lines() {
         let lines = lines_of(1000);
         assert_eq!(lines.len(), 10);
         assert_eq!(lines[2], "fast: 300 of 1000 images, about 700 s left");
     }
 
     #[test]
-    fn the_last_image_is_always_told() {
+    fn the_last_image_always_has_a_line() {
         for total in [1, 9, 11, 34, 101] {
             let end = format!("{total} of {total} images, about 0 s left");
             assert!(lines_of(total).last().unwrap().ends_with(&end));

@@ -19,9 +19,9 @@ use crate::{
     shutdown::Shutdown,
 };
 
-/// Most threads for sockets and JSON; frames have threads of their own.
+/// Most threads for sockets and JSON. Frames have separate threads.
 const MAX_RUNTIME_THREADS: usize = 2;
-/// How long the end waits for a model that is being loaded.
+/// Longest time that the shutdown waits for a model that is being loaded.
 const LONGEST_LOAD: Duration = Duration::from_secs(10);
 
 /// Arguments of `lookdown serve`.
@@ -35,26 +35,26 @@ pub(super) struct Arguments {
     settings_file: SettingsFile,
 }
 
-/// Runs the server until it is told to stop, or checks whether it could run.
+/// Runs the server until a stop is requested, or checks that it could run.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(runtime_threads())
         .enable_all()
         .build()
-        .context("the operating system gives no thread")?;
+        .context("the operating system creates no thread")?;
     let outcome = if arguments.check {
         runtime.block_on(check(settings))
     } else {
         runtime.block_on(serve(settings))
     };
-    // Whatever still runs was given up, but ONNX Runtime brings a process down that ends while a model
+    // Remaining tasks were aborted. But ONNX Runtime crashes the process if it ends while a model
     // is being loaded.
     runtime.shutdown_timeout(LONGEST_LOAD);
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
-/// One per two cores: an idle second thread is woken for each request, in case there are more.
+/// One thread per two cores: an idle second thread is woken for each request, in case more arrive.
 fn runtime_threads() -> usize {
     let cores = available_parallelism().map_or(1, NonZeroUsize::get);
     (cores / 2).clamp(1, MAX_RUNTIME_THREADS)
@@ -76,7 +76,7 @@ async fn serve(settings: Settings) -> anyhow::Result<()> {
 }
 
 async fn check(settings: Settings) -> anyhow::Result<()> {
-    // Nobody is listened to: the addresses are free again in a moment.
+    // Binds the addresses without accepting connections, and releases them at once.
     drop(Sockets::bind(&settings.server).await?);
     let app = start(settings).await?;
     let report = spawn_blocking(move || app.check()).await??;

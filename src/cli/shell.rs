@@ -1,4 +1,4 @@
-//! `lookdown completions` and `lookdown manual`: the command line described to shells and readers.
+//! `lookdown completions` and `lookdown manual`: the command line for shells and as manual pages.
 
 use std::{
     fs,
@@ -21,7 +21,7 @@ pub(super) struct CompletionArguments {
 /// Arguments of `lookdown manual`.
 #[derive(Debug, Args)]
 pub(super) struct ManualArguments {
-    /// Where the pages go; made if it is not there
+    /// Output folder of the pages; created if it is missing
     folder: PathBuf,
 }
 

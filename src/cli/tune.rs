@@ -1,4 +1,4 @@
-//! `lookdown tune`: which sessions, threads and batches are fastest on this machine.
+//! `lookdown tune`: measures which sessions, threads and batches are fastest on this machine.
 
 mod trial;
 
@@ -15,9 +15,9 @@ use self::trial::{Choice, Trial};
 use super::{SettingsFile, parameters::one_of};
 use crate::{inference::Device, pipeline::Profile, settings::Settings};
 
-/// A choice must be faster than the present one by this factor: less may be chance.
+/// Minimum speed-up over the present settings. A smaller one may be due to chance.
 const WORTH_WHILE: f64 = 1.03;
-/// How often the best choice and the present one are compared in turns.
+/// Number of comparisons between the best choice and the present one.
 const TURNS: usize = 5;
 
 /// Arguments of `lookdown tune`.
@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     settings_file: SettingsFile,
 }
 
-/// Does what the command asks for.
+/// Runs the command.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let profile = arguments.profile;
@@ -53,17 +53,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let (best, gain) = confirmed(&settings, profile, present, best.0)?;
     if gain < WORTH_WHILE {
-        say("\nThe present settings are as fast as any: nothing need be changed.".to_owned())?;
+        say("\nNo choice is faster than the present settings.".to_owned())?;
         return Ok(ExitCode::SUCCESS);
     }
     say(format!(
-        "\n{gain:.2} times as fast as the present settings, in turns with them:\n\n{}",
+        "\n{gain:.2} times as fast as the present settings, measured alternately:\n\n{}",
         toml(best)
     ))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// All ways to share the cores in powers of two, each with several sizes of batches.
+/// All divisions of the cores in powers of two, each with several batch sizes.
 fn choices(settings: &Settings) -> Vec<Choice> {
     let cores = settings.threads.remapping.get();
     let (shares, batches): (Vec<(usize, usize)>, &[usize]) = match settings.inference.device {
@@ -88,7 +88,7 @@ fn choices(settings: &Settings) -> Vec<Choice> {
     choices.collect()
 }
 
-/// How much faster the best choice is than the present one, when both take turns.
+/// The speed-up of the best choice over the present one, measured alternately.
 fn confirmed(
     settings: &Settings,
     profile: Profile,
@@ -118,7 +118,7 @@ fn row(choice: Choice, rate: f64) -> String {
     format!("{sessions:8}  {threads:7}  {batch_views:5}  {rate:7.1}")
 }
 
-/// The choice as a part of the settings file.
+/// The choice as part of the settings file.
 fn toml(choice: Choice) -> String {
     format!(
         "[inference]\nsessions = {}\nthreads = {}\nmax_batch_views = {}",
@@ -131,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_choice_uses_all_cores_and_the_present_one_is_among_them() {
+    fn every_choice_uses_all_cores_and_includes_the_present_one() {
         let settings = crate::settings::load(None, []).unwrap();
         let choices = choices(&settings);
         let cores = settings.threads.remapping.get();
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_choice_is_told_as_settings_that_can_be_loaded() {
+    fn the_choice_is_printed_as_loadable_settings() {
         let three = NonZeroUsize::new(3).unwrap();
         let told = toml(Choice {
             sessions: three,

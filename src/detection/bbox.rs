@@ -10,25 +10,25 @@ pub struct ViewPixels;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FramePixels;
 
-/// Numbers that are no box.
+/// Coordinates that do not form a box.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BBoxError {
-    /// A coordinate is NaN, infinite or absurdly large.
+    /// A coordinate is NaN, infinite or beyond ±1e9.
     #[error(
         "box coordinate {0} is not a pixel position; use finite numbers within ±{limit:e}",
         limit = MAX_COORDINATE
     )]
     Coordinate(f64),
-    /// The minimum of an axis lies beyond its maximum.
+    /// The minimum of an axis exceeds its maximum.
     #[error("box {0:?} is inverted; give x_min, y_min, x_max, y_max with each min ≤ max")]
     Inverted([f64; 4]),
 }
 
-/// Far beyond any picture, yet small enough that areas and sums over all boxes stay finite.
+/// Larger than any image, and small enough that areas and sums over all boxes stay finite.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// A box in the pixel space `S` ([`ViewPixels`] or [`FramePixels`]): corner-origin, continuous
-/// coordinates. Always finite, never inverted; zero width or height is allowed.
+/// A box in the pixel space `S` ([`ViewPixels`] or [`FramePixels`]) with corner-origin, continuous
+/// coordinates. Always finite and never inverted. Zero width or height is allowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BBox<S> {
     x_min: f64,
@@ -39,7 +39,7 @@ pub struct BBox<S> {
 }
 
 impl BBox<FramePixels> {
-    /// The whole of a frame.
+    /// The box that covers a whole frame.
     #[must_use]
     pub fn of_frame(width: u32, height: u32) -> Self {
         Self::from_ordered([0.0, 0.0, f64::from(width), f64::from(height)])
@@ -47,14 +47,14 @@ impl BBox<FramePixels> {
 }
 
 impl<S> BBox<S> {
-    /// The box `[x_min, y_min, x_max, y_max]`, pixels.
+    /// Builds the box `[x_min, y_min, x_max, y_max]`, in pixels.
     ///
     /// # Errors
     /// [`BBoxError`] when a coordinate is not finite or beyond ±1e9, or a min exceeds its max.
     pub fn new(corners: [f64; 4]) -> Result<Self, BBoxError> {
         let [x_min, y_min, x_max, y_max] = corners;
         for coordinate in corners {
-            // NaN is in no range.
+            // NaN is outside every range.
             if !(-MAX_COORDINATE..=MAX_COORDINATE).contains(&coordinate) {
                 return Err(BBoxError::Coordinate(coordinate));
             }
@@ -117,14 +117,14 @@ impl<S> BBox<S> {
         self.y_max - self.y_min
     }
 
-    /// Width times height, square pixels. No pixel is added to the sides: coordinates are
-    /// continuous.
+    /// Width times height, in square pixels. Coordinates are continuous, so no pixel is added to
+    /// the sides.
     #[must_use]
     pub fn area(&self) -> f64 {
         self.width() * self.height()
     }
 
-    /// The middle, `[x, y]`, pixels.
+    /// The centre `[x, y]`, in pixels.
     #[must_use]
     pub fn center(&self) -> [f64; 2] {
         [
@@ -133,17 +133,17 @@ impl<S> BBox<S> {
         ]
     }
 
-    /// Area shared with `other`, square pixels; 0 for boxes that only touch.
+    /// The area shared with `other`, in square pixels. 0 for boxes that only touch.
     #[must_use]
     pub fn intersection_area(&self, other: &Self) -> f64 {
-        // Each side is clamped alone: two negative overlaps must not multiply to a positive area.
+        // Each side is clamped separately, so that two negative overlaps do not multiply to a
+        // positive area.
         let width = (self.x_max.min(other.x_max) - self.x_min.max(other.x_min)).max(0.0);
         let height = (self.y_max.min(other.y_max) - self.y_min.max(other.y_min)).max(0.0);
         width * height
     }
 
-    /// Intersection over union, 0 to 1: shared area by covered area, and 0 when neither box has
-    /// any area.
+    /// Intersection over union, 0 to 1. 0 when neither box has an area.
     #[must_use]
     pub fn iou(&self, other: &Self) -> f64 {
         let intersection = self.intersection_area(other);
@@ -155,7 +155,7 @@ impl<S> BBox<S> {
         }
     }
 
-    /// The part inside `bounds`; `None` when that part has no area.
+    /// Returns the part inside `bounds`, or `None` when that part has no area.
     #[must_use]
     pub fn clipped_to(&self, bounds: &Self) -> Option<Self> {
         (self.intersection_area(bounds) > 0.0).then(|| {
@@ -168,9 +168,9 @@ impl<S> BBox<S> {
         })
     }
 
-    /// The box `share` (0 to 1) of the way from this one to `other`.
+    /// Returns the box `share` (0 to 1) of the way from this box to `other`.
     pub(super) fn moved_towards(&self, other: &Self, share: f64) -> Self {
-        // Both factors are the same for every edge and rounding is monotonic: min stays ≤ max.
+        // Both factors are the same for every edge and rounding is monotonic, so min stays ≤ max.
         let between = |here: f64, there: f64| here * (1.0 - share) + there * share;
         Self::from_ordered([
             between(self.x_min, other.x_min),

@@ -1,28 +1,29 @@
-//! What goes into the merge, and what comes out.
+//! Input and output of the merge.
 
 use super::{BBox, FramePixels};
 
 /// A person hypothesis of one view, mapped to the frame.
 ///
-/// Candidates with a field outside its range (a NaN score, say) are ignored by every refinement.
+/// Every refinement ignores a candidate with a field outside its range, for example a NaN score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    /// Where, in the frame.
+    /// Box in the frame.
     pub bbox: BBox<FramePixels>,
-    /// The detector's confidence, above 0, at most 1. A score of 0 says "no person".
+    /// Confidence of the detector, above 0, at most 1. A score of 0 means "no person".
     pub score: f64,
-    /// Which view of the plan saw it.
+    /// Index of the view in the plan.
     pub view: usize,
-    /// How far the coordinates are to be trusted compared with other candidates, above 0, at most
-    /// 1: less than 1 when the view's border cut the box off.
+    /// Weight of the coordinates relative to other candidates, above 0, at most 1. Less than 1 when
+    /// the border of the view cuts the box off.
     pub coordinate_weight: f64,
-    /// In how many views of the plan a box there should have been seen, at least 1. With 1,
-    /// [`Refinement::Fusion`](super::Refinement::Fusion) asks for no agreement between views.
+    /// Number of views of the plan in which a box at this position should be detected, at least 1.
+    /// With 1, [`Refinement::Fusion`](super::Refinement::Fusion) requires no agreement between
+    /// views.
     pub expected_views: f64,
 }
 
 impl Candidate {
-    /// Whether all fields are within their ranges.
+    /// Returns true if all fields are within their ranges.
     pub(super) fn is_usable(&self) -> bool {
         let share = |value: f64| value > 0.0 && value <= 1.0;
         share(self.score)
@@ -32,14 +33,14 @@ impl Candidate {
     }
 }
 
-/// A person, as the merge understands the candidates.
+/// A person after merging.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MergedDetection {
-    /// Where, in the frame.
+    /// Box in the frame.
     pub bbox: BBox<FramePixels>,
     /// Confidence after rescoring, above 0, at most 1.
     pub score: f64,
-    /// The candidates the box was made of, as indices into the merge's input, by descending
-    /// score. One for the NMS family, which picks boxes; a cluster for fusion, which averages.
+    /// Indices of the merged candidates in the merge's input, by descending score. One index for
+    /// the NMS family, which selects boxes, and a cluster for fusion, which averages them.
     pub members: Vec<usize>,
 }

@@ -1,38 +1,39 @@
-//! Weighted box fusion: average the boxes of a person instead of picking one.
+//! Weighted box fusion: averages the boxes of a person instead of selecting one.
 //!
-//! After Solovyev et al., "Weighted Boxes Fusion" (Image and Vision Computing 107, 2021), with
-//! three changes, each of which gained average precision on real and on rendered frames:
+//! Based on Solovyev et al., "Weighted Boxes Fusion" (Image and Vision Computing 107, 2021), with
+//! three changes. Each change increased average precision on real and on rendered frames:
 //!
-//! * A coordinate's weight is score³ × the candidate's own weight: sharper than the score alone,
-//!   and boxes cut off by a view's border hardly pull.
-//! * The score of a person is what its witnesses say on average. A word is a box's score × its IoU
-//!   with the fused box; the score is the mean of the best word of each distinct view, over the best `w` views, where `w` is 3 or the number of views that should have
-//!   seen the person, whichever is less. A view that is missing counts as 0. That number is an
-//!   estimate of each member at its own box, averaged with the same weights as the coordinates.
+//! * The weight of a coordinate is score³ × the candidate's coordinate weight. This is sharper than
+//!   the score alone, and boxes cut off by the border of a view have little influence.
+//! * The score of a person is the mean vote of its supporting views. A box votes with its score ×
+//!   its IoU with the fused box. The mean is taken over the best vote of each distinct view, for
+//!   the best `w` views. `w` is 3 or the number of views that should detect the person, whichever
+//!   is less. A missing view counts as 0. The expected number of views is an estimate of each
+//!   member at its own box, averaged with the same weights as the coordinates.
 //! * A fused box that lies mostly within a better one (or the other way round) is probably a part
-//!   of the same person, such as the legs or a group ([`doubt_nested`]).
+//!   of the same person or a group, so its score is lowered ([`penalise_nested`]).
 
 use super::{
     BBox, Candidate, FramePixels, MergedDetection, RefinementParameters,
     overlap_grid::{Overlap, OverlapGrid},
 };
 
-/// Views whose word makes a score: more would outvote a person whom few see well.
-const WITNESSES: usize = 3;
-/// A box is nested in another from this share of the smaller one's area on …
+/// Most views that vote on a score. More would outvote a person whom few views show well.
+const MAX_SUPPORTING_VIEWS: usize = 3;
+/// Share of the smaller box's area at which a box begins to count as nested in another.
 const NESTED_FROM: f64 = 0.5;
-/// … and fully from this share on.
+/// Share of the smaller box's area at which a box counts as fully nested.
 const NESTED_FULLY: f64 = 0.9;
-/// How much of its score a fully nested box loses to an undoubted better one.
-const NESTED_DOUBT: f64 = 0.5;
+/// Share of its score that a fully nested box loses to a better box with an unreduced score.
+const NESTED_PENALTY: f64 = 0.5;
 
-/// Fuses all usable candidates, also those below the score threshold: they are witnesses, too.
-/// The threshold and `max_detections` apply to the fused scores.
+/// Fuses all usable candidates. Candidates below the score threshold also vote. The threshold and
+/// `max_detections` apply to the fused scores.
 ///
-/// By descending score (of equal ones the lower index first), each candidate joins the cluster
-/// whose fused box, as it is by then, it overlaps most (of equal ones the older), if that IoU is
-/// at least the threshold; otherwise it founds a cluster. Boxes apart are never fused, also at
-/// threshold 0.
+/// Candidates are processed by descending score, and by ascending index for equal scores. Each
+/// candidate joins the cluster whose current fused box it overlaps most, if that IoU reaches the
+/// threshold. For equal IoUs the older cluster is taken. Any other candidate founds a new cluster.
+/// Boxes that do not overlap are never fused, also at threshold 0.
 pub(super) fn fuse(
     candidates: &[Candidate],
     parameters: &RefinementParameters,
@@ -61,7 +62,7 @@ pub(super) fn fuse(
         }
     }
 
-    // Nothing that joins a cluster is worth more than its founder.
+    // No member of a cluster has a higher score than its founder.
     let mut fused: Vec<MergedDetection> = clusters
         .into_iter()
         .take_while(|cluster| cluster.best_score >= parameters.score_threshold)
@@ -69,7 +70,7 @@ pub(super) fn fuse(
         .filter(|detection| detection.score >= parameters.score_threshold)
         .collect();
     sort_by_score(&mut fused);
-    doubt_nested(&mut fused);
+    penalise_nested(&mut fused);
     fused.retain(|detection| parameters.keeps(detection.score));
     sort_by_score(&mut fused);
     fused.truncate(parameters.max_detections);
@@ -80,9 +81,10 @@ fn sort_by_score(detections: &mut [MergedDetection]) {
     detections.sort_by(|a, b| b.score.total_cmp(&a.score));
 }
 
-/// Lowers the scores of boxes that share most of the smaller box's area with a better one: by up
-/// to [`NESTED_DOUBT`], in proportion to how much of the better box's own score is left.
-fn doubt_nested(descending: &mut [MergedDetection]) {
+/// Lowers the scores of boxes that share most of the smaller box's area with a better one. The
+/// reduction is at most [`NESTED_PENALTY`], in proportion to the remaining share of the better
+/// box's score.
+fn penalise_nested(descending: &mut [MergedDetection]) {
     let mut grid = OverlapGrid::covering(descending.iter().map(|detection| &detection.bbox), 0.0);
     for detection in descending.iter() {
         grid.insert(&detection.bbox);
@@ -100,13 +102,13 @@ fn doubt_nested(descending: &mut [MergedDetection]) {
                 let shared = bbox.intersection_area(&other) / smaller_area;
                 let nested =
                     ((shared - NESTED_FROM) / (NESTED_FULLY - NESTED_FROM)).clamp(0.0, 1.0);
-                descending[worse].score *= 1.0 - NESTED_DOUBT * nested * standing;
+                descending[worse].score *= 1.0 - NESTED_PENALTY * nested * standing;
             }
         }
     }
 }
 
-/// The number of the box that is overlapped most; of equal ones the lowest.
+/// Returns the number of the box with the largest overlap, the lowest number for equal overlaps.
 fn best_of(overlaps: &[Overlap]) -> Option<usize> {
     let first = overlaps.first()?;
     let best = overlaps.iter().fold(first, |best, overlap| {
@@ -119,12 +121,12 @@ fn best_of(overlaps: &[Overlap]) -> Option<usize> {
     Some(best.number)
 }
 
-/// How much two boxes agree, 0 to 1: equal ones fully, also if they have no area.
+/// The agreement of two boxes, 0 to 1. Equal boxes agree fully, also without an area.
 fn agreement(a: &BBox<FramePixels>, b: &BBox<FramePixels>) -> f64 {
     if a == b { 1.0 } else { a.iou(b) }
 }
 
-/// Candidates taken for one person, with running weighted means.
+/// Candidates assigned to one person, with running weighted means.
 struct Cluster {
     bbox: BBox<FramePixels>,
     expected_views: f64,
@@ -145,7 +147,7 @@ impl Cluster {
     }
 
     fn absorb(&mut self, index: usize, candidate: &Candidate) {
-        // Relative to the founder, whose score is the best: tiny scores do not underflow.
+        // Relative to the founder, which has the best score, so that tiny scores do not underflow.
         let weight = (candidate.score / self.best_score).powi(3) * candidate.coordinate_weight;
         self.weight += weight;
         let share = weight / self.weight;
@@ -158,13 +160,13 @@ impl Cluster {
     fn into_detection(self, candidates: &[Candidate]) -> MergedDetection {
         MergedDetection {
             bbox: self.bbox,
-            score: self.mean_witness_score(candidates),
+            score: self.mean_vote(candidates),
             members: self.members,
         }
     }
 
-    fn mean_witness_score(&self, candidates: &[Candidate]) -> f64 {
-        let mut words: Vec<(f64, usize)> = self
+    fn mean_vote(&self, candidates: &[Candidate]) -> f64 {
+        let mut votes: Vec<(f64, usize)> = self
             .members
             .iter()
             .map(|&index| {
@@ -174,33 +176,33 @@ impl Cluster {
                 (score * agreement(bbox, &self.bbox), *view)
             })
             .collect();
-        words.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        let mut heard: Vec<usize> = Vec::with_capacity(WITNESSES);
+        votes.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let mut voted: Vec<usize> = Vec::with_capacity(MAX_SUPPORTING_VIEWS);
         let mut sum = 0.0;
-        let wanted = self.witnesses_wanted();
-        // In descending order, a view's first word is its best.
-        for (word, view) in words {
-            if heard.len() == wanted {
+        let required = self.required_votes();
+        // The order is descending, so the first vote of a view is its best.
+        for (vote, view) in votes {
+            if voted.len() == required {
                 break;
             }
-            if !heard.contains(&view) {
-                heard.push(view);
-                sum += word;
+            if !voted.contains(&view) {
+                voted.push(view);
+                sum += vote;
             }
         }
-        #[expect(clippy::cast_precision_loss, reason = "at most three witnesses")]
-        let mean = sum / wanted as f64;
+        #[expect(clippy::cast_precision_loss, reason = "at most three views")]
+        let mean = sum / required as f64;
         mean
     }
 
-    fn witnesses_wanted(&self) -> usize {
+    fn required_votes(&self) -> usize {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "at least 1, and clamped"
+            reason = "at least 1 and clamped"
         )]
         let expected = self.expected_views.round().min(1e6) as usize;
-        expected.clamp(1, WITNESSES)
+        expected.clamp(1, MAX_SUPPORTING_VIEWS)
     }
 }
 

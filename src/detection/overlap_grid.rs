@@ -1,21 +1,21 @@
-//! Finds the boxes that a box overlaps without looking at all of them.
+//! Index that finds the boxes overlapping a given box without comparing all of them.
 //!
-//! A uniform grid in which every box is listed in each cell it reaches. Who asks for an IoU of at
-//! least `t` needs not look everywhere a box reaches: of each side, the overlap covers at least the
-//! share `t` (the IoU is at most that share), so whatever its place, it meets the side's *core*:
-//! what is left when `t` is cut off at both ends, from `t` = ½ on its middle alone. One cell, then,
-//! tells all boxes that can be meant.
+//! A uniform grid lists every box in each cell that the box covers. A query for an IoU of at least
+//! `t` searches only a part of the queried box. An overlap covers at least the share `t` of each
+//! side, since the IoU is at most that share. So it always meets the *core* of the side: the part
+//! that remains when `t` is cut off at both ends, which from `t` = ½ on is the centre alone. The
+//! cells of the core therefore contain all boxes that can match.
 
 use super::{BBox, FramePixels};
 
-/// Cells along a side of the mean box when whole boxes are asked for, and how many more when it is
-/// their middles alone: the finer the cells, the fewer boxes beside them are looked at.
+/// Cells along a side of the mean box when whole boxes are searched, and how many more when only
+/// their centres are searched. Finer cells reduce the number of neighbouring boxes compared.
 const CELLS_PER_BOX: [f64; 2] = [1.0, 4.0];
 const MAX_CELLS_PER_AXIS: usize = 128;
-/// Shares of sides are this much less exact than IoUs, so that rounding loses no box.
+/// Tolerance of shares of sides relative to IoUs, so that rounding loses no box.
 const ROUNDING: f64 = 1e-9;
 
-/// A box of the grid that overlaps a box asked for.
+/// A box of the grid that overlaps the queried box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Overlap {
     /// The number of the box in the grid.
@@ -24,7 +24,7 @@ pub(super) struct Overlap {
     pub(super) iou: f64,
 }
 
-/// Boxes, numbered in order of insertion, by the cells they reach.
+/// Boxes, numbered in order of insertion, listed by the cells they cover.
 pub(super) struct OverlapGrid {
     columns: Axis,
     rows: Axis,
@@ -32,14 +32,13 @@ pub(super) struct OverlapGrid {
     boxes: Vec<BBox<FramePixels>>,
     reach: Vec<Reach>,
     least_iou: f64,
-    /// How much of each end of a side is not core.
+    /// Share of a side that is cut off at each end to get its core.
     cut: f64,
 }
 
 impl OverlapGrid {
-    /// An empty grid for boxes that lie where `boxes` lie, of which those with an IoU of at least
-    /// `least_iou` will be looked for. Others may be inserted and asked for: the outermost cells go
-    /// on for ever.
+    /// Builds an empty grid sized for `boxes` and for queries with an IoU of at least `least_iou`.
+    /// Boxes elsewhere may also be inserted and queried: the outermost cells extend without limit.
     pub(super) fn covering<'a>(
         boxes: impl Iterator<Item = &'a BBox<FramePixels>> + Clone,
         least_iou: f64,
@@ -61,7 +60,7 @@ impl OverlapGrid {
         }
     }
 
-    /// Adds a box under the next number.
+    /// Adds a box with the next number.
     pub(super) fn insert(&mut self, bbox: &BBox<FramePixels>) {
         let number = self.reach.len();
         let reach = self.reach_of(bbox, 0.0);
@@ -72,7 +71,7 @@ impl OverlapGrid {
         self.reach.push(reach);
     }
 
-    /// Moves box `number`. It stays listed where it was, too.
+    /// Moves box `number`. The cells of its earlier positions keep listing it.
     pub(super) fn move_to(&mut self, number: usize, bbox: &BBox<FramePixels>) {
         self.boxes[number] = *bbox;
         let before = self.reach[number];
@@ -88,9 +87,9 @@ impl OverlapGrid {
         self.reach[number] = after;
     }
 
-    /// Writes to `found`, ascending and each once, the numbers from `first` on of all boxes that
-    /// overlap `bbox` with at least the grid's IoU. `first` above 0 needs a grid in which no box
-    /// was moved.
+    /// Writes to `found` the numbers of all boxes from `first` on that overlap `bbox` with at least
+    /// the grid's IoU. The numbers are ascending and unique. `first` above 0 requires a grid in
+    /// which no box was moved.
     pub(super) fn overlaps(
         &self,
         bbox: &BBox<FramePixels>,
@@ -103,7 +102,7 @@ impl OverlapGrid {
             let listed = &self.cells[row * self.columns.cells + column];
             for &number in listed.iter().rev().take_while(|number| **number >= first) {
                 let iou = bbox.iou(&self.boxes[number]);
-                // Two boxes may share many cells; only the first of those counts.
+                // Two boxes may share many cells. Only the first shared cell counts.
                 if iou > 0.0
                     && iou >= self.least_iou
                     && core.first_shared(&self.reach[number]) == (column, row)
@@ -115,8 +114,8 @@ impl OverlapGrid {
         found.sort_unstable_by_key(|overlap| overlap.number);
     }
 
-    /// The cells of what is left of a box when the share `cut` of each side is cut off at both of
-    /// its ends.
+    /// The cells of the part of a box that remains when the share `cut` of each side is cut off at
+    /// both of its ends.
     fn reach_of(&self, bbox: &BBox<FramePixels>, cut: f64) -> Reach {
         let (x_cut, y_cut) = (cut * bbox.width(), cut * bbox.height());
         Reach {
@@ -132,7 +131,7 @@ impl OverlapGrid {
     }
 }
 
-/// First and last column and row that a box reaches.
+/// First and last column and row that a box covers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Reach {
     columns: (usize, usize),
@@ -184,7 +183,7 @@ impl Axis {
             count += 1.0;
         }
         let extent = end - start;
-        // Without boxes, or without extent, the quotient is no number: one cell.
+        // Without boxes or without extent the quotient is NaN, which gives one cell.
         let cells = to_cell(cells_per_box * extent * count / sides).clamp(1, MAX_CELLS_PER_AXIS);
         #[expect(clippy::cast_precision_loss, reason = "at most 128 cells")]
         let cells_per_pixel = cells as f64 / extent;
@@ -203,7 +202,7 @@ impl Axis {
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "NaN and negative numbers become 0, large ones the largest: the outermost cells"
+    reason = "NaN and negative numbers become 0, large ones the maximum: the outermost cells"
 )]
 fn to_cell(position: f64) -> usize {
     position as usize

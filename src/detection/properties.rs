@@ -1,4 +1,4 @@
-//! What must hold for any candidates, and a plain reference that the fast merge must agree with.
+//! Properties that hold for any candidates, and a plain reference that the fast merge must match.
 
 use proptest::prelude::*;
 use strum::VariantArray;
@@ -11,8 +11,8 @@ const NMS_FAMILY: [Refinement; 3] = [
     Refinement::SoftNmsGaussian,
 ];
 
-/// Boxes on a coarse lattice, so that equal, nested and touching ones are frequent, and scores
-/// of which many are equal.
+/// Boxes on a coarse lattice, so that equal, nested and touching boxes are frequent, with many
+/// equal scores.
 fn candidate() -> impl Strategy<Value = Candidate> {
     let corner = || (0..60_i32).prop_map(|value| f64::from(value) * 5.0);
     let side = || (0..30_i32).prop_map(|value| f64::from(value) * 5.0);
@@ -42,7 +42,7 @@ fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
     prop::collection::vec(candidate(), 0..60)
 }
 
-/// Candidates in any order of which no two have the same score.
+/// Candidates in any order with pairwise different scores.
 fn distinct_candidates() -> impl Strategy<Value = Vec<Candidate>> {
     candidates()
         .prop_map(|mut candidates| {
@@ -95,8 +95,8 @@ fn nms_family() -> impl Strategy<Value = Refinement> {
     prop::sample::select(NMS_FAMILY.to_vec())
 }
 
-/// The NMS family as the paper words it: every pair compared, nothing left out before the loop,
-/// the threshold applied to the rescored scores.
+/// The NMS family as described in the paper: every pair is compared, nothing is left out before the
+/// loop, and the threshold is applied to the rescored scores.
 fn reference(candidates: &[Candidate], parameters: &RefinementParameters) -> Vec<(usize, f64)> {
     let mut scores: Vec<f64> = candidates.iter().map(|candidate| candidate.score).collect();
     let mut left: Vec<usize> = (0..candidates.len()).collect();
@@ -127,7 +127,7 @@ fn reference(candidates: &[Candidate], parameters: &RefinementParameters) -> Vec
     kept
 }
 
-/// Weighted box fusion without a grid and with the means computed anew from all members.
+/// Weighted box fusion without a grid, with the means recomputed from all members.
 fn fusion_reference(
     candidates: &[Candidate],
     parameters: &RefinementParameters,
@@ -159,7 +159,7 @@ fn fusion_reference(
             let [x_min, y_min, x_max, y_max] = mean(members);
             let fused = BBox::new([x_min, y_min, x_max.max(x_min), y_max.max(y_min)]).unwrap();
             let iou = candidates[index].bbox.iou(&fused);
-            // A little more than equal: the two ways to average differ in the last digits.
+            // The tolerance covers the last digits, in which the two ways of averaging differ.
             if iou >= parameters.iou_threshold && iou > best.map_or(0.0, |(_, iou)| iou + 1e-9) {
                 best = Some((number, iou));
             }
@@ -198,7 +198,7 @@ proptest! {
     }
 
     #[test]
-    fn leaving_out_low_scores_beforehand_changes_nothing_in_the_nms_family(
+    fn dropping_low_scores_first_changes_nothing_in_the_nms_family(
         candidates in candidates(),
         parameters in parameters(nms_family()),
     ) {
@@ -210,7 +210,7 @@ proptest! {
     }
 
     #[test]
-    fn candidates_below_the_threshold_need_not_be_offered_to_the_nms_family(
+    fn the_nms_family_ignores_candidates_below_the_threshold(
         candidates in candidates(),
         parameters in parameters(nms_family()),
     ) {
@@ -227,7 +227,7 @@ proptest! {
     #[test]
     fn fast_fusion_forms_the_same_clusters_as_the_plain_one(
         candidates in distinct_candidates(),
-        // Off the values that IoUs of lattice boxes take, where rounding would decide.
+        // Avoids the values that IoUs of lattice boxes take, where rounding would decide.
         iou_threshold in prop::sample::select(vec![0.2013, 0.4007, 0.6011]),
     ) {
         let parameters = RefinementParameters {
@@ -270,7 +270,7 @@ proptest! {
         };
         let mut original = boxes(refine(&candidates, &parameters));
         let mut other = boxes(refine(&shuffled, &parameters));
-        // Rescored scores may be equal; then it is the order that decides who is cut off.
+        // Rescored scores may be equal. Then the order decides which detection is cut off.
         if original.len() < parameters.max_detections {
             let by_score_and_place = |a: &(BBox<_>, f64), b: &(BBox<_>, f64)| {
                 b.1.total_cmp(&a.1).then(a.0.x_min().total_cmp(&b.0.x_min()))
@@ -317,7 +317,7 @@ proptest! {
     }
 
     #[test]
-    fn results_are_sorted_bounded_and_never_score_above_their_best_member(
+    fn results_are_sorted_and_never_exceed_their_best_member(
         candidates in candidates(),
         parameters in parameters(any_refinement()),
     ) {
@@ -332,7 +332,7 @@ proptest! {
     }
 
     #[test]
-    fn nonsense_candidates_give_no_nonsense_detections(
+    fn invalid_candidates_give_no_invalid_detections(
         mut candidates in prop::collection::vec(candidate(), 1..20),
         spoiled in prop::collection::vec((0..20_usize, 0..3, any::<f64>()), 0..20),
         parameters in parameters(any_refinement()),
@@ -353,7 +353,7 @@ proptest! {
     }
 
     #[test]
-    fn names_of_refinements_read_back(refinement in any_refinement()) {
+    fn names_of_refinements_parse_back(refinement in any_refinement()) {
         prop_assert_eq!(refinement.to_string().parse(), Ok(refinement));
     }
 }

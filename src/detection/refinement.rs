@@ -1,10 +1,10 @@
-//! Which way overlapping candidates become persons, and with which numbers.
+//! Refinement methods for overlapping candidates, and their parameters.
 
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 use super::{Candidate, MergedDetection, fusion, suppression};
 
-/// How overlapping candidates are refined into one detection per person.
+/// The method that merges overlapping candidates into one detection per person.
 #[derive(
     Debug,
     Clone,
@@ -38,26 +38,26 @@ impl Refinement {
     }
 }
 
-/// A refinement and its numbers.
+/// A refinement and its parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RefinementParameters {
-    /// Which refinement.
+    /// Refinement method.
     pub refinement: Refinement,
-    /// `N_t`, 0 to 1: two boxes with at least this IoU are the same person. Unused by Gaussian
-    /// Soft-NMS. At its ends: 0 leaves hard NMS a single box per frame (0 ≥ 0 holds for boxes
-    /// apart, too) and lets linear Soft-NMS and fusion act on any overlap; 1 merges only boxes
-    /// that coincide.
+    /// `N_t`, 0 to 1: two boxes with at least this IoU are the same person. Gaussian Soft-NMS does
+    /// not use it. At 0, hard NMS leaves a single box per frame (0 ≥ 0 also holds for disjoint
+    /// boxes), and linear Soft-NMS and fusion act on any overlap. At 1, only boxes that coincide
+    /// are merged.
     pub iou_threshold: f64,
-    /// σ of Gaussian Soft-NMS, above 0: the larger, the less an overlap lowers a score.
+    /// σ of Gaussian Soft-NMS, above 0. A larger σ lowers scores less for the same overlap.
     pub sigma: f64,
-    /// `C_t`, 0 to 1: detections with a lower score after rescoring are left out.
+    /// `C_t`, 0 to 1: detections with a lower score after rescoring are removed.
     pub score_threshold: f64,
-    /// At most this many detections, the best.
+    /// Largest number of detections. The best are kept.
     pub max_detections: usize,
 }
 
 impl RefinementParameters {
-    /// Whether a rescored score is good enough. 0 never is, whatever the threshold: it says "no
+    /// Returns true if a rescored score reaches the threshold. 0 never does, since it means "no
     /// person".
     pub(super) fn keeps(&self, score: f64) -> bool {
         score > 0.0 && score >= self.score_threshold
@@ -66,8 +66,8 @@ impl RefinementParameters {
 
 /// Merges the candidates of all views of one frame into detections, by descending score.
 ///
-/// `members` of the result index into `candidates`. Candidates out of their ranges are ignored (see
-/// [`Candidate`]); whatever they are, the result is finite and in range.
+/// `members` of the result are indices into `candidates`. Candidates with a field out of range are
+/// ignored (see [`Candidate`]). The result is finite and in range for any input.
 #[must_use]
 pub fn refine(candidates: &[Candidate], parameters: &RefinementParameters) -> Vec<MergedDetection> {
     let RefinementParameters {

@@ -1,9 +1,9 @@
-//! The NMS family: pick the best box, lower the scores of those it overlaps, repeat.
+//! The NMS family: select the best box, lower the scores of the boxes it overlaps, repeat.
 //!
-//! Hard NMS and the two Soft-NMS variants (Bodla et al., "Soft-NMS – Improving Object Detection
-//! With One Line of Code", ICCV 2017) differ only in the factor by which a picked box lowers a
-//! score: see [`hard`], [`linear`] and [`gaussian`]. All follow Seidel et al. (2019) in comparing
-//! `IoU >= N_t`.
+//! Hard NMS and the two Soft-NMS variants differ only in the factor by which a selected box lowers
+//! a score: see [`hard`], [`linear`] and [`gaussian`]. Soft-NMS is from Bodla et al., "Soft-NMS –
+//! Improving Object Detection With One Line of Code", ICCV 2017. All variants compare `IoU >= N_t`,
+//! as in Seidel et al. (2019).
 
 use std::{
     cmp::Ordering,
@@ -12,14 +12,14 @@ use std::{
 
 use super::{Candidate, MergedDetection, RefinementParameters, overlap_grid::OverlapGrid};
 
-/// Hard NMS: 0 where IoU ≥ `N_t`, else 1. At `iou_threshold` 0 even a box far away is suppressed
-/// (0 ≥ 0): one box is left. At 1 only boxes that coincide are.
+/// Hard NMS: 0 where IoU ≥ `N_t`, else 1. At `iou_threshold` 0 even a distant box is suppressed (0
+/// ≥ 0), so one box remains. At 1 only boxes that coincide are suppressed.
 pub(super) fn hard(iou_threshold: f64) -> impl Fn(f64) -> f64 {
     move |iou| if iou >= iou_threshold { 0.0 } else { 1.0 }
 }
 
-/// Linear Soft-NMS: 1 − IoU where IoU ≥ `N_t`, else 1. At `iou_threshold` 0 every overlap counts;
-/// at 1 only boxes that coincide are lowered, to 0.
+/// Linear Soft-NMS: 1 − IoU where IoU ≥ `N_t`, else 1. At `iou_threshold` 0 every overlap counts.
+/// At 1 only boxes that coincide are lowered, to 0.
 pub(super) fn linear(iou_threshold: f64) -> impl Fn(f64) -> f64 {
     move |iou| if iou >= iou_threshold { 1.0 - iou } else { 1.0 }
 }
@@ -29,15 +29,15 @@ pub(super) fn gaussian(sigma: f64) -> impl Fn(f64) -> f64 {
     move |iou| (-iou * iou / sigma).exp()
 }
 
-/// Picks boxes by descending score; `factor` says, from the IoU with a picked box, what is left
-/// of a score, and leaves it as it is below `least_iou`. Of equal scores the lower index goes first.
+/// Selects boxes by descending score, and by ascending index for equal scores. `factor` maps the
+/// IoU with a selected box to the share of the score that remains. It is 1 below `least_iou`.
 ///
-/// Scores only ever fall, hence three shortcuts that change no result:
-/// * A candidate below the threshold can never be picked, nor then lower another: it is left out
-///   from the start.
-/// * A score computed against the first few picked boxes bounds the true one from above, so
-///   candidates wait in a heap by that bound, and only the one on top is brought up to date.
-/// * Picked scores descend, so the loop ends at `max_detections`.
+/// Scores never rise, which allows three shortcuts that do not change the result:
+/// * A candidate below the threshold can never be selected, nor lower another candidate, so it is
+///   left out from the start.
+/// * A score computed against the first few selected boxes is an upper bound of the final one.
+///   Candidates wait in a heap ordered by that bound, and only the top one is updated.
+/// * Selected scores descend, so the loop ends at `max_detections`.
 pub(super) fn suppress(
     candidates: &[Candidate],
     parameters: &RefinementParameters,
@@ -60,7 +60,7 @@ pub(super) fn suppress(
     let mut grid = OverlapGrid::covering(boxes, least_iou);
     let mut picked: Vec<MergedDetection> = Vec::new();
     let mut overlaps = Vec::new();
-    // Boxes apart are never compared. It is only hard NMS at N_t = 0 that would suppress them.
+    // Disjoint boxes are never compared. Only hard NMS at N_t = 0 would suppress them.
     let at_most = if factor(0.0) <= 0.0 {
         parameters.max_detections.min(1)
     } else {
@@ -80,7 +80,7 @@ pub(super) fn suppress(
             if !parameters.keeps(top.score) {
                 PeekMut::pop(top);
             }
-            // Otherwise it sinks to where it belongs now.
+            // Otherwise it moves down the heap to its new position.
             continue;
         }
         let Waiting { score, index, .. } = PeekMut::pop(top);
@@ -94,9 +94,9 @@ pub(super) fn suppress(
     picked
 }
 
-/// A candidate not yet picked. The greatest is the next in line.
+/// A candidate that is not selected yet. The greatest is the next to be processed.
 struct Waiting {
-    /// Its score after the first `seen` picked boxes: an upper bound.
+    /// Its score after the first `seen` selected boxes: an upper bound.
     score: f64,
     index: usize,
     seen: usize,

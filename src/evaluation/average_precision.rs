@@ -1,9 +1,9 @@
-//! Average precision, by the three definitions in use.
+//! Average precision, by three common definitions.
 
 use super::PrecisionRecallCurve;
 
-/// The average precision of one curve. All three take as the precision at a recall the greatest
-/// at that recall or beyond (the envelope).
+/// The average precision of one curve. In all three definitions the precision at a recall is the
+/// maximum at that recall or a higher one (the envelope).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AveragePrecision {
     /// Area under the envelope: PASCAL VOC from 2010 on.
@@ -22,7 +22,7 @@ impl PrecisionRecallCurve {
         AveragePrecision {
             all_point_area: area(&envelope),
             eleven_point: mean_at(&envelope, (0..=10_u8).map(|level| f64::from(level) / 10.0)),
-            // The product, not the quotient: to the last bit the levels of `pycocotools`.
+            // A product, not a quotient: it equals the levels of `pycocotools` to the last bit.
             coco_101_point: mean_at(&envelope, (0..=100_u8).map(|level| f64::from(level) * 0.01)),
         }
     }
@@ -54,7 +54,7 @@ fn area(envelope: &[(f64, f64)]) -> f64 {
     area
 }
 
-/// Mean envelope precision at recall levels; 0 where a level is never reached.
+/// The mean envelope precision at recall levels. It is 0 at levels that are not reached.
 fn mean_at(envelope: &[(f64, f64)], levels: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = super::precision_recall::count(levels.len());
     let sum: f64 = levels

@@ -1,7 +1,8 @@
-//! Data sets: pictures with the persons in them, in the file formats in use.
+//! Data sets: images with annotated persons, in common file formats.
 //!
-//! What is at a path is recognised from its files; [`DataSet::open`] lists them. The readers give
-//! a picture's file, its truth and, where the data has it, its calibration and size.
+//! [`DataSet::open`] recognises the format from the files at a path, and lists the formats. The
+//! readers return an image's file, its ground truth and, if the data set has them, its calibration
+//! and size.
 
 mod coco;
 mod error;
@@ -30,44 +31,44 @@ use crate::{
     },
 };
 
-/// Pictures with the persons in them.
+/// Images with annotated persons.
 #[derive(Debug)]
 pub struct DataSet {
-    /// The pictures, in the order of the annotation files.
+    /// The images, in the order of the annotation files.
     pub images: Vec<DataSetImage>,
-    /// What the truth looks like.
+    /// The shape of the ground truth.
     pub scoring: Scoring,
 }
 
-/// One picture of a data set.
+/// One image of a data set.
 #[derive(Debug)]
 pub struct DataSetImage {
-    /// What the annotations call it.
+    /// The ID in the annotations.
     pub id: ImageId,
-    /// The picture's file.
+    /// The image's file.
     pub path: PathBuf,
-    /// The camera's calibration; without one a lens is assumed.
+    /// The camera's calibration. Without one a lens is assumed.
     pub calibration: Option<Arc<Calibration>>,
     /// `[width, height]` as annotated, pixels.
     pub size: Option<[u32; 2]>,
-    /// Who is in it.
+    /// The persons in it.
     pub truth: GroundTruth<Outline>,
 }
 
 impl DataSet {
-    /// Opens the data set at `path`, which is one of
+    /// Opens the data set at `path`, which is one of:
     ///
     /// * a folder with `annotations.json` (COCO, each image with a `calibration`), `images/` and
     ///   `calibrations/<id>.json`;
     /// * a COCO file, or a folder with `annotations.json`, `annotations/*.json` or `*.json` and
-    ///   the pictures anywhere below it; boxes of five numbers are rotated (CEPDOF, RAPiD);
-    /// * a folder with Pascal VOC XML files and the pictures of the same names anywhere below it
+    ///   the images anywhere below it; boxes of five numbers are rotated (CEPDOF, RAPiD);
+    /// * a folder with Pascal VOC XML files and the images of the same names anywhere below it
     ///   (VOC, boxes for PIROPO);
     /// * a PIROPO folder with head points, `Ground_Truth_Annotations/groundTruth_<sequence>.csv`
     ///   beside `<sequence>/`, or one such CSV file.
     ///
     /// # Errors
-    /// [`DataSetError`] naming the file and what is wrong with it.
+    /// [`DataSetError`], which names the file and the problem.
     pub fn open(path: &Path) -> Result<Self, DataSetError> {
         let unreadable = |source| DataSetError::Unreadable {
             path: path.to_owned(),
@@ -117,8 +118,9 @@ impl DataSet {
         }
     }
 
-    /// What is compared with the truth of `image` when a person was found in it with this box and
-    /// this oriented box. A data set of rotated boxes knows the size of every frame.
+    /// Returns the outline that is compared with the ground truth of `image` for a person detected
+    /// with this box and this oriented box. A data set of rotated boxes has the size of every
+    /// frame.
     #[must_use]
     pub fn outline(
         &self,
@@ -130,7 +132,7 @@ impl DataSet {
         self.scoring.outline(bbox, oriented_box, frame)
     }
 
-    /// The same data set with `calibration` for every picture.
+    /// Returns the same data set with `calibration` for every image.
     #[must_use]
     pub fn with_calibration(mut self, calibration: &Arc<Calibration>) -> Self {
         for image in &mut self.images {
@@ -139,11 +141,12 @@ impl DataSet {
         self
     }
 
-    /// The same data set with truths to be scored as `scoring`. Rotated boxes can be made
-    /// axis-parallel: the bounds of the ellipse inscribed in each.
+    /// Returns the same data set with ground truth to be scored as `scoring`. Rotated boxes can be
+    /// converted to axis-parallel ones: the bounds of the ellipse inscribed in each.
+    ///
     ///
     /// # Errors
-    /// [`ScoringMismatch`] when the truth cannot be brought into that shape.
+    /// [`ScoringMismatch`] if the ground truth cannot be converted to that shape.
     pub fn scored_as(mut self, scoring: Scoring) -> Result<Self, ScoringMismatch> {
         if scoring == self.scoring {
             return Ok(self);
@@ -176,7 +179,7 @@ fn made_axis_parallel(outline: &Outline) -> Outline {
 }
 
 impl DataSetImage {
-    /// A picture in which nobody is annotated so far.
+    /// Creates an image without annotations.
     fn empty(id: ImageId, path: PathBuf) -> Self {
         Self {
             id,
@@ -191,8 +194,7 @@ impl DataSetImage {
         self.truth.persons.push(person);
     }
 
-    /// `[width, height]` in pixels as annotated, or else as calibrated; `None` when neither is
-    /// known.
+    /// `[width, height]` in pixels as annotated, or else as calibrated. `None` if neither is known.
     #[must_use]
     pub fn frame_size(&self) -> Option<[u32; 2]> {
         let calibrated = || {
@@ -202,10 +204,10 @@ impl DataSetImage {
         self.size.or_else(calibrated)
     }
 
-    /// The angle in degrees between the optical axis and the ray to a point (corner-origin
-    /// pixels), through the calibrated lens or else through the equidistant lens of 180° whose
-    /// circle is the largest in the frame. Beyond the lens image, that of its rim; `None` where
-    /// the size of the frame is not known.
+    /// The angle in degrees between the optical axis and the ray to a point (corner-origin pixels).
+    /// It uses the calibrated lens, or else the equidistant lens of 180° with the largest circle in
+    /// the frame. Beyond the lens image it is the angle of the rim. `None` if the frame's size is
+    /// unknown.
     #[must_use]
     pub fn off_axis_deg(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let [width, height] = self.frame_size()?;

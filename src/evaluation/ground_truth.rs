@@ -1,28 +1,28 @@
-//! What is to be compared: the truth of an image, and what was found in it.
+//! The inputs of a comparison: the ground truth of an image, and its detections.
 
-/// The persons of one image, by hand or by construction.
+/// The annotated or synthetic persons of one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroundTruth<B> {
-    /// Persons, to be found or to be passed over.
+    /// Persons, those that count and those that do not.
     pub persons: Vec<AnnotatedPerson<B>>,
     /// Regions in which a detection is neither right nor wrong (`iscrowd` in COCO files).
     pub ignore_regions: Vec<B>,
 }
 
-/// A person of the truth.
+/// A person of the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AnnotatedPerson<B> {
-    /// Where.
+    /// The outline.
     pub outline: B,
-    /// Whether the person is to be found. Missing one that is not is no fault, and finding one
-    /// is no merit (`difficult` in VOC files).
+    /// True if the person counts. Otherwise a miss is not an error, and a detection is neither
+    /// right nor wrong (`difficult` in VOC files).
     pub counts: bool,
-    /// The share of the person that can be seen, 0 to 1, where the annotations say so.
+    /// The visible fraction of the person, 0 to 1, if the annotations state it.
     pub visible_fraction: Option<f64>,
 }
 
 impl<B> From<B> for AnnotatedPerson<B> {
-    /// A person to be found, of whom nothing else is known.
+    /// A person that counts, without further properties.
     fn from(outline: B) -> Self {
         Self {
             outline,
@@ -33,7 +33,7 @@ impl<B> From<B> for AnnotatedPerson<B> {
 }
 
 impl<B> GroundTruth<B> {
-    /// How many persons are to be found.
+    /// The number of persons that count.
     #[must_use]
     pub fn person_count(&self) -> usize {
         self.persons.iter().filter(|person| person.counts).count()
@@ -41,7 +41,7 @@ impl<B> GroundTruth<B> {
 }
 
 impl<B> Default for GroundTruth<B> {
-    /// Nobody.
+    /// Creates a ground truth without persons.
     fn default() -> Self {
         Self {
             persons: Vec::new(),
@@ -53,17 +53,17 @@ impl<B> Default for GroundTruth<B> {
 /// A detection with its confidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoredBox<B> {
-    /// Where.
+    /// The outline.
     pub bbox: B,
     /// Confidence, finite.
     pub score: f64,
 }
 
-/// One image's truth and detections.
+/// The ground truth and the detections of one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluatedImage<B> {
-    /// What is in it.
+    /// The ground truth.
     pub truth: GroundTruth<B>,
-    /// What was found, in any order; of equal scores the earlier goes first.
+    /// The detections, in any order. Of equal scores the earlier one is matched first.
     pub detections: Vec<ScoredBox<B>>,
 }

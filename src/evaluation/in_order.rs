@@ -1,4 +1,4 @@
-//! Several images at once, with results in the order of the images.
+//! Processes several images concurrently, with results in the order of the images.
 
 use std::{
     num::NonZeroUsize,
@@ -7,9 +7,9 @@ use std::{
     thread,
 };
 
-/// Does `work` for each item, on at most `at_once` threads. The results are those that one thread
-/// would give, in whichever order the items are finished: the error is that of the first item
-/// that has one, and after an error no item is begun.
+/// Runs `work` for each item, on at most `at_once` threads. The results equal those of one thread,
+/// regardless of the order in which items finish: the error is that of the first item with an
+/// error, and no item is started after an error.
 pub(super) fn in_order<T: Sync, R: Send, E: Send>(
     items: &[T],
     at_once: NonZeroUsize,
@@ -20,7 +20,7 @@ pub(super) fn in_order<T: Sync, R: Send, E: Send>(
     let take_turns = || {
         let mut results = Vec::new();
         while !failed.load(Ordering::Relaxed) {
-            // Items are begun in their order, so that whatever precedes a failed one is finished.
+            // Items are started in their order, so everything before a failed one is finished.
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = items.get(index) else { break };
             let result = work(item);
@@ -37,7 +37,7 @@ pub(super) fn in_order<T: Sync, R: Send, E: Send>(
             })
             .collect();
         let mut results = take_turns();
-        // A helper that the operating system did not give was only help.
+        // If the operating system refuses a helper thread, the other threads do its work.
         for helper in helpers.into_iter().flatten() {
             results.extend(helper.join().unwrap_or_else(|panic| resume_unwind(panic)));
         }
@@ -56,7 +56,7 @@ mod tests {
     const TWO: NonZeroUsize = NonZeroUsize::new(2).unwrap();
 
     #[test]
-    fn two_items_are_worked_on_at_once_and_results_keep_their_order() {
+    fn two_items_run_concurrently_and_results_keep_their_order() {
         let both_begun = Barrier::new(2);
         let result: Result<Vec<u32>, ()> = in_order(&[1, 2, 3, 4], TWO, |item| {
             both_begun.wait();
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_that_of_the_first_item_that_has_one() {
+    fn the_error_is_that_of_the_first_failed_item() {
         let both_begun = Barrier::new(2);
         let result: Result<Vec<()>, u32> = in_order(&[1, 2], TWO, |item| {
             both_begun.wait();
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn after_an_error_nothing_is_begun() {
+    fn no_item_is_started_after_an_error() {
         let begun = AtomicUsize::new(0);
         let result: Result<Vec<()>, &str> = in_order(&[0; 100], NonZeroUsize::MIN, |_| {
             begun.fetch_add(1, Ordering::Relaxed);

@@ -1,39 +1,40 @@
-//! Which detections of an image count as right.
+//! Matches the detections of an image with its persons.
 
 use super::{GroundTruth, Region, ScoredBox};
 
-/// COCO lowers a threshold of 1 by this much, so that rounding cannot part equal boxes.
+/// COCO lowers a threshold of 1 by this margin, so that rounding cannot separate equal boxes.
 const COCO_MARGIN: f64 = 1e-10;
 
-/// How a detection counts.
+/// The outcome of a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// It found a person no better detection had found.
+    /// It matches a person that no better detection has matched.
     TruePositive,
-    /// It found nothing, or a person found before.
+    /// It matches no person, or one that was matched before.
     FalsePositive,
-    /// It found a person that does not count, or lies in an ignore region: neither.
+    /// It matches a person that does not count, or lies in an ignore region.
     Ignored,
 }
 
-/// Which person a detection is compared with. Detections take their turns by descending score.
+/// The rule that selects the person for a detection. Detections are processed by descending score.
 ///
-/// In both rules a detection of a person that does not count is ignored, and so is one that no
-/// person decides when at least the threshold's share of its area lies in an ignore region.
+/// In both rules a detection is ignored if it matches a person that does not count. It is also
+/// ignored if no person decides it and at least the threshold's share of its area is in an ignore
+/// region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MatchingRule {
-    /// PASCAL VOC (Everingham et al., IJCV 2010): the person of greatest IoU, of equal ones the
-    /// first, decides. If another detection has it, this one is a duplicate: a false positive.
-    /// A person that does not count may be found any number of times.
+    /// PASCAL VOC (Everingham et al., IJCV 2010): the person of greatest IoU decides, of equal ones
+    /// the first. If it has another detection, this one is a duplicate, a false positive. A person
+    /// that does not count may be matched any number of times.
     Voc,
-    /// COCO (as in `pycocotools`): the person of greatest IoU, of equal ones the last, among
-    /// those not yet found; only where none of these counts, one that does not.
+    /// COCO (as in `pycocotools`): the unmatched person of greatest IoU decides, of equal ones the
+    /// last. Persons that do not count are considered only if no counting person qualifies.
     Coco,
 }
 
 impl MatchingRule {
-    /// The outcome of each detection of one image, in the order of `detections`. A match needs
-    /// at least `min_iou` (`O_t`).
+    /// Returns the outcome of each detection of one image, in the order of `detections`. A match
+    /// needs at least `min_iou` (`O_t`).
     #[must_use]
     pub fn outcomes<B: Region>(
         self,
@@ -104,13 +105,14 @@ fn coco_outcome<B: Region>(
             found[person] = true;
             Outcome::Ignored
         }
-        // Nobody is used up by a detection that lies in a region even more than on a person.
+        // A detection that overlaps an ignore region more than a person does not consume the
+        // person.
         _ if share >= min_iou => Outcome::Ignored,
         _ => Outcome::FalsePositive,
     }
 }
 
-/// The person of greatest IoU, and that IoU, among those not yet found that do or do not count.
+/// The unmatched person of greatest IoU, and that IoU, among those that do or do not count.
 fn nearest_free<B: Region>(
     bbox: &B,
     truth: &GroundTruth<B>,

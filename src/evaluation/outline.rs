@@ -1,4 +1,4 @@
-//! The outline of a person, as annotated or as found, in the shape that is compared.
+//! The outline of a person, annotated or detected, in the shape that is compared.
 
 use super::{Region, RotatedBox};
 use crate::{
@@ -6,21 +6,21 @@ use crate::{
     geometry::OrientedBox,
 };
 
-/// What a truth looks like, and so what of a detection is compared with it.
+/// The shape of the ground truth, which determines the compared shape of a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scoring {
     /// Axis-parallel boxes by their intersection over union.
     AxisParallel,
     /// Rotated boxes by the intersection over union of their masks.
     Rotated,
-    /// Head points: an axis-parallel box is right when the point lies in it.
+    /// Head points: an axis-parallel box is right if it contains the point.
     HeadPoint,
 }
 
 /// The outline of a person in frame pixels.
 ///
-/// An axis-parallel and a rotated box are never compared; a data set knows one shape of truth and
-/// [`Scoring`] gives detections the shape that goes with it.
+/// An axis-parallel box and a rotated box are never compared: a data set has one shape of ground
+/// truth, and [`Scoring`] converts detections to the matching shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outline {
     /// An axis-parallel box.
@@ -32,8 +32,9 @@ pub enum Outline {
 }
 
 impl Scoring {
-    /// What is compared of a person found in a frame of `[width, height]` pixels: where the truth
-    /// is rotated the oriented box, or for want of one the axis-parallel box.
+    /// Returns the compared outline of a person detected in a frame of `[width, height]` pixels. If
+    /// the ground truth is rotated it is the oriented box, or the axis-parallel box if there is
+    /// none.
     #[must_use]
     pub fn outline(
         self,
@@ -54,7 +55,7 @@ impl Scoring {
 }
 
 impl Outline {
-    /// The middle, `[x, y]`, corner-origin frame pixels.
+    /// The centre, `[x, y]`, corner-origin frame pixels.
     #[must_use]
     pub fn center(&self) -> [f64; 2] {
         match self {
@@ -64,7 +65,7 @@ impl Outline {
         }
     }
 
-    /// Width times height, square pixels; `None` of a point.
+    /// Width times height, square pixels. `None` for a point.
     #[must_use]
     pub fn area(&self) -> Option<f64> {
         match self {
@@ -76,8 +77,8 @@ impl Outline {
 }
 
 impl Region for Outline {
-    /// Intersection over union of equal shapes; of a box and a head 1 if the head lies in it
-    /// (edges included), else 0.
+    /// Intersection over union of equal shapes. For a box and a head it is 1 if the box contains
+    /// the head (edges included), else 0.
     fn iou(&self, other: &Self) -> f64 {
         match (self, other) {
             (Self::AxisParallel(a), Self::AxisParallel(b)) => a.iou(b),

@@ -15,21 +15,21 @@ use crate::imaging::{
 
 pub use precision_recall::precision_recall_plot;
 
-/// Most lines that a plot can show so that they are told apart.
+/// Most lines that can be distinguished in a plot.
 const MAX_LINES: usize = 64;
 /// Pixels of the PNG per unit of the SVG.
 const PNG_SCALE: u32 = 2;
 
-/// A plot that cannot be drawn.
+/// The reason why a plot cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum PlotError {
-    /// There is too much to show.
-    #[error("a plot of {0} lines shows nothing; choose at most {MAX_LINES}")]
+    /// There are too many lines.
+    #[error("a plot of {0} lines is unreadable; choose at most {MAX_LINES}")]
     TooManyLines(usize),
-    /// Our own fault.
+    /// An internal error.
     #[error("the plot could not be drawn: {0}")]
     Drawing(String),
-    /// The picture cannot be written.
+    /// The image cannot be encoded.
     #[error(transparent)]
     Encoding(#[from] EncodeError),
 }
@@ -37,11 +37,11 @@ pub enum PlotError {
 /// Lines over the unit square.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinePlot {
-    /// What stands above.
+    /// The title above the plot.
     pub title: String,
-    /// What the horizontal axis shows.
+    /// The label of the horizontal axis.
     pub x_name: String,
-    /// What the vertical axis shows.
+    /// The label of the vertical axis.
     pub y_name: String,
     /// The lines, in the order of the legend.
     pub lines: Vec<Line>,
@@ -50,21 +50,22 @@ pub struct LinePlot {
 /// One line of the legend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// What the legend says.
+    /// The text in the legend.
     pub name: String,
     /// `[x, y]`, 0 to 1 each.
     pub points: Vec<[f64; 2]>,
-    /// Drawn dashed in the same colour, without a name of its own.
+    /// A dashed line in the same colour, without its own name.
     pub dashed: Vec<[f64; 2]>,
-    /// Whether the points are marked.
+    /// True if the points have markers.
     pub marked: bool,
 }
 
 impl LinePlot {
-    /// The plot as an SVG document.
+    /// Returns the plot as an SVG document.
+    ///
     ///
     /// # Errors
-    /// [`PlotError`] when there are too many lines.
+    /// [`PlotError`] if there are too many lines.
     pub fn svg(&self) -> Result<String, PlotError> {
         let mut svg = String::new();
         let size = self.size(1)?;
@@ -74,10 +75,11 @@ impl LinePlot {
         Ok(svg)
     }
 
-    /// The plot as a PNG file.
+    /// Returns the plot as a PNG file.
+    ///
     ///
     /// # Errors
-    /// [`PlotError`] when there are too many lines.
+    /// [`PlotError`] if there are too many lines.
     pub fn png(&self) -> Result<Vec<u8>, PlotError> {
         let (width, height) = self.size(PNG_SCALE)?;
         let mut pixels = vec![0; width as usize * height as usize * 3];
@@ -99,7 +101,7 @@ impl LinePlot {
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "goes into `map_err`")]
+#[expect(clippy::needless_pass_by_value, reason = "passed to `map_err`")]
 fn failed<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> PlotError {
     PlotError::Drawing(error.to_string())
 }

@@ -1,31 +1,32 @@
-//! Precision and recall as the score threshold falls.
+//! Precision and recall for decreasing score thresholds.
 
 use std::num::NonZeroUsize;
 
 use super::{EvaluatedImage, MatchingRule, Outcome, Region};
 
-/// Precision and recall over all images after each detection, by descending score. Of equal
-/// scores, earlier images go first, then earlier detections.
+/// Precision and recall over all images after each detection, by descending score. Detections of
+/// equal score are ordered by image, then by position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrecisionRecallCurve {
     points: Vec<OperatingPoint>,
 }
 
-/// What a score threshold yields.
+/// The result of a score threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatingPoint {
-    /// The score of the last detection that counts.
+    /// The lowest score that reaches the threshold.
     pub score: f64,
-    /// The share of detections that are right, 0 to 1.
+    /// The fraction of detections that are right, 0 to 1.
     pub precision: f64,
-    /// The share of persons that are found, 0 to 1.
+    /// The fraction of persons that are detected, 0 to 1.
     pub recall: f64,
     /// Harmonic mean of precision and recall, 0 to 1.
     pub f1: f64,
 }
 
 impl PrecisionRecallCurve {
-    /// The curve at `O_t` = `min_iou`; `None` without persons to find, where recall means nothing.
+    /// Returns the curve at `O_t` = `min_iou`. `None` if no person counts, as recall is undefined
+    /// then.
     #[must_use]
     pub fn of_images<B: Region>(
         images: &[EvaluatedImage<B>],
@@ -41,7 +42,7 @@ impl PrecisionRecallCurve {
         Self::of_outcomes(outcomes, persons)
     }
 
-    /// The curve of scores and outcomes, image by image; `None` without persons to find.
+    /// Returns the curve of scores and outcomes, image by image. `None` if no person counts.
     pub(super) fn of_outcomes(
         outcomes: impl Iterator<Item = (f64, Outcome)>,
         persons: usize,
@@ -54,7 +55,7 @@ impl PrecisionRecallCurve {
         Some(Self::of_detections(counted, persons))
     }
 
-    /// The curve of `(score, is right)` pairs.
+    /// Returns the curve of `(score, is right)` pairs.
     fn of_detections(mut detections: Vec<(f64, bool)>, persons: NonZeroUsize) -> Self {
         detections.sort_by(|a, b| b.0.total_cmp(&a.0));
         let persons = count(persons.get());
@@ -81,15 +82,15 @@ impl PrecisionRecallCurve {
         &self.points
     }
 
-    /// The recall when every detection counts, 0 to 1.
+    /// The recall of all detections, 0 to 1.
     #[must_use]
     pub fn final_recall(&self) -> f64 {
         self.points.last().map_or(0.0, |point| point.recall)
     }
 
-    /// The point of greatest F1, of equal ones that of the highest score; `None` without
-    /// detections. Only points that a threshold can reach count: a threshold cannot part equal
-    /// scores.
+    /// The point of greatest F1, of equal ones that of the highest score. `None` without
+    /// detections. A threshold cannot separate equal scores, so only the last point of each score
+    /// counts.
     #[must_use]
     pub fn best_f1(&self) -> Option<OperatingPoint> {
         self.points
@@ -99,9 +100,9 @@ impl PrecisionRecallCurve {
     }
 }
 
-/// A count as a number to calculate with.
+/// Converts a count to a floating-point number.
 pub(super) fn count(count: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2⁵³ of anything")]
+    #[expect(clippy::cast_precision_loss, reason = "counts are far below 2⁵³")]
     let count = count as f64;
     count
 }

@@ -1,17 +1,18 @@
-//! What the matching needs to know about an outline of whatever shape.
+//! The interface between the matching and outlines of any shape.
 
 use crate::detection::BBox;
 
-/// A part of the plane that knows how far it agrees with another.
+/// A part of the plane that can be compared with another.
 pub trait Region {
-    /// Intersection over union, 0 to 1; 0 when neither has any area.
+    /// Intersection over union, 0 to 1. It is 0 if neither has any area.
     fn iou(&self, other: &Self) -> f64;
 
-    /// The share of this region that lies in `other`, 0 to 1; 0 when it has no area.
+    /// The fraction of this region that lies in `other`, 0 to 1. It is 0 if this region has no
+    /// area.
     fn share_in(&self, other: &Self) -> f64;
 }
 
-/// `part` by `whole`; 0 of nothing.
+/// `part` divided by `whole`, or 0 if `whole` is 0.
 pub(super) fn share(part: f64, whole: f64) -> f64 {
     if whole > 0.0 { part / whole } else { 0.0 }
 }

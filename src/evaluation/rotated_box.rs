@@ -1,9 +1,9 @@
-//! Rotated boxes, compared as the masks they cover.
+//! Rotated boxes, compared by the masks that they cover.
 //!
-//! A mask holds the pixels of the frame whose centres lie in the box, as in the evaluation of
-//! CEPDOF (Duan et al., RAPiD, CVPR Workshops 2020), which rasterises boxes before it compares
-//! them: what lies outside the frame does not count. A mask is never stored. The box is convex, so
-//! that its pixels in one row are one span, found where it is needed.
+//! A mask is the set of the frame's pixels whose centres lie in the box. The evaluation of CEPDOF
+//! (Duan et al., RAPiD, CVPR Workshops 2020) also rasterises boxes before it compares them, so the
+//! part outside the frame does not count. Masks are not stored: the box is convex, so its pixels in
+//! one row are one span, which is calculated on demand.
 
 use super::{Region, region::share};
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     geometry::OrientedBox,
 };
 
-/// A rectangle turned about its centre, seen as the pixels it covers in a frame.
+/// A rectangle rotated about its centre, represented by the pixels that it covers in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotatedBox {
     center: [f64; 2],
@@ -25,15 +25,16 @@ pub struct RotatedBox {
     frame: [u32; 2],
 }
 
-/// Far beyond any picture, yet small enough that areas stay finite.
+/// Far beyond any image, yet small enough that areas stay finite.
 const MAX_COORDINATE: f64 = 1e9;
-/// The largest side of a frame; what a comparison may cost.
+/// The largest side of a frame. It bounds the cost of a comparison.
 const MAX_FRAME_SIDE: u32 = 65_536;
 
 impl RotatedBox {
-    /// The box `[cx, cy, width, height]` (corner-origin frame pixels) turned clockwise by `angle`
-    /// radians, in a frame of `[width, height]` pixels. `None` unless all numbers are finite and
-    /// within ±1e9, the extents are not negative and the frame's sides at most 65 536.
+    /// Creates the box `[cx, cy, width, height]` (corner-origin frame pixels), rotated clockwise by
+    /// `angle` radians, in a frame of `[width, height]` pixels. Returns `None` unless all numbers
+    /// are finite and within ±1e9, the extents are not negative, and the frame's sides are at most
+    /// 65 536.
     #[must_use]
     pub fn new([cx, cy, width, height]: [f64; 4], angle: f64, frame: [u32; 2]) -> Option<Self> {
         let within = |value: f64| (-MAX_COORDINATE..=MAX_COORDINATE).contains(&value);
@@ -53,8 +54,8 @@ impl RotatedBox {
         })
     }
 
-    /// The oriented box of a detection, in a frame of `[width, height]` pixels. `None` as for
-    /// [`RotatedBox::new`].
+    /// Creates the oriented box of a detection, in a frame of `[width, height]` pixels. Returns
+    /// `None` as [`RotatedBox::new`] does.
     #[must_use]
     pub fn of_oriented_box(oriented_box: &OrientedBox, frame: [u32; 2]) -> Option<Self> {
         let OrientedBox {
@@ -67,26 +68,26 @@ impl RotatedBox {
         Self::new([center.x, center.y, width, height], angle, frame)
     }
 
-    /// The middle, `[x, y]`, corner-origin frame pixels.
+    /// The centre, `[x, y]`, corner-origin frame pixels.
     #[must_use]
     pub fn center(&self) -> [f64; 2] {
         self.center
     }
 
-    /// Width times height, square pixels, whether in the frame or not.
+    /// Width times height, square pixels, including the part outside the frame.
     #[must_use]
     pub fn full_area(&self) -> f64 {
         self.width * self.height
     }
 
-    /// The axis-parallel bounds of the ellipse inscribed in the box: what an axis-parallel
-    /// detection is compared with. The bounds of the box itself would be far larger than the
-    /// person, whose corners are empty. The half extents of an ellipse with semi-axes `a`, `b`
-    /// turned by `t` are `√(a² cos² t + b² sin² t)` and `√(a² sin² t + b² cos² t)`: its support
-    /// function along the axes.
+    /// The axis-parallel bounds of the ellipse inscribed in the box, which are compared with
+    /// axis-parallel detections. The bounds of the box itself would be far larger than the person,
+    /// as its corners are empty. The half extents of an ellipse with semi-axes `a`, `b` rotated by
+    /// `t` are `√(a² cos² t + b² sin² t)` and `√(a² sin² t + b² cos² t)`: its support function
+    /// along the axes.
     ///
     /// # Errors
-    /// [`BBoxError`] when an edge lies beyond ±1e9 pixels.
+    /// [`BBoxError`] if an edge lies beyond ±1e9 pixels.
     pub fn inscribed_ellipse_bounds(&self) -> Result<BBox<FramePixels>, BBoxError> {
         let (a, b) = (self.width / 2.0, self.height / 2.0);
         let half_width = (a * self.cos).hypot(b * self.sin);
@@ -100,7 +101,7 @@ impl RotatedBox {
         ])
     }
 
-    /// The rows of the frame that may hold pixels of the box, `start..end`.
+    /// The rows of the frame that may contain pixels of the box, `start..end`.
     fn rows(&self) -> [f64; 2] {
         let half_height = f64::midpoint(self.width * self.sin.abs(), self.height * self.cos.abs());
         first_and_end(
@@ -110,8 +111,8 @@ impl RotatedBox {
         )
     }
 
-    /// The columns whose pixels in `row` have their centres in the box, `start..end`; empty when
-    /// the end is not beyond the start.
+    /// The columns whose pixels in `row` have their centres in the box, `start..end`. Empty if the
+    /// end is not greater than the start.
     fn columns(&self, row: f64) -> [f64; 2] {
         let dy = row + 0.5 - self.center[1];
         // Along the width axis (cos, sin) and along the height axis (−sin, cos), from the centre.
@@ -122,18 +123,18 @@ impl RotatedBox {
         first_and_end(left, right, self.frame[0])
     }
 
-    /// Of the circle through the corners, pixels.
+    /// The radius of the circle through the corners, pixels.
     fn radius(&self) -> f64 {
         self.width.hypot(self.height) / 2.0
     }
 
-    /// Pixels in the mask.
+    /// The number of pixels in the mask.
     fn area(&self) -> f64 {
         let [first, end] = self.rows();
         rows(first, end).map(|row| length(self.columns(row))).sum()
     }
 
-    /// Pixels in both masks.
+    /// The number of pixels in both masks.
     fn intersection_area(&self, other: &Self) -> f64 {
         let [dx, dy] = [0, 1].map(|axis| self.center[axis] - other.center[axis]);
         if dx.hypot(dy) > self.radius() + other.radius() {
@@ -163,7 +164,7 @@ impl Region for RotatedBox {
     }
 }
 
-/// Where `slope · x + offset` is within ± `limit`.
+/// The interval in which `slope · x + offset` is within ± `limit`.
 fn interval(slope: f64, offset: f64, limit: f64) -> [f64; 2] {
     if slope == 0.0 {
         return if offset.abs() <= limit {
@@ -176,8 +177,8 @@ fn interval(slope: f64, offset: f64, limit: f64) -> [f64; 2] {
     [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }
 
-/// The pixels, `first..end`, whose centres lie from `low` up to but not on `high`, within a frame
-/// side of `side` pixels.
+/// The pixels, `first..end`, whose centres lie from `low` up to but excluding `high`, within a
+/// frame side of `side` pixels.
 fn first_and_end(low: f64, high: f64, side: u32) -> [f64; 2] {
     [low, high].map(|edge| (edge - 0.5).ceil().clamp(0.0, f64::from(side)))
 }

@@ -1,4 +1,4 @@
-//! One line of a table: what was found under one name, and how good it was.
+//! One line of a table: the detections under one name, and their figures.
 
 use std::{fmt, time::Duration};
 
@@ -12,15 +12,15 @@ use crate::{
     pipeline::{Person, Profile},
 };
 
-/// How detections are matched with the truth.
+/// The rule that matches detections with the ground truth.
 const RULE: MatchingRule = MatchingRule::Coco;
 
-/// A person found in an image of a data set.
+/// A person detected in an image of a data set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoundPerson {
     /// Axis-parallel box, corner-origin frame pixels.
     pub bbox: BBox<FramePixels>,
-    /// The box turned along the person, where the detector gives one.
+    /// The box aligned with the person, if the detector returns one.
     pub oriented_box: Option<OrientedBox>,
     /// Confidence, 0 to 1.
     pub score: f64,
@@ -36,14 +36,14 @@ impl From<&Person> for FoundPerson {
     }
 }
 
-/// Who found the persons of a row.
+/// The origin of the detections of a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowName {
-    /// The profile; `None` of detections that are not Lookdown's.
+    /// The profile. `None` for detections of other programs.
     pub profile: Option<Profile>,
-    /// The refinement; `None` of detections that are not Lookdown's.
+    /// The refinement. `None` for detections of other programs.
     pub refinement: Option<Refinement>,
-    /// The model, or what detections from elsewhere are called.
+    /// The model, or the name of detections of other programs.
     pub model: String,
 }
 
@@ -57,31 +57,31 @@ impl fmt::Display for RowName {
     }
 }
 
-/// What it took to find the persons of a row.
+/// The cost of the detections of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowCost {
-    /// How many views the network saw per image, on average.
+    /// The mean number of views per image that ran through the network.
     pub views: f64,
-    /// Mean time in which an image was worked on: decoding, camera, views, network and this
-    /// refinement. Reading the file and waiting for another image in the network do not count;
-    /// images in flight share the cores.
+    /// The mean processing time of an image: decoding, camera, views, network and this refinement.
+    /// Reading the file and waiting for another image in the network are not included. Concurrent
+    /// images share the cores.
     pub time_per_image: Duration,
 }
 
-/// The persons found in a data set by one profile, refinement and model.
+/// The persons detected in a data set with one profile, refinement and model.
 #[derive(Debug, Clone)]
 pub struct DetectedRow {
-    /// Who found them.
+    /// The origin.
     pub name: RowName,
-    /// The numbers of the refinement; `None` of detections from a file.
+    /// The parameters of the refinement. `None` for detections from a file.
     pub refinement: Option<RefinementParameters>,
-    /// What it took; `None` of detections from a file.
+    /// The cost. `None` for detections from a file.
     pub cost: Option<RowCost>,
-    /// The persons found in each image, in the order of the data set.
+    /// The persons detected in each image, in the order of the data set.
     pub images: Vec<Vec<FoundPerson>>,
 }
 
-/// How good the detections of a row are.
+/// The figures of the detections of a row.
 #[derive(Debug, Clone)]
 pub struct EvaluatedRow {
     /// The figures.
@@ -93,10 +93,11 @@ pub struct EvaluatedRow {
 }
 
 impl DetectedRow {
-    /// Scores the row against the truth of its data set.
+    /// Scores the row against the ground truth of its data set.
+    ///
     ///
     /// # Errors
-    /// [`NoPersons`] when there is nobody to be found.
+    /// [`NoPersons`] if no person counts.
     pub fn evaluate(&self, data_set: &DataSet) -> Result<EvaluatedRow, NoPersons> {
         let images = self.evaluated_images(data_set);
         let curve = |min_iou| PrecisionRecallCurve::of_images(&images, RULE, min_iou);
@@ -109,8 +110,9 @@ impl DetectedRow {
 
     /// Scores the row against the persons of each stratum of its data set.
     ///
+    ///
     /// # Errors
-    /// [`NoStrata`] when the data set does not say what persons are told apart by.
+    /// [`NoStrata`] if the data set lacks the property that defines the strata.
     pub fn strata(&self, data_set: &DataSet, by: Stratification) -> Result<Vec<Stratum>, NoStrata> {
         let images = self.evaluated_images(data_set);
         let images: Vec<_> = data_set.images.iter().zip(&images).collect();

@@ -13,43 +13,44 @@ use super::{
 };
 use crate::pipeline::{DetectJob, DetectParameters, Engine, PipelineError, Ticket};
 
-/// An image that got no detections.
+/// The reason why an image has no detections.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluationError {
-    /// A picture cannot be read.
+    /// An image cannot be read.
     #[error("{path}: cannot be read: {source}")]
     Unreadable {
-        /// The picture.
+        /// The image.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A picture cannot be looked at.
+    /// An image cannot be processed.
     #[error("{path}: {source}")]
     Failed {
-        /// The picture.
+        /// The image.
         path: PathBuf,
-        /// What the engine said.
+        /// The error of the engine.
         source: PipelineError,
     },
 }
 
-/// What came of one image.
+/// The detections of one image.
 struct Seen {
     model: String,
     views: usize,
-    /// Up to and including the network.
+    /// Time up to and including the network.
     observing: Duration,
-    /// What each variant found in it, and how long its refinement took.
+    /// The detections of each variant, and the time of its refinement.
     variants: Vec<(Vec<FoundPerson>, Duration)>,
 }
 
-/// Finds the persons in every image with each of `variants`, which differ in nothing but their
-/// refinement, on one inference per image. `at_once` images are in memory at a time. `done` is
-/// called after each, from any thread. The results do not depend on `at_once`, but for the times.
+/// Detects the persons in every image with each of `variants`, which differ only in their
+/// refinement, with one inference per image. At most `at_once` images are in memory at a time.
+/// `done` is called after each, from any thread. The results do not depend on `at_once`, except for
+/// the times.
 ///
 /// # Errors
-/// [`EvaluationError`] of the first picture that cannot be used.
+/// [`EvaluationError`] of the first image that cannot be used.
 pub fn detect(
     engine: &Engine,
     data_set: &DataSet,
@@ -115,7 +116,10 @@ fn rows(seen: Vec<Seen>, variants: &[DetectParameters]) -> Vec<DetectedRow> {
     let model = seen.first().map_or("", |image| &image.model).to_owned();
     let count = u32::try_from(seen.len().max(1)).unwrap_or(u32::MAX);
     let views: usize = seen.iter().map(|image| image.views).sum();
-    #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "there are far fewer than 2^52 views"
+    )]
     let views_per_image = views as f64 / f64::from(count);
     let observing: Duration = seen.iter().map(|image| image.observing).sum();
     let mut rows: Vec<_> = variants

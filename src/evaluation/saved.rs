@@ -1,7 +1,7 @@
-//! Detections in files: COCO results, one file per row, which `pycocotools` reads as well.
+//! Detections in files: COCO results, one file per row, which `pycocotools` can read.
 //!
 //! A file is a JSON array of `{"image_id", "category_id", "bbox": [left, top, width, height],
-//! "score"}`, corner-origin pixels. Ours carry an `oriented_box`, too.
+//! "score"}`, in corner-origin pixels. Lookdown's own files also have an `oriented_box`.
 
 use std::{
     collections::HashMap,
@@ -17,12 +17,12 @@ use crate::{
     geometry::{OrientedBox, Pixel},
 };
 
-/// `person` in COCO; detections of other things are passed over.
+/// The category ID of `person` in COCO. Detections of other categories are skipped.
 const PERSON: u64 = 1;
-/// Results of a hundred thousand crowded images.
+/// Enough for the results of a hundred thousand crowded images.
 const MAX_BYTES: u64 = 1024 * 1024 * 1024;
 
-/// Detections that cannot be saved or read.
+/// The reason why detections cannot be saved or read.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {problem}")]
 pub struct SavedDetectionsError {
@@ -40,7 +40,7 @@ struct Entry {
     oriented_box: Option<Oriented>,
 }
 
-/// As in reports, with all digits.
+/// The box of a report, with all digits.
 #[derive(Serialize, Deserialize)]
 struct Oriented {
     cx: f64,
@@ -62,7 +62,7 @@ impl RowName {
         }
     }
 
-    /// What a file's name says; a name of another form is all model.
+    /// Parses the name of a file. In a name of another form everything is the model.
     fn from_file(path: &Path) -> Self {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         Self::from_stem(&stem).unwrap_or_else(|| Self {
@@ -84,10 +84,10 @@ impl RowName {
 }
 
 impl DetectedRow {
-    /// Writes the row to its file in `folder`, which is made where it is missing.
+    /// Writes the row to its file in `folder`, which is created if it is missing.
     ///
     /// # Errors
-    /// [`SavedDetectionsError`] when the file cannot be written.
+    /// [`SavedDetectionsError`] if the file cannot be written.
     pub fn save(&self, folder: &Path, data_set: &DataSet) -> Result<(), SavedDetectionsError> {
         let path = folder.join(self.name.file_name());
         positions(data_set, &path)?;
@@ -107,11 +107,11 @@ impl DetectedRow {
         })
     }
 
-    /// Reads a row of detections in the images of `data_set`: one of ours, or COCO results of
+    /// Reads a row of detections in the images of `data_set`: Lookdown's own, or COCO results of
     /// any detector.
     ///
     /// # Errors
-    /// [`SavedDetectionsError`] saying what is wrong with the file.
+    /// [`SavedDetectionsError`] with the problem of the file.
     pub fn load(path: &Path, data_set: &DataSet) -> Result<Self, SavedDetectionsError> {
         let wrong = |problem| SavedDetectionsError {
             path: path.to_owned(),
@@ -135,7 +135,7 @@ impl DetectedRow {
             }
             let position = position_of.get(&entry.image_id).ok_or_else(|| {
                 wrong(format!(
-                    "[{index}].image_id: {} is no image of the data set",
+                    "[{index}].image_id: {} is not an image of the data set",
                     entry.image_id
                 ))
             })?;
@@ -151,7 +151,7 @@ impl DetectedRow {
     }
 }
 
-/// Where each image is in its data set, by what results call it.
+/// The index of each image in its data set, by its ID in results.
 fn positions<'a>(
     data_set: &'a DataSet,
     path: &Path,

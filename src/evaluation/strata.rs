@@ -1,8 +1,8 @@
-//! The figures by kind of person: far and near, small and large, hidden and in full view.
+//! The figures by kind of person: far and near, small and large, occluded and fully visible.
 //!
-//! A stratum is evaluated as COCO evaluates its area ranges: persons outside it need not be found
-//! and finding them is no fault; a detection that finds nobody is wrong in the stratum it lies in
-//! itself.
+//! A stratum is evaluated as COCO evaluates its area ranges. Persons outside it need not be
+//! detected, and their detections are ignored. A detection that matches no person is wrong in the
+//! stratum that it belongs to itself.
 
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
@@ -14,21 +14,21 @@ use super::{
 /// `O_t` of the figures.
 const MIN_IOU: f64 = 0.5;
 
-/// What persons are told apart by.
+/// A property by which persons are grouped.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray, strum::VariantNames,
 )]
 #[strum(serialize_all = "snake_case")]
 pub enum Stratification {
-    /// Distance from the centre: the angle between the optical axis and the ray to the middle of
-    /// the box, through the calibrated lens, or else through the equidistant lens of 180° whose
-    /// circle is the largest in the frame.
+    /// Distance from the centre: the angle between the optical axis and the ray to the centre of
+    /// the box. It uses the calibrated lens, or else the equidistant lens of 180° with the largest
+    /// circle in the frame.
     Distance,
-    /// Size: the square root of the box's area as a share of the frame's shorter side. Unlike
-    /// COCO's sizes in pixels it does not grow with the sensor's resolution.
+    /// Size: the square root of the box's area relative to the frame's shorter side. Unlike COCO's
+    /// sizes in pixels it does not depend on the resolution of the sensor.
     Size,
-    /// The share of the person that can be seen. A detection has none, so that one that finds
-    /// nobody is wrong in every stratum.
+    /// The visible fraction of the person. A detection has none, so a detection that matches no
+    /// person is wrong in every stratum.
     Visibility,
 }
 
@@ -42,26 +42,26 @@ struct Range {
 /// The figures of one stratum at `O_t` = 0.5.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stratum {
-    /// Which persons: a range with its unit.
+    /// The range of the persons, with its unit.
     pub name: &'static str,
-    /// How many of them are to be found.
+    /// The number of persons that count.
     pub persons: usize,
-    /// Average precision and recall; `None` where there is nobody to find.
+    /// Average precision and recall. `None` if no person counts.
     pub figures: Option<StratumFigures>,
 }
 
-/// How good the detections of a stratum are.
+/// The figures of the detections of a stratum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StratumFigures {
     /// Average precision.
     pub ap50: AveragePrecision,
-    /// The share of persons found by any detection, 0 to 1.
+    /// The fraction of persons matched by any detection, 0 to 1.
     pub recall: f64,
 }
 
-/// Persons cannot be told apart this way.
+/// The data set lacks the property that defines the strata.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("persons cannot be told apart by {by}: {missing}")]
+#[error("persons cannot be grouped by {by}: {missing}")]
 pub struct NoStrata {
     by: &'static str,
     missing: &'static str,
@@ -74,10 +74,11 @@ impl Stratification {
         self.into()
     }
 
-    /// The figures of each stratum. `images` are those of a data set with what was found in each.
+    /// Returns the figures of each stratum. `images` are those of a data set, with their
+    /// detections.
     ///
     /// # Errors
-    /// [`NoStrata`] when the data set does not say of a single person what they are told apart by.
+    /// [`NoStrata`] if the data set does not state the property of any person.
     pub fn strata(
         self,
         images: &[(&DataSetImage, &EvaluatedImage<Outline>)],
@@ -144,7 +145,7 @@ impl Stratification {
         }
     }
 
-    /// Where on the scale an outline lies; `None` when that is not known.
+    /// The value of an outline. `None` if it is not known.
     fn measure(self, place: &DataSetImage, outline: &Outline) -> Option<f64> {
         match self {
             Self::Distance => place.off_axis_deg(outline.center()),
@@ -217,7 +218,7 @@ impl Range {
         }
     }
 
-    /// The truth in which only the persons of this range count.
+    /// The ground truth in which only the persons of this range count.
     fn truth(&self, measured: &Measured<'_>) -> GroundTruth<Outline> {
         let truth = &measured.image.truth;
         let persons = truth.persons.iter().zip(&measured.persons);

@@ -2,17 +2,17 @@
 
 use super::{AveragePrecision, EvaluatedImage, MatchingRule, PrecisionRecallCurve, Region};
 
-/// There is nothing to find in any image.
+/// No person counts in any image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the data set has no persons, so recall means nothing; annotate at least one")]
+#[error("the data set has no persons, so recall is undefined; annotate at least one")]
 pub struct NoPersons;
 
-/// How good the detections of a data set are.
+/// The figures of the detections of a data set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Summary {
     /// Number of images.
     pub images: usize,
-    /// Persons to be found.
+    /// The number of persons that count.
     pub persons: usize,
     /// Average precision at `O_t` = 0.5.
     pub ap50: AveragePrecision,
@@ -24,19 +24,19 @@ pub struct Summary {
     pub f1: f64,
     /// The score threshold of `f1`; `None` without detections.
     pub f1_score_threshold: Option<f64>,
-    /// The share of detections that are right at that threshold, 0 to 1.
+    /// The fraction of detections that are right at that threshold, 0 to 1.
     pub f1_precision: f64,
-    /// The share of persons found at that threshold, 0 to 1.
+    /// The fraction of persons detected at that threshold, 0 to 1.
     pub f1_recall: f64,
-    /// The share of persons found by any detection at `O_t` = 0.5, 0 to 1.
+    /// The fraction of persons matched by any detection at `O_t` = 0.5, 0 to 1.
     pub recall: f64,
 }
 
 impl Summary {
-    /// The figures of `images`, matched by `rule`.
+    /// Returns the figures of `images`, matched by `rule`.
     ///
     /// # Errors
-    /// [`NoPersons`] when no image holds a person.
+    /// [`NoPersons`] if no person counts.
     pub fn of_images<B: Region>(
         images: &[EvaluatedImage<B>],
         rule: MatchingRule,

@@ -1,4 +1,4 @@
-//! The sweeps of the paper's results (Seidel et al., section IV): AP over N_t, and the detections
+//! The parameter sweeps of the paper (Seidel et al., section IV): AP over N_t, and the detections
 //! of Gaussian Soft-NMS over C_t and σ.
 
 mod matrix;
@@ -52,7 +52,7 @@ pub fn cells(base: &DetectParameters) -> Vec<DetectParameters> {
     over_iou.chain(of_matrix).collect()
 }
 
-/// The figures of all cells: comma-separated values with a heading.
+/// Returns the figures of all cells as comma-separated values with a header.
 #[must_use]
 pub fn table(cells: &[(DetectedRow, EvaluatedRow)]) -> String {
     let mut lines = String::from(
@@ -82,7 +82,7 @@ pub fn table(cells: &[(DetectedRow, EvaluatedRow)]) -> String {
     lines
 }
 
-/// AP over `N_t`, at `O_t` = 0.5, and dashed at 0.75.
+/// Plots AP over `N_t`, at `O_t` = 0.5, and dashed at 0.75.
 #[must_use]
 pub fn iou_threshold_plot(title: String, cells: &[(DetectedRow, EvaluatedRow)]) -> LinePlot {
     let line = |refinement: Refinement, name: &str| {

@@ -1,6 +1,6 @@
-//! Found persons, drawn into their frame: an oriented box, its axis-aligned box, a label; and zones.
+//! Annotated frames: an oriented box, an axis-aligned box and a label for each person, and zones.
 //!
-//! Sizes grow with the frame, so that a thumbnail and a 4000-pixel frame read alike.
+//! Sizes scale with the frame, so that a thumbnail and a 4000-pixel frame are equally legible.
 
 mod area_sketch;
 mod canvas;
@@ -21,27 +21,27 @@ pub use encode::{EncodeError, encode_jpeg, encode_png};
 pub use lens_sketch::sketch_lens;
 pub use mark::{Head, Mark, OrientedMark};
 
-/// What is drawn into a frame.
+/// Shapes and texts to draw into a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
-    /// The marks, the most important first: of more than [`MOST_MARKS`], the rest is left out.
+    /// The marks, the most important first. Marks beyond [`MOST_MARKS`] are left out.
     pub marks: Vec<Mark>,
-    /// Whether their axis-aligned boxes are drawn.
+    /// True to draw the axis-aligned boxes.
     pub boxes: bool,
-    /// Whether their oriented boxes are drawn; these are the main outlines then.
+    /// True to draw the oriented boxes, which are then the main outlines.
     pub oriented: bool,
     /// Thin lines below all marks, corner-origin frame pixels.
     pub lines: Vec<Vec<[f64; 2]>>,
-    /// Zones, above the lines and below all marks, with their names.
+    /// Zones with their names, above the lines and below all marks.
     pub zones: Vec<ZoneOutline>,
-    /// Text in the top left corner; empty for none.
+    /// Text in the top left corner. Empty draws no caption.
     pub caption: String,
 }
 
-/// More boxes than anybody can tell apart.
+/// Most marks drawn. More cannot be distinguished in an image.
 pub const MOST_MARKS: usize = 1000;
 
-/// Bright enough for dark text, and told apart by most colour-blind people by lightness.
+/// Bright enough for dark text, and distinguishable by lightness for most colour-blind people.
 const COLOURS: [Rgb; 6] = [
     [0, 214, 255],
     [255, 200, 30],
@@ -50,18 +50,18 @@ const COLOURS: [Rgb; 6] = [
     [255, 146, 72],
     [190, 166, 255],
 ];
-/// Dark on both sides of each outline: it stands out from floors as bright as itself.
+/// A dark line on both sides of each outline makes it stand out from floors of the same brightness.
 const SHADOW: Rgb = [0, 0, 0];
 const SHADOW_OPACITY: f64 = 0.7;
 const THIN_OPACITY: f64 = 0.6;
 const LINE: Rgb = [235, 240, 255];
 const LINE_OPACITY: f64 = 0.55;
 const INK: Rgb = [12, 14, 18];
-/// Far outside any frame, and near enough for exact distances.
+/// Far outside any frame, and small enough for exact distances.
 const MAX_COORDINATE: f64 = 1e6;
 
 impl Drawing {
-    /// Both boxes of the marks, and nothing else.
+    /// A drawing of both boxes of the marks, without lines, zones or a caption.
     #[must_use]
     pub fn of(marks: Vec<Mark>) -> Self {
         Self {
@@ -75,20 +75,20 @@ impl Drawing {
     }
 }
 
-/// Draws into the frame, labels above all boxes. Parts outside the frame are cut off; a mark
-/// or line with a coordinate that is not finite, or beyond a million pixels, is left out.
+/// Draws into the frame, labels above all boxes. Parts outside the frame are cut off. A mark or
+/// line with a coordinate that is not finite, or beyond a million pixels, is left out.
 ///
-/// The work is bounded: lines, zones, marks and labels are drawn in this order until as many pixels
-/// are painted as the frame has twice, and the rest is left out.
+/// The work is bounded: lines, zones, marks and labels are drawn in this order until the number of
+/// painted pixels is twice the number of pixels of the frame. The rest is left out.
 pub fn annotate(frame: &mut Frame, drawing: &Drawing) {
-    // Without a reason to stop it cannot fail.
+    // Without cancellation it cannot fail.
     let _ = annotate_unless(frame, drawing, &|| false);
 }
 
-/// Draws like [`annotate`], and asks `is_cancelled` before each shape.
+/// Draws like [`annotate`] and calls `is_cancelled` before each shape.
 ///
 /// # Errors
-/// [`Cancelled`] as soon as `is_cancelled` returns true; the frame is then partly drawn.
+/// [`Cancelled`] as soon as `is_cancelled` returns true. The frame is then partly drawn.
 pub fn annotate_unless(
     frame: &mut Frame,
     drawing: &Drawing,
@@ -143,16 +143,16 @@ pub fn annotate_unless(
 
 fn is_drawable(line: &[[f64; 2]]) -> bool {
     let mut coordinates = line.iter().flatten();
-    // NaN is not below anything.
+    // NaN fails every comparison.
     coordinates.all(|coordinate| coordinate.abs() <= MAX_COORDINATE)
 }
 
-/// Width of the main outline in pixels: a 450th of the shorter side, but visible.
+/// Width of the main outline in pixels: a 450th of the shorter side, with a visible minimum.
 fn line_width(frame: &Frame) -> f64 {
     (shorter_side(frame) / 450.0).max(1.6)
 }
 
-/// Height of a line of text in pixels: a 48th of the shorter side, but legible.
+/// Height of a line of text in pixels: a 48th of the shorter side, with a legible minimum.
 fn text_height(frame: &Frame) -> f64 {
     (shorter_side(frame) / 48.0).max(12.0)
 }

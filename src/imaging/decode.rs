@@ -1,6 +1,7 @@
-//! Bytes from anywhere → a [`Frame`], within limits that hold before any pixel is decoded.
+//! Decodes untrusted bytes to a [`Frame`], within limits that are checked before any pixel is
+//! decoded.
 //!
-//! The format is recognised from the content: file names and content types lie.
+//! The format is detected from the content, because file names and content types are unreliable.
 
 mod container;
 mod error;
@@ -15,18 +16,18 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limi
 use super::{frame::Frame, pixel_memory};
 pub use error::{DecodeError, ExceededLimit};
 
-/// How large a picture may be. All of these hold at once, and all are checked
-/// against the picture's header, before its pixels are decoded.
+/// Size limits of an image. All of them hold at once and are checked against the image's header,
+/// before its pixels are decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DecodeLimits {
     /// Greatest width in pixels, as stored (before the EXIF orientation is applied).
     pub max_width: u32,
     /// Greatest height in pixels, as stored.
     pub max_height: u32,
-    /// Greatest number of pixels in all.
+    /// Greatest total number of pixels.
     pub max_pixels: u64,
-    /// Greatest size of the decoded picture and its RGB copy together. The decoders'
-    /// own working memory comes on top: at most 8 bytes a pixel.
+    /// Greatest size of the decoded image and its RGB copy together. The decoders need at most 8
+    /// bytes a pixel in addition.
     pub max_alloc_bytes: u64,
 }
 
@@ -42,25 +43,24 @@ impl Default for DecodeLimits {
     }
 }
 
-/// A decoded picture, upright.
+/// A decoded, upright image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecodedFrame {
     /// The pixels, after the EXIF orientation was applied.
     pub frame: Frame,
-    /// Whether the EXIF orientation asked for a turn or a flip, so that the frame
-    /// differs from the pixels as stored.
+    /// True if the EXIF orientation requires a rotation or a flip, so that the frame differs from
+    /// the stored pixels.
     pub orientation_applied: bool,
 }
 
-/// Decodes a JPEG, PNG or WebP picture to RGB.
+/// Decodes a JPEG, PNG or WebP image to RGB.
 ///
-/// The EXIF orientation is applied, transparency is laid over black (as the surround of
-/// a lens is), 16-bit samples are rounded to 8, and of an animation the first frame is
-/// taken. A file that ends early is refused, even where a lenient decoder would fill the
-/// missing rows with grey.
+/// The EXIF orientation is applied. Transparent pixels are blended over black, like the surround of
+/// a lens. 16-bit samples are rounded to 8 bits. Of an animation, the first frame is used. A
+/// truncated file is refused, even where a lenient decoder would fill the missing rows with grey.
 ///
 /// # Errors
-/// See [`DecodeError`]; no input panics.
+/// See [`DecodeError`]. No input causes a panic.
 pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
     if bytes.is_empty() {
         return Err(DecodeError::Empty);
@@ -71,7 +71,7 @@ pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Decod
         Ok(ImageFormat::WebP) => decode_webp(bytes, limits),
         Ok(other) => Err(unsupported(format!("in the format {other:?}"))),
         Err(_) if container::is_heif(bytes) => Err(unsupported("in the format HEIF")),
-        Err(_) => Err(unsupported("not in a known picture format")),
+        Err(_) => Err(unsupported("not in a known image format")),
     }
 }
 
@@ -103,12 +103,12 @@ fn decode_webp(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Deco
     task.require(container::webp_is_whole(bytes), "the file ends early")?;
     task.require(
         container::webp_frames_fit(bytes, size),
-        "a frame is larger than the picture",
+        "a frame is larger than the image",
     )?;
     task.read(decoder)
 }
 
-/// One decoding: what its checks and its errors need to know.
+/// One decoding, with the data for its checks and errors.
 struct Task<'a> {
     format: &'static str,
     limits: &'a DecodeLimits,
@@ -164,8 +164,8 @@ impl<'a> Task<'a> {
             });
         }
         let orientation = decoder.orientation().map_err(|e| self.refusal(e))?;
-        let picture = read(decoder).map_err(|e| self.refusal(e))?;
-        let mut upright = DynamicImage::ImageRgb8(rgb_over_black(picture));
+        let image = read(decoder).map_err(|e| self.refusal(e))?;
+        let mut upright = DynamicImage::ImageRgb8(rgb_over_black(image));
         upright.apply_orientation(orientation);
         let (width, height) = (upright.width(), upright.height());
         let frame = Frame::new(width, height, upright.into_bytes())
@@ -186,14 +186,14 @@ impl<'a> Task<'a> {
     fn refusal(&self, error: ImageError) -> DecodeError {
         match error {
             ImageError::Unsupported(reason) => {
-                unsupported(format!("a rare kind of {} ({reason})", self.format))
+                unsupported(format!("an unsupported kind of {} ({reason})", self.format))
             }
             other => self.corrupt(other.to_string().trim()),
         }
     }
 }
 
-/// As `DynamicImage::from_decoder`, but what frames mostly are goes to memory that frames had.
+/// Like `DynamicImage::from_decoder`, but reuses the memory of earlier frames for 8-bit RGB images.
 fn read(decoder: impl ImageDecoder) -> Result<DynamicImage, ImageError> {
     if decoder.color_type() != ColorType::Rgb8 {
         return DynamicImage::from_decoder(decoder);
@@ -202,9 +202,9 @@ fn read(decoder: impl ImageDecoder) -> Result<DynamicImage, ImageError> {
     let too_large = || ImageError::Limits(LimitError::from_kind(LimitErrorKind::DimensionError));
     let bytes = usize::try_from(decoder.total_bytes()).map_err(|_| too_large())?;
     let pixels = pixel_memory::zeros(bytes);
-    let mut picture = RgbImage::from_raw(width, height, pixels).ok_or_else(too_large)?;
-    decoder.read_image(&mut picture)?;
-    Ok(DynamicImage::ImageRgb8(picture))
+    let mut image = RgbImage::from_raw(width, height, pixels).ok_or_else(too_large)?;
+    decoder.read_image(&mut image)?;
+    Ok(DynamicImage::ImageRgb8(image))
 }
 
 fn unsupported(found: impl Into<String>) -> DecodeError {
@@ -213,12 +213,12 @@ fn unsupported(found: impl Into<String>) -> DecodeError {
     }
 }
 
-/// Transparent parts become black, which is what surrounds a lens circle.
-fn rgb_over_black(picture: DynamicImage) -> RgbImage {
-    if !picture.color().has_alpha() {
-        return picture.into_rgb8();
+/// Blends transparent parts over black, the colour around a lens circle.
+fn rgb_over_black(image: DynamicImage) -> RgbImage {
+    if !image.color().has_alpha() {
+        return image.into_rgb8();
     }
-    let rgba = picture.into_rgba8();
+    let rgba = image.into_rgba8();
     let over_black = |value: u8, alpha: u8| {
         let rounded = (u16::from(value) * u16::from(alpha) + 127) / 255;
         u8::try_from(rounded).unwrap_or(u8::MAX)

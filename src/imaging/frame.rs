@@ -1,13 +1,12 @@
-//! A decoded picture: the one pixel format every stage works on.
+//! A decoded image in the pixel format that every stage uses.
 
 use std::ops::Range;
 
 use super::pixel_memory::Pixels;
 
-/// A picture in 8-bit RGB, rows from top to bottom, without padding.
+/// An image in 8-bit RGB, rows from top to bottom, without padding.
 ///
-/// *Invariant:* both sides are at least 1 and there are exactly
-/// `width * height * 3` bytes.
+/// *Invariant:* both sides are at least 1 and there are exactly `width * height * 3` bytes.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Frame {
     width: u32,
@@ -15,7 +14,7 @@ pub struct Frame {
     pixels: Pixels,
 }
 
-/// Why bytes do not make a [`Frame`].
+/// Bytes that do not form a [`Frame`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
     /// One side is zero.
@@ -26,7 +25,7 @@ pub enum FrameError {
         /// Height in pixels.
         height: u32,
     },
-    /// The buffer does not fit the size.
+    /// The length of the buffer does not match the size.
     #[error(
         "a frame of {width}×{height} pixels takes width × height × 3 bytes of RGB, not {bytes}"
     )]
@@ -35,7 +34,7 @@ pub enum FrameError {
         width: u32,
         /// Height in pixels.
         height: u32,
-        /// Length of the buffer that was given.
+        /// Length of the given buffer.
         bytes: usize,
     },
 }
@@ -49,7 +48,7 @@ impl Frame {
         if width == 0 || height == 0 {
             return Err(FrameError::NoPixels { width, height });
         }
-        // Two u32 and a small factor cannot overflow a u128.
+        // The product of two u32 and a small factor cannot overflow a u128.
         if u128::from(width) * u128::from(height) * 3 != pixels.len() as u128 {
             return Err(FrameError::WrongLength {
                 width,
@@ -76,21 +75,21 @@ impl Frame {
         self.height
     }
 
-    /// All bytes: R, G, B of the top-left pixel, then of the one to its right, and so on.
+    /// All bytes: R, G and B of the top-left pixel, then of the pixel to its right, and so on.
     #[must_use]
     pub fn pixels(&self) -> &[u8] {
         &self.pixels
     }
 
-    /// The same bytes, to be painted over.
+    /// The same bytes, mutable.
     pub fn pixels_mut(&mut self) -> &mut [u8] {
         &mut self.pixels
     }
 
-    /// The part in these columns and rows, as far as they lie inside.
+    /// Copies the given columns and rows, clipped to the frame.
     ///
     /// # Errors
-    /// [`FrameError::NoPixels`] when nothing of it lies inside.
+    /// [`FrameError::NoPixels`] when the range lies outside the frame.
     pub fn crop(&self, columns: Range<u32>, rows: Range<u32>) -> Result<Self, FrameError> {
         let columns = columns.start..columns.end.min(self.width);
         let rows = rows.start..rows.end.min(self.height);
@@ -127,7 +126,7 @@ impl Frame {
     }
 }
 
-/// Size only: megabytes of pixels help nobody in a log line.
+/// Prints the size only, to keep megabytes of pixels out of log lines.
 impl std::fmt::Debug for Frame {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(formatter, "Frame({}×{})", self.width, self.height)

@@ -1,11 +1,10 @@
-//! Where the lens image lies in a fisheye frame: a bright disc on a black surround.
+//! Detection of the lens image in a fisheye frame: a bright disc on a black surround.
 //!
-//! 1. The corners tell how dark the surround is (`surround`).
-//! 2. Scans along rows and columns, from the border inward, meet the disc; a consensus
-//!    circle through those points ignores captions and unlit parts of the room
-//!    (`outline`, `consensus`).
-//! 3. Along rays near that circle the rim is located to a fraction of a pixel, and a
-//!    robust least-squares circle is fitted to it (`rim`, `least_squares`).
+//! 1. The corners give the brightness of the surround (`surround`).
+//! 2. Scans along rows and columns, from the border inward, reach the disc. A consensus circle
+//! through those points ignores captions and unlit parts of the room (`outline`, `consensus`).
+//! 3. Along rays near that circle the rim is located to a fraction of a pixel, and a robust
+//! least-squares circle is fitted to it (`rim`, `least_squares`).
 
 mod agreement;
 mod consensus;
@@ -21,39 +20,38 @@ pub use agreement::{AgreedCircle, agreed_circle};
 use rim::RimPoint;
 use surround::Surround;
 
-/// The edge of the lens image, in pixel centres: the top-left pixel's centre is (0, 0).
+/// The edge of the lens image in pixel centres: the centre of the top-left pixel is (0, 0).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LensCircle {
     /// Column of the centre, in pixels.
     pub cx: f64,
     /// Row of the centre, in pixels.
     pub cy: f64,
-    /// Radius in pixels; the circle may reach beyond the frame.
+    /// Radius in pixels. The circle may extend beyond the frame.
     pub radius: f64,
 }
 
-/// Frames with a shorter side than this show too little of a rim to measure.
+/// Frames with a shorter side below this show too little of a rim to measure.
 const MIN_SIDE: u32 = 32;
-/// How much brighter than the surround the picture must be, in parts of the brightness of
-/// its middle. The first ignores stray light around the lens image; the second is for
-/// lenses that darken toward the rim.
+/// Least contrast between lens image and surround, relative to the brightness of the frame's
+/// centre. The first value ignores stray light around the lens image. The second is for lenses that
+/// darken toward the rim.
 const MIN_CONTRASTS: [f64; 2] = [0.1, 0.03];
-/// How far the rim is sought on either side of the circle known so far, in radii: wide
-/// first, to recover from a rough consensus.
+/// Search range for the rim on either side of the current circle, in radii. The first is wide, to
+/// recover from a rough consensus.
 const REACHES: [f64; 3] = [0.04, 0.02, 0.02];
-/// A circle smaller than this is a lamp or a table.
+/// A smaller circle is a lamp or a table.
 const MIN_RADIUS_IN_SHORT_SIDES: f64 = 0.25;
-/// Of the rays that meet the circle inside the frame, this part must show a rim. The rest
-/// may be dark room.
+/// Share of the rays meeting the circle inside the frame that must show a rim. The others may show
+/// a dark part of the room.
 const MIN_SUPPORT: f64 = 0.35;
-/// The widest angle without any rim: beyond it, centre and radius trade off.
+/// The widest angle without any rim. Beyond it, centre and radius are ambiguous.
 const MAX_GAP_RADIANS: f64 = 3.5;
 
-/// Finds the lens circle, to a fraction of a pixel; it may be cut off by the frame.
+/// Finds the lens circle to a fraction of a pixel. The frame may cut it off.
 ///
-/// `None` where no dark surround shows it: a frame that the lens image fills, a picture of
-/// an ordinary camera, a room too dark to tell. [`assumed_circle`] is what to use then.
-/// The same pixels always give the same answer.
+/// Returns `None` where no dark surround shows it: in a frame filled by the lens image, an image of
+/// an ordinary camera, or a dark room. Use [`assumed_circle`] then. The result is deterministic.
 #[must_use]
 pub fn find_lens_circle(frame: &Frame) -> Option<LensCircle> {
     if short_side(frame) < MIN_SIDE {
@@ -81,7 +79,7 @@ fn short_side(frame: &Frame) -> u32 {
     frame.width().min(frame.height())
 }
 
-/// Whether enough of the circle's rim was seen, all around it.
+/// Returns true if enough of the circle's rim was found, all around it.
 fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
     let shown: Vec<f64> = edge
         .iter()
@@ -100,8 +98,8 @@ fn is_shown(edge: &[RimPoint], frame: &Frame, circle: &LensCircle) -> bool {
     !shown.is_empty() && is_supported && widest_gap <= MAX_GAP_RADIANS
 }
 
-/// The largest circle in the middle of a frame of this size: the guess for frames in which
-/// no circle is found.
+/// The largest circle in the centre of a frame of this size. It is the guess for frames without a
+/// detected circle.
 #[must_use]
 pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
     LensCircle {
@@ -117,8 +115,8 @@ impl LensCircle {
         (x - self.cx).hypot(y - self.cy) - self.radius
     }
 
-    /// How far a point may lie from the circle and still count as its rim: half a percent
-    /// of the radius, but no less than pixels and compression blur.
+    /// Largest distance of a point from the circle to count as its rim: half a percent of the
+    /// radius, but at least the size of pixels and compression blur.
     fn tolerance(&self) -> f64 {
         (0.005 * self.radius).max(1.5)
     }

@@ -1,10 +1,10 @@
-//! The whole frame as one network input: scaled to fit, the rest filled with grey.
+//! The whole frame as one network input: scaled to fit, with the rest filled grey.
 
 use image::{RgbImage, imageops};
 
 use super::{Frame, NetworkInput};
 
-/// What the unused part of the input is filled with (0 to 255), as the detectors were trained.
+/// Value of the unused part of the input (0 to 255), the same as in the detectors' training.
 const FILL: f32 = 114.0;
 
 /// Scales frames to fit a network's input, top-left aligned.
@@ -63,7 +63,7 @@ impl Letterbox {
         }
     }
 
-    /// Takes a corner-origin input position back to the frame (corner-origin, pixels).
+    /// Maps an input position to the frame (corner-origin, pixels).
     #[must_use]
     pub fn frame_from_input(&self, position: f64) -> f64 {
         position / self.scale

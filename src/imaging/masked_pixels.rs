@@ -1,5 +1,5 @@
-//! Privacy masks: the pixels under polygons, found once for frames of one size and then blanked in
-//! each.
+//! Privacy masks: the pixels under polygons, computed once per frame size and then blanked in each
+//! frame.
 
 use std::ops::Range;
 
@@ -10,15 +10,17 @@ use crate::geometry::{
     polygon::{Edge, crossing},
 };
 
-/// The pixels that lie under masks, wholly or in part.
+/// The pixels that masks cover, wholly or in part.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct MaskedPixels {
-    /// For each row its columns, from left to right, with gaps in between; empty without masks.
+    /// Masked columns of each row, as ranges from left to right with gaps in between. Empty without
+    /// masks.
     rows: Vec<Box<[Range<u32>]>>,
 }
 
 impl MaskedPixels {
-    /// Those under `masks` (corner-origin pixels) in frames of `width` × `height` pixels.
+    /// Computes the pixels under `masks` (corner-origin pixels) in frames of `width` × `height`
+    /// pixels.
     #[must_use]
     pub fn new(masks: &[Polygon], width: u32, height: u32) -> Self {
         if masks.is_empty() {
@@ -33,20 +35,21 @@ impl MaskedPixels {
         }
     }
 
-    /// Whether there are no masks.
+    /// Returns true without masks.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// How many they are.
+    /// Number of masked pixels.
     #[must_use]
     pub fn count(&self) -> u64 {
         let spans = self.rows.iter().flatten();
         spans.map(|span| u64::from(span.end - span.start)).sum()
     }
 
-    /// Whether the pixel in column `x` and row `y` is one of them; those outside the frame are not.
+    /// Returns true if the pixel in column `x` and row `y` is masked. Pixels outside the frame are
+    /// not.
     #[must_use]
     pub fn hides(&self, x: u32, y: u32) -> bool {
         let Some(row) = self.rows.get(y as usize) else {
@@ -56,7 +59,7 @@ impl MaskedPixels {
         following > 0 && x < row[following - 1].end
     }
 
-    /// Whether the pixel is one of them in which a position (pixel centres) lies.
+    /// Returns true if the pixel that contains a position (pixel centres) is masked.
     #[must_use]
     pub fn hides_position(&self, position: Pixel) -> bool {
         let position = cross_half_pixel(position, PixelConvention::CornerOrigin);
@@ -65,7 +68,7 @@ impl MaskedPixels {
             && self.hides(whole(position.x.floor()), whole(position.y.floor()))
     }
 
-    /// Makes them black in a frame of the size they were found for.
+    /// Makes the masked pixels black in a frame of the same size.
     pub fn blank(&self, frame: &mut Frame) {
         let row_bytes = 3 * frame.width() as usize;
         let lines = frame.pixels_mut().chunks_exact_mut(row_bytes);
@@ -84,8 +87,8 @@ impl MaskedPixels {
     }
 }
 
-/// The columns in which a polygon covers some of the row `y`: where its middle is inside, and where
-/// an edge runs through it.
+/// The columns in which a polygon covers a part of the row `y`: where its centre line is inside,
+/// and where an edge crosses it.
 fn touched(polygon: &Polygon, y: u32, width: u32) -> Vec<Range<u32>> {
     let [top, middle, bottom] = [0.0, 0.5, 1.0].map(|down| f64::from(y) + down);
     let mut crossings: Vec<f64> = polygon
@@ -101,7 +104,7 @@ fn touched(polygon: &Polygon, y: u32, width: u32) -> Vec<Range<u32>> {
     inside.chain(along).collect()
 }
 
-/// How far an edge reaches across between two heights, if it runs between them.
+/// The horizontal extent of an edge between two heights, or `None` if it does not cross them.
 fn extent([a, b]: Edge, top: f64, bottom: f64) -> Option<[f64; 2]> {
     let [upper, lower] = if a.y <= b.y { [a, b] } else { [b, a] };
     if lower.y <= top || upper.y >= bottom {
@@ -120,7 +123,7 @@ fn extent([a, b]: Edge, top: f64, bottom: f64) -> Option<[f64; 2]> {
     Some([first.min(last), first.max(last)])
 }
 
-/// The columns that lie between two places or hold one of them, cut to the frame.
+/// The columns that lie between two positions or contain one of them, clipped to the frame.
 fn columns(left: f64, right: f64, width: u32) -> Range<u32> {
     whole(left.floor()).min(width)..whole(right.ceil()).min(width)
 }
@@ -128,13 +131,13 @@ fn columns(left: f64, right: f64, width: u32) -> Range<u32> {
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "`as` saturates, which cuts to the frame"
+    reason = "`as` saturates, which clips to the frame"
 )]
 fn whole(coordinate: f64) -> u32 {
     coordinate as u32
 }
 
-/// The same columns from left to right, none twice.
+/// Merges overlapping spans and sorts them from left to right.
 fn joined(mut spans: Vec<Range<u32>>) -> Box<[Range<u32>]> {
     spans.retain(|span| !span.is_empty());
     spans.sort_unstable_by_key(|span| span.start);

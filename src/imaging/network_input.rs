@@ -1,4 +1,4 @@
-//! What a network wants to see, and batches of it.
+//! Network input format, and batches of inputs.
 
 /// Order of the colour planes in a network's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
@@ -28,7 +28,7 @@ pub struct NetworkInput {
 }
 
 impl NetworkInput {
-    /// Pixels 0 to 255 as they are, in RGB planes.
+    /// Unscaled pixels (0 to 255) in RGB planes.
     #[must_use]
     pub fn plain(width: u32, height: u32) -> Self {
         Self {
@@ -40,19 +40,19 @@ impl NetworkInput {
         }
     }
 
-    /// Values in one plane of one view.
+    /// Number of values in one plane of one view.
     #[must_use]
     pub fn plane_len(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// Values in one view.
+    /// Number of values in one view.
     #[must_use]
     pub fn view_len(&self) -> usize {
         3 * self.plane_len()
     }
 
-    /// For each plane of the input: which of red (0), green (1) and blue (2) it holds.
+    /// The source channel of each plane of the input: red (0), green (1) or blue (2).
     #[must_use]
     pub fn source_channels(&self) -> [usize; 3] {
         match self.channel_order {
@@ -61,8 +61,8 @@ impl NetworkInput {
         }
     }
 
-    /// Turns one view of plain pixels (planes of red, green and blue, 0 to 255) into input; both
-    /// have [`NetworkInput::view_len`] values.
+    /// Converts one view of plain pixels (planes of red, green and blue, 0 to 255) to input values.
+    /// Both slices have [`NetworkInput::view_len`] values.
     pub fn fill(&self, slot: &mut [f32], pixels: &[f32]) {
         let planes = slot.chunks_exact_mut(self.plane_len());
         for (plane, (values, channel)) in planes.zip(self.source_channels()).enumerate() {
@@ -75,7 +75,7 @@ impl NetworkInput {
     }
 }
 
-/// Rendered views, ready for the network: `[views, 3, height, width]`, row-major.
+/// Rendered views as network input: `[views, 3, height, width]`, row-major.
 #[derive(Debug, Clone, Default)]
 pub struct ViewBatch {
     values: Vec<f32>,
@@ -83,8 +83,8 @@ pub struct ViewBatch {
 }
 
 impl ViewBatch {
-    /// Makes room for `views` views of `input` and hands out one slice per view to render into.
-    /// The memory is kept from batch to batch.
+    /// Allocates memory for `views` views of `input` and returns one slice per view to render into.
+    /// The memory is reused by the next batch.
     pub fn prepare(
         &mut self,
         views: usize,
@@ -95,7 +95,7 @@ impl ViewBatch {
         self.values.chunks_exact_mut(input.view_len())
     }
 
-    /// Leaves out the views that `keep` (one entry per view) says no to; the others keep their order.
+    /// Removes the views whose entry in `keep` is false. The others keep their order.
     pub fn retain(&mut self, keep: &[bool]) {
         let view_len = self.values.len() / self.views.max(1);
         let mut kept = 0;
@@ -108,7 +108,7 @@ impl ViewBatch {
         self.views = kept;
     }
 
-    /// How many views it holds.
+    /// Number of views.
     #[must_use]
     pub fn views(&self) -> usize {
         self.views
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plain_pixels_are_normalised_plane_by_plane_in_the_networks_order() {
+    fn plain_pixels_are_normalised_in_the_networks_plane_order() {
         let input = NetworkInput {
             channel_order: ChannelOrder::Bgr,
             scale: [2.0, 1.0, 0.5],

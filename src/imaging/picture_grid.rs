@@ -1,39 +1,39 @@
-//! Pictures in rows and columns with captions, as one picture.
+//! A grid of images with captions, as one image.
 
 use super::{Frame, FrameError, annotate::text::Text};
 
 const PAPER: u8 = 255;
 const INK: [u8; 3] = [40, 44, 52];
-/// Height of the letters as a share of a cell's width.
+/// Text height as a share of a cell's width.
 const TEXT_SHARE: f64 = 0.055;
-/// Space around cells and lines, as a share of the letters' height.
+/// Margin around cells and lines, as a share of the text height.
 const MARGIN_SHARE: f64 = 0.5;
 
-/// Pictures of one size with what stands beside them.
+/// Images of one size with labels for rows and columns.
 #[derive(Debug, Clone)]
 pub struct PictureGrid {
-    /// One line above everything.
+    /// Text line above the grid.
     pub title: String,
-    /// What stands above each column.
+    /// Labels above the columns.
     pub columns: Vec<String>,
-    /// The rows from top to bottom, each with what stands at its left.
+    /// The rows from top to bottom, each with the label at its left.
     pub rows: Vec<(String, Vec<GridCell>)>,
 }
 
-/// One picture of the grid.
+/// One image of the grid.
 #[derive(Debug, Clone)]
 pub struct GridCell {
-    /// The picture.
+    /// The image.
     pub picture: Frame,
-    /// What stands below it.
+    /// Text below the image.
     pub caption: String,
 }
 
 impl PictureGrid {
-    /// The grid as one picture, its cells as large as the largest picture.
+    /// Draws the grid as one image. Every cell has the size of the largest image.
     ///
     /// # Errors
-    /// [`FrameError`] when the picture would be too large for its size to be counted.
+    /// [`FrameError`] when the size of the grid overflows.
     pub fn drawn(&self) -> Result<Frame, FrameError> {
         let layout = Layout::of(self);
         let (width, height) = layout.size(self.columns.len(), self.rows.len());
@@ -60,14 +60,14 @@ impl PictureGrid {
     }
 }
 
-/// Where things are, pixels.
+/// Positions of the cells and texts, in pixels.
 struct Layout {
     text: Text,
     margin: f64,
     cell_height: u32,
-    /// Of the first column.
+    /// Left edge of the first column.
     left: u32,
-    /// Of the first row.
+    /// Top edge of the first row.
     top: u32,
     column_step: u32,
     row_step: u32,
@@ -144,14 +144,14 @@ mod tests {
         }
     }
 
-    /// How often a grey occurs.
+    /// Number of pixels of one grey level.
     fn count(sheet: &Frame, value: u8) -> usize {
         let pixels = sheet.pixels().chunks_exact(3);
         pixels.filter(|pixel| *pixel == [value; 3]).count()
     }
 
     #[test]
-    fn every_picture_is_whole_and_stands_in_its_row_and_column() {
+    fn every_image_is_complete_and_in_its_row_and_column() {
         let grid = PictureGrid {
             title: "title".to_owned(),
             columns: vec!["a".to_owned(), "b".to_owned()],

@@ -1,7 +1,7 @@
-//! Memory of frames that are done, for the next ones.
+//! Reuse of the memory of frames.
 //!
-//! An allocator that gives freed memory back, as `make serve` and the image tell theirs to, gets each
-//! page of a frame anew from the kernel, which clears it: that took 1 to 3 % of all processor time
+//! An allocator that returns freed memory to the kernel, as configured by `make serve` and in the
+//! container image, gets zeroed pages for each new frame. That took 1 to 3 % of all processor time
 //! (benches/NOTES.md).
 
 use std::{
@@ -10,14 +10,14 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-/// Most memory that is kept, bytes: a few frames of a common camera.
+/// Largest memory kept for reuse, bytes: a few frames of a common camera.
 const MOST_KEPT_BYTES: usize = 64 << 20;
-/// Smaller buffers are not worth keeping, bytes.
+/// Smaller buffers are not kept, bytes.
 const LEAST_KEPT_BYTES: usize = 1 << 20;
 
 static KEPT: Mutex<Vec<Vec<u8>>> = Mutex::new(Vec::new());
 
-/// So many zeros, in memory that was a frame's if there is some. Never what such a frame showed.
+/// Returns `count` zeros, in the memory of an earlier frame if available. No earlier pixels remain.
 pub(super) fn zeros(count: usize) -> Vec<u8> {
     let kept = (count >= LEAST_KEPT_BYTES).then(take).flatten();
     match kept {
@@ -26,7 +26,7 @@ pub(super) fn zeros(count: usize) -> Vec<u8> {
             bytes.resize(count, 0);
             bytes
         }
-        // Fresh pages are zeros already.
+        // Newly allocated pages are already zero.
         None => vec![0; count],
     }
 }
@@ -46,7 +46,7 @@ fn keep(bytes: Vec<u8>) {
     }
 }
 
-/// The bytes of a frame, whose memory is kept when the frame is done.
+/// The bytes of a frame. Their memory is kept for reuse when the frame is dropped.
 #[derive(Clone, PartialEq, Eq)]
 pub(super) struct Pixels(Vec<u8>);
 
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_begins_with_zeros_whatever_its_memory_showed_before() {
+    fn reused_frame_memory_is_zeroed() {
         for _ in 0..100 {
             drop(Pixels::from(vec![7; 3 << 20]));
             assert!(zeros(2 << 20).iter().all(|&byte| byte == 0));

@@ -92,8 +92,8 @@ impl RemapTable {
         shared.into_iter().map(table).collect()
     }
 
-    /// Where in the frame the view's pixel (`x`, `y`) samples (pixel centres), also beyond the
-    /// frame's borders; `None` beyond the lens image.
+    /// Returns the position in the frame (pixel centres) that the view's pixel (`x`, `y`) samples,
+    /// also beyond the frame's borders. `None` beyond the lens image.
     ///
     /// # Panics
     /// When the pixel lies outside the view.
@@ -108,13 +108,13 @@ impl RemapTable {
         (is_visible && !x.is_nan()).then(|| Pixel::new(x, y))
     }
 
-    /// Whether any of the view's pixels sees some of the lens image in the frame.
+    /// Returns true if a pixel of the view shows a part of the lens image in the frame.
     #[must_use]
     pub fn sees_anything(&self) -> bool {
         self.has_sample(|_| true)
     }
 
-    /// Whether any of them sees some of the lens image beside what is masked.
+    /// Returns true if a pixel of the view shows an unmasked part of the lens image.
     #[must_use]
     pub fn sees_beside(&self, masked: &MaskedPixels) -> bool {
         let width = self.frame_width as usize;
@@ -124,7 +124,7 @@ impl RemapTable {
         })
     }
 
-    /// Whether one of the view's pixels has a sample for which `counts` holds.
+    /// Returns true if a pixel of the view has a sample for which `counts` holds.
     fn has_sample(&self, counts: impl Fn(&Sample) -> bool) -> bool {
         let (width, height) = (self.frame_width as usize, self.frame_height as usize);
         (0..self.grid.visibility().bands()).any(|index| {
@@ -168,8 +168,8 @@ impl RemapTable {
         self.render_portably(frame, input, slot);
     }
 
-    /// What [`RemapTable::render`] does where there are no vector instructions it knows: the same,
-    /// to the bit.
+    /// Portable version of [`RemapTable::render`] for processors without supported vector
+    /// instructions. The results are bit-identical.
     pub fn render_portably(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
         self.render_bands(frame, input, slot, scalar::render);
     }

@@ -1,4 +1,4 @@
-//! Small versions of pictures.
+//! Reduced versions of images.
 
 use image::{
     ImageBuffer, Rgb,
@@ -7,8 +7,8 @@ use image::{
 
 use super::Frame;
 
-/// The picture made as small as its longer side says, every pixel taking part; a picture that is
-/// no longer stays as it is.
+/// Scales the image down so that its longer side is `longer_side`, averaging all pixels. An image
+/// that is not longer stays unchanged.
 #[must_use]
 pub fn thumbnail(frame: &Frame, longer_side: u32) -> Frame {
     let (width, height) = (frame.width(), frame.height());
@@ -23,15 +23,15 @@ pub fn thumbnail(frame: &Frame, longer_side: u32) -> Frame {
     resized(frame, scaled(width), scaled(height))
 }
 
-/// The picture made as narrow as this, every pixel taking part; a picture that is no wider stays
-/// as it is.
+/// Scales the image down to `width`, averaging all pixels. An image that is not wider stays
+/// unchanged.
 #[must_use]
 pub fn narrowed(frame: &Frame, width: u32) -> Frame {
     if frame.width() <= width {
         return frame.clone();
     }
     let (rows, columns) = (u64::from(frame.height()), u64::from(frame.width()));
-    // Rounded to the nearest, and no larger than it was.
+    // Rounded to the nearest integer, and not larger than before.
     let height = (rows * u64::from(width) + columns / 2) / columns;
     let height = u32::try_from(height).unwrap_or(frame.height()).max(1);
     resized(frame, width.max(1), height)
@@ -39,9 +39,9 @@ pub fn narrowed(frame: &Frame, width: u32) -> Frame {
 
 fn resized(frame: &Frame, width: u32, height: u32) -> Frame {
     ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(frame.width(), frame.height(), frame.pixels())
-        .map(|picture| resize(&picture, width, height, FilterType::Triangle))
+        .map(|image| resize(&image, width, height, FilterType::Triangle))
         .and_then(|small| Frame::new(small.width(), small.height(), small.into_raw()).ok())
-        // Neither can fail: a frame has as many bytes as its pixels take.
+        // Neither step can fail: the buffer length of a frame matches its size.
         .unwrap_or_else(|| frame.clone())
 }
 
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn a_narrowed_picture_has_the_width_and_the_nearest_height() {
+    fn a_narrowed_image_has_the_width_and_the_nearest_height() {
         let frame = Frame::new(10, 5, vec![7; 150]).unwrap();
         let small = narrowed(&frame, 3);
         assert_eq!((small.width(), small.height()), (3, 2));
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_picture_stays_as_it_is() {
+    fn a_small_image_stays_unchanged() {
         let frame = Frame::new(3, 2, (0..18).collect()).unwrap();
         assert_eq!(thumbnail(&frame, 3), frame);
         let line = Frame::new(1000, 1, vec![9; 3000]).unwrap();

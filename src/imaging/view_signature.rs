@@ -1,20 +1,20 @@
-//! What a rendered view looks like from afar: enough to tell that nothing has moved in it.
+//! Coarse signature of a rendered view for motion detection.
 
 use super::NetworkInput;
 
-/// Sides of the cells that are averaged, view pixels: 256 pixels hide the noise of a sensor and of
-/// JPEG, and a person who can be found at all fills a good part of one.
+/// Sides of the averaged cells, in view pixels. 256 pixels average out the noise of a sensor and of
+/// JPEG, and a detectable person fills a good part of one cell.
 const CELL: usize = 16;
-/// The change of a cell's mean, in grey levels (0 to 255), from which on something has moved. The
-/// noise of a mean is below 1; a person's clothes differ from the floor by tens.
+/// Least change of a cell's mean, in grey levels (0 to 255), that counts as motion. The noise of a
+/// mean is below 1. A person's clothes differ from the floor by tens.
 const MOVED_LEVELS: u8 = 4;
 
-/// Mean levels (0 to 255) of the cells of a view, for each colour.
+/// Mean levels (0 to 255) of the cells of a view, for each colour channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ViewSignature(Vec<u8>);
 
 impl ViewSignature {
-    /// The signature of a view rendered for `input`: its slot `[3, height, width]`.
+    /// Computes the signature of a view rendered for `input`, from its slot `[3, height, width]`.
     #[must_use]
     pub fn of(slot: &[f32], input: &NetworkInput) -> Self {
         let (width, height) = (input.width as usize, input.height as usize);
@@ -41,7 +41,7 @@ impl ViewSignature {
         Self(levels)
     }
 
-    /// Whether something has moved between the two, which are of one view.
+    /// Returns true if there is motion between two signatures of the same view.
     #[must_use]
     pub fn differs_from(&self, other: &Self) -> bool {
         let mut pairs = self.0.iter().zip(&other.0);
@@ -52,7 +52,7 @@ impl ViewSignature {
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "`as` keeps within 0 to 255, and a mean of levels is within them anyway"
+    reason = "`as` saturates to 0 to 255, and a mean of levels is within that range"
 )]
 fn level(mean: f32) -> u8 {
     mean.round() as u8
@@ -73,7 +73,7 @@ mod tests {
         }
     }
 
-    /// A view of one level but for a square of another one.
+    /// A view of one level with a square of another level.
     fn view(level: f32, square: [usize; 2], side: usize, other: f32) -> ViewSignature {
         let input = input();
         let mut slot = vec![0.0; input.view_len()];
@@ -88,11 +88,11 @@ mod tests {
     }
 
     #[test]
-    fn something_small_that_comes_or_goes_is_motion_wherever_it_is() {
+    fn a_small_object_that_comes_or_goes_is_motion_anywhere() {
         let empty = view(100.0, [0, 0], 0, 0.0);
         for corner in [[0, 0], [10, 10], [34, 27], [36, 0]] {
-            let somebody = view(100.0, corner, 6, 160.0);
-            assert!(empty.differs_from(&somebody) && somebody.differs_from(&empty));
+            let person = view(100.0, corner, 6, 160.0);
+            assert!(empty.differs_from(&person) && person.differs_from(&empty));
         }
     }
 

@@ -1,4 +1,4 @@
-//! What every detector offers.
+//! Interface and errors of all detectors.
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
@@ -8,10 +8,10 @@ use crate::{
     imaging::{NetworkInput, ViewBatch},
 };
 
-/// A person found in a view.
+/// A person detected in a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewDetection {
-    /// Where, corner-origin view pixels, within the view.
+    /// Box in corner-origin view pixels, clipped to the view.
     pub bbox: BBox<ViewPixels>,
     /// Confidence, 0 to 1.
     pub score: f64,
@@ -22,26 +22,26 @@ pub trait Detector: Send {
     /// The model's name.
     fn name(&self) -> &str;
 
-    /// Changes whenever the model does.
+    /// Identifier that changes with the model.
     fn revision(&self) -> &str;
 
-    /// What the network wants to see.
+    /// Input format of the network.
     fn input(&self) -> &NetworkInput;
 
-    /// How many views the network takes at once, if that is fixed: fewer cost as much.
+    /// Number of views per run, if it is fixed. Fewer views cost as much.
     fn views_per_run(&self) -> Option<NonZeroUsize> {
         None
     }
 
-    /// Finds persons in a batch rendered for [`Detector::input`]: one list per view, unsorted,
-    /// overlaps left in, scores at least the detector's floor.
+    /// Detects persons in a batch rendered for [`Detector::input`]. Returns one list per view,
+    /// unsorted, with overlaps and with scores of at least the detector's floor.
     ///
     /// # Errors
-    /// [`InferenceError`] when the run-time fails or answers in another shape than it promised.
+    /// [`InferenceError`] when the runtime fails or its output differs from the declared shape.
     fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError>;
 }
 
-/// A model that cannot be loaded or run. Every message is one sentence with the remedy.
+/// A model that cannot be loaded or run. Every message is one sentence that includes the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum InferenceError {
     /// The ONNX Runtime library cannot be used.
@@ -50,9 +50,9 @@ pub enum InferenceError {
          setup`, or point it to libonnxruntime.so 1.24 or newer"
     )]
     Runtime {
-        /// Where it was looked for.
+        /// Path of the library.
         path: PathBuf,
-        /// What the loader said.
+        /// Error of the loader.
         detail: String,
     },
     /// The library has no support for the device.
@@ -61,20 +61,20 @@ pub enum InferenceError {
          inference.library_path to the libonnxruntime.so of the package onnxruntime-gpu, or use cpu"
     )]
     NoProvider {
-        /// The device asked for.
+        /// The configured device.
         device: Device,
         /// The library.
         path: PathBuf,
     },
-    /// The device is not there, or its driver is not.
+    /// The device or its driver is missing.
     #[error(
         "inference.device: {device} cannot be used: {detail}; check the GPU's number and its \
          driver, CUDA and cuDNN libraries, or use cpu"
     )]
     NoDevice {
-        /// The device asked for.
+        /// The configured device.
         device: Device,
-        /// What the run-time said.
+        /// Error of the runtime.
         detail: String,
     },
     /// The model file or its manifest cannot be read.
@@ -83,53 +83,53 @@ pub enum InferenceError {
          `make models` the others"
     )]
     Unreadable {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What went wrong.
+        /// Cause of the failure.
         detail: String,
     },
-    /// The model is not one that can be used here.
+    /// The model is not supported.
     #[error("model: {path} cannot be used: {problem}")]
     Unusable {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What was found and what is needed.
+        /// The mismatch: what was found and what is needed.
         problem: String,
     },
-    /// The model on the inference server is not one that can be used here.
+    /// The model on the inference server is not supported.
     #[error("model: {model} on the server of inference.url cannot be used: {problem}")]
     RemoteModel {
-        /// What it is called there.
+        /// Name of the model on the server.
         model: String,
-        /// What was found and what is needed.
+        /// The mismatch: what was found and what is needed.
         problem: String,
     },
-    /// The inference server has no place for more.
-    #[error("the inference server has no place for more: send fewer frames at a time, or retry")]
+    /// The inference server is overloaded.
+    #[error("the inference server is overloaded: send fewer frames at a time, or retry")]
     RemoteBusy {
-        /// When it may have one.
+        /// Time to wait before a retry.
         retry_after: Duration,
     },
-    /// The inference server cannot be reached, or does not answer what was asked.
+    /// The inference server cannot be reached, or its response is invalid.
     #[error("inference.url: the server at {url} cannot be used: {detail}")]
     Remote {
-        /// Its address.
+        /// Address of the server.
         url: String,
-        /// What went wrong.
+        /// Cause of the failure.
         detail: String,
     },
-    /// The inference server does not tell what it is asked without a token, or with this one.
+    /// The inference server requires a token, or rejects this one.
     #[error(
-        "inference.bearer_token: the server at {url} wants another: {detail}; give the one that its operator gave \
-         out"
+        "inference.bearer_token: the server at {url} rejects the request: {detail}; set the \
+         token that the server's operator issued"
     )]
     RemoteDenied {
-        /// Its address.
+        /// Address of the server.
         url: String,
-        /// What it said.
+        /// Response of the server.
         detail: String,
     },
-    /// The run-time failed on a batch.
+    /// The runtime failed on a batch.
     #[error("the network failed: {0}")]
     Run(String),
 }

@@ -1,23 +1,24 @@
-//! What a network runs on.
+//! Device on which a network runs.
 
 use std::{fmt, str::FromStr};
 
-/// The highest number of a device: no machine has as many.
+/// Highest accepted device number. No machine has more devices.
 const MAX_DEVICE: i32 = 255;
 
-/// What networks run on.
+/// Device on which networks run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Device {
     /// The processor.
     #[default]
     Cpu,
-    /// An NVIDIA GPU, by its number, through CUDA.
+    /// An NVIDIA GPU, by its number, with CUDA.
     Cuda(i32),
-    /// An NVIDIA GPU, by its number, through `TensorRT`; what that cannot run, runs through CUDA.
+    /// An NVIDIA GPU, by its number, with `TensorRT`. Operators without `TensorRT` support run with
+    /// CUDA.
     TensorRt(i32),
 }
 
-/// The name of no device.
+/// An invalid device name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("use cpu, cuda:N or tensorrt:N, with N the GPU's number from 0")]
 pub struct UnknownDevice;
@@ -58,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_device_is_named_as_it_is_written() {
+    fn a_device_is_formatted_as_it_is_parsed() {
         for name in ["cpu", "cuda:0", "tensorrt:3"] {
             assert_eq!(name.parse::<Device>().unwrap().to_string(), name);
         }

@@ -1,9 +1,8 @@
-//! Output heads: what a network answers, turned into person boxes. Pure functions.
+//! Output heads, which decode the outputs of a network to person boxes. Pure functions.
 //!
-//! A [`Head`] is the `[output]` table of a model's manifest. Every head reads the score of the
-//! person class alone and drops what lies below the floor before it computes a box. Boxes come
-//! out in view pixels, clipped to the view, overlapping as the network left them. Arithmetic is
-//! in `f64`.
+//! A [`Head`] is the `[output]` table of a model's manifest. Every head reads only the score of the
+//! person class and drops candidates below the floor before it computes a box. Boxes are in view
+//! pixels, clipped to the view and not deduplicated. The arithmetic uses `f64`.
 
 mod boxes_scores;
 mod centernet;
@@ -43,11 +42,11 @@ pub use self::{
     yolox::YoloxHead,
 };
 
-/// How a model's outputs become boxes. In a manifest: `head = "yolox"` and that head's fields.
+/// Decoder of a model's outputs. In a manifest: `head = "yolox"` and the fields of that head.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "head", rename_all = "snake_case")]
 pub enum Head {
-    /// The graph decodes: boxes and person scores come out.
+    /// Boxes and person scores decoded by the graph.
     BoxesScores(BoxesScoresHead),
     /// SSD: offsets to anchors, class scores.
     Ssd(SsdHead),
@@ -65,11 +64,11 @@ pub enum Head {
     Detr(DetrHead),
     /// `CenterNet`: peaks of a heat map.
     Centernet(CenternetHead),
-    /// The graph suppresses overlaps too: rows of finished detections.
+    /// Final detections with overlaps suppressed by the graph.
     EndToEnd(EndToEndHead),
 }
 
-/// What a batch of views came to.
+/// Decoded outputs of a batch of views.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HeadOutput {
     /// The persons of each view, in the order of the network's candidates.
@@ -79,12 +78,12 @@ pub struct HeadOutput {
     pub non_finite: usize,
 }
 
-/// What is kept of what networks answer.
+/// Limits on the candidates that are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CandidateOptions {
     /// Boxes with a lower score are dropped, 0 to 1.
     pub score_floor: f64,
-    /// The best so many boxes of a view are kept.
+    /// Largest number of boxes per view. The best are kept.
     pub max_detections_per_view: usize,
 }
 
@@ -100,12 +99,12 @@ impl HeadOutput {
     }
 }
 
-/// What every head does. `batch.views` is known in [`Decoder::decode`] only.
+/// Interface of all heads. `batch.views` is known in [`Decoder::decode`] only.
 trait Decoder {
-    /// Whether outputs of these shapes can be decoded; otherwise a sentence.
+    /// Checks that outputs of these shapes can be decoded. The error is a sentence.
     fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String>;
 
-    /// Checks the outputs, then hands every candidate to `finds`.
+    /// Checks the outputs, then passes every candidate to `finds`.
     fn decode(
         &self,
         outputs: &[TensorView<'_>],
@@ -115,11 +114,11 @@ trait Decoder {
 }
 
 impl Head {
-    /// Whether a model with these outputs and an input of `(width, height)` pixels can be
-    /// decoded. Dimensions the model leaves open are -1.
+    /// Checks that a model with these outputs and an input of `(width, height)` pixels can be
+    /// decoded. Dimensions that the model leaves open are -1.
     ///
     /// # Errors
-    /// One sentence about the model ("its output …"): what was found, what is needed.
+    /// One sentence about the model ("its output …"): what was found and what is needed.
     pub fn check(&self, outputs: &[OutputShape<'_>], input: (u32, u32)) -> Result<(), String> {
         let batch = Batch {
             views: None,
@@ -129,11 +128,11 @@ impl Head {
         self.decoder().check(outputs, &batch)
     }
 
-    /// The persons in `views` views whose score is at least `floor` (0 to 1).
+    /// Decodes the persons in `views` views with a score of at least `floor` (0 to 1).
     ///
     /// # Errors
-    /// [`InferenceError::Run`] when an output is missing or has another shape than this head
-    /// needs, or holds scores that are no probabilities where the manifest says they are.
+    /// [`InferenceError::Run`] when an output is missing, its shape does not fit this head, or its
+    /// scores are not probabilities although the manifest declares them so.
     pub fn decode(
         &self,
         outputs: &[TensorView<'_>],

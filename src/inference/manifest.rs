@@ -1,4 +1,4 @@
-//! Model manifests: what a model is, beside its ONNX file.
+//! Model manifests, which describe the models in ONNX files.
 
 mod input;
 
@@ -15,7 +15,7 @@ pub(super) const FILE_NAME: &str = "model.toml";
 /// Longest manifest, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// What a model is and where it comes from. What the ONNX file tells, a manifest may leave out.
+/// Description and origin of a model. Fields that the ONNX file contains are optional.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelManifest {
@@ -23,27 +23,27 @@ pub struct ModelManifest {
     pub name: String,
     /// The ONNX file, relative to the manifest and within its folder.
     pub onnx: PathBuf,
-    /// The ONNX file's SHA-256, hexadecimal; a file with another one is refused.
+    /// The ONNX file's SHA-256, hexadecimal. A file with a different one is refused.
     #[serde(default)]
     pub sha256: Option<String>,
     /// SPDX identifier of the weights' licence.
     #[serde(default)]
     pub licence: Option<String>,
-    /// Where the weights come from.
+    /// Origin of the weights.
     #[serde(default)]
     pub source: Option<String>,
-    /// How pixels become network input.
+    /// Conversion of pixels to network input.
     #[serde(default)]
     pub input: ManifestInput,
-    /// How the outputs become boxes.
+    /// Decoder of the outputs.
     #[serde(default)]
     pub output: Head,
 }
 
 impl ModelManifest {
-    /// The manifest that `model` means: a folder with a `model.toml`, that file itself, or an ONNX
-    /// file. An ONNX file without a manifest beside it that names it gets one in which nothing is
-    /// said. `onnx` comes back as a path that can be opened.
+    /// Locates and reads the manifest of `model`: a folder with a `model.toml`, that file itself,
+    /// or an ONNX file. An ONNX file without a manifest that names it gets a default manifest. The
+    /// returned `onnx` is a path that can be opened.
     ///
     /// # Errors
     /// [`InferenceError`] when the manifest is missing or malformed, or names an ONNX file outside
@@ -92,7 +92,9 @@ impl ModelManifest {
             .map_err(|error| unreadable(error.to_string()))?
             .len();
         if bytes > MAX_BYTES {
-            return Err(unusable(format!("it has {bytes} bytes, no manifest")));
+            return Err(unusable(format!(
+                "it has {bytes} bytes, too many for a manifest"
+            )));
         }
         let text = std::fs::read_to_string(&path).map_err(|error| unreadable(error.to_string()))?;
         let manifest: Self =
@@ -113,9 +115,9 @@ impl ModelManifest {
         }
         let is_sum = |sum: &String| sum.len() == 64 && sum.chars().all(|c| c.is_ascii_hexdigit());
         match &self.sha256 {
-            Some(sum) if !is_sum(sum) => Err(format!(
-                "sha256 is {sum:?}: 64 hexadecimal digits are needed"
-            )),
+            Some(sum) if !is_sum(sum) => {
+                Err(format!("sha256 is {sum:?}: use 64 hexadecimal digits"))
+            }
             _ => self.input.normalisation().map(drop),
         }
     }
@@ -124,13 +126,13 @@ impl ModelManifest {
 /// Longest name of a model, characters.
 const MAX_NAME: usize = 64;
 
-/// Whether a model can be called that: it becomes a folder, a label and a part of a URL.
+/// Returns true if the name is valid for a model. It becomes a folder, a label and a part of a URL.
 pub(super) fn is_name(name: &str) -> bool {
     let usable = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
     (1..=MAX_NAME).contains(&name.len()) && !name.starts_with('.') && name.chars().all(usable)
 }
 
-/// A name made of a file's.
+/// Makes a valid name from a file name.
 fn name_from(stem: &str) -> String {
     let usable = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
     let name: String = stem
@@ -145,7 +147,8 @@ fn name_from(stem: &str) -> String {
     }
 }
 
-/// The path of `file` in `folder`, links followed; an error when that is somewhere else.
+/// Returns the path of `file` in `folder` with symbolic links resolved, or an error if it is
+/// outside.
 fn within(folder: &Path, file: &Path) -> Result<PathBuf, String> {
     let outside = || {
         format!(
@@ -160,12 +163,12 @@ fn within(folder: &Path, file: &Path) -> Result<PathBuf, String> {
     let path = folder.join(file);
     match (path.canonicalize(), folder.canonicalize()) {
         (Ok(real), Ok(folder)) if !real.starts_with(&folder) => Err(outside()),
-        // A file that is missing is told about when it is read.
+        // A missing file is reported when it is read.
         _ => Ok(path),
     }
 }
 
-/// A TOML error as one sentence with its line.
+/// Formats a TOML error as one sentence with its line.
 fn one_line(error: &toml::de::Error, text: &str) -> String {
     let message = error.message().replace('\n', " ");
     let before = error.span().and_then(|span| text.get(..span.start));

@@ -1,4 +1,4 @@
-//! A loaded model, shared by the frames that are looked at with it.
+//! A loaded model, shared by the frames that use it.
 
 use std::{
     num::NonZeroUsize,
@@ -9,19 +9,19 @@ use std::{
 use super::{Detector, HeadOutput, InferenceError, repository::Stamp};
 use crate::imaging::{NetworkInput, ViewBatch};
 
-/// A loaded model. A frame holds on to the one it began with, so that a model that was replaced
-/// goes when its last frame has ended.
+/// A loaded model. A frame keeps a reference to its model, so a replaced model is dropped when its
+/// last frame ends.
 pub struct Model {
     name: String,
     revision: String,
     input: NetworkInput,
     views_per_run: Option<NonZeroUsize>,
-    /// Each runs one batch at a time, side by side with the others.
+    /// Each session runs one batch at a time, in parallel with the others.
     sessions: Vec<Mutex<Box<dyn Detector>>>,
     files: Option<ModelFiles>,
 }
 
-/// Where a model was loaded from, and what the files were like then.
+/// Origin of a model, and the state of its files at the time of loading.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct ModelFiles {
     /// The model's folder or ONNX file.
@@ -30,13 +30,13 @@ pub(super) struct ModelFiles {
 }
 
 impl Model {
-    /// A model of one session.
+    /// A model with one session.
     #[must_use]
     pub fn new(session: Box<dyn Detector>) -> Self {
         Self::of_sessions(session, Vec::new())
     }
 
-    /// A model of several sessions of the same network.
+    /// A model with several sessions of the same network.
     #[must_use]
     pub fn of_sessions(first: Box<dyn Detector>, others: Vec<Box<dyn Detector>>) -> Self {
         Self {
@@ -63,26 +63,26 @@ impl Model {
         self.files.as_ref()
     }
 
-    /// Its name.
+    /// Name of the model.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Changes whenever the model does.
+    /// Identifier that changes with the model.
     #[must_use]
     pub fn revision(&self) -> &str {
         &self.revision
     }
 
-    /// What the network wants to see.
+    /// Input format of the network.
     #[must_use]
     pub fn input(&self) -> &NetworkInput {
         &self.input
     }
 
-    /// How many views make a good batch: at most `max_views`, but no less than the network takes at
-    /// once, and only whole runs of one that takes a fixed number.
+    /// The largest useful batch of at most `max_views` views. It is at least the number of views
+    /// per run, and a multiple of it where that number is fixed.
     #[must_use]
     pub fn batch_of(&self, max_views: NonZeroUsize) -> NonZeroUsize {
         let fixed = self.views_per_run.unwrap_or(NonZeroUsize::MIN);
@@ -90,19 +90,19 @@ impl Model {
         fixed.saturating_mul(NonZeroUsize::new(runs).unwrap_or(NonZeroUsize::MIN))
     }
 
-    /// Finds persons in a batch rendered for [`Model::input`], in the session of that number (they
-    /// are counted round), after waiting for its turn.
+    /// Detects persons in a batch rendered for [`Model::input`], in session `session` modulo the
+    /// number of sessions. Blocks until the session is free.
     ///
     /// # Errors
     /// [`InferenceError`] when the network cannot run.
     pub fn detect(&self, session: usize, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
         let session = &self.sessions[session % self.sessions.len()];
-        // A panic inside the run-time leaves no half-changed state of ours behind.
+        // A panic in the runtime leaves no inconsistent state in the session's wrapper.
         let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
         session.detect(batch)
     }
 
-    /// Runs each session once on blank views, so that the first frame finds them warm.
+    /// Runs each session once on blank views, so that the first frame does not pay for the warm-up.
     ///
     /// # Errors
     /// [`InferenceError`] when the network cannot run.

@@ -1,4 +1,4 @@
-//! Detectors run by ONNX Runtime. The only module that names `ort`.
+//! Detectors run by ONNX Runtime. The only module that uses `ort`.
 
 mod description;
 mod environment;
@@ -23,18 +23,18 @@ use crate::{
 pub(super) use description::{FLOAT, Metadata, float_shapes};
 pub use description::{ModelDescription, OnnxTensor};
 
-/// How a model is run.
+/// Options for running a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OnnxOptions {
-    /// What it runs on.
+    /// Device of the network.
     pub device: Device,
     /// Threads within one run of the network.
     pub threads: NonZeroUsize,
-    /// What is kept of what it answers.
+    /// Limits on the candidates that are kept.
     pub candidates: CandidateOptions,
 }
 
-/// A model in an ONNX file, with the output head that its manifest names.
+/// A model in an ONNX file, with the output head of its manifest.
 pub struct OnnxDetector {
     session: Session,
     description: ModelDescription,
@@ -56,8 +56,9 @@ impl OnnxDetector {
         Ok(Self::load_sessions(library, model, options, NonZeroUsize::MIN)?.0)
     }
 
-    /// As [`OnnxDetector::load`], in `count` sessions that run side by side: the first, and the
-    /// others. The file is read and checked once, and the sessions are built at the same time.
+    /// Like [`OnnxDetector::load`], in `count` sessions that run in parallel. Returns the first
+    /// session and the others. The file is read and checked once, and the other sessions are built
+    /// concurrently.
     ///
     /// # Errors
     /// [`InferenceError`] when the library, the device or the model cannot be used.
@@ -86,12 +87,12 @@ impl OnnxDetector {
             let session = provider::builder(environment, library, options)?.commit(&bytes);
             session.map_err(|error| unusable(first_line(&error)))
         };
-        // One that fails must be told before its threads are all over the log.
+        // Reports a failing model once, before every thread logs the same failure.
         let session = open()?;
         let others = std::thread::scope(|scope| {
             let opening: Vec<_> = (1..count.get()).map(|_| scope.spawn(open)).collect();
             let opened = opening.into_iter().map(|thread| {
-                let panicked = |_| Err(unusable("it brings the run-time down".to_owned()));
+                let panicked = |_| Err(unusable("the runtime panics on it".to_owned()));
                 thread.join().unwrap_or_else(panicked)
             });
             opened.collect::<Result<Vec<_>, _>>()
@@ -110,7 +111,7 @@ impl OnnxDetector {
             scale,
             offset,
         };
-        // The weights alone do not make a model: how it is fed and read counts, too.
+        // The revision covers the input and output settings in addition to the weights.
         let used = format!("{sha256} {:?} {:?}", manifest.input, manifest.output);
         let description = ModelDescription {
             revision: revision_of(used.as_bytes()),
@@ -134,7 +135,7 @@ impl OnnxDetector {
         Ok((detector(session), others))
     }
 
-    /// What was understood of the model.
+    /// Description of the model, from its manifest and its ONNX file.
     #[must_use]
     pub fn description(&self) -> &ModelDescription {
         &self.description
@@ -151,7 +152,7 @@ fn check_sum(manifest: &ModelManifest, found: &str) -> Result<(), String> {
     }
 }
 
-/// The run-time's own words without its call stack.
+/// The runtime's error message without its call stack.
 fn first_line(error: &ort::Error) -> String {
     let text = error.to_string();
     let line = text.lines().next().unwrap_or_default().trim();
@@ -216,7 +217,7 @@ fn run(
     let outputs: Vec<_> = outputs.iter().collect();
     let mut shaped = Vec::new();
     for (name, value) in &outputs {
-        // Heads read floats alone; a model may have other outputs, too.
+        // Heads read only floats, but a model may have further outputs.
         if let Ok((shape, values)) = value.try_extract_tensor::<f32>() {
             let side = |&side: &i64| usize::try_from(side).unwrap_or(0);
             shaped.push((name, shape.iter().map(side).collect::<Vec<_>>(), values));

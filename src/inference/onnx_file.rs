@@ -1,9 +1,9 @@
-//! Reading ONNX files that may be anything: bounded, and searched for references to other files
-//! before the run-time sees a byte of them.
+//! Reading of untrusted ONNX files, with size limits and a check for references to other files
+//! before the runtime sees the bytes.
 //!
-//! An ONNX tensor may keep its values in another file, by a path of the model's choice. The
-//! run-time resolves such paths even for models given to it as bytes, so the graph is walked here
-//! first. The field numbers are those of `onnx.proto`, which are stable.
+//! An ONNX tensor may keep its values in another file, at a path chosen by the model. The runtime
+//! resolves such paths even for models passed as bytes, so the graph is checked here first. The
+//! field numbers are those of `onnx.proto`, which are stable.
 
 mod protobuf;
 
@@ -11,28 +11,28 @@ use std::{fs::File, io::Read, path::Path};
 
 use self::protobuf::{Field, Value, fields};
 
-/// Largest ONNX file, bytes. Protocol buffers end at 2 GiB.
+/// Largest ONNX file, bytes. Protocol buffers are limited to 2 GiB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 /// Most values of one tensor in a file.
 const MAX_VALUES: u64 = 1 << 29;
 /// Deepest nesting of graphs within graphs.
 const MAX_DEPTH: usize = 64;
-/// The operator that stands for an execution provider's compiled engine, mostly in another file.
+/// The operator for an execution provider's compiled engine, which is mostly in another file.
 const ENGINE: &[u8] = b"EPContext";
 
-/// Reads a file whole.
+/// Reads a whole file.
 ///
 /// # Errors
-/// One sentence: what the operating system said, or that it is too large.
+/// One sentence: the error of the operating system, or that the file is too large.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
     let file = File::open(path).map_err(|error| error.to_string())?;
     let metadata = file.metadata().map_err(|error| error.to_string())?;
     if !metadata.is_file() {
-        return Err("it is no file".to_owned());
+        return Err("it is not a file".to_owned());
     }
     let mut bytes = Vec::new();
     if metadata.len() <= MAX_BYTES {
-        // One byte more than allowed, as the file may grow meanwhile.
+        // One byte more than allowed, as the file may grow during the read.
         file.take(MAX_BYTES + 1)
             .read_to_end(&mut bytes)
             .map_err(|error| error.to_string())?;
@@ -45,11 +45,11 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// Whether the run-time may see this file.
+/// Checks that the runtime may load this file.
 ///
 /// # Errors
-/// One sentence: that it is no ONNX model, that it refers to other files, or that it holds a
-/// tensor of absurd size.
+/// One sentence: the bytes are not an ONNX model, refer to other files, or contain an oversized
+/// tensor.
 pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     let mut has_graph = false;
     for field in fields(bytes) {
@@ -62,7 +62,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
 }
 
 fn no_model() -> String {
-    "it is no ONNX model, or is cut off".to_owned()
+    "it is not an ONNX model, or is cut off".to_owned()
 }
 
 /// The messages of `onnx.proto` on the way to a tensor.
@@ -79,7 +79,7 @@ enum Message {
 }
 
 impl Message {
-    /// The message in a field of this one.
+    /// The message type in a field of this message.
     fn child(self, field: u64) -> Option<Self> {
         match (self, field) {
             (Self::Model, 7) | (Self::Training, 1 | 2) | (Self::Attribute, 6 | 11) => {
@@ -108,7 +108,7 @@ impl Message {
             let Field { number, value } = field.map_err(|()| no_model())?;
             match (self, number, value) {
                 (Self::Node, 4, Value::Bytes(ENGINE)) => {
-                    return Err("it holds a compiled engine: save the model it was made of".into());
+                    return Err("it contains a compiled engine: save the original model".into());
                 }
                 (_, _, Value::Bytes(bytes)) => {
                     if let Some(child) = self.child(number) {
@@ -137,7 +137,7 @@ fn check_tensor(bytes: &[u8]) -> Result<(), String> {
             }
             (1, dimensions) => {
                 for dimension in dimensions.varints() {
-                    // A negative dimension is a very large number here.
+                    // A negative dimension is decoded as a very large number.
                     let dimension = dimension.map_err(|()| no_model())?;
                     values = values.saturating_mul(dimension.max(1));
                 }

@@ -1,4 +1,4 @@
-//! The models that answer, by name.
+//! The loaded models, by name.
 
 use std::{
     collections::BTreeMap,
@@ -7,38 +7,38 @@ use std::{
 
 use super::Model;
 
-/// Most models loaded at once: each holds its weights and its working memory.
+/// Largest number of loaded models. Each takes memory for its weights and its work.
 const MAX_MODELS: usize = 16;
 
-/// The models that answer, by name. Replacing one is a single step: a frame sees the old one or
-/// the new one, and finishes with what it saw.
+/// The loaded models, by name. Replacing a model is atomic: a frame gets the old or the new model
+/// and keeps it to its end.
 #[derive(Default)]
 pub struct ModelRegistry(RwLock<BTreeMap<String, Arc<Model>>>);
 
-/// There is no room for another model.
+/// The largest number of models is loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{MAX_MODELS} models are loaded, and no more can be: unload one first")]
+#[error("{MAX_MODELS} models are loaded, which is the limit: unload one first")]
 pub struct RegistryFull;
 
 impl ModelRegistry {
-    /// The model of that name.
+    /// Returns the model with that name.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<Arc<Model>> {
         let models = self.0.read().unwrap_or_else(PoisonError::into_inner);
         models.get(name).cloned()
     }
 
-    /// Every model, by name.
+    /// Returns every model, sorted by name.
     #[must_use]
     pub fn all(&self) -> Vec<Arc<Model>> {
         let models = self.0.read().unwrap_or_else(PoisonError::into_inner);
         models.values().cloned().collect()
     }
 
-    /// Adds a model, or puts it in the place of the one of its name, which is returned.
+    /// Adds a model or replaces the one with the same name, which is returned.
     ///
     /// # Errors
-    /// [`RegistryFull`] when it would be one too many.
+    /// [`RegistryFull`] when the limit is exceeded.
     pub fn put(&self, model: Arc<Model>) -> Result<Option<Arc<Model>>, RegistryFull> {
         let mut models = self.0.write().unwrap_or_else(PoisonError::into_inner);
         if models.len() >= MAX_MODELS && !models.contains_key(model.name()) {
@@ -47,7 +47,7 @@ impl ModelRegistry {
         Ok(models.insert(model.name().to_owned(), model))
     }
 
-    /// Takes a model out. Frames that began with it finish with it.
+    /// Removes a model. Frames in progress finish with it.
     pub fn remove(&self, name: &str) -> Option<Arc<Model>> {
         let mut models = self.0.write().unwrap_or_else(PoisonError::into_inner);
         models.remove(name)
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_replaced_model_lives_as_long_as_its_last_frame() {
+    fn a_replaced_model_is_dropped_after_its_last_frame() {
         let registry = ModelRegistry::default();
         assert!(registry.put(blind("a")).unwrap().is_none());
         let frame = registry.get("a").unwrap();
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_room_for_so_many_models_and_replacing_takes_none() {
+    fn the_number_of_models_is_limited_and_replacing_is_allowed() {
         let registry = ModelRegistry::default();
         for index in 0..MAX_MODELS {
             registry.put(blind(&index.to_string())).unwrap();

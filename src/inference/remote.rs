@@ -1,6 +1,7 @@
-//! Detectors whose network runs on another machine: any server of the Open Inference Protocol (KServe V2)
-//! over HTTP. Views go there as tensors, behind the JSON where the server takes that and in it otherwise;
-//! its outputs come back, and the head that the model's manifest names reads them here.
+//! Detectors whose network runs on another machine, on any server of the Open Inference Protocol
+//! (KServe V2) over HTTP. Views are sent as tensors, as bytes behind the JSON where the server
+//! supports that, otherwise within the JSON. The head in the model's manifest decodes the outputs
+//! locally.
 
 mod breaker;
 mod connection;
@@ -34,12 +35,12 @@ pub struct RemoteDetector {
 }
 
 impl RemoteDetector {
-    /// Asks the server what its model takes and answers, and holds that against the manifest at `model`
-    /// (a folder or a `model.toml`; an ONNX file is not needed). `count` sessions send side by side: the
-    /// first, and the others. Blocks.
+    /// Fetches the metadata of the server's model and checks it against the manifest at `model` (a
+    /// folder or a `model.toml`; no ONNX file is needed). Returns `count` sessions that send in
+    /// parallel: the first one and the others. Blocks.
     ///
     /// # Errors
-    /// [`InferenceError`] when the server cannot be asked or the model cannot be used.
+    /// [`InferenceError`] when the server cannot be reached or the model cannot be used.
     pub fn load_sessions(
         server: &Arc<RemoteServer>,
         model: &Path,
@@ -99,7 +100,7 @@ impl Detector for RemoteDetector {
     }
 }
 
-/// One request.
+/// Sends one inference request.
 fn run(
     server: &RemoteServer,
     understood: &Understood,

@@ -1,8 +1,8 @@
-//! The folder of models, and which of them are loaded: loaded and unloaded on request, reloaded
+//! The model repository: models in a folder that are loaded and unloaded on request, and reloaded
 //! when their files change.
 //!
-//! A model takes its place only after it was loaded, checked and run once. One that fails leaves
-//! the model it was to replace where it is.
+//! A model is put into service only after it was loaded, checked and run once. If that fails, the
+//! previous model stays in service.
 
 mod error;
 mod folder;
@@ -25,65 +25,65 @@ pub use error::RepositoryError;
 pub use folder::{ModelFolder, is_fetched};
 pub(super) use stamp::Stamp;
 
-/// Makes a model of its folder or ONNX file.
+/// Loads a model from its folder or ONNX file.
 pub type ModelLoader = Box<dyn Fn(&Path) -> Result<Model, InferenceError> + Send + Sync>;
 
-/// Which models there are, and how they are treated.
+/// Options of the repository.
 #[derive(Debug, Clone)]
 pub struct RepositoryOptions {
-    /// Where they are.
+    /// Folder of the models.
     pub folder: ModelFolder,
-    /// How many views a model has to see before it takes its place.
+    /// Number of blank views in the warm-up of a model.
     pub warm_up_views: NonZeroUsize,
-    /// Models that requests rely on without naming them: they are never unloaded.
+    /// Models used by requests that do not name one. They cannot be unloaded.
     pub kept: Vec<String>,
 }
 
-/// The folder of models, and which of them are loaded.
+/// The models of a folder, loaded or not.
 pub struct ModelRepository {
     options: RepositoryOptions,
     registry: Arc<ModelRegistry>,
     loader: ModelLoader,
     remote: Option<Arc<RemoteServer>>,
-    /// Held while a model is loaded: one at a time.
+    /// Locked while a model is loaded, so that only one is loaded at a time.
     memory: Mutex<Memory>,
     succeeded: AtomicU64,
     failed: AtomicU64,
 }
 
-/// What is known of models beside those that are loaded.
+/// State of models in addition to the loaded ones.
 #[derive(Default)]
 struct Memory {
-    /// Why a model's last load failed.
+    /// Error of the last load of each model.
     failures: BTreeMap<String, String>,
-    /// What changed files were like when they were last looked at.
+    /// State of changed files at the last check.
     changed: BTreeMap<String, Stamp>,
-    /// What files were like that are not to be tried again.
+    /// State of files that failed to load and are not tried again.
     refused: BTreeMap<String, Stamp>,
 }
 
-/// A model of the repository.
+/// One model of the repository.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RepositoryRow {
-    /// Its name.
+    /// Name of the model.
     pub name: String,
-    /// The revision that answers, if one does.
+    /// Revision in service, if any.
     pub revision: Option<String>,
-    /// Why it is not loaded, or why its last load failed.
+    /// Reason why it is not loaded, or error of its last load.
     pub reason: Option<String>,
 }
 
-/// How many loads succeeded and failed since the start.
+/// Numbers of successful and failed loads since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LoadCounts {
-    /// Loads whose model answers, or has answered.
+    /// Loads whose model was put into service.
     pub succeeded: u64,
     /// Loads whose model was refused.
     pub failed: u64,
 }
 
 impl ModelRepository {
-    /// The models that `options` describe, none of them loaded.
+    /// A repository with these options, without any loaded model.
     #[must_use]
     pub fn new(options: RepositoryOptions, loader: ModelLoader) -> Self {
         Self {
@@ -97,7 +97,7 @@ impl ModelRepository {
         }
     }
 
-    /// The same, with the server that the networks of its models run on.
+    /// Sets the server on which the networks run.
     #[must_use]
     pub fn on(self, remote: Arc<RemoteServer>) -> Self {
         Self {
@@ -106,13 +106,13 @@ impl ModelRepository {
         }
     }
 
-    /// The server that the networks run on, if they do not run here.
+    /// The server on which the networks run, or `None` if they run locally.
     #[must_use]
     pub fn remote(&self) -> Option<&Arc<RemoteServer>> {
         self.remote.as_ref()
     }
 
-    /// Whether networks can run as far as another server decides.
+    /// Returns false while the inference server is unavailable.
     #[must_use]
     pub fn is_remote_available(&self) -> bool {
         self.remote
@@ -120,13 +120,13 @@ impl ModelRepository {
             .is_none_or(|remote| remote.is_available())
     }
 
-    /// The models that answer.
+    /// The loaded models.
     #[must_use]
     pub fn registry(&self) -> &Arc<ModelRegistry> {
         &self.registry
     }
 
-    /// How many loads succeeded and failed.
+    /// Numbers of successful and failed loads.
     #[must_use]
     pub fn load_counts(&self) -> LoadCounts {
         LoadCounts {
@@ -135,22 +135,22 @@ impl ModelRepository {
         }
     }
 
-    /// Loads the model of that name, or loads it again. Blocks.
+    /// Loads or reloads the model with that name. Blocks.
     ///
     /// # Errors
-    /// [`RepositoryError`] when there is no such model, it fails its check, there is no room, or
-    /// another model is being loaded.
+    /// [`RepositoryError`] when there is no such model, it fails its check, the number of models is
+    /// at its limit, or another model is being loaded.
     pub fn load(&self, name: &str) -> Result<Arc<Model>, RepositoryError> {
         let mut memory = self.try_lock()?;
         let path = self.options.folder.find(name)?;
         self.replace(&mut memory, name, &path)
     }
 
-    /// Takes a model out. Frames that began with it finish with it.
+    /// Unloads a model. Frames in progress finish with it.
     ///
     /// # Errors
-    /// [`RepositoryError`] when it is not loaded, must be kept, or a model is being loaded, which may be
-    /// this one.
+    /// [`RepositoryError`] when it is not loaded, must be kept, or a model is being loaded, which
+    /// may be this one.
     pub fn unload(&self, name: &str) -> Result<(), RepositoryError> {
         if self.options.kept.iter().any(|kept| kept == name) {
             return Err(RepositoryError::Kept {
@@ -166,7 +166,7 @@ impl ModelRepository {
         Ok(())
     }
 
-    /// Every model that is loaded or in the folder, by name.
+    /// Returns every model that is loaded or in the folder, sorted by name.
     #[must_use]
     pub fn rows(&self) -> Vec<RepositoryRow> {
         let mut rows: BTreeMap<String, RepositoryRow> = BTreeMap::new();
@@ -187,9 +187,9 @@ impl ModelRepository {
         rows.into_values().collect()
     }
 
-    /// Reloads the models whose files have changed. Files must be the same at two looks, so that
-    /// none is read while it is written, and a model that failed is not tried again until they
-    /// change again.
+    /// Reloads the models whose files have changed. Files must be unchanged between two checks, so
+    /// that no file is read while it is written. A model that failed is tried again only after its
+    /// files change.
     pub fn reload_changed(&self) {
         if !self.is_remote_available() {
             return;
@@ -205,7 +205,7 @@ impl ModelRepository {
                 memory.changed.remove(name);
             } else if memory.changed.get(name) == Some(&found) {
                 memory.changed.remove(name);
-                // It was logged, and the rows tell it.
+                // The error is already logged, and the rows report it.
                 let _ = self.replace(&mut memory, name, &files.path);
             } else {
                 memory.changed.insert(name.to_owned(), found);
@@ -213,14 +213,14 @@ impl ModelRepository {
         }
     }
 
-    /// Load, check, warm up, replace.
+    /// Loads, checks and warms up a model, then replaces the previous one.
     fn replace(
         &self,
         memory: &mut Memory,
         name: &str,
         path: &Path,
     ) -> Result<Arc<Model>, RepositoryError> {
-        // Before reading: a file that changes meanwhile is read again.
+        // Taken before reading, so that a file that changes during the read is read again.
         let stamp = stamp(&files_of(path));
         let outcome = self.checked(name, path, &stamp).and_then(|model| {
             let model = Arc::new(model);
@@ -270,7 +270,7 @@ impl ModelRepository {
         Ok(model)
     }
 
-    /// Unless a model is being loaded.
+    /// Locks the state, or returns [`RepositoryError::Busy`] while a model is being loaded.
     fn try_lock(&self) -> Result<MutexGuard<'_, Memory>, RepositoryError> {
         self.memory.try_lock().or_else(|error| match error {
             TryLockError::Poisoned(poisoned) => Ok(poisoned.into_inner()),
@@ -279,7 +279,7 @@ impl ModelRepository {
     }
 
     fn lock(&self) -> MutexGuard<'_, Memory> {
-        // What a panic leaves behind are complete entries.
+        // After a panic the maps contain only complete entries.
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,4 +1,4 @@
-//! What a model wants to be given, from its declared inputs and its manifest.
+//! Input signature of a model, from its declared inputs and its manifest.
 
 use std::{
     num::{NonZeroU32, NonZeroUsize},
@@ -12,28 +12,28 @@ use super::{
 
 /// Network input sides accepted, pixels.
 const SIDE: RangeInclusive<u32> = 32..=4096;
-/// Most views that a model may want at once.
+/// Most views per run that a model may require.
 const MAX_VIEWS: u32 = 256;
 
-/// What a model wants to be given.
+/// Input signature of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Signature {
     pub(super) input_name: String,
     pub(super) layout: Layout,
-    /// Views per run; `None` for any number.
+    /// Views per run. `None` for any number.
     pub(super) views_per_run: Option<NonZeroUsize>,
     pub(super) width: u32,
     pub(super) height: u32,
 }
 
 impl Signature {
-    /// Reads the declared inputs; the manifest settles what they leave open, then the metadata.
+    /// Reads the declared inputs. Open dimensions come from the manifest, then from the metadata.
     pub(super) fn of(
         inputs: &[OnnxTensor],
         manifest: &ManifestInput,
         metadata: &Metadata,
     ) -> Result<Self, String> {
-        let input = picture_input(inputs, manifest)?;
+        let input = image_input(inputs, manifest)?;
         let [views, first, second, third] = dimensions(input)?;
         let layout = match (manifest.layout, first, third) {
             (Some(layout), ..) => layout,
@@ -62,7 +62,7 @@ impl Signature {
     }
 }
 
-fn picture_input<'i>(
+fn image_input<'i>(
     inputs: &'i [OnnxTensor],
     manifest: &ManifestInput,
 ) -> Result<&'i OnnxTensor, String> {
@@ -81,13 +81,13 @@ fn picture_input<'i>(
             names()
         )),
         _ => Err(format!(
-            "it has the inputs {}; a model with a picture as its only input is needed",
+            "it has the inputs {}; a model with an image as its only input is needed",
             names()
         )),
     }
 }
 
-/// The four dimensions; `None` for those left open.
+/// The four dimensions. `None` for those left open.
 fn dimensions(input: &OnnxTensor) -> Result<[Option<u32>; 4], String> {
     let [a, b, c, d] = input.shape[..] else {
         return Err(misfit(input));
@@ -95,7 +95,7 @@ fn dimensions(input: &OnnxTensor) -> Result<[Option<u32>; 4], String> {
     if input.element != FLOAT || [a, b, c, d].contains(&0) {
         return Err(misfit(input));
     }
-    // Negative ones are open; what is too large for an u32 is too large for every bound.
+    // Negative dimensions are open. A dimension too large for a u32 exceeds every limit.
     let dimension = |side: i64| (side > 0).then(|| u32::try_from(side).unwrap_or(u32::MAX));
     Ok([a, b, c, d].map(dimension))
 }
@@ -126,14 +126,14 @@ fn settle(
         (None, Some(side)) => match stride {
             Some(stride) if stride > 0 && !side.is_multiple_of(stride) => {
                 return Err(format!(
-                    "its input's {name} is {side}, no multiple of {stride}"
+                    "its input's {name} is {side}, not a multiple of {stride}"
                 ));
             }
             _ => side,
         },
         (None, None) => {
             return Err(format!(
-                "it leaves its input's {name} open; choose one with `{name}` in the manifest's \
+                "it leaves its input's {name} open; set it with `{name}` in the manifest's \
                  [input]"
             ));
         }

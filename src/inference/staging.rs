@@ -1,16 +1,16 @@
-//! Batches as a model wants them: in pieces of its fixed size, in its order of axes.
+//! Conversion of batches to a model's fixed number of views and its order of axes.
 
 use std::num::NonZeroUsize;
 
 use super::{Layout, signature::Signature};
 use crate::imaging::{NetworkInput, ViewBatch};
 
-/// Turns batches into inputs.
+/// Converts batches to inputs.
 pub(super) struct Staging {
     input_name: String,
     layout: Layout,
     views_per_run: Option<NonZeroUsize>,
-    /// Kept from run to run; empty for models that take batches as they are.
+    /// Reused from run to run. Empty for models that take batches unchanged.
     values: Vec<f32>,
 }
 
@@ -31,7 +31,7 @@ impl Staging {
         }
     }
 
-    /// The batch's values, as many as go into one run each.
+    /// The batch's values in pieces of one run each.
     pub(super) fn pieces<'b>(
         &self,
         batch: &'b ViewBatch,
@@ -41,7 +41,7 @@ impl Staging {
         batch.values().chunks(views.max(1) * input.view_len())
     }
 
-    /// A piece as input. Where it has fewer views than the model wants, black ones follow.
+    /// Converts a piece to an input. Missing views of a fixed number are filled with black ones.
     pub(super) fn stage<'a>(&'a mut self, piece: &'a [f32], input: &NetworkInput) -> Staged<'a> {
         let given = piece.len() / input.view_len();
         let views = self.views_per_run.map_or(given, NonZeroUsize::get);
@@ -68,7 +68,7 @@ impl Staging {
     }
 }
 
-/// Plane by plane to pixel by pixel.
+/// Converts planes to interleaved pixels.
 fn interleave(piece: &[f32], out: &mut [f32], input: &NetworkInput) {
     let views = piece.chunks_exact(input.view_len());
     for (view, out) in views.zip(out.chunks_exact_mut(input.view_len())) {
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn any_number_of_views_goes_in_as_it_is() {
+    fn an_open_batch_is_passed_on_unchanged() {
         let (batch, input) = batch(3);
         let mut staging = staging(Layout::Nchw, 0);
         let pieces: Vec<_> = staging.pieces(&batch, &input).collect();
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fixed_batch_is_cut_into_pieces_and_the_last_one_filled_up() {
+    fn a_fixed_batch_is_split_and_the_last_piece_is_padded() {
         let (batch, input) = batch(3);
         let mut staging = staging(Layout::Nchw, 2);
         let pieces: Vec<_> = staging.pieces(&batch, &input).collect();
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn planes_become_pixels_where_the_model_wants_them_last() {
+    fn planes_become_pixels_for_models_with_planes_last() {
         let (batch, input) = batch(1);
         let mut staging = staging(Layout::Nhwc, 0);
         let staged = staging.stage(batch.values(), &input);

@@ -1,18 +1,17 @@
-//! Kinds of metrics, created alike.
+//! The kinds of metrics, created through one trait.
 
 use prometheus::{
     Error, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts,
 };
 
-/// Upper bounds, seconds: from a stage of a frame that is over at once to a request that waited for
-/// as long as anybody does.
+/// Upper bounds, seconds: from a very short stage of a frame to the longest wait of a request.
 const DURATION_BUCKETS: [f64; 15] = [
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0,
 ];
 
 /// A kind of metric.
 pub(super) trait Kind: Sized {
-    /// A metric with that name, help text and labels.
+    /// Creates a metric with this name, help text and labels.
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error>;
 }
 
@@ -40,7 +39,7 @@ impl Kind for IntGaugeVec {
     }
 }
 
-/// Durations, in seconds.
+/// A histogram of durations, in seconds.
 impl Kind for HistogramVec {
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error> {
         let options = HistogramOpts::new(name, help).buckets(DURATION_BUCKETS.to_vec());

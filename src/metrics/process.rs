@@ -1,5 +1,5 @@
-//! What the operating system says of this process, under the names every Prometheus client uses.
-//! Linux only: elsewhere these metrics are missing.
+//! Metrics of this process from the operating system, under the standard names of Prometheus
+//! clients. They exist on Linux only.
 
 use std::{fs, io};
 
@@ -9,13 +9,13 @@ use prometheus::{
     proto::MetricFamily,
 };
 
-/// What the kernel counts CPU time in, per second: `USER_HZ`, which is 100 for programs on every
-/// architecture that Linux still gains users on (`proc(5)`, `time(7)`).
+/// The unit of CPU time in the kernel, per second: `USER_HZ`, which is 100 for programs on every
+/// current architecture of Linux (`proc(5)`, `time(7)`).
 const TICKS_PER_SECOND: f64 = 100.0;
-/// `/proc/self/status` counts memory in these.
+/// The unit of memory in `/proc/self/status`.
 const KIBIBYTE: f64 = 1024.0;
 
-/// The process, read at every scrape.
+/// The metrics of the process, read at every scrape.
 pub(super) struct Process {
     cpu: Counter,
     resident: Gauge,
@@ -28,7 +28,7 @@ pub(super) struct Process {
 
 impl Process {
     /// # Errors
-    /// When Prometheus accepts a name no more.
+    /// If Prometheus does not accept a name.
     pub(super) fn new() -> Result<Self, Error> {
         let gauge = |name: &str, help: &str| Gauge::with_opts(Opts::new(name, help));
         let cpu = Opts::new(
@@ -39,21 +39,21 @@ impl Process {
             cpu: Counter::with_opts(cpu)?,
             resident: gauge(
                 "process_resident_memory_bytes",
-                "Memory of the process that is in RAM.",
+                "Resident memory of the process, bytes.",
             )?,
             virtual_memory: gauge(
                 "process_virtual_memory_bytes",
-                "Address space of the process.",
+                "Virtual memory of the process, bytes.",
             )?,
             open_fds: gauge(
                 "process_open_fds",
-                "Open file descriptors, sockets included.",
+                "Open file descriptors, including sockets.",
             )?,
-            max_fds: gauge("process_max_fds", "Most file descriptors that may be open.")?,
+            max_fds: gauge("process_max_fds", "Limit of open file descriptors.")?,
             threads: gauge("process_threads", "Threads of the process.")?,
             start: gauge(
                 "process_start_time_seconds",
-                "When the process started, seconds since 1970.",
+                "Start time of the process, seconds since 1970.",
             )?,
         })
     }
@@ -85,7 +85,7 @@ impl Process {
         if let Some(limit) = number_after(&limits, "Max open files") {
             self.max_fds.set(limit);
         }
-        // The folder that is being read is open, too.
+        // The folder that is being read is open as well.
         let open = fs::read_dir("/proc/self/fd")?.count().saturating_sub(1);
         self.open_fds
             .set(f64::from(u32::try_from(open).unwrap_or(u32::MAX)));
@@ -124,16 +124,16 @@ fn number_after(text: &str, key: &str) -> Option<f64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// What `/proc/self/stat` says about time, in ticks.
+/// The times in `/proc/self/stat`, in ticks.
 struct Times {
     cpu_ticks: f64,
-    /// Since the machine was started.
+    /// Since the boot of the machine.
     start_ticks: f64,
 }
 
 impl Times {
-    /// Fields 14, 15 and 22 of `proc_pid_stat(5)`. The second field is a name in brackets that may
-    /// hold spaces and brackets itself.
+    /// Reads fields 14, 15 and 22 of `proc_pid_stat(5)`. The second field is a name in brackets
+    /// that may contain spaces and brackets.
     fn of(stat: &str) -> Option<Self> {
         let (_, after_name) = stat.rsplit_once(')')?;
         let fields: Vec<_> = after_name.split_whitespace().collect();
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_of_a_process_with_a_tricky_name_are_found() {
+    fn fields_after_a_name_with_brackets_are_found() {
         let stat = "42 (a) b (c) S 1 2 3 4 5 6 7 8 9 10 150 50 13 14 15 16 17 18 9000 20";
         let times = Times::of(stat).unwrap();
         assert_eq!((times.cpu_ticks, times.start_ticks), (200.0, 9000.0));
@@ -160,10 +160,10 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn the_process_is_seen_as_it_is() {
+    fn the_metrics_of_this_process_are_plausible() {
         let process = Process::new().unwrap();
         process.read().unwrap();
-        // Other tests open files, too, so only plain bounds are sure.
+        // Other tests open files, too, so only rough bounds hold.
         let open = process.open_fds.get();
         assert!((1.0..=process.max_fds.get()).contains(&open), "{open}");
         assert!(process.threads.get() >= 1.0);

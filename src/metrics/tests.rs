@@ -11,7 +11,7 @@ fn every_name_carries_the_prefix_and_every_metric_its_help() {
     let text = metrics.render().unwrap();
     assert!(
         text.contains(
-            "# HELP lookdown_views_total Views the network has seen of frames that got a report.\n"
+            "# HELP lookdown_views_total Views that ran through the network, of frames that got a report.\n"
         ),
         "{text}"
     );
@@ -22,7 +22,7 @@ fn every_name_carries_the_prefix_and_every_metric_its_help() {
 }
 
 #[test]
-fn scrapes_at_the_same_time_count_a_frame_that_was_given_up_once() {
+fn concurrent_scrapes_count_a_dropped_frame_once() {
     const FRAMES: u64 = 20_000;
     let metrics = Metrics::new().unwrap();
     std::thread::scope(|scope| {
@@ -35,7 +35,7 @@ fn scrapes_at_the_same_time_count_a_frame_that_was_given_up_once() {
 }
 
 #[test]
-fn counts_of_the_rig_cache_rise_and_its_size_goes_up_and_down() {
+fn rig_cache_counters_rise_and_gauges_follow_its_size() {
     let metrics = Metrics::new().unwrap();
     metrics.show_rig_cache(2, 2000, 3, 1);
     metrics.show_rig_cache(1, 1000, 4, 3);
@@ -51,7 +51,7 @@ fn counts_of_the_rig_cache_rise_and_its_size_goes_up_and_down() {
 }
 
 #[test]
-fn a_model_that_was_replaced_is_shown_no_more() {
+fn a_replaced_model_is_no_longer_shown() {
     let metrics = Metrics::new().unwrap();
     metrics.show_models(&[("a", "1"), ("b", "1")], &[("success", 2)]);
     metrics.show_models(&[("a", "2"), ("b", "1")], &[("success", 3)]);
@@ -71,7 +71,7 @@ fn a_model_that_was_replaced_is_shown_no_more() {
 }
 
 #[test]
-fn zones_are_shown_until_they_are_gone_and_no_more_than_a_thousand() {
+fn at_most_a_thousand_zones_are_shown_until_they_are_removed() {
     let metrics = Metrics::new().unwrap();
     let shown = || {
         let text = metrics.render().unwrap();
@@ -100,7 +100,7 @@ fn zones_are_shown_until_they_are_gone_and_no_more_than_a_thousand() {
 }
 
 #[test]
-fn of_all_calibrations_together_only_the_revision_of_now_is_shown() {
+fn only_the_current_revision_of_the_calibrations_is_shown() {
     let metrics = Metrics::new().unwrap();
     for revision in ["a", "a", "b"] {
         metrics.show_calibrations(2, revision, 0, true, &[("success", 2)]);

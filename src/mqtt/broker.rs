@@ -1,4 +1,4 @@
-//! Where the broker is and who we are to it, as one URL.
+//! The address of the broker and the login, as one URL.
 
 use std::{fmt, str::FromStr};
 
@@ -8,22 +8,22 @@ use url::Url;
 const PORT: u16 = 1883;
 const TLS_PORT: u16 = 8883;
 
-/// A broker, `mqtt://user:password@host:1883` or `mqtts://…`. Its password is never shown.
+/// A broker, `mqtt://user:password@host:1883` or `mqtts://…`. Its password is never displayed.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Broker {
-    /// Name or address; one of IPv6 without brackets.
+    /// Host name or address. An IPv6 address has no brackets.
     pub host: String,
     /// Port.
     pub port: u16,
-    /// Whether it speaks TLS.
+    /// True if the connection uses TLS.
     pub has_tls: bool,
     pub(super) login: Option<(String, String)>,
 }
 
-/// A URL that names no broker. What it says is not repeated, as a password may be in it.
+/// The text is no URL of a broker. The text is not repeated, as it may hold a password.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "it is no URL of a broker: give one such as mqtt://user:password@host:1883, or mqtts:// for TLS, \
+    "not a URL of a broker: give one such as mqtt://user:password@host:1883, or mqtts:// for TLS, \
      with other characters than letters and digits in the password percent-encoded"
 )]
 pub struct BrokerError;
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn other_urls_are_refused_without_a_word_of_them() {
+    fn other_urls_are_refused_without_being_repeated() {
         for url in [
             "",
             "broker:1883",

@@ -1,4 +1,4 @@
-//! How the cameras are: what the broker is to know of each, and what a report changes of that.
+//! The state of each camera that the broker is to have, and its changes by reports.
 
 use std::{collections::BTreeMap, num::NonZeroUsize};
 
@@ -11,23 +11,23 @@ use super::{
 };
 use crate::results::StoredReport;
 
-/// The cameras that are published, a bounded number of them.
+/// The published cameras, a bounded number of them.
 pub(super) struct Cameras {
     topics: Topics,
     most: NonZeroUsize,
     known: BTreeMap<String, Counts>,
-    /// Whether it was said that there are more.
-    told_of_more: bool,
+    /// True once the warning about further cameras was logged.
+    has_warned: bool,
 }
 
-/// Who is there.
+/// The persons in a camera's frame and in its zones.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Counts {
     persons: usize,
     zones: Vec<ZoneCount>,
 }
 
-/// What is read of a report's JSON.
+/// The parts of a report's JSON that are read.
 #[derive(Deserialize)]
 struct Zones {
     #[serde(default)]
@@ -46,26 +46,27 @@ impl Cameras {
             topics,
             most,
             known: BTreeMap::new(),
-            told_of_more: false,
+            has_warned: false,
         }
     }
 
-    /// Takes a report in. Returns what is to be published; nothing for a camera that is one too many.
+    /// Updates the camera of a report. Returns the messages to publish: none for a camera beyond
+    /// the limit.
     pub(super) fn hear(&mut self, report: &StoredReport) -> Vec<Message> {
         let report = &report.report;
         let camera = report.camera.as_str();
         let is_known = self.known.contains_key(camera);
         if !is_known && self.known.len() >= self.most.get() {
-            if !self.told_of_more {
+            if !self.has_warned {
                 tracing::warn!(
                     most = self.most,
-                    "more cameras have sent frames than are published (mqtt.max_cameras)"
+                    "more cameras than mqtt.max_cameras have sent frames: only the first are published"
                 );
             }
-            self.told_of_more = true;
+            self.has_warned = true;
             return Vec::new();
         }
-        // Reports are ours, and always JSON.
+        // Reports come from this server and are always JSON.
         let zones = serde_json::from_slice(&report.json);
         let counts = Counts {
             persons: report.persons,
@@ -88,18 +89,18 @@ impl Cameras {
             }
             messages.extend(counts.announced(&self.topics, camera));
         }
-        messages.extend(counts.told(&self.topics, camera));
+        messages.extend(counts.count_messages(&self.topics, camera));
         let json = report.json.clone();
         messages.push(Message::passing(self.topics.report(camera), json));
         messages
     }
 
-    /// All that the broker is to keep.
+    /// All messages that the broker is to retain.
     pub(super) fn all(&self) -> Vec<Message> {
         let known = self.known.iter();
         let messages = known.flat_map(|(camera, counts)| {
             let mut messages = counts.announced(&self.topics, camera);
-            messages.extend(counts.told(&self.topics, camera));
+            messages.extend(counts.count_messages(&self.topics, camera));
             messages
         });
         messages.collect()
@@ -117,7 +118,7 @@ impl Counts {
         announcements(topics, camera, zones)
     }
 
-    fn told(&self, topics: &Topics, camera: &str) -> Vec<Message> {
+    fn count_messages(&self, topics: &Topics, camera: &str) -> Vec<Message> {
         let count = |topic, persons: usize| Message::retained(topic, persons.to_string());
         let zones = self.zones.iter();
         let zones = zones.map(|zone| count(topics.zone(camera, &zone.name), zone.persons));

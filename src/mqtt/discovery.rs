@@ -1,5 +1,5 @@
-//! What Home Assistant is told of a camera's entities (its documentation: MQTT, section "MQTT
-//! discovery"): occupancy, the number of persons, and that in each zone.
+//! Announces a camera's entities to Home Assistant (its documentation: MQTT, section "MQTT
+//! discovery"): occupancy, the number of persons, and the number in each zone.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use super::{
     topics::{Topics, level},
 };
 
-/// What we are when we are there, and what the broker says when we are not.
+/// The status while the server is connected, and the one that the broker publishes when it is not.
 pub(super) const ONLINE: &str = "online";
 pub(super) const OFFLINE: &str = "offline";
 const SENSOR: &str = "sensor";
@@ -16,7 +16,7 @@ const BINARY_SENSOR: &str = "binary_sensor";
 /// Home Assistant's template for a state that is ON or OFF.
 const IS_OCCUPIED: &str = "{{ 'ON' if value | int(0) > 0 else 'OFF' }}";
 
-/// The announcement of a camera and its zones; nothing where nobody wants to discover.
+/// The announcements of a camera and its zones. Empty without a discovery prefix.
 pub(super) fn announcements<'a>(
     topics: &Topics,
     camera: &str,
@@ -57,7 +57,7 @@ pub(super) fn announcements<'a>(
     .collect()
 }
 
-/// What makes Home Assistant forget a zone.
+/// The message that removes a zone from Home Assistant.
 pub(super) fn withdrawal(topics: &Topics, camera: &str, zone: &str) -> Option<Message> {
     let id = format!("{}_{}", topics.device_id(camera), zone_entity(zone));
     topics.config(SENSOR, &id).map(Message::forget)
@@ -67,7 +67,7 @@ fn zone_entity(zone: &str) -> String {
     format!("zone_{}", level(zone))
 }
 
-/// With what all entities of a camera have in common.
+/// Adds the fields that all entities of a camera have in common.
 fn completed(mut config: Value, id: &str, topics: &Topics, camera: &str) -> Value {
     config["unique_id"] = json!(id);
     config["availability_topic"] = json!(topics.status());
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_is_an_occupancy_a_number_of_persons_and_one_for_each_zone() {
+    fn a_camera_announces_occupancy_persons_and_zones() {
         let messages = announcements(&topics(), "north gate", ["till"]);
         let [occupancy, persons, till] = messages.as_slice() else {
             panic!("{messages:?}")
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_zone_is_withdrawn_where_it_was_announced() {
+    fn a_zone_is_withdrawn_on_its_announcement_topic() {
         let announced = announcements(&topics(), "lobby", ["till"]);
         let withdrawn = withdrawal(&topics(), "lobby", "till").unwrap();
         assert_eq!(withdrawn.topic, announced[2].topic);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_announced_where_nobody_discovers() {
+    fn nothing_is_announced_without_a_discovery_prefix() {
         let topics = Topics::new("lookdown", None);
         assert!(announcements(&topics, "lobby", ["till"]).is_empty());
         assert_eq!(withdrawal(&topics, "lobby", "till"), None);

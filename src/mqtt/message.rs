@@ -1,4 +1,4 @@
-//! What is published.
+//! Messages to publish.
 
 use bytes::Bytes;
 
@@ -7,12 +7,12 @@ use bytes::Bytes;
 pub(super) struct Message {
     pub(super) topic: String,
     pub(super) payload: Bytes,
-    /// Whether the broker keeps it for whoever comes later.
+    /// True if the broker keeps it for later subscribers.
     pub(super) retained: bool,
 }
 
 impl Message {
-    /// One that is kept.
+    /// A message that the broker retains.
     pub(super) fn retained(topic: String, payload: impl Into<Bytes>) -> Self {
         Self {
             topic,
@@ -21,7 +21,7 @@ impl Message {
         }
     }
 
-    /// One for those who listen now.
+    /// A message for current subscribers only.
     pub(super) fn passing(topic: String, payload: Bytes) -> Self {
         Self {
             topic,
@@ -30,7 +30,7 @@ impl Message {
         }
     }
 
-    /// One that makes the broker forget what it keeps (MQTT 3.1.1, section 3.3.1.3).
+    /// A message that deletes a retained one (MQTT 3.1.1, section 3.3.1.3).
     pub(super) fn forget(topic: String) -> Self {
         Self::retained(topic, Bytes::new())
     }

@@ -1,4 +1,5 @@
-//! From the results to the broker: who listens, what waits, and what happens while there is no broker.
+//! Publishes results to the broker: the subscription to the results, the queue, and the time
+//! without a broker.
 
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 
@@ -23,45 +24,45 @@ use crate::{
     tls::{ClientTls, TlsError},
 };
 
-/// Reports that may wait for the broker; with one more, the oldest is not sent.
+/// Most reports that wait for the broker. When the queue is full, the oldest report is not sent.
 const QUEUE: usize = 64;
-/// Pauses before the broker is tried again.
+/// Pauses before the next attempt to connect to the broker.
 const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_mins(1);
-/// A connection that has lasted as long was a good one.
+/// A connection that has lasted this long resets the pause.
 const STEADY: Duration = Duration::from_secs(10);
 
-/// To whom what is published, and how.
+/// The broker to publish to, and the settings of the messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MqttOptions {
     /// The broker.
     pub broker: Broker,
-    /// File of the authorities that a broker with TLS may have its certificate from, PEM; `None` for
-    /// those that the system trusts.
+    /// PEM file of the authorities that may issue the certificate of a broker with TLS. `None`
+    /// trusts those of the system.
     pub authorities: Option<PathBuf>,
-    /// What all topics begin with.
+    /// The prefix of all topics.
     pub topic_prefix: String,
-    /// What those of Home Assistant begin with; `None` for no discovery.
+    /// The prefix of the topics of Home Assistant. `None` disables discovery.
     pub discovery_prefix: Option<String>,
-    /// Cameras that are published at most.
+    /// Most cameras that are published.
     pub max_cameras: NonZeroUsize,
 }
 
-/// Publishes what the results tell.
+/// Publishes the results.
 pub struct Publisher {
     options: MqttOptions,
     results: Arc<dyn ResultStore>,
     metrics: Arc<Metrics>,
     tls: Option<ClientTls>,
     topics: Topics,
-    /// Nobody else's: a broker drops the first of two clients with the same.
+    /// Unique, as a broker drops the first of two clients with the same ID.
     client_id: String,
 }
 
 type Queue = broadcast::Receiver<Arc<StoredReport>>;
 
 impl Publisher {
-    /// Connects to nobody yet.
+    /// Creates a publisher that is not connected yet.
     ///
     /// # Errors
     /// [`TlsError`] when the authorities cannot be used.
@@ -84,16 +85,16 @@ impl Publisher {
         })
     }
 
-    /// Publishes until the results end, and then says so to the broker.
+    /// Publishes until the results end, and then tells the broker that the server is offline.
     pub async fn run(self) {
         let (sender, queue) = broadcast::channel(QUEUE);
         tokio::join!(hear(&self.results, sender), self.publish(queue));
     }
 
-    /// Keeps a connection, again and again.
+    /// Keeps a connection, and reconnects when it is lost.
     async fn publish(&self, mut queue: Queue) {
         let mut cameras = Cameras::new(self.topics.clone(), self.options.max_cameras);
-        // Whose place does not answer now is heard of with its next report.
+        // If the result store does not answer now, a camera is published with its next report.
         for report in self.results.latest_of_all().await.unwrap_or_default() {
             cameras.hear(&report);
         }
@@ -125,7 +126,7 @@ impl Publisher {
             let Err(error) = ended else { return };
             if !is_told {
                 let broker = &self.options.broker;
-                tracing::warn!("nothing is published to the broker {broker} (mqtt.url): {error}");
+                tracing::warn!("not publishing to the broker {broker} (mqtt.url): {error}");
             }
             is_told = true;
             tokio::select! {
@@ -151,7 +152,7 @@ impl Publisher {
         Message::retained(self.topics.status(), status)
     }
 
-    /// Keeps up with the reports until they end; none of them is sent.
+    /// Updates the cameras from the reports until they end, without sending anything.
     async fn go_without(&self, cameras: &mut Cameras, queue: &mut Queue) {
         loop {
             match queue.recv().await {
@@ -165,7 +166,7 @@ impl Publisher {
         }
     }
 
-    /// Publishes all that is known, and then what comes, to the end of the reports.
+    /// Publishes the current state and then each report, until the reports end.
     async fn serve(
         &self,
         mut session: Session,
@@ -203,8 +204,9 @@ impl Publisher {
         }
     }
 
-    /// What is to be said to what others have said: everything to a Home Assistant that has started,
-    /// and that we are there to whoever says otherwise, such as the will of a replica that has ended.
+    /// The messages that answer an incoming one: the whole state when Home Assistant has started,
+    /// and the status "online" when another client says otherwise, such as the will of a replica
+    /// that has ended.
     fn answer(&self, said: &Publish, cameras: &Cameras) -> Vec<Message> {
         let is_of = |topic: &str, payload: &str| said.topic == topic && said.payload == payload;
         if is_of(&self.topics.status(), OFFLINE) {
@@ -221,18 +223,18 @@ impl Publisher {
     }
 }
 
-/// Hands on what the results tell, to their end. Never waits for the broker.
+/// Forwards the results to the queue until they end. Never waits for the broker.
 async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<StoredReport>>) {
     loop {
         match results.listeners().listen(results::Cameras::All) {
             Ok(mut listening) => {
                 while let Some(report) = listening.next().await {
-                    // Who reads the queue goes when it ends.
+                    // The receiver of the queue is dropped when the publisher ends.
                     let _ = queue.send(report);
                 }
             }
             Err(ListenError::Ended) => return,
-            // There is a place again when somebody has gone.
+            // A permit is released when another listener leaves.
             Err(ListenError::Full { .. }) => sleep(SHORTEST_PAUSE).await,
         }
     }

@@ -1,4 +1,5 @@
-//! One connection to the broker, from its beginning to its end. Whatever takes too long ends it.
+//! One connection to the broker, from CONNECT to its end. Every operation has a timeout that ends
+//! it.
 
 use std::{future::Future, io, time::Duration};
 
@@ -17,25 +18,28 @@ use super::{
 };
 use crate::tls::ClientTls;
 
-/// After one and a half times as long without a word the broker takes us for dead and publishes our
-/// will (MQTT 3.1.1, section 3.1.2.10); so long without a word of its own is as much as we wait.
+/// The keep-alive interval. After 1.5 times as long without a packet the broker regards the client
+/// as lost and publishes its will (MQTT 3.1.1, section 3.1.2.10). The client waits as long for a
+/// packet of the broker.
 const KEEP_ALIVE_SECONDS: u16 = 30;
 const KEEP_ALIVE: Duration = Duration::from_secs(KEEP_ALIVE_SECONDS as u64);
-/// Longest that connecting, or giving the broker a message, may take.
+/// Longest time for connecting, or for sending a message to the broker.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Most bytes of what the broker sends: statuses.
+/// Most bytes of an incoming packet: only statuses are expected.
 const MAX_INCOMING: usize = 64 * 1024;
-/// Most bytes of what it is sent: the largest report by far.
+/// Most bytes of an outgoing packet: much more than the largest report.
 const MAX_OUTGOING: usize = 16 * 1024 * 1024;
 
-/// A connection that has ended, or never began.
+/// The reason why a connection has ended or could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum SessionError {
     #[error("{0}")]
     Failed(#[from] io::Error),
-    #[error("it does not speak MQTT 3.1.1 as it should: {0}")]
+    #[error("it violates MQTT 3.1.1: {0}")]
     Protocol(#[from] rumqttc::mqttbytes::Error),
-    #[error("it refuses us ({0:?}): look at user and password in mqtt.url, and at its rules")]
+    #[error(
+        "it refuses the login ({0:?}): check the user, the password and the broker's access rules"
+    )]
     Refused(ConnectReturnCode),
     #[error("it has closed the connection")]
     Closed,
@@ -51,7 +55,7 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Connects, and has the broker say `will` if it loses us.
+    /// Connects. The broker publishes `will` if the connection is lost.
     pub(super) async fn open(
         broker: &Broker,
         tls: Option<&ClientTls>,
@@ -100,7 +104,7 @@ impl Session {
         .await
     }
 
-    /// Asks to be told what is published on these topics.
+    /// Subscribes to these topics.
     pub(super) async fn subscribe(
         &mut self,
         topics: impl IntoIterator<Item = String>,
@@ -113,7 +117,7 @@ impl Session {
         in_time(self.send(Packet::Subscribe(subscribe))).await
     }
 
-    /// Gives the broker messages.
+    /// Sends messages to the broker.
     pub(super) async fn publish(
         &mut self,
         messages: impl IntoIterator<Item = Message>,
@@ -126,8 +130,8 @@ impl Session {
         Ok(())
     }
 
-    /// The next that somebody has published on a topic that was asked for. Shows the broker meanwhile
-    /// that we are there, and ends when the broker is not. May be given up and called again.
+    /// Returns the next message on a subscribed topic. Keeps the connection alive during the wait,
+    /// and fails when the broker does not answer. Cancel-safe: it may be dropped and called again.
     pub(super) async fn next(&mut self) -> Result<Publish, SessionError> {
         loop {
             tokio::select! {
@@ -148,7 +152,7 @@ impl Session {
         }
     }
 
-    /// Says a last message and goodbye, after which the broker forgets our will.
+    /// Sends a last message and DISCONNECT, after which the broker discards the will.
     pub(super) async fn close(mut self, last: Message) -> Result<(), SessionError> {
         self.publish([last]).await?;
         in_time(self.send(Packet::Disconnect)).await?;

@@ -1,17 +1,17 @@
-//! Where messages go.
+//! The names of topics.
 
 use sha2::{Digest, Sha256};
 
-/// Longest name that stands for itself in a topic.
+/// Longest name that is used unchanged in a topic.
 const MAX_CHARS: usize = 64;
-/// Of a name that does not, so much is kept to recognise it by.
+/// Characters that are kept of a name that is changed, to recognise it by.
 const RECOGNISABLE_CHARS: usize = 32;
 
 /// The names of topics.
 #[derive(Debug, Clone)]
 pub(super) struct Topics {
     prefix: String,
-    /// That of Home Assistant.
+    /// The prefix of Home Assistant.
     discovery: Option<String>,
 }
 
@@ -23,22 +23,22 @@ impl Topics {
         }
     }
 
-    /// Whether we are there.
+    /// The topic of the connection status.
     pub(super) fn status(&self) -> String {
         format!("{}/status", self.prefix)
     }
 
-    /// How many persons a camera sees.
+    /// The topic of the number of persons in a camera's frame.
     pub(super) fn persons(&self, camera: &str) -> String {
         format!("{}/persons", self.of_camera(camera))
     }
 
-    /// How many of them are in a zone.
+    /// The topic of the number of persons in a zone.
     pub(super) fn zone(&self, camera: &str, zone: &str) -> String {
         format!("{}/zones/{}", self.of_camera(camera), level(zone))
     }
 
-    /// Reports of a camera.
+    /// The topic of a camera's reports.
     pub(super) fn report(&self, camera: &str) -> String {
         format!("{}/report", self.of_camera(camera))
     }
@@ -47,27 +47,27 @@ impl Topics {
         format!("{}/cameras/{}", self.prefix, level(camera))
     }
 
-    /// Where Home Assistant says that it has started.
+    /// The topic on which Home Assistant announces its start.
     pub(super) fn birth(&self) -> Option<String> {
         self.discovery
             .as_ref()
             .map(|prefix| format!("{prefix}/status"))
     }
 
-    /// Where Home Assistant looks for an entity with this ID.
+    /// The topic on which Home Assistant looks for an entity with this ID.
     pub(super) fn config(&self, component: &str, unique_id: &str) -> Option<String> {
         let prefix = self.discovery.as_ref()?;
         Some(format!("{prefix}/{component}/{unique_id}/config"))
     }
 
-    /// What tells a camera from everything else in Home Assistant.
+    /// The ID that identifies a camera in Home Assistant.
     pub(super) fn device_id(&self, camera: &str) -> String {
         format!("{}_{}", level(&self.prefix), level(camera))
     }
 }
 
-/// A name as one level of a topic, for which Home Assistant's alphabet of IDs will do
-/// (`[a-zA-Z0-9_-]`). Different names stay different: one that needs a change gets a piece of its digest.
+/// Returns a name as one level of a topic, in the alphabet of Home Assistant's IDs
+/// (`[a-zA-Z0-9_-]`). Different names stay different: a changed name gets a part of its digest.
 pub(super) fn level(name: &str) -> String {
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if !name.is_empty() && name.len() <= MAX_CHARS && name.chars().all(fits) {
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plain_names_stand_for_themselves() {
+    fn plain_names_are_used_unchanged() {
         let topics = Topics::new("lookdown", Some("homeassistant"));
         assert_eq!(topics.persons("lobby"), "lookdown/cameras/lobby/persons");
         assert_eq!(
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_become_alike_are_still_told_apart() {
+    fn names_that_become_alike_stay_distinct() {
         let names = [
             "north gate",
             "north+gate",

@@ -1,5 +1,5 @@
-//! Tensors as bytes: numbers little-endian and row-major, an element of `BYTES` behind its length, which
-//! has four bytes, little-endian (extension `binary_tensor_data`).
+//! Tensors as bytes: numbers little-endian and row-major, an element of `BYTES` after its length in
+//! four bytes, little-endian (extension `binary_tensor_data`).
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 
@@ -7,7 +7,8 @@ use super::Datatype;
 
 const LENGTH_BYTES: usize = 4;
 
-/// The one element of a tensor of `BYTES`.
+/// Returns the one element of a tensor of `BYTES`.
+///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -15,19 +16,19 @@ pub fn only_element(bytes: &Bytes) -> Result<Bytes, String> {
     let mut rest = bytes.clone();
     let length = rest.try_get_u32_le().map_err(|_| {
         let sent = bytes.len();
-        format!("it has {sent} bytes: its length in four bytes, little-endian, comes first")
+        format!("it has {sent} bytes: it must begin with its length in four bytes, little-endian")
     })?;
     if rest.len() != length as usize {
         let sent = rest.len();
         return Err(format!(
-            "its length is {length}, but {sent} bytes follow: one element is taken, behind its length \
+            "its length is {length}, but {sent} bytes follow: send one element after its length \
              in four bytes, little-endian"
         ));
     }
     Ok(rest)
 }
 
-/// An element of `BYTES` behind its length; `None` when that cannot be said in four bytes.
+/// Returns an element of `BYTES` after its length. `None` if the length exceeds four bytes.
 #[must_use]
 pub fn element(content: &[u8]) -> Option<Bytes> {
     let mut bytes = BytesMut::with_capacity(LENGTH_BYTES + content.len());
@@ -36,7 +37,8 @@ pub fn element(content: &[u8]) -> Option<Bytes> {
     Some(bytes.freeze())
 }
 
-/// `count` finite numbers of `UINT8` or `FP32`.
+/// Returns `count` finite numbers of `UINT8` or `FP32`.
+///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -53,7 +55,8 @@ pub fn numbers(bytes: &[u8], datatype: Datatype, count: usize) -> Result<Vec<f32
     }
 }
 
-/// `count` numbers of `FP32`, whichever they are.
+/// Returns `count` numbers of `FP32`, finite or not.
+///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -69,7 +72,7 @@ fn check_length(bytes: &[u8], count: usize, width: usize) -> Result<(), String> 
         return Ok(());
     }
     Err(format!(
-        "it has {sent} bytes, and its shape asks for {count} numbers of {width} each"
+        "it has {sent} bytes, but its shape needs {count} numbers of {width} bytes each"
     ))
 }
 
@@ -81,13 +84,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn an_element_comes_back_as_it_was(content in prop::collection::vec(any::<u8>(), 0..300)) {
+        fn an_element_survives_a_round_trip(content in prop::collection::vec(any::<u8>(), 0..300)) {
             let written = element(&content).unwrap();
             prop_assert_eq!(only_element(&written).unwrap(), content);
         }
 
         #[test]
-        fn any_bytes_are_an_element_or_a_sentence(bytes in prop::collection::vec(any::<u8>(), 0..40)) {
+        fn any_bytes_give_an_element_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..40)) {
             let bytes = Bytes::from(bytes);
             match only_element(&bytes) {
                 Ok(content) => prop_assert_eq!(element(&content).unwrap(), bytes),
@@ -96,7 +99,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_so_many_finite_numbers_or_a_sentence(
+        fn any_bytes_give_finite_numbers_or_an_error(
             bytes in prop::collection::vec(any::<u8>(), 0..40), count in any::<usize>(), few in 0_usize..12,
         ) {
             for count in [count, few] {
@@ -110,7 +113,7 @@ mod tests {
         }
 
         #[test]
-        fn finite_numbers_come_back_as_they_were(
+        fn finite_numbers_survive_a_round_trip(
             sent in prop::collection::vec(prop::num::f32::NORMAL | prop::num::f32::ZERO, 0..20),
         ) {
             let bytes: Vec<_> = sent.iter().flat_map(|number| number.to_le_bytes()).collect();
@@ -126,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_element_says_how_much_is_missing() {
+    fn a_truncated_element_is_refused_with_both_lengths() {
         let told = only_element(&Bytes::from_static(b"\x09\0\0\0abc")).unwrap_err();
         assert!(
             told.contains("its length is 9, but 3 bytes follow"),

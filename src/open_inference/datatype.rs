@@ -1,21 +1,21 @@
-//! What the elements of a tensor are.
+//! The datatypes of tensors.
 
 use serde::Serialize;
 use strum::{Display, EnumString, IntoStaticStr};
 
-/// What the elements of a tensor are, of all that the protocol has those that are used here.
+/// The element type of a tensor, as far as it is used here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Display, EnumString, IntoStaticStr)]
 #[cfg_attr(test, derive(strum::VariantArray))]
 #[serde(rename_all = "UPPERCASE")]
 #[strum(serialize_all = "UPPERCASE")]
 pub enum Datatype {
-    /// Texts, or bytes of any kind.
+    /// Text or any bytes.
     Bytes,
-    /// Numbers of 32 bits, IEEE 754.
+    /// 32-bit floating-point numbers, IEEE 754.
     Fp32,
-    /// Whole numbers of 32 bits.
+    /// 32-bit signed integers.
     Int32,
-    /// Whole numbers 0 to 255.
+    /// Integers from 0 to 255.
     Uint8,
 }
 

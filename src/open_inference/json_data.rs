@@ -1,5 +1,5 @@
-//! Tensors in JSON: lists, flat or nested as the shape is. They are read one by one into what they
-//! become, as a tree of JSON values takes many times the memory.
+//! Tensors in JSON: lists, flat or nested like the shape. Elements are converted one by one, as a
+//! tree of JSON values takes many times the memory.
 
 use std::{borrow::Cow, fmt};
 
@@ -13,26 +13,28 @@ use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
 
 use super::Datatype;
 
-/// With or without the `=` at the end.
+/// Base64 with or without padding.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// Most bytes that [`only_bytes`] takes from data of this length: three of four letters.
+/// Most bytes that [`only_bytes`] returns for data of this length: three of four letters.
 #[must_use]
 pub fn bytes_at_most(json: &str) -> usize {
-    // With the signs around them, there are at least four letters more than it decodes.
+    // With the quotes and brackets around them, the data have at least four letters more than are
+    // decoded.
     json.len() / 4 * 3
 }
 
-/// Most numbers that [`numbers`] takes from data of this length: each has a digit and a sign behind it.
+/// Most numbers that [`numbers`] returns for data of this length: each has a digit and a separator.
 #[must_use]
 pub fn numbers_at_most(json: &str, count: usize) -> usize {
     count.min(json.len() / 2)
 }
 
-/// The one element of a tensor of `BYTES`, which is base64.
+/// Returns the one element of a tensor of `BYTES`, encoded in base64.
+///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -40,14 +42,15 @@ pub fn only_bytes(json: &str) -> Result<Bytes, String> {
     let mut texts = Texts(Vec::new());
     read(json, &mut texts)?;
     let [text] = &texts.0[..] else {
-        return Err("its data are empty: one text of base64 is taken".to_owned());
+        return Err("its data are empty: send one string in base64".to_owned());
     };
     let bytes = BASE64.decode(text.as_bytes());
-    let bytes = bytes.map_err(|error| format!("its data are no base64: {error}"))?;
+    let bytes = bytes.map_err(|error| format!("its data are not base64: {error}"))?;
     Ok(bytes.into())
 }
 
-/// `count` finite numbers of `UINT8` or `FP32`.
+/// Returns `count` finite numbers of `UINT8` or `FP32`.
+///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -64,19 +67,19 @@ pub fn numbers(json: &str, datatype: Datatype, count: usize) -> Result<Vec<f32>,
     } else {
         let sent = values.len();
         Err(format!(
-            "it has {sent} numbers, and its shape asks for {count}"
+            "it has {sent} numbers, but its shape needs {count}"
         ))
     }
 }
 
-/// Takes the elements of a list one by one.
+/// Receives the elements of a list one by one.
 trait Elements<'de> {
     fn number(&mut self, _number: f64) -> Result<(), String> {
-        Err("a text of base64 is taken, and no number".to_owned())
+        Err("it holds a number: send a string in base64".to_owned())
     }
 
     fn text(&mut self, _text: Cow<'de, str>) -> Result<(), String> {
-        Err("numbers are taken, and no text".to_owned())
+        Err("it holds a string: send numbers".to_owned())
     }
 }
 
@@ -88,7 +91,7 @@ impl<'de> Elements<'de> for Texts<'de> {
             self.0.push(text);
             return Ok(());
         }
-        Err("it has more than one element, and its shape asks for one".to_owned())
+        Err("it has more than one element, but its shape needs one".to_owned())
     }
 }
 
@@ -103,19 +106,19 @@ impl Elements<'_> for Numbers {
         if self.values.len() == self.count {
             let count = self.count;
             return Err(format!(
-                "it has more numbers than the {count} that its shape asks for"
+                "it has more numbers than the {count} that its shape needs"
             ));
         }
         let is_byte = (0.0..=255.0).contains(&number) && number.fract() == 0.0;
         if self.datatype == Datatype::Uint8 && !is_byte {
             return Err(format!(
-                "it holds {number}: UINT8 is a whole number from 0 to 255"
+                "it holds {number}: UINT8 is an integer from 0 to 255"
             ));
         }
-        #[expect(clippy::cast_possible_truncation, reason = "this is what FP32 means")]
+        #[expect(clippy::cast_possible_truncation, reason = "FP32 is the target format")]
         let value = number as f32;
         if !value.is_finite() {
-            return Err(format!("it holds {number}, which is beyond FP32"));
+            return Err(format!("it holds {number}, which is out of range for FP32"));
         }
         self.values.push(value);
         Ok(())
@@ -125,19 +128,19 @@ impl Elements<'_> for Numbers {
 fn read<'de>(json: &'de str, elements: &mut impl Elements<'de>) -> Result<(), String> {
     let mut reader = serde_json::Deserializer::from_str(json);
     if !json.trim_start().starts_with('[') {
-        return Err("its data are no list".to_owned());
+        return Err("its data are not a list".to_owned());
     }
-    // Where it happened says little: the data are one line of many.
-    let without_place = |error: serde_json::Error| {
-        let told = error.to_string();
-        let told = told
+    // The position is not useful: the data are one line of many.
+    let without_position = |error: serde_json::Error| {
+        let error = error.to_string();
+        let error = error
             .rsplit_once(" at line ")
-            .map_or(&*told, |(told, _)| told);
-        format!("its data cannot be used: {told}")
+            .map_or(&*error, |(error, _)| error);
+        format!("its data cannot be used: {error}")
     };
     Reading(elements)
         .deserialize(&mut reader)
-        .map_err(without_place)
+        .map_err(without_position)
 }
 
 struct Reading<'a, E>(&'a mut E);
@@ -163,12 +166,12 @@ impl<'de, E: Elements<'de>> Visitor<'de> for Reading<'_, E> {
     }
 
     fn visit_u64<F: Error>(self, number: u64) -> Result<(), F> {
-        #[expect(clippy::cast_precision_loss, reason = "it becomes FP32")]
+        #[expect(clippy::cast_precision_loss, reason = "the target format is FP32")]
         self.visit_f64(number as f64)
     }
 
     fn visit_i64<F: Error>(self, number: i64) -> Result<(), F> {
-        #[expect(clippy::cast_precision_loss, reason = "it becomes FP32")]
+        #[expect(clippy::cast_precision_loss, reason = "the target format is FP32")]
         self.visit_f64(number as f64)
     }
 
@@ -202,25 +205,25 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fill_its_shape_is_told() {
+    fn data_that_do_not_fit_the_shape_are_refused() {
         for (json, count, part) in [
-            ("[1,2]", 3, "it has 2 numbers, and its shape asks for 3"),
+            ("[1,2]", 3, "it has 2 numbers, but its shape needs 3"),
             ("[1,2,3]", 2, "more numbers than the 2"),
             ("[1,256]", 2, "256"),
-            ("[1,0.5]", 2, "whole number"),
-            ("[\"a\"]", 1, "no text"),
+            ("[1,0.5]", 2, "an integer"),
+            ("[\"a\"]", 1, "holds a string"),
             ("[true]", 1, "boolean"),
-            ("{\"a\":1}", 1, "no list"),
-            ("7", 1, "no list"),
+            ("{\"a\":1}", 1, "not a list"),
+            ("7", 1, "not a list"),
         ] {
-            let told = numbers(json, Datatype::Uint8, count).unwrap_err();
+            let error = numbers(json, Datatype::Uint8, count).unwrap_err();
             assert!(
-                told.contains(part) && !told.contains("at line"),
-                "{json}: {told}"
+                error.contains(part) && !error.contains("at line"),
+                "{json}: {error}"
             );
         }
-        let told = numbers("[1e39]", Datatype::Fp32, 1).unwrap_err();
-        assert!(told.contains("beyond FP32"), "{told}");
+        let error = numbers("[1e39]", Datatype::Fp32, 1).unwrap_err();
+        assert!(error.contains("out of range for FP32"), "{error}");
     }
 
     #[test]
@@ -232,18 +235,18 @@ mod tests {
         for (json, part) in [
             ("[]", "empty"),
             ("[\"AA==\",\"AA==\"]", "more than one"),
-            ("[\"a b\"]", "no base64"),
-            ("[7]", "no number"),
-            ("\"AA==\"", "no list"),
+            ("[\"a b\"]", "not base64"),
+            ("[7]", "holds a number"),
+            ("\"AA==\"", "not a list"),
         ] {
-            let told = only_bytes(json).unwrap_err();
-            assert!(told.contains(part), "{json}: {told}");
+            let error = only_bytes(json).unwrap_err();
+            assert!(error.contains(part), "{json}: {error}");
         }
     }
 
     proptest! {
         #[test]
-        fn any_text_is_a_list_or_a_sentence(json in "[\\[\\]{},:\"0-9a-e.+\\- ]{0,40}", count in 0_usize..5) {
+        fn any_text_gives_a_list_or_an_error(json in "[\\[\\]{},:\"0-9a-e.+\\- ]{0,40}", count in 0_usize..5) {
             for datatype in [Datatype::Fp32, Datatype::Uint8] {
                 let length = numbers(&json, datatype, count).map(|read| read.len());
                 prop_assert!(length.is_err() || length == Ok(count));
@@ -252,7 +255,7 @@ mod tests {
         }
 
         #[test]
-        fn no_data_take_more_memory_than_their_length_tells(bytes in prop::collection::vec(any::<u8>(), 1..40)) {
+        fn data_take_no_more_memory_than_their_length_implies(bytes in prop::collection::vec(any::<u8>(), 1..40)) {
             for json in [BASE64.encode(&bytes), STANDARD_NO_PAD.encode(&bytes)] {
                 let json = format!("[{json:?}]");
                 let decoded = only_bytes(&json).unwrap().try_into_mut().unwrap();

@@ -16,7 +16,7 @@ const CERTIFICATE: [(&str, &str); 2] = [
 ];
 
 #[test]
-fn a_server_that_listens_everywhere_is_asked_on_its_own_machine() {
+fn an_unspecified_address_is_probed_on_the_loopback() {
     let cases = [
         ("0.0.0.0:8080", "http://127.0.0.1:8080/readyz"),
         ("[::]:8080", "http://[::1]:8080/readyz"),
@@ -29,14 +29,14 @@ fn a_server_that_listens_everywhere_is_asked_on_its_own_machine() {
 }
 
 #[test]
-fn with_a_certificate_the_question_is_asked_over_tls() {
+fn a_server_with_a_certificate_is_probed_over_tls() {
     let server = server(&CERTIFICATE);
     let asked = url(&server, Probe::Liveness).unwrap();
     assert_eq!(asked, "https://127.0.0.1:8080/livez");
 }
 
 #[test]
-fn a_port_for_metrics_is_asked_first_as_it_needs_no_certificate() {
+fn the_metrics_port_is_preferred() {
     let mut variables = CERTIFICATE.to_vec();
     variables.push(("METRICS_LISTEN", "0.0.0.0:9090"));
     let asked = url(&server(&variables), Probe::Readiness).unwrap();
@@ -44,14 +44,14 @@ fn a_port_for_metrics_is_asked_first_as_it_needs_no_certificate() {
 }
 
 #[test]
-fn a_port_that_the_system_chooses_cannot_be_asked() {
+fn port_0_cannot_be_probed() {
     let server = server(&[("LISTEN", "127.0.0.1:0")]);
     let refused = url(&server, Probe::Readiness).unwrap_err();
     assert!(refused.to_string().contains("server.listen"), "{refused}");
 }
 
 #[test]
-fn a_server_that_asks_for_certificates_is_explained() {
+fn the_error_names_required_client_certificates() {
     let mut variables = CERTIFICATE.to_vec();
     variables.push(("TLS__CLIENT_CERTIFICATES", "clients.pem"));
     assert!(hint(&server(&variables)).contains("server.metrics_listen"));
@@ -59,8 +59,8 @@ fn a_server_that_asks_for_certificates_is_explained() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_server_that_never_answers_is_given_up() {
-    // Connects, and says nothing: the clock is ahead of it as soon as nothing else is to be done.
+async fn the_probe_of_a_silent_server_times_out() {
+    // The peer connects and sends nothing. The paused clock advances as soon as all tasks are idle.
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = silent.local_addr().unwrap().to_string();
     let gave_up = ask(&server(&[("LISTEN", &address)]), Probe::Liveness).await;

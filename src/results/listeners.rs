@@ -1,5 +1,5 @@
-//! Who listens to what is published. Each listener has a queue of its own; whoever lets it run full is
-//! told nothing more, so that nobody has to wait for him and no memory fills up.
+//! The listeners to published reports. Each listener has its own bounded queue. A listener whose
+//! queue overflows gets no more reports, so the publisher never waits and memory stays bounded.
 
 use std::{
     collections::HashMap,
@@ -11,24 +11,24 @@ use tokio::sync::mpsc;
 
 use super::{Cameras, StoredReport};
 
-/// Reports that may wait for a listener.
+/// Most reports that wait for a listener.
 const QUEUE: usize = 64;
 
-/// Nobody can listen now.
+/// The reason why a new listener is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ListenError {
-    /// Every place is taken.
-    #[error("{most} listeners are there already, and no more may be (results.max_listeners)")]
+    /// The maximum number of listeners is reached.
+    #[error("all {most} permitted listeners are connected (results.max_listeners)")]
     Full {
-        /// How many places there are.
+        /// The maximum number of listeners.
         most: usize,
     },
-    /// The server ends.
-    #[error("nothing more will be told: the server is shutting down")]
+    /// The server is shutting down.
+    #[error("no more reports will be published: the server is shutting down")]
     Ended,
 }
 
-/// Everybody who listens.
+/// All listeners.
 #[derive(Debug)]
 pub struct Listeners {
     most: NonZeroUsize,
@@ -38,7 +38,7 @@ pub struct Listeners {
 #[derive(Debug, Default)]
 struct Group {
     ended: bool,
-    /// Places taken, also by those who are told nothing more and have not noticed yet.
+    /// Permits in use, including those of dropped listeners that have not noticed yet.
     places: usize,
     dropped: u64,
     last_number: u64,
@@ -46,7 +46,7 @@ struct Group {
 }
 
 impl Listeners {
-    /// Room for so many.
+    /// Creates a group of at most `most` listeners.
     #[must_use]
     pub fn new(most: NonZeroUsize) -> Self {
         Self {
@@ -55,10 +55,10 @@ impl Listeners {
         }
     }
 
-    /// A place from which everything is heard that is published from now on.
+    /// Adds a listener that receives everything published from now on.
     ///
     /// # Errors
-    /// [`ListenError`] when there is no place, or nothing will be published any more.
+    /// [`ListenError`] when all permits are in use, or the server is shutting down.
     pub fn listen(self: &Arc<Self>, to: Cameras) -> Result<Listening, ListenError> {
         let mut group = self.group();
         if group.ended {
@@ -82,14 +82,14 @@ impl Listeners {
         })
     }
 
-    /// Whether anybody would be told of a report of this camera.
+    /// Returns true if any listener would receive a report of this camera.
     pub(super) fn are_there_for(&self, camera: &str) -> bool {
         let group = self.group();
         let one = Cameras::One(camera.to_owned());
         group.queues.contains_key(&Cameras::All) || group.queues.contains_key(&one)
     }
 
-    /// Tells a report to whoever listens to its camera. Never waits.
+    /// Publishes a report to the listeners of its camera. Never waits.
     pub fn tell(&self, report: &Arc<StoredReport>) {
         let mut group = self.group();
         let group = &mut *group;
@@ -105,27 +105,27 @@ impl Listeners {
         }
     }
 
-    /// Tells everybody that nothing more will come.
+    /// Ends the stream of every listener.
     pub fn end(&self) {
         let mut group = self.group();
         group.ended = true;
         group.queues.clear();
     }
 
-    /// How many places are taken.
+    /// The number of permits in use.
     #[must_use]
     pub fn count(&self) -> usize {
         self.group().places
     }
 
-    /// How many were given up because they did not keep up.
+    /// The number of listeners that were dropped because they did not keep up.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.group().dropped
     }
 
     fn group(&self) -> MutexGuard<'_, Group> {
-        // No change can panic half-way.
+        // No change can panic before it is complete.
         self.group.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -141,7 +141,7 @@ impl Listeners {
     }
 }
 
-/// A listener's place; free again when this is dropped.
+/// A listener's permit and queue. Dropping it releases the permit.
 #[derive(Debug)]
 pub struct Listening {
     queue: mpsc::Receiver<Arc<StoredReport>>,
@@ -151,8 +151,8 @@ pub struct Listening {
 }
 
 impl Listening {
-    /// The next report; `None` when nothing more will be told, because this listener did not keep up
-    /// or the server ends.
+    /// Returns the next report, or `None` when there will be no more: this listener did not keep
+    /// up, or the server is shutting down.
     pub async fn next(&mut self) -> Option<Arc<StoredReport>> {
         self.queue.recv().await
     }

@@ -17,7 +17,7 @@ use super::{
     StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
 
-/// Keeps reports in memory, within limits; they go when the process ends.
+/// Keeps reports in memory, within limits. They are lost when the process ends.
 #[derive(Debug)]
 pub struct MemoryResults {
     kept: Mutex<Kept>,
@@ -25,7 +25,7 @@ pub struct MemoryResults {
 }
 
 impl MemoryResults {
-    /// An empty store.
+    /// Creates an empty store.
     #[must_use]
     pub fn new(limits: ResultLimits) -> Self {
         Self {
@@ -34,9 +34,9 @@ impl MemoryResults {
         }
     }
 
-    /// Keeps a report, perhaps with its picture, and tells whoever listens.
+    /// Keeps a report, possibly with its image, and publishes it to the listeners.
     pub fn store(&self, report: NewReport, picture: Option<NewPicture>) -> Arc<StoredReport> {
-        // Told while nobody else can publish: listeners rely on the order.
+        // Published while the lock is held: listeners rely on the order.
         let mut kept = self.kept();
         let stored = kept.add(report, picture, Timestamp::now());
         self.listeners.tell(&stored);
@@ -44,7 +44,7 @@ impl MemoryResults {
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
-        // No change can panic half-way.
+        // No change can panic before it is complete.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

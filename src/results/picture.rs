@@ -1,4 +1,4 @@
-//! A picture that is kept of a camera, and of which cameras there may be some.
+//! An image that is kept for a camera, and the set of cameras whose images may be kept.
 
 use std::collections::BTreeSet;
 
@@ -6,29 +6,29 @@ use bytes::Bytes;
 
 use super::ReportId;
 
-/// A picture that is to be kept.
+/// An image to be kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewPicture {
     /// The frame of a report.
     pub frame: Bytes,
-    /// What can be drawn into it.
+    /// The drawings that can be added to the frame.
     pub sketch: Bytes,
 }
 
 impl NewPicture {
-    /// How much memory it takes, bytes.
+    /// The memory that it takes, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.frame.len() + self.sketch.len()
     }
 }
 
-/// A picture that is kept: the one of its camera's latest report.
+/// A kept image: that of its camera's latest report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredPicture {
-    /// Its report's.
+    /// The ID of its report.
     pub id: ReportId,
-    /// What is kept.
+    /// The image.
     pub picture: NewPicture,
 }
 
@@ -37,12 +37,12 @@ pub struct StoredPicture {
 pub enum PicturesOf {
     /// Every camera.
     All,
-    /// These, perhaps none.
+    /// These cameras, possibly none.
     Some(BTreeSet<String>),
 }
 
 impl PicturesOf {
-    /// Whether this camera is one of them.
+    /// Returns true if the image of this camera may be kept.
     #[must_use]
     pub fn include(&self, camera: &str) -> bool {
         match self {
@@ -53,7 +53,7 @@ impl PicturesOf {
 }
 
 impl Default for PicturesOf {
-    /// Nobody's: they show people.
+    /// No cameras: images show people.
     fn default() -> Self {
         Self::Some(BTreeSet::new())
     }

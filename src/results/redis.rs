@@ -1,8 +1,9 @@
-//! Reports in a Redis that several servers share, so that any of them answers for any camera.
+//! Reports in a Redis that several servers share, so that each server answers for every camera.
 //!
-//! Two connections for a server, whoever listens: one for what is asked and sent, one that waits for
-//! news. Redis gives the IDs, so they are the same on every server. While it is away, reports wait in a
-//! bounded outbox and nobody waits for them.
+//! A server holds two connections, independent of the number of listeners: one for queries and
+//! reports, one that blocks until new reports arrive. Redis assigns the IDs, so they are the same
+//! on every server. While Redis is unreachable, reports wait in a bounded outbox, and detection
+//! does not wait for them.
 
 mod address;
 mod keys;
@@ -32,17 +33,17 @@ use super::{
     StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
 
-/// How long the end of the server waits for reports that Redis does not have yet.
+/// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
 
-/// Which Redis, and which part of it.
+/// The Redis server and the part of it that this installation uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RedisOptions {
-    /// Where it is.
+    /// Its address.
     pub address: RedisAddress,
-    /// How all keys begin: servers with the same one share their reports.
+    /// The prefix of all keys: servers with the same prefix share their reports.
     pub key_prefix: String,
-    /// How long a report is kept at most.
+    /// The longest time for which a report is kept.
     pub max_age: Duration,
 }
 
@@ -50,7 +51,7 @@ pub struct RedisOptions {
 #[derive(Debug)]
 pub struct RedisResults {
     shared: Arc<Shared>,
-    /// End with this.
+    /// Background tasks, aborted when this is dropped.
     _tasks: JoinSet<()>,
 }
 
@@ -66,10 +67,10 @@ struct Shared {
 }
 
 impl RedisResults {
-    /// A store that connects by itself, now and whenever it has to. Needs a tokio runtime.
+    /// Starts a store that connects, and reconnects, in the background. Needs a tokio runtime.
     #[must_use]
     pub fn start(options: RedisOptions, limits: ResultLimits) -> Self {
-        // For TLS. Fails when there is one already, which is as good.
+        // Needed for TLS. Fails if a provider is already installed, which is equally good.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let shared = Arc::new(Shared {
             keys: Keys::new(options.key_prefix.clone()),
@@ -89,7 +90,7 @@ impl RedisResults {
         }
     }
 
-    /// Asks, if there is somebody to ask.
+    /// Sends a query if there is a connection.
     async fn ask<T>(
         &self,
         question: impl for<'a> AsyncFnOnce(Reader<'a>) -> RedisResult<T>,
@@ -166,7 +167,7 @@ impl ResultStore for RedisResults {
         };
         if timeout(LAST_WAIT, sent).await.is_err() || outbox.count() > 0 {
             tracing::warn!(
-                "{} reports were not kept: Redis did not take them in time",
+                "{} reports were not kept: Redis did not store them in time",
                 outbox.count()
             );
         }

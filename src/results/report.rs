@@ -1,30 +1,30 @@
-//! A report that is kept, and the ID that says where it stands among all of them.
+//! A stored report, and the ID that gives its position in the order of all reports.
 
 use std::{fmt, num::ParseIntError, str::FromStr};
 
 use bytes::Bytes;
 use jiff::Timestamp;
 
-/// Says which of two reports came later. It is the time at which its report was stored, in microseconds
-/// since 1970, or one more than the ID before it when that was not earlier. So IDs also grow from one
-/// start of the server to the next.
+/// The ID of a report. It orders reports by the time at which they were stored: it is that time in
+/// microseconds since 1970, or the previous ID plus one if that is larger. IDs therefore also
+/// increase across restarts of the server.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ReportId(u64);
 
 impl ReportId {
-    /// The ID after `last`, now.
+    /// Returns the ID that follows `last` at the time `now`.
     #[must_use]
     pub fn next(last: Self, now: Timestamp) -> Self {
         Self::at(now).max(Self(last.0.saturating_add(1)))
     }
 
-    /// That of a report stored at this time; times before 1970 count as 1970.
+    /// Returns the ID of a report that was stored at this time. Times before 1970 count as 1970.
     #[must_use]
     pub fn at(time: Timestamp) -> Self {
         Self(u64::try_from(time.as_microsecond()).unwrap_or(0))
     }
 
-    /// When the report was stored, to the microsecond.
+    /// The time at which the report was stored, to the microsecond.
     #[must_use]
     pub fn time(self) -> Timestamp {
         let micros = i64::try_from(self.0).unwrap_or(i64::MAX);
@@ -46,33 +46,33 @@ impl FromStr for ReportId {
     }
 }
 
-/// A report that is to be kept.
+/// A report to be stored.
 #[derive(Debug, Clone)]
 pub struct NewReport {
-    /// The name under which it is kept.
+    /// The name under which it is stored.
     pub camera: String,
-    /// When its frame arrived.
+    /// The time at which its frame arrived.
     pub received_at: Timestamp,
-    /// How many persons are in it.
+    /// The number of persons in it.
     pub persons: usize,
     /// The report as it was answered: one line of JSON.
     pub json: Bytes,
 }
 
 impl NewReport {
-    /// About how much memory it takes when it is kept, bytes.
+    /// The approximate memory that it takes when it is stored, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of::<StoredReport>() + self.json.len() + self.camera.len()
     }
 }
 
-/// A report that is kept. It never changes.
+/// A stored report. It never changes.
 #[derive(Debug)]
 pub struct StoredReport {
-    /// Where it stands among all reports.
+    /// Its position in the order of all reports.
     pub id: ReportId,
-    /// What is kept.
+    /// The report.
     pub report: NewReport,
 }
 
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_id_is_the_time_unless_that_stands_still_or_goes_back() {
+    fn ids_increase_when_the_clock_stands_still_or_goes_back() {
         let now: Timestamp = "2026-11-21T09:30:00.123456Z".parse().unwrap();
         let first = ReportId::next(ReportId::default(), now);
         assert_eq!(first, ReportId::at(now));
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn an_id_is_read_as_it_is_written() {
+    fn an_id_is_parsed_as_it_is_written() {
         let id = ReportId::at("2026-11-21T09:30:00Z".parse().unwrap());
         assert_eq!(id.to_string().parse(), Ok(id));
         for no_id in ["", "-1", "1.5", "99999999999999999999", "latest"] {

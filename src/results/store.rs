@@ -1,4 +1,4 @@
-//! What a place for reports can do.
+//! The interface of a result store.
 
 use std::{num::NonZeroUsize, sync::Arc};
 
@@ -6,32 +6,32 @@ use async_trait::async_trait;
 
 use super::{Listeners, NewPicture, NewReport, ReportId, StoredPicture, StoredReport};
 
-/// Whose reports.
+/// The cameras of a query.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Cameras {
-    /// Every camera's.
+    /// Every camera.
     All,
-    /// This camera's.
+    /// This camera.
     One(String),
 }
 
-/// The place where reports are kept does not answer.
+/// The result store does not answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the place of the results does not answer: {0}")]
+#[error("the result store does not answer: {0}")]
 pub struct Unreachable(pub String);
 
-/// A place for reports. What it gives back is shared, not copied.
+/// A result store. Its return values are shared, not copied.
 #[async_trait]
 pub trait ResultStore: Send + Sync {
-    /// Keeps a report, gives it the next ID, and tells whoever listens, in the order of the IDs. Nobody
-    /// waits for that: a place that is elsewhere has it a little later. The picture takes the place of
-    /// the one before; so does none.
+    /// Stores a report under the next ID and publishes it to the listeners, in the order of the
+    /// IDs. The caller does not wait: a remote store has the report a little later. The image
+    /// replaces the camera's previous one. A report without an image removes that.
     fn publish(&self, report: NewReport, picture: Option<NewPicture>);
 
     /// The latest report of a camera, if it has one.
     ///
     /// # Errors
-    /// [`Unreachable`], as of all that is read.
+    /// [`Unreachable`], as for all queries.
     async fn latest(&self, camera: &str) -> Result<Option<Arc<StoredReport>>, Unreachable>;
 
     /// The latest report of every camera, in the order of their IDs.
@@ -40,10 +40,7 @@ pub trait ResultStore: Send + Sync {
     /// [`Unreachable`].
     async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable>;
 
-    /// The first reports after `after` that are still kept, oldest first, `most` of them at most.
-    ///
-    /// # Errors
-    /// [`Unreachable`].
+    /// The first reports after `after` that are still stored, oldest first, at most `most`.
     async fn since(
         &self,
         cameras: &Cameras,
@@ -51,47 +48,49 @@ pub trait ResultStore: Send + Sync {
         most: NonZeroUsize,
     ) -> Result<Vec<Arc<StoredReport>>, Unreachable>;
 
-    /// The picture of a camera's latest report, if it is kept.
+    /// The image of the camera's latest report, if it is stored.
     ///
     /// # Errors
     /// [`Unreachable`].
     async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable>;
 
-    /// Who listens to what is published, here or on another server with the same store.
+    /// The listeners to what is published, here or on another server with the same store.
     fn listeners(&self) -> &Arc<Listeners>;
 
-    /// What is kept.
+    /// The current use of the store.
     ///
     /// # Errors
     /// [`Unreachable`].
     async fn usage(&self) -> Result<ResultUse, Unreachable>;
 
-    /// What became of what was published here.
+    /// The outcome of what was published here.
     fn health(&self) -> StoreHealth;
 
-    /// Waits until what was published here is kept, but not for a place that does not answer.
+    /// Waits until everything published here is stored. Does not wait for a store that does not
+    /// answer.
     async fn flush(&self);
 }
 
-/// What is kept at most.
+/// The limits of the store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResultLimits {
-    /// Cameras; the one that has been silent for longest goes first.
+    /// Most cameras. The one that has been silent for longest is evicted first.
     pub max_cameras: NonZeroUsize,
-    /// Reports of one camera, the latest among them.
+    /// Most reports of one camera, including its latest.
     pub history_per_camera: NonZeroUsize,
-    /// Reports of all cameras; the oldest that is not its camera's latest goes first.
+    /// Most reports of all cameras. The oldest one that is not its camera's latest is evicted
+    /// first.
     pub max_reports: NonZeroUsize,
-    /// Bytes of all reports, in the same way.
+    /// Most bytes of all reports, evicted in the same order.
     pub max_bytes: usize,
-    /// Cameras with a picture; the one that has been silent for longest loses its.
+    /// Most cameras with an image. The one that has been silent for longest loses its image first.
     pub max_pictures: NonZeroUsize,
-    /// Listeners at the same time.
+    /// Most listeners at the same time.
     pub max_listeners: NonZeroUsize,
 }
 
 impl Default for ResultLimits {
-    /// A hundred reports of a hundred cameras, and the latest of many more.
+    /// A hundred reports of each of a hundred cameras, and the latest report of many more.
     fn default() -> Self {
         let count = |number| NonZeroUsize::new(number).unwrap_or(NonZeroUsize::MIN);
         Self {
@@ -105,28 +104,28 @@ impl Default for ResultLimits {
     }
 }
 
-/// What is kept now.
+/// The current use of a store.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ResultUse {
-    /// Cameras with a report.
+    /// The number of cameras with a report.
     pub cameras: usize,
-    /// Their reports.
+    /// The number of their reports.
     pub reports: usize,
-    /// How much memory those take, bytes.
+    /// The memory that the reports take, bytes.
     pub bytes: usize,
-    /// Cameras with a picture.
+    /// The number of cameras with an image.
     pub pictures: usize,
 }
 
-/// What became of the reports that were published here.
+/// The outcome of the reports that were published here.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct StoreHealth {
-    /// Why their place cannot be reached, if it cannot.
+    /// The reason why the store cannot be reached, if it cannot.
     pub problem: Option<String>,
-    /// How many were ever kept.
+    /// The number of reports that were ever stored.
     pub stored: u64,
-    /// How many never will be: too many waited, or their place refused them.
+    /// The number of reports that were lost: too many waited, or the store refused them.
     pub dropped: u64,
-    /// How many wait to be kept.
+    /// The number of reports that wait to be stored.
     pub waiting: usize,
 }

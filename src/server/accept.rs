@@ -1,4 +1,4 @@
-//! Accepting connections, whatever comes in between.
+//! Accepts connections, and retries after errors.
 
 use std::{io, time::Duration};
 
@@ -7,9 +7,9 @@ use tokio::{
     time::{Instant, sleep},
 };
 
-/// How long nothing is accepted after the system has refused.
+/// Pause after the system has refused a connection.
 const PAUSE: Duration = Duration::from_millis(100);
-/// Refusals with less than this between them are one outage.
+/// Refusals that are less than this apart belong to one outage.
 const OUTAGE: Duration = Duration::from_mins(1);
 
 /// Accepts connections.
@@ -26,8 +26,8 @@ impl Acceptor {
         }
     }
 
-    /// The next connection. When the system gives none, such as for want of file descriptors, it is
-    /// asked again after a pause.
+    /// Returns the next connection. When the system refuses one, for example for lack of file
+    /// descriptors, it retries after a pause.
     pub(super) async fn accept(&mut self) -> TcpStream {
         loop {
             match self.listener.accept().await {
@@ -36,7 +36,7 @@ impl Acceptor {
                 Err(error) => {
                     if self.outage.begins(Instant::now()) {
                         tracing::error!(
-                            "connections cannot be accepted ({error}): trying on; if these are too \
+                            "connections cannot be accepted ({error}): retrying; if there are too \
                              few file descriptors, raise their limit or lower \
                              server.max_connections"
                         );
@@ -47,9 +47,9 @@ impl Acceptor {
         }
     }
 
-    /// Closes the listener and gives the connections that have come by then.
+    /// Closes the listener and returns the connections of its backlog.
     pub(super) fn close(self) -> Vec<TcpStream> {
-        // Asked directly: tokio may not have heard of the last ones yet.
+        // Uses the socket directly: tokio may not have registered the last connections yet.
         let Ok(listener) = self.listener.into_std() else {
             return Vec::new();
         };
@@ -62,14 +62,14 @@ impl Acceptor {
     }
 }
 
-/// Without this, answers wait for the client's acknowledgement of earlier ones.
+/// Disables Nagle's algorithm. Otherwise responses wait for the acknowledgement of earlier ones.
 fn without_delay(stream: TcpStream) -> TcpStream {
-    // A connection that has gone by now is found out when it is read.
+    // A connection that is already closed is detected when it is read.
     let _ = stream.set_nodelay(true);
     stream
 }
 
-/// Whether only the connection is lost that was about to be accepted.
+/// Returns true if the error concerns only the connection that was about to be accepted.
 fn is_of_one_connection(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -79,14 +79,14 @@ fn is_of_one_connection(error: &io::Error) -> bool {
     )
 }
 
-/// Tells the first refusal of an outage from those that follow.
+/// Distinguishes the first refusal of an outage from those that follow.
 #[derive(Debug, Default)]
 struct Outage {
     last: Option<Instant>,
 }
 
 impl Outage {
-    /// Takes note of a refusal, and says whether an outage begins with it.
+    /// Records a refusal. Returns true if an outage begins with it.
     fn begins(&mut self, now: Instant) -> bool {
         let last = self.last.replace(now);
         last.is_none_or(|last| now.duration_since(last) > OUTAGE)
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_outage_is_told_once_however_often_it_is_run_into() {
+    fn an_outage_is_reported_once() {
         let mut outage = Outage::default();
         let start = Instant::now();
         let told = (0..1000).filter(|tenth| outage.begins(start + PAUSE * *tenth));

@@ -1,4 +1,4 @@
-//! One connection, from its first byte to its last.
+//! One connection, from the first byte to the last.
 
 use std::{convert::Infallible, io, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
 
@@ -23,25 +23,27 @@ use super::{
 };
 use crate::shutdown::Shutdown;
 
-/// Heads of up to so many times the limit reach the service, so that it can tell what is wrong.
+/// The connection passes heads of up to this multiple of the limit to the service, which refuses
+/// them with a description.
 const TOLD_LIMITS: usize = 2;
-/// How long a connection that was accepted just before the end may take to send its first request.
+/// Longest wait for the first request on a connection that was accepted just before draining.
 const LAST_CALL: Duration = Duration::from_millis(500);
-/// How long, and for how many bytes, a client is listened to whose request could not be read.
+/// Longest time, and most bytes, for which input is discarded after a request that could not be
+/// parsed.
 const LINGER: Duration = Duration::from_secs(1);
 const LINGER_BYTES: u64 = 4 << 20;
 
-/// What holds for a connection.
+/// The rules of a connection.
 pub(super) struct Rules {
     pub(super) limits: ConnectionLimits,
     pub(super) one_request_only: bool,
-    /// Who has connected, unless it has gone already.
+    /// The address of the client, unless it has already disconnected.
     pub(super) client: Option<SocketAddr>,
     pub(super) shutdown: Shutdown,
 }
 
-/// Serves the requests of a client, one after the other, until it leaves, takes too long, or the
-/// server ends.
+/// Serves the requests of a client one after the other, until it disconnects, exceeds a timeout, or
+/// the server shuts down.
 pub(super) async fn serve<T, S, B>(stream: T, service: S, rules: Rules)
 where
     T: AsyncRead + AsyncWrite + Unpin + Send,
@@ -83,7 +85,7 @@ where
         let mut connection = pin!(connection);
         let to_its_end = async {
             tokio::select! {
-                // First: what has come before the server ends is served.
+                // Checked first: requests that arrived before the shutdown are served.
                 biased;
                 ended = connection.as_mut() => return ended,
                 () = shutdown.draining() => {}
@@ -98,11 +100,11 @@ where
         };
         tokio::select! {
             ended = to_its_end => ended.is_err_and(|error| {
-                tracing::debug!("a connection has broken: {error}");
+                tracing::debug!("a connection failed: {error}");
                 error.is_parse()
             }),
             () = pace.overdue() => {
-                tracing::debug!("a connection took too long and was closed");
+                tracing::debug!("a connection exceeded a timeout and was closed");
                 false
             }
         }
@@ -112,8 +114,8 @@ where
     }
 }
 
-/// Ends a connection whose client may still be sending: closed at once, it would be reset, and the
-/// answer lost with it.
+/// Ends a connection whose client may still be sending. An immediate close would reset the
+/// connection and lose the response.
 async fn discard_rest(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Result<()> {
     stream.shutdown().await?;
     let mut rest = stream.take(LINGER_BYTES);

@@ -1,4 +1,5 @@
-//! The connection limit: permits for regular connections, and short-lived ones for connections beyond it.
+//! The connection limit: permits for regular connections, and short-lived permits for connections
+//! beyond it.
 
 use std::{
     collections::VecDeque,
@@ -11,26 +12,27 @@ use tokio_util::sync::CancellationToken;
 
 use crate::metrics::Metrics;
 
-/// Connections beyond the limit that are open at the same time. They are answered with 503, and probes
-/// as ever.
+/// Most connections beyond the limit at the same time. They are answered with 503, except for
+/// probes.
 const MAX_BEYOND_LIMIT: usize = 256;
 
-/// Gives permits to connections.
+/// Issues permits to connections.
 ///
-/// A connection beyond the limit never waits for another one: when there are too many of them, the oldest
-/// is closed. So a probe is accepted at once, however many silent connections came before it.
+/// A connection beyond the limit never waits for another one: when there are too many of them, the
+/// oldest is closed. A probe is therefore accepted at once, regardless of the number of silent
+/// connections.
 pub(super) struct ConnectionPermits {
     regular: Arc<Semaphore>,
-    /// Closes the latest connections beyond the limit, the oldest first.
+    /// Tokens that close the latest connections beyond the limit, oldest first.
     beyond_limit: Mutex<VecDeque<CancellationToken>>,
     metrics: Arc<Metrics>,
 }
 
-/// The permit of a connection, which counts as open until this is dropped.
+/// The permit of a connection. The connection counts as open until the permit is dropped.
 pub(super) struct ConnectionPermit {
     /// `None` beyond the limit.
     regular: Option<OwnedSemaphorePermit>,
-    /// Cancelled when the connection has to make room for another one.
+    /// Cancelled to close the connection in favour of a newer one.
     pub(super) closed: CancellationToken,
     metrics: Arc<Metrics>,
 }
@@ -44,8 +46,8 @@ impl ConnectionPermits {
         }
     }
 
-    /// A permit within the limit if one is free, else one beyond it, for which the oldest one beyond the
-    /// limit may be taken back.
+    /// Returns a permit within the limit if one is free. Otherwise returns one beyond the limit,
+    /// which may revoke the oldest of these.
     pub(super) fn take(&self) -> ConnectionPermit {
         let regular = Arc::clone(&self.regular).try_acquire_owned().ok();
         let closed = CancellationToken::new();
@@ -71,7 +73,7 @@ impl ConnectionPermits {
 }
 
 impl ConnectionPermit {
-    /// Whether the connection is within the limit.
+    /// Returns true if the connection is within the limit.
     pub(super) fn is_regular(&self) -> bool {
         self.regular.is_some()
     }

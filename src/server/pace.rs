@@ -1,4 +1,4 @@
-//! Who keeps a connection waiting, and until when it may.
+//! The timeouts of a connection.
 
 use std::{
     sync::{Mutex, MutexGuard, PoisonError},
@@ -9,29 +9,29 @@ use tokio::time::{Instant, sleep_until};
 
 use super::ConnectionLimits;
 
-/// What a connection waits for.
+/// The phase of a connection: the event that it waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
-    /// For the head of its first request.
+    /// The head of its first request.
     FirstHead,
-    /// For the rest of a later request's head.
+    /// The rest of a later request's head.
     Head,
-    /// For the next request.
+    /// The next request.
     Idle,
-    /// For the service, which has deadlines of its own.
+    /// The service, which has its own deadlines.
     Service,
 }
 
 #[derive(Debug)]
 struct State {
     phase: Phase,
-    /// When the phase has taken too long.
+    /// The time at which the phase times out.
     until: Option<Instant>,
-    /// When the client, which does not take what it is sent, has done so for too long.
+    /// The time at which a client that does not read its response times out.
     blocked_until: Option<Instant>,
 }
 
-/// Follows a connection, and notices when its client takes too long.
+/// Tracks the phases of a connection and detects timeouts.
 #[derive(Debug)]
 pub(super) struct Pace {
     state: Mutex<State>,
@@ -40,7 +40,7 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// A connection that has just been accepted.
+    /// Starts with a connection that has just been accepted.
     pub(super) fn new(limits: &ConnectionLimits) -> Self {
         let state = State {
             phase: Phase::FirstHead,
@@ -54,7 +54,7 @@ impl Pace {
         }
     }
 
-    /// Bytes have come.
+    /// Records received bytes.
     pub(super) fn received(&self) {
         let mut state = self.state();
         if state.phase == Phase::Idle {
@@ -63,41 +63,41 @@ impl Pace {
         }
     }
 
-    /// The head of a request is complete.
+    /// Records that the head of a request is complete.
     pub(super) fn request_begins(&self) {
         let mut state = self.state();
         state.phase = Phase::Service;
         state.until = None;
     }
 
-    /// All of an answer is ready to be sent.
+    /// Records that all of a response is ready to be sent.
     pub(super) fn request_ends(&self) {
         let mut state = self.state();
         state.phase = Phase::Idle;
         state.until = Some(Instant::now() + self.idle_timeout);
     }
 
-    /// The client takes, or does not take, what it is sent.
+    /// Records if the client is blocking the response.
     pub(super) fn sending(&self, is_blocked: bool) {
         let mut state = self.state();
         if is_blocked != state.blocked_until.is_some() {
             state.blocked_until = is_blocked.then(|| Instant::now() + self.idle_timeout);
         }
-        // The body of an answer may be given up long before its last byte is taken.
+        // The body of a response may be dropped long before its last byte is read.
         if !is_blocked && state.phase == Phase::Idle {
             state.until = Some(Instant::now() + self.idle_timeout);
         }
     }
 
-    /// Whether there was no request yet.
+    /// Returns true if no request has arrived yet.
     pub(super) fn awaits_first_request(&self) -> bool {
         self.state().phase == Phase::FirstHead
     }
 
-    /// Waits until the client has taken too long.
+    /// Waits for a timeout.
     ///
-    /// Looks now and then, so that requests need not wake it: what is set between two looks is no earlier
-    /// than the second, because they are no further apart than the shortest timeout.
+    /// It polls, so that requests need not wake it. The polls are no further apart than the
+    /// shortest timeout, so a deadline that is set between two polls is not before the second.
     pub(super) async fn overdue(&self) {
         loop {
             let now = Instant::now();
@@ -111,7 +111,7 @@ impl Pace {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // No change can panic half-way.
+        // No change can panic before it is complete.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_client_that_goes_on_taking_its_answer_slowly_may_finish() {
+    async fn a_client_that_reads_slowly_but_steadily_may_finish() {
         let pace = pace();
         pace.request_begins();
         pace.request_ends();
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_deadline_that_is_set_while_somebody_waits_is_kept_to() {
+    async fn a_deadline_set_during_the_wait_is_kept() {
         let pace = pace();
         pace.request_begins();
         pace.request_ends();

@@ -1,4 +1,4 @@
-//! Streams and answers that tell the [`Pace`] what happens to them.
+//! Streams and response bodies that report their activity to the [`Pace`].
 
 use std::{
     io::{self, IoSlice},
@@ -12,7 +12,7 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
 use super::pace::Pace;
 
-/// A client's stream.
+/// The stream of a client.
 pub(super) struct WatchedStream<T> {
     pub(super) stream: T,
     pub(super) pace: Arc<Pace>,
@@ -67,7 +67,7 @@ impl<T: AsyncWrite + Unpin> AsyncWrite for WatchedStream<T> {
     }
 }
 
-/// The body of an answer. The request ends when this is dropped.
+/// The body of a response. The request ends when this is dropped.
 pub(super) struct WatchedBody<B> {
     pub(super) body: B,
     pub(super) pace: Arc<Pace>,

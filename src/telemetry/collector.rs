@@ -1,4 +1,5 @@
-//! The way to the collector: HTTP, bounded in time, silent but for the first failure of an outage.
+//! The HTTP client of the trace collector. Requests have a timeout, and only the first failure of
+//! an outage is logged.
 
 use std::{
     error::Error,
@@ -11,12 +12,12 @@ use opentelemetry_http::{Bytes, HttpClient, HttpError, Request, Response};
 use reqwest::{Client, redirect};
 use tokio::runtime::Handle;
 
-/// Longest that one delivery may take.
+/// Longest time for one delivery.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Most bytes of an answer that are read: collectors have little to say.
+/// Most bytes of a response that are read.
 const MAX_ANSWER_BYTES: usize = 64 * 1024;
 
-/// Delivers what the exporter has written.
+/// Delivers the spans that the exporter has serialised.
 #[derive(Debug)]
 pub(super) struct Collector {
     client: Client,
@@ -26,12 +27,13 @@ pub(super) struct Collector {
 }
 
 impl Collector {
-    /// Sends nothing yet. Needs a tokio runtime.
+    /// Creates a client that has sent nothing yet. Needs a tokio runtime.
+    ///
     ///
     /// # Errors
-    /// When the system's certificates cannot be used.
+    /// If the certificates of the system cannot be used.
     pub(super) fn new() -> reqwest::Result<Self> {
-        // Fails when there is one already, which is as good.
+        // Fails if a provider is already installed, which is equally good.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let client = Client::builder()
             .timeout(PATIENCE)
@@ -44,8 +46,8 @@ impl Collector {
         })
     }
 
-    /// Says when an outage begins and ends, once each.
-    fn tell(&self, problem: Option<String>) {
+    /// Logs the beginning and the end of an outage, once each.
+    fn log_outage(&self, problem: Option<String>) {
         let was_down = self.is_down.swap(problem.is_some(), Ordering::Relaxed);
         match problem {
             Some(problem) if !was_down => tracing::warn!(
@@ -63,9 +65,9 @@ impl HttpClient for Collector {
     async fn send_bytes(&self, request: Request<Bytes>) -> Result<Response<Bytes>, HttpError> {
         let client = self.client.clone();
         let delivery = self.runtime.spawn(deliver(client, request));
-        // A runtime that has ended cancels it.
+        // Dropping the runtime cancels the task.
         let delivered = delivery.await.unwrap_or_else(|error| Err(error.into()));
-        self.tell(match &delivered {
+        self.log_outage(match &delivered {
             Ok(answer) if answer.status().is_success() => None,
             Ok(answer) => Some(format!("the collector answered {}", answer.status())),
             Err(error) => Some(with_causes(error.as_ref())),
@@ -80,7 +82,7 @@ async fn deliver(client: Client, request: Request<Bytes>) -> Result<Response<Byt
         .await
         .map_err(reqwest::Error::without_url)?;
     let mut body = Vec::new();
-    // To the end, so that the connection can be used again.
+    // Reads the response to its end, so that the connection can be reused.
     while let Some(chunk) = answer.chunk().await? {
         if body.len() + chunk.len() > MAX_ANSWER_BYTES {
             break;
@@ -92,7 +94,7 @@ async fn deliver(client: Client, request: Request<Bytes>) -> Result<Response<Byt
     Ok(response)
 }
 
-/// The error and why it came to it, in one line.
+/// The error with its causes, in one line.
 fn with_causes(error: &(dyn Error + 'static)) -> String {
     let causes = std::iter::successors(Some(error), |error| (*error).source());
     let causes: Vec<_> = causes.map(ToString::to_string).collect();

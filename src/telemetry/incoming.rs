@@ -1,4 +1,4 @@
-//! The trace that a request belongs to, as W3C Trace Context tells it.
+//! The incoming trace of a request, according to W3C Trace Context.
 //! Source: W3C Recommendation "Trace Context", section 3, "Trace Context HTTP Headers Format".
 
 use opentelemetry::{
@@ -10,17 +10,18 @@ use opentelemetry_sdk::propagation::TraceContextPropagator;
 /// Lengths of version, trace ID, parent ID and flags.
 const PART_LENGTHS: [usize; 4] = [2, 32, 16, 2];
 
-/// The headers of a request that tell of its trace.
+/// The trace headers of a request.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct IncomingTrace<'a> {
-    /// `traceparent`; `None` also when there are several.
+    /// `traceparent`. `None` also if there are several.
     pub parent: Option<&'a str>,
-    /// `tracestate`, several joined with commas.
+    /// `tracestate`. Several are joined with commas.
     pub state: Option<&'a str>,
 }
 
 impl IncomingTrace<'_> {
-    /// The caller's span as a parent; a context without a span where the headers tell of none.
+    /// Returns a context with the caller's span as parent, or without a span if the headers name
+    /// none.
     pub(super) fn context(&self) -> Context {
         if self.parent.is_none() {
             return Context::new();
@@ -43,7 +44,7 @@ impl Extractor for IncomingTrace<'_> {
     }
 }
 
-/// Whether the parts are there; the propagator checks what they say.
+/// Returns true if all parts are present. The propagator validates their values.
 fn is_well_formed(parent: &str) -> bool {
     let mut parts = parent.split('-');
     PART_LENGTHS.into_iter().all(|length| {
@@ -77,14 +78,14 @@ mod tests {
         ] {
             let known = trace_of(&parent, Some("a=1,b=2")).unwrap();
             assert_eq!(known, (trace.to_owned(), "a=1,b=2".to_owned()));
-            // A state that cannot be read costs nothing but itself.
+            // An invalid state is ignored without affecting the parent.
             let known = trace_of(&parent, Some("nonsense")).unwrap();
             assert_eq!(known, (trace.to_owned(), String::new()));
         }
     }
 
     #[test]
-    fn what_is_no_parent_is_as_if_it_were_not_there() {
+    fn an_invalid_parent_is_ignored() {
         for parent in [
             "",
             "00",

@@ -1,4 +1,4 @@
-//! Logs, on standard error: standard output belongs to reports.
+//! Logs on standard error. Standard output is reserved for reports.
 
 use std::io::IsTerminal;
 
@@ -11,10 +11,11 @@ use tracing_subscriber::{
 
 use crate::settings::{LogFormat, LogSettings};
 
-/// Starts logging, and has panics logged like everything else.
+/// Starts logging, including that of panics.
+///
 ///
 /// # Errors
-/// When logging was already started in this process.
+/// If logging was already started in this process.
 pub fn start_logs(settings: &LogSettings) -> Result<(), TryInitError> {
     let in_colour = std::io::stderr().is_terminal();
     log_subscriber(settings, std::io::stderr, in_colour).try_init()?;
@@ -25,8 +26,8 @@ pub fn start_logs(settings: &LogSettings) -> Result<(), TryInitError> {
     Ok(())
 }
 
-/// What writes log lines as the settings say. Lines of a request carry what is known of it: in text
-/// before the message, in JSON in the object `span`.
+/// Returns the subscriber that writes log lines according to the settings. Lines of a request carry
+/// its fields: in text before the message, in JSON in the object `span`.
 #[must_use]
 pub fn log_subscriber(
     settings: &LogSettings,

@@ -1,4 +1,4 @@
-//! One request's place in its trace.
+//! The spans of one request.
 
 use std::{
     fmt,
@@ -11,7 +11,7 @@ use opentelemetry::{
 };
 use opentelemetry_sdk::trace::SdkTracer;
 
-/// One request's place in its trace. Clones share it.
+/// The spans of one request. Clones share them.
 #[derive(Debug, Clone)]
 pub struct RequestTrace {
     id: Option<TraceId>,
@@ -23,12 +23,12 @@ struct Recording {
     /// Holds the request's span.
     context: Context,
     tracer: SdkTracer,
-    /// One moment on both clocks: spans keep their lengths when somebody sets the calendar.
+    /// The same moment on both clocks: spans keep their lengths when the system time is changed.
     moment: (Instant, SystemTime),
 }
 
 impl RequestTrace {
-    /// A request whose spans nobody collects, though its trace may be known.
+    /// Creates a request without spans. Its trace ID may still be known.
     pub(super) fn not_recorded(context: &Context) -> Self {
         let span = context.span();
         let told = span.span_context();
@@ -38,7 +38,7 @@ impl RequestTrace {
         }
     }
 
-    /// A request whose span is in `context`.
+    /// Creates a request whose span is in `context`.
     pub(super) fn recorded(context: &Context, tracer: &SdkTracer) -> Self {
         let trace = Self::not_recorded(context);
         let moment = (Instant::now(), SystemTime::now());
@@ -50,20 +50,20 @@ impl RequestTrace {
         Self { recording, ..trace }
     }
 
-    /// The trace's ID, 32 hexadecimal digits; `None` when the request belongs to no trace.
+    /// The ID of the trace, 32 hexadecimal digits. `None` if the request belongs to no trace.
     #[must_use]
     pub fn id(&self) -> Option<impl fmt::Display + use<>> {
         self.id
     }
 
-    /// Says something about the request.
+    /// Adds an attribute to the span of the request.
     pub fn note(&self, key: &'static str, value: impl Into<Value>) {
         if let Some(Recording { context, .. }) = &self.recording {
             context.span().set_attribute(KeyValue::new(key, value));
         }
     }
 
-    /// Tells of a stretch of time within the request.
+    /// Adds a child span of the request.
     pub fn stage(&self, name: &'static str, began: Instant, ended: Instant) {
         if let Some(recording) = &self.recording {
             let span = SpanBuilder::from_name(name).with_start_time(recording.by_calendar(began));
@@ -74,7 +74,7 @@ impl RequestTrace {
         }
     }
 
-    /// Ends the request's span; `fault` says what went wrong on our side.
+    /// Ends the span of the request. `fault` is the error of this server, if there is one.
     pub fn end(&self, fault: Option<&'static str>) {
         if let Some(Recording { context, .. }) = &self.recording {
             if let Some(fault) = fault {

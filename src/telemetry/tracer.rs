@@ -1,5 +1,5 @@
-//! Spans for OpenTelemetry, sent with OTLP over HTTP. Whoever works never waits for them: they queue
-//! within a bound, a thread of their own sends them, and those that find no place are lost.
+//! OpenTelemetry spans, sent with OTLP over HTTP. Requests never wait for the export: spans wait in
+//! a bounded queue, a separate thread sends them, and spans that find the queue full are lost.
 
 use std::time::Duration;
 
@@ -16,22 +16,22 @@ use opentelemetry_sdk::{
 use super::{IncomingTrace, RequestTrace, collector::Collector};
 use crate::settings::TraceSettings;
 
-/// Longest that the end of the server waits for the last spans.
+/// Longest time that the shutdown waits for the last spans.
 const LAST_DELIVERY: Duration = Duration::from_secs(3);
 const SIGNAL_PATH: &str = "v1/traces";
 
-/// Why traces cannot be sent.
+/// The reason why traces cannot be sent.
 #[derive(Debug, thiserror::Error)]
 pub enum TracerError {
-    /// HTTP cannot be spoken at all.
+    /// No HTTP client can be created.
     #[error("telemetry.otlp_endpoint: no connection can be made: {0}")]
     Client(#[from] reqwest::Error),
-    /// The exporter refuses what it is told.
+    /// The exporter refuses its configuration.
     #[error("telemetry.otlp_endpoint: {0}")]
     Exporter(#[from] opentelemetry_otlp::ExporterBuildError),
 }
 
-/// Makes the spans of requests. The default one records nothing. Clones share its queue.
+/// Creates the spans of requests. The default one records nothing. Clones share its queue.
 #[derive(Debug, Clone, Default)]
 pub struct Tracer(Option<Exporting>);
 
@@ -42,8 +42,9 @@ struct Exporting {
 }
 
 impl Tracer {
-    /// Starts the thread that sends spans, if the settings name a collector. Whether it answers is
-    /// not asked. Needs a tokio runtime.
+    /// Starts the thread that sends spans, if the settings name a collector. Does not check that
+    /// the collector answers. Needs a tokio runtime.
+    ///
     ///
     /// # Errors
     /// [`TracerError`], which names the setting.
@@ -76,8 +77,8 @@ impl Tracer {
         Ok(Self(Some(Exporting { provider, tracer })))
     }
 
-    /// The trace of a request that begins now. Its span ends with [`RequestTrace::end`], or with the
-    /// last clone of it.
+    /// Starts the trace of a request. Its span ends with [`RequestTrace::end`], or with its last
+    /// clone.
     #[must_use]
     pub fn request(&self, name: impl FnOnce() -> String, incoming: &IncomingTrace) -> RequestTrace {
         let parent = incoming.context();
@@ -89,10 +90,10 @@ impl Tracer {
         RequestTrace::recorded(&parent.with_span(span), tracer)
     }
 
-    /// Sends what is still in the queue, within three seconds, and no more after that. Blocks.
+    /// Sends the spans in the queue within three seconds, and none after that. Blocks.
     pub fn shut_down(&self) {
         if let Some(Exporting { provider, .. }) = &self.0 {
-            // The collector has told what went wrong.
+            // The collector has already logged a failure.
             let _ = provider.shutdown_with_timeout(LAST_DELIVERY);
         }
     }

@@ -1,4 +1,4 @@
-//! TLS towards servers that we connect to.
+//! TLS for outgoing connections.
 
 use std::{io, path::Path, sync::Arc};
 
@@ -8,23 +8,24 @@ use tokio_rustls::{TlsConnector, client::TlsStream};
 
 use super::{TlsError, files};
 
-/// Whom we trust when we connect.
+/// The authorities that outgoing connections trust.
 #[derive(Clone)]
 pub struct ClientTls(TlsConnector);
 
 impl ClientTls {
-    /// Trusts the authorities in a PEM file, which the setting `setting` names, or those that the
-    /// system trusts.
+    /// Trusts the authorities in a PEM file, which the setting `setting` names, or those of the
+    /// system.
+    ///
     ///
     /// # Errors
-    /// [`TlsError`] when the file cannot be used.
+    /// [`TlsError`] if the file cannot be used.
     pub fn new(setting: &'static str, authorities: Option<&Path>) -> Result<Self, TlsError> {
         let mut roots = RootCertStore::empty();
         let trusted = match authorities {
             Some(path) => files::authorities(setting, path)?,
             None => rustls_native_certs::load_native_certs().certs,
         };
-        // What cannot be used vouches for nobody.
+        // A certificate that cannot be parsed is not trusted.
         let (_, refused) = roots.add_parsable_certificates(trusted);
         if let Some(path) = authorities.filter(|_| refused > 0) {
             return Err(TlsError::Damaged {
@@ -40,10 +41,11 @@ impl ClientTls {
         Ok(Self(TlsConnector::from(Arc::new(config))))
     }
 
-    /// Shakes hands with the server `host`, a name or an address.
+    /// Performs the handshake with the server `host`, a name or an address.
+    ///
     ///
     /// # Errors
-    /// When the server cannot show that it is this one, or the connection fails.
+    /// If the server's certificate is not valid for this host, or the connection fails.
     pub async fn connect(
         &self,
         host: &str,

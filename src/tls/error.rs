@@ -1,22 +1,22 @@
-//! Certificates and keys that cannot be used.
+//! Errors of certificates and keys.
 
 use std::{io, path::PathBuf};
 
-/// Certificates and keys that cannot be used: each message names the setting, the file and what to
-/// do, and none repeats what a file holds.
+/// Certificates and keys that cannot be used. Each message names the setting, the file and the
+/// remedy, and none repeats the content of a file.
 #[derive(Debug, thiserror::Error)]
 pub enum TlsError {
     /// A file cannot be read.
-    #[error("{setting}: {} cannot be read ({cause}): check its path and who may read it", path.display())]
+    #[error("{setting}: {} cannot be read ({cause}): check its path and its permissions", path.display())]
     Unreadable {
         /// The setting.
         setting: &'static str,
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         cause: io::Error,
     },
-    /// A file is not PEM throughout.
+    /// A file is not valid PEM.
     #[error("{setting}: {} is damaged PEM: replace it with the file as it was issued", path.display())]
     Damaged {
         /// The setting.
@@ -46,7 +46,7 @@ pub enum TlsError {
         /// The file.
         path: PathBuf,
     },
-    /// The private key is of a kind that is not known.
+    /// The type of the private key is not supported.
     #[error(
         "server.tls.private_key: the private key in {} cannot be used: give an RSA key of 2048 bits \
          or more, an ECDSA key on P-256 or P-384, or an Ed25519 key",
@@ -56,7 +56,7 @@ pub enum TlsError {
         /// The file.
         path: PathBuf,
     },
-    /// The private key is another certificate's.
+    /// The private key does not belong to the certificate.
     #[error(
         "server.tls.private_key: the private key in {} is not that of the first certificate in {} \
          (server.tls.certificate): give both files of one pair, the server's own certificate first",
@@ -64,9 +64,9 @@ pub enum TlsError {
         certificate.display()
     )]
     Mismatch {
-        /// The private key's file.
+        /// The file of the private key.
         private_key: PathBuf,
-        /// The certificate's file.
+        /// The file of the certificate.
         certificate: PathBuf,
     },
     /// A certificate is damaged.
@@ -80,10 +80,10 @@ pub enum TlsError {
         setting: &'static str,
         /// The file.
         path: PathBuf,
-        /// Which it is, from 1.
+        /// The position of the certificate, from 1.
         position: usize,
     },
-    /// The library refuses what looked right.
+    /// The TLS library refuses files that passed all checks.
     #[error("server.tls: these files cannot be used together ({0}): give others")]
     Refused(#[from] rustls::Error),
 }

@@ -1,4 +1,4 @@
-//! The files of TLS as they are read, with a digest that tells whether they changed.
+//! The content of the TLS files, with a digest that detects changes.
 
 use std::{os::unix::fs::PermissionsExt, path::Path};
 
@@ -14,10 +14,10 @@ use crate::watched_file;
 const CERTIFICATE: &str = "server.tls.certificate";
 const PRIVATE_KEY: &str = "server.tls.private_key";
 const CLIENT_CERTIFICATES: &str = "server.tls.client_certificates";
-/// Whoever is neither owner nor group may read.
+/// The permission bit of users that are neither owner nor group.
 const READABLE_BY_OTHERS: u32 = 0o004;
 
-/// What the files hold now.
+/// The content of the files.
 pub(super) struct TlsFiles {
     certificate: Vec<u8>,
     private_key: Vec<u8>,
@@ -25,7 +25,7 @@ pub(super) struct TlsFiles {
 }
 
 impl TlsFiles {
-    /// Reads all of them.
+    /// Reads all files.
     pub(super) fn read(options: &TlsOptions) -> Result<Self, TlsError> {
         let authorities = options.client_certificates.as_deref();
         Ok(Self {
@@ -37,7 +37,7 @@ impl TlsFiles {
         })
     }
 
-    /// Equal for equal files.
+    /// A digest of the content.
     pub(super) fn digest(&self) -> [u8; 32] {
         let mut digest = Sha256::new();
         let optional = self.client_certificates.as_deref().unwrap_or_default();
@@ -47,7 +47,7 @@ impl TlsFiles {
         digest.finalize().into()
     }
 
-    /// The server's certificate and those that lead from it to an authority.
+    /// The certificate of the server and the intermediate certificates up to an authority.
     pub(super) fn chain(
         &self,
         options: &TlsOptions,
@@ -61,7 +61,7 @@ impl TlsFiles {
             let path = options.private_key.clone();
             match error {
                 Error::NoItemsFound => TlsError::NoKey { path },
-                // The error itself quotes the file.
+                // The original error would quote the file.
                 _ => TlsError::Damaged {
                     setting: PRIVATE_KEY,
                     path,
@@ -70,7 +70,7 @@ impl TlsFiles {
         })
     }
 
-    /// The authorities that clients must have a certificate of, if they need one.
+    /// The authorities of client certificates, if these are required.
     pub(super) fn authorities(
         &self,
         options: &TlsOptions,
@@ -83,7 +83,7 @@ impl TlsFiles {
     }
 }
 
-/// The authorities in a file that the setting `setting` names.
+/// The authorities in the file that the setting `setting` names.
 pub(super) fn authorities(
     setting: &'static str,
     path: &Path,
@@ -104,7 +104,7 @@ pub(super) fn invalid(options: &TlsOptions, of_clients: bool, position: usize) -
     }
 }
 
-/// Whether every user of the machine may read the file.
+/// Returns true if every user of the machine may read the file.
 pub(super) fn is_readable_by_others(path: &Path) -> bool {
     path.metadata()
         .is_ok_and(|metadata| metadata.permissions().mode() & READABLE_BY_OTHERS != 0)

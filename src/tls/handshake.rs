@@ -1,4 +1,4 @@
-//! From a connection to an encrypted one.
+//! The TLS handshake of an accepted connection.
 
 use std::{io, sync::Arc};
 
@@ -9,25 +9,25 @@ use tokio::{
 };
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
 
-/// What a TLS record with a handshake begins with (RFC 8446, section 5.1).
+/// The first byte of a TLS record that holds a handshake (RFC 8446, section 5.1).
 const HANDSHAKE_RECORD: u8 = 22;
-/// To who speaks plain HTTP.
+/// The response to a plain HTTP request.
 const ANSWER_TO_PLAIN_HTTP: &[u8] = b"HTTP/1.1 400 Bad Request\r\n\
     Content-Type: text/plain; charset=utf-8\r\nContent-Length: 63\r\nConnection: close\r\n\r\n\
     This server speaks TLS: ask with https:// instead of http://.\r\n";
-/// Most that is read of a plain request after the answer to it.
+/// Most bytes of a plain request that are discarded after the response.
 const MAX_IGNORED_BYTES: u64 = 1 << 20;
 
-/// A connection that did not become an encrypted one.
+/// The reason why a connection was not encrypted.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum HandshakeError {
-    #[error("it began with something else than TLS")]
+    #[error("its first byte is not TLS")]
     NotTls,
     #[error("{0}")]
     Failed(#[from] io::Error),
 }
 
-/// Shakes hands. Who speaks something else than TLS is told so, as HTTP.
+/// Performs the handshake. A client that sends no TLS gets an HTTP response that says so.
 pub(super) async fn shake_hands(
     mut connection: TcpStream,
     config: Arc<ServerConfig>,
@@ -40,7 +40,7 @@ pub(super) async fn shake_hands(
     if first != [HANDSHAKE_RECORD] {
         connection.write_all(ANSWER_TO_PLAIN_HTTP).await?;
         connection.shutdown().await?;
-        // Closing with unread bytes would reset the connection, and the answer with it.
+        // A close with unread bytes would reset the connection and lose the response.
         let mut rest = connection.take(MAX_IGNORED_BYTES);
         tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
         return Err(HandshakeError::NotTls);
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_answer_to_plain_http_states_its_length() {
+    fn the_response_to_plain_http_states_its_length() {
         let answer = std::str::from_utf8(ANSWER_TO_PLAIN_HTTP).unwrap();
         let (head, body) = answer.split_once("\r\n\r\n").unwrap();
         assert!(

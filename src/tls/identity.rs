@@ -1,4 +1,4 @@
-//! What a server shows and asks for in handshakes, made of checked files.
+//! The certificates and settings that a server uses in handshakes, made of validated files.
 
 use std::{path::Path, sync::Arc};
 
@@ -17,20 +17,20 @@ use super::{
     files::{TlsFiles, invalid, is_readable_by_others},
     validity::Validity,
 };
-/// What is spoken over TLS, as handshakes call it (ALPN, RFC 7301).
+/// The application protocol over TLS (ALPN, RFC 7301).
 const PROTOCOL: &[u8] = b"http/1.1";
 
-/// What a server shows and asks for in handshakes.
+/// The certificates and settings that a server uses in handshakes.
 pub(super) struct Identity {
-    /// That of the files it is made of.
+    /// The digest of the files that it is made of.
     pub(super) digest: [u8; 32],
     pub(super) config: Arc<ServerConfig>,
-    /// That of the server's own certificate, where it can be understood.
+    /// The validity of the server's certificate, if it could be parsed.
     pub(super) validity: Option<Validity>,
 }
 
 impl Identity {
-    /// Checks what the files hold: the key is the certificate's, and all can be used.
+    /// Validates the content of the files: the key belongs to the certificate, and all can be used.
     pub(super) fn new(files: &TlsFiles, options: &TlsOptions) -> Result<Self, TlsError> {
         let provider = Arc::new(ring::default_provider());
         let certified = certified_key(files, options, &provider)?;
@@ -55,7 +55,7 @@ impl Identity {
         })
     }
 
-    /// Logs what somebody should look at although it works.
+    /// Logs problems that the operator should fix although TLS works.
     pub(super) fn warn(&self, now: Timestamp, options: &TlsOptions) {
         let certificate = options.certificate.display();
         match self.validity {
@@ -71,7 +71,7 @@ impl Identity {
             ),
             Some(_) => {}
             None => tracing::warn!(
-                "server.tls.certificate: until when {certificate} is valid cannot be read, and no \
+                "server.tls.certificate: the validity of {certificate} cannot be parsed, so no \
                  metric shows it"
             ),
         }
@@ -82,7 +82,7 @@ impl Identity {
 fn warn_of_readers(private_key: &Path) {
     if is_readable_by_others(private_key) {
         tracing::warn!(
-            "server.tls.private_key: every user of this machine may read {}: take that right away \
+            "server.tls.private_key: every user of this machine may read {}: remove that permission \
              (chmod o-r; defaultMode: 0440 for a Secret of Kubernetes)",
             private_key.display()
         );

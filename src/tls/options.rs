@@ -1,19 +1,19 @@
-//! What TLS is made of.
+//! The settings of TLS.
 
 use std::{num::NonZeroU64, path::PathBuf, time::Duration};
 
-/// What TLS is made of.
+/// The settings of TLS.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TlsOptions {
-    /// File of the server's certificate, PEM, and those that lead from it to an authority.
+    /// PEM file of the server's certificate, followed by the intermediate certificates up to an
+    /// authority.
     pub certificate: PathBuf,
-    /// File of its private key, PEM.
+    /// PEM file of the private key.
     pub private_key: PathBuf,
-    /// File of certificates of authorities, PEM: who connects must have a certificate of one of
-    /// them.
+    /// PEM file of authorities. If it is given, clients must have a certificate of one of them.
     pub client_certificates: Option<PathBuf>,
-    /// How often the files are looked at, seconds; `None` for never.
+    /// Interval between two checks of the files, seconds. `None` disables them.
     pub poll_seconds: Option<NonZeroU64>,
-    /// Longest a handshake may take.
+    /// Longest time for a handshake.
     pub handshake_timeout: Duration,
 }

@@ -28,7 +28,7 @@ fn open(files: &Files) -> Arc<Tls> {
     Arc::new(Tls::open(files.options.clone(), metrics).unwrap())
 }
 
-/// Why the files are refused at the start: one line that holds nothing of the private key.
+/// The error of files that are refused at the start: one line without any of the private key.
 fn refusal(files: &Files) -> String {
     let metrics = Arc::new(Metrics::new().unwrap());
     let refused = Tls::open(files.options.clone(), metrics).err();
@@ -75,7 +75,7 @@ async fn clients_of_both_versions_of_tls_are_served_over_http_1() {
 }
 
 #[tokio::test]
-async fn a_client_that_does_not_trust_the_authority_ends_the_handshake() {
+async fn a_client_without_the_authority_ends_the_handshake() {
     let tls = open(&Files::of(&Authority::new().issue()));
     let address = echo(&tls).await;
     let stranger = Client::of(&Authority::new(), None, BOTH);
@@ -83,7 +83,7 @@ async fn a_client_that_does_not_trust_the_authority_ends_the_handshake() {
 }
 
 #[tokio::test]
-async fn a_changed_certificate_is_shown_to_new_connections_and_old_ones_live_on() {
+async fn a_changed_certificate_applies_to_new_connections_only() {
     let authority = Authority::new();
     let (old, new) = (authority.issue(), authority.issue_until(2080));
     let files = Files::of(&old);
@@ -113,7 +113,7 @@ async fn a_changed_certificate_is_shown_to_new_connections_and_old_ones_live_on(
 }
 
 #[tokio::test]
-async fn files_behind_a_link_are_changed_by_changing_the_link() {
+async fn a_changed_symbolic_link_changes_the_files() {
     let authority = Authority::new();
     let (old, new) = (Files::of(&authority.issue()), authority.issue());
     let newer = Files::of(&new);
@@ -135,7 +135,7 @@ async fn files_behind_a_link_are_changed_by_changing_the_link() {
 }
 
 #[tokio::test]
-async fn a_broken_replacement_leaves_the_old_certificate_and_is_logged_once() {
+async fn an_invalid_replacement_is_logged_once_and_not_used() {
     let authority = Authority::new();
     let (pair, other) = (authority.issue(), authority.issue());
     let files = Files::of(&pair);
@@ -170,7 +170,7 @@ async fn a_broken_replacement_leaves_the_old_certificate_and_is_logged_once() {
 }
 
 #[tokio::test]
-async fn with_authorities_for_clients_only_clients_of_theirs_are_served() {
+async fn only_clients_certified_by_the_authorities_are_served() {
     let (authority, of_clients) = (Authority::new(), Authority::new());
     let mut files = Files::of(&authority.issue());
     files.ask_clients(&of_clients.pem());
@@ -181,8 +181,8 @@ async fn with_authorities_for_clients_only_clients_of_theirs_are_served() {
         let client = Client::of(&authority, Some(&own), version);
         client.talk(address).await.unwrap();
 
-        let nobody = Client::of(&authority, None, version);
-        assert!(nobody.talk(address).await.is_err());
+        let uncertified = Client::of(&authority, None, version);
+        assert!(uncertified.talk(address).await.is_err());
         let strange = authority.issue();
         let stranger = Client::of(&authority, Some(&strange), version);
         assert!(stranger.talk(address).await.is_err());
@@ -194,7 +194,7 @@ async fn with_authorities_for_clients_only_clients_of_theirs_are_served() {
 }
 
 #[tokio::test]
-async fn changed_authorities_for_clients_hold_for_new_connections_resumed_ones_too() {
+async fn changed_client_authorities_apply_to_resumed_sessions_too() {
     let (authority, old, new) = (Authority::new(), Authority::new(), Authority::new());
     let mut files = Files::of(&authority.issue());
     let of_clients = files.ask_clients(&old.pem());
@@ -210,7 +210,7 @@ async fn changed_authorities_for_clients_hold_for_new_connections_resumed_ones_t
 }
 
 #[tokio::test]
-async fn plain_http_is_told_that_this_is_tls() {
+async fn plain_http_gets_an_answer_that_names_tls() {
     let tls = open(&Files::of(&Authority::new().issue()));
     let mut connection = TcpStream::connect(echo(&tls).await).await.unwrap();
     let request = format!(
@@ -226,7 +226,7 @@ async fn plain_http_is_told_that_this_is_tls() {
 }
 
 #[tokio::test]
-async fn who_says_nothing_is_sent_away_when_the_time_is_up() {
+async fn a_silent_client_is_disconnected_after_the_timeout() {
     let mut files = Files::of(&Authority::new().issue());
     files.options.handshake_timeout = Duration::from_millis(20);
     let tls = open(&files);
@@ -235,14 +235,14 @@ async fn who_says_nothing_is_sent_away_when_the_time_is_up() {
         let mut connection = TcpStream::connect(address).await.unwrap();
         connection.write_all(beginning).await.unwrap();
         let mut answer = Vec::new();
-        // Unread bytes make the end a reset.
+        // Unread bytes cause a reset at the end.
         let _ = connection.read_to_end(&mut answer).await;
     }
     has_metric(&tls, "lookdown_tls_handshakes_total{result=\"timeout\"} 2");
 }
 
 #[test]
-fn files_that_cannot_be_used_are_refused_with_setting_file_and_remedy() {
+fn errors_of_files_name_setting_file_and_remedy() {
     let authority = Authority::new();
     let (pair, other) = (authority.issue(), authority.issue());
     let half = |pem: &str| pem[..pem.len() / 2].to_owned();
@@ -300,7 +300,7 @@ fn files_that_cannot_be_used_are_refused_with_setting_file_and_remedy() {
 }
 
 #[test]
-fn files_that_are_missing_too_large_or_hold_no_authority_are_refused_by_name() {
+fn errors_of_missing_or_large_files_and_authorities_name_them() {
     let pair = Authority::new().issue();
     let mut files = Files::of(&pair);
     for (authorities, told) in [
@@ -335,7 +335,7 @@ fn certificate_and_private_key_may_be_in_one_file() {
 }
 
 #[test]
-fn what_somebody_should_look_at_is_warned_of_and_nothing_else() {
+fn only_certificates_with_problems_cause_warnings() {
     let authority = Authority::new();
     let files = Files::of(&authority.issue());
     let quiet = logged_by(|| drop(open(&files)));

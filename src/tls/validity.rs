@@ -1,9 +1,9 @@
-//! From when and until when a certificate is valid.
+//! The validity period of a certificate.
 
 use jiff::Timestamp;
 use x509_cert::{Certificate, der::Decode, time::Time};
 
-/// From when and until when a certificate is valid (RFC 5280, section 4.1.2.5).
+/// The validity period of a certificate (RFC 5280, section 4.1.2.5).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Validity {
     pub(super) not_before: Timestamp,
@@ -11,7 +11,7 @@ pub(super) struct Validity {
 }
 
 impl Validity {
-    /// What a certificate, DER, says; `None` where that cannot be understood.
+    /// Reads the validity of a DER certificate. Returns `None` if it cannot be parsed.
     pub(super) fn of(certificate: &[u8]) -> Option<Self> {
         let certificate = Certificate::from_der(certificate).ok()?;
         let validity = certificate.tbs_certificate().validity();

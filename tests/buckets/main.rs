@@ -1,5 +1,5 @@
 //! Calibrations in a bucket, on a real S3 server (moto, from `requirements.txt`).
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod s3_server;
 mod service;

@@ -1,4 +1,4 @@
-//! The S3 server, started and stopped as a process.
+//! The S3 server as a process.
 
 use std::{
     fs::File,
@@ -12,11 +12,11 @@ use std::{
 use lookdown::calibration::{BucketStore, CalibrationStore, Replaces};
 use tempfile::TempDir;
 
-/// Must never be told to anybody.
+/// Must never appear in any output.
 pub(crate) const SECRET: &str = "kept-to-itself-7f3a";
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// A server with the bucket `cameras`; what it was asked is in its log.
+/// A server with the bucket `cameras`. Its log lists the requests.
 pub(crate) struct S3Server {
     process: Child,
     pub(crate) address: SocketAddr,
@@ -28,7 +28,7 @@ impl S3Server {
         Self::at("127.0.0.1:0".parse().unwrap())
     }
 
-    /// A new and empty one in the place of one that was stopped.
+    /// Starts a new, empty server on the address of one that was stopped.
     pub(crate) fn at(address: SocketAddr) -> Self {
         let program = Path::new(env!("CARGO_MANIFEST_DIR")).join(".setup/venv/bin/moto_server");
         assert!(
@@ -83,12 +83,12 @@ impl S3Server {
         std::fs::read_to_string(self.folder.path().join("log")).unwrap()
     }
 
-    /// The level `ceiling` of its bucket.
+    /// The store at the prefix `ceiling` of its bucket.
     pub(crate) fn store(&self) -> BucketStore {
         store("s3://cameras/ceiling", self.address)
     }
 
-    /// Somebody else writes an object.
+    /// Writes an object as another client would.
     pub(crate) fn put(&self, name: &str, content: &str) {
         let store = self.store();
         store
@@ -105,7 +105,7 @@ impl Drop for S3Server {
     }
 }
 
-/// The variables of the provider that lead to the server at `address`.
+/// The provider's variables for the server at `address`.
 pub(crate) fn variables(address: SocketAddr) -> Vec<(String, String)> {
     let endpoint = format!("http://{address}");
     [

@@ -1,4 +1,4 @@
-//! Lookdown's own process, with its calibrations in a bucket.
+//! The process of Lookdown with its calibrations in a bucket.
 
 use std::{
     io::{BufRead, BufReader, Read, Write},
@@ -13,7 +13,7 @@ use crate::s3_server::variables;
 
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// A server that looks at `s3://cameras/ceiling` every second.
+/// A server that polls `s3://cameras/ceiling` every second.
 pub(crate) struct Service {
     process: Child,
     address: SocketAddr,
@@ -37,7 +37,7 @@ pub(crate) fn command(s3: SocketAddr) -> Command {
 }
 
 impl Service {
-    /// A server whose `/readyz` answers.
+    /// Starts a server and waits until its `/readyz` answers 200.
     pub(crate) fn start(s3: SocketAddr) -> Self {
         let mut process = command(s3).spawn().unwrap();
         let mut lines = BufReader::new(process.stderr.take().unwrap());
@@ -63,7 +63,7 @@ impl Service {
         service
     }
 
-    /// The whole answer to a request.
+    /// Returns the complete response to a request.
     pub(crate) fn send(&self, method: &str, path: &str, header: &str, body: &str) -> String {
         let mut connection = TcpStream::connect(self.address).unwrap();
         let length = body.len();
@@ -82,7 +82,7 @@ impl Service {
         self.send("GET", path, "", "")
     }
 
-    /// The first answer that is as it should be.
+    /// Waits for the first response for which `is_right` returns true.
     pub(crate) fn wait_for(&self, path: &str, is_right: impl Fn(&str) -> bool) -> String {
         let begun = Instant::now();
         loop {
@@ -95,7 +95,7 @@ impl Service {
         }
     }
 
-    /// The log, once it holds this.
+    /// Returns the log once it contains this text.
     pub(crate) fn log_with(&self, expected: &str) -> String {
         let begun = Instant::now();
         loop {
@@ -113,7 +113,7 @@ impl Service {
     }
 }
 
-/// Keeps what the server says, so that it never waits for somebody to read it.
+/// Collects the log, so that the server never blocks on a full pipe.
 fn follow(lines: BufReader<ChildStderr>, log: Arc<Mutex<String>>) -> JoinHandle<()> {
     let thread = thread::Builder::new().name("log".to_owned());
     let follow = move || {

@@ -14,7 +14,7 @@ fn native(id: &str, focal: f64) -> String {
     )
 }
 
-/// Whether an answer holds the native file of a lens of this focal length.
+/// Returns true if a response holds the native file of a lens of this focal length.
 fn has_focal(answer: &str, focal: f64) -> bool {
     let body = answer.split_once("\r\n\r\n").unwrap().1;
     let native: serde_json::Value = serde_json::from_str(body).unwrap();
@@ -22,7 +22,7 @@ fn has_focal(answer: &str, focal: f64) -> bool {
 }
 
 #[test]
-fn calibrations_are_changed_through_the_api_and_in_the_bucket_and_read_only_when_they_change() {
+fn calibrations_are_read_again_only_when_they_change() {
     let s3 = S3Server::start();
     s3.put("lobby.json", &native("lobby", 190.0));
     let service = Service::start(s3.address);
@@ -75,7 +75,7 @@ fn calibrations_are_changed_through_the_api_and_in_the_bucket_and_read_only_when
             .get("/calibrations/yard")
             .starts_with("HTTP/1.1 404")
     );
-    // At the start, after the change, and broken.
+    // At the start, after the change, and invalid.
     let log = s3.log();
     let looks = log.matches("GET /cameras?").count();
     let downloads = log.matches("GET /cameras/ceiling/lobby.json").count();
@@ -83,7 +83,7 @@ fn calibrations_are_changed_through_the_api_and_in_the_bucket_and_read_only_when
 }
 
 #[test]
-fn the_last_calibrations_serve_while_the_bucket_is_away_and_new_ones_when_it_is_back() {
+fn the_last_calibrations_are_used_during_an_outage() {
     let s3 = S3Server::start();
     s3.put("lobby.json", &native("lobby", 190.0));
     let service = Service::start(s3.address);
@@ -116,8 +116,8 @@ fn the_last_calibrations_serve_while_the_bucket_is_away_and_new_ones_when_it_is_
     let count = problems.len();
     problems.sort_unstable();
     problems.dedup();
-    // Refused, cut off, and a new server without its bucket are different problems.
-    assert!(count > 0 && problems.len() == count, "told again: {log}");
+    // Refused, disconnected, and a new server without the bucket are different problems.
+    assert!(count > 0 && problems.len() == count, "logged again: {log}");
     assert!(
         !log.contains(SECRET) && !log.contains("backing off"),
         "{log}"
@@ -125,7 +125,7 @@ fn the_last_calibrations_serve_while_the_bucket_is_away_and_new_ones_when_it_is_
 }
 
 #[test]
-fn a_bucket_that_cannot_be_reached_at_the_start_ends_it_with_a_sentence() {
+fn an_unreachable_bucket_ends_the_start_with_a_sentence() {
     let closed = TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()

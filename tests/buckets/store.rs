@@ -1,4 +1,4 @@
-//! What a bucket does as a store.
+//! A bucket as a calibration store.
 
 use std::net::TcpListener;
 
@@ -35,7 +35,7 @@ fn objects_of_one_level_are_written_read_replaced_and_deleted() {
     assert_eq!(names(&store), ["lobby.json", "yard.json"]);
 
     let seen = store.list().unwrap();
-    assert_eq!(store.list().unwrap(), seen, "stamps change by themselves");
+    assert_eq!(store.list().unwrap(), seen, "stamps change without a write");
     let lobby = seen.iter().find(|file| file.name == "lobby.json").unwrap();
     let replaces = Replaces::Stamp(&lobby.stamp);
     store.write("lobby.json", b"two", replaces).unwrap();
@@ -49,7 +49,7 @@ fn objects_of_one_level_are_written_read_replaced_and_deleted() {
     assert_ne!(store.list().unwrap(), seen);
 
     let contents = store.read(&["yard.json", "lobby.json", "gone.json"], 3);
-    assert_eq!(contents[0].as_ref().unwrap(), b"thr", "not cut");
+    assert_eq!(contents[0].as_ref().unwrap(), b"thr", "not truncated");
     assert_eq!(contents[1].as_ref().unwrap(), b"two");
     assert!(
         matches!(contents[2], Err(StoreError::Failed { .. })),
@@ -60,11 +60,11 @@ fn objects_of_one_level_are_written_read_replaced_and_deleted() {
     store.delete("lobby.json").unwrap();
     assert_eq!(names(&store), ["yard.json"]);
     let whole = self::store("s3://cameras", server.address);
-    assert_eq!(names(&whole), [""; 0], "a level is no object");
+    assert_eq!(names(&whole), [""; 0], "a prefix is not an object");
 }
 
 #[test]
-fn a_bucket_that_is_not_there_is_told_without_secrets() {
+fn the_error_of_a_missing_bucket_holds_no_secrets() {
     let server = S3Server::start();
     let error = store("s3://elsewhere/x", server.address)
         .list()
@@ -77,7 +77,7 @@ fn a_bucket_that_is_not_there_is_told_without_secrets() {
 }
 
 #[test]
-fn a_server_that_refuses_or_does_not_answer_is_given_up_with_the_same_words_every_time() {
+fn an_unreachable_server_gives_the_same_error_every_time() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = store("s3://cameras", listener.local_addr().unwrap());
     let error = silent.list().unwrap_err().to_string();
@@ -104,7 +104,7 @@ fn a_server_that_refuses_or_does_not_answer_is_given_up_with_the_same_words_ever
 }
 
 #[test]
-fn addresses_and_variables_that_lead_to_no_bucket_are_refused_without_secrets() {
+fn errors_of_invalid_addresses_hold_no_secrets() {
     let secrets = [
         ("AWS_SECRET_ACCESS_KEY", SECRET),
         ("AWS_ALLOW_HTTP", "perhaps"),
@@ -129,7 +129,7 @@ fn addresses_and_variables_that_lead_to_no_bucket_are_refused_without_secrets() 
 }
 
 #[test]
-fn the_addresses_of_every_provider_are_understood() {
+fn the_addresses_of_every_provider_are_parsed() {
     let variables = || {
         [
             ("AZURE_STORAGE_ACCOUNT_NAME", "account"),

@@ -1,4 +1,4 @@
-//! Files with the parameters of a camera in `fixtures/vectors` project as its known answers.
+//! Files with the parameters of a camera in `fixtures/vectors` project to its known answers.
 
 use lookdown::{calibration::CalibrationFile, geometry::Pixel};
 use serde_json::Value;
@@ -127,7 +127,7 @@ fn every_file_is_recognised_and_projects_as_its_camera() {
             let Some(pixel) = lens.project(&ray(&point["xyz"])) else {
                 panic!("{file}, camera {index}: refuses {}", point["xyz"]);
             };
-            // Near its limit a lens reaches pixels beyond any frame, where digits run out.
+            // Near its limit a lens reaches pixels far beyond any frame, where precision is lost.
             let tolerance = f64::max(1e-6, 1e-9 * expected.coords.norm());
             assert!(
                 (pixel - expected).norm() <= tolerance,

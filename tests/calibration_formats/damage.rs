@@ -1,4 +1,4 @@
-//! Damaged files are refused or read, and never bring the program down.
+//! Damaged files are refused or read, and never crash the program.
 
 use lookdown::calibration::{CalibrationFile, Calibrations, FolderStore, Reading, WriteCondition};
 use proptest::prelude::*;
@@ -24,7 +24,7 @@ fn survives(content: &[u8]) {
 #[test]
 fn files_cut_short_anywhere_are_refused_or_read() {
     for content in files() {
-        // Every place in the smaller files, enough of them in the larger.
+        // Every position in the smaller files, and a sample of positions in the larger ones.
         let step = content.len() / 300 + 1;
         for length in (0..content.len()).step_by(step) {
             survives(&content[..length]);
@@ -34,7 +34,7 @@ fn files_cut_short_anywhere_are_refused_or_read() {
 
 #[test]
 fn a_file_of_too_many_values_is_refused_before_they_take_memory() {
-    // Half a gibibyte of tables when it was read.
+    // Such a file took half a gibibyte of tables when it was read.
     let lines = (0..8_000).map(|line| format!("a{line}{}=1\n", ".b".repeat(60)));
     let tables = lines.collect::<Vec<_>>().concat();
     let maps = format!("{{\"a\":[{}0]}}", "{\"\":0},".repeat(100_000));
@@ -70,7 +70,7 @@ fn a_refusal_quotes_little_of_a_large_file() {
 }
 
 #[test]
-fn a_choice_between_cameras_tells_little_of_their_names() {
+fn an_error_about_ambiguous_cameras_truncates_their_names() {
     let folder = tempfile::tempdir().unwrap();
     let store = Box::new(FolderStore::new(folder.path()));
     let calibrations = Calibrations::open(store, true).unwrap();

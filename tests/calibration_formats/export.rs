@@ -1,4 +1,5 @@
-//! Written files read back as the same lens; what a format cannot hold is refused or told.
+//! Written files read back as the same lens. Content that a format cannot hold is refused or
+//! reported.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +11,7 @@ use strum::VariantArray;
 
 use crate::{camera, fixture, lens};
 
-/// Every lens model, with the targets that can hold it besides the native one.
+/// Every lens model with the formats that can hold it, in addition to the native one.
 const LENSES: [(&str, &[&str]); 14] = [
     (
         r#"{"model":"equidistant","focal":190.5,"cx":255,"cy":257}"#,
@@ -112,7 +113,7 @@ fn every_target_holds_its_lenses_and_refuses_the_others() {
 }
 
 #[test]
-fn what_a_format_has_no_place_for_is_told() {
+fn content_that_a_format_cannot_hold_is_reported() {
     let mut calibration = calibration(
         LENSES[0]
             .0
@@ -132,7 +133,7 @@ fn what_a_format_has_no_place_for_is_told() {
 }
 
 #[test]
-fn a_skewed_lens_is_not_written_where_skew_has_no_place() {
+fn a_skewed_lens_is_refused_by_formats_without_skew() {
     let skewed = LENSES[6].0.replace("\"k\":", "\"skew\":0.5,\"k\":");
     let calibration = calibration(&skewed);
     assert!(Target::OpenCv.write(&calibration).is_ok());
@@ -143,14 +144,14 @@ fn a_skewed_lens_is_not_written_where_skew_has_no_place() {
 #[test]
 fn a_native_file_keeps_everything() {
     let content = fixture("calibrations/nvidia_ftheta.json");
-    let told = camera(&content, 0);
+    let read_back = camera(&content, 0);
     let native = NativeCalibration {
         id: "hall".to_owned(),
-        image: told.image.unwrap(),
-        lens: told.lens,
-        mount: told.mount,
-        zones: told.zones,
-        masks: told.masks,
+        image: read_back.image.unwrap(),
+        lens: read_back.lens,
+        mount: read_back.mount,
+        zones: read_back.zones,
+        masks: read_back.masks,
     };
     let written = Target::Native.write(&native).unwrap().content;
     let file = CalibrationFile::parse(written.as_bytes()).unwrap();

@@ -1,6 +1,6 @@
-//! Calibration files of other programs: each is recognised from its content and read as the lens
-//! that its program means.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! Calibration files of other programs: each format is detected from the content and read as the
+//! lens that the program defines.
+#![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
 
 mod answers;
 mod damage;
@@ -28,7 +28,7 @@ fn json(path: &str) -> Value {
     serde_json::from_slice(&fixture(path)).unwrap()
 }
 
-/// The camera of that index in a file.
+/// The camera with index `index` in a file.
 fn camera(content: &[u8], index: usize) -> Camera {
     CalibrationFile::parse(content).unwrap().cameras[index]
         .camera
@@ -36,7 +36,7 @@ fn camera(content: &[u8], index: usize) -> Camera {
         .unwrap()
 }
 
-/// Why a file, or its first camera, is refused.
+/// The error message for a refused file, or for its first camera.
 fn refusal(content: &[u8]) -> String {
     match CalibrationFile::parse(content) {
         Err(error) => error.to_string(),

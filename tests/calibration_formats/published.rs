@@ -1,4 +1,4 @@
-//! Published calibrations, written as their programs write them, project as their programs do.
+//! Published calibrations, in the files of their programs, project like the programs do.
 
 use std::fmt::Write;
 
@@ -16,18 +16,18 @@ fn published(name: &str) -> Value {
     sets.iter().find(|set| set["name"] == name).unwrap().clone()
 }
 
-/// The file projects the set's rays to its pixels.
+/// Asserts that the file projects the set's rays to its pixels.
 #[track_caller]
 fn assert_projects(content: &str, set: &Value, tolerance: f64, convention: PixelConvention) {
     let lens = lens(camera(content.as_bytes(), 0));
     let rays = set["rays"].as_array().unwrap();
     let mut compared = 0;
-    for (told, pixel) in rays.iter().zip(set["pixels"].as_array().unwrap()) {
+    for (ray_fields, pixel) in rays.iter().zip(set["pixels"].as_array().unwrap()) {
         let (Some(u), Some(v)) = (pixel[0].as_f64(), pixel[1].as_f64()) else {
             continue;
         };
-        // Some curves turn over before the last rays; their programs project them all the same.
-        let Some(projected) = lens.project(&ray(told)) else {
+        // Some curves turn back before the last rays, which their programs project nevertheless.
+        let Some(projected) = lens.project(&ray(ray_fields)) else {
             continue;
         };
         let projected = match convention {
@@ -35,7 +35,7 @@ fn assert_projects(content: &str, set: &Value, tolerance: f64, convention: Pixel
             PixelConvention::CornerOrigin => cross_half_pixel(projected, convention),
         };
         let off = (projected - Pixel::new(u, v)).norm();
-        assert!(off <= tolerance, "{told}: off by {off} pixels");
+        assert!(off <= tolerance, "{ray_fields}: off by {off} pixels");
         compared += 1;
     }
     assert!(compared >= 48, "only {compared} rays were compared");
@@ -74,7 +74,7 @@ fn opencv_fisheye() {
 }
 
 #[test]
-fn ros_calls_the_same_lens_fisheye() {
+fn ros_fisheye_is_the_same_lens() {
     let set = published("fiord");
     let content = format!(
         "image_width: {}\nimage_height: {}\ncamera_name: ceiling\n\
@@ -171,7 +171,7 @@ fn ocamcalib() {
     }
 }
 
-/// The file sees the set's pixels along its rays.
+/// Asserts that the file unprojects the set's pixels to its rays.
 #[track_caller]
 fn assert_unprojects(content: &str, set: &Value) {
     let lens = lens(camera(content.as_bytes(), 0));
@@ -187,7 +187,7 @@ fn assert_unprojects(content: &str, set: &Value) {
 }
 
 #[test]
-fn colmap_counts_from_the_corner_of_the_first_pixel() {
+fn colmap_has_its_origin_at_the_corner_of_the_first_pixel() {
     for (name, model) in [
         ("aria", "OPENCV_FISHEYE"),
         ("simple_radial_fisheye", "SIMPLE_RADIAL_FISHEYE"),

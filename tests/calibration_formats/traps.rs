@@ -1,4 +1,4 @@
-//! What is easily read wrong: each trap has its test.
+//! Details of calibration formats that are easily misread.
 
 use lookdown::{calibration::CalibrationFile, geometry::lens::LensModel};
 
@@ -15,7 +15,7 @@ fn assert_refused(content: &str, expected: &str) {
 }
 
 #[test]
-fn ocamcalib_tells_row_before_column_and_height_before_width() {
+fn ocamcalib_lists_row_before_column_and_height_before_width() {
     let content = text("ocamcalib_calib_results.txt").replace("1600 1600", "1200 1600");
     let camera = camera(content.as_bytes(), 0);
     let image = camera.image.unwrap();
@@ -45,7 +45,7 @@ fn colmap_loses_half_a_pixel() {
 }
 
 #[test]
-fn colmap_thin_prism_terms_have_no_lens_unless_they_are_zero() {
+fn colmap_thin_prism_terms_are_refused_unless_they_are_zero() {
     let content = text("colmap_cameras.txt");
     let file = CalibrationFile::parse(content.as_bytes()).unwrap();
     let names: Vec<_> = file
@@ -69,7 +69,7 @@ fn colmap_thin_prism_terms_have_no_lens_unless_they_are_zero() {
 }
 
 #[test]
-fn kalibr_puts_the_sphere_before_the_focal_lengths() {
+fn kalibr_lists_sphere_parameters_before_focal_lengths() {
     let camera = |model: &str, intrinsics: &str| {
         let content = format!(
             "cam0:\n  camera_model: {model}\n  distortion_model: none\n  distortion_coeffs: []\n  \
@@ -92,7 +92,7 @@ fn kalibr_puts_the_sphere_before_the_focal_lengths() {
 }
 
 #[test]
-fn kalibr_models_that_do_not_go_together_are_refused() {
+fn incompatible_kalibr_models_are_refused() {
     for (from, to, expected) in [
         (
             "camera_model: omni\n  distortion_coeffs: [-0.33518750, 0.13211436, 0.00055967, \
@@ -120,7 +120,7 @@ fn kalibr_models_that_do_not_go_together_are_refused() {
 }
 
 #[test]
-fn an_ordinary_lens_is_refused_whatever_it_is_called() {
+fn an_ordinary_lens_is_refused_under_every_name() {
     assert_refused(
         &text("ros_plumb_bob_called_fisheye.yaml"),
         "distortion_model: it is plumb_bob, which describes ordinary lenses below 180°",
@@ -144,7 +144,7 @@ fn an_ordinary_lens_is_refused_whatever_it_is_called() {
 }
 
 #[test]
-fn four_coefficients_without_a_model_are_taken_for_a_fisheye_with_a_note() {
+fn four_coefficients_without_a_model_are_read_as_fisheye() {
     let camera = camera(&fixture("calibrations/opencv_nameless_model.yml"), 0);
     assert_eq!(camera.notes.len(), 1);
     assert!(camera.notes[0].message.contains("taken for cv::fisheye"));
@@ -209,7 +209,7 @@ fn nvidia_uses_the_polynomial_that_it_calls_exact() {
 }
 
 #[test]
-fn a_field_of_view_beyond_the_curve_ends_with_the_curve_and_a_note() {
+fn a_field_of_view_beyond_the_curve_is_cut_off_with_a_note() {
     let file = CalibrationFile::parse(&fixture("calibrations/moil.json")).unwrap();
     let by_name = |name: &str| {
         let mut cameras = file.cameras.iter();
@@ -224,7 +224,7 @@ fn a_field_of_view_beyond_the_curve_ends_with_the_curve_and_a_note() {
         "{:?}",
         bent.notes
     );
-    // 200 a - 60 a³ turns over at a = sqrt(200 / 180).
+    // 200 a - 60 a³ has its maximum at a = sqrt(200 / 180).
     let limit = (200.0_f64 / 180.0).sqrt();
     assert!((bent.lens.max_theta().unwrap() - limit).abs() < 1e-3);
     assert!(by_name("Axis").unwrap().notes.is_empty());
@@ -236,7 +236,7 @@ fn a_field_of_view_beyond_the_curve_ends_with_the_curve_and_a_note() {
 }
 
 #[test]
-fn formats_that_do_not_tell_the_frame_size_say_so() {
+fn formats_without_a_frame_size_have_a_clear_error() {
     let content = fixture("calibrations/py_ocamcalib.json");
     let file = CalibrationFile::parse(&content).unwrap();
     let (id, calibration) = file.calibrations("hall", &content).remove(0);
@@ -249,7 +249,7 @@ fn formats_that_do_not_tell_the_frame_size_say_so() {
 }
 
 #[test]
-fn what_is_no_calibration_is_refused_in_a_sentence() {
+fn a_file_without_a_calibration_is_refused_in_a_sentence() {
     for (content, expected) in [
         (
             "{\"a\": 1}",

@@ -3,7 +3,7 @@
 use crate::{assert_fails_with, lookdown};
 
 #[test]
-fn a_calibration_is_fitted_to_frames_and_says_what_it_assumes() {
+fn fit_writes_a_calibration_and_names_its_assumptions() {
     let fitted = lookdown(
         &[
             "calibration",
@@ -53,14 +53,14 @@ fn frames_without_a_lens_circle_are_not_fitted() {
     assert!(fitted.stdout.is_empty());
     let said: Vec<_> = said.lines().collect();
     assert!(
-        said[0].ends_with("bright.png: shows no lens circle"),
+        said[0].ends_with("bright.png: no lens circle found"),
         "{said:?}"
     );
     assert!(said[1].contains("give brighter frames"), "{said:?}");
 }
 
 #[test]
-fn a_calibration_of_another_program_is_checked_and_converted() {
+fn calibrations_of_other_programs_are_checked_and_converted() {
     let camchain = "tests/fixtures/calibrations/kalibr_camchain.yaml";
     let checked = lookdown(&["calibration", "check", camchain], &[]);
     assert!(checked.status.success());
@@ -91,7 +91,7 @@ fn a_calibration_of_another_program_is_checked_and_converted() {
 }
 
 #[test]
-fn a_calibration_that_cannot_be_used_is_explained_and_costs_the_exit_code() {
+fn an_unusable_calibration_is_explained_and_exits_with_1() {
     let file = "tests/fixtures/calibrations/ros_plumb_bob_called_fisheye.yaml";
     let output = lookdown(&["calibration", "check", file], &[]);
     assert_eq!(output.status.code(), Some(1));
@@ -103,7 +103,7 @@ fn a_calibration_that_cannot_be_used_is_explained_and_costs_the_exit_code() {
 }
 
 #[test]
-fn a_frame_size_is_given_only_where_the_file_has_none() {
+fn the_frame_size_is_an_option_only_if_the_file_has_none() {
     let file = "tests/fixtures/calibrations/py_ocamcalib.json";
     let arguments = ["calibration", "check", file, "--size", "1600x1600"];
     let report = String::from_utf8(lookdown(&arguments, &[]).stdout).unwrap();
@@ -145,7 +145,7 @@ fn a_preview_shows_the_lens_in_the_frame() {
 }
 
 #[test]
-fn zones_and_masks_are_told_and_shown_in_the_preview() {
+fn zones_and_masks_are_listed_and_drawn_in_the_preview() {
     let folder = tempfile::tempdir().unwrap();
     let [file, out] = ["office.json", "preview.jpg"].map(|name| {
         let path = folder.path().join(name);
@@ -171,7 +171,7 @@ fn zones_and_masks_are_told_and_shown_in_the_preview() {
     let limits = lookdown::imaging::decode::DecodeLimits::default();
     let picture = lookdown::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
     let picture = picture.unwrap().frame;
-    // Between the rings and lines that are drawn into the frame it is black.
+    // Between the rings and lines of the drawing the frame is black.
     let black = (0..240)
         .flat_map(|y| (0..960).map(move |x| (x, y)))
         .filter(|&(x, y)| picture.pixel(x, y).iter().all(|&value| value < 30));

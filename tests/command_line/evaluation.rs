@@ -2,7 +2,8 @@
 
 use crate::{assert_fails_with, lookdown};
 
-/// The samples as a data set folder with the truth as detections, one missing and one made up.
+/// Creates a data set of the samples with the ground truth as detections, one missing and one
+/// added.
 fn samples_with_detections() -> tempfile::TempDir {
     let samples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples");
     let folder = tempfile::tempdir().unwrap();
@@ -36,7 +37,7 @@ fn samples_with_detections() -> tempfile::TempDir {
 }
 
 #[test]
-fn saved_detections_are_scored_and_plotted_without_looking() {
+fn saved_detections_are_scored_and_plotted_without_a_model() {
     let folder = samples_with_detections();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (rows, plot) = (path("rows"), path("curves.svg"));
@@ -99,7 +100,7 @@ fn saved_detections_are_scored_by_stratum() {
 }
 
 #[test]
-fn a_calibration_for_every_picture_must_exist() {
+fn the_calibration_for_every_image_must_exist() {
     let folder = samples_with_detections();
     let data_set = folder.path().to_str().unwrap();
     let flags = [

@@ -1,4 +1,4 @@
-//! `lookdown health`: the answer of a server as an exit status.
+//! `lookdown health`: the answer of a server as an exit code.
 
 use std::{
     io::{BufRead, BufReader, Write},
@@ -9,7 +9,7 @@ use std::{
 
 use super::{assert_fails_with, lookdown};
 
-/// What comes of asking a server that gives this answer, and the request it got.
+/// Runs the health check against a server with this answer. Returns its output, and the request.
 fn asked(answer: &'static str, arguments: &[&str]) -> (Output, String) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -28,7 +28,7 @@ fn asked(answer: &'static str, arguments: &[&str]) -> (Output, String) {
 }
 
 #[test]
-fn a_server_that_is_ready_ends_it_with_0() {
+fn a_ready_server_gives_exit_code_0() {
     let yes = "HTTP/1.1 200 OK\r\ncontent-length: 0\r\n\r\n";
     let (output, request) = asked(yes, &["health"]);
     assert!(output.status.success(), "{output:?}");
@@ -37,14 +37,14 @@ fn a_server_that_is_ready_ends_it_with_0() {
 }
 
 #[test]
-fn a_server_that_is_not_ready_ends_it_with_1() {
+fn a_server_that_is_not_ready_gives_exit_code_1() {
     let no = "HTTP/1.1 503 Service Unavailable\r\ncontent-length: 0\r\n\r\n";
     let (output, _) = asked(no, &["health"]);
     assert_fails_with(&output, &["/readyz answered 503"]);
 }
 
 #[test]
-fn a_server_that_is_not_there_ends_it_with_1() {
+fn a_missing_server_gives_exit_code_1() {
     let unused = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = unused.local_addr().unwrap().to_string();
     drop(unused);

@@ -5,7 +5,7 @@ use lookdown::access::KeyList;
 use crate::lookdown;
 
 #[test]
-fn a_new_key_comes_with_the_line_that_makes_it_known() {
+fn a_new_key_is_printed_with_its_line_for_the_keys_file() {
     let scopes = ["--scope", "read", "--scope", "detect"];
     let new = || {
         lookdown(
@@ -29,7 +29,7 @@ fn a_new_key_comes_with_the_line_that_makes_it_known() {
 }
 
 #[test]
-fn a_key_without_a_scope_or_with_an_odd_name_is_not_made() {
+fn a_key_without_a_scope_or_with_an_invalid_name_is_refused() {
     for arguments in [
         &["key", "new", "--name", "gate"][..],
         &["key", "new", "--name", "gate", "--scope", "root"],

@@ -1,5 +1,5 @@
-//! The executable: what it prints where, and how it ends.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! The executable: its outputs and exit codes.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod calibration;
 mod evaluation;
@@ -18,7 +18,7 @@ pub(crate) fn lookdown(arguments: &[&str], environment: &[(&str, &str)]) -> Outp
         .unwrap()
 }
 
-/// A failure must say one line on standard error, nothing on standard output, and end with 1.
+/// Asserts a failure: one line on standard error, nothing on standard output, exit code 1.
 #[track_caller]
 pub(crate) fn assert_fails_with(output: &Output, parts: &[&str]) {
     let message = String::from_utf8(output.stderr.clone()).unwrap();
@@ -84,19 +84,19 @@ fn a_parameter_out_of_range_is_refused_as_over_http() {
 }
 
 #[test]
-fn several_pictures_cannot_be_drawn_into_one_file() {
+fn several_images_cannot_be_drawn_into_one_file() {
     let output = lookdown(&["detect", "a.jpg", "b.jpg", "--annotate", "out.jpg"], &[]);
     assert_fails_with(&output, &["--annotate", "single"]);
 }
 
 #[test]
-fn a_calibration_that_is_nowhere_is_refused_before_anything_is_loaded() {
+fn a_missing_calibration_is_refused_before_loading() {
     let output = lookdown(&["detect", "a.jpg", "--calibration", "no/such.json"], &[]);
     assert_fails_with(&output, &["--calibration", "no/such.json"]);
 }
 
 #[test]
-fn every_usable_picture_gets_a_line_and_every_other_a_sentence() {
+fn every_image_gives_a_report_or_an_error_line() {
     let office = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
     let calibration = concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -135,7 +135,7 @@ fn every_usable_picture_gets_a_line_and_every_other_a_sentence() {
 }
 
 #[test]
-fn a_person_is_drawn_into_the_picture_on_request() {
+fn annotate_draws_persons_into_the_image() {
     let office = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
     let folder = tempfile::tempdir().unwrap();
     let drawn = folder.path().join("drawn.jpg");
@@ -157,7 +157,7 @@ fn a_person_is_drawn_into_the_picture_on_request() {
 }
 
 #[test]
-fn options_of_pictures_are_checked_and_need_a_picture() {
+fn annotation_options_are_validated_and_need_annotate() {
     let annotate = ["detect", "a.jpg", "--annotate", "out.jpg"];
     let output = lookdown(&[&annotate[..], &["--draw", "hats"]].concat(), &[]);
     assert_lists_values(&output, "hats", "boxes, oriented, scores");
@@ -172,7 +172,7 @@ fn options_of_pictures_are_checked_and_need_a_picture() {
 }
 
 #[test]
-fn a_folder_of_pictures_becomes_annotations_instead_of_reports() {
+fn a_folder_of_images_is_converted_to_annotations() {
     let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/samples");
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("labels");
@@ -195,7 +195,7 @@ fn a_folder_of_pictures_becomes_annotations_instead_of_reports() {
 }
 
 #[test]
-fn pictures_that_would_share_their_annotations_are_refused_before_anything_is_loaded() {
+fn images_with_the_same_annotation_file_are_refused() {
     let flags = ["--format", "voc", "--out", "/nowhere/labels"];
     let arguments = [&["detect", "a/1.jpg", "b/1.png"], &flags[..]].concat();
     let output = lookdown(&arguments, &[]);
@@ -203,7 +203,7 @@ fn pictures_that_would_share_their_annotations_are_refused_before_anything_is_lo
 }
 
 #[test]
-fn turned_boxes_are_refused_where_the_format_has_none() {
+fn oriented_boxes_are_refused_for_formats_without_them() {
     let flags = ["--format", "yolo", "--out", "labels", "--oriented"];
     let output = lookdown(&[&["detect", "a.jpg"], &flags[..]].concat(), &[]);
     assert_fails_with(&output, &["--oriented", "yolo", "cvat"]);

@@ -5,7 +5,7 @@ use std::fs;
 use super::lookdown;
 
 #[test]
-fn shells_are_told_the_commands() {
+fn completions_contain_the_commands() {
     for shell in ["bash", "zsh", "fish"] {
         let output = lookdown(&["completions", shell], &[]);
         let script = String::from_utf8(output.stdout).unwrap();
@@ -32,7 +32,7 @@ fn each_command_has_a_manual_page() {
 }
 
 #[test]
-fn the_version_is_the_crates() {
+fn the_version_is_that_of_the_crate() {
     let output = lookdown(&["--version"], &[]);
     let said = String::from_utf8(output.stdout).unwrap();
     let wanted = concat!("lookdown ", env!("CARGO_PKG_VERSION"));

@@ -1,9 +1,9 @@
-//! The common shape of all sets of known answers.
+//! Common structure of all sets of known answers.
 
 use lookdown::geometry::{Lens, Pixel, Ray, lens::LensModel};
 use serde_json::Value;
 
-/// What one camera does to rays and pixels; `None` where it must refuse.
+/// Projections and unprojections of one camera. `None` where the lens must refuse.
 pub struct KnownAnswers {
     pub name: String,
     /// The lens as in a native calibration file.
@@ -14,7 +14,7 @@ pub struct KnownAnswers {
     pub unprojections: Vec<(Pixel, Option<Ray>)>,
     pub tolerance_px: f64,
     pub tolerance_ray: f64,
-    /// Where the reference says that the lens ends, radians.
+    /// The largest angle of the lens according to the reference, radians.
     pub max_theta: Option<f64>,
 }
 
@@ -35,7 +35,7 @@ pub fn numbers(value: &Value) -> Vec<f64> {
     serde_json::from_value(value.clone()).unwrap()
 }
 
-/// The items of a list, none when it is missing.
+/// The items of a list. Empty when it is missing.
 pub fn items(value: &Value) -> &[Value] {
     value.as_array().map_or(&[], Vec::as_slice)
 }

@@ -1,6 +1,6 @@
 //! Every lens model against known answers from independent implementations
-//! (`tests/fixtures/vectors`; each set names its source).
-#![expect(clippy::unwrap_used, reason = "a broken fixture should stop the test")]
+//! (`tests/fixtures/vectors`, where each set names its source).
+#![expect(clippy::unwrap_used, reason = "an invalid fixture fails the test")]
 
 mod known_answers;
 mod model_vectors;
@@ -12,8 +12,8 @@ use known_answers::KnownAnswers;
 use lookdown::{calibration::Calibration, geometry::Ray};
 use serde_json::json;
 
-/// All sets: 22 of made-up and published cameras with rays all around, 16 of calibrations that
-/// others have published.
+/// All sets: 22 synthetic and published cameras with rays in all directions, and 16 published
+/// calibrations.
 fn every_set() -> Vec<KnownAnswers> {
     let mut sets = model_vectors::all();
     sets.extend(public_calibrations::all());
@@ -26,13 +26,14 @@ fn angle_of(ray: &Ray) -> f64 {
 }
 
 #[test]
-fn every_model_projects_as_its_known_answers_say() {
+fn every_model_projects_to_the_known_pixels() {
     for set in every_set() {
         let lens = set.lens();
         for (ray, expected) in &set.projections {
             let found = lens.project(ray);
             let name = set.name.as_str();
-            // What the reference maps beyond the angle at which its curve turns back is no image.
+            // Projections of the reference beyond the angle at which its curve turns back are
+            // invalid.
             let Some(expected) = expected.filter(|_| angle_of(ray) <= lens.max_theta()) else {
                 assert_eq!(found, None, "{name}: {ray} must be refused");
                 continue;
@@ -46,7 +47,7 @@ fn every_model_projects_as_its_known_answers_say() {
 }
 
 #[test]
-fn every_model_unprojects_as_its_known_answers_say() {
+fn every_model_unprojects_to_the_known_rays() {
     for set in every_set() {
         let lens = set.lens();
         for (pixel, expected) in &set.unprojections {
@@ -67,7 +68,7 @@ fn every_model_unprojects_as_its_known_answers_say() {
 }
 
 #[test]
-fn every_model_returns_from_the_image_where_the_known_answers_went_in() {
+fn unprojection_inverts_projection_for_every_model() {
     for set in every_set() {
         let lens = set.lens();
         for (ray, pixel) in &set.projections {
@@ -82,14 +83,14 @@ fn every_model_returns_from_the_image_where_the_known_answers_went_in() {
 }
 
 #[test]
-fn every_model_knows_where_it_stops_being_one_to_one() {
+fn every_model_has_the_known_max_theta() {
     for set in every_set() {
         let Some(expected) = set.max_theta else {
             continue;
         };
         let found = set.lens().max_theta();
-        // A curve with a pole ends a little before it; that of ocam ends farther out than the
-        // reference looks.
+        // A curve with a pole ends shortly before the pole. The curve of ocam ends beyond the range
+        // of the reference.
         let tolerance = match set.name.as_str() {
             "mei_kalibr" | "mei_nodist" | "ucm_alpha_lt_half" => 1.1e-6,
             "ocamcalib_1600" => PI - expected,

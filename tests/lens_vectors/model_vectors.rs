@@ -1,4 +1,4 @@
-//! The 22 cameras with rays all around, and pixels in and outside the lens image.
+//! The 22 cameras with rays in all directions, and pixels inside and outside the lens image.
 
 use serde_json::{Value, json};
 
@@ -60,7 +60,7 @@ fn read(name: &str) -> KnownAnswers {
     }
 }
 
-/// The camera's parameters under the names of the native calibration file.
+/// The camera's parameters with the names of the native calibration file.
 fn lens_fields(fixture: &Value) -> Value {
     let params = &fixture["params"];
     let number = |name: &str| params[name].as_f64().unwrap();

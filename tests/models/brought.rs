@@ -1,4 +1,4 @@
-//! What a manifest and an ONNX file together make of a picture.
+//! Custom models: effects of a manifest and an ONNX file on the network input and the detections.
 
 use lookdown::{
     imaging::{Frame, Letterbox, NetworkInput, ViewBatch},
@@ -7,8 +7,8 @@ use lookdown::{
 
 use crate::folder::{fixture, library, load, options};
 
-/// Looks at views that are each of one colour.
-fn look(detector: &mut OnnxDetector, colours: &[[u8; 3]]) -> HeadOutput {
+/// Runs the detector on views of one colour each.
+fn detect(detector: &mut OnnxDetector, colours: &[[u8; 3]]) -> HeadOutput {
     let input: NetworkInput = detector.input().clone();
     let mut batch = ViewBatch::default();
     let views = batch.prepare(colours.len(), &input);
@@ -20,7 +20,7 @@ fn look(detector: &mut OnnxDetector, colours: &[[u8; 3]]) -> HeadOutput {
     detector.detect(&batch).unwrap()
 }
 
-/// The score of the one box in each view, as hundredths.
+/// The score of the only box in each view, in hundredths.
 fn scores(found: &HeadOutput) -> Vec<i32> {
     let scores = found.per_view.iter().map(|view| {
         assert!(view.len() <= 1, "{view:?}");
@@ -35,9 +35,9 @@ const DARK_RED: [u8; 3] = [102, 0, 0];
 const BLUE: [u8; 3] = [0, 0, 204];
 
 #[test]
-fn a_model_with_nothing_said_about_it_sees_red_green_and_blue_as_they_are() {
+fn a_model_without_a_manifest_gets_plain_rgb() {
     let mut detector = load("any_batch", "").unwrap();
-    let found = look(&mut detector, &[RED, DARK_RED, BLUE]);
+    let found = detect(&mut detector, &[RED, DARK_RED, BLUE]);
     assert_eq!(scores(&found), [100, 40, 0]);
     let [x_min, y_min, x_max, y_max] = found.per_view[0][0].bbox.corners();
     assert_eq!([x_min, y_min, x_max, y_max], [4.0, 6.0, 20.0, 30.0]);
@@ -45,45 +45,51 @@ fn a_model_with_nothing_said_about_it_sees_red_green_and_blue_as_they_are() {
 }
 
 #[test]
-fn planes_are_ordered_and_pixels_scaled_as_the_manifest_says() {
+fn planes_and_scaling_follow_the_manifest() {
     let mut swapped = load("any_batch", "[input]\nchannel_order = \"bgr\"").unwrap();
-    assert_eq!(scores(&look(&mut swapped, &[RED, BLUE])), [0, 80]);
+    assert_eq!(scores(&detect(&mut swapped, &[RED, BLUE])), [0, 80]);
     let more = "[input]\nscale = [0.5, 1.0, 1.0]\noffset = [25.5, 0.0, 0.0]";
     let mut scaled = load("any_batch", more).unwrap();
-    assert_eq!(scores(&look(&mut scaled, &[RED, BLUE])), [60, 10]);
+    assert_eq!(scores(&detect(&mut scaled, &[RED, BLUE])), [60, 10]);
     let more = "[input]\nmean = [51.0, 0.0, 0.0]\nstd = [2.0, 1.0, 1.0]";
     let mut standardised = load("any_batch", more).unwrap();
-    assert_eq!(scores(&look(&mut standardised, &[RED, DARK_RED])), [40, 10]);
+    assert_eq!(
+        scores(&detect(&mut standardised, &[RED, DARK_RED])),
+        [40, 10]
+    );
 }
 
 #[test]
-fn a_model_for_a_fixed_number_of_views_sees_all_of_them() {
+fn a_model_with_a_fixed_batch_gets_all_views() {
     let colours = [RED, DARK_RED, BLUE, RED, DARK_RED];
     let mut pairs = load("pairs", "").unwrap();
-    assert_eq!(scores(&look(&mut pairs, &colours)), [100, 40, 0, 100, 40]);
+    assert_eq!(scores(&detect(&mut pairs, &colours)), [100, 40, 0, 100, 40]);
     assert_eq!(pairs.description().views_per_run.unwrap().get(), 2);
     let mut threes = load("any_batch", "[input]\nbatch = 3").unwrap();
-    assert_eq!(scores(&look(&mut threes, &colours)), [100, 40, 0, 100, 40]);
-    assert!(look(&mut threes, &[]).per_view.is_empty());
+    assert_eq!(
+        scores(&detect(&mut threes, &colours)),
+        [100, 40, 0, 100, 40]
+    );
+    assert!(detect(&mut threes, &[]).per_view.is_empty());
 }
 
 #[test]
-fn a_model_with_planes_last_sees_the_same() {
+fn a_model_with_planes_last_gets_the_same_input() {
     let mut detector = load("planes_last", "").unwrap();
     assert_eq!(detector.description().layout, Layout::Nhwc);
-    assert_eq!(scores(&look(&mut detector, &[DARK_RED, RED])), [40, 100]);
+    assert_eq!(scores(&detect(&mut detector, &[DARK_RED, RED])), [40, 100]);
 }
 
 #[test]
-fn a_model_that_takes_any_size_gets_the_one_chosen_for_it() {
+fn a_model_of_any_size_gets_the_configured_size() {
     let more = "[input]\nwidth = 96\nheight = 64\nstride = 32";
     let mut detector = load("any_size", more).unwrap();
     assert_eq!((detector.input().width, detector.input().height), (96, 64));
-    assert_eq!(scores(&look(&mut detector, &[DARK_RED])), [40]);
+    assert_eq!(scores(&detect(&mut detector, &[DARK_RED])), [40]);
 }
 
 #[test]
-fn what_the_onnx_file_says_about_itself_need_not_be_said_again() {
+fn metadata_of_the_onnx_file_is_used_as_default() {
     let detector = OnnxDetector::load(&library(), &fixture("with_metadata"), &options()).unwrap();
     let description = detector.description();
     assert_eq!((detector.input().width, detector.input().height), (96, 64));
@@ -98,18 +104,18 @@ fn what_the_onnx_file_says_about_itself_need_not_be_said_again() {
 fn outputs_are_found_by_the_names_in_the_manifest() {
     let more = "[output]\nhead = \"boxes_scores\"\nboxes = \"dets\"\nscores = \"confidence\"";
     let mut detector = load("other_names", more).unwrap();
-    assert_eq!(scores(&look(&mut detector, &[DARK_RED])), [40]);
+    assert_eq!(scores(&detect(&mut detector, &[DARK_RED])), [40]);
 }
 
 #[test]
-fn scores_that_are_no_numbers_are_dropped_and_counted() {
+fn nan_scores_are_dropped_and_counted() {
     let mut detector = load("not_finite", "").unwrap();
-    let found = look(&mut detector, &[RED, BLUE]);
+    let found = detect(&mut detector, &[RED, BLUE]);
     assert_eq!((scores(&found), found.non_finite), (vec![0, 0], 2));
 }
 
 #[test]
-fn a_revision_changes_with_what_is_done_and_not_with_what_is_written_about_it() {
+fn a_revision_changes_with_settings_but_not_with_comments() {
     let revision = |onnx, more| load(onnx, more).unwrap().revision().to_owned();
     let plain = revision("any_batch", "");
     assert_eq!(

@@ -1,4 +1,4 @@
-//! The paper's own detector, from darknet's files to boxes, at full size.
+//! The paper's detector at full size, from darknet's files to boxes.
 
 use std::{fs, path::Path, process::Command};
 
@@ -23,8 +23,8 @@ fn script(name: &str, arguments: &[&Path]) {
     assert!(output.status.success(), "{name}: {output:?}");
 }
 
-/// The picture of `tests/fixtures/models/make_yolov2_answers.py`.
-fn picture() -> Frame {
+/// The image of `tests/fixtures/models/make_yolov2_answers.py`.
+fn image() -> Frame {
     let level = |place: u32| u8::try_from(place * 255 / (SIZE - 1)).unwrap();
     let pixels = (0..SIZE * SIZE).flat_map(|index| {
         let (row, column) = (index / SIZE, index % SIZE);
@@ -35,7 +35,7 @@ fn picture() -> Frame {
 }
 
 #[test]
-fn yolov2_of_full_size_finds_what_the_reference_finds() {
+fn full_size_yolov2_matches_the_reference() {
     let folder = TempDir::new().unwrap();
     let model = folder.path().join("yolov2");
     script("made_up_yolov2.py", &[folder.path()]);
@@ -54,7 +54,7 @@ fn yolov2_of_full_size_finds_what_the_reference_finds() {
     let input = detector.input().clone();
     let mut batch = ViewBatch::default();
     for slot in batch.prepare(1, &input) {
-        Letterbox::new(SIZE, SIZE, &input).render(&picture(), &input, slot);
+        Letterbox::new(SIZE, SIZE, &input).render(&image(), &input, slot);
     }
     let mut found = detector.detect(&batch).unwrap().per_view.remove(0);
     found.sort_by(|a, b| b.score.total_cmp(&a.score));

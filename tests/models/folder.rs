@@ -23,12 +23,12 @@ pub(crate) fn fixture(name: &str) -> PathBuf {
     of_repository("tests/fixtures/models").join(format!("{name}.onnx"))
 }
 
-/// The ONNX Runtime library of the set-up.
+/// The ONNX Runtime library installed by `make setup`.
 pub(crate) fn library() -> PathBuf {
     of_repository("runtime/libonnxruntime.so")
 }
 
-/// How tests run networks.
+/// Options for networks in tests.
 pub(crate) fn options() -> OnnxOptions {
     OnnxOptions {
         device: Device::Cpu,
@@ -40,7 +40,7 @@ pub(crate) fn options() -> OnnxOptions {
     }
 }
 
-/// A model of two sessions.
+/// A model with two sessions.
 pub(crate) fn model_of_two_sessions(path: &Path) -> Result<Model, InferenceError> {
     let two = NonZeroUsize::new(2).unwrap();
     let (first, others) = OnnxDetector::load_sessions(&library(), path, &options(), two)?;
@@ -48,10 +48,10 @@ pub(crate) fn model_of_two_sessions(path: &Path) -> Result<Model, InferenceError
     Ok(Model::of_sessions(Box::new(first), others.collect()))
 }
 
-/// Writes a model folder: a manifest called `name` that goes on with `more`, and an ONNX file.
+/// Writes a model folder: an ONNX file and a manifest with `name` and the fields in `more`.
 pub(crate) fn write(folder: &Path, name: &str, more: &str, onnx: &Path) {
     fs::create_dir_all(folder).unwrap();
-    // A copy under another name first, as whoever replaces a model does it.
+    // Copies to a temporary name first, like an operator who replaces a model.
     fs::copy(onnx, folder.join("model.onnx.new")).unwrap();
     fs::rename(folder.join("model.onnx.new"), folder.join("model.onnx")).unwrap();
     let manifest = format!("name = \"{name}\"\nonnx = \"model.onnx\"\n{more}");
@@ -65,7 +65,7 @@ pub(crate) fn load(onnx: &str, more: &str) -> Result<OnnxDetector, InferenceErro
     OnnxDetector::load(&library(), folder.path(), &options())
 }
 
-/// Why such a model is refused.
+/// The error message for a refused model.
 #[track_caller]
 pub(crate) fn refusal(onnx: &str, more: &str) -> String {
     match load(onnx, more) {

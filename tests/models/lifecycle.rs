@@ -1,4 +1,4 @@
-//! Loading, reloading and unloading, and what failures leave behind.
+//! Loading, reloading and unloading of models, and the state after failures.
 
 use std::{
     fs,
@@ -19,7 +19,7 @@ use crate::folder::{fixture, model_of_two_sessions, write};
 
 const OTHER_ORDER: &str = "[input]\nchannel_order = \"bgr\"";
 
-/// Those of the models in a folder, of which `a` must stay.
+/// Options for the models in a folder. `a` must stay loaded.
 fn options_of(folder: &TempDir) -> RepositoryOptions {
     RepositoryOptions {
         folder: ModelFolder {
@@ -37,7 +37,7 @@ struct Models {
 }
 
 impl Models {
-    /// A repository with the models `a` and `b`, of which `a` must stay.
+    /// A repository with the models `a` and `b`. `a` must stay loaded.
     fn new() -> Self {
         let folder = TempDir::new().unwrap();
         for name in ["a", "b"] {
@@ -112,11 +112,11 @@ fn only_what_is_in_the_folder_can_be_loaded() {
         &fixture("any_batch"),
     );
     let error = models.repository.load("c").err().unwrap().to_string();
-    assert!(error.contains("calls itself \"a\""), "{error}");
+    assert!(error.contains("has the name \"a\""), "{error}");
 }
 
 #[test]
-fn a_model_whose_files_change_is_replaced_once_they_keep_still() {
+fn a_model_with_changed_files_is_replaced_once_they_are_stable() {
     let models = Models::new();
     models.repository.load("a").unwrap();
     let before = models.revision("a");
@@ -125,11 +125,7 @@ fn a_model_whose_files_change_is_replaced_once_they_keep_still() {
 
     models.write("a", OTHER_ORDER, "any_batch");
     models.repository.reload_changed();
-    assert_eq!(
-        models.revision("a"),
-        before,
-        "the files may still be written to"
-    );
+    assert_eq!(models.revision("a"), before, "the files may still change");
     models.repository.reload_changed();
     let after = models.revision("a");
     assert_ne!(after, before);
@@ -139,7 +135,7 @@ fn a_model_whose_files_change_is_replaced_once_they_keep_still() {
 }
 
 #[test]
-fn a_model_that_fails_its_check_leaves_the_old_one_at_work() {
+fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
     for (onnx, reason) in [
         ("external_in_a_branch", "tensors in other files"),
         ("huge_tensor", "a tensor of more than"),
@@ -155,7 +151,7 @@ fn a_model_that_fails_its_check_leaves_the_old_one_at_work() {
         assert!(error.contains(reason), "{error}");
         assert_eq!(models.revision("a"), before);
         assert_eq!(models.row("a").reason, Some(error));
-        // What was refused is not tried again and again.
+        // A refused model is not loaded again until its files change.
         models.repository.reload_changed();
         models.repository.reload_changed();
         assert_eq!(models.counts(), (1, 1));
@@ -169,7 +165,7 @@ fn a_model_that_fails_its_check_leaves_the_old_one_at_work() {
 }
 
 #[test]
-fn a_model_whose_files_are_gone_stays_at_work() {
+fn a_model_with_deleted_files_stays_loaded() {
     let models = Models::new();
     models.repository.load("a").unwrap();
     fs::remove_dir_all(models.folder.path().join("a")).unwrap();
@@ -180,7 +176,7 @@ fn a_model_whose_files_are_gone_stays_at_work() {
 }
 
 #[test]
-fn a_manifest_that_breaks_is_told_about_once_and_changes_nothing() {
+fn an_invalid_manifest_is_reported_once_and_changes_nothing() {
     let models = Models::new();
     models.repository.load("a").unwrap();
     fs::write(models.folder.path().join("a/model.toml"), "name = ").unwrap();
@@ -194,37 +190,37 @@ fn a_manifest_that_breaks_is_told_about_once_and_changes_nothing() {
 #[test]
 fn nothing_is_unloaded_while_a_model_is_being_loaded() {
     let Models { folder, .. } = Models::new();
-    let at_work = Arc::new(Barrier::new(2));
-    let at_work_too = Arc::clone(&at_work);
+    let steps = Arc::new(Barrier::new(2));
+    let steps_of_load = Arc::clone(&steps);
     let repository = ModelRepository::new(
         options_of(&folder),
         Box::new(move |path| {
-            at_work_too.wait();
-            at_work_too.wait();
+            steps_of_load.wait();
+            steps_of_load.wait();
             model_of_two_sessions(path)
         }),
     );
     thread::scope(|scope| {
         let loading = scope.spawn(|| repository.load("b"));
-        at_work.wait();
+        steps.wait();
         let refused = repository.unload("b").unwrap_err();
         assert!(matches!(refused, RepositoryError::Busy), "{refused}");
-        at_work.wait();
+        steps.wait();
         loading.join().unwrap().unwrap();
     });
     repository.unload("b").unwrap();
 }
 
 #[test]
-fn files_that_changed_while_the_inference_server_was_away_are_tried_again() {
+fn changed_files_are_retried_after_a_server_outage() {
     let models = Models::new();
     let folder = &models.folder;
-    let is_away = Arc::new(AtomicBool::new(false));
-    let away = Arc::clone(&is_away);
+    let is_unavailable = Arc::new(AtomicBool::new(false));
+    let unavailable = Arc::clone(&is_unavailable);
     let repository = ModelRepository::new(
         options_of(folder),
         Box::new(move |path| {
-            if away.load(Ordering::Relaxed) {
+            if unavailable.load(Ordering::Relaxed) {
                 let (url, detail) = ("http://elsewhere".to_owned(), "silence".to_owned());
                 return Err(InferenceError::Remote { url, detail });
             }
@@ -233,11 +229,11 @@ fn files_that_changed_while_the_inference_server_was_away_are_tried_again() {
     );
     let before = repository.load("a").unwrap().revision().to_owned();
     models.write("a", OTHER_ORDER, "any_batch");
-    is_away.store(true, Ordering::Relaxed);
+    is_unavailable.store(true, Ordering::Relaxed);
     repository.reload_changed();
     repository.reload_changed();
     assert_eq!(repository.load_counts().failed, 1);
-    is_away.store(false, Ordering::Relaxed);
+    is_unavailable.store(false, Ordering::Relaxed);
     repository.reload_changed();
     repository.reload_changed();
     let now = repository.registry().get("a").unwrap();
@@ -245,7 +241,7 @@ fn files_that_changed_while_the_inference_server_was_away_are_tried_again() {
 }
 
 #[test]
-fn a_model_that_was_not_fetched_says_how_to() {
+fn a_missing_model_file_error_names_the_command_to_fetch_it() {
     let models = Models::new();
     fs::remove_file(models.folder.path().join("b/model.onnx")).unwrap();
     assert!(models.row("b").reason.unwrap().contains("make models"));

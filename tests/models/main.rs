@@ -1,5 +1,5 @@
-//! Models through the real run-time: tiny ones made for these tests, and those of the set-up.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! Models with the real runtime: small ones made for these tests, and those of `make setup`.
+#![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
 
 mod brought;
 mod darknet;

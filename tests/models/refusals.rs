@@ -1,4 +1,4 @@
-//! Models that are refused, and what is said about it.
+//! Refused models and their error messages.
 
 use std::{fs, os::unix::fs::symlink};
 
@@ -16,7 +16,7 @@ fn assert_says(message: &str, parts: &[&str]) {
 }
 
 #[test]
-fn a_model_that_refers_to_other_files_is_refused_wherever_it_does() {
+fn a_model_that_refers_to_other_files_is_refused() {
     for onnx in [
         "external_initializer",
         "external_elsewhere",
@@ -32,7 +32,7 @@ fn a_model_that_refers_to_other_files_is_refused_wherever_it_does() {
 }
 
 #[test]
-fn a_model_with_tensors_of_absurd_size_is_refused() {
+fn a_model_with_oversized_tensors_is_refused() {
     assert_says(&refusal("huge_tensor", ""), &["a tensor of more than"]);
     assert_says(
         &refusal("wide_input", ""),
@@ -41,7 +41,7 @@ fn a_model_with_tensors_of_absurd_size_is_refused() {
 }
 
 #[test]
-fn a_model_that_wants_no_picture_is_refused_with_what_it_wants() {
+fn a_model_without_an_image_input_is_refused_with_its_inputs() {
     let needed = "32-bit floats [views, 3, height, width]";
     assert_says(
         &refusal("four_planes", ""),
@@ -56,7 +56,7 @@ fn a_model_that_wants_no_picture_is_refused_with_what_it_wants() {
 }
 
 #[test]
-fn a_model_whose_outputs_fit_no_head_is_refused_with_what_it_has() {
+fn outputs_that_fit_no_head_are_refused_with_their_shapes() {
     assert_says(
         &refusal("other_names", ""),
         &["\"dets\"", "\"confidence\"", "[output]"],
@@ -127,7 +127,7 @@ fn a_manifest_that_contradicts_its_model_is_refused() {
 }
 
 #[test]
-fn a_file_with_another_sum_than_its_manifest_says_is_refused() {
+fn a_file_with_a_wrong_checksum_is_refused() {
     let sum = load("any_batch", "").unwrap().description().sha256.clone();
     load("any_batch", &format!("sha256 = \"{sum}\"")).unwrap();
     let other = format!("sha256 = \"{}\"", "0".repeat(64));
@@ -135,7 +135,7 @@ fn a_file_with_another_sum_than_its_manifest_says_is_refused() {
 }
 
 #[test]
-fn a_file_outside_the_model_s_folder_is_refused_however_it_is_reached() {
+fn a_file_outside_the_model_s_folder_is_refused() {
     let folder = TempDir::new().unwrap();
     let inside = folder.path().join("mine");
     write(&inside, "mine", "", &fixture("any_batch"));
@@ -158,7 +158,7 @@ fn a_file_outside_the_model_s_folder_is_refused_however_it_is_reached() {
 }
 
 #[test]
-fn what_is_no_onnx_file_is_refused() {
+fn a_file_that_is_not_onnx_is_refused() {
     let whole = fs::read(fixture("any_batch")).unwrap();
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("model.onnx");
@@ -173,7 +173,7 @@ fn what_is_no_onnx_file_is_refused() {
         let error = OnnxDetector::load(&library(), &file, &options())
             .err()
             .unwrap();
-        assert_says(&error.to_string(), &["model.onnx", "no ONNX model"]);
+        assert_says(&error.to_string(), &["model.onnx", "not an ONNX model"]);
     }
     fs::write(&file, []).unwrap();
     fs::File::options()
@@ -194,7 +194,7 @@ fn what_is_no_onnx_file_is_refused() {
 }
 
 #[test]
-fn a_gpu_is_refused_by_a_library_that_cannot_use_one() {
+fn a_library_without_gpu_support_refuses_a_gpu() {
     for device in [Device::Cuda(0), Device::TensorRt(1)] {
         let options = OnnxOptions {
             device,

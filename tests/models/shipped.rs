@@ -1,4 +1,4 @@
-//! The models of the set-up on the samples.
+//! The models of `make setup` on the samples.
 
 use std::{fs, sync::Arc, time::Instant};
 
@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::folder::of_repository;
 
-/// Looks at the office with a model, for whatever looks a little like a person.
+/// Runs a model on the office sample with a low score threshold.
 fn detect(model: &str) -> DetectionReport {
     let settings = settings::load(None, []).unwrap();
     let parameters =
@@ -35,7 +35,7 @@ fn detect(model: &str) -> DetectionReport {
     engine.detect(&job).unwrap().report
 }
 
-/// Where the persons in the office are.
+/// Boxes of the persons in the office.
 fn annotated() -> Vec<BBox<FramePixels>> {
     let file = fs::read_to_string(of_repository("samples/annotations.json")).unwrap();
     let file: Value = serde_json::from_str(&file).unwrap();
@@ -58,7 +58,7 @@ fn every_fetched_model_finds_the_persons_of_a_sample() {
     let fetched: Vec<_> = folders.filter(|folder| is_fetched(folder)).collect();
     assert!(
         fetched.len() >= 2,
-        "the set-up brings two models: {fetched:?}"
+        "`make setup` installs two models: {fetched:?}"
     );
     let annotated = annotated();
     for folder in fetched {
@@ -72,7 +72,7 @@ fn every_fetched_model_finds_the_persons_of_a_sample() {
                 .any(|person| person.bbox.iou(truth) > 0.4)
         };
         let found = annotated.iter().filter(is_found).count();
-        // The smallest of them misses some.
+        // The smallest model misses some persons.
         assert!(
             2 * found >= annotated.len(),
             "{name} finds {found} of {}",

@@ -1,4 +1,4 @@
-//! Replacing a model while it is at work.
+//! Replacement of a model under load.
 
 use std::{
     collections::BTreeSet,
@@ -127,7 +127,7 @@ async fn a_model_is_swapped_under_load_without_a_failed_request() {
             "{loaded}"
         );
         let revision = loaded["version"].as_str().unwrap().to_owned();
-        // A frame that begins now is looked at with the new one.
+        // A frame that starts now uses the new model.
         let (_, report) = post(&router, "/detect?profile=fast", frame.clone()).await;
         assert_eq!(report["model"]["revision"], revision.as_str());
         revisions.insert(revision);
@@ -140,6 +140,6 @@ async fn a_model_is_swapped_under_load_without_a_failed_request() {
     }
     assert_eq!(
         seen, revisions,
-        "reports name a model that never was, or none was seen"
+        "a report names an unknown revision, or no reports were received"
     );
 }

@@ -17,7 +17,7 @@ fn name_of(list: &KeyList, key: &str) -> Option<String> {
 }
 
 #[test]
-fn a_file_and_a_variable_say_the_same() {
+fn a_file_and_a_variable_give_the_same_keys() {
     let text = line("gate", "\"detect\", \"read\"", "one") + &line("office", "\"admin\"", "two");
     let file = KeyList::from_toml(&text).unwrap();
     let (one, two) = (digest_of("one"), digest_of("two"));
@@ -32,7 +32,7 @@ fn a_file_and_a_variable_say_the_same() {
 }
 
 #[test]
-fn nothing_but_the_whole_key_is_the_key() {
+fn only_the_whole_key_is_accepted() {
     let list = KeyList::from_toml(&line("gate", "\"detect\"", "secret")).unwrap();
     let digest = digest_of("secret");
     for wrong in [
@@ -51,7 +51,7 @@ fn nothing_but_the_whole_key_is_the_key() {
 }
 
 #[test]
-fn every_mistake_is_told_with_its_place_and_without_what_was_written() {
+fn errors_name_the_position_and_do_not_repeat_the_input() {
     let good = digest_of("one");
     let leak = "lookdown_do-not-show-me";
     for (text, told) in [
@@ -100,7 +100,7 @@ fn every_mistake_is_told_with_its_place_and_without_what_was_written() {
 }
 
 #[test]
-fn there_may_be_a_thousand_keys_and_no_more() {
+fn more_than_a_thousand_keys_are_refused() {
     let lines = |count: usize| -> String {
         let line = |at| line(&format!("key-{at}"), "\"read\"", &format!("{at}"));
         (0..count).map(line).collect()

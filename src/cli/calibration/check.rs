@@ -23,7 +23,7 @@ use crate::{
     },
 };
 
-/// The views of the plan are as fine as the default network's input, pixels.
+/// The resolution of the plan's views: the input side of the default network, pixels.
 const VIEW_SIDE: u32 = 416;
 const JPEG_QUALITY: u8 = 92;
 
@@ -35,12 +35,12 @@ pub(in super::super) struct Arguments {
     /// Draw the lens, the balanced view plan, zones and masks into this frame of the camera
     #[arg(long, value_name = "FRAME", requires = "out")]
     preview: Option<PathBuf>,
-    /// Where to write the drawing, a JPEG file
+    /// Output file of the drawing, JPEG
     #[arg(long, value_name = "OUT.jpg", requires = "preview")]
     out: Option<PathBuf>,
 }
 
-/// Reports on every camera of the file; one that cannot be used costs the exit code.
+/// Reports on every camera of the file. A camera that cannot be used results in exit code 1.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let (Some(frame), Some(out)) = (&arguments.preview, &arguments.out) {
         let (_, camera) = arguments.source.read_one()?;
@@ -82,14 +82,14 @@ fn views(calibration: &Calibration) -> Vec<VirtualView> {
     ViewPlan::balanced().views(calibration.mount(), VIEW_SIDE, VIEW_SIDE)
 }
 
-/// The lines on one camera.
+/// Describes one camera in lines.
 fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str, String)> {
     let lens = calibration.lens();
     let (width, height) = calibration.image_size();
     let told = camera.told.camera.as_ref().ok();
     let end = match told.and_then(|told| told.lens.max_theta()) {
         Some(_) => "",
-        None => ", to the farthest corner of the frame or where the curve ends",
+        None => ", up to the farthest corner of the frame or the end of the curve",
     };
     let views = views(calibration);
     let coverage = Coverage::of(lens, &views, width, height);
@@ -105,8 +105,8 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
         (
             "  plan",
             format!(
-                "balanced, {} views: {:.1} % of the lens image is seen, a place of it in {:.1} views \
-                 on average",
+                "balanced, {} views: {:.1} % of the lens image is covered, each point by {:.1} \
+                 views on average",
                 views.len(),
                 100.0 * coverage.seen_share,
                 coverage.mean_views
@@ -120,7 +120,7 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
     lines
 }
 
-/// Where the rim of the lens image lies, and whether the frame holds it.
+/// Describes the rim of the lens image, and its position in the frame.
 fn circle(lens: &Lens, width: u32, height: u32) -> String {
     const AZIMUTHS: u32 = 72;
     let centre = lens.principal_point();
@@ -144,8 +144,8 @@ fn circle(lens: &Lens, width: u32, height: u32) -> String {
     let is_inside =
         |pixel: &Pixel| (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y);
     let held = match rim.iter().filter(|pixel| is_inside(pixel)).count() {
-        0 => "beyond the frame on every side",
-        inside if inside == rim.len() => "whole in the frame",
+        0 => "outside the frame on every side",
+        inside if inside == rim.len() => "completely in the frame",
         _ => "cut off by the frame",
     };
     format!(
@@ -164,11 +164,11 @@ fn mount(calibration: &Calibration) -> String {
     };
     match mount.height_m() {
         Some(height) => format!("{looks} from {height} m"),
-        None => format!("{looks}, height unknown: persons get no place on the floor"),
+        None => format!("{looks}, height unknown: persons have no floor position"),
     }
 }
 
-/// The zones and masks, if there are some.
+/// Describes the zones and masks, if there are any.
 fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, String)> {
     let Areas { zones, masks } = calibration.areas();
     let names = zones.iter().map(|zone| match zone.area {

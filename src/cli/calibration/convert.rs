@@ -30,12 +30,13 @@ pub(in super::super) struct Arguments {
     /// The ID to write into a native file [default: the file's name, with the camera's]
     #[arg(long, value_name = "ID")]
     id: Option<String>,
-    /// Where to write it [default: standard output]
+    /// Output file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// Writes one camera; what the target cannot hold is told on standard error.
+/// Writes one camera. Properties that the target format does not support are listed on standard
+/// error.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = arguments.source.file.display();
     let (_, camera) = arguments.source.read_one()?;

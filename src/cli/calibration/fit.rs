@@ -27,27 +27,27 @@ use crate::{
 /// Arguments of `lookdown calibration fit`.
 #[derive(Debug, Args)]
 pub(in super::super) struct Arguments {
-    /// Frames of one camera: JPEG, PNG or WebP, all of one size. Bright ones show the circle best
+    /// Frames of one camera: JPEG, PNG or WebP, all of one size. Bright frames work best
     #[arg(required = true, value_name = "FRAME")]
     frames: Vec<PathBuf>,
-    /// The calibration's ID
+    /// ID of the calibration
     #[arg(long, value_name = "ID", default_value = "camera")]
     id: CalibrationId,
-    /// How the radius grows with the angle; the data sheet may tell
+    /// Projection of the lens: the growth of the radius with the angle, see its data sheet
     #[arg(long, value_name = "MODEL", default_value = "equidistant")]
     lens: IdealLens,
-    /// What the circle spans, degrees, as in the data sheet
+    /// Field of view of the circle in degrees, as in the data sheet
     #[arg(long, value_name = "DEGREES", default_value_t = 180.0, value_parser = field_of_view)]
     field_of_view: f64,
-    /// How high the camera hangs above the floor: gives persons a place on it
+    /// Height of the camera above the floor: enables floor positions of persons
     #[arg(long, value_name = "METRES", value_parser = height)]
     height: Option<f64>,
-    /// Where to write it [default: standard output]
+    /// Output file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// Lenses that a circle and a field of view determine.
+/// Lenses that are determined by a circle and a field of view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum IdealLens {
     /// `r = f theta`: most ceiling cameras
@@ -71,7 +71,7 @@ impl IdealLens {
     }
 }
 
-/// Finds the circle, writes the calibration, and says on standard error how sure it is.
+/// Fits the circle, writes the calibration, and describes the accuracy on standard error.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let (image, agreed) = circle(&arguments.frames)?;
     let calibration = calibration(arguments, image, &agreed)?;
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The frames' size and the circle that most of them agree on.
+/// Returns the size of the frames, and the circle on which most of them agree.
 fn circle(frames: &[PathBuf]) -> anyhow::Result<(NativeImage, AgreedCircle)> {
     let mut size = None;
     let mut circles = Vec::with_capacity(frames.len());
@@ -105,11 +105,11 @@ fn circle(frames: &[PathBuf]) -> anyhow::Result<(NativeImage, AgreedCircle)> {
         }
         match find_lens_circle(&frame) {
             Some(circle) => circles.push(circle),
-            None => eprintln!("lookdown: {}: shows no lens circle", path.display()),
+            None => eprintln!("lookdown: {}: no lens circle found", path.display()),
         }
     }
     size.zip(agreed_circle(&circles)).context(
-        "no frame shows a lens circle: give brighter frames, in which black surrounds the picture",
+        "no frame shows a lens circle: give brighter frames, with black around the lens image",
     )
 }
 
@@ -128,7 +128,7 @@ fn calibration(
     )?;
     let rim = Ray::new(max_theta.sin(), 0.0, max_theta.cos());
     let rim = of_one_pixel.project_to_rim(&rim);
-    let rim = rim.context("--field-of-view: the rim of this lens cannot be placed")?;
+    let rim = rim.context("--field-of-view: the rim of this lens cannot be calculated")?;
     let radius_in_focal_lengths = rim.x - of_one_pixel.principal_point().x;
     let lens = lens(thousandths(circle.radius / radius_in_focal_lengths));
     Ok(NativeCalibration {
@@ -144,7 +144,7 @@ fn calibration(
     })
 }
 
-/// What was measured, what was assumed, and how to tell.
+/// Describes the measurements, the assumptions, and a way to check them.
 fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
     let AgreedCircle {
         circle,
@@ -153,7 +153,7 @@ fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
     } = agreed;
     let frames = arguments.frames.len();
     let how_sure = match (frames, *agreeing) {
-        (1, _) => "seen in one frame: a second one would show how sure that is".to_owned(),
+        (1, _) => "found in one frame: give a second one to measure the accuracy".to_owned(),
         (_, agreeing) if 2 * agreeing > frames => {
             format!("{agreeing} of {frames} frames agree within {spread:.1} pixels")
         }
@@ -162,9 +162,9 @@ fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
         ),
     };
     format!(
-        "circle: centre {:.1}, {:.1}, radius {:.1} pixels, {how_sure}; the lens ({}) and the field of \
-         view of {}° are what was given, not measured, and the camera is taken to look straight \
-         down; look at it with `lookdown calibration check FILE --preview FRAME --out P.jpg`",
+        "circle: centre {:.1}, {:.1}, radius {:.1} pixels, {how_sure}; the lens ({}) and the field \
+         of view of {}° were given, not measured, and the camera is assumed to look straight \
+         down; check it with `lookdown calibration check FILE --preview FRAME --out P.jpg`",
         circle.cx + 0.5,
         circle.cy + 0.5,
         circle.radius,

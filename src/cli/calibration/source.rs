@@ -1,4 +1,4 @@
-//! The cameras of a file that a command is about.
+//! The cameras of the file that a command reads.
 
 use std::path::PathBuf;
 
@@ -12,16 +12,16 @@ use crate::calibration::{
     read_content,
 };
 
-/// Which file, and which camera of it.
+/// The arguments that select a file, and a camera of it.
 #[derive(Debug, Args)]
 pub(super) struct Source {
-    /// A calibration file: its format is recognised from its content
+    /// A calibration file; its format is detected from its content
     #[arg(value_name = "FILE")]
     pub(super) file: PathBuf,
-    /// Take this one of a file with several cameras
+    /// Camera of a file with several cameras
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
-    /// The frame size in pixels, for formats that do not tell it
+    /// Frame size in pixels, for formats that do not contain it
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<NativeImage>,
 }
@@ -32,16 +32,16 @@ pub(super) struct Cameras {
     pub(super) cameras: Vec<NamedCamera>,
 }
 
-/// A camera as the file tells it and as it was understood.
+/// A camera as stated in the file, and as it was interpreted.
 pub(super) struct NamedCamera {
-    /// The ID it has in a calibration folder.
+    /// Its ID in a calibration folder.
     pub(super) id: String,
     pub(super) told: FileCamera,
     pub(super) checked: Result<Calibration, FormatError>,
 }
 
 impl Source {
-    /// Reads the file: the camera that was asked for, or all.
+    /// Reads the file: the requested camera, or all.
     pub(super) fn read(&self) -> anyhow::Result<Cameras> {
         let path = self.file.display();
         let content = read_content(&self.file)?;
@@ -68,7 +68,7 @@ impl Source {
         })
     }
 
-    /// Reads the file's only camera, or the one that was asked for.
+    /// Reads the only camera of the file, or the requested one.
     pub(super) fn read_one(&self) -> anyhow::Result<(Format, NamedCamera)> {
         let Cameras { format, cameras } = self.read()?;
         match <[NamedCamera; 1]>::try_from(cameras) {

@@ -1,4 +1,4 @@
-//! Where rows go: to standard output as they come, and at last into the picture.
+//! The output of rows: to standard output as they are finished, and finally into the plot.
 
 use std::io::{self, Write};
 
@@ -13,7 +13,7 @@ use crate::evaluation::{DataSet, DetectedRow, EvaluatedRow, precision_recall_plo
 /// The rows of one run.
 pub(super) struct Output<'a> {
     arguments: &'a Arguments,
-    /// Kept for the picture alone.
+    /// Kept only for the plot.
     plotted: Vec<(String, EvaluatedRow)>,
     head_is_due: bool,
 }

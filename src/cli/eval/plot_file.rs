@@ -1,4 +1,4 @@
-//! `--plot`: a picture of the rows.
+//! `--plot`: a plot of the rows.
 
 use std::{ffi::OsStr, fs, path::Path, str::FromStr};
 
@@ -6,16 +6,16 @@ use anyhow::Context;
 
 use crate::evaluation::LinePlot;
 
-/// Where a plot goes: an SVG or a PNG file, by its ending.
+/// The output file of a plot: SVG or PNG, by its extension.
 #[derive(Debug, Clone)]
 pub(super) struct PlotFile {
     path: std::path::PathBuf,
     is_png: bool,
 }
 
-/// A file of another kind.
+/// The extension is not supported.
 #[derive(Debug, thiserror::Error)]
-#[error("a plot is an .svg or a .png file; end its name in one of them")]
+#[error("a plot is an .svg or a .png file; give its name one of these extensions")]
 pub(super) struct NoPlotFile;
 
 impl FromStr for PlotFile {

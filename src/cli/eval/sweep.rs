@@ -22,10 +22,10 @@ use crate::{
 
 const JPEG_QUALITY: u8 = 90;
 
-/// A cell of the sweep and how good it is.
+/// A cell of the sweep and its figures.
 type Cells = [(DetectedRow, EvaluatedRow)];
 
-/// Prints the figures of every cell and writes them and their pictures to `folder`.
+/// Prints the figures of every cell, and writes them and their plots to `folder`.
 pub(super) fn run(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     let base = variants::base_of_sweep(arguments)?;
     let settings = arguments.settings_file.load()?;

@@ -10,8 +10,8 @@ use crate::{
     pipeline::Profile,
 };
 
-/// One row: a JSON object, or a line of the table by its `Display`. What is not known of
-/// detections from a file is null, or a dash.
+/// One row: a JSON object, or a line of the table by its `Display`. Unknown values of detections
+/// from a file are null, or a dash.
 #[derive(Debug, Serialize)]
 pub(super) struct Row<'a> {
     profile: Option<&'static str>,
@@ -22,7 +22,7 @@ pub(super) struct Row<'a> {
     sigma: Option<f64>,
     images: usize,
     persons: usize,
-    /// Views per image that the network saw.
+    /// Views per image that ran through the network.
     views: Option<f64>,
     /// Areas under the precision-recall curve, all points.
     ap50: f64,
@@ -39,13 +39,13 @@ pub(super) struct Row<'a> {
     f1_precision: f64,
     f1_recall: f64,
     recall: f64,
-    /// Working on an image, without waiting for others in flight.
+    /// Processing time of an image, without waiting for concurrent ones.
     seconds_per_image: Option<f64>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     strata: Vec<StratumRow>,
 }
 
-/// The figures of one stratum; null, or a dash, where it has nobody to find.
+/// The figures of one stratum. They are null, or a dash, if no person counts.
 #[derive(Debug, Serialize)]
 struct StratumRow {
     by: &'static str,
@@ -98,12 +98,12 @@ impl<'a> Row<'a> {
     }
 }
 
-/// The line above the rows of a sweep.
+/// The header of a sweep.
 pub(super) const SWEEP_HEAD: &str =
     "refine               C_t    N_t  sigma   AP50   AP75  AP50:95     F1  recall";
 
 impl Row<'_> {
-    /// The line of a cell of a sweep. Each refinement shows the numbers that it uses.
+    /// The line of a cell of a sweep. Each refinement shows the parameters that it uses.
     pub(super) fn sweep_line(&self) -> String {
         let refine = self.refine.unwrap_or("-");
         let is_gaussian = refine == Refinement::SoftNmsGaussian.name();
@@ -128,7 +128,7 @@ fn number(value: Option<f64>, decimals: usize) -> String {
     }
 }
 
-/// The line above the rows.
+/// The header of the table.
 pub(super) const HEAD: &str = "\
 profile   refine             model                  views   AP50   AP75  AP50:95     F1  recall  s/image";
 

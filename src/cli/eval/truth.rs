@@ -1,4 +1,4 @@
-//! The data set: where it is, and how its truth is looked at.
+//! The data set and the interpretation of its ground truth.
 
 use std::{
     path::{Path, PathBuf},
@@ -15,18 +15,19 @@ use crate::{
     evaluation::{DataSet, Scoring, Stratification},
 };
 
-/// The flags that name a data set.
+/// The flags that select a data set.
 #[derive(Debug, Args)]
 pub(super) struct TruthFlags {
-    /// Pictures with the persons in them: a folder with annotations.json (COCO with a `calibration`
-    /// per image), images/ and calibrations/; a COCO or CEPDOF file or a folder with such; a folder
-    /// with Pascal VOC XML files; a PIROPO folder with head points
+    /// Images with annotated persons: a folder with annotations.json (COCO with a `calibration` per
+    /// image), images/ and calibrations/; a COCO or CEPDOF file or a folder of them; a folder with
+    /// Pascal VOC XML files; a PIROPO folder with head points
     pub(super) data_set: PathBuf,
-    /// A calibration file, or the ID of one in the calibration folder, for every picture [default:
-    /// each picture's own; without one an ideal lens is assumed]
+    /// A calibration file, or the ID of one in the calibration folder, for every image [default:
+    /// each image's own; without one an ideal lens is assumed]
     #[arg(long, value_name = "FILE|ID")]
     calibration: Option<String>,
-    /// Score rotated truth by the bounds of the ellipses in it, with axis-parallel detections
+    /// Score rotated ground truth by the bounds of the inscribed ellipses, with axis-parallel
+    /// detections
     #[arg(long)]
     axis_parallel: bool,
     /// Also score the persons of each stratum: by distance from the optical axis, size or

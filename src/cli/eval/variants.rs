@@ -1,4 +1,4 @@
-//! What is to be looked at with: groups of parameters that share an inference per image.
+//! The variants to evaluate: groups of parameters that share an inference per image.
 
 use anyhow::{Context, bail};
 use strum::VariantArray;
@@ -43,7 +43,7 @@ pub(super) fn groups(arguments: &Arguments) -> Result<Vec<Vec<DetectParameters>>
     groups.collect()
 }
 
-/// The profile of a sweep with NMS, for the sweep to vary.
+/// The profile of a sweep with NMS, whose parameters the sweep varies.
 pub(super) fn base_of_sweep(arguments: &Arguments) -> anyhow::Result<DetectParameters> {
     let profile = match arguments.profile[..] {
         [] => Profile::Paper,

@@ -1,4 +1,4 @@
-//! A model's description in lines.
+//! The description of a model as text.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use crate::{
     inference::{ModelDescription, OnnxTensor, heads::Head},
 };
 
-/// One fact a line.
+/// One property per line.
 pub(super) struct Lines<'a>(pub(super) &'a ModelDescription);
 
 impl fmt::Display for Lines<'_> {
@@ -62,7 +62,7 @@ impl fmt::Display for Lines<'_> {
     }
 }
 
-/// A head's name in manifests, and what it takes the outputs for.
+/// The name of a head in manifests, and its interpretation of the outputs.
 fn head(head: &Head) -> &'static str {
     match head {
         Head::BoxesScores(_) => "boxes_scores: finished boxes and person scores",

@@ -1,4 +1,4 @@
-//! One way to run the network, tried.
+//! A measurement of one way to run the network.
 
 use std::{
     num::NonZeroUsize,
@@ -14,17 +14,17 @@ use crate::{
     settings::Settings,
 };
 
-/// How long the sessions run for one figure.
+/// The duration of one measurement.
 const WINDOW: Duration = Duration::from_millis(1500);
 
 /// One way to run the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Choice {
-    /// Sessions side by side.
+    /// The number of concurrent sessions.
     pub(super) sessions: NonZeroUsize,
-    /// Threads in each.
+    /// The number of threads of each.
     pub(super) threads: NonZeroUsize,
-    /// Views in one run.
+    /// The number of views of one run.
     pub(super) batch_views: NonZeroUsize,
 }
 
@@ -50,7 +50,7 @@ impl Trial {
         Ok(Self { model, choice })
     }
 
-    /// How many views all sessions together look at in a second.
+    /// The number of views that all sessions together process in a second.
     pub(super) fn views_per_second(&self) -> Result<f64, InferenceError> {
         std::thread::scope(|scope| {
             let sessions = 0..self.choice.sessions.get();
@@ -77,7 +77,10 @@ impl Trial {
             self.model.detect(session, &batch)?;
             runs += 1.0;
         }
-        #[expect(clippy::cast_precision_loss, reason = "far below 2^52 views")]
+        #[expect(
+            clippy::cast_precision_loss,
+            reason = "there are far fewer than 2^52 views"
+        )]
         let views = runs * views as f64;
         Ok(views / began.elapsed().as_secs_f64())
     }

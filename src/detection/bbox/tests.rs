@@ -1,4 +1,4 @@
-//! What a box is, and what no box is.
+//! Construction, geometry and refusals of boxes.
 
 use super::{BBox, BBoxError, FramePixels};
 
@@ -7,7 +7,7 @@ fn frame_box(corners: [f64; 4]) -> BBox<FramePixels> {
 }
 
 #[test]
-fn coordinates_that_are_no_numbers_are_refused() {
+fn coordinates_that_are_not_numbers_are_refused() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1.1e9] {
         for position in 0..4 {
             let mut corners = [0.0, 0.0, 1.0, 1.0];
@@ -29,7 +29,7 @@ fn an_inverted_box_is_refused_on_either_axis() {
 }
 
 #[test]
-fn refusals_say_what_was_given_and_what_to_give() {
+fn errors_name_the_given_and_the_expected_coordinates() {
     assert_eq!(
         BBoxError::Coordinate(f64::NAN).to_string(),
         "box coordinate NaN is not a pixel position; use finite numbers within ±1e9"

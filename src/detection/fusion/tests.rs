@@ -1,4 +1,4 @@
-//! How candidates gather into persons, and what agreement is worth.
+//! Clustering of candidates, and scores from the agreement of views.
 
 use crate::detection::{
     BBox, Candidate, MergedDetection, Refinement, RefinementParameters, refine,
@@ -35,7 +35,7 @@ fn assert_close(actual: f64, expected: f64) {
     );
 }
 
-/// The IoU of a box of the person's width with itself, shifted sideways.
+/// The IoU of a box of the person's width with the same box shifted sideways.
 fn iou_when_shifted(pixels: f64) -> f64 {
     (50.0 - pixels) / (50.0 + pixels)
 }
@@ -57,7 +57,7 @@ fn a_fused_box_is_the_mean_weighted_by_cubed_score() {
 }
 
 #[test]
-fn a_box_cut_off_by_its_view_hardly_moves_the_mean_but_counts_as_a_witness() {
+fn a_box_cut_off_by_its_view_votes_but_hardly_moves_the_mean() {
     let cut_off = Candidate {
         coordinate_weight: 0.1,
         expected_views: 2.0,
@@ -75,7 +75,7 @@ fn a_box_cut_off_by_its_view_hardly_moves_the_mean_but_counts_as_a_witness() {
 }
 
 #[test]
-fn missing_witnesses_count_as_zero_up_to_three_of_those_expected() {
+fn missing_views_vote_zero_up_to_three_expected_views() {
     let lonely = |expected_views| Candidate {
         expected_views,
         ..candidate(PERSON, 0.9, 0)
@@ -86,7 +86,7 @@ fn missing_witnesses_count_as_zero_up_to_three_of_those_expected() {
 }
 
 #[test]
-fn a_view_that_reports_a_person_twice_is_one_witness() {
+fn a_view_that_reports_a_person_twice_votes_once() {
     let expecting_two = |corners, score, view| Candidate {
         expected_views: 2.0,
         ..candidate(corners, score, view)
@@ -109,7 +109,7 @@ fn a_view_that_reports_a_person_twice_is_one_witness() {
 }
 
 #[test]
-fn more_witnesses_than_expected_neither_raise_nor_lower_a_score() {
+fn more_views_than_expected_do_not_change_a_score() {
     let crowd: Vec<_> = [0.7, 0.6, 0.5, 0.4, 0.3]
         .into_iter()
         .enumerate()
@@ -124,16 +124,16 @@ fn expected_views_are_averaged_like_the_coordinates() {
         expected_views,
         ..candidate(PERSON, score, view)
     };
-    // (1 · 0.512 + 3 · 0.064) / 0.576 = 1.22: one witness is enough.
+    // (1 · 0.512 + 3 · 0.064) / 0.576 = 1.22: one vote is required.
     let fused = fuse(&[expecting(1.0, 0.8, 0), expecting(3.0, 0.4, 1)], 0.4);
     assert_close(fused[0].score, 0.8);
-    // (3 · 0.512 + 1 · 0.064) / 0.576 = 2.78: three are wanted, one is missing.
+    // (3 · 0.512 + 1 · 0.064) / 0.576 = 2.78: three votes are required, one is missing.
     let fused = fuse(&[expecting(3.0, 0.8, 0), expecting(1.0, 0.4, 1)], 0.4);
     assert_close(fused[0].score, 0.4);
 }
 
 #[test]
-fn a_box_within_a_better_one_is_doubted_and_one_beside_it_is_not() {
+fn a_nested_box_loses_score_and_a_neighbouring_box_does_not() {
     let legs = [100.0, 170.0, 150.0, 200.0];
     let beside = [160.0, 100.0, 210.0, 200.0];
     let fused = fuse(
@@ -151,7 +151,7 @@ fn a_box_within_a_better_one_is_doubted_and_one_beside_it_is_not() {
 }
 
 #[test]
-fn boxes_below_the_score_threshold_are_still_witnesses() {
+fn boxes_below_the_score_threshold_still_vote() {
     let parameters = RefinementParameters {
         refinement: Refinement::Fusion,
         iou_threshold: 0.4,
@@ -182,7 +182,7 @@ fn a_candidate_joins_the_cluster_it_overlaps_most() {
 }
 
 #[test]
-fn boxes_apart_are_never_fused_even_at_threshold_zero() {
+fn disjoint_boxes_are_never_fused_even_at_threshold_zero() {
     let apart = [
         candidate([0.0, 0.0, 10.0, 10.0], 0.9, 0),
         candidate([20.0, 0.0, 30.0, 10.0], 0.8, 1),
@@ -191,7 +191,7 @@ fn boxes_apart_are_never_fused_even_at_threshold_zero() {
 }
 
 #[test]
-fn the_tiniest_scores_still_average_to_a_box() {
+fn tiny_scores_still_average_to_a_box() {
     let tiny = f64::MIN_POSITIVE;
     let fused = fuse(
         &[candidate(PERSON, tiny, 0), candidate(SHIFTED, tiny, 1)],
@@ -213,7 +213,7 @@ fn disagreement_can_reorder_persons() {
 }
 
 #[test]
-fn of_two_clusters_it_overlaps_equally_a_candidate_joins_the_older() {
+fn equal_overlap_joins_the_older_cluster() {
     let left = candidate([0.0, 0.0, 10.0, 10.0], 0.71, 0);
     let right = candidate([4.0, 0.0, 14.0, 10.0], 0.9, 1);
     let between = candidate([2.0, 0.0, 12.0, 10.0], 0.7, 2);

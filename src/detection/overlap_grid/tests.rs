@@ -1,4 +1,4 @@
-//! The grid must never miss an overlap.
+//! Queries of the grid against a comparison of every pair.
 
 use proptest::prelude::*;
 
@@ -15,12 +15,12 @@ fn boxes() -> impl Strategy<Value = Vec<FrameBox>> {
     prop::collection::vec(frame_box(), 0..40)
 }
 
-/// Any overlap, any that a refinement may ask for, or that of boxes which coincide.
+/// An IoU above 0, one that a refinement may use, or 1 for boxes that coincide.
 fn least_iou() -> impl Strategy<Value = f64> {
     prop_oneof![Just(0.0), 0.0..1.0, Just(0.5), Just(1.0)]
 }
 
-/// Inserts one box after the other.
+/// Inserts the boxes one by one.
 fn grid_of(boxes: &[FrameBox], least_iou: f64) -> OverlapGrid {
     let mut grid = OverlapGrid::covering(boxes.iter(), least_iou);
     for bbox in boxes {
@@ -35,7 +35,7 @@ fn found(grid: &OverlapGrid, bbox: &FrameBox, first: usize) -> Vec<Overlap> {
     found
 }
 
-/// Every box compared.
+/// Compares every box.
 fn overlaps(boxes: &[FrameBox], bbox: &FrameBox, first: usize, least_iou: f64) -> Vec<Overlap> {
     (first..boxes.len())
         .map(|number| Overlap {
@@ -48,7 +48,7 @@ fn overlaps(boxes: &[FrameBox], bbox: &FrameBox, first: usize, least_iou: f64) -
 
 proptest! {
     #[test]
-    fn the_overlaps_are_those_that_comparing_every_box_finds(
+    fn the_grid_finds_the_same_overlaps_as_comparing_every_box(
         boxes in boxes(),
         wanted in frame_box(),
         first in 0..40_usize,
@@ -68,7 +68,7 @@ proptest! {
         at_the_end in any::<bool>(),
         others in boxes(),
     ) {
-        // The whole height and a share of the width, at either end: the IoU is that share.
+        // The whole height and a share of the width, at either end. The IoU is that share.
         let [x_min, y_min, x_max, y_max] = wanted.corners();
         let part = if at_the_end {
             [x_max - share * wanted.width(), y_min, x_max, y_max]

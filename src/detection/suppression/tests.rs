@@ -1,4 +1,4 @@
-//! Ties, and both ends of the IoU threshold.
+//! Equal scores, and both ends of the IoU threshold.
 
 use crate::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
 
@@ -27,10 +27,10 @@ fn picked(refinement: Refinement, iou_threshold: f64, candidates: &[Candidate]) 
 }
 
 #[test]
-fn of_equal_scores_the_lower_index_goes_first_also_when_rescoring_made_them_equal() {
+fn the_lower_index_wins_ties_also_after_rescoring() {
     let apart = row(100.0, 110.0, 0.45);
     let best = row(0.0, 10.0, 1.0);
-    // Overlaps the best by one half: 0.9 becomes 0.45.
+    // Overlaps the best box by one half, so 0.9 becomes 0.45.
     let half = row(0.0, 5.0, 0.9);
     let linear = |candidates: [Candidate; 3]| picked(Refinement::SoftNmsLinear, 0.5, &candidates);
     assert_eq!(linear([apart, best, half]), [1, 0, 2]);
@@ -38,7 +38,7 @@ fn of_equal_scores_the_lower_index_goes_first_also_when_rescoring_made_them_equa
 }
 
 #[test]
-fn at_threshold_0_hard_nms_leaves_one_box_and_linear_soft_nms_all_that_do_not_coincide() {
+fn threshold_0_leaves_hard_nms_one_box_but_not_soft_nms() {
     let candidates = [
         row(0.0, 10.0, 0.9),
         row(0.0, 10.0, 0.8),

@@ -1,9 +1,9 @@
 //! COCO files, and those of CEPDOF and RAPiD, whose boxes have an angle.
 //!
-//! `images[]`: `id`, `file_name`, `width`, `height`, and in our own data sets `calibration`.
-//! `annotations[]`: `image_id`, `bbox`, `iscrowd`, `category_id`, and in our own data sets
-//! `visible_fraction`. A `bbox` is `[left, top, width, height]`, or, in CEPDOF and RAPiD,
-//! `[cx, cy, width, height, degrees clockwise]`; corner-origin pixels in either.
+//! `images[]`: `id`, `file_name`, `width`, `height`, and in Lookdown's data sets `calibration`.
+//! `annotations[]`: `image_id`, `bbox`, `iscrowd`, `category_id`, and in Lookdown's data sets
+//! `visible_fraction`. A `bbox` is `[left, top, width, height]`, or, in CEPDOF and RAPiD, `[cx, cy,
+//! width, height, degrees clockwise]`, in corner-origin pixels.
 
 use std::{
     collections::HashMap,
@@ -19,7 +19,7 @@ use crate::{
     evaluation::{AnnotatedPerson, Outline, RotatedBox, Scoring},
 };
 
-/// The largest file in use, that of COCO's training set, has 450 MB.
+/// The largest common file, that of COCO's training set, has 450 MB.
 const MAX_BYTES: u64 = 1024 * 1024 * 1024;
 
 #[derive(Deserialize)]
@@ -82,7 +82,7 @@ pub(super) fn read_files(
 struct Reader {
     images: Vec<DataSetImage>,
     index_by_id: HashMap<ImageId, usize>,
-    /// That of the boxes read so far.
+    /// The scoring of the boxes read so far.
     scoring: Option<Scoring>,
 }
 
@@ -132,7 +132,7 @@ impl Reader {
             let index = *self
                 .index_by_id
                 .get(id)
-                .ok_or_else(|| wrong(format!("annotations: image_id {id} is no image's id")))?;
+                .ok_or_else(|| wrong(format!("annotations: image_id {id} is not an image's id")))?;
             self.annotate(index, annotation)
                 .map_err(|problem| wrong(format!("annotations[{position}].{problem}")))?;
         }
@@ -144,7 +144,7 @@ impl Reader {
         let (scoring, outline) = outline(&annotation.bbox, image.size)?;
         if *self.scoring.get_or_insert(scoring) != scoring {
             return Err(format!(
-                "bbox: has {} numbers, unlike those before; give all boxes 4 or all 5",
+                "bbox: has {} numbers, unlike the previous ones; give all boxes 4 or all 5",
                 annotation.bbox.len()
             ));
         }
@@ -174,8 +174,8 @@ impl Reader {
     }
 }
 
-/// The category whose annotations are persons: the one of that name, or else the only one; `None`
-/// where the file has no categories, so that every annotation is a person.
+/// The category of persons: the one named `person`, or else the only one. `None` if the file has no
+/// categories, so that every annotation is a person.
 fn person_category(categories: &[CocoCategory]) -> Result<Option<u64>, String> {
     let person = categories
         .iter()
@@ -183,7 +183,7 @@ fn person_category(categories: &[CocoCategory]) -> Result<Option<u64>, String> {
     match (person, categories) {
         (Some(category), _) | (None, [category]) => Ok(Some(category.id)),
         (None, []) => Ok(None),
-        (None, _) => Err("categories: none of several is named person; name it so".to_owned()),
+        (None, _) => Err("categories: none of several is named person; rename one".to_owned()),
     }
 }
 
@@ -201,8 +201,8 @@ fn outline(bbox: &[f64], size: Option<[u32; 2]>) -> Result<(Scoring, Outline), S
             let rotated = RotatedBox::new([cx, cy, width, height], degrees.to_radians(), size)
                 .ok_or_else(|| {
                     format!(
-                        "bbox: {bbox:?} is no rotated box; give finite cx, cy, width, height and \
-                         degrees, with extents of at least 0"
+                        "bbox: {bbox:?} is not a rotated box; give finite cx, cy, width, height \
+                         and degrees, with extents of at least 0"
                     )
                 })?;
             Ok((Scoring::Rotated, Outline::Rotated(rotated)))

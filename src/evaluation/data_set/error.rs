@@ -1,10 +1,10 @@
-//! What can be wrong with a data set.
+//! Errors of data sets.
 
 use std::path::PathBuf;
 
 use crate::{calibration::CalibrationError, evaluation::Scoring};
 
-/// Something that is no data set.
+/// The path holds no usable data set.
 #[derive(Debug, thiserror::Error)]
 pub enum DataSetError {
     /// A file or folder cannot be read.
@@ -12,13 +12,13 @@ pub enum DataSetError {
     Unreadable {
         /// The file or folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// Nothing tells what is there.
+    /// The format was not recognised.
     #[error(
-        "{path}: holds no data set that is known; expected annotations.json, annotations/*.json, \
-         *.json, *.xml or Ground_Truth_Annotations/groundTruth_*.csv"
+        "{path}: holds no data set in a known format; expected annotations.json, \
+         annotations/*.json, *.json, *.xml or Ground_Truth_Annotations/groundTruth_*.csv"
     )]
     Unrecognised {
         /// The path given.
@@ -29,7 +29,7 @@ pub enum DataSetError {
     Annotations {
         /// The annotation file, or the folder of them.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
     /// A calibration cannot be used.
@@ -37,16 +37,16 @@ pub enum DataSetError {
     Calibration(#[from] CalibrationError),
 }
 
-/// Truths of one shape cannot be scored as another.
+/// Ground truth of one shape cannot be scored as another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "this data set has {truth} and cannot be scored by {wanted}; only rotated boxes can be made \
      axis-parallel"
 )]
 pub struct ScoringMismatch {
-    /// What the truth looks like.
+    /// The shape of the ground truth.
     pub truth: Scoring,
-    /// What it was to look like.
+    /// The requested shape.
     pub wanted: Scoring,
 }
 

@@ -1,9 +1,9 @@
 //! The head points of PIROPO: `Ground_Truth_Annotations/groundTruth_<sequence>.csv` beside the
-//! folder `<sequence>/` of pictures.
+//! folder `<sequence>/` of images.
 //!
-//! A file has no header and one row for each picture, in the order of their names: a frame number,
-//! then `x, y` of every head. Columns of nobody are empty, 0 or negative. This was gathered from
-//! programs that read the files, not from the files, which are not freely at hand.
+//! A file has no header and one row for each image, in the order of their names: a frame number,
+//! then `x, y` of every head. Unused columns are empty, 0 or negative. The format was derived from
+//! programs that read the files, as the files themselves are not freely available.
 
 use std::path::{Path, PathBuf};
 
@@ -13,12 +13,12 @@ use crate::evaluation::{AnnotatedPerson, Outline, Scoring};
 const MAX_BYTES: u64 = 64 * 1024 * 1024;
 const PREFIX: &str = "groundTruth_";
 
-/// Whether a file is named like one of head points.
+/// Returns true if the file name is that of a file of head points.
 pub(super) fn is_head_file(path: &Path) -> bool {
     sequence(path).is_some()
 }
 
-/// The sequence that a file of head points is for.
+/// The sequence to which a file of head points belongs.
 fn sequence(path: &Path) -> Option<&str> {
     let name = path.file_name()?.to_str()?;
     name.strip_prefix(PREFIX)?.strip_suffix(".csv")
@@ -46,13 +46,13 @@ fn read(path: &Path, images: &mut Vec<DataSetImage>) -> Result<(), DataSetError>
     let folder = beside
         .map(|folder| folder.join(sequence))
         .find(|folder| folder.is_dir())
-        .ok_or_else(|| wrong(format!("there is no folder {sequence}/ of pictures for it")))?;
+        .ok_or_else(|| wrong(format!("there is no folder {sequence}/ with its images")))?;
     let pictures = pictures_in(&folder)?;
     let text = read_text(path, MAX_BYTES)?;
     let rows: Vec<_> = text.lines().filter(|row| !row.trim().is_empty()).collect();
     if rows.len() != pictures.len() {
         return Err(wrong(format!(
-            "it has {} rows, but {} has {} pictures; there must be a row for each",
+            "it has {} rows, but {} has {} images; there must be a row for each",
             rows.len(),
             folder.display(),
             pictures.len()
@@ -70,29 +70,29 @@ fn read(path: &Path, images: &mut Vec<DataSetImage>) -> Result<(), DataSetError>
     Ok(())
 }
 
-/// The points in a row.
+/// The points of a row.
 fn heads(row: &str) -> Result<Vec<[f64; 2]>, String> {
     let coordinates = row.split(',').skip(1).map(coordinate);
     let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
     let (points, left) = coordinates.as_chunks::<2>();
     if left.iter().any(|value| *value > 0.0) {
-        return Err("it has an x without a y; give both of every head".to_owned());
+        return Err("it has an x without a y; give both for every head".to_owned());
     }
     let is_somebody = |point: &&[f64; 2]| point.iter().all(|value| *value > 0.0);
     Ok(points.iter().filter(is_somebody).copied().collect())
 }
 
-/// A coordinate; 0 where there is none.
+/// Parses a coordinate. Returns 0 if there is none.
 fn coordinate(text: &str) -> Result<f64, String> {
     let text = text.trim();
     if text.is_empty() {
         return Ok(0.0);
     }
     match text.parse::<f64>() {
-        // Programs that know no empty column write NaN.
+        // Programs that do not support empty columns write NaN.
         Ok(value) if value.is_nan() => Ok(0.0),
         Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("{text:?} is no coordinate; give pixels")),
+        _ => Err(format!("{text:?} is not a coordinate; give pixels")),
     }
 }
 

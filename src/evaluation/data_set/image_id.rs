@@ -1,16 +1,16 @@
-//! What annotations call a picture.
+//! The ID of an image in its annotations.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// The ID of a picture in its data set; in JSON a number or a text, as the annotations have it.
+/// The ID of an image in its data set. In JSON it is a number or a string, as in the annotations.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum ImageId {
     /// A number, as in COCO.
     Number(u64),
-    /// A text, as in CEPDOF; of pictures without an ID their path in the data set.
+    /// A string, as in CEPDOF. Images without an ID have their path in the data set.
     Text(String),
 }
 

@@ -1,4 +1,4 @@
-//! The files below a folder, and which of them is the picture that annotations speak of.
+//! The files below a folder, and the lookup of the image to which an annotation refers.
 
 use std::{
     collections::HashMap,
@@ -8,17 +8,17 @@ use std::{
 
 use super::DataSetError;
 
-/// Endings of pictures that can be decoded, in lower case.
+/// Extensions of images that can be decoded, in lower case.
 const PICTURE_ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
-/// Folders within folders; the largest sets have five levels.
+/// Most levels of folders. The largest data sets have five.
 const MAX_DEPTH: usize = 12;
-/// Files and folders; the largest sets have some 300 000.
+/// Most files and folders. The largest data sets have some 300 000.
 const MAX_ENTRIES: usize = 2_000_000;
 
 /// Every file below a folder, sorted.
 pub(super) struct Files(Vec<PathBuf>);
 
-/// Pictures by name.
+/// Images by name.
 pub(super) struct PictureIndex {
     by_stem: HashMap<Box<OsStr>, Vec<PathBuf>>,
 }
@@ -58,8 +58,8 @@ impl Files {
         Ok(Self(files))
     }
 
-    /// The JSON files where COCO files lie: `annotations.json`, or else those in `annotations/`,
-    /// or else those in `root` itself.
+    /// The JSON files of a COCO layout: `annotations.json`, or else those in `annotations/`, or
+    /// else those in `root` itself.
     pub(super) fn of_coco_layout(&self, root: &Path) -> Vec<PathBuf> {
         let single = root.join("annotations.json");
         if self.0.binary_search(&single).is_ok() {
@@ -78,18 +78,18 @@ impl Files {
         }
     }
 
-    /// The files of one ending, given in lower case.
+    /// The files with this extension, given in lower case.
     pub(super) fn ending_in(&self, ending: &str) -> Vec<PathBuf> {
         self.named(|path| has_ending(path, ending))
     }
 
-    /// The files that `is_wanted`.
+    /// The files for which `is_wanted` returns true.
     pub(super) fn named(&self, is_wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
         let wanted = self.0.iter().filter(|path| is_wanted(path));
         wanted.cloned().collect()
     }
 
-    /// The pictures among the files.
+    /// The images among the files.
     pub(super) fn pictures(&self) -> PictureIndex {
         let mut by_stem: HashMap<Box<OsStr>, Vec<PathBuf>> = HashMap::new();
         for path in self.0.iter().filter(|path| is_picture(path)) {
@@ -102,7 +102,7 @@ impl Files {
 }
 
 impl PictureIndex {
-    /// The picture that annotations call `file_name`, with or without folders before it.
+    /// The image with the name `file_name` in annotations, with or without folders before it.
     pub(super) fn by_file_name(&self, file_name: &Path) -> Result<PathBuf, String> {
         let name = file_name.file_name();
         let same_name = self.of_stem(file_name.file_stem());
@@ -120,9 +120,9 @@ impl PictureIndex {
         the_only(&found, file_name)
     }
 
-    /// The picture named like the annotation file `beside`: in the same folder, or else in one of
-    /// the same name but for underscores (PIROPO's `omni1A_test2` is `omni_1A_test2` in the
-    /// boxes for it), or else anywhere.
+    /// The image with the same name as the annotation file `beside`. It is looked up in the same
+    /// folder, else in a folder of the same name except for underscores (PIROPO's `omni1A_test2` is
+    /// `omni_1A_test2` in its box annotations), else anywhere.
     pub(super) fn named_like(&self, beside: &Path) -> Result<PathBuf, String> {
         let same_stem: Vec<_> = self.of_stem(beside.file_stem()).iter().collect();
         let here = same_stem
@@ -150,14 +150,14 @@ impl PictureIndex {
     }
 }
 
-/// The pictures directly in `folder`, by name.
+/// The images directly in `folder`, by name.
 pub(super) fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, DataSetError> {
     let mut pictures = Files::below(folder)?.named(is_picture);
     pictures.retain(|path| path.parent() == Some(folder));
     Ok(pictures)
 }
 
-/// The name of the folder that a file is in, without underscores.
+/// The name of the folder that contains a file, without underscores.
 fn bare_folder_name(path: &Path) -> Option<String> {
     let folder = path.parent()?.file_name()?;
     Some(folder.to_string_lossy().replace('_', ""))
@@ -166,9 +166,9 @@ fn bare_folder_name(path: &Path) -> Option<String> {
 fn the_only(found: &[&PathBuf], name: &Path) -> Result<PathBuf, String> {
     match found {
         [only] => Ok((*only).clone()),
-        [] => Err(format!("the picture {} is nowhere below", name.display())),
+        [] => Err(format!("no image {} was found", name.display())),
         [first, second, ..] => Err(format!(
-            "the picture {} may be {} or {}; keep one of them, or evaluate their folders apart",
+            "the image {} may be {} or {}; keep one of them, or evaluate their folders separately",
             name.display(),
             first.display(),
             second.display()

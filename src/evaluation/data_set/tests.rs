@@ -1,4 +1,4 @@
-//! What is recognised, and what can be done with a data set of any kind.
+//! Tests of the recognition of data sets, and of operations on all kinds.
 
 use std::path::Path;
 
@@ -14,11 +14,11 @@ const ROTATED: &str = r#"{"images":[{"id":"a_1","file_name":"a_1.jpg","width":60
         {"image_id":"a_1","bbox":[100,200,20,60,0],"iscrowd":1}]}"#;
 
 #[test]
-fn a_folder_of_anything_else_is_no_data_set() {
+fn a_folder_of_other_files_is_refused() {
     let folder = folder(&[("readme.txt", ""), ("a.jpg", "")]);
     let message = refusal(&folder);
     assert!(
-        message.contains("holds no data set that is known"),
+        message.contains("holds no data set in a known format"),
         "{message}"
     );
     let file = DataSet::open(&folder.path().join("readme.txt"));
@@ -30,7 +30,7 @@ fn a_folder_of_anything_else_is_no_data_set() {
 }
 
 #[test]
-fn one_calibration_can_be_given_to_every_picture() {
+fn one_calibration_can_be_set_for_every_image() {
     let files = [
         ("annotations.json", ROTATED),
         ("a_1.jpg", ""),
@@ -46,7 +46,7 @@ fn one_calibration_can_be_given_to_every_picture() {
 }
 
 #[test]
-fn rotated_truth_can_be_scored_as_the_bounds_of_inscribed_ellipses() {
+fn rotated_truth_can_be_scored_as_bounds_of_ellipses() {
     let folder = folder(&[("annotations.json", ROTATED), ("a_1.jpg", "")]);
     let data_set = open(&folder).scored_as(Scoring::Rotated).unwrap();
     let data_set = data_set.scored_as(Scoring::AxisParallel).unwrap();
@@ -75,12 +75,12 @@ fn the_distance_from_the_centre_is_an_angle_through_the_lens() {
     let folder = folder(&[("lobby.json", CALIBRATION)]);
     let mut image = DataSetImage::empty(ImageId::Number(1), PathBuf::new());
     assert_eq!(image.off_axis_deg([300.0, 300.0]), None);
-    // No calibration: 90° at the edge of the shorter side, and no more anywhere.
+    // Without a calibration: 90° at the edge of the shorter side, which is also the maximum.
     image.size = Some([800, 600]);
     assert_eq!(image.off_axis_deg([400.0, 300.0]), Some(0.0));
     assert_eq!(image.off_axis_deg([400.0, 150.0]), Some(45.0));
     assert_eq!(image.off_axis_deg([0.0, 300.0]), Some(90.0));
-    // Twice the size of the calibration: 380 pixels a radian.
+    // Twice the size of the calibration: 380 pixels per radian.
     image.size = Some([1200, 1200]);
     let calibration = Calibration::read(&folder.path().join("lobby.json")).unwrap();
     image.calibration = Some(Arc::new(calibration));

@@ -1,10 +1,10 @@
-//! Annotation files as text, up to a size.
+//! Annotation files as text, with a size limit.
 
 use std::path::Path;
 
 use super::DataSetError;
 
-/// The text of a file of at most `max_bytes`.
+/// Reads the text of a file of at most `max_bytes`.
 pub(super) fn read_text(path: &Path, max_bytes: u64) -> Result<String, DataSetError> {
     let unreadable = |source| DataSetError::Unreadable {
         path: path.to_owned(),

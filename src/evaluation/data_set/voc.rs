@@ -1,9 +1,9 @@
-//! Pascal VOC XML: one file per picture, of the same name. Boxes for PIROPO (Tamura et al.,
-//! "Omnidirectional Pedestrian Detection by Rotation Invariant Training", WACV 2019, the
-//! annotations they call `normal`) have this form, too.
+//! Pascal VOC XML: one file per image, with the same name. The box annotations of PIROPO have this
+//! format, too (Tamura et al., "Omnidirectional Pedestrian Detection by Rotation Invariant
+//! Training", WACV 2019, the annotations named `normal`).
 //!
-//! `bndbox` is read as corner-origin pixels, as written by today's annotation tools. The VOC
-//! challenge itself counts pixels from 1; a pixel more or less is far below what matters here.
+//! `bndbox` is read as corner-origin pixels, as current annotation tools write it. The VOC
+//! challenge itself counts pixels from 1. This difference of one pixel is negligible here.
 
 use std::path::{Path, PathBuf};
 
@@ -15,10 +15,10 @@ use crate::{
     evaluation::{AnnotatedPerson, Outline, Scoring},
 };
 
-/// A picture of a crowd has some 100 kB.
+/// The file of a crowded image has some 100 kB.
 const MAX_BYTES: u64 = 16 * 1024 * 1024;
 
-/// Reads one file per picture; its path below `root` is the ID of the picture.
+/// Reads one file per image. Its path below `root` is the ID of the image.
 pub(super) fn read_files(
     root: &Path,
     files: &[PathBuf],
@@ -47,7 +47,7 @@ pub(super) fn read_files(
         Some(first) if is_anything_annotated && !is_somebody_there => {
             Err(DataSetError::Annotations {
                 path: first.clone(),
-                problem: "no object here or in the other files is named person; name persons so"
+                problem: "no object in any file is named person; give the persons that name"
                     .to_owned(),
             })
         }
@@ -77,7 +77,7 @@ fn read(
         None => None,
     };
     for object in objects(annotation).filter(is_person) {
-        let bndbox = child(object, "bndbox").ok_or("an object has no bndbox; give it one")?;
+        let bndbox = child(object, "bndbox").ok_or("an object has no bndbox; add one")?;
         let corners = [
             number(bndbox, "xmin")?,
             number(bndbox, "ymin")?,

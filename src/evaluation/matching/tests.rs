@@ -1,4 +1,4 @@
-//! Who gets the person when several detections want it.
+//! Tests of several detections for one person.
 
 use super::{
     GroundTruth, MatchingRule,
@@ -65,9 +65,9 @@ fn of_equal_scores_the_earlier_detection_is_right() {
 }
 
 #[test]
-fn only_coco_gives_a_duplicate_the_next_person() {
+fn only_coco_matches_a_duplicate_with_the_next_person() {
     let truth = truth(&[row(0.0, 10.0), row(3.0, 13.0)], &[]);
-    // Both overlap the first person most, and the second one enough.
+    // Both overlap the first person most, and the second person sufficiently.
     let detections = [(row(0.0, 10.0), 0.9), (row(1.0, 11.0), 0.8)];
     assert_eq!(
         outcomes(MatchingRule::Voc, &detections, &truth),
@@ -118,7 +118,7 @@ fn a_person_in_an_ignore_region_is_still_found() {
 }
 
 #[test]
-fn a_duplicate_in_an_ignore_region_is_ignored_by_coco_and_wrong_by_voc() {
+fn duplicates_in_ignore_regions_are_ignored_by_coco_only() {
     let truth = truth(&[row(0.0, 10.0)], &[row(0.0, 100.0)]);
     let detections = [(row(0.0, 10.0), 0.9), (row(0.0, 10.0), 0.8)];
     assert_eq!(
@@ -132,7 +132,7 @@ fn a_duplicate_in_an_ignore_region_is_ignored_by_coco_and_wrong_by_voc() {
 }
 
 #[test]
-fn of_two_persons_it_overlaps_equally_a_detection_takes_the_first_in_voc_and_the_last_in_coco() {
+fn equal_overlaps_match_the_first_in_voc_and_the_last_in_coco() {
     let (first, last) = (row(0.0, 10.0), row(4.0, 14.0));
     let truth = truth(&[first, last], &[]);
     let between = row(2.0, 12.0);
@@ -146,7 +146,7 @@ fn of_two_persons_it_overlaps_equally_a_detection_takes_the_first_in_voc_and_the
 }
 
 #[test]
-fn at_a_threshold_of_1_coco_forgives_rounding() {
+fn at_a_threshold_of_1_coco_tolerates_rounding() {
     let truth = truth(&[row(0.0, 10.0)], &[]);
     let nearly = [ScoredBox {
         bbox: row(0.0, 10.0 - 5e-10),
@@ -162,7 +162,7 @@ fn at_a_threshold_of_1_coco_forgives_rounding() {
     );
 }
 
-fn of_no_account(outline: FrameBox) -> AnnotatedPerson<FrameBox> {
+fn uncounted(outline: FrameBox) -> AnnotatedPerson<FrameBox> {
     AnnotatedPerson {
         counts: false,
         ..AnnotatedPerson::from(outline)
@@ -170,11 +170,11 @@ fn of_no_account(outline: FrameBox) -> AnnotatedPerson<FrameBox> {
 }
 
 #[test]
-fn finding_a_person_that_does_not_count_is_neither_right_nor_wrong() {
+fn detections_of_uncounted_persons_are_ignored() {
     let mut truth = truth(&[], &[]);
-    truth.persons.push(of_no_account(row(0.0, 10.0)));
+    truth.persons.push(uncounted(row(0.0, 10.0)));
     let twice = [(row(0.0, 10.0), 0.9), (row(1.0, 10.0), 0.8)];
-    // In COCO each person, counting or not, is there for one detection.
+    // In COCO each person, counting or not, matches one detection.
     assert_eq!(
         outcomes(MatchingRule::Voc, &twice, &truth),
         [Ignored, Ignored]
@@ -186,9 +186,9 @@ fn finding_a_person_that_does_not_count_is_neither_right_nor_wrong() {
 }
 
 #[test]
-fn coco_prefers_a_person_that_counts_to_a_nearer_one_that_does_not() {
+fn coco_prefers_counted_persons_to_nearer_uncounted_ones() {
     let mut truth = truth(&[row(2.0, 12.0)], &[]);
-    truth.persons.push(of_no_account(row(0.0, 10.0)));
+    truth.persons.push(uncounted(row(0.0, 10.0)));
     let between = [(row(0.0, 10.0), 0.9)];
     assert_eq!(
         outcomes(MatchingRule::Coco, &between, &truth),

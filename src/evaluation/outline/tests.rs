@@ -1,4 +1,4 @@
-//! Which shapes are compared, and how.
+//! Tests of the comparison of shapes.
 
 use nalgebra::Vector2;
 
@@ -17,7 +17,7 @@ fn boxed(corners: [f64; 4]) -> Outline {
 }
 
 #[test]
-fn rotated_truth_is_compared_with_the_oriented_box_and_other_truth_with_the_box() {
+fn only_rotated_truth_is_compared_with_the_oriented_box() {
     let frame = [100, 100];
     let bbox = BBox::new([10.0, 20.0, 50.0, 60.0]).unwrap();
     let oriented_box = OrientedBox {
@@ -44,7 +44,7 @@ fn rotated_truth_is_compared_with_the_oriented_box_and_other_truth_with_the_box(
 }
 
 #[test]
-fn a_box_finds_one_person_whose_head_lies_in_it_and_a_second_box_the_next() {
+fn each_box_matches_one_person_whose_head_it_contains() {
     let truth = GroundTruth {
         persons: vec![
             Outline::Head([30.0, 30.0]).into(),

@@ -1,4 +1,4 @@
-//! How a plot looks: axes and grid on the left, the legend below.
+//! The layout of a plot: axes and grid on the left, the legend below.
 
 use plotters::{
     chart::ChartBuilder,
@@ -24,7 +24,7 @@ const FONT: &str = "sans-serif";
 const INK: RGBColor = RGBColor(40, 44, 52);
 const GRID: RGBColor = RGBColor(225, 228, 232);
 
-/// Told apart by colour-blind people as well (Okabe and Ito, Color Universal Design, 2008).
+/// Distinguishable with colour blindness (Okabe and Ito, Color Universal Design, 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -49,7 +49,7 @@ pub(super) fn draw<DB: DrawingBackend>(
     area: &DrawingArea<DB, Shift>,
     scale: u32,
 ) -> Drawn<DB> {
-    // The only failure is a font that cannot be read; drawing text would say so again.
+    // It fails only for an invalid font, which would also fail when text is drawn.
     let _ = register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
     let text = |height: u32| TextStyle::from((FONT, height * scale).into_font()).color(&INK);
     area.fill(&WHITE)?;
@@ -115,7 +115,7 @@ fn name<DB: DrawingBackend>(
     legend.draw(&Text::new(line.name.as_str(), at, text))
 }
 
-/// The look of a line among `count`.
+/// The style of a line among `count`.
 fn style(index: usize, count: usize, scale: u32) -> ShapeStyle {
     let width = 2 * scale;
     if count <= COLOURS.len() {

@@ -3,8 +3,9 @@
 use super::{Line, LinePlot};
 use crate::evaluation::{EvaluatedRow, PrecisionRecallCurve};
 
-/// Precision over recall of named rows at `O_t` = 0.5, and dashed at 0.75. Precision is the
-/// greatest at a recall or beyond: the area under a line is its average precision.
+/// Plots precision over recall of named rows at `O_t` = 0.5, and dashed at 0.75. The precision at a
+/// recall is the maximum at that recall or a higher one: the area under a line is its average
+/// precision.
 #[must_use]
 pub fn precision_recall_plot<'a>(
     title: String,
@@ -30,7 +31,7 @@ pub fn precision_recall_plot<'a>(
 /// The corners of the envelope, from recall 0 to the last.
 fn steps(curve: &PrecisionRecallCurve) -> Vec<[f64; 2]> {
     let envelope = curve.envelope();
-    // Of the points at one recall the first is the highest.
+    // The first of the points at one recall is the highest.
     let levels = envelope
         .chunk_by(|a, b| a.0 == b.0)
         .filter_map(|points| points.first().copied());
@@ -55,10 +56,10 @@ mod tests {
     };
 
     #[test]
-    fn a_line_has_the_corners_of_the_envelope_and_its_area_is_the_average_precision() {
+    fn the_area_under_a_line_is_the_average_precision() {
         let bbox = |left: f64| BBox::<FramePixels>::new([left, 0.0, left + 5.0, 5.0]).unwrap();
         let persons = [0.0, 10.0, 20.0, 30.0].map(|left| bbox(left).into());
-        // Right, right, wrong, wrong, right, wrong; one person is never found.
+        // Right, right, wrong, wrong, right, wrong. One person is missed.
         let found = [0.0, 10.0, 50.0, 60.0, 20.0, 70.0]
             .iter()
             .zip([9, 8, 7, 6, 5, 4]);

@@ -34,16 +34,16 @@ fn an_svg_names_its_lines_axes_and_title_in_well_formed_text() {
 }
 
 #[test]
-fn a_png_shows_each_line_in_a_colour_of_its_own() {
+fn a_png_shows_each_line_in_its_own_colour() {
     let png = plot(&["a", "b"]).png().unwrap();
     let frame = decode(&png, &DecodeLimits::default()).unwrap().frame;
     let has = |colour: [u8; 3]| frame.pixels().chunks_exact(3).any(|pixel| pixel == colour);
-    // The second covers the first, but for the legend.
+    // The second covers the first, except in the legend.
     assert!(has([0, 114, 178]) && has([213, 94, 0]));
 }
 
 #[test]
-fn a_plot_without_points_and_one_of_many_lines_are_drawn_and_one_of_too_many_is_refused() {
+fn only_plots_of_too_many_lines_are_refused() {
     assert!(plot(&[]).svg().is_ok());
     assert!(plot(&["line"; MAX_LINES]).svg().is_ok());
     let refused = plot(&["line"; MAX_LINES + 1])

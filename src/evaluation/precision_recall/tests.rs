@@ -1,4 +1,4 @@
-//! Curves small enough to be worked out by hand, and the bounds of all others.
+//! Small curves with results calculated by hand, and bounds for all others.
 
 use std::num::NonZeroUsize;
 
@@ -19,7 +19,7 @@ fn assert_close(actual: f64, expected: f64) {
 }
 
 #[test]
-fn perfect_detections_have_average_precision_1_by_every_definition() {
+fn perfect_detections_have_average_precision_1() {
     let ap = curve(&[(0.9, true), (0.8, true), (0.7, true)], 3).average_precision();
     assert_close(ap.all_point_area, 1.0);
     assert_close(ap.eleven_point, 1.0);
@@ -27,7 +27,7 @@ fn perfect_detections_have_average_precision_1_by_every_definition() {
 }
 
 #[test]
-fn no_detections_have_average_precision_0_and_no_operating_point() {
+fn no_detections_give_average_precision_0_and_no_best_f1() {
     let curve = curve(&[], 4);
     assert_eq!(curve.average_precision(), AveragePrecision::default());
     assert_eq!(curve.best_f1(), None);
@@ -35,7 +35,7 @@ fn no_detections_have_average_precision_0_and_no_operating_point() {
 }
 
 #[test]
-fn the_three_definitions_differ_as_worked_out_by_hand() {
+fn the_three_definitions_match_a_calculation_by_hand() {
     // Envelope: precision 1 up to recall 1/2, then 2/3 up to 1.
     let ap = curve(&[(0.9, true), (0.8, false), (0.7, true)], 2).average_precision();
     assert_close(ap.all_point_area, 0.5 + 0.5 * 2.0 / 3.0);
@@ -73,7 +73,7 @@ fn best_f1_is_the_point_before_the_false_positives() {
 }
 
 #[test]
-fn best_f1_cannot_part_equal_scores() {
+fn best_f1_does_not_separate_equal_scores() {
     let best = curve(&[(0.9, true), (0.9, false)], 1).best_f1().unwrap();
     assert_close(best.precision, 0.5);
 }
@@ -96,7 +96,7 @@ proptest! {
     }
 
     #[test]
-    fn a_false_positive_below_all_others_never_changes_average_precision(
+    fn a_false_positive_of_lowest_score_changes_nothing(
         outcomes in prop::collection::vec((0.1..1.0, any::<bool>()), 1..50),
     ) {
         let persons = outcomes.len();

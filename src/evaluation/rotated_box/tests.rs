@@ -1,4 +1,4 @@
-//! What a rotated box covers; known answers are in `tests/evaluation_vectors.rs`.
+//! Tests of the mask of a rotated box. Known answers are in `tests/evaluation_vectors.rs`.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -24,7 +24,7 @@ fn an_upright_box_of_whole_pixels_covers_exactly_these() {
 
 #[test]
 fn the_angle_turns_clockwise_from_image_up() {
-    // Its upper end to the upper right.
+    // The upper end leans to the upper right.
     let leaning = rotated([50.0, 40.0, 6.0, 40.0], PI / 4.0);
     let at = |x, y| rotated([x, y, 4.0, 4.0], 0.0);
     assert_eq!(at(60.0, 30.0).share_in(&leaning), 1.0);
@@ -32,7 +32,7 @@ fn the_angle_turns_clockwise_from_image_up() {
 }
 
 #[test]
-fn half_a_turn_changes_nothing_and_a_quarter_turn_swaps_the_extents() {
+fn quarter_turns_swap_the_extents_and_half_turns_do_not() {
     let upright = rotated([50.2, 40.3, 10.0, 24.0], 0.0);
     assert_eq!(upright.iou(&rotated([50.2, 40.3, 10.0, 24.0], PI)), 1.0);
     let lying = rotated([50.2, 40.3, 24.0, 10.0], FRAC_PI_2);
@@ -40,7 +40,7 @@ fn half_a_turn_changes_nothing_and_a_quarter_turn_swaps_the_extents() {
 }
 
 #[test]
-fn what_lies_outside_the_frame_does_not_count() {
+fn parts_outside_the_frame_do_not_count() {
     let half_outside = rotated([0.0, 40.0, 20.0, 10.0], 0.0);
     assert_eq!(half_outside.area(), 100.0);
     let outside = rotated([-30.0, 40.0, 20.0, 10.0], 0.3);
@@ -50,13 +50,13 @@ fn what_lies_outside_the_frame_does_not_count() {
 }
 
 #[test]
-fn the_ellipse_in_an_upright_box_reaches_its_edges() {
+fn the_ellipse_in_an_upright_box_touches_its_edges() {
     let bounds = rotated([20.0, 30.0, 10.0, 20.0], 0.0).inscribed_ellipse_bounds();
     assert_eq!(bounds.unwrap().corners(), [15.0, 20.0, 25.0, 40.0]);
 }
 
 #[test]
-fn numbers_that_are_no_box_are_refused() {
+fn invalid_numbers_are_refused() {
     for numbers in [
         [f64::NAN, 0.0, 1.0, 1.0],
         [0.0, f64::INFINITY, 1.0, 1.0],
@@ -71,7 +71,7 @@ fn numbers_that_are_no_box_are_refused() {
 
 proptest! {
     #[test]
-    fn overlaps_are_shares_and_do_not_depend_on_the_order(
+    fn overlaps_are_symmetric_and_between_0_and_1(
         a in prop::array::uniform4(0.0..120.0),
         b in prop::array::uniform4(0.0..120.0),
         angles in prop::array::uniform2(-7.0..7.0),

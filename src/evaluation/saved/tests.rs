@@ -1,8 +1,8 @@
 use serde_json::json;
 
 use super::*;
-use crate::pipeline::Profile;
 use crate::detection::Refinement;
+use crate::pipeline::Profile;
 use crate::pipeline::Profile;
 
 /// Two images, 7 and 8.
@@ -51,7 +51,7 @@ fn person(oriented_box: Option<OrientedBox>) -> FoundPerson {
 }
 
 #[test]
-fn a_row_comes_back_as_it_was_saved() {
+fn a_row_survives_saving_and_loading() {
     let (folder, data_set) = data_set();
     let oriented = OrientedBox::turned(Pixel::new(25.0, 40.0), 20.0, 35.5, 0.5);
     let saved = row(vec![vec![], vec![person(Some(oriented)), person(None)]]);
@@ -68,7 +68,7 @@ fn a_row_comes_back_as_it_was_saved() {
 }
 
 #[test]
-fn what_is_saved_are_coco_results() {
+fn rows_are_saved_as_coco_results() {
     let (folder, data_set) = data_set();
     row(vec![vec![person(None)], vec![]])
         .save(folder.path(), &data_set)
@@ -81,7 +81,7 @@ fn what_is_saved_are_coco_results() {
 }
 
 #[test]
-fn results_of_another_detector_are_read_without_its_other_things() {
+fn results_of_other_detectors_are_read_without_extra_keys() {
     let (folder, data_set) = data_set();
     let path = folder.path().join("faster.rcnn.json");
     let results = json!([
@@ -99,13 +99,13 @@ fn results_of_another_detector_are_read_without_its_other_things() {
 }
 
 #[test]
-fn what_is_wrong_with_a_file_is_named() {
+fn errors_name_the_file_and_the_problem() {
     let (folder, data_set) = data_set();
     let path = folder.path().join("results.json");
     for (text, expected) in [
         (
             r#"[{"image_id":9,"category_id":1,"bbox":[1,2,3,4],"score":0.5}]"#,
-            "results.json: [0].image_id: 9 is no image of the data set",
+            "results.json: [0].image_id: 9 is not an image of the data set",
         ),
         (
             r#"[{"image_id":7,"category_id":1,"bbox":[1,2,-3,4],"score":0.5}]"#,
@@ -122,7 +122,7 @@ fn what_is_wrong_with_a_file_is_named() {
 }
 
 #[test]
-fn images_that_share_an_id_are_told_instead_of_mixed_up() {
+fn images_that_share_an_id_are_refused() {
     let (folder, mut data_set) = data_set();
     data_set.images[1].id = data_set.images[0].id.clone();
     let error = row(vec![vec![], vec![]]).save(folder.path(), &data_set);

@@ -1,4 +1,4 @@
-//! Who belongs where; known answers are in `tests/evaluation_vectors.rs`.
+//! Tests of the assignment to strata. Known answers are in `tests/evaluation_vectors.rs`.
 
 use std::path::PathBuf;
 
@@ -49,7 +49,7 @@ fn ap50(stratum: &Stratum) -> Option<f64> {
 }
 
 #[test]
-fn a_detection_of_nobody_lowers_only_the_stratum_it_lies_in() {
+fn a_false_positive_lowers_only_its_own_stratum() {
     let (centre, rim) = (square(300.0, 300.0, 40.0), square(580.0, 300.0, 40.0));
     let wrong_at_the_rim = square(300.0, 20.0, 40.0);
     let image = image([centre.into(), rim.into()], [wrong_at_the_rim, centre, rim]);
@@ -61,8 +61,8 @@ fn a_detection_of_nobody_lowers_only_the_stratum_it_lies_in() {
 }
 
 #[test]
-fn a_detection_that_finds_a_person_of_another_stratum_is_no_fault() {
-    // The person is large, the detection of it medium, and it finds the person all the same.
+fn a_match_with_a_person_of_another_stratum_is_ignored() {
+    // The person is large and its detection medium, and they still match.
     let person = square(300.0, 300.0, 0.101 * SIDE);
     let found = square(300.0, 300.0, 0.099 * SIDE);
     let also = square(100.0, 300.0, 0.07 * SIDE);
@@ -75,7 +75,7 @@ fn a_detection_that_finds_a_person_of_another_stratum_is_no_fault() {
 }
 
 #[test]
-fn a_detection_of_nobody_is_wrong_at_every_visibility() {
+fn a_false_positive_is_wrong_at_every_visibility() {
     let seen = |outline: Outline, fraction| AnnotatedPerson {
         visible_fraction: Some(fraction),
         ..AnnotatedPerson::from(outline)
@@ -91,7 +91,7 @@ fn a_detection_of_nobody_is_wrong_at_every_visibility() {
 }
 
 #[test]
-fn strata_that_the_data_knows_nothing_of_are_refused() {
+fn strata_without_data_are_refused() {
     let person = square(300.0, 300.0, 40.0);
     let boxes = image([person.into()], []);
     let refusal = |by: Stratification, size, image: &EvaluatedImage<Outline>| {

@@ -1,4 +1,4 @@
-//! The picture of the matrix: one image with what is found in it at each `C_t` and σ.
+//! The image of the matrix: one image with its detections at each `C_t` and σ.
 
 use std::ops::Range;
 
@@ -14,17 +14,17 @@ use crate::{
     },
 };
 
-/// Room around the boxes, a share of the side of the square that holds them.
+/// Margin around the boxes, as a fraction of the side of the square that contains them.
 const ROOM_SHARE: f64 = 0.06;
 /// Longer side of the image in each cell, pixels.
 const CELL_SIDE: u32 = 300;
 
-/// The part of the image `frame`, that in `position` of the data set, in which boxes are, with the
-/// boxes of each cell: rows of `C_t`, columns of σ. Below each cell its boxes are counted, and the
-/// AP of the whole data set is told.
+/// Draws the part of the image `frame` (at `position` in the data set) that contains boxes, once
+/// for each cell: rows of `C_t`, columns of σ. The caption of a cell has its number of boxes, and
+/// the AP over the whole data set.
 ///
 /// # Errors
-/// [`FrameError`] when the picture would be too large.
+/// [`FrameError`] if the image would be too large.
 pub fn matrix(
     title: String,
     cells: &[(DetectedRow, EvaluatedRow)],
@@ -77,8 +77,8 @@ fn of_matrix((detected, _): &(DetectedRow, EvaluatedRow)) -> Option<(f64, f64)> 
         .then_some((numbers.score_threshold, numbers.sigma))
 }
 
-/// Columns and rows of the square around all boxes, with room for the outlines; the whole frame
-/// without boxes.
+/// Columns and rows of the square around all boxes with a margin. It is the whole frame if there
+/// are no boxes.
 fn part_with<'a>(
     boxes: impl Iterator<Item = &'a FoundPerson>,
     frame: &Frame,
@@ -101,11 +101,11 @@ fn part_with<'a>(
         let start = (f64::midpoint(from, to) - side / 2.0)
             .min(length - side)
             .max(0.0);
-        // `as` saturates, and the frame cuts what is too long.
+        // `as` saturates, and the frame clips what is too long.
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "within the frame"
+            reason = "clipped to the frame"
         )]
         {
             start as u32..(start + side).ceil().max(1.0) as u32

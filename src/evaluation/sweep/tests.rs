@@ -15,7 +15,7 @@ fn cells_of_paper() -> Vec<DetectParameters> {
 }
 
 #[test]
-fn the_cells_are_those_of_the_papers_sweeps() {
+fn the_cells_are_those_of_the_sweeps_in_the_paper() {
     let cells = cells_of_paper();
     let of = |refinement: Refinement| {
         let numbers = cells.iter().map(|cell| cell.refinement);
@@ -35,7 +35,7 @@ fn the_cells_are_those_of_the_papers_sweeps() {
     assert_eq!(cells.len(), 42);
 }
 
-/// A sweep in which a cell of lower `C_t` finds more: the first finds both persons.
+/// A sweep in which a cell of lower `C_t` has more detections: the first has both persons.
 fn swept() -> Vec<(DetectedRow, EvaluatedRow)> {
     let bbox = |left: f64| BBox::new([left, 40.0, left + 20.0, 80.0]).unwrap();
     let found = |left, score| FoundPerson {
@@ -111,21 +111,21 @@ fn the_plot_has_a_point_per_iou_threshold() {
 }
 
 #[test]
-fn the_matrix_shows_the_boxes_of_each_cell_in_the_part_that_has_any() {
+fn the_matrix_is_cropped_to_the_boxes_of_all_cells() {
     let grey = Frame::new(200, 200, vec![90; 200 * 200 * 3]).unwrap();
     let picture = matrix("tiny".to_owned(), &swept(), &grey, 0).unwrap();
-    // The two boxes lie within columns 20 to 160; with room a square of 157 pixels.
+    // The two boxes lie within columns 20 to 160. With the margin this is a square of 157 pixels.
     assert!(
         (5 * 157..5 * 157 + 160).contains(&picture.width()),
         "{picture:?}"
     );
-    // Outlines are bluish of the first box and yellowish of the second, with soft edges.
+    // The outline of the first box is bluish, that of the second yellowish, with soft edges.
     let count = |more: usize, less: usize| {
         let pixels = picture.pixels().chunks_exact(3);
         let outlined = pixels.filter(|pixel| pixel[more] > pixel[less].saturating_add(60));
         outlined.count()
     };
-    // The first box in 20 cells, the second in the five cells of C_t = 0.3 alone.
+    // The first box is in 20 cells, the second only in the five cells of C_t = 0.3.
     let (first, second) = (count(2, 0), count(0, 2));
     assert!(second > 500, "{second}");
     assert!(

@@ -17,20 +17,20 @@ use crate::{
 
 pub(super) const ZONE: Rgb = [126, 240, 110];
 const MASK: Rgb = [255, 128, 210];
-/// Edges on the floor are curves in the frame.
+/// Straight edges on the floor are curves in the frame.
 const POINTS_PER_EDGE: u32 = 32;
 
-/// A zone as a frame shows it.
+/// A zone, projected into a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ZoneOutline {
     /// Its name.
     pub name: String,
-    /// Its border, in pieces where the lens does not see all of it; corner-origin frame pixels.
+    /// Its border in corner-origin frame pixels, in several pieces where the lens shows only parts.
     pub lines: Vec<Vec<[f64; 2]>>,
 }
 
 impl ZoneOutline {
-    /// A zone that is in pixels of the frame, or on the floor seen through `lens`.
+    /// The outline of a zone given in frame pixels, or on the floor and projected through `lens`.
     #[must_use]
     pub fn of(zone: &Zone, lens: &Lens, mount: &Mount) -> Self {
         let outline = zone.outline(lens, mount, POINTS_PER_EDGE);
@@ -51,7 +51,7 @@ impl ZoneOutline {
             .sum()
     }
 
-    /// Its name at its bounding box; `None` when nothing of it is seen.
+    /// A mark with its name at its bounding box, or `None` when no part of it is visible.
     pub(super) fn mark(&self) -> Option<Mark> {
         let points = self.lines.iter().flatten().map(|&[x, y]| [x, y, x, y]);
         let bbox = points.reduce(|a, b| {
@@ -72,8 +72,8 @@ impl ZoneOutline {
     }
 }
 
-/// Blanks what is under `masks` and outlines them, and draws `zones` with their names; all are in
-/// pixels of the frame or on the floor seen through `lens`.
+/// Blanks the pixels under `masks` and outlines the masks, then draws `zones` with their names.
+/// Both are in frame pixels or on the floor and projected through `lens`.
 pub fn sketch_areas(
     frame: &mut Frame,
     zones: &[Zone],
@@ -106,7 +106,7 @@ mod tests {
     use crate::geometry::ZoneArea;
 
     #[test]
-    fn masks_are_black_in_their_outline_and_zones_are_outlined_with_their_names() {
+    fn masks_are_black_and_zones_are_outlined_with_their_names() {
         let mut frame = Frame::new(200, 200, vec![90; 3 * 200 * 200]).unwrap();
         let lens = Lens::equidistant_circle(99.5, 99.5, 100.0, 1.5).unwrap();
         let square = |left: f64, right: f64| {
@@ -126,12 +126,12 @@ mod tests {
         assert_eq!(frame.pixel(30, 30), [0; 3]);
         assert_ne!(frame.pixel(10, 30), [0; 3]);
         assert_ne!(frame.pixel(120, 135), [90; 3]);
-        // A metre to the left of the camera, 3 m below it, on an equidistant lens.
+        // A metre to the left of the camera and 3 m below it, on an equidistant lens.
         let left = 100.0 - 100.0 / 1.5 * (1.0_f64 / 3.0).atan();
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a pixel"
+            reason = "a pixel position"
         )]
         let left = left as u32;
         assert_ne!(frame.pixel(left, 100), [90; 3]);

@@ -1,5 +1,5 @@
-//! Anti-aliased shapes: how much of a pixel is painted follows from its centre's distance
-//! to the shape.
+//! Anti-aliased shapes. The coverage of a pixel follows from the distance of its centre to the
+//! shape.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use crate::imaging::frame::Frame;
 /// A colour, 8 bits a channel.
 pub(super) type Rgb = [u8; 3];
 
-/// Mixes a colour into one pixel; `opacity` from 0 to 1.
+/// Mixes a colour into one pixel. `opacity` ranges from 0 to 1.
 pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, colour: Rgb, opacity: f64) {
     let start = 3 * (y as usize * frame.width() as usize + x as usize);
     let Some(pixel) = frame.pixels_mut().get_mut(start..start + 3) else {
@@ -28,26 +28,26 @@ pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, colour: Rgb, opacity: f64
     }
 }
 
-/// Pixels whose centres lie between two coordinates, cut to `0..length`.
+/// Pixels whose centres lie between two coordinates, clipped to `0..length`.
 pub(super) fn pixels(from: f64, to: f64, length: u32) -> Range<u32> {
-    // `as` saturates, which is the cut; NaN becomes 0.
+    // `as` saturates, which clips. NaN becomes 0.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "cut to the frame"
+        reason = "clipped to the frame"
     )]
     let bound = |coordinate: f64| ((coordinate - 0.5).ceil() as u32).min(length);
     bound(from)..bound(to)
 }
 
-/// The outline of a quadrilateral, with round joints.
+/// The outline of a quadrilateral with round joints.
 pub(super) struct Outline {
     corners: [[f64; 2]; 4],
     half_width: f64,
 }
 
 impl Outline {
-    /// An outline of a width in pixels along four corners.
+    /// An outline of `width` pixels along four corners.
     pub(super) fn new(corners: [[f64; 2]; 4], width: f64) -> Self {
         Self {
             corners,
@@ -55,8 +55,8 @@ impl Outline {
         }
     }
 
-    /// Paints it, each pixel once, so that see-through lines stay even at their joints. Returns the
-    /// number of painted pixels.
+    /// Paints the outline, each pixel once, so that translucent lines stay even at their joints.
+    /// Returns the number of painted pixels.
     pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
         let mut painted_pixels = 0;
         let reach = self.half_width + 0.5;
@@ -104,7 +104,7 @@ pub(super) struct Stroke {
 }
 
 impl Stroke {
-    /// A line of a width in pixels between two points.
+    /// A line of `width` pixels between two points.
     pub(super) fn new(from: [f64; 2], to: [f64; 2], width: f64) -> Self {
         Self {
             edge: [from, to],
@@ -112,7 +112,7 @@ impl Stroke {
         }
     }
 
-    /// Paints it. Returns the number of painted pixels.
+    /// Paints the line. Returns the number of painted pixels.
     pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
         let mut painted_pixels = 0;
         let reach = self.half_width + 0.5;
@@ -131,7 +131,7 @@ impl Stroke {
     }
 }
 
-/// Columns, from and to, outside of which a row has nothing within `reach` of an edge.
+/// The column range outside of which a row has no point within `reach` of an edge.
 fn edge_span([a, b]: [[f64; 2]; 2], row: f64, reach: f64) -> [f64; 2] {
     let [upper, lower] = if a[1] <= b[1] { [a, b] } else { [b, a] };
     let (from, to) = ((row - reach).max(upper[1]), (row + reach).min(lower[1]));
@@ -184,7 +184,7 @@ pub(super) struct Plate {
 }
 
 impl Plate {
-    /// Paints it. Returns the number of painted pixels.
+    /// Paints the rectangle. Returns the number of painted pixels.
     pub(super) fn draw(&self, frame: &mut Frame, colour: Rgb, opacity: f64) -> u64 {
         let mut painted_pixels = 0;
         let (right, bottom) = (self.left + self.width, self.top + self.height);
@@ -215,7 +215,7 @@ impl Plate {
         [self.left, self.top, right, bottom]
     }
 
-    /// What it shares with the rectangle between two corners, square pixels.
+    /// The area shared with the rectangle between two corners, in square pixels.
     pub(super) fn shared_area(&self, [left, top, right, bottom]: &[f64; 4]) -> f64 {
         let width = right.min(self.left + self.width) - left.max(self.left);
         let height = bottom.min(self.top + self.height) - top.max(self.top);

@@ -1,4 +1,4 @@
-//! A line of text in the frame's corner.
+//! A line of text in the corner of the frame.
 
 use super::{
     canvas::{Plate, Rgb},
@@ -11,10 +11,10 @@ use crate::imaging::frame::Frame;
 const BACKGROUND: Rgb = [0, 0, 0];
 const BACKGROUND_OPACITY: f64 = 0.6;
 const INK: Rgb = [255, 255, 255];
-/// Between the text and the end of its plate, in heights of the text.
+/// Distance between the text and the edge of its plate, in text heights.
 const PADDING: f64 = 0.4;
 
-/// Writes the text, as small as the frame's width asks for, and returns the plate below it.
+/// Writes the text, reduced to the frame's width if necessary, and returns the plate behind it.
 pub(super) fn draw(frame: &mut Frame, caption: &str) -> Option<Plate> {
     let mut text = Text::new(text_height(frame));
     let mut width = text.width(caption) + 2.0 * PADDING * text.height();

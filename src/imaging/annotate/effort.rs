@@ -1,24 +1,24 @@
-//! The bound on the work of one drawing: painted pixels, and a check that the result is still wanted.
+//! Bound on the work of one drawing: a budget of painted pixels and a cancellation check.
 
-/// Most painted pixels per pixel of the frame. Where lines cover a frame twice, nothing below them can
-/// be seen, so that what is drawn later would not help either.
+/// Most painted pixels per pixel of the frame. Where lines cover a frame twice, it is unreadable,
+/// and further shapes would not help.
 const MAX_PAINTED_PER_PIXEL: u64 = 2;
-/// Small frames may be painted more often, because that costs nothing.
+/// Most painted pixels of small frames, which cost little.
 const MIN_BUDGET_PIXELS: u64 = 2_000_000;
 
-/// A drawing was given up because its result is no longer wanted.
+/// A drawing was cancelled because its result is no longer needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the drawing was given up because the client no longer waits for it")]
+#[error("the drawing was cancelled because the client no longer waits for it")]
 pub struct Cancelled;
 
-/// Counts the work of one drawing.
+/// Counts the painted pixels of one drawing.
 pub(super) struct Effort<'a> {
     is_cancelled: &'a dyn Fn() -> bool,
     pixels_left: u64,
 }
 
 impl<'a> Effort<'a> {
-    /// The work that a frame of so many pixels may cost.
+    /// The budget for a frame of `width` × `height` pixels.
     pub(super) fn new(width: u32, height: u32, is_cancelled: &'a dyn Fn() -> bool) -> Self {
         let pixels = u64::from(width) * u64::from(height);
         Self {
@@ -27,10 +27,10 @@ impl<'a> Effort<'a> {
         }
     }
 
-    /// Returns whether the next shape may be drawn.
+    /// Returns true if the next shape may be drawn.
     ///
     /// # Errors
-    /// [`Cancelled`] when the result is no longer wanted.
+    /// [`Cancelled`] when the result is no longer needed.
     pub(super) fn allows_more(&self) -> Result<bool, Cancelled> {
         if (self.is_cancelled)() {
             return Err(Cancelled);
@@ -38,7 +38,7 @@ impl<'a> Effort<'a> {
         Ok(self.pixels_left > 0)
     }
 
-    /// Subtracts the pixels of a shape.
+    /// Subtracts the painted pixels of a shape from the budget.
     pub(super) fn spend(&mut self, painted_pixels: u64) {
         self.pixels_left = self.pixels_left.saturating_sub(painted_pixels);
     }

@@ -1,4 +1,4 @@
-//! A frame as bytes to send or save.
+//! Encoding of a frame as JPEG or PNG.
 
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
@@ -6,7 +6,7 @@ use image::{ExtendedColorType, ImageEncoder, ImageError};
 
 use crate::imaging::frame::Frame;
 
-/// Why a frame cannot be encoded.
+/// A frame cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 #[error("a frame of {width}×{height} pixels cannot be written as {format}: {source}")]
 pub struct EncodeError {
@@ -16,7 +16,7 @@ pub struct EncodeError {
     source: ImageError,
 }
 
-/// The frame as JPEG; `quality` from 1 to 100, others are taken for the nearest of these.
+/// Encodes the frame as JPEG. `quality` is clamped to 1 to 100.
 ///
 /// # Errors
 /// When a side is longer than the 65535 pixels that JPEG can hold.
@@ -30,10 +30,10 @@ pub fn encode_jpeg(frame: &Frame, quality: u8) -> Result<Vec<u8>, EncodeError> {
     Ok(bytes)
 }
 
-/// The frame as PNG, without loss.
+/// Encodes the frame as PNG, without loss.
 ///
 /// # Errors
-/// When the encoder fails, which no frame is known to bring about.
+/// When the encoder fails. No frame is known to cause this.
 pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     encode(frame, "PNG", PngEncoder::new(&mut bytes))?;

@@ -1,4 +1,4 @@
-//! Plates with text at their boxes, inside the frame, clear of each other and of heads.
+//! Text plates next to their boxes, inside the frame, clear of each other and of heads.
 
 use super::{
     INK, Mark,
@@ -11,11 +11,11 @@ use super::{
 use crate::imaging::frame::Frame;
 
 const PLATE_OPACITY: f64 = 0.92;
-/// How bad it is to cover a plate, a head or any box, by the share of the plate that does.
+/// Costs of covering another plate, a head or a box, per covered share of the plate.
 const COST_OF_PLATE: f64 = 4.0;
 const COST_OF_HEAD: f64 = 3.0;
 const COST_OF_BOX: f64 = 1.0;
-/// How bad it is to be one place further down the list of places.
+/// Additional cost per position in the list of candidate positions.
 const COST_OF_PLACE: f64 = 0.02;
 
 /// The labels of one frame.
@@ -24,14 +24,14 @@ pub(super) struct Labels<'a> {
     heads: Vec<[f64; 4]>,
     boxes: Vec<[f64; 4]>,
     text: Text,
-    /// Between a box and its plate, in pixels.
+    /// Distance between a box and its plate, in pixels.
     gap: f64,
     frame_size: [f64; 2],
     placed: Vec<Plate>,
 }
 
 impl<'a> Labels<'a> {
-    /// Labels for these marks that leave what is `taken` free; sizes fit the frame.
+    /// Labels for the marks that keep clear of `taken`. Sizes fit the frame.
     pub(super) fn new(frame: &Frame, marks: &'a [(&'a Mark, Rgb)], taken: Option<Plate>) -> Self {
         let heads = marks.iter().filter_map(|(mark, _)| mark.head);
         let heads = heads.map(|head| {
@@ -49,7 +49,8 @@ impl<'a> Labels<'a> {
         }
     }
 
-    /// Draws the labels that are not empty, the first ones if `effort` does not allow all.
+    /// Draws the labels that are not empty. If `effort` does not allow all, the last ones are left
+    /// out.
     pub(super) fn draw(
         mut self,
         frame: &mut Frame,
@@ -76,7 +77,7 @@ impl<'a> Labels<'a> {
         Ok(())
     }
 
-    /// The place at the boxes where the plate covers least: above them if all are alike.
+    /// The position next to the boxes with the lowest cost. Above them, if all costs are equal.
     fn place(&self, mark: &Mark, [width, height]: [f64; 2]) -> Plate {
         let [left, top, right, bottom] = mark.extent();
         let (above, below) = (top - self.gap - height, bottom + self.gap);
@@ -112,7 +113,7 @@ impl<'a> Labels<'a> {
         best
     }
 
-    /// What the plate would cover.
+    /// The cost of the areas that the plate would cover.
     fn cost(&self, plate: &Plate) -> f64 {
         let covered =
             |areas: &[[f64; 4]]| -> f64 { areas.iter().map(|area| plate.shared_area(area)).sum() };

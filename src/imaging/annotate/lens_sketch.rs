@@ -1,5 +1,5 @@
-//! A lens drawn into its frame: the circle where its image ends, rings of equal angle, radial
-//! lines, and where virtual views look.
+//! A lens drawn into its frame: the edge of the lens image, rings of equal angle, radial lines and
+//! the outlines of virtual views.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -19,16 +19,16 @@ const RIM: Rgb = [255, 90, 80];
 const RING: Rgb = [255, 220, 60];
 const RIGHT_ANGLE: Rgb = [255, 160, 40];
 const VIEW: Rgb = [0, 214, 255];
-/// Between two rings, radians.
+/// Angle between two rings, radians.
 const RING_STEP: f64 = TAU / 24.0;
 /// Radial lines in a full turn.
 const RADIAL_LINES: u32 = 12;
-/// Points on a circle, and along each side of a view.
+/// Points on a circle and along each side of a view.
 const CIRCLE_POINTS: u32 = 180;
 const SIDE_POINTS: u32 = 32;
 
-/// Draws the outlines of `views` thinly, a ring every 15° off the axis, a line every 30° around
-/// it, and the rim of the lens image.
+/// Draws thin outlines of `views`, a ring every 15° off the axis, a line every 30° around the axis,
+/// and the rim of the lens image.
 pub fn sketch_lens(frame: &mut Frame, lens: &Lens, views: &[VirtualView]) {
     let thin = line_width(frame) * 0.5;
     for view in views {
@@ -74,13 +74,14 @@ fn ray(theta: f64, azimuth: f64) -> Ray {
     )
 }
 
-/// Rays of equal angle from the axis, the first one twice.
+/// Rays of equal angle from the axis. The first one is repeated at the end.
 fn circle(theta: f64) -> impl Iterator<Item = Ray> {
     (0..=CIRCLE_POINTS)
         .map(move |step| ray(theta, TAU * f64::from(step) / f64::from(CIRCLE_POINTS)))
 }
 
-/// Draws a line through points (pixel centres); where the lens does not see one, it breaks.
+/// Draws a line through points (pixel centres), interrupted where a point is outside the lens
+/// image.
 fn draw(frame: &mut Frame, points: impl Iterator<Item = Option<Pixel>>, colour: Rgb, width: f64) {
     let mut previous = None;
     for point in points {

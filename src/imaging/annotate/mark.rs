@@ -1,11 +1,10 @@
-//! What is marked in a frame.
+//! Marks to draw into a frame.
 
 use serde::{Deserialize, Serialize};
 
 use super::is_drawable;
 
-/// One thing to draw. All coordinates are frame pixels, corner-origin: pixel i covers
-/// [i, i + 1).
+/// One mark. All coordinates are corner-origin frame pixels: pixel i covers [i, i + 1).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
     /// Axis-aligned box: x and y of its top-left corner, then of its bottom-right corner.
@@ -14,7 +13,7 @@ pub struct Mark {
     pub oriented: Option<OrientedMark>,
     /// The head, which labels keep clear of.
     pub head: Option<Head>,
-    /// What the plate at the box says, such as a score; nothing makes no plate.
+    /// Text of the plate at the box, for example a score. Empty draws no plate.
     pub label: String,
 }
 
@@ -45,7 +44,7 @@ pub struct Head {
 }
 
 impl Mark {
-    /// The mark in the same frame made `factor` times as large.
+    /// The mark for the same frame scaled by `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self {
@@ -80,7 +79,7 @@ impl Mark {
         [[left, top], [right, top], [right, bottom], [left, bottom]]
     }
 
-    /// What both boxes cover: left, top, right, bottom.
+    /// The smallest rectangle around both boxes: left, top, right, bottom.
     pub(super) fn extent(&self) -> [f64; 4] {
         let oriented = self.oriented.map(|oriented| oriented.corners());
         let corners = oriented.into_iter().flatten();

@@ -1,22 +1,22 @@
-//! Writing, in the font that is part of the program.
+//! Text rendering with the embedded font.
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
 
 use super::canvas::{Rgb, blend, pixels};
 use crate::imaging::frame::Frame;
 
-/// Letters of one size.
+/// Glyphs of one size.
 pub(in crate::imaging) struct Text {
     font: FontRef<'static>,
     scale: PxScale,
 }
 
 impl Text {
-    /// Letters `height` pixels high, from the lowest to the highest.
+    /// Glyphs `height` pixels high, from the lowest to the highest point.
     pub(in crate::imaging) fn new(height: f64) -> Self {
         #[expect(clippy::expect_used, reason = "the font is part of the program")]
         let font = FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR)
-            .expect("the embedded font is whole");
+            .expect("the embedded font is valid");
         #[expect(clippy::cast_possible_truncation, reason = "a size in pixels")]
         let scale = PxScale::from(height as f32);
         Self { font, scale }
@@ -34,8 +34,8 @@ impl Text {
         f64::from(text.chars().map(advance).sum::<f32>())
     }
 
-    /// Writes one line with its upper left corner at `[left, top]`; what lies outside the frame
-    /// is cut off.
+    /// Writes one line with its upper left corner at `[left, top]`. Parts outside the frame are cut
+    /// off.
     #[expect(clippy::cast_possible_truncation, reason = "positions in a frame")]
     pub(in crate::imaging) fn write(
         &self,

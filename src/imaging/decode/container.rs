@@ -1,12 +1,12 @@
-//! What a picture's outer structure says before any pixel is decoded.
+//! Checks of an image's container structure before any pixel is decoded.
 //!
-//! The decoders are lenient where a service should not be: the JPEG decoder fills the
-//! rows that a cut-off file lacks with grey, the PNG decoder tells the size only once
-//! it has reached the pixels, and the WebP decoder allocates for an inner frame before
-//! it compares that frame with the canvas. The walks here close those gaps; they only
-//! step over lengths and never read outside the bytes.
+//! The decoders are too lenient for a service. The JPEG decoder fills the missing rows of a
+//! truncated file with grey. The PNG decoder reports the size only when it reaches the pixels. The
+//! WebP decoder allocates memory for an inner frame before it compares that frame with the canvas.
+//! The functions here close those gaps. They only skip over lengths and never read outside the
+//! bytes.
 
-/// Whether the bytes begin like HEIF/HEIC, which telephones send.
+/// Returns true if the bytes begin like HEIF/HEIC, a format of telephones.
 pub(super) fn is_heif(bytes: &[u8]) -> bool {
     bytes.get(4..8) == Some(b"ftyp")
         && matches!(
@@ -15,8 +15,8 @@ pub(super) fn is_heif(bytes: &[u8]) -> bool {
         )
 }
 
-/// Width and height from a PNG's header chunk, which always comes first
-/// (PNG specification, section 11.2.1).
+/// Width and height from a PNG's header chunk, which always comes first (PNG specification, section
+/// 11.2.1).
 pub(super) fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
     if bytes.get(12..16)? != b"IHDR" {
         return None;
@@ -25,7 +25,7 @@ pub(super) fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
     Some((side(16)?, side(20)?))
 }
 
-/// Whether a PNG goes on to its end chunk.
+/// Returns true if a PNG reaches its end chunk.
 pub(super) fn png_is_whole(bytes: &[u8]) -> bool {
     let mut rest = bytes.get(8..);
     while let Some([l0, l1, l2, l3, kind @ ..]) = rest {
@@ -43,10 +43,10 @@ pub(super) fn png_is_whole(bytes: &[u8]) -> bool {
     false
 }
 
-/// Whether a JPEG goes on to its end-of-image marker (ITU-T T.81, annex B).
+/// Returns true if a JPEG reaches its end-of-image marker (ITU-T T.81, annex B).
 ///
-/// Segments are skipped by their length, so that the end marker of a thumbnail inside
-/// one does not count; bytes between segments are entropy-coded data, or padding.
+/// Segments are skipped by their length, so that the end marker of a thumbnail inside one does not
+/// count. Bytes between segments are entropy-coded data or padding.
 pub(super) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     const STUFFED_ZERO: u8 = 0x00;
     const TEMPORARY: u8 = 0x01;
@@ -58,14 +58,14 @@ pub(super) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     loop {
         match rest {
             [0xFF, END_OF_IMAGE, ..] => return true,
-            // Markers without a payload; 0xFF before a marker is a fill byte.
+            // Markers without a payload. 0xFF before a marker is a fill byte.
             [
                 0xFF,
                 STUFFED_ZERO | TEMPORARY | FIRST_RESTART..=START_OF_IMAGE,
                 ..,
             ] => rest = &rest[2..],
             [0xFF, 0xFF, ..] => rest = &rest[1..],
-            // The length counts its own two bytes, but not the marker's.
+            // The length includes its own two bytes, but not the marker's.
             [0xFF, _, high, low, ..] => {
                 let length = usize::from(u16::from_be_bytes([*high, *low]));
                 match rest.get(2 + length..) {
@@ -82,7 +82,7 @@ pub(super) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     }
 }
 
-/// Whether a WebP has all the bytes its RIFF header announces.
+/// Returns true if a WebP has all the bytes announced by its RIFF header.
 pub(super) fn webp_is_whole(bytes: &[u8]) -> bool {
     let announced = bytes
         .get(4..8)
@@ -90,8 +90,8 @@ pub(super) fn webp_is_whole(bytes: &[u8]) -> bool {
     announced.is_some_and(|size| bytes.len() as u64 >= u64::from(size) + 8)
 }
 
-/// Whether no lossy frame of a WebP is larger than the canvas that its header announces
-/// (RFC 9649, section 2).
+/// Returns true if no lossy frame of a WebP is larger than the canvas announced by its header (RFC
+/// 9649, section 2).
 pub(super) fn webp_frames_fit(bytes: &[u8], (width, height): (u32, u32)) -> bool {
     const ANIMATION_FRAME_HEADER: usize = 16;
     chunks(bytes.get(12..).unwrap_or_default()).all(|(name, payload)| match &name {
@@ -115,7 +115,7 @@ fn lossy_frame_fits(payload: &[u8], width: u32, height: u32) -> bool {
     }
 }
 
-/// Name and payload of each RIFF chunk; the last one may be cut off.
+/// Name and payload of each RIFF chunk. The last one may be cut off.
 fn chunks(mut bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
     std::iter::from_fn(move || {
         let [n0, n1, n2, n3, s0, s1, s2, s3, rest @ ..] = bytes else {

@@ -2,20 +2,19 @@
 
 use super::LensCircle;
 
-/// What the frames of one camera say together.
+/// Common lens circle of several frames of one camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AgreedCircle {
-    /// The median of the frames' circles, coordinate by coordinate: a frame too dark or too crowded
-    /// to tell does not move it.
+    /// The median of the frames' circles, coordinate by coordinate. A single frame that is too dark
+    /// or too crowded does not change it.
     pub circle: LensCircle,
-    /// How many frames have a circle whose centre and radius lie within half a percent of the
-    /// radius from it.
+    /// Number of frames whose centre and radius lie within half a percent of the radius from it.
     pub agreeing: usize,
-    /// The greatest distance of an agreeing frame's centre or radius from it, pixels.
+    /// The greatest distance of an agreeing frame's centre or radius from it, in pixels.
     pub spread: f64,
 }
 
-/// The circle that most frames agree on; `None` without any.
+/// Returns the circle on which most frames agree, or `None` without any frame.
 #[must_use]
 pub fn agreed_circle(circles: &[LensCircle]) -> Option<AgreedCircle> {
     let median = |coordinate: fn(&LensCircle) -> f64| {
@@ -23,7 +22,7 @@ pub fn agreed_circle(circles: &[LensCircle]) -> Option<AgreedCircle> {
         values.sort_by(f64::total_cmp);
         let middle = values.len() / 2;
         let upper = values.get(middle)?;
-        // Of an even number, the mean of the two in the middle.
+        // For an even number, the mean of the two middle values.
         let lower = values[values.len().saturating_sub(1) / 2];
         Some(f64::midpoint(lower, *upper))
     };

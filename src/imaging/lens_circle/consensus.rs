@@ -1,17 +1,17 @@
-//! The circle that most outline points agree on.
+//! The circle on which most outline points agree.
 //!
-//! Random sample consensus (Fischler and Bolles, 1981) over circles through three points,
-//! with a fixed seed: the same frame gives the same circle.
+//! Random sample consensus (Fischler and Bolles, 1981) over circles through three points, with a
+//! fixed seed: the same frame gives the same circle.
 
 use super::LensCircle;
 
-/// Enough to hit three true points a few times when two thirds are false.
+/// Enough to draw three true points a few times when two thirds are false.
 const TRIALS: usize = 400;
-/// Fewer points than this agree by chance.
+/// Fewer agreeing points can occur by chance.
 const MIN_AGREEING: usize = 24;
 
-/// The circle with the most points on it, less those outside of it: a dark room moves
-/// outline points inward, while only a caption lies outside.
+/// Returns the circle with the most points on it, minus the points outside of it. A dark room moves
+/// outline points inward, whereas only captions lie outside.
 pub(super) fn circle(points: &[[f64; 2]]) -> Option<LensCircle> {
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     let mut best = None;
@@ -35,7 +35,7 @@ pub(super) fn circle(points: &[[f64; 2]]) -> Option<LensCircle> {
 
 fn score(circle: &LensCircle, points: &[[f64; 2]]) -> i64 {
     let tolerance = circle.tolerance();
-    // Squares will do, and no root is as cheap as none: this runs for each trial and point.
+    // Compares squares, which avoids a square root for each trial and point.
     let [nearest, farthest] =
         [-tolerance, tolerance].map(|off| (circle.radius + off).max(0.0).powi(2));
     points
@@ -47,7 +47,7 @@ fn score(circle: &LensCircle, points: &[[f64; 2]]) -> i64 {
         .sum()
 }
 
-/// A pseudo-random point (xorshift64, Marsaglia 2003).
+/// Draws a pseudo-random point (xorshift64, Marsaglia 2003).
 fn draw(state: &mut u64, points: &[[f64; 2]]) -> Option<[f64; 2]> {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -58,16 +58,16 @@ fn draw(state: &mut u64, points: &[[f64; 2]]) -> Option<[f64; 2]> {
     points.get(index).copied()
 }
 
-/// The circle through three points; `None` when they are nearly on a line.
+/// The circle through three points, or `None` when they are nearly collinear.
 ///
-/// Its centre is as far from the first point as from the two others: two linear equations,
-/// solved by Cramer's rule.
+/// Its centre has the same distance from all three points, which gives two linear equations, solved
+/// by Cramer's rule.
 fn through(first: [f64; 2], second: [f64; 2], third: [f64; 2]) -> Option<LensCircle> {
     let [u, v] = [second[0] - first[0], second[1] - first[1]];
     let [s, t] = [third[0] - first[0], third[1] - first[1]];
     let (near, far) = (u * u + v * v, s * s + t * t);
     let twice_area = u * t - v * s;
-    // On a large circle, a short arc looks like a line: the area is small for the sides.
+    // On a large circle, a short arc is almost a line: the area is small compared with the sides.
     if twice_area.abs() < 0.01 * near.max(far) {
         return None;
     }

@@ -1,7 +1,7 @@
-//! The circle that fits rim points best, whatever a minority of them says.
+//! The circle that fits rim points best, robust against a minority of outliers.
 //!
-//! Iteratively reweighted Gauss–Newton on the geometric distance, with Tukey's biweight
-//! (Holland and Welsch, 1977): points far off count nothing at all.
+//! Iteratively reweighted Gauss–Newton on the geometric distance, with Tukey's biweight (Holland
+//! and Welsch, 1977), which gives distant points no weight.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,13 +12,13 @@ const ITERATIONS: usize = 12;
 const CUTOFF_IN_SIGMAS: f64 = 4.685;
 /// The standard deviation of a normal distribution in median absolute deviations.
 const SIGMA_IN_MEDIAN_DEVIATIONS: f64 = 1.4826;
-/// Below this, in pixels, the spread is numerical and would throw good points out.
+/// A smaller spread, in pixels, is numerical noise and would exclude good points.
 const MIN_SIGMA: f64 = 0.25;
-/// A circle has three unknowns; fewer points than this leave nothing to vote.
+/// A circle has three unknowns. Fewer points leave no redundancy to detect outliers.
 const MIN_POINTS: usize = 12;
 
-/// Fits a circle to points, starting from `start`. `None` when there are too few points
-/// or they determine no circle.
+/// Fits a circle to points, starting from `start`. Returns `None` when there are too few points or
+/// they do not determine a circle.
 pub(super) fn circle(points: &[[f64; 2]], start: &LensCircle) -> Option<LensCircle> {
     if points.len() < MIN_POINTS {
         return None;
@@ -51,7 +51,7 @@ pub(super) fn circle(points: &[[f64; 2]], start: &LensCircle) -> Option<LensCirc
     Some(circle)
 }
 
-/// Robust standard deviation of the points about the circle, in pixels.
+/// Robust standard deviation of the points around the circle, in pixels.
 fn spread(points: &[[f64; 2]], circle: &LensCircle) -> f64 {
     let mut deviations: Vec<f64> = points
         .iter()

@@ -1,14 +1,14 @@
-//! First contact: where scans from the frame's border inward leave the surround.
+//! Outline points: positions where scans from the frame's border inward leave the surround.
 
 use super::surround::{Surround, brightness, margin};
 use crate::imaging::frame::Frame;
 
-/// Scan lines across each axis of the frame. Rows and columns together cover the outline
-/// of a circle almost evenly.
+/// Scan lines across each axis of the frame. Rows and columns together cover the outline of a
+/// circle almost evenly.
 const LINES: u32 = 160;
 
-/// One point per scan line and side, in pixel centres, precise to about a pixel. Lines
-/// that start inside the picture, because the circle is cut off there, give none.
+/// One point per scan line and side, in pixel centres, precise to about a pixel. Lines that start
+/// inside the lens image, because the circle is cut off there, give no point.
 pub(super) fn points(frame: &Frame, surround: &Surround) -> Vec<[f64; 2]> {
     let (width, height) = (frame.width(), frame.height());
     let mut points = Vec::new();
@@ -34,7 +34,7 @@ pub(super) fn points(frame: &Frame, surround: &Surround) -> Vec<[f64; 2]> {
     points
 }
 
-/// The pixel in the middle of one of [`LINES`] equal slices of a side.
+/// The pixel in the centre of one of [`LINES`] equal slices of a side.
 fn middle_of_slice(line: u32, side: u32) -> u32 {
     let middle = u64::from(2 * line + 1) * u64::from(side) / u64::from(2 * LINES);
     u32::try_from(middle).unwrap_or(side - 1)
@@ -44,8 +44,8 @@ fn is_lit(frame: &Frame, surround: &Surround, x: u32, y: u32) -> bool {
     f64::from(brightness(frame.pixel(x, y))) > surround.threshold
 }
 
-/// How many pixels a scan goes before it stays lit for a while: specks, and most strokes
-/// of a caption, are shorter than that.
+/// The number of pixels before a scan stays lit for several pixels. Specks, and most strokes of a
+/// caption, are shorter.
 fn entry(length: u32, frame: &Frame, is_lit: impl Fn(u32) -> bool) -> Option<f64> {
     let run_length = (frame.width().min(frame.height()) / 150).max(3);
     let start = margin(frame);

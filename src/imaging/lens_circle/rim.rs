@@ -1,4 +1,4 @@
-//! The rim to a fraction of a pixel, along rays near a known circle.
+//! Location of the rim to a fraction of a pixel, along rays near a known circle.
 
 use std::f64::consts::TAU;
 
@@ -8,17 +8,17 @@ use crate::imaging::frame::Frame;
 
 /// Rays around the circle.
 const RAYS: u32 = 360;
-/// How far inside the rim its brightness is measured, in radii: farther than the blur of
-/// a rim reaches.
+/// Distance inside the rim at which its brightness is measured, in radii. It exceeds the blur of a
+/// rim.
 const INSIDE: f64 = 0.03;
-/// The same in pixels, at least.
+/// Minimum of the same distance, in pixels.
 const MIN_INSIDE: f64 = 4.0;
-/// Samples in a row, one pixel apart, that must be lit: noise is shorter.
+/// Consecutive samples, one pixel apart, that must be lit. Noise is shorter.
 const LIT_RUN: usize = 3;
 
-/// Where one ray meets the rim.
+/// Intersection of one ray with the rim.
 pub(super) struct RimPoint {
-    /// Direction of the ray from the centre of the circle it was sought along, in radians.
+    /// Direction of the ray from the centre of the searched circle, in radians.
     pub angle: f64,
     /// The rim in pixel centres.
     pub at: [f64; 2],
@@ -31,8 +31,8 @@ struct Sample {
     value: f64,
 }
 
-/// The rim on every ray that shows one within `reach` (in radii) on either side of the
-/// circle, by growing angle.
+/// The rim on every ray that shows one within `reach` (in radii) on either side of the circle, by
+/// increasing angle.
 pub(super) fn points(
     frame: &Frame,
     surround: &Surround,
@@ -64,7 +64,7 @@ pub(super) fn points(
         .collect()
 }
 
-/// Number of rays that meet the circle where the frame shows both of its sides.
+/// Number of rays that meet the circle where both of its sides are in the frame.
 pub(super) fn visible_rays(frame: &Frame, circle: &LensCircle) -> usize {
     let beyond = circle.radius + 2.0;
     rays()
@@ -82,8 +82,8 @@ fn rays() -> impl Iterator<Item = f64> {
     (0..RAYS).map(|ray| TAU * f64::from(ray) / f64::from(RAYS))
 }
 
-/// Where, coming from outside, brightness passes halfway between the surround and the
-/// picture just inside: a symmetric blur leaves that point in place.
+/// The distance at which brightness, coming from outside, passes halfway between the surround and
+/// the lens image just inside. A symmetric blur does not move that point.
 ///
 /// `profile` goes inward, one pixel at a time.
 fn rim_radius(profile: &[Sample], surround: &Surround, inside: f64) -> Option<f64> {
@@ -91,7 +91,7 @@ fn rim_radius(profile: &[Sample], surround: &Surround, inside: f64) -> Option<f6
     let first_lit = profile
         .windows(LIT_RUN)
         .position(|run| run.iter().all(is_lit))?;
-    // A ray that starts lit was cut off by the frame, or crosses a caption.
+    // A ray that starts lit is cut off by the frame or crosses a caption.
     let last_dark = first_lit.checked_sub(1)?;
     let innermost = profile.get(first_lit)?.radius - inside;
     let lit: Vec<f64> = profile[first_lit..]

@@ -1,14 +1,14 @@
-//! How dark the surround of the lens image is, and what counts as brighter than it.
+//! Brightness of the surround of the lens image, and the threshold above it.
 
 use std::ops::Range;
 
 use crate::imaging::frame::Frame;
 
-/// A corner brighter than this (of 255) is picture, not surround.
+/// A corner brighter than this (of 255) is lens image, not surround.
 const MAX_LEVEL: f64 = 80.0;
-/// The least step from surround to picture that is told from compression noise.
+/// The least step from surround to lens image that exceeds compression noise.
 const MIN_STEP: f64 = 6.0;
-/// Steps are also at least this many interquartile ranges of the surround's own noise.
+/// Least step in interquartile ranges of the surround's own noise.
 const STEP_IN_NOISE: f64 = 3.0;
 
 /// Brightness of the surround.
@@ -16,27 +16,26 @@ const STEP_IN_NOISE: f64 = 3.0;
 pub(super) struct Surround {
     /// The surround's brightness, 0 to 255.
     pub level: f64,
-    /// What is brighter than this is not surround.
+    /// Brighter values are not surround.
     pub threshold: f64,
 }
 
-/// The strongest of the three channels: a saturated blue wall is dark in luma, but it is
-/// not black.
+/// The strongest of the three channels. A saturated blue wall is dark in luma, but not black.
 pub(super) fn brightness([red, green, blue]: [u8; 3]) -> u8 {
     red.max(green).max(blue)
 }
 
-/// Pixels along the frame's border that are ignored: some recorders draw a thin frame.
+/// Pixels along the frame's border that are ignored, because some recorders draw a thin border.
 pub(super) fn margin(frame: &Frame) -> u32 {
     frame.width().min(frame.height()) / 100
 }
 
 impl Surround {
-    /// Measures the four corners and takes the darkest and calmest, since a caption may
-    /// cover the others. `None` when even that one is too bright to be a surround.
+    /// Measures the four corners and uses the darkest and least noisy one, since a caption may
+    /// cover the others. Returns `None` when even that corner is too bright to be a surround.
     ///
-    /// `min_contrast` is the part of the brightness in the frame's middle by which the
-    /// picture must at least outshine the surround, 0 to 1.
+    /// `min_contrast` (0 to 1) is the least contrast between lens image and surround, relative to
+    /// the brightness of the frame's centre.
     pub(super) fn of(frame: &Frame, min_contrast: f64) -> Option<Self> {
         let (width, height) = (frame.width(), frame.height());
         let margin = margin(frame);
@@ -68,8 +67,8 @@ impl Surround {
     }
 }
 
-/// Median and interquartile range of the brightness in a rectangle, from some thousand of
-/// its pixels.
+/// Median and interquartile range of the brightness in a rectangle, from some thousand of its
+/// pixels.
 fn level_and_spread(frame: &Frame, columns: Range<u32>, rows: Range<u32>) -> (f64, f64) {
     let sparse = |range: Range<u32>| {
         let step = range.len() / 64 + 1;

@@ -23,7 +23,7 @@ fn masked(polygons: &[&[[f64; 2]]]) -> MaskedPixels {
     MaskedPixels::new(&polygons, WIDTH, HEIGHT)
 }
 
-/// Columns and rows of a frame that are black.
+/// Columns and rows of the black pixels of a frame.
 fn black(frame: &Frame) -> Vec<(u32, u32)> {
     let places = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
     places
@@ -58,7 +58,7 @@ fn a_pixel_is_blanked_however_little_of_it_is_covered() {
 }
 
 #[test]
-fn masks_beyond_the_frame_are_cut_off_and_those_that_overlap_count_once() {
+fn masks_are_clipped_and_overlapping_masks_count_once() {
     let far: &[[f64; 2]] = &[[-1e6, -1e6], [1e6, -1e6], [1e6, 1e6], [-1e6, 1e6]];
     let near: &[[f64; 2]] = &[[1.0, 1.0], [9.0, 1.0], [9.0, 9.0]];
     let masked = masked(&[near, far, near]);
@@ -78,9 +78,9 @@ fn without_masks_a_frame_stays_as_it_is() {
 }
 
 proptest! {
-    /// Slim and fat triangles, some of them partly outside the frame.
+    /// Thin and wide triangles, some of them partly outside the frame.
     #[test]
-    fn what_is_inside_is_blanked_and_what_is_a_pixel_away_is_not(
+    fn pixels_inside_are_blanked_and_pixels_further_out_are_not(
         corners in prop::array::uniform3(prop::array::uniform2(-10.0..50.0_f64)),
         places in prop::collection::vec((0.0..f64::from(WIDTH), 0.0..f64::from(HEIGHT)), 50),
     ) {

@@ -16,7 +16,7 @@ use super::{
 /// Pixels rendered at once: from node to node.
 pub(super) const LANES: usize = NODE_STEP as usize;
 
-/// How far down from one row of nodes to the next each row of pixels lies.
+/// Vertical position of each row of pixels between two rows of nodes, 0 to 1.
 const DOWN: [f32; LANES] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875];
 
 /// Eight rows of a view.
@@ -33,25 +33,25 @@ pub(super) struct Band<'a> {
 
 /// 8×8 pixels between four nodes.
 pub(super) struct Patch {
-    /// Of each row, where in the frame its first pixel samples: columns, then rows.
+    /// Position in the frame that the first pixel of each row samples: columns, then rows.
     start: [[f32; LANES]; 2],
-    /// Of each row, from one pixel to the next.
+    /// Step from one pixel to the next, for each row.
     step: [[f32; LANES]; 2],
 }
 
 /// Eight pixels, a row of a patch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
-    /// Where the first one samples.
+    /// Position in the frame that the first pixel samples.
     pub(super) start: [f32; 2],
-    /// From one to the next.
+    /// Step from one pixel to the next.
     pub(super) step: [f32; 2],
 }
 
-/// Which pixels of a block see the lens image, the first one in the lowest bit.
+/// Bit mask of the pixels of a block that show the lens image, the first one in the lowest bit.
 pub(super) type Lanes = u8;
 
-/// What is known of a block before it is sampled.
+/// Visibility of a block, known before it is sampled.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Seen {
     /// All of its pixels see the lens image, within the frame.
@@ -61,7 +61,7 @@ pub(super) enum Seen {
 }
 
 impl Band<'_> {
-    /// How many patches it has.
+    /// Number of patches.
     pub(super) fn patches(&self) -> usize {
         self.above.x.len() - 1
     }
@@ -79,7 +79,7 @@ impl Band<'_> {
         }
     }
 
-    /// Which pixels of a row of a patch see the lens image.
+    /// The pixels of a row of a patch that show the lens image.
     #[inline]
     pub(super) fn lanes(&self, row: usize, patch: usize) -> Lanes {
         #[expect(clippy::cast_possible_truncation, reason = "a view's width is a u32")]
@@ -88,7 +88,8 @@ impl Band<'_> {
         row.lanes(first_pixel)
     }
 
-    /// Where in the frame each row samples between the nodes of a column: columns, then rows.
+    /// The position in the frame that each row samples between the nodes of a column: columns, then
+    /// rows.
     #[inline(always)]
     fn edge(&self, column: usize) -> [[f32; LANES]; 2] {
         let [x, y] = [

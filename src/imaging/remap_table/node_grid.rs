@@ -61,7 +61,7 @@ impl NodeGrid {
         self.nodes_across - 1
     }
 
-    /// Which pixels see the lens image.
+    /// The pixels that show the lens image.
     pub(super) fn visibility(&self) -> &Visibility {
         &self.visibility
     }

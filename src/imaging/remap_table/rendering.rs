@@ -10,10 +10,10 @@ pub(super) const WEIGHT_ONE: i16 = 1 << 14;
 /// Patches that fill a cache line.
 const LINE_PATCHES: usize = 2;
 
-/// How many pixels ahead of the writing its places are announced.
+/// Number of pixels between the prefetched and the written position.
 const AHEAD: usize = 2 * LINE_PATCHES * LANES;
 
-/// What is sampled, and what becomes of the samples.
+/// Input of the sampling, and the conversion of its samples.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Source<'a> {
     /// R, G, B of the frame's pixels, row by row.
@@ -26,7 +26,7 @@ pub(super) struct Source<'a> {
     pub(super) offset: [f32; 3],
 }
 
-/// Where red, green and blue go to.
+/// Output planes for red, green and blue.
 pub(super) type Planes<'a> = [&'a mut [f32]; 3];
 
 /// Red, green and blue of one block.

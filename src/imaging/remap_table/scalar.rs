@@ -10,9 +10,9 @@ use super::{
 pub(super) struct Sample {
     /// The upper left neighbour's index, row by row.
     first_pixel: usize,
-    /// Of the right neighbours, of [`WEIGHT_ONE`].
+    /// Weight of the right neighbours, as a part of [`WEIGHT_ONE`].
     right_weight: i32,
-    /// Of the lower neighbours, 0 to 1.
+    /// Weight of the lower neighbours, 0 to 1.
     lower_weight: f32,
 }
 
@@ -44,7 +44,7 @@ impl Block {
         })
     }
 
-    /// Where one of its pixels samples the frame (pixel centres).
+    /// The position in the frame (pixel centres) that one of its pixels samples.
     pub(super) fn position(&self, lane: usize) -> [f32; 2] {
         #[expect(clippy::cast_precision_loss, reason = "below 8")]
         let lane = lane as f32;

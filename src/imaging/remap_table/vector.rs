@@ -77,9 +77,9 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Where eight pixels sample.
+/// Sampling positions and weights of eight pixels.
 struct Samples {
-    /// Of each upper left neighbour, its first byte's index.
+    /// Index of the first byte of each upper left neighbour.
     first_bytes: [u32; LANES],
     /// As 16-bit numbers, the weights of left and right neighbours.
     weights: __m256i,
@@ -113,7 +113,7 @@ fn sample_block(source: &Source, frame_lines: &Lines, samples: &Samples) -> Valu
     [value(0), value(1), value(2)]
 }
 
-/// Of a block all of whose pixels see the lens image, within the frame.
+/// The samples of a block whose pixels all show the lens image, within the frame.
 #[target_feature(enable = "avx2")]
 fn whole_samples(source: &Source, block: &Block) -> Samples {
     let [left, top] = [0, 1].map(|axis| {
@@ -171,7 +171,7 @@ impl Neighbours {
     }
 }
 
-/// What the processor fetches at once, bytes.
+/// Bytes that the processor fetches at once.
 const CACHE_LINE: isize = 64;
 
 /// Lets the processor fetch what lies ahead: it follows neither the curves nor the rows of a view by

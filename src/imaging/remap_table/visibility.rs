@@ -1,4 +1,4 @@
-//! Which pixels of a view see the lens image.
+//! Visibility of the lens image in the pixels of a view.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::geometry::{Lens, Pixel, VirtualView};
 /// lens sees, or, where that is more than a half space, what it does not.
 #[derive(Debug)]
 pub(super) struct Visibility {
-    /// Of each row, the first pixel of its span and the first one after it.
+    /// For each row, the first pixel of its span and the first one after it.
     pub(super) spans: Vec<[u32; 2]>,
     pub(super) spans_are_hidden: bool,
 }
@@ -63,7 +63,7 @@ impl Visibility {
         }
     }
 
-    /// How many bands of eight rows the view has; the last one may be of fewer.
+    /// Number of bands of eight rows in the view. The last one may have fewer rows.
     pub(super) fn bands(&self) -> usize {
         self.spans.len().div_ceil(LANES)
     }
@@ -80,8 +80,8 @@ impl Visibility {
 }
 
 impl RowVisibility {
-    /// Which of the eight pixels from `first_pixel` see the lens image, the first one in the lowest
-    /// bit. What it says of pixels beyond the view's right border means nothing.
+    /// The pixels, of the eight from `first_pixel` on, that show the lens image, the first one in
+    /// the lowest bit. Bits for pixels beyond the view's right border are undefined.
     pub(super) fn lanes(self, first_pixel: u32) -> u8 {
         let lanes_before = |end: u32| end.saturating_sub(first_pixel).min(8);
         let (start, end) = (lanes_before(self.start), lanes_before(self.end));

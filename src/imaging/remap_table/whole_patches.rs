@@ -1,10 +1,10 @@
-//! Which patches of a view need no checks while they are rendered.
+//! Patches of a view that need no checks while they are rendered.
 
 use std::ops::Range;
 
 use super::{frame_from_plane::FrameFromPlane, node_grid::NodeGrid};
 
-/// Of each band of a view, the longest run of patches of which all pixels see the lens image, a
+/// For each band of a view, the longest run of patches whose pixels all show the lens image, a
 /// pixel or more from the frame's borders.
 #[derive(Debug, Clone)]
 pub(super) struct WholePatches {

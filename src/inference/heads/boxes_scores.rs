@@ -1,4 +1,4 @@
-//! Graphs that decode by themselves.
+//! Graphs that decode boxes and scores.
 
 use serde::Deserialize;
 
@@ -15,7 +15,7 @@ use super::{
 /// `[views, candidates]` of being a person, 0 to 1.
 ///
 /// ```toml
-/// [output]              # may be left out altogether
+/// [output]              # optional
 /// head = "boxes_scores"
 /// boxes = "boxes"       # default
 /// scores = "scores"     # default

@@ -19,13 +19,15 @@ use super::{
 pub use extent::CenternetUnit;
 
 /// `CenterNet`: a heat map `[views, classes, rows, columns]` of object centres, and maps of the
-/// same grid that say how large the object at each centre is: either sizes `[views, 2, …]`
-/// (width, height), with or without offsets `[views, 2, …]` of the centre within its cell
-/// (x, y; half a cell without), or distances to the sides `[views, 4, …]` (left, top, right,
-/// bottom) from the cell's top-left corner.
+/// same grid with the size of the object at each centre. There are two kinds of maps:
 ///
-/// A person is a cell whose score is not beaten by any of its eight neighbours; the best
-/// `max_peaks` of a view count.
+/// * sizes `[views, 2, …]` (width, height), with or without offsets `[views, 2, …]` of the centre
+///   within its cell (x, y; half a cell without offsets)
+/// * distances to the sides `[views, 4, …]` (left, top, right, bottom) from the cell's top-left
+///   corner
+///
+/// A person is a cell whose score no neighbour of the eight exceeds. The best `max_peaks` of a view
+/// are kept.
 ///
 /// Sources: Zhou et al., "Objects as Points", 2019, sections 3 and 4; Liu et al.,
 /// "Training-Time-Friendly Network", 2020, section 3 (distances to the sides).
@@ -35,10 +37,10 @@ pub use extent::CenternetUnit;
 /// head = "centernet"
 /// person_class = 0            # COCO, 80 classes
 /// heat_map = "hm"
-/// size = "wh"                 # with `offset = "reg"` where there is one; or:
+/// size = "wh"                 # with `offset = "reg"` if it exists; or:
 /// # sides = "ltrb"
 /// unit = "cells"              # default, of sizes and sides; or "pixels"
-/// score_activation = "none"   # default; "sigmoid" where the heat map holds logits
+/// score_activation = "none"   # default; "sigmoid" if the heat map contains logits
 /// max_peaks = 100             # default
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -54,16 +56,16 @@ pub struct CenternetHead {
     /// The output with centres within their cells, cells.
     #[serde(default)]
     pub offset: Option<String>,
-    /// The output with distances to the sides; instead of `size` and `offset`.
+    /// The output with distances to the sides, instead of `size` and `offset`.
     #[serde(default)]
     pub sides: Option<String>,
-    /// What sizes and sides are measured in.
+    /// Unit of sizes and sides.
     #[serde(default)]
     pub unit: CenternetUnit,
-    /// What is left to do to the heat map.
+    /// Activation applied to the heat map.
     #[serde(default)]
     pub score_activation: Activation,
-    /// The most persons in a view.
+    /// Largest number of persons in a view.
     #[serde(default = "default_max_peaks")]
     pub max_peaks: usize,
 }

@@ -11,11 +11,11 @@ use super::{
     tensor::{Output, OutputShape, TensorView},
 };
 
-/// DETR and descendants (RT-DETR, D-FINE, RF-DETR), raw: class logits
-/// `[views, queries, classes]` and boxes `[views, queries, 4]` (centre x, centre y, width,
-/// height, in shares of the view).
+/// DETR and its successors (RT-DETR, D-FINE, RF-DETR) before decoding: class logits `[views,
+/// queries, classes]` and boxes `[views, queries, 4]` (centre x, centre y, width, height, as shares
+/// of the view).
 ///
-/// The score is a sigmoid per class; in the original DETR a softmax over the classes and "no
+/// The score is a sigmoid per class. The original DETR uses a softmax over the classes and "no
 /// object".
 ///
 /// Sources: Carion et al., "End-to-End Object Detection with Transformers", 2020, section 3;
@@ -26,7 +26,7 @@ use super::{
 /// head = "detr"
 /// person_class = 0               # 80 COCO classes; 1 where they are numbered as in COCO (RF-DETR, DETR)
 /// score_activation = "sigmoid"   # default; DETR: "softmax"
-/// # boxes = "pred_boxes"         # where the shapes do not tell them apart
+/// # boxes = "pred_boxes"         # if the shapes are ambiguous
 /// # scores = "logits"
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -34,13 +34,13 @@ use super::{
 pub struct DetrHead {
     /// Index of the person among the classes.
     pub person_class: u16,
-    /// What is left to do to the class scores.
+    /// Activation applied to the class scores.
     #[serde(default)]
     pub score_activation: ClassActivation,
-    /// The output with the boxes; by default the one whose last axis is 4.
+    /// The output with the boxes. Default: the one whose last axis is 4.
     #[serde(default)]
     pub boxes: Option<String>,
-    /// The output with the class scores; by default the other one with three axes.
+    /// The output with the class scores. Default: the other one with three axes.
     #[serde(default)]
     pub scores: Option<String>,
 }

@@ -1,10 +1,10 @@
-//! Graphs with suppression inside.
+//! Graphs that include suppression.
 
 mod columns;
 
 use serde::Deserialize;
 
-use self::columns::Places;
+use self::columns::Indices;
 use super::{
     Decoder,
     finds::Finds,
@@ -16,14 +16,14 @@ use super::{
 
 pub use columns::Column;
 
-/// Graphs that suppress overlaps themselves: rows of finished detections, either
-/// `[views, rows, columns]`, or, where a column says which view a row belongs to,
-/// `[…, rows, columns]` with any leading axes. Rows of padding (view -1, score 0) fall away.
+/// Graphs that suppress overlaps: rows of final detections in `[views, rows, columns]`. If a column
+/// holds the view of a row, the shape is `[…, rows, columns]` with any leading axes. Rows of
+/// padding (view -1, score 0) are ignored.
 ///
-/// Six columns are by default `x_min, y_min, x_max, y_max, score, class` (`YOLOv10`, YOLO26 and
-/// exports "with NMS"). There is no usual order of seven, so it has to be said: `YOLOv7` writes
-/// `view, x_min, y_min, x_max, y_max, class, score`, Caffe and `OpenVINO` write
-/// `view, class, score, x_min, y_min, x_max, y_max` in shares of the view.
+/// The default for six columns is `x_min, y_min, x_max, y_max, score, class` (`YOLOv10`, YOLO26 and
+/// exports "with NMS"). Seven columns have no common order, so they must be listed. `YOLOv7` writes
+/// `view, x_min, y_min, x_max, y_max, class, score`. Caffe and `OpenVINO` write `view, class,
+/// score, x_min, y_min, x_max, y_max` as shares of the view.
 ///
 /// ```toml
 /// [output]
@@ -37,18 +37,18 @@ pub use columns::Column;
 pub struct EndToEndHead {
     /// The person's number in the class column.
     pub person_class: u16,
-    /// What the first columns hold; columns beyond are left alone.
+    /// Content of the first columns. Further columns are ignored.
     #[serde(default)]
     pub columns: Option<Vec<Column>>,
-    /// What box sides are measured in.
+    /// Unit of box sides.
     #[serde(default)]
     pub unit: EndToEndUnit,
-    /// The output to read; by default the only one.
+    /// The output to read. Default: the only one.
     #[serde(default)]
     pub name: Option<String>,
 }
 
-/// What box sides are measured in.
+/// Unit of box sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EndToEndUnit {
@@ -64,7 +64,7 @@ impl EndToEndHead {
         &self,
         outputs: &'o [T],
         batch: &Batch,
-    ) -> Result<(&'o T, Places), String> {
+    ) -> Result<(&'o T, Indices), String> {
         let rows = named_or_only(outputs, self.name.as_deref())?;
         let dimensions = rows.dimensions();
         let columns = match (&self.columns, dimensions.last().copied().flatten()) {
@@ -72,14 +72,14 @@ impl EndToEndHead {
             (None, None | Some(6)) => &columns::SIX[..],
             (None, Some(found)) => {
                 return Err(format!(
-                    "its output {:?} has rows of {found}; list what they hold as `columns` in the \
+                    "its output {:?} has rows of {found}; list their content as `columns` in the \
                      manifest's [output]",
                     rows.name()
                 ));
             }
         };
-        let places = Places::of(columns)?;
-        let mut axes = match places.view {
+        let indices = Indices::of(columns)?;
+        let mut axes = match indices.view {
             None => vec![Axis::Views],
             Some(_) => vec![Axis::Any; dimensions.len().saturating_sub(2)],
         };
@@ -88,11 +88,11 @@ impl EndToEndHead {
             Axis::AtLeast(columns.len(), "columns"),
         ]);
         batch.require(&[(rows, &axes)])?;
-        Ok((rows, places))
+        Ok((rows, indices))
     }
 
-    fn offer(&self, row: &[f32], places: &Places, view: usize, batch: &Batch, finds: &mut Finds) {
-        let class = row[places.class];
+    fn offer(&self, row: &[f32], indices: &Indices, view: usize, batch: &Batch, finds: &mut Finds) {
+        let class = row[indices.class];
         if !class.is_finite() {
             return finds.count_non_finite();
         }
@@ -103,20 +103,20 @@ impl EndToEndHead {
             EndToEndUnit::Pixels => [1.0; 2],
             EndToEndUnit::Share => [batch.width, batch.height].map(f64::from),
         };
-        let score = Activation::None.score(row[places.score], finds.floor);
+        let score = Activation::None.score(row[indices.score], finds.floor);
         finds.offer(view, score, || {
-            let [x_min, y_min, x_max, y_max] = places.sides.map(|place| f64::from(row[place]));
+            let [x_min, y_min, x_max, y_max] = indices.sides.map(|index| f64::from(row[index]));
             [x_min * width, y_min * height, x_max * width, y_max * height]
         });
     }
 }
 
-/// The view numbered `raw`, if it is one of so many.
+/// The view with the number `raw`, if it is less than `views`.
 fn view_number(raw: f32, views: usize) -> Option<usize> {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "the cast saturates and negative numbers are ruled out"
+        reason = "the cast saturates and negative numbers are excluded"
     )]
     (raw > -0.5)
         .then_some(raw.round() as usize)
@@ -134,21 +134,21 @@ impl Decoder for EndToEndHead {
         batch: &Batch,
         finds: &mut Finds,
     ) -> Result<(), String> {
-        let (rows, places) = self.select(outputs, batch)?;
+        let (rows, indices) = self.select(outputs, batch)?;
         let columns = rows.shape[rows.shape.len() - 1];
-        let Some(place) = places.view else {
+        let Some(index) = indices.view else {
             for (view, values) in rows.views().enumerate() {
                 for row in values.chunks_exact(columns) {
-                    self.offer(row, &places, view, batch, finds);
+                    self.offer(row, &indices, view, batch, finds);
                 }
             }
             return Ok(());
         };
         for row in rows.values.chunks_exact(columns) {
-            if !row[place].is_finite() {
+            if !row[index].is_finite() {
                 finds.count_non_finite();
-            } else if let Some(view) = view_number(row[place], batch.views.unwrap_or(0)) {
-                self.offer(row, &places, view, batch, finds);
+            } else if let Some(view) = view_number(row[index], batch.views.unwrap_or(0)) {
+                self.offer(row, &indices, view, batch, finds);
             }
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The persons of a batch, gathered candidate by candidate.
+//! Collection of the persons of a batch, candidate by candidate.
 
 use super::{
     HeadOutput, ViewDetection,
@@ -9,11 +9,11 @@ use crate::{
     imaging::NetworkInput,
 };
 
-/// Gathers persons, and counts what had to be dropped.
+/// Collects persons and counts the dropped candidates.
 pub(super) struct Finds {
-    /// What a score has to reach.
+    /// Least score of a person.
     pub(super) floor: Floor,
-    /// The whole view; none for inputs too large to have boxes.
+    /// The whole view. `None` for inputs too large to have boxes.
     bounds: Option<BBox<ViewPixels>>,
     output: HeadOutput,
     not_a_probability: Option<f32>,
@@ -33,15 +33,15 @@ impl Finds {
         }
     }
 
-    /// A candidate of the view numbered `view`; its corners (`x_min, y_min, x_max, y_max`, view
-    /// pixels) are computed only if its score is kept.
+    /// Adds a candidate of the view with the number `view`. Its corners (`x_min, y_min, x_max,
+    /// y_max`, view pixels) are computed only if its score is kept.
     pub(super) fn offer(&mut self, view: usize, score: Score, corners: impl FnOnce() -> [f64; 4]) {
         if let Some(score) = self.judge(score) {
             self.add(view, score, corners());
         }
     }
 
-    /// The score, if it is kept; counts it if it is no score at all.
+    /// Returns the score if it is kept. Counts it if it is not finite.
     pub(super) fn judge(&mut self, score: Score) -> Option<f64> {
         match score {
             Score::Kept(score) => return Some(score),
@@ -52,7 +52,7 @@ impl Finds {
         None
     }
 
-    /// A candidate with a score that is kept. Boxes without area in the view are dropped.
+    /// Adds a candidate whose score is kept. Boxes without area in the view are dropped.
     pub(super) fn add(&mut self, view: usize, score: f64, corners: [f64; 4]) {
         let bbox = match BBox::new(corners) {
             Ok(bbox) => bbox,
@@ -73,7 +73,7 @@ impl Finds {
         match self.not_a_probability {
             None => Ok(self.output),
             Some(raw) => Err(format!(
-                "its scores hold {raw} where 0 to 1 is needed; if they are logits, say so with \
+                "its scores hold {raw} where 0 to 1 is needed; if they are logits, declare it with \
                  `score_activation` in the manifest's [output]"
             )),
         }
@@ -86,7 +86,7 @@ pub(super) fn corners_around([x, y]: [f64; 2], [width, height]: [f64; 2]) -> [f6
     [x - x_reach, y - y_reach, x + x_reach, y + y_reach]
 }
 
-/// The first four values of a candidate, in `f64`.
+/// The first four values of a candidate as `f64`.
 pub(super) fn four(values: &[f32]) -> [f64; 4] {
     [0, 1, 2, 3].map(|index| f64::from(values[index]))
 }

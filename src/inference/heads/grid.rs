@@ -42,7 +42,7 @@ impl Grid {
         grid.stretched_over(batch)
     }
 
-    /// As many cells, of such a size that they cover exactly the input.
+    /// The same number of cells with a size that covers the input exactly.
     pub(super) fn stretched_over(self, batch: &Batch) -> Self {
         let cell = [
             f64::from(batch.width) / f64::from(self.columns),
@@ -51,7 +51,7 @@ impl Grid {
         Self { cell, ..self }
     }
 
-    /// Square cells of `stride` pixels; the last ones may reach beyond the input.
+    /// Square cells of `stride` pixels. The last ones may reach beyond the input.
     pub(super) fn of_stride(stride: NonZeroU32, batch: &Batch) -> Self {
         let side = f64::from(stride.get());
         Self {
@@ -61,7 +61,7 @@ impl Grid {
         }
     }
 
-    /// How many cells.
+    /// Number of cells.
     pub(super) fn len(self) -> usize {
         (self.columns as usize).saturating_mul(self.rows as usize)
     }
@@ -73,10 +73,10 @@ impl Grid {
             .flat_map(move |row| (0..columns).map(move |column| [column, row].map(f64::from)))
     }
 
-    /// Column and row of the cell numbered `index`, row by row.
+    /// Column and row of the cell with the number `index`, row by row.
     pub(super) fn cell_at(self, index: usize) -> [f64; 2] {
         let columns = self.columns.max(1) as usize;
-        // Both fit: there are at most u32::MAX of either.
+        // Both fit in a u32: there are at most u32::MAX columns and rows.
         [index % columns, index / columns]
             .map(|cell| u32::try_from(cell).map_or(f64::NAN, f64::from))
     }
@@ -87,7 +87,7 @@ impl Grid {
     }
 }
 
-/// The usual pyramid.
+/// The usual strides of a feature pyramid.
 pub(super) fn default_strides() -> Vec<NonZeroU32> {
     [8, 16, 32]
         .into_iter()
@@ -95,7 +95,7 @@ pub(super) fn default_strides() -> Vec<NonZeroU32> {
         .collect()
 }
 
-/// How many cells a pyramid has over all its levels.
+/// Number of cells of a pyramid over all its levels.
 pub(super) fn pyramid_len(strides: &[NonZeroU32], batch: &Batch) -> usize {
     strides
         .iter()

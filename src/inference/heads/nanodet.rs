@@ -14,9 +14,9 @@ use super::{
     tensor::{Output, OutputShape, TensorView},
 };
 
-/// `NanoDet`: `[views, cells, classes + 4 (reg_max + 1)]`, per cell the class scores, then for
-/// the left, top, right and bottom side logits of the distances 0 to `reg_max` strides; cells
-/// level by level, row by row.
+/// `NanoDet`: `[views, cells, classes + 4 (reg_max + 1)]`. Each cell has the class scores, then
+/// logits of the distances 0 to `reg_max` strides for the left, top, right and bottom side. Cells
+/// are ordered level by level, row by row.
 ///
 /// A side's distance from the cell's prior is `stride · Σ i · softmax(logits)_i`.
 ///
@@ -46,25 +46,25 @@ pub struct NanodetHead {
     /// The greatest distance of a side, strides.
     #[serde(default = "plus_reg_max")]
     pub reg_max: u16,
-    /// From where in a cell distances count.
+    /// Position within a cell from which distances are measured.
     #[serde(default)]
     pub prior: PriorPosition,
-    /// What is left to do to the class scores.
+    /// Activation applied to the class scores.
     #[serde(default)]
     pub score_activation: Activation,
-    /// The output to read; by default the only one.
+    /// The output to read. Default: the only one.
     #[serde(default)]
     pub name: Option<String>,
 }
 
-/// Where in a cell its prior lies.
+/// Position of the prior within a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PriorPosition {
     /// The top-left corner, as in NanoDet-Plus.
     #[default]
     Corner,
-    /// The middle, as in `NanoDet` before Plus.
+    /// The centre, as in `NanoDet` before Plus.
     Center,
 }
 

@@ -1,8 +1,8 @@
-//! Finding a head's outputs among all of a model's.
+//! Selection of a head's outputs among all outputs of a model.
 
 use super::tensor::Output;
 
-/// The output of that name.
+/// Returns the output with that name.
 pub(super) fn named<'o, T: Output>(outputs: &'o [T], name: &str) -> Result<&'o T, String> {
     let found = outputs.iter().find(|output| output.name() == name);
     found.ok_or_else(|| {
@@ -13,7 +13,7 @@ pub(super) fn named<'o, T: Output>(outputs: &'o [T], name: &str) -> Result<&'o T
     })
 }
 
-/// The output of that name; without a name, the only one.
+/// Returns the output with that name. Without a name, the only output.
 pub(super) fn named_or_only<'o, T: Output>(
     outputs: &'o [T],
     name: Option<&str>,
@@ -22,14 +22,14 @@ pub(super) fn named_or_only<'o, T: Output>(
         (Some(name), _) => named(outputs, name),
         (None, [only]) => Ok(only),
         (None, _) => Err(format!(
-            "it has the outputs {}; say which one to read with `name` in the manifest's [output]",
+            "it has the outputs {}; select one with `name` in the manifest's [output]",
             names(outputs)
         )),
     }
 }
 
-/// The outputs with boxes and with the scores of all classes: those named, else those told
-/// apart by shape. Both have three axes, the last axis of the boxes is 4.
+/// Returns the outputs with boxes and with the scores of all classes, by name or else by shape.
+/// Both have three axes, and the last axis of the boxes is 4.
 pub(super) fn boxes_and_scores<'o, T: Output>(
     outputs: &'o [T],
     [boxes, scores]: [Option<&str>; 2],
@@ -38,7 +38,7 @@ pub(super) fn boxes_and_scores<'o, T: Output>(
         if let Some(name) = name {
             return named(outputs, name).map(Some);
         }
-        // An axis that is not known yet could be either.
+        // An axis of unknown length could be either.
         let mut fitting = outputs.iter().filter(|output| {
             let dimensions = output.dimensions();
             let last = dimensions.last().copied().flatten();
@@ -52,7 +52,7 @@ pub(super) fn boxes_and_scores<'o, T: Output>(
         return Ok([boxes, scores]);
     }
     Err(format!(
-        "which of its outputs {} hold boxes and scores cannot be told by shape; name them with \
+        "its outputs {} with boxes and scores cannot be distinguished by shape; name them with \
          `boxes` and `scores` in the manifest's [output]",
         names(outputs)
     ))

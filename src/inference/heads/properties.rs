@@ -1,4 +1,4 @@
-//! What must hold for any outputs whatsoever.
+//! Properties that hold for any outputs.
 
 mod cases;
 
@@ -18,7 +18,7 @@ fn value() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// Outputs that fit their head, or nearly: one axis may be another, or one too many.
+/// Outputs that fit their head, or almost: one axis may differ or be superfluous.
 #[derive(Debug, Clone)]
 struct Outputs {
     manifest: &'static str,
@@ -105,7 +105,7 @@ proptest! {
     }
 
     #[test]
-    fn what_a_head_accepts_when_loaded_it_decodes(outputs in outputs(), open in any::<u8>()) {
+    fn a_head_decodes_what_it_accepts_when_loaded(outputs in outputs(), open in any::<u8>()) {
         let declared = |open: u8| [0, 1].map(|output: usize| -> Vec<i64> {
             let is_open = |axis: usize| open >> (axis + 4 * output) & 1 == 1;
             let dimensions = outputs.shapes[output].iter().enumerate();
@@ -120,7 +120,7 @@ proptest! {
         prop_assert!(decoded.is_ok() || !outputs.fit, "{:?}", decoded);
         if decoded.is_ok() {
             prop_assert!(accepts(declared(0)));
-            // Where outputs are told apart by shape, their last axes have to be known.
+            // Where outputs are distinguished by shape, their last axes must be known.
             let by_shape = !["'a'", "yolo_v3"].iter().any(|name| outputs.manifest.contains(name));
             prop_assert!(by_shape || accepts(declared(open & 0b0111_0111)));
         }

@@ -1,52 +1,53 @@
-//! Raw values to scores, cheapest test first.
+//! Conversion of raw values to scores, cheapest test first.
 
 use serde::Deserialize;
 
-/// Rounding by quantised networks that is still taken for a probability.
+/// Deviation from 0 to 1 that is accepted as rounding of a quantised network.
 const PROBABILITY_TOLERANCE: f32 = 0.01;
-/// Logits this much below the floor's are dropped unseen; far more than `f64` rounding.
+/// Logits below the floor's logit by this much are dropped without the sigmoid. The margin is far
+/// larger than `f64` rounding.
 const LOGIT_MARGIN: f64 = 1e-3;
-/// Beyond this logit sigmoids crowd so close to 1 that the margin would not cover the rounding.
+/// Above this logit, sigmoids are so close to 1 that the margin would not cover the rounding.
 const MAX_FLOOR_LOGIT: f64 = 27.0;
 
-/// What is left to do to a raw score.
+/// Activation applied to a raw score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Activation {
-    /// Nothing: the graph did it, values are 0 to 1.
+    /// None: the graph applied it, and values are 0 to 1.
     #[default]
     None,
     /// `1 / (1 + e^-x)`.
     Sigmoid,
 }
 
-/// What is left to do to the raw scores of all classes.
+/// Activation applied to the raw scores of all classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClassActivation {
-    /// Nothing: the graph did it, values are 0 to 1.
+    /// None: the graph applied it, and values are 0 to 1.
     None,
-    /// `1 / (1 + e^-x)`, each class by itself.
+    /// `1 / (1 + e^-x)` for each class separately.
     #[default]
     Sigmoid,
-    /// `e^x / Σ e^x` over all classes, background or "no object" among them.
+    /// `e^x / Σ e^x` over all classes, including background or "no object".
     Softmax,
 }
 
-/// A judged score.
+/// A score compared with the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Score {
     /// At least the floor, 0 to 1.
     Kept(f64),
     /// Below the floor.
     Below,
-    /// Made from a NaN or an infinity.
+    /// Computed from a NaN or an infinity.
     NotFinite,
-    /// Said to be 0 to 1, but is not.
+    /// Declared as 0 to 1, but out of that range.
     NotAProbability(f32),
 }
 
-/// The score below which nothing is of interest.
+/// The least score that is kept.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Floor {
     score: f64,
@@ -94,14 +95,14 @@ impl Floor {
         }
     }
 
-    /// The softmax of `logits` at `class`, which must be one of them.
+    /// The softmax of `logits` at `class`, which must be a valid index.
     pub(super) fn softmax(self, logits: &[f32], class: usize) -> Score {
         if !logits.iter().all(|logit| logit.is_finite()) {
             return Score::NotFinite;
         }
         let own = f64::from(logits[class]);
         let greatest = f64::from(logits.iter().copied().fold(f32::MIN, f32::max));
-        // A softmax over all classes is at most the one over two of them, which is a sigmoid.
+        // A softmax over all classes is at most the softmax over two of them, which is a sigmoid.
         if own < greatest && own - greatest < self.logit {
             return Score::Below;
         }
@@ -123,7 +124,7 @@ impl Activation {
 }
 
 impl ClassActivation {
-    /// The score of `class`, which must be one of `raw`.
+    /// The score of `class`, which must be an index of `raw`.
     pub(super) fn score(self, raw: &[f32], class: usize, floor: Floor) -> Score {
         match self {
             Self::None => floor.probability(raw[class]),
@@ -134,8 +135,8 @@ impl ClassActivation {
 }
 
 impl Score {
-    /// The product with `other`, which is asked for only if this factor is kept: a product is at
-    /// most either factor.
+    /// The product with `other`. `other` is computed only if this factor is kept, because a product
+    /// is at most either factor.
     pub(super) fn times(self, floor: Floor, other: impl FnOnce() -> Self) -> Self {
         let Self::Kept(own) = self else {
             return self;

@@ -1,13 +1,13 @@
-//! Holding the shapes of outputs against what a head needs.
+//! Comparison of output shapes with the requirements of a head.
 
 use std::fmt;
 
 use super::tensor::Output;
 
-/// What is known of a batch when shapes are checked.
+/// Properties of a batch that are known when shapes are checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Batch {
-    /// How many views; `None` while the model is loaded.
+    /// Number of views. `None` while the model is loaded.
     pub(super) views: Option<usize>,
     /// Width of the network's input, pixels.
     pub(super) width: u32,
@@ -15,7 +15,7 @@ pub(super) struct Batch {
     pub(super) height: u32,
 }
 
-/// What one axis of an output has to be. Axes of the same name have to be equal.
+/// Requirement on one axis of an output. Axes with the same name must be equal.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Axis {
     /// One entry per view.
@@ -23,9 +23,9 @@ pub(super) enum Axis {
     Any,
     Exactly(usize),
     AtLeast(usize, &'static str),
-    /// Cells along a side of so many pixels, none of them cut off.
+    /// Number of whole cells along a side of the given length in pixels.
     Dividing(u32, &'static str),
-    /// So many anchors, each with at least so many channels.
+    /// A number of anchors, each with at least `at_least` channels.
     PerAnchor {
         anchors: usize,
         at_least: usize,
@@ -73,7 +73,7 @@ impl fmt::Display for Axis {
 }
 
 impl Batch {
-    /// Holds outputs against what their axes have to be.
+    /// Checks outputs against the requirements on their axes.
     pub(super) fn require<T: Output>(&self, wanted: &[(&T, &[Axis])]) -> Result<(), String> {
         let mut known: Vec<(&str, usize)> = Vec::new();
         for &(output, axes) in wanted {
@@ -126,7 +126,7 @@ impl Batch {
     }
 }
 
-/// Refuses numbers in the manifest that are no sizes.
+/// Refuses numbers in the manifest that are not positive.
 pub(super) fn check_positive<'n>(
     field: &str,
     numbers: impl IntoIterator<Item = &'n f64>,
@@ -135,7 +135,7 @@ pub(super) fn check_positive<'n>(
     match numbers.into_iter().find(wrong) {
         None => Ok(()),
         Some(number) => Err(format!(
-            "`{field}` in the manifest's [output] holds {number}; only numbers above 0 fit"
+            "`{field}` in the manifest's [output] contains {number}; only numbers above 0 are valid"
         )),
     }
 }

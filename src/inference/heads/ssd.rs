@@ -18,9 +18,9 @@ pub use anchors::AnchorGenerator;
 /// SSD with the box coder of Faster R-CNN: encodings `[views, anchors, 4]`
 /// (`t_y, t_x, t_h, t_w`) and class scores `[views, anchors, classes]`.
 ///
-/// For an anchor `(c_y, c_x, h, w)` and scale factors `(s_y, s_x, s_h, s_w)` the box has the
-/// centre `(c_x + w t_x / s_x, c_y + h t_y / s_y)` and the size
-/// `(w e^(t_w / s_w), h e^(t_h / s_h))`.
+/// For an anchor `(c_y, c_x, h, w)` and scale factors `(s_y, s_x, s_h, s_w)`, the box has the
+/// centre `(c_x + w t_x / s_x, c_y + h t_y / s_y)` and the size `(w e^(t_w / s_w), h e^(t_h /
+/// s_h))`.
 ///
 /// Sources: Liu et al., "SSD: Single Shot `MultiBox` Detector", 2016, section 2.2; Ren et al.,
 /// "Faster R-CNN", 2015, equation 2; `faster_rcnn_box_coder.py` of the TensorFlow object
@@ -32,8 +32,8 @@ pub use anchors::AnchorGenerator;
 /// person_class = 1               # TensorFlow's COCO classes, 0 is the background
 /// score_activation = "sigmoid"   # default; or "softmax", "none"
 /// scale_factors = [10.0, 10.0, 5.0, 5.0]   # default
-/// # boxes = "…", scores = "…"    # where the shapes do not tell them apart
-/// # anchors = [[c_y, c_x, h, w], …]        # in shares of the view, or:
+/// # boxes = "…", scores = "…"    # if the shapes are ambiguous
+/// # anchors = [[c_y, c_x, h, w], …]        # as shares of the view, or:
 /// # [output.anchor_generator] …            # see its defaults
 /// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -41,22 +41,22 @@ pub use anchors::AnchorGenerator;
 pub struct SsdHead {
     /// Index of the person among the classes.
     pub person_class: u16,
-    /// What is left to do to the class scores.
+    /// Activation applied to the class scores.
     #[serde(default)]
     pub score_activation: ClassActivation,
     /// Divisors of `t_y, t_x, t_h, t_w`.
     #[serde(default = "default_scale_factors")]
     pub scale_factors: [f64; 4],
-    /// The output with the encodings; by default the one whose last axis is 4.
+    /// The output with the encodings. Default: the one whose last axis is 4.
     #[serde(default)]
     pub boxes: Option<String>,
-    /// The output with the class scores; by default the other one with three axes.
+    /// The output with the class scores. Default: the other one with three axes.
     #[serde(default)]
     pub scores: Option<String>,
-    /// The anchors as `c_y, c_x, h, w`, each in shares of the view; excludes `anchor_generator`.
+    /// The anchors as `c_y, c_x, h, w`, each as a share of the view. Excludes `anchor_generator`.
     #[serde(default)]
     pub anchors: Option<Vec<[f64; 4]>>,
-    /// How the anchors are generated unless they are given.
+    /// Parameters of the anchor generation if `anchors` is not given.
     #[serde(default)]
     pub anchor_generator: Option<AnchorGenerator>,
 }
@@ -71,7 +71,7 @@ impl SsdHead {
         let [width, height] = [batch.width, batch.height].map(f64::from);
         match (&self.anchors, &self.anchor_generator) {
             (Some(_), Some(_)) => Err(
-                "the manifest's [output] has both `anchors` and `anchor_generator`; leave one out"
+                "the manifest's [output] has both `anchors` and `anchor_generator`; remove one"
                     .to_owned(),
             ),
             (Some(anchors), None) => Ok(anchors

@@ -1,11 +1,11 @@
-//! A network's outputs: their promised shapes, and their values.
+//! Outputs of a network: their declared shapes and their values.
 
-/// An output as the model declares it.
+/// An output declared by the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OutputShape<'a> {
     /// The output's name in the model.
     pub name: &'a str,
-    /// Its dimensions; -1 (or any negative number) for one that is known only at run time.
+    /// Its dimensions. -1 (or any negative number) stands for one that is known only at run time.
     pub shape: &'a [i64],
 }
 
@@ -14,18 +14,18 @@ pub struct OutputShape<'a> {
 pub struct TensorView<'a> {
     /// The output's name in the model.
     pub name: &'a str,
-    /// Its dimensions. Their product must be the number of values; [`super::Head::decode`]
-    /// refuses the tensor otherwise.
+    /// Its dimensions. Their product must be the number of values, otherwise
+    /// [`super::Head::decode`] refuses the tensor.
     pub shape: &'a [usize],
     /// Its values, row-major.
     pub values: &'a [f32],
 }
 
-/// What shape checks need to know of an output, before and after a run.
+/// Properties of an output for shape checks before and after a run.
 pub(super) trait Output {
     fn name(&self) -> &str;
 
-    /// The dimensions; `None` for one that is not known yet.
+    /// The dimensions. `None` for one that is not known yet.
     fn dimensions(&self) -> Vec<Option<usize>>;
 }
 
@@ -53,7 +53,7 @@ impl Output for TensorView<'_> {
 }
 
 impl<'a> TensorView<'a> {
-    /// Refuses a shape that its values do not fill exactly.
+    /// Refuses a shape whose product differs from the number of values.
     pub(super) fn check_len(&self) -> Result<(), String> {
         let product = self.shape.iter().try_fold(1_usize, |product, &dimension| {
             product.checked_mul(dimension)
@@ -62,7 +62,7 @@ impl<'a> TensorView<'a> {
             return Ok(());
         }
         Err(format!(
-            "its output {:?} came back with {} values for the shape {:?}",
+            "its output {:?} has {} values for the shape {:?}",
             self.name,
             self.values.len(),
             self.shape

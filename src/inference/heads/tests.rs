@@ -1,4 +1,4 @@
-//! How every head treats floors, edges and broken values.
+//! Floors, edges and invalid values in every head.
 
 mod known_models;
 mod refusals;
@@ -27,7 +27,7 @@ fn decode(
     head.decode(&outputs, 1, &NetworkInput::plain(100, 50), floor)
 }
 
-/// What comes of one box with one score.
+/// Output for one box with one score.
 fn decode_one(corners: [f32; 4], score: f32, floor: f64) -> HeadOutput {
     decode(
         &Head::default(),
@@ -79,13 +79,13 @@ fn values_that_are_not_finite_are_dropped_and_counted() {
 }
 
 #[test]
-fn the_box_of_a_low_score_is_not_looked_at() {
+fn the_box_of_a_low_score_is_not_computed() {
     let found = decode_one([f32::NAN; 4], 0.4, 0.5);
     assert_eq!((found.per_view[0].len(), found.non_finite), (0, 0));
 }
 
 #[test]
-fn an_exponential_beyond_all_pictures_is_counted() {
+fn an_exponential_beyond_any_image_is_counted() {
     let yolo = head("head = 'yolo_v2'\nperson_class = 0\nanchors = [[1, 1]]");
     let raw = [0.0, 0.0, 1000.0, 0.0, 9.0, 9.0];
     let found = decode(&yolo, &[("grid", &[1, 6, 1, 1], &raw)], 0.5).unwrap();
@@ -129,7 +129,7 @@ fn every_cell_of_a_plateau_is_a_peak() {
 }
 
 #[test]
-fn of_too_many_equal_peaks_the_first_are_kept() {
+fn the_first_of_too_many_equal_peaks_are_kept() {
     assert_eq!(plateau(3), [[5.0, 5.0], [15.0, 5.0], [25.0, 5.0]]);
     assert!(plateau(0).is_empty());
 }

@@ -12,11 +12,11 @@ use super::{
     tensor::{Output, OutputShape, TensorView},
 };
 
-/// `YOLOv2`'s region layer, raw: `[views, anchors × (5 + classes), rows, columns]`, per anchor
-/// `t_x, t_y, t_w, t_h, t_o` and the class logits.
+/// `YOLOv2`'s region layer before decoding: `[views, anchors × (5 + classes), rows, columns]`, with
+/// `t_x, t_y, t_w, t_h, t_o` and the class logits per anchor.
 ///
-/// In cells: centre `(σ(t_x) + column, σ(t_y) + row)`, size `(p_w e^t_w, p_h e^t_h)` for the
-/// anchor `(p_w, p_h)`; score `σ(t_o) · softmax(classes)`.
+/// In cells: centre `(σ(t_x) + column, σ(t_y) + row)`, size `(p_w e^t_w, p_h e^t_h)` for the anchor
+/// `(p_w, p_h)`. Score: `σ(t_o) · softmax(classes)`.
 ///
 /// Source: Redmon and Farhadi, "YOLO9000: Better, Faster, Stronger", 2017, section 2 (direct
 /// location prediction).
@@ -34,7 +34,7 @@ pub struct YoloV2Head {
     pub person_class: u16,
     /// Width and height of each anchor, cells.
     pub anchors: Vec<[f64; 2]>,
-    /// The output to read; by default the only one.
+    /// The output to read. Default: the only one.
     #[serde(default)]
     pub name: Option<String>,
 }

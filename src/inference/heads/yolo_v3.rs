@@ -12,11 +12,11 @@ use super::{
     tensor::{Output, OutputShape, TensorView},
 };
 
-/// `YOLOv3`'s maps, raw, one per scale: `[views, anchors × (5 + classes), rows, columns]`, per
-/// anchor `t_x, t_y, t_w, t_h, t_o` and the class logits.
+/// `YOLOv3`'s maps before decoding, one per scale: `[views, anchors × (5 + classes), rows,
+/// columns]`, with `t_x, t_y, t_w, t_h, t_o` and the class logits per anchor.
 ///
 /// Centre `(σ(t_x) + column, σ(t_y) + row)` cells, size `(p_w e^t_w, p_h e^t_h)` pixels for the
-/// anchor `(p_w, p_h)`; score `σ(t_o) · σ(class)`.
+/// anchor `(p_w, p_h)`. Score: `σ(t_o) · σ(class)`.
 ///
 /// Source: Redmon and Farhadi, "`YOLOv3`: An Incremental Improvement", 2018, section 2.
 ///
@@ -25,8 +25,8 @@ use super::{
 /// head = "yolo_v3"
 /// person_class = 0   # COCO, 80 classes
 /// anchors = [[10, 14], [23, 27], [37, 58], [81, 82], [135, 169], [344, 319]]   # YOLOv3-tiny
-/// masks = [[3, 4, 5], [1, 2, 3]]   # which anchors each map has, in the order of the outputs
-/// # names = ["coarse", "fine"]     # where the model has other outputs too
+/// masks = [[3, 4, 5], [1, 2, 3]]   # anchors of each map, in the order of the outputs
+/// # names = ["coarse", "fine"]     # if the model also has other outputs
 /// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,9 +35,9 @@ pub struct YoloV3Head {
     pub person_class: u16,
     /// Width and height of each anchor, pixels of the network's input.
     pub anchors: Vec<[f64; 2]>,
-    /// For each map: indices of its anchors.
+    /// Indices of the anchors of each map.
     pub masks: Vec<Vec<usize>>,
-    /// For each map: its output; by default all outputs, in the model's order.
+    /// Output of each map. Default: all outputs, in the model's order.
     #[serde(default)]
     pub names: Option<Vec<String>>,
 }
@@ -64,8 +64,8 @@ impl YoloV3Head {
         };
         if maps.len() != self.masks.len() {
             return Err(format!(
-                "{} `masks` in the manifest's [output] do not fit its {} maps; `names` says which \
-                 of the outputs {} to read",
+                "{} `masks` in the manifest's [output] do not fit its {} maps; select the \
+                 outputs to read from {} with `names`",
                 self.masks.len(),
                 maps.len(),
                 names(outputs)

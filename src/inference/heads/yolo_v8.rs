@@ -14,21 +14,21 @@ use super::{
     tensor::{Output, OutputShape, TensorView},
 };
 
-/// `YOLOv8`, YOLO11 and relatives as they are exported without suppression:
-/// `[views, 4 + classes, cells]`, per cell centre x, centre y, width, height (pixels) and class
-/// scores; further channels (mask coefficients, key points) are left alone.
+/// `YOLOv8`, YOLO11 and relatives, exported without suppression: `[views, 4 + classes, cells]`.
+/// Each cell has centre x, centre y, width, height (pixels) and class scores. Further channels
+/// (mask coefficients, key points) are ignored.
 ///
-/// Source: the export of the reference implementation; the graph decodes the boxes and applies
-/// the sigmoids.
+/// Source: the export of the reference implementation. The graph decodes the boxes and applies the
+/// sigmoids.
 ///
 /// ```toml
 /// [output]
 /// head = "yolo_v8"
 /// person_class = 0              # COCO, 80 classes
-/// strides = [8, 16, 32]         # default; they say how many cells there have to be
+/// strides = [8, 16, 32]         # default; they give the number of cells
 /// layout = "channels_first"     # default; or "cells_first": [views, cells, 4 + classes]
 /// score_activation = "none"     # default; or "sigmoid"
-/// # name = "output0"            # where the model has other outputs too
+/// # name = "output0"            # if the model also has other outputs
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -38,13 +38,13 @@ pub struct YoloV8Head {
     /// Pixels per cell of each level.
     #[serde(default = "default_strides")]
     pub strides: Vec<NonZeroU32>,
-    /// Which axis comes first.
+    /// Order of the axes.
     #[serde(default)]
     pub layout: YoloV8Layout,
-    /// What is left to do to the class scores.
+    /// Activation applied to the class scores.
     #[serde(default)]
     pub score_activation: Activation,
-    /// The output to read; by default the only one.
+    /// The output to read. Default: the only one.
     #[serde(default)]
     pub name: Option<String>,
 }

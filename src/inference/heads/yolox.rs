@@ -14,11 +14,11 @@ use super::{
     tensor::{Output, OutputShape, TensorView},
 };
 
-/// YOLOX: `[views, cells, 5 + classes]`, per cell `t_x, t_y, t_w, t_h`, objectness and class
-/// scores; cells level by level, row by row.
+/// YOLOX: `[views, cells, 5 + classes]`, with `t_x, t_y, t_w, t_h`, objectness and class scores per
+/// cell. Cells are ordered level by level, row by row.
 ///
-/// Centre `((t_x + column) · stride, (t_y + row) · stride)`, size
-/// `(stride · e^t_w, stride · e^t_h)`; score `objectness · class`.
+/// Centre `((t_x + column) · stride, (t_y + row) · stride)`, size `(stride · e^t_w, stride ·
+/// e^t_h)`. Score: `objectness · class`.
 ///
 /// Sources: Ge et al., "YOLOX: Exceeding YOLO Series in 2021", section 2.1; `decode_outputs` of
 /// the reference implementation, whose export applies the sigmoids but does not decode boxes.
@@ -28,7 +28,7 @@ use super::{
 /// head = "yolox"
 /// person_class = 0            # COCO, 80 classes
 /// strides = [8, 16, 32]       # default
-/// decode_in_graph = false     # default; true: centre and size come in pixels
+/// decode_in_graph = false     # default; true: centre and size are in pixels
 /// score_activation = "none"   # default; or "sigmoid"
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -39,13 +39,13 @@ pub struct YoloxHead {
     /// Pixels per cell of each level, in the network's order.
     #[serde(default = "default_strides")]
     pub strides: Vec<NonZeroU32>,
-    /// Whether boxes come as centre and size in pixels.
+    /// True if the graph returns boxes as centre and size in pixels.
     #[serde(default)]
     pub decode_in_graph: bool,
-    /// What is left to do to objectness and class scores.
+    /// Activation applied to objectness and class scores.
     #[serde(default)]
     pub score_activation: Activation,
-    /// The output to read; by default the only one.
+    /// The output to read. Default: the only one.
     #[serde(default)]
     pub name: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! The `[input]` table: how pixels become network input.
+//! The `[input]` table: conversion of pixels to network input.
 
 use std::num::NonZeroU32;
 
@@ -7,17 +7,17 @@ use strum::Display;
 
 use crate::imaging::ChannelOrder;
 
-/// How pixels become network input. With pixels 0 to 255, each value is either
-/// `pixel · scale + offset` or `(pixel − mean) / std`, per plane in the network's plane order.
+/// Conversion of pixels to network input. With pixels 0 to 255, each value is either `pixel · scale
+/// + offset` or `(pixel − mean) / std`, per plane in the network's plane order.
 ///
 /// ```toml
-/// [input]                    # may be left out altogether
+/// [input]                    # optional
 /// name = "images"            # default: the model's only input
-/// width = 640                # needed where the model leaves it open
+/// width = 640                # required if the model leaves it open
 /// height = 640
 /// stride = 32                # sides of open models must be multiples of it
-/// batch = 1                  # for models that only claim to take any number of views
-/// layout = "nchw"            # or "nhwc"; default: told by where the 3 planes are
+/// batch = 1                  # for models that wrongly declare any number of views
+/// layout = "nchw"            # or "nhwc"; default: from the axis with the 3 planes
 /// channel_order = "rgb"      # default; or "bgr"
 /// scale = [0.00392156863, 0.00392156863, 0.00392156863]   # default: ones
 /// offset = [0.0, 0.0, 0.0]                                # default: zeros
@@ -28,17 +28,17 @@ use crate::imaging::ChannelOrder;
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ManifestInput {
-    /// The input that takes the picture; by default the only one.
+    /// The input that takes the image. Default: the only one.
     pub name: Option<String>,
-    /// Width, pixels; told by the model unless it leaves it open.
+    /// Width, pixels. Required if the model leaves it open.
     pub width: Option<NonZeroU32>,
-    /// Height, pixels; told by the model unless it leaves it open.
+    /// Height, pixels. Required if the model leaves it open.
     pub height: Option<NonZeroU32>,
-    /// What the sides of a model that leaves them open must be multiples of, pixels.
+    /// Divisor of the input sides, in pixels, for models that leave the sides open.
     pub stride: Option<NonZeroU32>,
-    /// Views per run; told by the model unless it leaves it open, and then any number.
+    /// Views per run, for models that leave it open. Default: any number.
     pub batch: Option<NonZeroU32>,
-    /// The order of the axes; told by the model unless it leaves them open.
+    /// Order of the axes, for models that leave them open.
     pub layout: Option<Layout>,
     /// Order of the colour planes.
     pub channel_order: ChannelOrder,
@@ -46,9 +46,9 @@ pub struct ManifestInput {
     pub scale: Option<[f32; 3]>,
     /// Offset per plane.
     pub offset: Option<[f32; 3]>,
-    /// What is subtracted per plane.
+    /// Value subtracted per plane.
     pub mean: Option<[f32; 3]>,
-    /// What is divided by per plane, then.
+    /// Divisor per plane, applied after the subtraction.
     pub std: Option<[f32; 3]>,
 }
 
@@ -67,7 +67,7 @@ impl ManifestInput {
     /// Factor and offset per plane.
     ///
     /// # Errors
-    /// One sentence when both ways are used at once, or a number is none or a divisor is 0.
+    /// One sentence when both pairs are used at once, a number is not finite or a divisor is 0.
     pub(in crate::inference) fn normalisation(&self) -> Result<([f32; 3], [f32; 3]), String> {
         let one_way = self.scale.is_some() || self.offset.is_some();
         let other_way = self.mean.is_some() || self.std.is_some();

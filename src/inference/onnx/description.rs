@@ -1,4 +1,4 @@
-//! What a model is, as far as it was understood: for whoever brings one.
+//! Description of a model, for its users.
 
 use std::num::NonZeroUsize;
 
@@ -12,16 +12,16 @@ use crate::{
     inference::{Layout, ModelManifest, heads::OutputShape},
 };
 
-/// What was understood of a model.
+/// Properties of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelDescription {
     /// Its manifest, `onnx` as a path that can be opened.
     pub manifest: ModelManifest,
-    /// The licence: the manifest's, else the one in the ONNX file's metadata.
+    /// The licence from the manifest, or else from the ONNX file's metadata.
     pub licence: Option<String>,
     /// The ONNX file's SHA-256, hexadecimal.
     pub sha256: String,
-    /// Changes whenever the file or what the manifest says does.
+    /// Identifier that changes with the file or the manifest's settings.
     pub revision: String,
     /// Length of the ONNX file.
     pub bytes: usize,
@@ -29,11 +29,11 @@ pub struct ModelDescription {
     pub inputs: Vec<OnnxTensor>,
     /// The ONNX file's outputs.
     pub outputs: Vec<OnnxTensor>,
-    /// What the network wants to see.
+    /// Input format of the network.
     pub input: NetworkInput,
     /// The order of the input's axes.
     pub layout: Layout,
-    /// Views per run; `None` for any number.
+    /// Views per run. `None` for any number.
     pub views_per_run: Option<NonZeroUsize>,
 }
 
@@ -42,16 +42,16 @@ pub struct ModelDescription {
 pub struct OnnxTensor {
     /// Its name.
     pub name: String,
-    /// What its values are, in ONNX Runtime's words; "f32" for those that can be used.
+    /// Element type in ONNX Runtime's notation. Only "f32" is supported.
     pub element: String,
-    /// Its dimensions, -1 for those that are open; none for what is no tensor.
+    /// Its dimensions, -1 for those that are open. Empty for values that are not tensors.
     pub shape: Vec<i64>,
 }
 
-/// The element type of tensors that can be used.
+/// The supported element type of tensors.
 pub(in crate::inference) const FLOAT: &str = "f32";
 
-/// What the ONNX file's metadata says, where exporters write it.
+/// Metadata of the ONNX file, as far as exporters write it.
 #[derive(Debug, Default)]
 pub(in crate::inference) struct Metadata {
     pub(in crate::inference) licence: Option<String>,
@@ -60,7 +60,7 @@ pub(in crate::inference) struct Metadata {
     pub(in crate::inference) stride: Option<u32>,
 }
 
-/// Reads the keys that Ultralytics' exporter writes; others write none.
+/// Reads the metadata keys of Ultralytics' exporter. Other exporters write none.
 pub(super) fn metadata(session: &Session) -> Metadata {
     let Ok(metadata) = session.metadata() else {
         return Metadata::default();

@@ -1,4 +1,4 @@
-//! The process's one ONNX Runtime environment.
+//! The ONNX Runtime environment of the process.
 
 use std::{
     path::Path,
@@ -10,10 +10,10 @@ use ort::environment::Environment;
 use crate::inference::InferenceError;
 
 static ENVIRONMENT: OnceLock<Environment> = OnceLock::new();
-/// The run-time refuses a second environment, so only one thread may make the first.
+/// The runtime refuses a second environment, so only one thread may create it.
 static LOADING: Mutex<()> = Mutex::new(());
 
-/// Loads the library on the first call; later calls return the same environment.
+/// Loads the library on the first call. Later calls return the same environment.
 pub(super) fn load(library: &Path) -> Result<&'static Environment, InferenceError> {
     let _only_loader = LOADING.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(environment) = ENVIRONMENT.get() {
@@ -23,7 +23,7 @@ pub(super) fn load(library: &Path) -> Result<&'static Environment, InferenceErro
         path: library.to_owned(),
         detail,
     };
-    // A bare path would be looked for beside the executable first.
+    // A bare path would first be searched beside the executable.
     let library = library
         .canonicalize()
         .map_err(|error| unusable(error.to_string()))?;

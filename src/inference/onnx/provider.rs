@@ -1,4 +1,4 @@
-//! Sessions on the device that the settings name.
+//! Sessions on the configured device.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use ort::{
 use super::{OnnxOptions, first_line};
 use crate::inference::{Device, InferenceError};
 
-/// Makes sessions.
+/// Builder of sessions.
 pub(super) struct Builder(SessionBuilder);
 
 impl Builder {
@@ -20,7 +20,7 @@ impl Builder {
     }
 }
 
-/// A builder of sessions on the options' device: they run there or not at all.
+/// Returns a builder of sessions on the options' device, without a fallback to another device.
 pub(super) fn builder(
     environment: &Environment,
     library: &Path,
@@ -39,7 +39,7 @@ pub(super) fn builder(
         .map_err(failed)?
         .with_intra_threads(options.threads.get())
         .map_err(|error| failed(error.into()))?
-        // Idle pool threads must not spin: they would steal the cores that decode and remap.
+        // Idle pool threads must not spin: spinning takes CPU time from decoding and remapping.
         .with_intra_op_spinning(false)
         .map_err(|error| failed(error.into()))?
         .with_execution_providers(providers)
@@ -50,8 +50,8 @@ pub(super) fn builder(
     Ok(Builder(builder))
 }
 
-/// The device's execution providers, first choice first, and whether the library has them. The
-/// processor is always the last choice, for operators that a GPU has no code for.
+/// The device's execution providers in order of preference, and true if the library has them. The
+/// CPU is always the last choice, for operators without GPU code.
 fn providers(device: Device) -> (Vec<ExecutionProviderDispatch>, bool) {
     let cuda = |number| {
         CUDA::default()
@@ -70,7 +70,7 @@ fn providers(device: Device) -> (Vec<ExecutionProviderDispatch>, bool) {
     }
 }
 
-/// Whether the library was built with this provider.
+/// Returns true if the library was built with this provider.
 fn has<P: ExecutionProvider>() -> bool {
     P::is_available().unwrap_or(false)
 }

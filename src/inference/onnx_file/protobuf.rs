@@ -1,4 +1,4 @@
-//! The wire format of protocol buffers, as far as walking needs it.
+//! The wire format of protocol buffers, as far as the check of ONNX files needs it.
 //!
 //! Source: "Encoding", protocol buffers documentation.
 
@@ -9,18 +9,18 @@ pub(super) struct Field<'a> {
     pub(super) value: Value<'a>,
 }
 
-/// What a field holds.
+/// Value of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value<'a> {
     Varint(u64),
-    /// A text, a message, or packed numbers.
+    /// A string, a message or packed numbers.
     Bytes(&'a [u8]),
-    /// Four or eight bytes of a number that nobody asks for.
+    /// A number of four or eight bytes, which is skipped.
     Fixed,
 }
 
 impl<'a> Value<'a> {
-    /// The numbers of a repeated field, packed or not; an error ends them where they are cut off.
+    /// The numbers of a repeated field, packed or not. Ends with an error where they are cut off.
     pub(super) fn varints(self) -> impl Iterator<Item = Result<u64, ()>> + use<'a> {
         let (single, mut packed) = match self {
             Self::Varint(number) => (Some(Ok(number)), &[][..]),
@@ -40,7 +40,7 @@ impl<'a> Value<'a> {
     }
 }
 
-/// The fields of a message, one after the other; an error ends them where they make no sense.
+/// The fields of a message in order. Ends with an error at the first invalid field.
 pub(super) fn fields(mut bytes: &[u8]) -> impl Iterator<Item = Result<Field<'_>, ()>> {
     std::iter::from_fn(move || {
         (!bytes.is_empty()).then(|| {
@@ -75,7 +75,7 @@ fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Option<&'a [u8]> {
     Some(taken)
 }
 
-/// Seven bits a byte, the least significant first; at most ten bytes.
+/// Reads a varint: seven bits per byte, least significant first, at most ten bytes.
 fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut number = 0;
     for shift in (0..64).step_by(7) {

@@ -21,13 +21,13 @@ fn with_tensor(tensor: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_tensor_that_keeps_its_values_to_itself_is_fine() {
+fn a_tensor_with_inline_values_is_accepted() {
     check(&with_tensor(&[0x08, 0x03, 0x08, 0x04])).unwrap();
     check(&with_tensor(&[0x70, 0x00])).unwrap();
 }
 
 #[test]
-fn either_mark_of_other_files_is_enough_to_refuse() {
+fn either_sign_of_external_data_is_refused() {
     let by_location = with_tensor(&[0x70, 0x01]);
     let by_entry = with_tensor(&field(13, b"location"));
     for model in [by_location, by_entry] {
@@ -36,7 +36,7 @@ fn either_mark_of_other_files_is_enough_to_refuse() {
 }
 
 #[test]
-fn dimensions_may_be_packed_and_may_not_multiply_beyond_measure() {
+fn packed_dimensions_are_read_and_their_product_is_limited() {
     // 2^14 by 2^15, and 2^15 by 2^15.
     check(&with_tensor(&field(
         1,
@@ -58,10 +58,10 @@ fn dimensions_may_be_packed_and_may_not_multiply_beyond_measure() {
 }
 
 #[test]
-fn graphs_in_graphs_end_somewhere() {
+fn nested_graphs_have_a_depth_limit() {
     let nested = |depth| {
         let graph = (0..depth).fold(Vec::new(), |inner: Vec<u8>, _| {
-            // A graph with a node with an attribute with the inner graph.
+            // A graph with a node whose attribute contains the inner graph.
             field(1, &field(5, &field(6, &inner)))
         });
         field(7, &graph)
@@ -72,7 +72,7 @@ fn graphs_in_graphs_end_somewhere() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_judged(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+    fn any_bytes_are_checked(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
         let _ = check(&bytes);
         let _ = check(&with_tensor(&bytes));
     }

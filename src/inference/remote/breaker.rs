@@ -1,15 +1,15 @@
-//! A circuit breaker: whether a server is asked at all.
+//! A circuit breaker for requests to a server.
 //!
-//! After a few failures in a row it opens, and nobody has to wait for what fails. Whoever looks after the
-//! server closes it when it answers again; the next failure opens it at once then, and an answer makes it
-//! as good as new.
+//! It opens after a few failures in a row, so that no request waits for an unavailable server. The
+//! health check closes it when the server is ready again. The next failure then reopens it at once,
+//! and a response resets it completely.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Failures in a row that open it.
+/// Consecutive failures that open it.
 const FAILURES: u32 = 3;
 
-/// Whether a server is asked at all.
+/// Circuit breaker state, shared by all sessions.
 #[derive(Debug, Default)]
 pub(super) struct Breaker(Mutex<State>);
 
@@ -24,12 +24,12 @@ impl Breaker {
         self.state().is_open
     }
 
-    /// An answer came.
+    /// Records a response.
     pub(super) fn succeeded(&self) {
         self.state().failures = 0;
     }
 
-    /// None came; returns whether that opens it.
+    /// Records a failure. Returns true if that opens the breaker.
     pub(super) fn failed(&self) -> bool {
         let mut state = self.state();
         state.failures = state.failures.saturating_add(1);
@@ -38,7 +38,7 @@ impl Breaker {
         opens
     }
 
-    /// The server says that it is there; returns whether that closes it.
+    /// Records that the server is ready. Returns true if that closes the breaker.
     pub(super) fn close(&self) -> bool {
         let mut state = self.state();
         let closes = state.is_open;
@@ -50,7 +50,7 @@ impl Breaker {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // Numbers only: nothing can be left half changed.
+        // The state contains only numbers, so a panic cannot leave it inconsistent.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn failures_in_a_row_open_it_and_an_answer_between_them_counts() {
+    fn consecutive_failures_open_it_and_a_response_resets_it() {
         let breaker = Breaker::default();
         for _ in 0..2 {
             assert!(!breaker.failed());
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn a_closed_one_is_on_probation_until_an_answer_comes() {
+    fn one_failure_reopens_it_until_a_response_arrives() {
         let breaker = Breaker::default();
         while !breaker.failed() {}
         assert!(breaker.close() && !breaker.close() && !breaker.is_open());

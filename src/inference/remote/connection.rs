@@ -1,4 +1,4 @@
-//! HTTP to the server: connections that are kept, bounds on the time and the length of every answer.
+//! HTTP connection to the server: keep-alive, and limits on the time and size of every response.
 
 use std::{error::Error, io::Read, time::Duration};
 
@@ -13,11 +13,11 @@ use url::Url;
 use super::RemoteOptions;
 use crate::open_inference::HEAD_LENGTH;
 
-/// Longest that a connection may take to be made.
-const CONNECT_PATIENCE: Duration = Duration::from_secs(2);
-/// Longest that a connection stays open while nothing is sent: less than servers and proxies commonly keep one.
-const IDLE: Duration = Duration::from_secs(20);
-/// Most bytes of an answer: those of the raw outputs of a large network for a large batch.
+/// Connect timeout.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Longest idle time of a connection: less than the keep-alive of common servers and proxies.
+const IDLE_TIMEOUT: Duration = Duration::from_secs(20);
+/// Largest response, in bytes: the raw outputs of a large network for a large batch.
 const MAX_ANSWER_BYTES: u64 = 64 << 20;
 
 /// Connections to a server.
@@ -27,31 +27,31 @@ pub(super) struct Connection {
     patience: Duration,
 }
 
-/// What a server answered.
+/// Response of a server.
 #[derive(Debug)]
 pub(super) struct Reply {
     pub(super) status: u16,
-    /// When it wants to be asked again.
+    /// Value of `Retry-After`.
     pub(super) retry_after: Option<Duration>,
-    /// The length of the JSON, where bytes follow it.
+    /// Length of the JSON, if bytes follow it.
     pub(super) head_length: Option<usize>,
     pub(super) body: Vec<u8>,
 }
 
 impl Connection {
-    /// Sends nothing yet.
+    /// Creates the client. Sends nothing.
     ///
     /// # Errors
     /// When the system's certificates cannot be used.
     pub(super) fn new(options: &RemoteOptions) -> reqwest::Result<Self> {
-        // Fails when there is one already, which is as good.
+        // Fails when a provider is already installed, which has the same effect.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let token = options.token.as_ref();
         let headers = token.map(|token| (AUTHORIZATION, token.authorization()));
         let client = Client::builder()
             .default_headers(headers.into_iter().collect())
-            .connect_timeout(CONNECT_PATIENCE.min(options.patience))
-            .pool_idle_timeout(IDLE)
+            .connect_timeout(CONNECT_TIMEOUT.min(options.patience))
+            .pool_idle_timeout(IDLE_TIMEOUT)
             .redirect(redirect::Policy::none())
             .no_proxy()
             .build()?;
@@ -66,12 +66,12 @@ impl Connection {
         &self.address
     }
 
-    /// Asks for what is at a path, whose parts are given.
+    /// Sends a GET request to the path with the given segments.
     pub(super) fn get(&self, path: &[&str], patience: Duration) -> Result<Reply, String> {
         reply(|| self.client.get(self.at(path)).timeout(patience))
     }
 
-    /// Sends JSON, or, with the length of the JSON, JSON and bytes behind it.
+    /// Sends a POST request with JSON, or, with the length of the JSON, JSON followed by bytes.
     pub(super) fn post(
         &self,
         path: &[&str],
@@ -90,10 +90,10 @@ impl Connection {
         })
     }
 
-    /// The address of a path below the server's own.
+    /// The URL of a path below the server's base URL.
     fn at(&self, path: &[&str]) -> Url {
         let mut address = self.address.clone();
-        // Only addresses that can have paths come this far.
+        // Only URLs that can have a path are configured.
         if let Ok(mut parts) = address.path_segments_mut() {
             parts.pop_if_empty().extend(path);
         }
@@ -101,9 +101,9 @@ impl Connection {
     }
 }
 
-/// Sends a request; once more when no connection could be made, or one that was kept was closed
-/// before an answer came, as servers do that are restarted. Inference changes nothing there, so it may
-/// be asked for twice; whoever takes too long is not given more work.
+/// Sends a request. Retries once when the connection fails or an idle connection was closed before
+/// the response, for example by a restarted server. Inference has no side effects, so a repeated
+/// request is safe. A timeout is not retried, to avoid more load on a slow server.
 fn reply(request: impl Fn() -> RequestBuilder) -> Result<Reply, String> {
     let sent = match request().send() {
         Err(error) if (error.is_connect() || error.is_request()) && !error.is_timeout() => {
@@ -125,10 +125,10 @@ fn read(response: Response) -> Result<Reply, String> {
     let mut body = Vec::new();
     let mut bounded = response.take(MAX_ANSWER_BYTES + 1);
     let length = bounded.read_to_end(&mut body);
-    let length = length.map_err(|error| format!("its answer broke off: {error}"))?;
+    let length = length.map_err(|error| format!("its response is incomplete: {error}"))?;
     if length as u64 > MAX_ANSWER_BYTES {
         return Err(format!(
-            "its answer is longer than {MAX_ANSWER_BYTES} bytes"
+            "its response is longer than {MAX_ANSWER_BYTES} bytes"
         ));
     }
     Ok(Reply {
@@ -139,14 +139,14 @@ fn read(response: Response) -> Result<Reply, String> {
     })
 }
 
-/// The error and why it came to it, in one line.
+/// Formats the error with its causes in one line.
 fn with_causes(error: reqwest::Error) -> String {
     let error = error.without_url();
-    let mut told = error.to_string();
+    let mut message = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {
-        told = format!("{told}: {error}");
+        message = format!("{message}: {error}");
         cause = error.source();
     }
-    told
+    message
 }

@@ -1,22 +1,22 @@
-//! A question to a model and its answer, as they are written.
+//! Inference requests and responses in their wire format.
 
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
 use crate::open_inference::{Datatype, binary_data, json_data};
 
-/// Views for a model.
+/// An inference request with views for a model.
 pub(super) struct Question<'a> {
     pub(super) input: &'a str,
     pub(super) shape: &'a [usize],
     pub(super) values: &'a [f32],
-    /// The outputs that are wanted.
+    /// Names of the requested outputs.
     pub(super) outputs: &'a [String],
-    /// Whether tensors go and come as bytes.
+    /// True to transfer tensors as bytes.
     pub(super) as_bytes: bool,
 }
 
-/// The outputs whose numbers can be read: those of `FP32`.
+/// The outputs with readable numbers: those of type `FP32`.
 #[derive(Debug, PartialEq)]
 pub(super) struct Answer {
     pub(super) outputs: Vec<Output>,
@@ -86,7 +86,7 @@ struct OutputParameters {
 }
 
 impl Question<'_> {
-    /// The body of its request, and the length of the JSON in it where bytes follow.
+    /// The body of the request, and the length of its JSON if bytes follow.
     pub(super) fn body(&self) -> serde_json::Result<(Vec<u8>, Option<usize>)> {
         let wanted = self.outputs.iter().map(|name| WantedHead {
             name,
@@ -116,29 +116,31 @@ impl Question<'_> {
 }
 
 impl Answer {
-    /// Reads an answer, `head_length` bytes of which are JSON if that is told.
+    /// Parses a response. `head_length` is the length of its JSON if bytes follow.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Description of the error.
     pub(super) fn read(body: &[u8], head_length: Option<usize>) -> Result<Self, String> {
         let (json, mut behind) = body
             .split_at_checked(head_length.unwrap_or(body.len()))
-            .ok_or("its answer is shorter than it says")?;
+            .ok_or("its response is shorter than its declared length")?;
         let head: AnswerHead = serde_json::from_slice(json)
-            .map_err(|error| format!("its answer cannot be read: {error}"))?;
+            .map_err(|error| format!("its response cannot be read: {error}"))?;
         let mut outputs = Vec::new();
         for output in head.outputs {
-            let size = output.parameters.and_then(|told| told.binary_data_size);
+            let size = output
+                .parameters
+                .and_then(|parameters| parameters.binary_data_size);
             let bytes = behind.split_at_checked(size.unwrap_or(0));
-            let (bytes, rest) = bytes.ok_or("its answer is shorter than its outputs say")?;
+            let (bytes, rest) = bytes.ok_or("its response is shorter than its outputs declare")?;
             behind = rest;
-            // Heads read floats alone; a model may have other outputs, too.
+            // Heads read only floats, but a model may have further outputs.
             if output.datatype != Datatype::Fp32.name() {
                 continue;
             }
             let mut sides = output.shape.iter();
             let count = sides.try_fold(1_usize, |count, &side| count.checked_mul(side));
-            let count = count.ok_or("its answer tells an impossible shape")?;
+            let count = count.ok_or("its response contains an impossible shape")?;
             let values = match (output.data, size) {
                 (_, Some(_)) => binary_data::floats(bytes, count),
                 (Some(data), None) => json_data::numbers(data.get(), Datatype::Fp32, count),
@@ -174,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn views_go_as_numbers_that_come_back_as_they_were() {
+    fn views_sent_as_numbers_are_parsed_unchanged() {
         let (body, head_length) = question(false);
         assert_eq!(head_length, None);
         let written: Value = serde_json::from_slice(&body).unwrap();
@@ -186,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn views_go_as_bytes_behind_the_json() {
+    fn views_are_sent_as_bytes_behind_the_json() {
         let (body, head_length) = question(true);
         let (head, behind) = body.split_at(head_length.unwrap());
         let written: Value = serde_json::from_slice(head).unwrap();
@@ -201,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_are_read_as_bytes_and_as_lists_and_other_datatypes_are_passed_over() {
+    fn responses_are_parsed_from_bytes_and_from_lists() {
         let head = json!({ "model_name": "m", "outputs": [
             { "name": "ids", "datatype": "INT64", "shape": [1], "parameters": { "binary_data_size": 8 } },
             { "name": "boxes", "datatype": "FP32", "shape": [1, 2], "parameters": { "binary_data_size": 8 } },
@@ -219,13 +221,13 @@ mod tests {
         assert_eq!(names, ["boxes", "scores"]);
         assert!(
             answer.outputs[0].values[0].is_nan(),
-            "heads know what to do with it"
+            "NaN is passed on to the heads"
         );
         assert_eq!(answer.outputs[1].values, [0.5, 1.0]);
     }
 
     #[test]
-    fn answers_that_do_not_add_up_are_told() {
+    fn inconsistent_responses_are_reported() {
         let output = |parameters: Value, data: Value| {
             json!({ "outputs": [{ "name": "boxes", "datatype": "FP32", "shape": [2],
                 "parameters": parameters, "data": data }] })
@@ -244,8 +246,8 @@ mod tests {
         ] {
             let head = head.to_string();
             let body = [head.as_bytes(), behind].concat();
-            let told = Answer::read(&body, Some(head.len())).unwrap_err();
-            assert!(told.contains(part), "{told}");
+            let message = Answer::read(&body, Some(head.len())).unwrap_err();
+            assert!(message.contains(part), "{message}");
         }
         assert!(
             Answer::read(b"{}", Some(3))

@@ -1,4 +1,4 @@
-//! An inference server as all sessions and whoever looks after it share it.
+//! An inference server, shared by all sessions and the health check.
 
 use std::{
     sync::{
@@ -19,44 +19,45 @@ use super::{
 };
 use crate::inference::InferenceError;
 
-/// Longest that the server may take to say that it is ready.
-const PROBE_PATIENCE: Duration = Duration::from_secs(2);
-/// Whoever answered this recently need not be asked how it is.
+/// Timeout of the readiness probe.
+const PROBE_TIMEOUT: Duration = Duration::from_secs(2);
+/// A response within this time makes a readiness probe unnecessary.
 const RECENT: Duration = Duration::from_secs(2);
-/// When to come again, where a busy server says nothing.
+/// Default retry time for responses of a busy server without `Retry-After`.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
-/// Most characters of the server's own words that are told.
-const MAX_TOLD_CHARS: usize = 300;
+/// Most characters of the server's error message that are reported.
+const MAX_MESSAGE_CHARS: usize = 300;
 
-/// Where networks run.
+/// Settings of the inference server.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RemoteOptions {
     /// The server's address, without `/v2`.
     pub url: Url,
-    /// Sent with every request, if there is one.
+    /// Token sent with every request, if any.
     pub token: Option<BearerToken>,
-    /// The model there whose readiness stands for the server's.
+    /// Name on the server of the model whose readiness represents the server's.
     pub model: String,
-    /// The name in manifests of the model that is called `model` there; others are called the same.
+    /// Manifest name of the model that is called `model` on the server. Other names are the same in
+    /// both.
     pub called: String,
-    /// Longest that one request to infer may take.
+    /// Timeout of one inference request.
     pub patience: Duration,
 }
 
-/// How often requests to infer came out how since the start.
+/// Numbers of inference requests by result since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RemoteCounts {
-    /// Answered.
+    /// Requests with a valid response.
     pub answered: u64,
-    /// Refused, as there was no place for more.
+    /// Requests refused by a busy server.
     pub busy: u64,
-    /// Not answered, or not with what was asked for.
+    /// Requests without a valid response.
     pub failed: u64,
-    /// Not sent, as the breaker was open.
+    /// Requests that were not sent because the breaker was open.
     pub not_sent: u64,
 }
 
-/// An inference server. Blocks: keep it off the async runtime.
+/// An inference server. Its methods block and must not run on the async runtime.
 pub struct RemoteServer {
     connection: Connection,
     options: RemoteOptions,
@@ -70,7 +71,7 @@ pub struct RemoteServer {
 }
 
 impl RemoteServer {
-    /// The server that the options name. Sends nothing yet.
+    /// Creates the client for the configured server. Sends nothing.
     ///
     /// # Errors
     /// [`InferenceError::Remote`] when the system's certificates cannot be used.
@@ -93,13 +94,13 @@ impl RemoteServer {
         })
     }
 
-    /// Whether requests are sent to it: the breaker is closed.
+    /// Returns true if requests are sent to the server, that is, the breaker is closed.
     #[must_use]
     pub fn is_available(&self) -> bool {
         !self.breaker.is_open()
     }
 
-    /// How often requests to infer came out how.
+    /// Numbers of inference requests by result.
     #[must_use]
     pub fn counts(&self) -> RemoteCounts {
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
@@ -111,16 +112,18 @@ impl RemoteServer {
         }
     }
 
-    /// Looks whether it is there, unless its answers tell that already; returns whether requests are sent
-    /// to it from now on. Whoever calls this every second or so makes it recover by itself.
+    /// Probes the server's readiness, unless recent responses make that unnecessary. Returns true
+    /// if requests are sent to it from now on. A periodic call, about every second, lets the server
+    /// recover automatically.
     pub fn look_after(&self) -> bool {
-        if self.is_available() && self.tells_by_itself() {
+        if self.is_available() && self.responded_recently() {
             return true;
         }
         match self.ready() {
             Ok(()) => {
                 if self.breaker.close() {
-                    tracing::info!(url = %self.connection.address(), "the inference server is there again");
+                    let url = self.connection.address();
+                    tracing::info!(%url, "the inference server is available again");
                 }
             }
             Err(detail) => self.note_failure(&detail),
@@ -128,7 +131,7 @@ impl RemoteServer {
         self.is_available()
     }
 
-    /// What a model is called there whose manifest has this name.
+    /// The server's name for the model with this name in its manifest.
     pub(super) fn name_of<'a>(&'a self, name: &'a str) -> &'a str {
         if name == self.options.called {
             &self.options.model
@@ -137,14 +140,14 @@ impl RemoteServer {
         }
     }
 
-    /// Asks for what is at a path.
+    /// Sends a GET request to a path.
     pub(super) fn get(&self, path: &[&str]) -> Result<Reply, InferenceError> {
         let reply = self.connection.get(path, self.options.patience);
-        reply.map_err(|detail| self.away(detail))
+        reply.map_err(|detail| self.unavailable(detail))
     }
 
-    /// Has a model answer. A server that is ready and still refuses with 503 has no place, as one that
-    /// answers 429.
+    /// Sends an inference request. 429 means that the server is busy, and so does 503 if the server
+    /// reports that it is ready.
     pub(super) fn infer(
         &self,
         model: &str,
@@ -152,8 +155,8 @@ impl RemoteServer {
     ) -> Result<Answer, InferenceError> {
         if self.breaker.is_open() {
             self.not_sent.fetch_add(1, Ordering::Relaxed);
-            return Err(self.away(
-                "it has not answered lately, and is not asked until it is ready".to_owned(),
+            return Err(self.unavailable(
+                "it failed repeatedly, so no requests are sent until it is ready".to_owned(),
             ));
         }
         let (body, head_length) = question
@@ -189,23 +192,23 @@ impl RemoteServer {
             Err(detail) => {
                 self.failed.fetch_add(1, Ordering::Relaxed);
                 self.note_failure(&detail);
-                Err(self.away(detail))
+                Err(self.unavailable(detail))
             }
         }
     }
 
     fn ready(&self) -> Result<(), String> {
         let path = ["v2", "models", &self.options.model, "ready"];
-        let reply = self.connection.get(&path, PROBE_PATIENCE)?;
+        let reply = self.connection.get(&path, PROBE_TIMEOUT)?;
         match reply.status {
             200 => Ok(()),
             _ => Err(refusal(&reply)),
         }
     }
 
-    /// Whether somebody waits for an answer, or got one just now: a server that computes may have no time
-    /// for other questions.
-    fn tells_by_itself(&self) -> bool {
+    /// Returns true if a request is in flight or was answered recently. A computing server may have
+    /// no time for a readiness probe.
+    fn responded_recently(&self) -> bool {
         let answered_at = self
             .answered_at
             .lock()
@@ -217,7 +220,7 @@ impl RemoteServer {
     fn note_failure(&self, detail: &str) {
         if self.breaker.failed() {
             let url = self.connection.address();
-            tracing::warn!(%url, "the inference server is away, and no requests are sent to it: {detail}");
+            tracing::warn!(%url, "the inference server is unavailable: {detail}");
         }
     }
 
@@ -228,7 +231,7 @@ impl RemoteServer {
         }
     }
 
-    pub(super) fn away(&self, detail: String) -> InferenceError {
+    pub(super) fn unavailable(&self, detail: String) -> InferenceError {
         InferenceError::Remote {
             url: self.connection.address().to_string(),
             detail,
@@ -236,14 +239,14 @@ impl RemoteServer {
     }
 }
 
-/// A status that is no success, with the server's own words.
+/// Formats an error status with the server's message.
 pub(super) fn refusal(reply: &Reply) -> String {
     let status = reply.status;
-    let told = String::from_utf8_lossy(&reply.body);
-    let told: String = told
+    let message = String::from_utf8_lossy(&reply.body);
+    let message: String = message
         .chars()
         .filter(|c| !c.is_control())
-        .take(MAX_TOLD_CHARS)
+        .take(MAX_MESSAGE_CHARS)
         .collect();
-    format!("it answered {status}: {told}")
+    format!("it answered {status}: {message}")
 }

@@ -1,4 +1,4 @@
-//! A server that answers as it is told, on a real socket.
+//! Tests against a fake server with scripted responses on a real socket.
 
 mod fake;
 
@@ -6,7 +6,7 @@ use std::{fs, path::Path, time::Duration};
 
 use tempfile::TempDir;
 
-use self::fake::{FakeServer, Told};
+use self::fake::{FakeServer, ScriptedReply};
 use super::*;
 use crate::imaging::ViewBatch;
 
@@ -41,7 +41,7 @@ fn load(server: &Arc<RemoteServer>, model: &Path) -> Result<RemoteDetector, Infe
     RemoteDetector::load_sessions(server, model, options, NonZeroUsize::MIN).map(|(first, _)| first)
 }
 
-fn look(detector: &mut RemoteDetector, views: usize) -> Result<HeadOutput, InferenceError> {
+fn detect(detector: &mut RemoteDetector, views: usize) -> Result<HeadOutput, InferenceError> {
     let mut batch = ViewBatch::default();
     for slot in batch.prepare(views, &detector.input().clone()) {
         slot.fill(7.0);
@@ -50,7 +50,7 @@ fn look(detector: &mut RemoteDetector, views: usize) -> Result<HeadOutput, Infer
 }
 
 #[test]
-fn views_go_as_bytes_where_the_server_takes_them_and_as_lists_elsewhere() {
+fn views_are_sent_as_bytes_or_as_lists_as_the_server_supports() {
     for (as_bytes, first_axis) in [(true, -1), (false, -1), (true, 2)] {
         let fake = FakeServer::start(as_bytes, first_axis);
         let folder = manifest();
@@ -59,9 +59,9 @@ fn views_go_as_bytes_where_the_server_takes_them_and_as_lists_elsewhere() {
         assert_eq!(
             detector.views_per_run().is_some(),
             first_axis == 2,
-            "the metadata say how many"
+            "the metadata gives the number"
         );
-        let found = look(&mut detector, 3).unwrap();
+        let found = detect(&mut detector, 3).unwrap();
         let scores: Vec<_> = found.per_view.iter().map(|view| view[0].score).collect();
         assert_eq!(scores, [0.5; 3], "{as_bytes}");
         assert_eq!(found.per_view[2][0].bbox.corners(), [1.0, 2.0, 3.0, 4.0]);
@@ -77,14 +77,14 @@ fn views_go_as_bytes_where_the_server_takes_them_and_as_lists_elsewhere() {
 }
 
 #[test]
-fn every_request_shows_the_token_and_none_without_one_shows_any() {
+fn every_request_carries_the_token_if_one_is_set() {
     for token in [None, Some("s3cret")] {
         let fake = FakeServer::start(true, -1);
         let folder = manifest();
         let server = server_with_token(&fake, token);
-        look(&mut load(&server, folder.path()).unwrap(), 1).unwrap();
+        detect(&mut load(&server, folder.path()).unwrap(), 1).unwrap();
         let shown = fake.authorizations();
-        // What it is, what the model takes, and a view.
+        // The server's metadata, the model's metadata and a view.
         assert!(shown.len() >= 3, "{shown:?}");
         let expected = token.map(|_| "bearer s3cret");
         assert!(
@@ -95,7 +95,7 @@ fn every_request_shows_the_token_and_none_without_one_shows_any() {
 }
 
 #[test]
-fn a_server_that_wants_another_token_says_so_at_the_start() {
+fn a_rejected_token_fails_at_the_start() {
     let fake = FakeServer::start(true, -1);
     fake.refuse_all(401);
     let folder = manifest();
@@ -104,63 +104,63 @@ fn a_server_that_wants_another_token_says_so_at_the_start() {
         matches!(error, InferenceError::RemoteDenied { .. }),
         "{error}"
     );
-    let told = error.to_string();
+    let message = error.to_string();
     assert!(
-        told.contains("inference.bearer_token") && told.contains("401"),
-        "{told}"
+        message.contains("inference.bearer_token") && message.contains("401"),
+        "{message}"
     );
 }
 
 #[test]
-fn a_server_without_a_place_is_busy_and_one_that_is_not_ready_is_away() {
+fn an_overloaded_server_is_busy_and_an_unready_one_unavailable() {
     let fake = FakeServer::start(true, -1);
     let folder = manifest();
     let server = server(&fake);
     let mut detector = load(&server, folder.path()).unwrap();
-    fake.tell(Told::status(429).header("Retry-After", "7"));
-    let error = look(&mut detector, 1).unwrap_err();
+    fake.queue(ScriptedReply::status(429).header("Retry-After", "7"));
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(
         matches!(error, InferenceError::RemoteBusy { retry_after } if retry_after.as_secs() == 7),
         "{error}"
     );
-    fake.tell(Told::status(503));
-    let error = look(&mut detector, 1).unwrap_err();
+    fake.queue(ScriptedReply::status(503));
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(
         matches!(error, InferenceError::RemoteBusy { .. }),
         "{error}"
     );
     fake.be_ready(false);
-    fake.tell(Told::status(503));
-    let error = look(&mut detector, 1).unwrap_err();
+    fake.queue(ScriptedReply::status(503));
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(matches!(error, InferenceError::Remote { .. }), "{error}");
     let counts = server.counts();
     assert_eq!((counts.busy, counts.failed, counts.answered), (2, 1, 0));
 }
 
 #[test]
-fn what_fails_again_and_again_is_not_asked_until_it_is_ready() {
+fn a_failing_server_gets_no_requests_until_it_is_ready() {
     let fake = FakeServer::start(true, -1);
     let folder = manifest();
     let server = server(&fake);
     let mut detector = load(&server, folder.path()).unwrap();
     for _ in 0..3 {
-        fake.tell(Told::status(500));
+        fake.queue(ScriptedReply::status(500));
         assert!(server.is_available());
-        let told = look(&mut detector, 1).unwrap_err().to_string();
-        assert!(told.contains("answered 500"), "{told}");
+        let message = detect(&mut detector, 1).unwrap_err().to_string();
+        assert!(message.contains("answered 500"), "{message}");
     }
     assert!(!server.is_available());
-    look(&mut detector, 1).unwrap_err();
+    detect(&mut detector, 1).unwrap_err();
     assert_eq!((fake.inferred().len(), server.counts().not_sent), (3, 1));
     fake.be_ready(false);
     assert!(!server.look_after());
     fake.be_ready(true);
     assert!(server.look_after());
-    look(&mut detector, 1).unwrap();
+    detect(&mut detector, 1).unwrap();
 }
 
 #[test]
-fn an_idle_server_that_is_gone_is_noticed_and_one_that_answers_is_left_alone() {
+fn an_idle_server_is_probed_and_an_answering_one_is_not() {
     let fake = FakeServer::start(true, -1);
     let folder = manifest();
     let server = server(&fake);
@@ -169,49 +169,49 @@ fn an_idle_server_that_is_gone_is_noticed_and_one_that_answers_is_left_alone() {
     assert!(server.look_after() && server.look_after() && !server.look_after());
     fake.be_ready(true);
     assert!(server.look_after());
-    look(&mut detector, 1).unwrap();
+    detect(&mut detector, 1).unwrap();
     fake.be_ready(false);
-    assert!((0..5).all(|_| server.look_after()), "it has just answered");
+    assert!((0..5).all(|_| server.look_after()), "it has just responded");
 }
 
 #[test]
-fn a_connection_that_was_closed_meanwhile_costs_nobody_an_answer() {
+fn a_request_on_a_closed_connection_is_retried() {
     let fake = FakeServer::start(true, -1);
     let folder = manifest();
     let mut detector = load(&server(&fake), folder.path()).unwrap();
     for _ in 0..3 {
-        fake.tell(Told::nothing());
-        look(&mut detector, 1).unwrap();
+        fake.queue(ScriptedReply::closed());
+        detect(&mut detector, 1).unwrap();
     }
 }
 
 #[test]
-fn answers_that_are_none_are_told_and_slow_ones_are_given_up() {
+fn invalid_responses_are_reported_and_slow_ones_time_out() {
     let fake = FakeServer::start(true, -1);
     let folder = manifest();
-    for (told, part) in [
+    for (reply, part) in [
         (
-            Told::status(404).body("{\"error\":\"no model\"}"),
+            ScriptedReply::status(404).body("{\"error\":\"no model\"}"),
             "no model",
         ),
-        (Told::status(200).body("{}"), "cannot be read"),
+        (ScriptedReply::status(200).body("{}"), "cannot be read"),
         (
-            Told::status(302).header("Location", "http://127.0.0.1:9/"),
+            ScriptedReply::status(302).header("Location", "http://127.0.0.1:9/"),
             "answered 302",
         ),
-        (Told::slowly(), "timed out"),
+        (ScriptedReply::slow(), "timed out"),
     ] {
         let server = server(&fake);
         let mut detector = load(&server, folder.path()).unwrap();
-        fake.tell(told);
-        let error = look(&mut detector, 1).unwrap_err();
+        fake.queue(reply);
+        let error = detect(&mut detector, 1).unwrap_err();
         assert!(matches!(error, InferenceError::Remote { .. }), "{error}");
         assert!(error.to_string().contains(part), "{error}");
     }
     let server = server(&fake);
     let mut detector = load(&server, folder.path()).unwrap();
-    fake.tell(Told::status(200).body("{\"outputs\":[]}"));
-    let error = look(&mut detector, 1).unwrap_err();
+    fake.queue(ScriptedReply::status(200).body("{\"outputs\":[]}"));
+    let error = detect(&mut detector, 1).unwrap_err();
     assert!(error.to_string().contains("no output \"boxes\""), "{error}");
 }
 

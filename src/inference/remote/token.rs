@@ -1,23 +1,23 @@
-//! The token that an inference server wants to see.
+//! The bearer token for an inference server.
 
 use std::str::FromStr;
 
 use reqwest::header::HeaderValue;
 
-/// A token, as it is sent with every request: a sensitive header, which is never shown.
+/// A token sent with every request. The header is marked as sensitive and never logged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BearerToken(HeaderValue);
 
-/// Text that is no token. It is not repeated.
+/// Invalid token text. It is not repeated in the error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "give the token alone, as the inference server's operator gave it out: letters, digits and signs \
+    "use only the token that the inference server's operator issued: letters, digits and signs \
      without spaces"
 )]
 pub struct InvalidToken;
 
 impl BearerToken {
-    /// The header `Authorization` that shows it (RFC 6750, section 2.1).
+    /// The header `Authorization` with the token (RFC 6750, section 2.1).
     pub(super) fn authorization(&self) -> HeaderValue {
         self.0.clone()
     }

@@ -1,4 +1,4 @@
-//! What was understood of a model on a server.
+//! Metadata of a model on a server.
 
 use serde::Deserialize;
 
@@ -14,18 +14,18 @@ use crate::{
     revision::revision_of,
 };
 
-/// What was understood of a model on a server.
+/// Metadata of a model on a server, checked against its manifest.
 pub(super) struct Understood {
     pub(super) manifest: ModelManifest,
-    /// What it is called there.
+    /// Name of the model on the server.
     pub(super) name_there: String,
-    /// Changes whenever what the server tells of it or its manifest does.
+    /// Identifier that changes with the server's metadata or the manifest.
     pub(super) revision: String,
     pub(super) signature: Signature,
     pub(super) input: NetworkInput,
     /// The outputs that heads can read.
     pub(super) outputs: Vec<String>,
-    /// Whether the server takes tensors as bytes.
+    /// True if the server supports tensors as bytes.
     pub(super) as_bytes: bool,
 }
 
@@ -53,7 +53,7 @@ struct TensorMetadata {
 }
 
 impl Understood {
-    /// Asks the server, and holds what it says against the manifest.
+    /// Fetches the metadata and checks it against the manifest.
     pub(super) fn ask(
         server: &RemoteServer,
         manifest: ModelManifest,
@@ -63,11 +63,11 @@ impl Understood {
             model: name_there.clone(),
             problem,
         };
-        let metadata: ServerMetadata = told(server, &["v2"])?;
-        let model: ModelMetadata = told(server, &["v2", "models", &name_there])?;
+        let metadata: ServerMetadata = fetch(server, &["v2"])?;
+        let model: ModelMetadata = fetch(server, &["v2", "models", &name_there])?;
         let (Some(inputs), Some(outputs)) = (&model.inputs, &model.outputs) else {
             return Err(unusable(
-                "its metadata name no inputs and outputs: describe them on the server".to_owned(),
+                "its metadata lacks inputs and outputs: declare them on the server".to_owned(),
             ));
         };
         let (inputs, outputs) = (tensors(inputs), tensors(outputs));
@@ -101,8 +101,8 @@ impl Understood {
     }
 }
 
-/// Reads what the server tells at a path.
-fn told<T: for<'de> Deserialize<'de>>(
+/// Fetches and parses the metadata at a path.
+fn fetch<T: for<'de> Deserialize<'de>>(
     server: &RemoteServer,
     path: &[&str],
 ) -> Result<T, InferenceError> {
@@ -110,21 +110,21 @@ fn told<T: for<'de> Deserialize<'de>>(
     match reply.status {
         200 => {}
         401 | 403 => return Err(server.denied(refusal(&reply))),
-        _ => return Err(server.away(refusal(&reply))),
+        _ => return Err(server.unavailable(refusal(&reply))),
     }
     let read = serde_json::from_slice(&reply.body);
-    read.map_err(|error| server.away(format!("its metadata cannot be read: {error}")))
+    read.map_err(|error| server.unavailable(format!("its metadata cannot be read: {error}")))
 }
 
-fn tensors(told: &[TensorMetadata]) -> Vec<OnnxTensor> {
-    let tensor = |told: &TensorMetadata| OnnxTensor {
-        name: told.name.clone(),
-        element: if told.datatype == Datatype::Fp32.name() {
+fn tensors(declared: &[TensorMetadata]) -> Vec<OnnxTensor> {
+    let tensor = |declared: &TensorMetadata| OnnxTensor {
+        name: declared.name.clone(),
+        element: if declared.datatype == Datatype::Fp32.name() {
             FLOAT.to_owned()
         } else {
-            told.datatype.clone()
+            declared.datatype.clone()
         },
-        shape: told.shape.clone(),
+        shape: declared.shape.clone(),
     };
-    told.iter().map(tensor).collect()
+    declared.iter().map(tensor).collect()
 }

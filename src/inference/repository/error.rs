@@ -1,46 +1,51 @@
-//! Why a model could not be loaded or unloaded.
+//! Errors of loading and unloading models.
 
 use std::path::PathBuf;
 
 use crate::inference::{InferenceError, RegistryFull};
 
-/// A model that was not loaded or unloaded. Every message is one sentence with the remedy.
+/// A model that was not loaded or unloaded. Every message is one sentence that includes the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum RepositoryError {
     /// There is no such model.
     #[error("model: there is no {name:?} in the repository; there are {known}")]
     Unknown {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The available names.
         known: String,
     },
     /// The model is not loaded.
     #[error("model: {name:?} is not loaded")]
     NotLoaded {
-        /// The name asked for.
+        /// The requested name.
         name: String,
     },
-    /// Requests that name no model rely on it.
-    #[error("model: {name:?} answers requests that name no model, so it is not unloaded")]
+    /// Requests that do not name a model use it.
+    #[error(
+        "model: {name:?} is used by requests that do not name a model, so it cannot be unloaded"
+    )]
     Kept {
-        /// The model.
+        /// Name of the model.
         name: String,
     },
-    /// The manifest has another name than its folder.
-    #[error("model: {path} calls itself {found:?}; name it {name:?} as its folder, or rename that")]
+    /// The manifest's name differs from its folder's.
+    #[error(
+        "model: {path} has the name {found:?}: rename it to {name:?} like its folder or rename \
+         the folder"
+    )]
     OtherName {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The name it gives itself.
+        /// The name in the manifest.
         found: String,
-        /// Where it is.
+        /// Path of the model.
         path: PathBuf,
     },
     /// One model is loaded at a time.
     #[error("another model is being loaded: try again in a second")]
     Busy,
-    /// There is no room.
+    /// The largest number of models is loaded.
     #[error(transparent)]
     Full(#[from] RegistryFull),
     /// It cannot be read, failed its check, or failed to run.
@@ -49,7 +54,7 @@ pub enum RepositoryError {
 }
 
 impl RepositoryError {
-    /// Whether the model may be loaded in a moment, without anybody doing something.
+    /// Returns true if a retry after a short time may succeed without a change.
     #[must_use]
     pub fn is_passing(&self) -> bool {
         matches!(
@@ -59,7 +64,8 @@ impl RepositoryError {
         )
     }
 
-    /// Whether it says something of the model: then nothing changes until its files do.
+    /// Returns true if the error is caused by the model itself, so that it persists until the files
+    /// change.
     #[must_use]
     pub fn is_of_model(&self) -> bool {
         !self.is_passing() && !matches!(self, Self::Refused(InferenceError::RemoteDenied { .. }))

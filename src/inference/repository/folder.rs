@@ -1,4 +1,4 @@
-//! Where models are.
+//! The folder of the models.
 
 use std::{
     collections::BTreeSet,
@@ -11,22 +11,22 @@ use crate::inference::{
     manifest::{FILE_NAME, is_name},
 };
 
-/// Most entries of the folder looked at when it is listed.
+/// Most entries of the folder that are read for a listing.
 const MAX_ENTRIES: usize = 1000;
-/// Most characters of a name that are repeated to its sender.
+/// Most characters of a name that an error message repeats.
 const MAX_NAME_CHARS: usize = 64;
 
-/// A folder with a folder for each model, called as the model is.
+/// A folder with one subfolder per model, named like the model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ModelFolder {
     /// The folder.
     pub path: PathBuf,
-    /// A model by its name that is somewhere else: a folder or an ONNX file.
+    /// Name and path of a model outside the folder: a folder or an ONNX file.
     pub elsewhere: Option<(String, PathBuf)>,
 }
 
 impl ModelFolder {
-    /// Where the model of that name is.
+    /// Returns the path of the model with that name.
     pub(super) fn find(&self, name: &str) -> Result<PathBuf, RepositoryError> {
         match &self.elsewhere {
             Some((there, path)) if there == name => return Ok(path.clone()),
@@ -54,17 +54,17 @@ impl ModelFolder {
         names.into_iter().collect()
     }
 
-    /// What is to be done about a model that does not answer.
+    /// Remedy for a model that is not loaded.
     pub(super) fn why_not_loaded(&self, name: &str) -> String {
         if self.find(name).is_ok_and(|path| is_fetched(&path)) {
-            format!("it is not loaded: POST /v2/repository/models/{name}/load loads it")
+            format!("it is not loaded: load it with POST /v2/repository/models/{name}/load")
         } else {
-            "its ONNX file is not there: run `make models`".to_owned()
+            "its ONNX file is missing: run `make models`".to_owned()
         }
     }
 }
 
-/// Whether a model's ONNX file is there; weights are fetched, manifests are not.
+/// Returns true if a model's ONNX file exists. Weights are fetched, manifests are not.
 #[must_use]
 pub fn is_fetched(model: &Path) -> bool {
     ModelManifest::locate(model).is_ok_and(|manifest| manifest.onnx.is_file())

@@ -1,4 +1,4 @@
-//! Telling whether files have changed without reading them.
+//! Detection of changed files without reading them.
 
 use std::{
     os::unix::fs::MetadataExt,
@@ -8,8 +8,8 @@ use std::{
 
 use crate::inference::{ModelManifest, manifest::FILE_NAME};
 
-/// What tells a file's content from another: which file it is, how long and from when; links are
-/// followed. `None` when a file is not there, as while it is being replaced.
+/// Fingerprint of files: inode, length and time of modification, with symbolic links followed.
+/// `None` when a file is missing, for example while it is being replaced.
 pub(in crate::inference) type Stamp = Option<Vec<(u64, u64, SystemTime)>>;
 
 /// The files that make a model.
@@ -19,14 +19,14 @@ pub(super) fn files_of(model: &Path) -> Vec<PathBuf> {
     } else {
         None
     };
-    // Of a broken manifest only itself can be watched.
+    // If the manifest is invalid, only the manifest itself can be watched.
     let onnx = ModelManifest::locate(model)
         .ok()
         .map(|manifest| manifest.onnx);
     manifest.into_iter().chain(onnx).collect()
 }
 
-/// What the files are like now.
+/// Returns the present fingerprint of the files.
 pub(super) fn stamp(files: &[PathBuf]) -> Stamp {
     if files.is_empty() {
         return None;

@@ -20,20 +20,20 @@ fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
     }
 }
 
-/// Topic and payload of all that is no announcement, and how many announcements there are.
-fn told(messages: &[Message]) -> (Vec<(String, String)>, usize) {
+/// Topic and payload of all messages that are no announcements, and the number of announcements.
+fn published(messages: &[Message]) -> (Vec<(String, String)>, usize) {
     let is_announcement = |message: &&Message| message.topic.starts_with("homeassistant/");
-    let told = messages.iter().filter(|message| !is_announcement(message));
+    let published = messages.iter().filter(|message| !is_announcement(message));
     let text = |message: &Message| String::from_utf8(message.payload.to_vec()).unwrap();
-    let told = told.map(|message| (message.topic.clone(), text(message)));
+    let published = published.map(|message| (message.topic.clone(), text(message)));
     (
-        told.collect(),
+        published.collect(),
         messages.iter().filter(is_announcement).count(),
     )
 }
 
 #[test]
-fn a_camera_is_announced_with_its_first_report_and_counted_with_each() {
+fn the_first_report_announces_a_camera_and_each_updates_it() {
     let mut cameras = cameras(10);
     let messages = cameras.hear(&report("lobby", 2, ""));
     let expected = [
@@ -41,19 +41,19 @@ fn a_camera_is_announced_with_its_first_report_and_counted_with_each() {
         ("lookdown/cameras/lobby/report", "{\"camera\":\"lobby\"}"),
     ];
     let expected = expected.map(|(topic, text)| (topic.to_owned(), text.to_owned()));
-    assert_eq!(told(&messages), (expected.to_vec(), 2));
+    assert_eq!(published(&messages), (expected.to_vec(), 2));
     let kept: Vec<_> = messages.iter().map(|message| message.retained).collect();
     assert_eq!(kept, [true, true, true, false]);
 
-    let (told, announcements) = told(&cameras.hear(&report("lobby", 0, "")));
-    assert_eq!((told[0].1.as_str(), announcements), ("0", 0));
+    let (published, announcements) = published(&cameras.hear(&report("lobby", 0, "")));
+    assert_eq!((published[0].1.as_str(), announcements), ("0", 0));
 }
 
 #[test]
 fn zones_come_and_go_with_the_calibration() {
     let mut cameras = cameras(10);
     let zones = ",\"zones\":[{\"name\":\"door\",\"persons\":1},{\"name\":\"till\",\"persons\":0}]";
-    let (first, announcements) = told(&cameras.hear(&report("lobby", 1, zones)));
+    let (first, announcements) = published(&cameras.hear(&report("lobby", 1, zones)));
     assert_eq!(announcements, 4);
     assert_eq!(
         first[1],
@@ -76,11 +76,11 @@ fn zones_come_and_go_with_the_calibration() {
         messages.contains(&Message::forget(config.to_owned())),
         "{messages:?}"
     );
-    assert_eq!(told(&messages).1, 1 + 3);
+    assert_eq!(published(&messages).1, 1 + 3);
 }
 
 #[test]
-fn all_that_is_kept_is_told_again_without_reports() {
+fn retained_messages_are_repeated_without_reports() {
     let mut cameras = cameras(10);
     cameras.hear(&report("lobby", 1, ""));
     cameras.hear(&report("gate", 3, ""));
@@ -92,16 +92,16 @@ fn all_that_is_kept_is_told_again_without_reports() {
         ("lookdown/cameras/lobby/persons", "2"),
     ];
     let expected = expected.map(|(topic, text)| (topic.to_owned(), text.to_owned()));
-    assert_eq!(told(&messages), (expected.to_vec(), 4));
+    assert_eq!(published(&messages), (expected.to_vec(), 4));
 }
 
 #[test]
-fn of_too_many_cameras_the_first_are_published() {
+fn only_the_first_cameras_up_to_the_limit_are_published() {
     let mut cameras = cameras(2);
     for camera in ["a", "b", "c"] {
         let published = !cameras.hear(&report(camera, 1, "")).is_empty();
         assert_eq!(published, camera != "c", "{camera}");
     }
     assert!(!cameras.hear(&report("a", 2, "")).is_empty());
-    assert_eq!(told(&cameras.all()).0.len(), 2);
+    assert_eq!(published(&cameras.all()).0.len(), 2);
 }

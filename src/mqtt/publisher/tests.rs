@@ -49,7 +49,7 @@ fn report(persons: usize) -> NewReport {
     }
 }
 
-/// A client of the broker that has said this.
+/// Accepts a client of the broker and reads its CONNECT.
 async fn accept(listener: &TcpListener) -> (Client, Connect) {
     let (stream, _) = listener.accept().await.unwrap();
     let codec = Codec {
@@ -68,7 +68,7 @@ async fn welcome(client: &mut Client) {
     client.send(Packet::ConnAck(welcome)).await.unwrap();
 }
 
-/// The next message: topic, payload, whether it is kept.
+/// The next message: topic, payload, and whether it is retained.
 async fn heard(client: &mut Client) -> (String, String, bool) {
     loop {
         match client.next().await.unwrap().unwrap() {
@@ -142,10 +142,10 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
 }
 
 #[tokio::test]
-async fn while_there_is_no_broker_reports_are_counted_and_nobody_waits() {
+async fn without_a_broker_reports_are_counted_without_waiting() {
     let setup = setup().await;
     let running = tokio::spawn(setup.publisher.run());
-    // The connection is there, but nobody says welcome.
+    // The broker accepts the connection but does not send CONNACK.
     let (client, _) = accept(&setup.listener).await;
     for _ in 0..1000 {
         setup.results.publish(report(1), None);
@@ -159,13 +159,13 @@ async fn while_there_is_no_broker_reports_are_counted_and_nobody_waits() {
 }
 
 #[tokio::test]
-async fn a_report_that_does_not_get_through_is_counted_as_not_sent() {
+async fn a_report_that_cannot_be_sent_is_counted_as_not_sent() {
     let setup = setup().await;
     let running = tokio::spawn(setup.publisher.run());
     let (mut client, _) = accept(&setup.listener).await;
     welcome(&mut client).await;
     assert_eq!(heard(&mut client).await.1, "online");
-    // More than the broker is ever sent.
+    // This exceeds the limit of outgoing messages.
     let json = Bytes::from(vec![b' '; 20 << 20]);
     setup.results.publish(NewReport { json, ..report(1) }, None);
     setup.results.listeners().end();
@@ -175,7 +175,7 @@ async fn a_report_that_does_not_get_through_is_counted_as_not_sent() {
 }
 
 #[tokio::test]
-async fn a_new_connection_is_told_what_is_true_now() {
+async fn a_new_connection_publishes_the_current_state() {
     let setup = setup().await;
     setup.results.publish(report(7), None);
     let running = tokio::spawn(setup.publisher.run());

@@ -26,7 +26,7 @@ fn lobby() -> Cameras {
 }
 
 #[tokio::test]
-async fn a_listener_hears_its_camera_and_one_to_all_hears_everybody() {
+async fn listeners_receive_reports_of_their_camera_or_of_all() {
     let listeners = room_for(2);
     let mut one = listeners.listen(lobby()).unwrap();
     let mut all = listeners.listen(Cameras::All).unwrap();
@@ -39,7 +39,7 @@ async fn a_listener_hears_its_camera_and_one_to_all_hears_everybody() {
 }
 
 #[test]
-fn there_is_no_more_room_than_there_is_and_who_leaves_makes_some() {
+fn listener_limit_holds_and_a_dropped_listener_frees_a_permit() {
     let listeners = room_for(2);
     let first = listeners.listen(lobby()).unwrap();
     let _second = listeners.listen(Cameras::All).unwrap();
@@ -52,7 +52,7 @@ fn there_is_no_more_room_than_there_is_and_who_leaves_makes_some() {
 }
 
 #[tokio::test]
-async fn who_does_not_keep_up_hears_what_waits_for_him_and_nothing_more() {
+async fn slow_listener_gets_its_queue_and_nothing_more() {
     let listeners = room_for(2);
     let mut slow = listeners.listen(lobby()).unwrap();
     for _ in 0..=QUEUE {
@@ -68,7 +68,7 @@ async fn who_does_not_keep_up_hears_what_waits_for_him_and_nothing_more() {
 }
 
 #[tokio::test]
-async fn at_the_end_everybody_is_told_and_nobody_comes_any_more() {
+async fn end_closes_all_streams_and_refuses_new_listeners() {
     let listeners = room_for(2);
     let mut listening = listeners.listen(lobby()).unwrap();
     listeners.end();
@@ -77,7 +77,7 @@ async fn at_the_end_everybody_is_told_and_nobody_comes_any_more() {
 }
 
 #[test]
-fn nothing_is_left_of_listeners_that_have_gone() {
+fn dropped_listeners_leave_nothing_behind() {
     let listeners = room_for(100);
     for number in 0..1000 {
         drop(listeners.listen(Cameras::One(number.to_string())).unwrap());

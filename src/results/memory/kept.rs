@@ -1,4 +1,4 @@
-//! What is in memory, and what goes first when there is too much of it.
+//! Reports in memory, and their eviction when a limit is exceeded.
 
 use std::{
     collections::{BTreeMap, HashMap, VecDeque},
@@ -13,15 +13,15 @@ use crate::results::{
     Cameras, NewPicture, NewReport, ReportId, ResultLimits, ResultUse, StoredPicture, StoredReport,
 };
 
-/// Every report is in `cameras`, and in one of `latest` and `earlier`.
+/// Every report is in `cameras`, and in exactly one of `latest` and `earlier`.
 #[derive(Debug)]
 pub(super) struct Kept {
     limits: ResultLimits,
-    /// Of each camera, oldest first; at least one.
+    /// The reports of each camera, oldest first, at least one.
     cameras: HashMap<String, VecDeque<Arc<StoredReport>>>,
-    /// The last of every camera.
+    /// The latest report of every camera.
     latest: BTreeMap<ReportId, Arc<StoredReport>>,
-    /// All others.
+    /// All other reports.
     earlier: BTreeMap<ReportId, Arc<StoredReport>>,
     pictures: Pictures,
     bytes: usize,
@@ -43,7 +43,7 @@ impl Kept {
         }
     }
 
-    /// Keeps a report, and lets go what there is no room for.
+    /// Keeps a report, and evicts reports until all limits hold.
     pub(super) fn add(
         &mut self,
         report: NewReport,
@@ -89,7 +89,7 @@ impl Kept {
         }
     }
 
-    /// Says whether there was one.
+    /// Removes the oldest report of the camera. Returns false if there was none.
     fn forget_oldest_of(&mut self, camera: &str) -> bool {
         let Some(reports) = self.cameras.get_mut(camera) else {
             return false;
@@ -151,7 +151,7 @@ impl Kept {
         self.pictures.of(camera)
     }
 
-    /// How many were ever kept.
+    /// The number of reports that were ever kept.
     pub(super) fn stored(&self) -> u64 {
         self.stored
     }

@@ -1,10 +1,10 @@
-//! The latest picture of each camera that has one.
+//! The latest image of each camera that has one.
 
 use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
 use crate::results::{NewPicture, ReportId, StoredPicture};
 
-/// Of too many cameras, the one goes that was silent for longest.
+/// The images, at most `most`: the camera that was silent for longest is evicted first.
 #[derive(Debug)]
 pub(super) struct Pictures {
     most: NonZeroUsize,
@@ -19,7 +19,8 @@ impl Pictures {
         }
     }
 
-    /// What the report of this ID says of the camera: that there is this picture, or none any more.
+    /// Replaces the camera's image by that of the report with this ID, or removes it if that report
+    /// has none.
     pub(super) fn replace(&mut self, camera: &str, id: ReportId, picture: Option<NewPicture>) {
         let Some(picture) = picture else {
             return self.forget(camera);
@@ -42,7 +43,7 @@ impl Pictures {
         self.of_cameras.get(camera).cloned()
     }
 
-    /// How many there are.
+    /// The number of images.
     pub(super) fn count(&self) -> usize {
         self.of_cameras.len()
     }

@@ -1,21 +1,22 @@
-//! Where a Redis is.
+//! The address of a Redis.
 
 use std::{fmt, str::FromStr};
 
 use redis::{Client, ConnectionAddr};
 use url::Url;
 
-/// Where a Redis is, and with which credentials; it is shown without them.
+/// The address and the credentials of a Redis. It is displayed without the credentials.
 #[derive(Clone)]
 pub struct RedisAddress {
     url: Url,
     client: Client,
 }
 
-/// No address of a Redis. What it was is not repeated: it may hold a password.
+/// The text is no address of a Redis. The text is not repeated, as it may hold a password.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "give redis://host:port/database, or rediss:// for TLS, if need be with user:password@ before the host"
+    "give redis://host:port/database, or rediss:// for TLS, with user:password@ before \
+     the host where a login is needed"
 )]
 pub struct RedisAddressError;
 
@@ -80,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_address_of_a_redis_is_refused_without_being_repeated() {
+    fn other_texts_are_refused_without_being_repeated() {
         for text in [
             "",
             "localhost:6379",

@@ -1,6 +1,6 @@
-//! What is where in Redis.
+//! The keys in Redis.
 
-/// The keys of one installation: all begin alike.
+/// The keys of one installation. They all begin with the same prefix.
 #[derive(Debug)]
 pub(super) struct Keys {
     prefix: String,
@@ -11,7 +11,7 @@ impl Keys {
         Self { prefix }
     }
 
-    /// A stream of all reports: camera and bytes of each.
+    /// A stream of all reports, with the camera and the size in bytes of each.
     pub(super) fn reports(&self) -> String {
         format!("{}:reports", self.prefix)
     }
@@ -26,22 +26,22 @@ impl Keys {
         format!("{}:cameras", self.prefix)
     }
 
-    /// A hash of the newest ID (`last`) and the bytes of all reports (`bytes`).
+    /// A hash of the newest ID (`last`) and the total size of all reports (`bytes`).
     pub(super) fn totals(&self) -> String {
         format!("{}:totals", self.prefix)
     }
 
-    /// A sorted set of the cameras that have a picture by the ID of its report.
+    /// A sorted set of the cameras that have an image, by the ID of its report.
     pub(super) fn pictures(&self) -> String {
         format!("{}:pictures", self.prefix)
     }
 
-    /// A hash of a camera's picture: the report's ID (`id`), `frame` and `sketch`.
+    /// A hash of a camera's image: the report's ID (`id`), `frame` and `sketch`.
     pub(super) fn picture(&self, camera: &str) -> String {
         format!("{}{camera}", self.prefix_of_pictures())
     }
 
-    /// How the keys of all pictures begin.
+    /// The prefix of the keys of all images.
     pub(super) fn prefix_of_pictures(&self) -> String {
         format!("{}:picture:", self.prefix)
     }
@@ -56,7 +56,7 @@ impl Keys {
         format!("{}{camera}", self.prefix_of_cameras())
     }
 
-    /// How the keys of all cameras begin.
+    /// The prefix of the keys of all cameras.
     pub(super) fn prefix_of_cameras(&self) -> String {
         format!("{}:camera:", self.prefix)
     }

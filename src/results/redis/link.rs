@@ -1,11 +1,11 @@
-//! Whether Redis answers: one connection that all share while it does, and what is wrong while it does not.
+//! The state of the link to Redis: one shared connection, or the reason why there is none.
 
 use redis::{RedisError, RetryMethod, aio::MultiplexedConnection};
 use tokio::sync::watch;
 
 use crate::results::Unreachable;
 
-/// The way to Redis, if there is one now.
+/// The shared connection to Redis, if there is one now.
 #[derive(Debug)]
 pub(super) struct Link(watch::Sender<State>);
 
@@ -14,7 +14,7 @@ enum State {
     Down(String),
 }
 
-/// A connection, and the how many-th it is.
+/// A connection and its sequence number.
 #[derive(Clone)]
 pub(super) struct Line {
     pub(super) connection: MultiplexedConnection,
@@ -30,23 +30,23 @@ impl std::fmt::Debug for State {
 impl Default for Link {
     fn default() -> Self {
         Self(watch::Sender::new(State::Down(
-            "there is no connection yet".to_owned(),
+            "not connected yet".to_owned(),
         )))
     }
 }
 
 impl Link {
-    /// From now on there is this connection.
+    /// Sets the current connection.
     pub(super) fn is_up(&self, connection: MultiplexedConnection, number: u64) {
         self.0.send_replace(State::Up(Line { connection, number }));
     }
 
-    /// There is none, or none any more, for that reason.
+    /// Removes the connection and keeps the reason.
     pub(super) fn is_down(&self, problem: &RedisError) {
         self.0.send_replace(State::Down(problem.to_string()));
     }
 
-    /// What came of asking: a connection that has failed serves nobody any more.
+    /// Returns the outcome of a query. A connection that has failed is removed.
     pub(super) fn outcome<T>(
         &self,
         line: &Line,
@@ -55,7 +55,7 @@ impl Link {
         outcome.map_err(|error| {
             if !is_refusal(&error) {
                 self.0.send_if_modified(|state| {
-                    // It may have been replaced meanwhile.
+                    // It may have been replaced in the meantime.
                     let is_it = matches!(state, State::Up(now) if now.number == line.number);
                     if is_it {
                         *state = State::Down(error.to_string());
@@ -67,7 +67,7 @@ impl Link {
         })
     }
 
-    /// The connection.
+    /// The connection, or an error with the reason why there is none.
     pub(super) fn line(&self) -> Result<Line, Unreachable> {
         match &*self.0.borrow() {
             State::Up(line) => Ok(line.clone()),
@@ -75,11 +75,11 @@ impl Link {
         }
     }
 
-    /// The connection, when there is one.
+    /// Waits until there is a connection.
     pub(super) async fn next_line(&self) -> Line {
         loop {
             let mut state = self.0.subscribe();
-            // The sender is `self`, so the channel cannot close meanwhile.
+            // The sender is `self`, so the channel cannot close during the wait.
             if let Ok(state) = state.wait_for(|state| state.problem().is_none()).await
                 && let State::Up(line) = &*state
             {
@@ -88,7 +88,7 @@ impl Link {
         }
     }
 
-    /// Waits until there is no connection, and says why.
+    /// Waits until there is no connection, and returns the reason.
     pub(super) async fn lost(&self) -> String {
         let mut state = self.0.subscribe();
         let down = state.wait_for(|state| state.problem().is_some()).await;
@@ -97,7 +97,7 @@ impl Link {
             .unwrap_or_default()
     }
 
-    /// What is wrong.
+    /// The reason why there is no connection.
     pub(super) fn problem(&self) -> Option<String> {
         self.0.borrow().problem().map(ToOwned::to_owned)
     }
@@ -112,7 +112,7 @@ impl State {
     }
 }
 
-/// Whether Redis has answered, and would answer the same again.
+/// Returns true if Redis has answered, and a retry would get the same answer.
 pub(super) fn is_refusal(error: &RedisError) -> bool {
     let is_about_us = !error.is_io_error() && !error.is_timeout();
     is_about_us && matches!(error.retry_method(), RetryMethod::NoRetry)

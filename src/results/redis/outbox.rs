@@ -1,5 +1,5 @@
-//! Reports on their way to Redis. Whoever has found something puts it here and goes on; of too many,
-//! the oldest are dropped.
+//! A bounded queue of reports for Redis. Publishing never waits. When the queue is full, the oldest
+//! reports are dropped.
 
 use std::{
     collections::VecDeque,
@@ -10,18 +10,18 @@ use tokio::sync::Notify;
 
 use crate::results::{NewPicture, NewReport};
 
-/// What may wait: minutes of a few cameras.
+/// Most reports that wait: minutes of a few cameras.
 const MOST_REPORTS: usize = 1000;
 const MOST_BYTES: usize = 32 << 20;
 
-/// A report, perhaps with its picture.
+/// A report, possibly with its image.
 #[derive(Debug)]
 pub(super) struct Parcel {
     pub(super) report: NewReport,
     pub(super) picture: Option<NewPicture>,
 }
 
-/// Reports that wait, oldest first.
+/// The queue, oldest first.
 #[derive(Debug, Default)]
 pub(super) struct Outbox {
     waiting: Mutex<Waiting>,
@@ -32,13 +32,13 @@ pub(super) struct Outbox {
 struct Waiting {
     parcels: VecDeque<Parcel>,
     bytes: usize,
-    /// Whether one was taken and is not done with.
+    /// True while a report was taken and is not done.
     one_is_taken: bool,
     dropped: u64,
 }
 
 impl Outbox {
-    /// Puts a report behind the others. Never waits.
+    /// Appends a report. Never waits.
     pub(super) fn push(&self, report: NewReport, picture: Option<NewPicture>) {
         let parcel = Parcel { report, picture };
         let mut waiting = self.waiting();
@@ -53,12 +53,13 @@ impl Outbox {
         self.changed.notify_waiters();
     }
 
-    /// Takes the first report, when there is one; [`Outbox::done`] says when it is done with.
+    /// Waits for the first report and takes it. [`Outbox::done`] completes it.
     pub(super) async fn first(&self) -> Parcel {
         loop {
             let changed = self.changed.notified();
             tokio::pin!(changed);
-            // Listens before it looks: nothing is missed in between.
+            // Registers for the notification before the check, so that no report is missed in
+            // between.
             changed.as_mut().enable();
             if let Some(first) = self.take() {
                 return first;
@@ -67,7 +68,7 @@ impl Outbox {
         }
     }
 
-    /// The report that was taken is where it belongs, or was `refused` for ever.
+    /// Completes the report that was taken: it was stored, or it was `refused` permanently.
     pub(super) fn done(&self, refused: bool) {
         let mut waiting = self.waiting();
         waiting.one_is_taken = false;
@@ -76,7 +77,7 @@ impl Outbox {
         self.changed.notify_waiters();
     }
 
-    /// Waits until nothing waits.
+    /// Waits until the queue is empty.
     pub(super) async fn is_empty(&self) {
         loop {
             let changed = self.changed.notified();
@@ -89,13 +90,13 @@ impl Outbox {
         }
     }
 
-    /// How many are not done with.
+    /// The number of reports that are not done.
     pub(super) fn count(&self) -> usize {
         let waiting = self.waiting();
         waiting.parcels.len() + usize::from(waiting.one_is_taken)
     }
 
-    /// How many were dropped or refused.
+    /// The number of reports that were dropped or refused.
     pub(super) fn dropped(&self) -> u64 {
         self.waiting().dropped
     }
@@ -108,7 +109,7 @@ impl Outbox {
     }
 
     fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        // No change can panic half-way.
+        // No change can panic before it is complete.
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -120,7 +121,7 @@ impl Parcel {
 }
 
 impl Waiting {
-    /// A picture that another follows is of no use any more.
+    /// Drops the camera's queued image, as a later report replaces it.
     fn drop_picture_of(&mut self, camera: &str) {
         let mut own = self.parcels.iter_mut().rev();
         let last = own.find(|parcel| parcel.report.camera == camera);
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn reports_leave_in_the_order_in_which_they_came() {
+    async fn reports_are_taken_in_arrival_order() {
         let outbox = Outbox::default();
         let (taken, ()) = tokio::join!(
             async {
@@ -168,7 +169,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn of_too_many_reports_the_oldest_are_dropped_and_counted() {
+    async fn a_full_outbox_drops_and_counts_the_oldest_reports() {
         for length in [1, MOST_BYTES / 10] {
             let outbox = Outbox::default();
             for number in 0..2 * MOST_REPORTS {
@@ -183,7 +184,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn it_is_empty_when_the_last_report_is_done_with() {
+    async fn the_outbox_is_empty_when_the_last_report_is_done() {
         let outbox = Outbox::default();
         outbox.is_empty().await;
         outbox.push(report(1, 1), None);
@@ -196,7 +197,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn of_a_camera_only_the_latest_picture_waits() {
+    async fn only_the_latest_image_of_a_camera_waits() {
         let outbox = Outbox::default();
         let picture = |length| NewPicture {
             frame: Bytes::from(vec![0; length]),

@@ -1,4 +1,5 @@
-//! What is asked of Redis, and reports out of its answers. What is no report of ours is passed over.
+//! Queries to Redis, and the parsing of its answers into reports. Entries that are no reports of
+//! Lookdown are skipped.
 
 use std::{num::NonZeroUsize, sync::Arc};
 
@@ -13,13 +14,13 @@ use redis::{
 use super::keys::Keys;
 use crate::results::{NewPicture, NewReport, ReportId, ResultUse, StoredPicture, StoredReport};
 
-/// A place in the stream of all reports.
+/// An entry of the stream of all reports.
 pub(super) struct Entry {
     pub(super) id: ReportId,
     pub(super) camera: String,
 }
 
-/// Redis, and what is where in it.
+/// A connection to Redis, and its keys.
 pub(super) struct Reader<'a> {
     pub(super) connection: MultiplexedConnection,
     pub(super) keys: &'a Keys,
@@ -44,7 +45,7 @@ impl Reader<'_> {
             last.arg("+").arg("-").arg("COUNT").arg(1);
         }
         let mut latest = self.found(&each, cameras).await?;
-        // One may have been replaced since the cameras were listed.
+        // One may have been replaced after the cameras were listed.
         latest.sort_unstable_by_key(|report| report.id);
         Ok(latest)
     }
@@ -69,7 +70,7 @@ impl Reader<'_> {
         self.reports_at(entries(found.ids)).await
     }
 
-    /// The reports at these places, as far as they are still kept.
+    /// The reports of these entries, as far as they are still kept.
     pub(super) async fn reports_at(
         &mut self,
         entries: Vec<Entry>,
@@ -105,7 +106,7 @@ impl Reader<'_> {
         Ok(stored())
     }
 
-    /// The newest ID there ever was.
+    /// The newest ID that was ever assigned.
     pub(super) async fn newest(&mut self) -> RedisResult<ReportId> {
         let mut last = cmd("HGET");
         last.arg(self.keys.totals()).arg("last");
@@ -136,14 +137,15 @@ impl Reader<'_> {
         after: ReportId,
         most: NonZeroUsize,
     ) -> RedisResult<StreamRangeReply> {
-        // The parts of a report's ID in Redis are its own and 0: this is just behind it.
+        // An ID in Redis has two parts: the ID of the report, and 0. This range begins directly
+        // after it.
         let mut range = cmd("XRANGE");
         range.arg(key).arg(format!("{after}-1")).arg("+");
         range.arg("COUNT").arg(most.get());
         range.query_async(&mut self.connection).await
     }
 
-    /// What a pipeline finds that asks for a report of each of these cameras.
+    /// The reports that a pipeline with one query per camera returns.
     async fn found(
         &mut self,
         each: &Pipeline,
@@ -160,7 +162,7 @@ impl Reader<'_> {
     }
 }
 
-/// The places in a part of the stream of all reports.
+/// The entries of a range of the stream of all reports.
 pub(super) fn entries(found: Vec<StreamId>) -> Vec<Entry> {
     let entries = found.into_iter().filter_map(|entry| {
         Some(Entry {

@@ -1,24 +1,25 @@
--- Keeps a report and lets go what there is no room for, in one step.
+-- Stores a report and evicts what exceeds the limits, in one atomic step.
 --
--- `reports`: all that are kept, a stream of camera and bytes. `earlier`: the IDs of those that are not their
--- camera's latest. `cameras`: each with the ID of its latest. `totals`: the newest ID, and the bytes of all
--- reports. `pictures`: the cameras that have one, with the ID of its report. `sender`: the number of the last
--- report that this server sent. What is in a report is in a stream of its camera, under the same ID.
+-- `reports`: a stream of all kept reports, with the camera and the size of each. `earlier`: the IDs
+-- of those that are not their camera's latest. `cameras`: each camera with the ID of its latest
+-- report. `totals`: the newest ID, and the size of all reports in bytes. `pictures`: the cameras
+-- that have an image, with the ID of its report. `sender`: the number of the last report that this
+-- server sent. The content of a report is in a stream of its camera, under the same ID.
 local reports, earlier, cameras, totals, pictures, sender = unpack(KEYS)
 local prefix_of_cameras, prefix_of_pictures, number = unpack(ARGV, 1, 3)
 local camera, received_at, persons, json, frame, sketch, bytes = unpack(ARGV, 4, 10)
 local most_cameras, most_of_camera = tonumber(ARGV[11]), tonumber(ARGV[12])
 local most_reports, most_bytes = tonumber(ARGV[13]), tonumber(ARGV[14])
 local most_pictures, max_age_seconds = tonumber(ARGV[15]), tonumber(ARGV[16])
--- Of what is too old, a report lets go more than itself.
+-- Most expired reports that one call removes.
 local OLD_AT_A_TIME = 100
 
--- It was kept, only the answer got lost.
+-- The report was stored before, but the answer was lost.
 if redis.call('GET', sender) == number then
   return
 end
 
--- Redis may have let one of them go to make room: then begin anew.
+-- Redis may have evicted one of the two keys: start with an empty store then.
 if redis.call('EXISTS', reports, totals) < 2 then
   redis.call('DEL', reports, earlier, cameras)
   redis.call('HSET', totals, 'bytes', 0)
@@ -63,7 +64,7 @@ redis.call('XADD', reports, id, 'camera', camera, 'bytes', bytes)
 redis.call('ZADD', cameras, micros, camera)
 redis.call('HSET', totals, 'last', micros)
 redis.call('HINCRBY', totals, 'bytes', bytes)
--- The picture is that of the latest report, or there is none.
+-- The image is that of the latest report. A report without an image removes it.
 forget_picture(camera)
 if frame ~= '' then
   redis.call('HSET', prefix_of_pictures .. camera, 'id', micros, 'frame', frame, 'sketch', sketch)
@@ -98,7 +99,7 @@ end
 while too_many() do
   local first = redis.call('ZPOPMIN', earlier)[1]
   if not first then
-    -- All that are left are their cameras' latest, in order.
+    -- All remaining reports are their cameras' latest, in order.
     first = redis.call('XRANGE', reports, '-', '+', 'COUNT', 1)[1][1]
   end
   forget(first)

@@ -1,5 +1,5 @@
-//! Sends reports from the outbox to Redis, one after the other. Each is kept in one step, and once: when an
-//! answer got lost, Redis knows by the number that it has that report.
+//! Sends reports from the outbox to Redis, one after the other. Each report is stored atomically
+//! and exactly once: after a lost answer, Redis recognises the report by its number.
 
 use std::sync::{Arc, atomic::Ordering};
 
@@ -8,10 +8,10 @@ use uuid::Uuid;
 
 use super::{Shared, link::is_refusal, outbox::Parcel};
 
-/// What Redis does with a report.
+/// The script that stores a report in Redis.
 const RECORD: &str = include_str!("record.lua");
 
-/// Sends, for as long as the server runs. Refusals are logged until there is none, the first of them.
+/// Sends reports for as long as the server runs. The first of consecutive refusals is logged.
 pub(super) async fn run(shared: Arc<Shared>) {
     let sender = Sender {
         script: Script::new(RECORD),
@@ -43,7 +43,7 @@ struct Sender<'a> {
 }
 
 impl Sender<'_> {
-    /// Sends a report until Redis has answered; fails only with a refusal.
+    /// Sends a report until Redis has answered. Fails only with a refusal.
     async fn send(&self, parcel: &Parcel, number: u64) -> RedisResult<()> {
         loop {
             let line = self.shared.link.next_line().await;
@@ -81,7 +81,7 @@ impl Sender<'_> {
         call.arg(&report.camera);
         call.arg(report.received_at.to_string());
         call.arg(report.persons).arg(&report.json[..]);
-        // No picture is one of no bytes.
+        // An empty image means that there is none.
         let parts = picture.as_ref().map(|it| [&it.frame[..], &it.sketch[..]]);
         let [frame, sketch] = parts.unwrap_or_default();
         call.arg(frame).arg(sketch);

@@ -1,5 +1,5 @@
-//! Keeps the connection to Redis, makes it anew when it is lost, and tells whoever listens here of the
-//! reports that any server publishes.
+//! Keeps the connection to Redis, reconnects when it is lost, and publishes to the listeners here
+//! the reports of all servers.
 
 use std::{convert::Infallible, sync::Arc, time::Duration};
 
@@ -14,29 +14,29 @@ use super::{
 };
 use crate::results::ReportId;
 
-/// Longest that Redis may take to let us in, and to answer anything.
+/// Longest time for the login, and for any answer of Redis.
 const TIMEOUT: Duration = Duration::from_secs(2);
-/// How long Redis holds a question for news before it answers that there are none.
+/// Time for which a blocking read waits for new reports.
 const NEWS_WAIT: Duration = Duration::from_secs(5);
-/// News that are fetched at a time.
+/// Most new reports per read.
 const PAGE: usize = 32;
-/// Between two attempts to connect; each pause is twice as long as the one before.
+/// Pause before the second attempt to connect. Each pause is twice as long as the one before.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
-/// A connection for everybody, and one that waits for news.
+/// The shared connection, and the one that waits for new reports.
 struct Session {
     commands: MultiplexedConnection,
     news: MultiplexedConnection,
     newest: ReportId,
 }
 
-/// Connects, for as long as the server runs. Loss and return are logged once each.
+/// Connects for as long as the server runs. A loss and a reconnection are logged once each.
 pub(super) async fn keep(shared: Arc<Shared>) {
     let address = &shared.options.address;
     let mut pause = FIRST_PAUSE;
     let mut heard = None;
-    let mut loss_was_told = false;
+    let mut loss_was_logged = false;
     for number in 1.. {
         let problem = match open(&shared).await {
             Err(error) => {
@@ -46,13 +46,13 @@ pub(super) async fn keep(shared: Arc<Shared>) {
             Ok(session) => {
                 let began = Instant::now();
                 shared.link.is_up(session.commands, number);
-                if loss_was_told {
-                    tracing::info!("Redis at {address} answers again: reports are kept there");
-                    loss_was_told = false;
+                if loss_was_logged {
+                    tracing::info!("Redis at {address} answers again: reports are stored there");
+                    loss_was_logged = false;
                 } else {
-                    tracing::info!("reports are kept in Redis at {address}");
+                    tracing::info!("reports are stored in Redis at {address}");
                 }
-                // A Redis that has lost everything may also be behind.
+                // A Redis that has lost its data may have a lower ID than this position.
                 let mut position = heard.unwrap_or(session.newest).min(session.newest);
                 let problem = tokio::select! {
                     Err(error) = follow(&shared, session.news, &mut position) => {
@@ -68,12 +68,12 @@ pub(super) async fn keep(shared: Arc<Shared>) {
                 problem
             }
         };
-        if !loss_was_told {
+        if !loss_was_logged {
             tracing::warn!(
-                "Redis at {address} does not answer ({problem}): frames are looked at all the same, reports \
+                "Redis at {address} does not answer ({problem}): detection continues, reports \
                  wait for it, and results cannot be read; trying again until it does"
             );
-            loss_was_told = true;
+            loss_was_logged = true;
         }
         sleep(pause).await;
         pause = LONGEST_PAUSE.min(2 * pause);
@@ -102,7 +102,7 @@ async fn open(shared: &Shared) -> RedisResult<Session> {
     })
 }
 
-/// Tells listeners of what comes after `position`, in order, and moves that on.
+/// Publishes the reports after `position` to the listeners, in order, and advances `position`.
 async fn follow(
     shared: &Shared,
     mut connection: MultiplexedConnection,

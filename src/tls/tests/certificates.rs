@@ -78,7 +78,7 @@ impl Files {
         let_read(&self.options.private_key, 0o600);
     }
 
-    /// Asks clients for certificates of these authorities, PEM.
+    /// Requires client certificates of these authorities, PEM.
     pub(super) fn ask_clients(&mut self, authorities: &str) -> PathBuf {
         let file = self.folder.path().join("clients.pem");
         fs::write(&file, authorities).unwrap();
@@ -87,7 +87,7 @@ impl Files {
     }
 }
 
-/// Changes who may read a file.
+/// Changes the permissions of a file.
 pub(super) fn let_read(file: &Path, mode: u32) {
     fs::set_permissions(file, fs::Permissions::from_mode(mode)).unwrap();
 }

@@ -1,4 +1,4 @@
-//! A client that trusts one authority, and a server that sends back what it is sent.
+//! A client that trusts one authority, and an echo server.
 
 use std::{io, net::SocketAddr, sync::Arc};
 
@@ -21,7 +21,7 @@ use super::{
 
 pub(super) const BOTH: &[&SupportedProtocolVersion] = &[&TLS13, &TLS12];
 
-/// Accepts connections and sends back what comes.
+/// Accepts connections and echoes what they send.
 pub(super) async fn echo(tls: &Arc<Tls>) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
@@ -40,7 +40,7 @@ pub(super) async fn echo(tls: &Arc<Tls>) -> SocketAddr {
     address
 }
 
-/// Who connects.
+/// A client.
 pub(super) struct Client {
     config: ClientConfig,
 }
@@ -80,8 +80,8 @@ impl Client {
         connector.connect(name, connection).await
     }
 
-    /// Connects and exchanges a few bytes: only then is it known whether the server takes the
-    /// client's certificate.
+    /// Connects and exchanges a few bytes. Only then it is known if the server accepts the client's
+    /// certificate.
     pub(super) async fn talk(&self, address: SocketAddr) -> io::Result<TlsStream<TcpStream>> {
         let mut connection = self.connect(address).await?;
         exchange(&mut connection).await?;
@@ -97,7 +97,7 @@ pub(super) async fn exchange(connection: &mut TlsStream<TcpStream>) -> io::Resul
     Ok(())
 }
 
-/// The certificate that the server showed, DER.
+/// The certificate of the server, DER.
 pub(super) fn shown(connection: &TlsStream<TcpStream>) -> Vec<u8> {
     let chain = connection.get_ref().1.peer_certificates().unwrap();
     chain[0].to_vec()

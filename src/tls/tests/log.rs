@@ -1,11 +1,11 @@
-//! What is logged while something runs.
+//! Captures the log of a function.
 
 use std::{
     io::{self, Write},
     sync::{Arc, Mutex},
 };
 
-/// Part of a log.
+/// A part of a log.
 struct Log(Arc<Mutex<Vec<u8>>>);
 
 impl Write for Log {

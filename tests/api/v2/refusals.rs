@@ -1,4 +1,4 @@
-//! What is refused, in one sentence each.
+//! Refused requests, with one sentence each.
 
 use axum::{body::Body, http::Request};
 use serde_json::{Value, json};
@@ -37,9 +37,9 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
             json!([input(json!([1]), json!([image, image]))]),
             "more than one",
         ),
-        (json!([input(json!([1]), json!(["*"]))]), "no base64"),
+        (json!([input(json!([1]), json!(["*"]))]), "not base64"),
         (json!([input(json!([1]), json!([""]))]), "it is empty"),
-        (json!([input(json!([1]), json!(image))]), "no list"),
+        (json!([input(json!([1]), json!(image))]), "not a list"),
         (
             json!([input(json!([65536, 65536, 65536, 65536, 2]), json!([]))]),
             "more elements than memory",
@@ -54,7 +54,7 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
         ),
         (
             json!([{ "name": "image", "datatype": "FP32", "shape": [2], "data": [1] }]),
-            "asks for 2",
+            "needs 2",
         ),
         (
             json!([{ "name": "image", "datatype": "BYTES", "shape": [1] }]),

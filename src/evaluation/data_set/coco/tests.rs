@@ -1,4 +1,4 @@
-//! Files of COCO's form, with all that may be said and all that may be wrong.
+//! COCO files, valid and invalid.
 
 use super::super::test_support::{boxes, folder, open, refusal};
 use super::*;
@@ -23,7 +23,7 @@ fn own_folder(annotations: &str) -> tempfile::TempDir {
 }
 
 #[test]
-fn our_own_folder_has_persons_ignore_regions_and_calibrations() {
+fn own_folder_has_persons_ignore_regions_and_calibrations() {
     let data_set = open(&own_folder(OWN));
     let [first, second] = &data_set.images[..] else {
         panic!("two images")
@@ -39,7 +39,7 @@ fn our_own_folder_has_persons_ignore_regions_and_calibrations() {
 }
 
 #[test]
-fn of_a_coco_file_the_persons_are_read() {
+fn only_persons_of_a_coco_file_are_read() {
     let files = [
         ("annotations/instances_val.json", COCO),
         ("val/a.jpg", ""),
@@ -88,7 +88,7 @@ fn boxes_of_five_numbers_are_rotated_clockwise_by_degrees() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_file_and_the_problem() {
     for (from, to, expected) in [
         (
             "\"calibration\":\"lobby\"",
@@ -98,7 +98,7 @@ fn what_is_wrong_is_named() {
         (
             "{\"image_id\":7",
             "{\"image_id\":9",
-            "image_id 9 is no image's id",
+            "image_id 9 is not an image's id",
         ),
         ("\"id\":8", "\"id\":7", "the id 7 occurs twice"),
         (
@@ -126,7 +126,7 @@ fn what_is_wrong_is_named() {
 }
 
 #[test]
-fn boxes_of_two_shapes_and_categories_without_a_person_are_refused() {
+fn mixed_boxes_and_categories_without_person_are_refused() {
     let with_angle = COCO
         .replace("[1,2,3,4]", "[50,50,3,4,5]")
         .replace("dog", "Person");
@@ -147,7 +147,7 @@ fn boxes_of_two_shapes_and_categories_without_a_person_are_refused() {
         ]));
         assert!(error.contains(expected), "{error}");
     }
-    // A category is known by its name, however it is written.
+    // The name of the category is compared without case.
     let data_set = open(&folder(&[("annotations.json", &with_angle), ("a.jpg", "")]));
     assert_eq!(data_set.scoring, Scoring::Rotated);
 }

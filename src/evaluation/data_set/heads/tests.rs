@@ -1,4 +1,4 @@
-//! Head points beside their pictures.
+//! Head points with their images.
 
 use super::super::test_support::{folder, open, refusal};
 use super::*;
@@ -17,7 +17,7 @@ fn sequence(rows: &str) -> tempfile::TempDir {
 }
 
 #[test]
-fn rows_are_the_heads_in_the_pictures_in_the_order_of_their_names() {
+fn rows_belong_to_the_images_in_the_order_of_their_names() {
     let folder = sequence("1,120,80,300,410.5,0,0\r\n2,0,0,,,-1,-1\n\n");
     let file = folder.path().join(CSV);
     for data_set in [open(&folder), DataSet::open(&file).unwrap()] {
@@ -35,11 +35,11 @@ fn rows_are_the_heads_in_the_pictures_in_the_order_of_their_names() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_row_and_the_problem() {
     for (rows, expected) in [
         ("1,2,3", "it has 1 rows, but "),
-        ("1,2,3\n2,x,3", "row 2: \"x\" is no coordinate"),
-        ("1,inf,3\n2", "row 1: \"inf\" is no coordinate"),
+        ("1,2,3\n2,x,3", "row 2: \"x\" is not a coordinate"),
+        ("1,inf,3\n2", "row 1: \"inf\" is not a coordinate"),
         ("1,2,3\n2,4", "row 2: it has an x without a y"),
     ] {
         let error = refusal(&sequence(rows));

@@ -1,4 +1,4 @@
-//! Which picture annotations speak of.
+//! Tests of the lookup of images.
 
 use super::*;
 
@@ -18,7 +18,7 @@ fn pictures(folder: &tempfile::TempDir) -> PictureIndex {
 }
 
 #[test]
-fn a_picture_is_found_by_its_name_wherever_it_lies() {
+fn an_image_is_found_by_its_name_in_any_folder() {
     let folder = folder(&["deep/er/a.jpg", "b.PNG", "a.txt"]);
     let pictures = pictures(&folder);
     let found = pictures.by_file_name(Path::new("a.jpg")).unwrap();
@@ -26,18 +26,18 @@ fn a_picture_is_found_by_its_name_wherever_it_lies() {
     let found = pictures.by_file_name(Path::new("elsewhere/b.PNG")).unwrap();
     assert!(found.ends_with("b.PNG"));
     let problem = pictures.by_file_name(Path::new("c.jpg")).unwrap_err();
-    assert_eq!(problem, "the picture c.jpg is nowhere below");
+    assert_eq!(problem, "no image c.jpg was found");
 }
 
 #[test]
-fn pictures_of_the_same_name_are_told_apart_by_their_folders_or_not_at_all() {
+fn equal_names_are_resolved_by_folder_or_refused() {
     let folder = folder(&["one/a.jpg", "two/a.jpg", "three/a.png"]);
     let pictures = pictures(&folder);
     let found = pictures.by_file_name(Path::new("two/a.jpg")).unwrap();
     assert!(found.ends_with("two/a.jpg"));
     let problem = pictures.by_file_name(Path::new("a.jpg")).unwrap_err();
     assert!(problem.contains("one/a.jpg") && problem.contains("two/a.jpg"));
-    // Beside its annotations, a picture needs no other name.
+    // In the folder of its annotations, an image's name is unambiguous.
     let beside = folder.path().join("three/a.xml");
     assert!(
         pictures
@@ -64,7 +64,7 @@ fn a_dot_in_a_name_is_part_of_the_name() {
 }
 
 #[test]
-fn folders_that_go_on_and_on_are_refused() {
+fn too_many_levels_of_folders_are_refused() {
     let deep = "x/".repeat(MAX_DEPTH + 1) + "a.jpg";
     let folder = folder(&[&deep]);
     let error = Files::below(folder.path()).map(|_| ()).unwrap_err();

@@ -1,4 +1,4 @@
-//! One XML file per picture.
+//! Tests of VOC files.
 
 use super::super::test_support::{boxes, folder, open, refusal};
 
@@ -14,13 +14,14 @@ const XML: &str = r#"<?xml version="1.0" encoding="utf-8"?>
         <bndbox><ymin>2</ymin><xmin>1</xmin><ymax>4</ymax><xmax>3</xmax></bndbox>
     </object>
 </annotation>"#;
-const NOBODY: &str = "<annotation><size><width>8</width><height>6</height></size></annotation>";
+const WITHOUT_PERSONS: &str =
+    "<annotation><size><width>8</width><height>6</height></size></annotation>";
 
 #[test]
 fn persons_are_read_and_difficult_ones_do_not_count() {
     let data_set = open(&folder(&[
         ("Annotations/000001.xml", XML),
-        ("Annotations/000002.xml", NOBODY),
+        ("Annotations/000002.xml", WITHOUT_PERSONS),
         ("JPEGImages/000001.jpg", ""),
         ("JPEGImages/000002.jpg", ""),
         ("JPEGImages/000003.jpg", ""),
@@ -37,7 +38,7 @@ fn persons_are_read_and_difficult_ones_do_not_count() {
 }
 
 #[test]
-fn boxes_for_piropo_find_its_pictures_by_their_time() {
+fn boxes_for_piropo_are_matched_to_images_by_time() {
     let name = "2015-05-12T12-42-29.320Z";
     let data_set = open(&folder(&[
         (
@@ -56,7 +57,7 @@ fn boxes_for_piropo_find_its_pictures_by_their_time() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_file_and_the_problem() {
     for (from, to, expected) in [
         ("</annotation>", "", "not XML: "),
         ("annotation>", "svg>", "its root is <svg>"),
@@ -77,11 +78,11 @@ fn what_is_wrong_is_named() {
         assert!(error.contains(expected), "{error}");
     }
     let error = refusal(&folder(&[("a.xml", XML), ("b.jpg", "")]));
-    assert!(error.contains("the picture a is nowhere below"), "{error}");
+    assert!(error.contains("no image a was found"), "{error}");
 }
 
 #[test]
-fn a_file_made_to_exhaust_the_reader_is_refused() {
+fn entity_bombs_and_deep_nesting_are_refused() {
     let bomb =
         r#"<!DOCTYPE a [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><annotation>&b;</annotation>"#;
     let error = refusal(&folder(&[("a.xml", bomb), ("a.jpg", "")]));

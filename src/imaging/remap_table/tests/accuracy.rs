@@ -1,4 +1,4 @@
-//! How far interpolated positions are from where the lens really is.
+//! Errors of interpolated positions against the exact lens model.
 
 use super::{
     super::*,

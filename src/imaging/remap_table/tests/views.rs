@@ -100,7 +100,7 @@ fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
 }
 
 #[test]
-fn whole_patches_see_the_lens_image_within_the_frame_with_every_pixel() {
+fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
     for lens in every_lens() {
         let views = ViewPlan::balanced().views(&Mount::default(), 100, 100);
         let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
@@ -129,7 +129,7 @@ fn whole_patches_see_the_lens_image_within_the_frame_with_every_pixel() {
 }
 
 #[test]
-fn views_that_are_not_turned_about_the_optical_axis_share_nothing() {
+fn views_not_rotated_about_the_optical_axis_share_nothing() {
     let lens = Lens::equidistant_circle(99.5, 99.5, 100.0, 1.5).unwrap();
     let views = ViewPlan::balanced().views(&tilted(), 64, 64);
     let tables = RemapTable::of_views(&views, &lens, 200, 200);

@@ -1,10 +1,10 @@
-//! How large the object at a peak is.
+//! Size of the object at a peak.
 
 use serde::Deserialize;
 
 use crate::inference::heads::{finds::corners_around, grid::Grid, tensor::TensorView};
 
-/// What sizes and sides are measured in.
+/// Unit of sizes and sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CenternetUnit {
@@ -15,7 +15,7 @@ pub enum CenternetUnit {
     Pixels,
 }
 
-/// The maps from which boxes are made.
+/// The maps with the extent of objects.
 pub(super) enum Extent<'o, T> {
     /// Widths and heights, and the centres within their cells.
     Size(&'o T, Option<&'o T>),
@@ -24,7 +24,7 @@ pub(super) enum Extent<'o, T> {
 }
 
 impl Extent<'_, TensorView<'_>> {
-    /// The box of the cell numbered `index`.
+    /// The box of the cell with the number `index`.
     pub(super) fn corners(
         &self,
         view: usize,

@@ -1,7 +1,7 @@
 //! Peaks of a heat map.
 
-/// Whether no neighbour in the 3×3 window around a cell is greater. All cells of a plateau are
-/// peaks, and NaN neighbours do not count.
+/// Returns true if no neighbour in the 3×3 window around a cell is greater. All cells of a plateau
+/// are peaks. NaN neighbours are ignored.
 pub(super) fn is_peak(plane: &[f32], columns: usize, index: usize) -> bool {
     let (row, column) = (index / columns, index % columns);
     let rows = plane.len() / columns;
@@ -13,7 +13,8 @@ pub(super) fn is_peak(plane: &[f32], columns: usize, index: usize) -> bool {
     })
 }
 
-/// Keeps the `count` best of the scored cells, in their order; of equal ones the first.
+/// Keeps the `count` best of the scored cells, in their order. For equal scores, the first are
+/// kept.
 pub(super) fn keep_best(scored: &mut Vec<(f64, usize)>, count: usize) {
     if scored.len() <= count {
         return;

@@ -2,11 +2,11 @@
 
 use serde::Deserialize;
 
-/// What a column holds.
+/// Content of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Column {
-    /// Which view of the batch, from 0.
+    /// Index of the view in the batch.
     View,
     /// The box's left side.
     XMin,
@@ -18,11 +18,11 @@ pub enum Column {
     YMax,
     /// The score, 0 to 1.
     Score,
-    /// The class's number.
+    /// Number of the class.
     Class,
 }
 
-/// The order taken for granted when a table has six columns.
+/// The default order of six columns.
 pub(super) const SIX: [Column; 6] = [
     Column::XMin,
     Column::YMin,
@@ -32,16 +32,16 @@ pub(super) const SIX: [Column; 6] = [
     Column::Class,
 ];
 
-/// Where in a row everything is.
+/// Indices of the columns in a row.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Places {
+pub(super) struct Indices {
     pub(super) view: Option<usize>,
     pub(super) sides: [usize; 4],
     pub(super) score: usize,
     pub(super) class: usize,
 }
 
-impl Places {
+impl Indices {
     pub(super) fn of(columns: &[Column]) -> Result<Self, String> {
         Ok(Self {
             view: find(columns, Column::View, "view")?,
@@ -63,9 +63,9 @@ fn need(columns: &[Column], wanted: Column, name: &str) -> Result<usize, String>
 }
 
 fn find(columns: &[Column], wanted: Column, name: &str) -> Result<Option<usize>, String> {
-    let mut places = (0..columns.len()).filter(|&place| columns[place] == wanted);
-    let first = places.next();
-    match places.next() {
+    let mut indices = (0..columns.len()).filter(|&index| columns[index] == wanted);
+    let first = indices.next();
+    match indices.next() {
         None => Ok(first),
         Some(_) => Err(format!(
             "`columns` in the manifest's [output] has {name:?} twice"

@@ -1,12 +1,12 @@
-//! Outputs that fit, for every way through every head.
+//! Valid outputs for every code path of every head.
 
-/// A manifest and the shapes of the outputs `a` and `b` that it fits, for an input of 8×4 pixels.
+/// A manifest and the matching shapes of the outputs `a` and `b`, for an input of 8×4 pixels.
 pub(super) type Case = (&'static str, &'static [usize], &'static [usize]);
 
-/// Stands for the number of views in the shapes below.
+/// Placeholder for the number of views in the shapes below.
 pub(super) const N: usize = usize::MAX;
 
-/// One case for every way through every head.
+/// One case for every code path of every head.
 pub(super) const CASES: [Case; 15] = [
     (
         "head = 'boxes_scores'\nboxes = 'a'\nscores = 'b'",

@@ -1,4 +1,4 @@
-//! Short cuts must not change what is kept.
+//! Short cuts must not change the kept scores.
 
 use proptest::prelude::*;
 
@@ -24,7 +24,7 @@ fn a_floor_of_zero_keeps_every_finite_score() {
 }
 
 #[test]
-fn a_floor_of_one_keeps_saturated_scores_alone() {
+fn a_floor_of_one_keeps_only_saturated_scores() {
     let floor = Floor::new(1.0);
     assert_eq!(floor.sigmoid(100.0), Score::Kept(1.0));
     assert_eq!(floor.sigmoid(20.0), Score::Below);
@@ -39,7 +39,7 @@ fn nothing_reaches_a_floor_that_is_nan() {
 }
 
 #[test]
-fn values_that_are_not_finite_are_told_apart_from_low_scores() {
+fn non_finite_values_are_distinguished_from_low_scores() {
     let floor = Floor::new(0.5);
     for raw in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert_eq!(Activation::None.score(raw, floor), Score::NotFinite);
@@ -49,7 +49,7 @@ fn values_that_are_not_finite_are_told_apart_from_low_scores() {
 }
 
 #[test]
-fn a_logit_is_no_probability_but_rounding_is_forgiven() {
+fn a_logit_is_not_a_probability_but_rounding_is_accepted() {
     let floor = Floor::new(0.5);
     assert_eq!(
         Activation::None.score(3.0, floor),
@@ -64,7 +64,7 @@ fn a_logit_is_no_probability_but_rounding_is_forgiven() {
 }
 
 #[test]
-fn a_product_below_the_floor_is_dropped_though_both_factors_reach_it() {
+fn a_product_below_the_floor_is_dropped() {
     let floor = Floor::new(0.5);
     let half_way = Score::Kept(0.6);
     assert_eq!(half_way.times(floor, || half_way), Score::Below);
@@ -76,7 +76,7 @@ fn plain_softmax(logits: &[f32], class: usize) -> f64 {
     exponentials[class] / exponentials.iter().sum::<f64>()
 }
 
-/// Judged by the formula alone, without the short cuts.
+/// Computed by the formula alone, without the short cuts.
 fn plainly(score: f64, floor: f64) -> Option<f64> {
     (score >= floor).then_some(score)
 }
@@ -95,7 +95,7 @@ proptest! {
         nudge in -3_i32..4,
         offset in -1e-3_f64..1e-3,
     ) {
-        // Floors all around the score itself, down to single roundings.
+        // Floors close to the score itself, down to single roundings.
         let score = sigmoid(f64::from(logit));
         let near = (0..nudge.abs()).fold(score, |s, _| if nudge > 0 { s.next_up() } else { s.next_down() });
         for floor in [near, near + offset, 0.0, 1.0] {
@@ -109,7 +109,7 @@ proptest! {
         floor in 0.0_f64..1.0,
     ) {
         let score = plain_softmax(&logits, 0);
-        // Where rounding decides, either answer is right.
+        // Where rounding decides, either result is correct.
         prop_assume!((score - floor).abs() > 1e-12);
         let found = kept(Floor::new(floor).softmax(&logits, 0));
         prop_assert_eq!(found.is_some(), plainly(score, floor).is_some());

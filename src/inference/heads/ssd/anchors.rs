@@ -1,4 +1,4 @@
-//! SSD's anchors, generated from a handful of parameters.
+//! SSD's anchors, generated from a few parameters.
 
 use std::num::NonZeroU32;
 
@@ -9,15 +9,15 @@ use crate::inference::heads::{
     shape::{Batch, check_positive},
 };
 
-/// No anchor grid of a real model comes near this many anchors.
+/// Far more than the anchors of any real model.
 const MAX_ANCHORS: usize = 1 << 20;
 
 /// The parameters of `ssd_anchor_generator` in the TensorFlow object detection API, with its
 /// defaults (`multiple_grid_anchor_generator.py`, `create_ssd_anchors`).
 ///
-/// Layer `i` of `n` has the scale `s_i = min + (max - min) i / (n - 1)`, and `s_n = 1`. An
-/// anchor of scale `s` and aspect ratio `a` is `s √a` wide and `s / √a` high, in units of the
-/// view's shorter side, around the middle of every cell.
+/// Layer `i` of `n` has the scale `s_i = min + (max - min) i / (n - 1)`, and `s_n = 1`. An anchor
+/// of scale `s` and aspect ratio `a` is `s √a` wide and `s / √a` high, in units of the view's
+/// shorter side. Anchors are centred in every cell.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnchorGenerator {
@@ -27,11 +27,11 @@ pub struct AnchorGenerator {
     pub min_scale: f64,
     /// Scale of the last layer.
     pub max_scale: f64,
-    /// Width by height, each.
+    /// Ratios of width to height.
     pub aspect_ratios: Vec<f64>,
-    /// Gives the first layer three anchors only: scale 0.1 at aspect 1, `s_0` at 2 and at 1/2.
+    /// Restricts the first layer to three anchors: scale 0.1 at aspect 1, `s_0` at 2 and at 1/2.
     pub reduce_boxes_in_lowest_layer: bool,
-    /// Aspect of one more anchor per layer, of scale `√(s_i s_(i+1))`; 0 for none.
+    /// Aspect ratio of one more anchor per layer, with the scale `√(s_i s_(i+1))`. 0 for none.
     pub interpolated_scale_aspect_ratio: f64,
 }
 
@@ -49,8 +49,8 @@ impl Default for AnchorGenerator {
 }
 
 impl AnchorGenerator {
-    /// The anchors `c_y, c_x, h, w`, pixels, in the order of the network's candidates: layer by
-    /// layer, row by row, cell by cell.
+    /// Generates the anchors `c_y, c_x, h, w`, in pixels, in the order of the network's candidates:
+    /// layer by layer, row by row, cell by cell.
     pub(super) fn generate(&self, batch: &Batch) -> Result<Vec<[f64; 4]>, String> {
         check_positive("anchor_generator", &self.aspect_ratios)?;
         check_positive("anchor_generator", &[self.min_scale, self.max_scale])?;

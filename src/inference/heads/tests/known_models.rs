@@ -1,9 +1,9 @@
-//! Manifests of well-known models against the shapes these models are known to have.
+//! Manifests of well-known models with the output shapes of these models.
 
 use super::head;
 use crate::inference::heads::OutputShape;
 
-/// The manifest's head accepts the outputs.
+/// Asserts that the manifest's head accepts the outputs.
 fn fits(manifest: &str, side: u32, outputs: &[(&str, &[i64])]) {
     let outputs: Vec<OutputShape<'_>> = outputs
         .iter()
@@ -90,7 +90,7 @@ fn centernets_fit() {
 }
 
 #[test]
-fn graphs_with_suppression_inside_fit() {
+fn graphs_that_include_suppression_fit() {
     fits(
         "head = 'end_to_end'\nperson_class = 0",
         640,

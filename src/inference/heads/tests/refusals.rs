@@ -1,4 +1,4 @@
-//! Models and manifests that do not fit, and what is said about them.
+//! Models and manifests that do not fit, and their error messages.
 
 use super::{decode, head};
 use crate::inference::heads::{Head, OutputShape};
@@ -35,7 +35,7 @@ fn outputs_that_disagree_with_one_another_are_refused() {
 }
 
 #[test]
-fn a_missing_output_is_named_with_those_there_are() {
+fn a_missing_output_is_named_with_the_existing_outputs() {
     let outputs: [(&str, &[i64]); 2] = [("a", &[1, 2, 4]), ("b", &[1, 2])];
     let sentence = refusal("head = 'boxes_scores'\nboxes = 'a'", &outputs);
     assert_eq!(
@@ -43,11 +43,11 @@ fn a_missing_output_is_named_with_those_there_are() {
         "it has no output \"scores\", only \"a\", \"b\"; name the right one in the manifest's \
          [output]"
     );
-    assert!(refusal(YOLOX, &outputs).contains("say which one to read with `name`"));
+    assert!(refusal(YOLOX, &outputs).contains("select one with `name`"));
 }
 
 #[test]
-fn boxes_and_scores_that_shapes_do_not_tell_apart_have_to_be_named() {
+fn ambiguous_boxes_and_scores_must_be_named() {
     let outputs: [(&str, &[i64]); 2] = [("dets", &[1, 300, 4]), ("labels", &[1, 300, 4])];
     let detr = "head = 'detr'\nperson_class = 0";
     for ambiguous in [
@@ -64,7 +64,7 @@ fn boxes_and_scores_that_shapes_do_not_tell_apart_have_to_be_named() {
             ("hidden", &[1, 300, 256]),
         ],
     ] {
-        assert!(refusal(detr, ambiguous).contains("cannot be told by shape"));
+        assert!(refusal(detr, ambiguous).contains("cannot be distinguished by shape"));
     }
     let named = head(&format!("{detr}\nboxes = 'dets'\nscores = 'labels'"));
     let declared = outputs.map(|(name, shape)| OutputShape { name, shape });
@@ -72,7 +72,7 @@ fn boxes_and_scores_that_shapes_do_not_tell_apart_have_to_be_named() {
 }
 
 #[test]
-fn a_map_that_does_not_divide_the_input_or_the_anchors_is_refused() {
+fn a_map_that_does_not_divide_the_input_is_refused() {
     let yolo = "head = 'yolo_v2'\nperson_class = 0\nanchors = [[1, 1], [2, 2]]";
     for shape in [[1, 12, 10, 19], [1, 12, 9, 20], [1, 13, 10, 20]] {
         assert_eq!(
@@ -87,13 +87,13 @@ fn a_map_that_does_not_divide_the_input_or_the_anchors_is_refused() {
 }
 
 #[test]
-fn seven_columns_have_to_be_listed() {
+fn seven_columns_must_be_listed() {
     let sentence = refusal(
         "head = 'end_to_end'\nperson_class = 0",
         &[("output", &[-1, 100, 7])],
     );
     assert!(
-        sentence.contains("has rows of 7; list what they hold"),
+        sentence.contains("has rows of 7; list their content"),
         "{sentence}"
     );
 }
@@ -106,11 +106,11 @@ fn a_manifest_that_contradicts_itself_is_refused() {
         (&*format!("{YOLO_V3}masks = [[1]]"), "names anchor 1"),
         (
             "head = 'yolo_v2'\nperson_class = 0\nanchors = [[1, -1]]",
-            "`anchors` in the manifest's [output] holds -1",
+            "`anchors` in the manifest's [output] contains -1",
         ),
         (
             "head = 'ssd'\nperson_class = 0\nanchors = []\nanchor_generator = {}",
-            "leave one out",
+            "remove one",
         ),
         (
             "head = 'ssd'\nperson_class = 0\nanchor_generator = { aspect_ratios = [nan] }",
@@ -145,7 +145,7 @@ fn unknown_heads_and_fields_are_refused() {
 }
 
 #[test]
-fn logits_taken_for_scores_are_refused_with_the_remedy() {
+fn logits_declared_as_scores_are_refused_with_the_remedy() {
     let values = [0.0, 0.0, 0.0, 0.0, 1.0, 3.5];
     let yolox = head("head = 'yolox'\nperson_class = 0\nstrides = [100]");
     let error = decode(&yolox, &[("output", &[1, 1, 6], &values)], 0.5).unwrap_err();
@@ -155,7 +155,7 @@ fn logits_taken_for_scores_are_refused_with_the_remedy() {
 }
 
 #[test]
-fn values_that_do_not_fill_their_shape_are_refused() {
+fn values_that_do_not_match_their_shape_are_refused() {
     for shape in [&[1, 1, 7][..], &[usize::MAX, 2, 6]] {
         let error = decode(&head(YOLOX), &[("output", shape, &[0.0; 6])], 0.5).unwrap_err();
         assert!(error.to_string().contains("6 values for the shape"));

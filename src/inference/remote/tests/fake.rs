@@ -1,4 +1,4 @@
-//! A server of the Open Inference Protocol with one model, which answers as it is told.
+//! A fake server of the Open Inference Protocol with one model and scripted responses.
 
 use std::{
     collections::VecDeque,
@@ -9,7 +9,7 @@ use std::{
 
 use serde_json::{Value, json};
 
-/// A server on a port of this machine.
+/// A server on a local port.
 pub(super) struct FakeServer {
     address: SocketAddr,
     state: Arc<Mutex<State>>,
@@ -19,33 +19,33 @@ struct State {
     as_bytes: bool,
     first_axis: i64,
     is_ready: bool,
-    /// What everything is answered, instead of as asked.
+    /// Status of every response, instead of the regular response.
     refusal: Option<u16>,
     has_ended: bool,
-    /// What the next requests to infer are answered, instead of as asked.
-    told: VecDeque<Told>,
+    /// Scripted responses to the next inference requests.
+    replies: VecDeque<ScriptedReply>,
     inferred: Vec<Inferred>,
-    /// Of every request, in lower case.
+    /// `Authorization` header of every request, in lower case.
     authorizations: Vec<Option<String>>,
 }
 
-/// A request to infer that came.
+/// A received inference request.
 #[derive(Clone)]
 pub(super) struct Inferred {
     pub(super) path: String,
     pub(super) head_length: Option<usize>,
 }
 
-/// An answer; without a status the connection is closed.
+/// A response. Without a status the connection is closed.
 #[derive(Default)]
-pub(super) struct Told {
+pub(super) struct ScriptedReply {
     status: Option<u16>,
     headers: String,
     body: Vec<u8>,
-    slowly: bool,
+    is_slow: bool,
 }
 
-impl Told {
+impl ScriptedReply {
     pub(super) fn status(status: u16) -> Self {
         Self {
             status: Some(status),
@@ -53,13 +53,13 @@ impl Told {
         }
     }
 
-    pub(super) fn nothing() -> Self {
+    pub(super) fn closed() -> Self {
         Self::default()
     }
 
-    pub(super) fn slowly() -> Self {
+    pub(super) fn slow() -> Self {
         Self {
-            slowly: true,
+            is_slow: true,
             ..Self::status(200)
         }
     }
@@ -78,7 +78,8 @@ impl Told {
 }
 
 impl FakeServer {
-    /// A model of views of 32×32 pixels that sees the same person in each; `first_axis` is its batch.
+    /// Starts a server whose model returns the same person for each view of 32×32 pixels.
+    /// `first_axis` is the model's batch axis.
     pub(super) fn start(as_bytes: bool, first_axis: i64) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
@@ -88,7 +89,7 @@ impl FakeServer {
             is_ready: true,
             refusal: None,
             has_ended: false,
-            told: VecDeque::new(),
+            replies: VecDeque::new(),
             inferred: Vec::new(),
             authorizations: Vec::new(),
         }));
@@ -117,8 +118,8 @@ impl FakeServer {
         format!("http://{}", self.address)
     }
 
-    pub(super) fn tell(&self, told: Told) {
-        self.state.lock().unwrap().told.push_back(told);
+    pub(super) fn queue(&self, reply: ScriptedReply) {
+        self.state.lock().unwrap().replies.push_back(reply);
     }
 
     pub(super) fn be_ready(&self, is_ready: bool) {
@@ -137,10 +138,10 @@ impl FakeServer {
         self.state.lock().unwrap().authorizations.clone()
     }
 
-    /// Listens no more.
+    /// Stops listening.
     pub(super) fn end(&self) {
         self.state.lock().unwrap().has_ended = true;
-        // Wakes the listener, which then goes.
+        // Wakes the listener so that it ends.
         drop(TcpStream::connect(self.address));
         while TcpStream::connect(self.address).is_ok() {}
     }
@@ -152,7 +153,7 @@ impl Drop for FakeServer {
     }
 }
 
-/// Answers what comes over a connection.
+/// Serves the requests of a connection.
 fn serve(stream: &TcpStream, state: &Mutex<State>) {
     let mut reader = BufReader::new(stream);
     loop {
@@ -177,29 +178,29 @@ fn serve(stream: &TcpStream, state: &Mutex<State>) {
         let mut body = vec![0; number("content-length:").unwrap_or(0)];
         reader.read_exact(&mut body).unwrap();
         let path = lines[0].split(' ').nth(1).unwrap().to_owned();
-        let told = answer(
+        let reply = answer(
             &path,
             &body,
             number("inference-header-content-length:"),
             state,
         );
-        if told.slowly {
-            // Until the client has had enough.
+        if reply.is_slow {
+            // Waits until the client closes the connection.
             let _ = reader.read_to_end(&mut Vec::new());
             return;
         }
-        let Some(status) = told.status else {
+        let Some(status) = reply.status else {
             stream.shutdown(Shutdown::Both).unwrap();
             return;
         };
-        let length = told.body.len();
+        let length = reply.body.len();
         let head = format!(
             "HTTP/1.1 {status} X\r\nContent-Length: {length}\r\n{}\r\n",
-            told.headers
+            reply.headers
         );
         let mut stream = stream;
         if stream
-            .write_all(&[head.as_bytes(), &told.body].concat())
+            .write_all(&[head.as_bytes(), &reply.body].concat())
             .is_err()
         {
             return;
@@ -207,11 +208,16 @@ fn serve(stream: &TcpStream, state: &Mutex<State>) {
     }
 }
 
-fn answer(path: &str, body: &[u8], head_length: Option<usize>, state: &Mutex<State>) -> Told {
+fn answer(
+    path: &str,
+    body: &[u8],
+    head_length: Option<usize>,
+    state: &Mutex<State>,
+) -> ScriptedReply {
     let mut state = state.lock().unwrap();
-    let json = |value: &Value| Told::status(200).body(value.to_string());
+    let json = |value: &Value| ScriptedReply::status(200).body(value.to_string());
     if let Some(status) = state.refusal {
-        return Told::status(status);
+        return ScriptedReply::status(status);
     }
     match path {
         "/v2" => json(
@@ -226,27 +232,27 @@ fn answer(path: &str, body: &[u8], head_length: Option<usize>, state: &Mutex<Sta
                 { "name": "ids", "datatype": "INT64", "shape": [-1, 1] }
             ]
         })),
-        "/v2/models/there/ready" => Told::status(if state.is_ready { 200 } else { 400 }),
+        "/v2/models/there/ready" => ScriptedReply::status(if state.is_ready { 200 } else { 400 }),
         _ => {
             state.inferred.push(Inferred {
                 path: path.to_owned(),
                 head_length,
             });
-            let told = state.told.pop_front();
-            told.unwrap_or_else(|| found(body, head_length))
+            let reply = state.replies.pop_front();
+            reply.unwrap_or_else(|| found(body, head_length))
         }
     }
 }
 
-/// The same person in each view, as bytes if the views came so.
-fn found(body: &[u8], head_length: Option<usize>) -> Told {
+/// A response with the same person in each view, as bytes if the views were sent as bytes.
+fn found(body: &[u8], head_length: Option<usize>) -> ScriptedReply {
     let (head, behind) = body.split_at(head_length.unwrap_or(body.len()));
     let head: Value = serde_json::from_slice(head).unwrap();
     let input = &head["inputs"][0];
     let views = usize::try_from(input["shape"][0].as_u64().unwrap()).unwrap();
     let values = views * 3 * 32 * 32;
     let sent = input["data"].as_array().map_or(behind.len() / 4, Vec::len);
-    assert_eq!(sent, values, "as many values as the shape says");
+    assert_eq!(sent, values, "as many values as the shape declares");
     let boxes = [1.0_f32, 2.0, 3.0, 4.0].repeat(views);
     let scores = [0.5_f32].repeat(views);
     let output = |name: &str, shape: Value, values: &[f32]| match head_length {
@@ -258,17 +264,17 @@ fn found(body: &[u8], head_length: Option<usize>) -> Told {
         output("boxes", json!([views, 1, 4]), &boxes),
         output("scores", json!([views, 1]), &scores),
     ];
-    let told = json!({ "model_name": "there", "outputs": outputs }).to_string();
+    let reply = json!({ "model_name": "there", "outputs": outputs }).to_string();
     if head_length.is_none() {
-        return Told::status(200).body(told);
+        return ScriptedReply::status(200).body(reply);
     }
     let bytes = boxes
         .iter()
         .chain(&scores)
         .flat_map(|value| value.to_le_bytes());
-    let length = told.len().to_string();
-    let body: Vec<_> = told.bytes().chain(bytes).collect();
-    Told::status(200)
+    let length = reply.len().to_string();
+    let body: Vec<_> = reply.bytes().chain(bytes).collect();
+    ScriptedReply::status(200)
         .header("Inference-Header-Content-Length", &length)
         .body(body)
 }

@@ -53,7 +53,7 @@ fn one(camera: &str) -> Cameras {
 }
 
 #[test]
-fn a_camera_keeps_its_last_reports_and_no_more() {
+fn a_camera_keeps_only_its_last_reports() {
     let mut kept = kept([10, 3, 100, 1 << 20]);
     let given: Vec<_> = (0..5).map(|_| add(&mut kept, "lobby", 1)).collect();
     let start = ReportId::default();
@@ -65,7 +65,7 @@ fn a_camera_keeps_its_last_reports_and_no_more() {
 }
 
 #[test]
-fn all_cameras_are_told_in_the_order_in_which_their_reports_came_and_page_by_page() {
+fn reports_of_all_cameras_are_paged_in_arrival_order() {
     let mut kept = kept(ROOMY);
     let cameras = ["a", "b", "a", "c", "b", "a"];
     let given = cameras.map(|camera| add(&mut kept, camera, 1));
@@ -83,7 +83,7 @@ fn all_cameras_are_told_in_the_order_in_which_their_reports_came_and_page_by_pag
 }
 
 #[test]
-fn of_too_many_cameras_the_one_goes_that_was_silent_for_longest() {
+fn the_longest_silent_camera_is_evicted_first() {
     let mut kept = kept([2, 10, 100, 1 << 20]);
     for camera in ["a", "a", "b", "a", "c"] {
         add(&mut kept, camera, 1);
@@ -94,7 +94,7 @@ fn of_too_many_cameras_the_one_goes_that_was_silent_for_longest() {
 }
 
 #[test]
-fn what_a_busy_camera_sends_does_not_cost_a_silent_one_its_latest_report() {
+fn a_busy_camera_does_not_evict_the_latest_report_of_another() {
     for limits in [[10, 100, 4, 1 << 20], [10, 100, 100, 3000]] {
         let mut kept = kept(limits);
         let silent = add(&mut kept, "silent", 100);
@@ -107,7 +107,7 @@ fn what_a_busy_camera_sends_does_not_cost_a_silent_one_its_latest_report() {
 }
 
 #[test]
-fn a_report_larger_than_all_room_is_not_kept_and_nothing_else_either() {
+fn a_report_above_the_byte_limit_evicts_everything() {
     let mut kept = kept([10, 10, 10, 1000]);
     add(&mut kept, "a", 100);
     add(&mut kept, "b", 5000);
@@ -116,14 +116,14 @@ fn a_report_larger_than_all_room_is_not_kept_and_nothing_else_either() {
 }
 
 #[test]
-fn a_camera_has_the_picture_of_its_latest_report_or_none() {
+fn a_camera_has_the_image_of_its_latest_report_or_none() {
     let mut kept = kept([2, 1, 100, 1 << 20]);
     add_with_picture(&mut kept, "a");
     let id = add_with_picture(&mut kept, "a");
     assert_eq!(kept.picture("a").unwrap().id, id);
     add(&mut kept, "a", 1);
     assert!(kept.picture("a").is_none());
-    // With its camera, its picture goes.
+    // The image is evicted with its camera.
     add_with_picture(&mut kept, "a");
     add(&mut kept, "b", 1);
     add(&mut kept, "c", 1);
@@ -132,7 +132,7 @@ fn a_camera_has_the_picture_of_its_latest_report_or_none() {
 }
 
 #[test]
-fn of_too_many_pictures_the_oldest_goes() {
+fn the_oldest_image_is_evicted_first() {
     let mut kept = kept(ROOMY);
     for camera in ["a", "b", "a", "c"] {
         add_with_picture(&mut kept, camera);
@@ -143,7 +143,7 @@ fn of_too_many_pictures_the_oldest_goes() {
 
 proptest! {
     #[test]
-    fn no_limit_is_passed_and_the_books_balance_whatever_comes(
+    fn limits_and_counts_hold_for_any_sequence_of_reports(
         limits in [1_usize..6, 1_usize..6, 1_usize..20, 200_usize..4000],
         reports in prop::collection::vec((0_u8..8, 0_usize..600), 1..80),
     ) {
