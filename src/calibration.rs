@@ -3,7 +3,6 @@
 mod areas;
 mod calibrated_camera;
 mod calibrations;
-mod doubts;
 mod error;
 pub mod export;
 mod file;
@@ -12,6 +11,7 @@ mod id;
 pub mod native;
 mod plausibility;
 mod store;
+mod warnings;
 
 pub use areas::Areas;
 pub use calibrated_camera::{Calibration, CameraGeometry, FrameSizeMismatch};

@@ -47,7 +47,7 @@ impl From<&CalibrationEntry> for CalibrationInfo {
         let calibration = &entry.calibration;
         let (width, height) = calibration.image_size();
         let mut warnings = entry.notes.clone();
-        warnings.extend(calibration.doubts());
+        warnings.extend(calibration.warnings());
         Self {
             id: calibration.id().to_string(),
             revision: Some(calibration.revision().to_owned()),

@@ -20,7 +20,7 @@ pub struct CalibrationEntry {
     pub calibration: Arc<Calibration>,
     /// The same in the native format, whatever format its file has.
     pub native: NativeCalibration,
-    /// What had to be assumed to read it, a sentence each.
+    /// Assumptions made while reading it, one sentence each.
     pub notes: Vec<String>,
     /// The name of its file in the store.
     pub file: String,
@@ -84,12 +84,12 @@ impl CalibrationEntry {
     }
 }
 
-/// How an uploaded file is to be read.
+/// The options for reading an uploaded file.
 #[derive(Debug, Clone, Default)]
 pub struct Reading {
-    /// Which camera of the file is meant, by its name there, if there are several.
+    /// The camera of the file that is meant, by its name there, if there are several.
     pub camera: Option<String>,
-    /// The size of the frames, for formats that do not tell it.
+    /// The size of the frames, for formats that do not have it.
     pub size: Option<NativeImage>,
 }
 

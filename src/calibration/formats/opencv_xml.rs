@@ -3,7 +3,7 @@
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::{Map, Number, Value};
 
-/// Reads a file into a tree; refuses deeper or larger ones than told.
+/// Reads a file into a tree; refuses deeper or larger ones than given.
 pub(super) fn parse(text: &str, max_depth: usize, max_nodes: usize) -> Result<Value, String> {
     let options = ParsingOptions {
         nodes_limit: u32::try_from(max_nodes).unwrap_or(u32::MAX),

@@ -118,7 +118,7 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
     lines.extend(notes.map(|note| ("  note", note)));
     lines.extend(
         calibration
-            .doubts()
+            .warnings()
             .into_iter()
             .map(|doubt| ("  doubt", doubt)),
     );

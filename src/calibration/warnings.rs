@@ -1,4 +1,4 @@
-//! What is odd about a calibration that can be used all the same.
+//! Warnings about calibrations that are implausible and yet usable.
 
 use super::Calibration;
 use crate::geometry::{Lens, Ray};
@@ -13,27 +13,27 @@ const NARROW: f64 = 1.0;
 const NEAR_AXIS: f64 = 0.01;
 
 impl Calibration {
-    /// What is odd, a sentence each: the field, its value, and what it usually means.
+    /// Returns one sentence for each implausible fact: the field, its value and the usual cause.
     #[must_use]
-    pub fn doubts(&self) -> Vec<String> {
+    pub fn warnings(&self) -> Vec<String> {
         let lens = self.lens();
-        let mut doubts = self.off_centre();
+        let mut warnings = self.off_centre();
         if let Some((across, down)) = scales_at_axis(lens)
             && (across / down - 1.0).abs() > SQUARE_PIXELS
         {
-            doubts.push(format!(
+            warnings.push(format!(
                 "the lens has {across:.1} pixels per radian across and {down:.1} down at its axis: \
                  frames are rarely squeezed, check the focal lengths and the frame size"
             ));
         }
         if lens.max_theta() < NARROW {
-            doubts.push(format!(
+            warnings.push(format!(
                 "the lens sees only {:.0}°: for a fisheye of a ceiling camera 160° to 220° are \
                  usual, check the model and its coefficients",
                 2.0 * lens.max_theta().to_degrees()
             ));
         }
-        doubts
+        warnings
     }
 
     fn off_centre(&self) -> Vec<String> {
@@ -74,7 +74,7 @@ fn scales_at_axis(lens: &Lens) -> Option<(f64, f64)> {
 mod tests {
     use crate::calibration::CalibrationFile;
 
-    fn doubts(cx: f64, cy: f64, fx: f64, max_theta: f64) -> Vec<String> {
+    fn warnings(cx: f64, cy: f64, fx: f64, max_theta: f64) -> Vec<String> {
         let content = format!(
             r#"{{"id":"hall","image":{{"width":1000,"height":600}},"lens":{{"model":"equidistant",
                 "fx":{fx},"fy":300,"cx":{cx},"cy":{cy},"max_theta":{max_theta}}}}}"#
@@ -82,34 +82,34 @@ mod tests {
         let file = CalibrationFile::parse(content.as_bytes()).expect("a whole file");
         let mut cameras = file.calibrations("hall", content.as_bytes());
         let (_, calibration) = cameras.remove(0);
-        calibration.expect("a plausible camera").doubts()
+        calibration.expect("a plausible camera").warnings()
     }
 
     #[test]
-    fn an_ordinary_camera_raises_no_doubt() {
-        assert!(doubts(498.0, 303.0, 301.0, 1.6).is_empty());
+    fn plausible_camera_has_no_warnings() {
+        assert!(warnings(498.0, 303.0, 301.0, 1.6).is_empty());
     }
 
     #[test]
-    fn each_oddity_is_told_with_its_value() {
-        for (doubts, expected) in [
+    fn each_warning_names_its_value() {
+        for (warnings, expected) in [
             (
-                doubts(299.5, 499.5, 300.0, 1.6),
+                warnings(299.5, 499.5, 300.0, 1.6),
                 "cx, cy is 299.5, 499.5, far from the middle of the frame (499.5, 299.5): perhaps \
                  row and column are swapped",
             ),
             (
-                doubts(299.5, 299.5, 300.0, 1.6),
+                warnings(299.5, 299.5, 300.0, 1.6),
                 "perhaps the frame size is not the one",
             ),
             (
-                doubts(499.5, 299.5, 400.0, 1.6),
+                warnings(499.5, 299.5, 400.0, 1.6),
                 "400.0 pixels per radian across and 300.0 down",
             ),
-            (doubts(499.5, 299.5, 300.0, 0.5), "the lens sees only 57°"),
+            (warnings(499.5, 299.5, 300.0, 0.5), "the lens sees only 57°"),
         ] {
-            assert_eq!(doubts.len(), 1, "{doubts:?}");
-            assert!(doubts[0].contains(expected), "{doubts:?}");
+            assert_eq!(warnings.len(), 1, "{warnings:?}");
+            assert!(warnings[0].contains(expected), "{warnings:?}");
         }
     }
 }
