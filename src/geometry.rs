@@ -8,12 +8,12 @@
 
 pub mod floor;
 pub mod footprint;
+pub mod height_ratio;
 pub mod lens;
 pub mod mount;
 pub mod oriented_box;
 pub mod pixels;
 pub mod polygon;
-pub mod stature;
 pub mod view_plan;
 pub mod virtual_view;
 pub mod zone;

@@ -6,8 +6,8 @@ use nalgebra::Vector2;
 
 use super::{
     Lens, Mount, Pixel, Ray, VirtualView,
+    height_ratio::Extremities,
     pixels::{PixelConvention, cross_half_pixel},
-    stature::Extremities,
 };
 
 /// Points on an inscribed ellipse: more change the hull by less than 0.2 % of its size.
@@ -25,12 +25,12 @@ static ELLIPSE_ANGLES: LazyLock<[(f64, f64); ELLIPSE_POINTS]> = LazyLock::new(||
 const MIN_TILT_DETERMINANT: f64 = 0.18;
 /// A tilted ellipse thinner than this (ratio of squared axes) is not a person.
 const MIN_SQUARED_AXIS_RATIO: f64 = 0.04;
-/// Of every so many outline points the ray is kept.
+/// The ray of one in this many outline points is kept.
 const RAY_STRIDE: usize = 4;
 /// A box of which less than this share of the outline lies in the lens image is not mapped.
 const MIN_INSIDE_SHARE: f64 = 0.5;
 
-/// How a box is taken back to the frame.
+/// The method by which a box is taken back to the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BackProjection {
     /// The axis-parallel hull of the four mapped corners: the paper's way, oversized at oblique

@@ -27,7 +27,7 @@ pub struct OrientedBox {
 
 impl OrientedBox {
     /// The box of these extents whose height axis is turned clockwise from image up by `angle`,
-    /// radians; its head is at the upper end, as an axis alone does not tell.
+    /// radians; its head is at the upper end, which the axis alone leaves open.
     #[must_use]
     pub fn turned(center: Pixel, width: f64, height: f64, angle: f64) -> Self {
         Self {

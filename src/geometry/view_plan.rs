@@ -8,8 +8,8 @@ pub use coverage::Coverage;
 
 use super::{Mount, VirtualView, virtual_view::ViewDirection};
 
-/// How the paper's field of view is read (Seidel et al., section III; their formula for the field
-/// of view contradicts its own symbols, so three readings exist).
+/// The reading of the paper's field of view (Seidel et al., section III; their formula for the
+/// field of view contradicts its own symbols, so three readings exist).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FieldOfViewReading {
@@ -41,7 +41,7 @@ impl FieldOfViewReading {
 pub struct Ring {
     /// Angle from the plan's axis, radians.
     pub elevation: f64,
-    /// How many views.
+    /// The number of views.
     pub count: u32,
     /// Full horizontal opening angle of each, radians.
     pub field_of_view: f64,

@@ -66,15 +66,15 @@ impl Mapped {
     /// should have seen that person counted.
     fn weighed(&self, looks: &[Look], rig: &CameraRig) -> Candidate {
         let mount = &rig.geometry().mount;
-        let stature = self
+        let height_ratio = self
             .footprint
             .extremities()
-            .and_then(|extremities| extremities.stature(mount));
+            .and_then(|extremities| extremities.height_ratio(mount));
         let holding = views_holding(looks, self.footprint.rays());
         #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
         let expected_views = holding.max(1) as f64;
         Candidate {
-            score: self.candidate.score * worth(self.cut_off, stature, mount),
+            score: self.candidate.score * worth(self.cut_off, height_ratio, mount),
             expected_views,
             ..self.candidate
         }

@@ -3,7 +3,6 @@ use serde_json::json;
 use super::*;
 use crate::detection::Refinement;
 use crate::pipeline::Profile;
-use crate::pipeline::Profile;
 
 /// Two images, 7 and 8.
 fn data_set() -> (tempfile::TempDir, DataSet) {

@@ -13,7 +13,7 @@ fn the_height_axis_of_a_ceiling_camera_points_outward() {
 }
 
 #[test]
-fn angles_run_clockwise_from_image_up_and_forget_the_sign_of_the_axis() {
+fn angles_run_clockwise_from_up_and_ignore_the_axis_sign() {
     for (up, angle) in [
         ((0.0, -1.0), 0.0),
         ((1.0, 0.0), FRAC_PI_2),

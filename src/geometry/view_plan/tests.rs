@@ -13,7 +13,7 @@ fn the_paper_plan_has_four_rings_of_thirty_two_views() {
 }
 
 #[test]
-fn the_three_readings_of_the_field_of_view_are_53_39_and_90_degrees() {
+fn readings_of_the_field_of_view_are_53_39_and_90_degrees() {
     let degrees = |reading: FieldOfViewReading| reading.radians().to_degrees();
     assert!((degrees(FieldOfViewReading::Horizontal) - 53.1301).abs() < 1e-4);
     assert!((degrees(FieldOfViewReading::Diagonal) - 38.9424).abs() < 1e-4);
