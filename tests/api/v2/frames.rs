@@ -109,7 +109,7 @@ async fn parameters_of_detect_are_parameters_of_the_request() {
             json!({ "score_threshold": 1.5 }),
             422,
             "invalid-parameter",
-            "score_threshold: 1.5",
+            "score_threshold: \"1.5\" is not a number from 0 to 1",
         ),
         (
             json!({ "score_threshold": "0.5" }),
