@@ -55,11 +55,11 @@ def _calibration(address: str, file: Path) -> Row:
         if kind == "one byte changed":
             continue  # white space
         file.write_bytes(damage)
-        row.require(_becomes_true(lambda: _is_reported_invalid(address)), f"{kind}: /readyz does not report it")
+        row.require(_becomes(lambda: _is_reported_invalid(address)), f"{kind}: /readyz does not report it")
         row.require(_revision(address) == revision, f"{kind}: another calibration is served")
         row.require(_detects(address), f"{kind}: frames are refused")
         file.write_bytes(whole)
-        row.require(_becomes_true(lambda: not _is_reported_invalid(address)), f"{kind}: the valid file is not loaded")
+        row.require(_becomes(lambda: not _is_reported_invalid(address)), f"{kind}: the valid file is not loaded")
     row.done = row.done.replace(str(len(damages(whole))), str(len(damages(whole)) - 1))
     row.seen = "the old revision was served throughout, /readyz reported each damage, the valid file was loaded again"
     return row
@@ -77,17 +77,17 @@ def _model(address: str, folder: Path) -> Row:
             failures = _failed_loads(address)
             file.write_bytes(damage)
             row.require(
-                _becomes_true(lambda before=failures: _failed_loads(address) > before), f"{file.name} {kind}: not noticed"
+                _becomes(lambda before=failures: _failed_loads(address) > before), f"{file.name} {kind}: not noticed"
             )
             row.require(_model_revision(address) == revision, f"{file.name} {kind}: another model answers")
             file.write_bytes(good)
     manifest.write_text(MANIFEST + "[input]\nscale = [0.5, 0.5, 0.5]\n", encoding="utf-8")
-    row.require(_becomes_true(lambda: _model_revision(address) != revision), "a new valid model is not loaded")
+    row.require(_becomes(lambda: _model_revision(address) != revision), "a new valid model is not loaded")
     row.seen = "the old revision answered throughout, each damage was counted, a new valid model was loaded"
     return row
 
 
-def _becomes_true(holds: Callable[[], bool]) -> bool:
+def _becomes(holds: Callable[[], bool]) -> bool:
     """Returns true if the condition becomes true in time."""
     deadline = time.monotonic() + PATIENCE_SECONDS
     while time.monotonic() < deadline:
