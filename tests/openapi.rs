@@ -1,5 +1,5 @@
-//! The checked-in API description, and what it promises.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! The checked-in OpenAPI document and its properties.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::{collections::BTreeSet, fs};
 
@@ -23,17 +23,17 @@ fn operations(document: &Value) -> Vec<(String, Value)> {
 }
 
 #[test]
-fn the_checked_in_document_is_that_of_the_code() {
+fn the_checked_in_document_matches_the_code() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");
     let checked_in: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     assert!(
         checked_in == document(),
-        "run `make bless` and look at the difference"
+        "run `make bless` and review the difference"
     );
 }
 
 #[test]
-fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
+fn every_operation_has_name_summary_tag_and_responses() {
     let document = document();
     let mut names = BTreeSet::new();
     for (path, operation) in operations(&document) {
@@ -42,7 +42,7 @@ fn every_operation_has_a_name_a_summary_a_tag_and_its_own_responses() {
             name.contains('_'),
             "{path}: {name} is not <verb>_<resource>"
         );
-        assert!(names.insert(name.to_owned()), "{name} is there twice");
+        assert!(names.insert(name.to_owned()), "{name} is not unique");
         assert!(operation["summary"].is_string(), "{path} has no summary");
         assert!(operation["tags"][0].is_string(), "{path} has no tag");
         let statuses = operation["responses"].as_object().unwrap();
@@ -107,17 +107,14 @@ fn detection_describes_every_status_and_every_parameter() {
     }
     let answers = detect["responses"]["200"]["content"].as_object().unwrap();
     for media_type in ["application/json", "image/jpeg", "image/png"] {
-        assert!(
-            answers.contains_key(media_type),
-            "{media_type} is not answered"
-        );
+        assert!(answers.contains_key(media_type), "{media_type} is missing");
     }
     let report = &answers["application/json"]["schema"]["$ref"];
     assert_eq!(report, "#/components/schemas/Report");
 }
 
 #[test]
-fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
+fn each_body_has_a_schema_and_no_parameter_has_a_default() {
     let document = document();
     for (path, operation) in operations(&document) {
         let bodies = operation["requestBody"]["content"].as_object();
@@ -125,7 +122,7 @@ fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
             assert!(body["schema"].is_object(), "{path} {media_type}");
         }
     }
-    // What has a default is sent by itself, in the query and in the form.
+    // Generated clients send a parameter with a default on their own, in the query and in the form.
     let query = &document["paths"]["/detect"]["post"]["parameters"];
     let form = &document["components"]["schemas"]["DetectForm"];
     for described in [query, form] {
@@ -137,7 +134,7 @@ fn generated_clients_find_a_schema_in_each_body_and_send_no_parameter_twice() {
 }
 
 #[test]
-fn choices_are_described_with_their_names() {
+fn choices_list_their_names() {
     let document = document();
     let parameters = &document["paths"]["/detect"]["post"]["parameters"];
     let schema = |name: &str| {
