@@ -53,7 +53,8 @@ mod tests {
     #[test]
     fn a_problem_is_reported_once_until_it_changes_or_ends() {
         let mut complaint = Complaint::default();
-        let reported = ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_news(problem));
+        let reported =
+            ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_news(problem));
         assert_eq!(reported, [true, false, true, true]);
         complaint.settle();
         assert!(complaint.is_news("empty"));

@@ -114,7 +114,9 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
         ),
     ];
     lines.extend(areas(calibration));
-    let notes = stated.into_iter().flat_map(|stated| stated.notes.iter().cloned());
+    let notes = stated
+        .into_iter()
+        .flat_map(|stated| stated.notes.iter().cloned());
     let warnings = notes.chain(calibration.warnings());
     lines.extend(warnings.map(|warning| ("  warning", warning.to_string())));
     lines

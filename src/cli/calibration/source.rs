@@ -53,7 +53,11 @@ impl Source {
         let checked = file.calibrations(&stem, &content);
         let cameras = file.cameras.into_iter().zip(checked);
         let mut cameras: Vec<_> = cameras
-            .map(|(stated, (id, checked))| NamedCamera { id, stated, checked })
+            .map(|(stated, (id, checked))| NamedCamera {
+                id,
+                stated,
+                checked,
+            })
             .collect();
         if let Some(wanted) = &self.camera {
             let names: Vec<_> = cameras.iter().map(NamedCamera::name).collect();
