@@ -15,7 +15,7 @@ pub enum Profile {
     Paper,
     /// Four wide views.
     Fast,
-    /// 24 views, wide near the nadir and narrow at the rim.
+    /// 24 runs: 16 views, wide near the nadir and narrow at the rim.
     #[default]
     Balanced,
     /// The views of `balanced` and up to 40 closer looks, half of them by a second model.
@@ -69,14 +69,28 @@ impl Profile {
         (self == Self::Quality).then_some(CloserLook {
             most_views: 40,
             fill: 1.0 / 3.0,
-            first_look: RefinementParameters {
-                refinement: Refinement::Fusion,
-                iou_threshold: 0.5,
-                sigma: 0.3,
-                score_threshold: 0.03,
-                max_detections: 500,
-            },
+            first_look: FIRST_PASS_CANDIDATES,
         })
+    }
+
+    /// The upright crops of the frame that follow the plan's views, if any.
+    pub(super) fn crop_pass(self) -> Option<CropPass> {
+        let most_crops = match self {
+            Self::Balanced => 8,
+            Self::Quality => 20,
+            Self::Paper | Self::Fast | Self::Direct => return None,
+        };
+        Some(CropPass {
+            most_crops,
+            fill: 0.3,
+            candidates: FIRST_PASS_CANDIDATES,
+        })
+    }
+
+    /// Most runs of the network that follow the plan's views.
+    pub(super) fn most_zoomed_views(self) -> usize {
+        let closer = self.closer_look().map_or(0, |closer| closer.most_views);
+        closer + self.crop_pass().map_or(0, |crops| crops.most_crops)
     }
 
     /// How boxes are taken back to the frame.
@@ -97,6 +111,25 @@ impl Profile {
             Self::Fast | Self::Balanced | Self::Quality => Refinement::Fusion,
         }
     }
+}
+
+/// How the boxes of the first pass become places for a second one.
+const FIRST_PASS_CANDIDATES: RefinementParameters = RefinementParameters {
+    refinement: Refinement::Fusion,
+    iou_threshold: 0.5,
+    sigma: 0.3,
+    score_threshold: 0.03,
+    max_detections: 500,
+};
+
+/// A second pass through upright crops of the frame around possible persons.
+pub(super) struct CropPass {
+    /// Most crops.
+    pub(super) most_crops: usize,
+    /// The share of a crop's side that the larger side of a person's box fills.
+    pub(super) fill: f64,
+    /// How the boxes of the first pass become places of crops.
+    pub(super) candidates: RefinementParameters,
 }
 
 /// A closer look at whatever may be a person after the first one.
