@@ -106,10 +106,18 @@ impl ViewPlan {
         Self::rings(&[Ring::of_degrees(0.9, 4, 95.0)])
     }
 
-    /// 24 views from wide near the nadir to narrow at the rim, where people are small: the best of
-    /// the plans of at most 24 views that were tried on real and on rendered frames.
+    /// 16 views: wide around the nadir, and narrow at the rim, where people are small.
     #[must_use]
     pub fn balanced() -> Self {
+        Self::rings(&[
+            Ring::of_degrees(0.8, 8, 90.0),
+            Ring::of_degrees(1.25, 8, 45.0),
+        ])
+    }
+
+    /// 24 views from wide near the nadir to narrow at the rim.
+    #[must_use]
+    pub fn quality() -> Self {
         Self::rings(&[
             Ring::of_degrees(0.05, 2, 75.0),
             Ring::of_degrees(0.8, 12, 90.0),

@@ -224,6 +224,15 @@ impl CameraRig {
         }
     }
 
+    /// The crops; none of a rig of virtual views.
+    pub(super) fn crops(&self) -> impl Iterator<Item = &FrameCrop> {
+        let crops = match &self.views {
+            Views::Crops(crops) => crops.as_slice(),
+            Views::Virtual(_) | Views::Direct(_) => &[],
+        };
+        crops.iter().map(|(crop, _)| crop)
+    }
+
     /// Whether boxes of the views are exact in the frame, as those of crops are.
     pub(super) fn is_exact(&self) -> bool {
         matches!(self.views, Views::Crops(_))

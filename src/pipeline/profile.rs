@@ -15,10 +15,11 @@ pub enum Profile {
     Paper,
     /// Four wide views.
     Fast,
-    /// 24 runs: 16 views, wide near the nadir and narrow at the rim.
+    /// 16 views, wide around the nadir and narrow at the rim, and up to 8 upright crops of the frame.
     #[default]
     Balanced,
-    /// The views of `balanced` and up to 40 closer looks, half of them by a second model.
+    /// 24 views, up to 20 closer looks, half of them by a second model, and up to 20 upright crops
+    /// of the frame.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -59,7 +60,8 @@ impl Profile {
         match self {
             Self::Paper => Some(ViewPlan::paper(paper_reading)),
             Self::Fast => Some(ViewPlan::fast()),
-            Self::Balanced | Self::Quality => Some(ViewPlan::balanced()),
+            Self::Balanced => Some(ViewPlan::balanced()),
+            Self::Quality => Some(ViewPlan::quality()),
             Self::Direct => None,
         }
     }
@@ -67,7 +69,7 @@ impl Profile {
     /// The closer look that follows the plan's views, if any.
     pub(super) fn closer_look(self) -> Option<CloserLook> {
         (self == Self::Quality).then_some(CloserLook {
-            most_views: 40,
+            most_views: 20,
             fill: 1.0 / 3.0,
             first_look: FIRST_PASS_CANDIDATES,
         })

@@ -6,7 +6,9 @@ use super::{Engine, Observation};
 use crate::{
     geometry::{crop_placement::place_crops, zoom::zoomed_views},
     inference::Model,
-    pipeline::{DetectJob, Stage, camera_rig::CameraRig, merge, network::LookTask},
+    pipeline::{
+        DetectJob, Stage, camera_rig::CameraRig, merge, network::LookTask, still_views::CameraViews,
+    },
 };
 
 /// Views and the model that sees them.
@@ -24,9 +26,11 @@ impl Engine {
         let mut planned = self.zoomed(job, observation);
         planned.extend(self.crops(observation));
         let tasks = planned.into_iter().map(|(rig, model)| {
+            let rig = Arc::new(rig);
+            let seen_before = self.crops_seen_before(job, &rig, &model);
             let frame = Arc::clone(&observation.frame);
             let ticket = job.ticket.clone();
-            self.network.look(Arc::new(rig), model, frame, ticket, None)
+            self.network.look(rig, model, frame, ticket, seen_before)
         });
         let tasks: Vec<_> = tasks.collect();
         if tasks.is_empty() {
@@ -35,6 +39,19 @@ impl Engine {
             timeline.enter(Stage::Queue, Instant::now());
         }
         tasks
+    }
+
+    /// What the camera saw before in the same crops, if the request wants to rely on it.
+    fn crops_seen_before(
+        &self,
+        job: &DetectJob,
+        rig: &Arc<CameraRig>,
+        model: &Arc<Model>,
+    ) -> Option<Arc<CameraViews>> {
+        let parameters = &job.parameters;
+        let camera = parameters.camera_name().filter(|_| parameters.motion)?;
+        let _first = rig.crops().next()?;
+        self.still_views.of_crops(camera, rig, model)
     }
 
     /// Zoomed views: for the model of the first pass, or half for it and half for another, if the
