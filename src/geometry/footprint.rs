@@ -5,7 +5,7 @@ use std::{f64::consts::TAU, sync::LazyLock};
 use nalgebra::Vector2;
 
 use super::{
-    Lens, Mount, Pixel, Ray, VirtualView,
+    FrameCrop, Lens, Mount, Pixel, Ray, VirtualView,
     height_ratio::Extremities,
     pixels::{PixelConvention, cross_half_pixel},
 };
@@ -103,6 +103,30 @@ impl Footprint {
             outline,
             rays,
             extremities,
+        })
+    }
+
+    /// Maps the box `[x_min, y_min, x_max, y_max]` of a crop to the frame. Its bounds are exact: the
+    /// outline is the inscribed ellipse, which touches all four sides. `None` when the middle of
+    /// the box lies beyond the lens image.
+    #[must_use]
+    pub fn of_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
+        let [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
+        let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
+        let half = Vector2::new(x_max - x_min, y_max - y_min) / 2.0;
+        let ray = |point: &Pixel| {
+            let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
+            lens.unproject(&pixel)
+        };
+        ray(&center)?;
+        let outline = ELLIPSE_ANGLES
+            .map(|(sin, cos)| center + Vector2::new(half.x * sin, -half.y * cos))
+            .to_vec();
+        let rays = outline.iter().step_by(RAY_STRIDE).filter_map(ray).collect();
+        Some(Self {
+            outline,
+            rays,
+            extremities: None,
         })
     }
 

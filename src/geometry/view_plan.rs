@@ -100,16 +100,26 @@ impl ViewPlan {
         }
     }
 
-    /// Four wide views, the least that sees everything from close to the nadir to the rim.
+    /// Five wide views: one more than the least that sees everything from close to the nadir to the
+    /// rim.
     #[must_use]
     pub fn fast() -> Self {
-        Self::rings(&[Ring::of_degrees(0.9, 4, 95.0)])
+        Self::rings(&[Ring::of_degrees(0.9, 5, 90.0)])
     }
 
-    /// 24 views from wide near the nadir to narrow at the rim, where people are small: the best of
-    /// the plans of at most 24 views that were tried on real and on rendered frames.
+    /// 18 views: wide around the nadir, and narrow at the rim, where people are small.
     #[must_use]
     pub fn balanced() -> Self {
+        Self::rings(&[
+            Ring::of_degrees(0.05, 2, 75.0),
+            Ring::of_degrees(0.8, 8, 90.0),
+            Ring::of_degrees(1.25, 8, 45.0),
+        ])
+    }
+
+    /// 24 views from wide near the nadir to narrow at the rim.
+    #[must_use]
+    pub fn quality() -> Self {
         Self::rings(&[
             Ring::of_degrees(0.05, 2, 75.0),
             Ring::of_degrees(0.8, 12, 90.0),
