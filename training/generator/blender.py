@@ -5,8 +5,8 @@ import math
 import os
 
 os.environ["OPENCV_IO_ENABLE_OPENEXR"] = "1"
-import bmesh
 import bpy
+import bmesh   # Exists only once bpy is imported.
 import cv2
 import numpy as np
 from mathutils import Matrix

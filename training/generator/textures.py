@@ -143,7 +143,7 @@ def write_all(folder, seed=5):
     def save(name, image):
         cv2.imwrite(str(folder / f"{name}.png"), np.clip(image[..., ::-1] * 255, 0, 255).astype(np.uint8))
 
-    grey = lambda low, high: rng.uniform(low, high) * np.array([1, 1, 1]) + rng.uniform(-0.05, 0.05, 3)
+    grey = lambda low, high: rng.uniform(low, high) * np.array([1, 1, 1]) + rng.uniform(-0.03, 0.03, 3)
     for i, colour in enumerate([(0.50, 0.33, 0.20), (0.36, 0.22, 0.13), (0.66, 0.50, 0.33), (0.24, 0.16, 0.11), (0.55, 0.45, 0.36), (0.45, 0.28, 0.15)]):
         save(f"floor_wood{i}", planks(rng, colour, 8))
         save(f"wood{i}", np.array(colour) * (1 + 0.07 * grain(SIZE, rng)[..., None]))
@@ -158,7 +158,7 @@ def write_all(folder, seed=5):
     for i in range(4):
         save(f"floor_checker{i}", checker(rng, grey(0.55, 0.75), rng.uniform(0.05, 0.45, 3)))
     for i in range(12):
-        save(f"wall{i}", np.clip(grey(0.4, 0.8) + rng.uniform(-0.08, 0.08, 3), 0, 1) * (1 + 0.015 * noise(SIZE, 3, rng, 6)[..., None]))
+        save(f"wall{i}", np.clip(grey(0.4, 0.8) + rng.uniform(-0.02, 0.02, 3), 0, 1) * (1 + 0.015 * noise(SIZE, 3, rng, 6)[..., None]))
     for i in range(9):
         save(f"rug{i}", rug(rng, i % 3))
     for i in range(16):
