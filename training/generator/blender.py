@@ -40,6 +40,7 @@ def clear():
     for block in (bpy.data.objects, bpy.data.meshes, bpy.data.lights, bpy.data.cameras, bpy.data.materials):
         bpy.data.batch_remove([*block])
     _materials.clear()
+    _meshes.clear()
 
 
 def link(item):
@@ -47,7 +48,7 @@ def link(item):
     return item
 
 
-_images, _materials = {}, {}
+_images, _materials, _meshes = {}, {}, {}
 
 
 def image(path, data=False):
@@ -122,8 +123,21 @@ class Builder:
         self.matrix = matrix or Matrix.Translation((x, y, z)) @ Matrix.Rotation(math.radians(degrees), 4, "Z")
         self.index = index
 
-    def _place(self, mesh, made, x, y, z, rx=0.0, ry=0.0, rz=0.0):
-        mesh.materials.append(made)
+    def _mesh(self, made, shape, build, smooth=None):
+        """The mesh of a shape and material: equal solids share one, which keeps large rooms small."""
+        key = (made, *(round(v, 3) if isinstance(v, float) else v for v in shape))
+        if key not in _meshes:
+            mesh, b = bpy.data.meshes.new(shape[0]), bmesh.new()
+            build(b)
+            b.to_mesh(mesh)
+            b.free()
+            if smooth is not None:
+                mesh.polygons.foreach_set("use_smooth", [smooth(p) for p in mesh.polygons])
+            mesh.materials.append(made)
+            _meshes[key] = mesh
+        return _meshes[key]
+
+    def _place(self, mesh, x, y, z, rx=0.0, ry=0.0, rz=0.0):
         item = link(bpy.data.objects.new("solid", mesh))
         item.matrix_world = (self.matrix @ Matrix.Translation((x, y, z)) @ Matrix.Rotation(rz, 4, "Z")
                              @ Matrix.Rotation(ry, 4, "Y") @ Matrix.Rotation(rx, 4, "X"))
@@ -131,42 +145,38 @@ class Builder:
         return item
 
     def box(self, sx, sy, sz, x, y, z, made, bevel=0.01, rx=0.0, ry=0.0, rz=0.0):
-        mesh, b = bpy.data.meshes.new("box"), bmesh.new()
-        bmesh.ops.create_cube(b, size=1)
-        bmesh.ops.scale(b, vec=(sx, sy, sz), verts=b.verts)
-        if bevel and min(sx, sy, sz) > 2.2 * bevel:
-            bmesh.ops.bevel(b, geom=b.edges[:] + b.verts[:], offset=bevel, segments=1 if bevel < 0.03 else 3, affect="EDGES", profile=0.5)
-        b.to_mesh(mesh)
-        b.free()
-        if bevel >= 0.03:
-            mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
-        return self._place(mesh, made, x, y, z, rx, ry, rz)
+        def build(b):
+            bmesh.ops.create_cube(b, size=1)
+            bmesh.ops.scale(b, vec=(sx, sy, sz), verts=b.verts)
+            if bevel and min(sx, sy, sz) > 2.2 * bevel:
+                bmesh.ops.bevel(b, geom=b.edges[:] + b.verts[:], offset=bevel, segments=1 if bevel < 0.03 else 3, affect="EDGES", profile=0.5)
+
+        mesh = self._mesh(made, ("box", sx, sy, sz, bevel), build, (lambda _: True) if bevel >= 0.03 else None)
+        return self._place(mesh, x, y, z, rx, ry, rz)
 
     def cylinder(self, radius, height, x, y, z, made, top=None, segments=16, rx=0.0, ry=0.0, scale=(1, 1), capped=True):
-        mesh, b = bpy.data.meshes.new("cylinder"), bmesh.new()
-        bmesh.ops.create_cone(b, cap_ends=capped, segments=segments, radius1=radius, radius2=radius if top is None else top, depth=height)
-        bmesh.ops.scale(b, vec=(*scale, 1), verts=b.verts)
-        b.to_mesh(mesh)
-        b.free()
-        mesh.polygons.foreach_set("use_smooth", [len(p.vertices) == 4 for p in mesh.polygons])
-        return self._place(mesh, made, x, y, z, rx, ry)
+        def build(b):
+            bmesh.ops.create_cone(b, cap_ends=capped, segments=segments, radius1=radius, radius2=radius if top is None else top, depth=height)
+            bmesh.ops.scale(b, vec=(*scale, 1), verts=b.verts)
+
+        mesh = self._mesh(made, ("cylinder", radius, height, top, segments, scale, capped), build, lambda p: len(p.vertices) == 4)
+        return self._place(mesh, x, y, z, rx, ry)
 
     def sphere(self, radius, x, y, z, made, scale=(1, 1, 1), lower=-1.0, rx=0.0):
         """An ellipsoid; what lies below `lower` (in radii) is cut off."""
-        mesh, b = bpy.data.meshes.new("sphere"), bmesh.new()
-        bmesh.ops.create_uvsphere(b, u_segments=16, v_segments=10, radius=radius)
-        bmesh.ops.delete(b, geom=[v for v in b.verts if v.co.z < lower * radius], context="VERTS")
-        bmesh.ops.scale(b, vec=scale, verts=b.verts)
-        b.to_mesh(mesh)
-        b.free()
-        mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
-        return self._place(mesh, made, x, y, z, rx)
+        def build(b):
+            bmesh.ops.create_uvsphere(b, u_segments=16, v_segments=10, radius=radius)
+            bmesh.ops.delete(b, geom=[v for v in b.verts if v.co.z < lower * radius], context="VERTS")
+            bmesh.ops.scale(b, vec=scale, verts=b.verts)
+
+        return self._place(self._mesh(made, ("sphere", radius, scale, lower), build, lambda _: True), x, y, z, rx)
 
     def plane(self, sx, sy, x, y, z, made, rx=0.0, ry=0.0, rz=0.0):
         mesh = bpy.data.meshes.new("plane")
         mesh.from_pydata([(-sx / 2, -sy / 2, 0), (sx / 2, -sy / 2, 0), (sx / 2, sy / 2, 0), (-sx / 2, sy / 2, 0)], [], [(0, 1, 2, 3)])
         mesh.uv_layers.new().data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
-        return self._place(mesh, made, x, y, z, rx, ry, rz)
+        mesh.materials.append(made)
+        return self._place(mesh, x, y, z, rx, ry, rz)
 
     def xy(self, x, y):
         at = (self.matrix @ Matrix.Translation((x, y, 0))).translation

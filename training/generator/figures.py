@@ -2,7 +2,6 @@
 import math
 
 import bpy
-import cv2
 import numpy as np
 from mathutils import Matrix
 
@@ -33,6 +32,7 @@ class Figure:
             offset += len(part.vertices)
         mesh = bpy.data.meshes.new("figure")
         self.vertices = np.concatenate(vertices)
+        self.triangles = np.array([(f[0], f[a], f[a + 1]) for f in faces for a in range(1, len(f) - 1)])
         mesh.from_pydata(self.vertices.tolist(), [], faces)
         mesh.uv_layers.new().data.foreach_set("uv", np.array(uv, np.float32).ravel())
         mesh.polygons.foreach_set("material_index", slots)

@@ -101,9 +101,14 @@ def panorama_xy(theta, phi, focal):
     return focal * theta * np.sin(phi), -focal * theta * np.cos(phi)
 
 
+def panorama_of(points, camera_height, focal):
+    """World points as panorama pixels relative to the nadir (n × 2)."""
+    theta, phi = nadir_angles(np.asarray(points) - np.array([0, 0, camera_height]))
+    return np.stack(panorama_xy(theta, phi, focal), 1)
+
+
 def panorama_bounds(points, camera_height, focal, margin=3):
     """Whole-pixel bounds (left, top, right, bottom), relative to the nadir, of world points in the panorama."""
-    theta, phi = nadir_angles(np.asarray(points) - np.array([0, 0, camera_height]))
-    x, y = panorama_xy(theta, phi, focal)
-    return (int(math.floor(x.min())) - margin, int(math.floor(y.min())) - margin, int(math.ceil(x.max())) + margin + 1,
-            int(math.ceil(y.max())) + margin + 1)
+    at = panorama_of(points, camera_height, focal)
+    (left, top), (right, bottom) = np.floor(at.min(0)).astype(int) - margin, np.ceil(at.max(0)).astype(int) + margin + 1
+    return int(left), int(top), int(right), int(bottom)

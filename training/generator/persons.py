@@ -9,34 +9,34 @@ import os
 import tempfile
 
 import bpy
+import cv2
 import numpy as np
 
 from . import blender as bl
 from .body import Body
 from .crops import encode_radiance
-from .geometry import panorama_bounds
+from .geometry import panorama_bounds, panorama_of
+from .heights import HEIGHT_SHARES, HEIGHTS
 from .light import floor_irradiance
 from .pieces import Maker, make_piece
 from .progress import Progress
 from .wardrobe import random_colours
 
 VIEWS = 10
-HEIGHTS = np.exp(np.linspace(math.log(2.4), math.log(8.0), 8))
-"""Camera heights in metres. A crop also serves heights up to 9 % away: the person is then so much taller or shorter."""
+FARTHEST = 18.0
+"""Metres on the floor."""
 LIGHTS = {"soft": 0.5, "side": 0.22, "sun": 0.16, "infrared": 0.12}
 
 
 def random_viewpoint(rng, k):
     """Camera height, distance on the floor, bearing, and pixels a radian."""
-    height = float(HEIGHTS[rng.integers(len(HEIGHTS))] * rng.uniform(0.95, 1.05))
+    height = float(HEIGHTS[rng.choice(len(HEIGHTS), p=HEIGHT_SHARES)] * rng.uniform(0.92, 1.08))
     if k == 0:
         theta = rng.uniform(0, 20)
-    elif rng.random() < 0.22:
-        theta = rng.uniform(15, 42)
     else:
-        theta = rng.uniform(42, 85)
+        theta = rng.uniform(*((12, 42), (40, 68), (66, 84))[rng.choice(3, p=[0.25, 0.5, 0.25])])
     distance = height * math.tan(math.radians(theta))
-    return height, min(distance, 32.0), float(rng.uniform(0, 2 * math.pi))
+    return height, min(distance, FARTHEST), float(rng.uniform(0, 2 * math.pi))
 
 
 def light_rig(rng, kind, camera):
@@ -68,6 +68,16 @@ def light_rig(rng, kind, camera):
     return total
 
 
+def whole_area(points, triangles):
+    """Pixels that a body covers when nothing stands before it: what the visible share is counted from."""
+    low = np.floor(points.min(0)) - 1
+    size = np.ceil(points.max(0) - low).astype(int) + 2
+    mask, corners = np.zeros(size[::-1], np.uint8), np.rint((points - low) * 16).astype(np.int32)
+    for corner in corners[triangles]:
+        cv2.fillConvexPoly(mask, corner, 1, cv2.LINE_8, 4)
+    return max(1, int(mask.sum()))
+
+
 def render_group(scene, body, seed, work, split, scratch, samples):
     """Renders all views of one random piece; returns the arrays of its file."""
     rng = np.random.default_rng(seed)
@@ -90,7 +100,8 @@ def render_group(scene, body, seed, work, split, scratch, samples):
         height, distance, bearing = random_viewpoint(rng, k)
         light = str(rng.choice(list(LIGHTS), p=list(LIGHTS.values())))
         at = (distance * math.sin(bearing), -distance * math.cos(bearing), height)
-        turned = outline @ np.array([[math.cos(bearing), math.sin(bearing), 0], [-math.sin(bearing), math.cos(bearing), 0], [0, 0, 1]]).T + (0, distance, 0)
+        turn = np.array([[math.cos(bearing), math.sin(bearing), 0], [-math.sin(bearing), math.cos(bearing), 0], [0, 0, 1]]).T
+        turned = outline @ turn + (0, distance, 0)
         size = max(np.ptp(np.array(panorama_bounds(turned, height, 1000.0, 0)).reshape(2, 2), axis=0)) / 1000
         focal = float(np.clip(300 / size, 260, 440))
         left, top, right, bottom = panorama_bounds(turned, height, focal)
@@ -107,7 +118,9 @@ def render_group(scene, body, seed, work, split, scratch, samples):
         arrays[f"depth{k}"] = np.clip(np.rint(depth * 1000), 0, 65535).astype(np.uint16)
         arrays[f"index{k}"] = index
         views.append(dict(camera_height=height, distance=distance, bearing=bearing, focal=focal, light=light, left=border[0] - (side - 1) / 2,
-                          top=border[1] - (side - 1) / 2))
+                          top=border[1] - (side - 1) / 2,
+                          whole={f.index: whole_area(panorama_of(f.world_vertices() @ turn + (0, distance, 0), height, focal), f.triangles)
+                                 for f in maker.figures}))
     step = max(1, len(outline) // 1500)
     arrays["cloud"] = outline[rng.permutation(len(outline))[::step]].astype(np.float16)
     about = dict(seed=seed, split=split, piece=name, views=views, reach=float(np.hypot(outline[:, 0], outline[:, 1]).max()),

@@ -27,7 +27,7 @@ class Maker:
         return figure
 
     def seated(self, x, y, degrees, arms=None, with_chair=True):
-        figure = self.person("sitting", x, y, degrees, arms)
+        figure = self.person("sitting", *Builder(x, y, degrees).xy(0, 0.07), degrees, arms)
         if with_chair:
             seat = max(0.3, natural_seat(figure))
             if self.rng.random() < 0.5 and seat < 0.44:

@@ -11,14 +11,16 @@ from . import furniture as f
 from .body import Body
 from .crops import encode_radiance
 from .figures import add_figure
+from .heights import HEIGHT_SHARES, HEIGHTS
 from .light import floor_irradiance
 from .portraits import portrait_name
 from .progress import Progress
 from .wardrobe import random_colours, random_person
 from .zones import COATS, MANNEQUIN, PICTURE_OF_PERSON, ZONES
 
-RESOLUTION = 1200
+RESOLUTION = 1040
 """Default diameter in pixels of a panorama to 90° from the nadir."""
+MOST_MANNEQUINS = 4
 FLOORS = ("wood", "tile", "carpet", "terrazzo", "concrete", "checker")
 
 
@@ -29,14 +31,14 @@ class Room:
         self.rng, self.split, self.body, self.work = np.random.default_rng(seed), split, body, work
         r = self.rng
         self.palette = f.Palette(r, work / "textures", split)
-        self.height = float(np.exp(r.uniform(math.log(2.4), math.log(8.0))))
+        self.height = float(HEIGHTS[r.choice(len(HEIGHTS), p=HEIGHT_SHARES)] * r.uniform(0.92, 1.08))
         largest, least = float(np.clip(self.height * 6, 12, 30)), max(8.0, 2.6 * self.height)
         self.width, self.depth = (float(r.uniform(least, largest)) for _ in range(2))
         if r.random() < 0.15:
             self.depth = float(r.uniform(2.5, 4.5))                       # A corridor.
         self.cx, self.cy = (float(r.uniform(-0.3, 0.3) * s) for s in (self.width, self.depth))
         self.ceiling = self.height + float(r.choice([0.05, 0.05, 0.1, 0.4, 1.0]))
-        self.occupied, self.lights = [], []
+        self.occupied, self.lights, self.mannequins = [], [], 0
         self.grid = bl.Builder(self.cx, self.cy)
         self._shell()
         self._lights()
@@ -155,6 +157,9 @@ class Room:
     def mannequin(self, b):
         """A shop-window figure: one plain colour for skin and head, dressed or not, on a base plate."""
         r = self.rng
+        self.mannequins += 1
+        if self.mannequins > MOST_MANNEQUINS:
+            return
         who = random_person(r, self.work / "assets", self.split, False)
         who["extras"], who["wear"] = [], [w for w in who["wear"] if w[1] not in ("hair", "shoe")]
         x, y = b.xy(0, 0)
@@ -189,7 +194,7 @@ def render_room(scene, body, seed, work, split, scratch, samples, resolution):
                 about=np.frombuffer(json.dumps(about).encode(), np.uint8))
 
 
-def render_rooms(work, first_seed, count, split="train", threads=1, samples=8, resolution=RESOLUTION):
+def render_rooms(work, first_seed, count, split="train", threads=1, samples=6, resolution=RESOLUTION):
     folder = work / "rooms" / split
     folder.mkdir(parents=True, exist_ok=True)
     todo = [s for s in range(first_seed, first_seed + count) if not (folder / f"{s}.npz").exists()]
