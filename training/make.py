@@ -18,6 +18,7 @@ def parse():
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--split", choices=("train", "unseen"), default="train")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--nice", type=int, default=19, help="priority; 19 is the lowest")
     parser.add_argument("--samples", type=int, help="samples a pixel")
     parser.add_argument("--resolution", type=int, help="pixels: diameter of a room's panorama to 90 degrees")
     options = parser.parse_args()
@@ -28,7 +29,7 @@ def parse():
 
 def main():
     options = parse()
-    os.nice(max(0, 19 - os.nice(0)))
+    os.nice(max(0, options.nice - os.nice(0)))
     work = options.work.resolve()
     more = {k: v for k, v in (("samples", options.samples), ("resolution", options.resolution)) if v is not None}
     if options.what == "textures":

@@ -22,26 +22,25 @@ def wrap_upright(angle):
     return (angle + 90) % 180 - 90
 
 
-def _corners(mask):
-    """The corners of all outline pixels of a mask (n × 2)."""
+def _outline(mask):
+    """The centres of all outline pixels of a mask (n × 2)."""
     outlines, _ = cv2.findContours(np.ascontiguousarray(mask, np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    points = np.concatenate(outlines)[:, 0].astype(np.float32)
-    return np.concatenate([points + np.float32((dx, dy)) for dx in (0, 1) for dy in (0, 1)])
+    return np.concatenate(outlines)[:, 0].astype(np.float32) + 0.5
 
 
 def box_along(mask, angle):
-    """The tightest box of a mask whose height runs along `angle`."""
+    """The tightest box of a mask whose height runs along `angle`: exact at 0, half a pixel around the outermost centres at others."""
     t = math.radians(angle)
     across, along = np.array([math.cos(t), math.sin(t)]), np.array([-math.sin(t), math.cos(t)])
-    points = _corners(mask)
+    points = _outline(mask)
     u, v = points @ across, points @ along
     centre = (u.min() + u.max()) / 2 * across + (v.min() + v.max()) / 2 * along
-    return [float(centre[0]), float(centre[1]), float(np.ptp(u)), float(np.ptp(v)), wrap_upright(angle)]
+    return [float(centre[0]), float(centre[1]), float(np.ptp(u)) + 1, float(np.ptp(v)) + 1, wrap_upright(angle)]
 
 
 def oriented_box(mask, upright):
     """The smallest box of a mask at any angle; of its two axes the one nearer to the angle `upright` is the height."""
-    (_, _), (_, _), angle = cv2.minAreaRect(_corners(mask))
+    (_, _), (_, _), angle = cv2.minAreaRect(_outline(mask))
     nearest = min((angle, angle + 90), key=lambda a: abs(wrap_upright(a - upright)))
     return box_along(mask, nearest)
 
