@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from generator.geometry import radius_of
+from generator.geometry import circle_radius
 
 UPRIGHT_LIMIT = 62.0
 """Degrees between a person's foot-to-head direction and the sample's up."""
@@ -96,12 +96,6 @@ class Frames:
             sample = sample[:, ::-1]
             boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
         return jitter(sample, rng), boxes, ignore
-
-
-def circle_radius(lens):
-    """The radius in pixels of the circle of a native calibration's lens."""
-    lens = dict(lens, k=[lens[f"k{i}"] for i in range(1, 5) if f"k{i}" in lens])
-    return float(radius_of(lens, lens["max_theta"]))
 
 
 class Pack:

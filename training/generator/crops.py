@@ -28,29 +28,31 @@ class Crop:
 
 
 class CropFile:
-    """A file of persons.py."""
+    """A file of persons.py. Only its description stays in memory and no file stays open: there are thousands."""
 
     def __init__(self, path):
-        self.arrays = np.load(path)
-        self.about = json.loads(bytes(self.arrays["about"]))
+        self.path = path
+        with np.load(path) as arrays:
+            self.about = json.loads(bytes(arrays["about"]))
         self.views = self.about["views"]
 
     def crop(self, k):
-        a = self.arrays
-        return Crop(decode_radiance(a[f"colour{k}"]), a[f"alpha{k}"].astype(np.float32) / 255, a[f"depth{k}"].astype(np.float32) / 1000,
-                    a[f"index{k}"], self.views[k])
+        with np.load(self.path) as a:
+            return Crop(decode_radiance(a[f"colour{k}"]), a[f"alpha{k}"].astype(np.float32) / 255, a[f"depth{k}"].astype(np.float32) / 1000,
+                        a[f"index{k}"], self.views[k])
 
     def cloud(self):
         """Points of the piece's surfaces about its centre, for shadows."""
-        return self.arrays["cloud"].astype(np.float32)
+        with np.load(self.path) as arrays:
+            return arrays["cloud"].astype(np.float32)
 
 
 class RoomFile:
     """A file of rooms.py: one panorama of an empty room."""
 
     def __init__(self, path):
-        arrays = np.load(path)
-        self.about = json.loads(bytes(arrays["about"]))
-        self.colour = decode_radiance(arrays["colour"])
-        self.depth = arrays["depth"].astype(np.float32) / 1000
-        self.index = arrays["index"]
+        with np.load(path) as arrays:
+            self.about = json.loads(bytes(arrays["about"]))
+            self.colour = decode_radiance(arrays["colour"])
+            self.depth = arrays["depth"].astype(np.float32) / 1000
+            self.index = arrays["index"]

@@ -38,7 +38,7 @@ def make_lens(rng, circle_radius):
     max_theta = math.radians(float(rng.choice([85, 90, 90, 92, 95]) + rng.uniform(-1.5, 1.5)))
     lens = dict(model=model, focal=1.0, max_theta=max_theta)
     if model == "kannala_brandt":
-        lens["k"] = [float(x) for x in np.array([rng.uniform(-0.03, 0.03), rng.uniform(-0.012, 0.004), rng.uniform(-0.001, 0.002), 0.0])]
+        lens["k"] = [float(x) for x in np.array([rng.uniform(-0.03, 0.03), rng.uniform(-0.008, 0.004), rng.uniform(-0.001, 0.002), 0.0])]
     lens["focal"] = float(circle_radius / radius_of(lens, max_theta))
     return lens
 
@@ -53,6 +53,12 @@ def camera_rotation(yaw, tilt=0.0, roll=0.0):
     return np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]]) @ tilted
 
 
+def circle_radius(native_lens):
+    """The radius in pixels of the circle that a native calibration's lens fills."""
+    lens = dict(native_lens, focal=native_lens.get("focal", native_lens.get("fx")))
+    return float(radius_of(lens, lens["max_theta"]))
+
+
 @dataclass
 class Calibration:
     """A camera of one frame: lens, principal point, rotation and height."""
@@ -65,11 +71,12 @@ class Calibration:
     height_m: float = 3.0
 
     def project(self, points):
-        """World points (n × 3, metres) to pixels (n × 2) and angles from the axis."""
+        """World points (n × 3, metres) to pixels (n × 2) and angles from the axis. Points beyond the lens's largest angle
+        land just outside the circle: polynomials fold back there."""
         rays = (np.atleast_2d(points) - np.array([0, 0, self.height_m])) @ self.rotation.T
         rho = np.hypot(rays[:, 0], rays[:, 1])
         theta = np.arctan2(rho, rays[:, 2])
-        scale = radius_of(self.lens, theta) / np.maximum(rho, 1e-12)
+        scale = radius_of(self.lens, np.minimum(theta, self.lens["max_theta"] + 0.05)) / np.maximum(rho, 1e-12)
         return np.stack([self.cx + scale * rays[:, 0], self.cy + scale * rays[:, 1]], 1), theta
 
     def rays(self, x, y):
@@ -82,9 +89,9 @@ class Calibration:
 
     def native(self, identifier):
         """The calibration in Lookdown's native JSON."""
-        lens = {k: v for k, v in self.lens.items() if k != "k"}
-        if "k" in self.lens:
-            lens.update({f"k{i + 1}": v for i, v in enumerate(self.lens["k"])})
+        lens = dict(self.lens)
+        if lens["model"] == "kannala_brandt":
+            lens["fx"] = lens["fy"] = lens.pop("focal")
         up = self.rotation @ np.array([0, 0, 1.0])
         return dict(id=identifier, image=dict(width=self.width, height=self.height), lens=dict(lens, cx=self.cx, cy=self.cy),
                     mount=dict(world_up=[round(float(x), 9) for x in up], height_m=round(self.height_m, 4)))

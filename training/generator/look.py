@@ -2,6 +2,7 @@
 import cv2
 import numpy as np
 
+from .geometry import circle_radius
 from .tone import curve
 
 KINDS = {"day": 0.58, "dim": 0.14, "infrared": 0.18, "monochrome": 0.10}
@@ -49,7 +50,7 @@ def apply_look(rng, look, composition, calibration):
     """The 8-bit BGR frame."""
     colour, h, w = composition.colour, calibration.height, calibration.width
     y, x = np.mgrid[0:h, 0:w].astype(np.float32)
-    rim = np.hypot(x - calibration.cx, y - calibration.cy) / calibration_radius(calibration)
+    rim = np.hypot(x - calibration.cx, y - calibration.cy) / circle_radius(calibration.lens)
     inside = rim <= 1
     if look["kind"] == "infrared":
         colour = infrared(rng, colour, composition.distance, calibration.height_m)
@@ -83,9 +84,3 @@ def apply_look(rng, look, composition, calibration):
         image = cv2.resize(small, (w, h), interpolation=cv2.INTER_CUBIC)
     image[rim > 1.002] = np.abs(rng.normal(size=(int((rim > 1.002).sum()), 3))) * 0.006
     return np.rint(np.clip(image, 0, 1)[..., ::-1] * 255).astype(np.uint8)
-
-
-def calibration_radius(calibration):
-    """Radius of the lens circle in pixels."""
-    from .geometry import radius_of
-    return float(radius_of(calibration.lens, calibration.lens["max_theta"]))

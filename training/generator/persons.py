@@ -63,8 +63,7 @@ def light_rig(rng, kind, camera):
         item = bl.link(bpy.data.objects.new("sun", data))
         item.rotation_euler = (float(rng.uniform(0.5, 1.2)), 0, float(rng.uniform(0, 6.28)))
     if kind == "infrared":
-        r2 = camera[0] ** 2 + camera[1] ** 2 + camera[2] ** 2
-        total = math.pi * ambient + 60 / math.pi * camera[2] / math.sqrt(r2)
+        total = math.pi * ambient + 60 / math.pi                         # On a surface that faces the lamp beside the lens.
     return total
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from generator.boxes import axis_box, box_along, oriented_box
 from generator.compose import compose
-from generator.geometry import Calibration, camera_rotation, make_lens, nadir_angles, panorama_of, radius_of, theta_of
+from generator.geometry import Calibration, camera_rotation, circle_radius, make_lens, nadir_angles, panorama_of, radius_of, theta_of
 from generator.placement import Placement
 
 FOCAL, HEIGHT, SIDE = 100.0, 3.0, 401
@@ -63,6 +63,13 @@ class Lenses(unittest.TestCase):
     def test_native_calibration_has_up_against_the_axis(self):
         native = calibration().native("a")
         np.testing.assert_allclose(native["mount"]["world_up"], [0, 0, -1], atol=1e-9)
+
+
+    def test_native_calibration_keeps_the_circle_of_every_model(self):
+        for seed in range(12):
+            lens = make_lens(np.random.default_rng(seed), 400)
+            native = Calibration(900, 900, lens, 449.5, 449.5).native("a")
+            self.assertAlmostEqual(circle_radius(native["lens"]), 400, places=6)
 
 
 class Turning(unittest.TestCase):
