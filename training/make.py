@@ -1,4 +1,4 @@
-"""The generator's commands: textures, persons, rooms, frames, sheets. Everything is made below --work and can be resumed.
+"""The generator's commands: textures, persons, rooms, frames, sheets, statistics. Everything is made below --work and can be resumed.
 
     nice -n 19 python training/make.py persons --work WORK --first-seed 1000000 --count 200
 """
@@ -12,7 +12,7 @@ FIRST_SEED = 1_000_000
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("textures", "portraits", "persons", "rooms", "frames", "sheets"))
+    parser.add_argument("what", choices=("textures", "portraits", "persons", "rooms", "frames", "sheets", "statistics"))
     parser.add_argument("--work", type=Path, default=Path(__file__).parent / "work")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--count", type=int, default=20)
@@ -49,6 +49,9 @@ def main():
         cv2.setNumThreads(options.threads)
         from generator.frames import make_frames
         make_frames(work, options.first_seed, options.count, options.split)
+    elif options.what == "statistics":
+        from generator.statistics import print_statistics
+        print_statistics(work / "frames" / options.split)
     else:
         from generator.sheets import make_sheets
         make_sheets(work, options.split)

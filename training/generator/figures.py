@@ -107,7 +107,7 @@ class Figure:
                 hip = j["upperleg01.L" if side > 0 else "upperleg01.R"]
                 b.box(0.1 * k, 0.32 * k, 0.24 * k, hip[0] + side * 0.16 * k, hip[1], hip[2] + 0.02, tone[name], bevel=0.03)
             elif name in ("cap", "hood", "helmet"):
-                size = {"cap": 0.105, "hood": 0.135, "helmet": 0.135}[name] * (0.9 + 0.1 * k)
+                size = {"cap": 0.1, "hood": 0.12, "helmet": 0.118}[name] * (0.9 + 0.1 * k)
                 b.sphere(size, head[0], head[1], min(head[2] + 0.02, top - size * 0.75), tone[name], scale=(0.92, 1.12, 1.0), lower=-0.05 if name != "hood" else -0.75)
                 if name == "cap":
                     b.box(0.14, 0.1, 0.012, head[0], head[1] - 0.14, min(head[2] + 0.03, top - 0.07), tone[name], bevel=0)

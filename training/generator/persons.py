@@ -25,6 +25,8 @@ from .wardrobe import random_colours
 VIEWS = 10
 FARTHEST = 18.0
 """Metres on the floor."""
+LONGEST_SIDE = 250
+"""Pixels: crops are at most about so long, but never coarser than 220 pixels a radian."""
 LIGHTS = {"soft": 0.5, "side": 0.22, "sun": 0.16, "infrared": 0.12}
 
 
@@ -69,12 +71,13 @@ def light_rig(rng, kind, camera):
 
 def whole_area(points, triangles):
     """Pixels that a body covers when nothing stands before it: what the visible share is counted from."""
+    fine = 4 if np.ptp(points, axis=0).max() < 120 else 2                # Filled triangles include the pixels that they touch.
     low = np.floor(points.min(0)) - 1
-    size = np.ceil(points.max(0) - low).astype(int) + 2
-    mask, corners = np.zeros(size[::-1], np.uint8), np.rint((points - low) * 16).astype(np.int32)
+    size = (np.ceil(points.max(0) - low).astype(int) + 2) * fine
+    mask, corners = np.zeros(size[::-1], np.uint8), np.rint((points - low) * fine * 16).astype(np.int32)
     for corner in corners[triangles]:
         cv2.fillConvexPoly(mask, corner, 1, cv2.LINE_8, 4)
-    return max(1, int(mask.sum()))
+    return max(1, round(int(mask.sum()) / fine**2))
 
 
 def render_group(scene, body, seed, work, split, scratch, samples):
@@ -102,7 +105,7 @@ def render_group(scene, body, seed, work, split, scratch, samples):
         turn = np.array([[math.cos(bearing), math.sin(bearing), 0], [-math.sin(bearing), math.cos(bearing), 0], [0, 0, 1]]).T
         turned = outline @ turn + (0, distance, 0)
         size = max(np.ptp(np.array(panorama_bounds(turned, height, 1000.0, 0)).reshape(2, 2), axis=0)) / 1000
-        focal = float(np.clip(300 / size, 260, 440))
+        focal = float(np.clip(LONGEST_SIDE / size, 220, 400))
         left, top, right, bottom = panorama_bounds(turned, height, focal)
         white = light_rig(rng, light, at) / math.pi
         for item in [o for o in bpy.data.objects if o.type == "CAMERA"]:
@@ -130,7 +133,7 @@ def render_group(scene, body, seed, work, split, scratch, samples):
     return arrays
 
 
-def render_persons(work, first_seed, count, split="train", threads=1, samples=16):
+def render_persons(work, first_seed, count, split="train", threads=1, samples=12):
     """Renders `count` groups of VIEWS crops each, skipping those that exist."""
     folder = work / "persons" / split
     folder.mkdir(parents=True, exist_ok=True)

@@ -32,7 +32,7 @@ class Room:
         r = self.rng
         self.palette = f.Palette(r, work / "textures", split)
         self.height = float(HEIGHTS[r.choice(len(HEIGHTS), p=HEIGHT_SHARES)] * r.uniform(0.92, 1.08))
-        largest, least = float(np.clip(self.height * 6, 12, 30)), max(8.0, 2.6 * self.height)
+        largest, least = float(np.clip(self.height * 7, 16, 30)), max(10.0, 3.2 * self.height)
         self.width, self.depth = (float(r.uniform(least, largest)) for _ in range(2))
         if r.random() < 0.15:
             self.depth = float(r.uniform(2.5, 4.5))                       # A corridor.
