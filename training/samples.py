@@ -17,8 +17,10 @@ from generator.geometry import circle_radius
 
 UPRIGHT_LIMIT = 62.0
 """Degrees between a person's foot-to-head direction and the sample's up."""
-TILE_WIDTH, TILE_HEIGHT = 1.5, 1.15
-"""A tile in radii of the lens circle: as wide, and from the rim down to a little beyond the centre."""
+BELOW_CAMERA = 12.0
+"""Degrees from straight down within which a person has no upright direction and counts in every turn."""
+TILE_WIDTH = 1.5
+"""Side of a tile in radii of the lens circle: from the rim down to half a radius beyond the centre."""
 
 
 def turned(width, height, boxes, angles, quarter):
@@ -64,14 +66,15 @@ class Frames:
             self.annotations[a["image_id"]].append(a)
 
     def load(self, k):
-        """Image (RGB), boxes, upright angles, ignore flags, circle's centre and radius."""
+        """Image (RGB), boxes, upright angles (NaN below the camera: upright in every turn), ignore flags, circle's centre and radius."""
         about = self.images[k]
         image = cv2.cvtColor(cv2.imread(str(self.folder / about["file_name"])), cv2.COLOR_BGR2RGB)
         found = self.annotations[about["id"]]
         boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in (a["bbox"] for a in found)], float).reshape(-1, 4)
         lens = json.loads((self.folder / about["calibration"]).read_text())["lens"]
         radius = circle_radius(lens)
-        return image, boxes, np.array([a["upright_deg"] for a in found]), np.array([a["ignore"] for a in found], bool), (lens["cx"], lens["cy"], radius)
+        angles = np.array([a["upright_deg"] if a["nadir_deg"] > BELOW_CAMERA else np.nan for a in found])
+        return image, boxes, angles, np.array([a["ignore"] for a in found], bool), (lens["cx"], lens["cy"], radius)
 
     def sample(self, rng, size, tile_share=0.5):
         """One random sample: image (size × size × 3), boxes, ignore flags."""
