@@ -116,7 +116,9 @@ class Figure:
             elif name in ("skirt", "long_coat") and not sitting:
                 hips = (j["upperleg01.L"] + j["upperleg01.R"]) / 2
                 low = hips[2] * (0.5 if colours["extra"][1][0] > 0.2 else 0.2)
-                feet = max(0.16, 0.12 + 0.5 * abs(j["lowerleg01.L"][1] - j["lowerleg01.R"][1]))
+                stride = float(np.hypot(*(j["foot.L"] - j["foot.R"])[:2]))
+                low = max(low, 0.42 * hips[2]) if stride > 0.45 * k else low             # Long skirts do not allow long steps.
+                feet = max(0.16, 0.12 + 0.42 * stride * (1 - low / hips[2]))
                 high = hips[2] + 0.12 * k
                 b.cylinder(feet * 1.35 * k, high - low, hips[0], hips[1] - 0.02, (high + low) / 2, tone[name], top=0.16 * k, segments=20, scale=(1, 0.85), capped=False)
             elif name == "vest":

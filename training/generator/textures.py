@@ -86,7 +86,8 @@ def rug(rng, kind):
 
 def fabric(rng, number, n=512):
     """Plain, stripes, checks, dots, camouflage, print: mid-grey on average, so that a tint colours it."""
-    base, other = rng.uniform(0.25, 0.75, 3), rng.uniform(0.05, 0.95, 3)
+    muted = lambda low, high: rng.uniform(low, high) * (1 + 0.35 * rng.uniform(-1, 1, 3))      # Clothes are greyer than paint.
+    base, other = muted(0.25, 0.75), muted(0.05, 0.95)
     image = np.ones((n, n, 3), np.float32) * base
     y, x = np.mgrid[0:n, 0:n]
     period = int(rng.choice([16, 24, 36, 64]))
@@ -103,7 +104,7 @@ def fabric(rng, number, n=512):
     elif kind == 5:
         blots = noise(n, 10, rng)
         image[blots > 0.4] = other
-        image[blots < -0.7] = rng.uniform(0.05, 0.8, 3)
+        image[blots < -0.7] = muted(0.05, 0.8)
     elif kind == 6:
         image = np.ascontiguousarray(image)
         for _ in range(60):
