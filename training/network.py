@@ -3,6 +3,7 @@
 The graph's operations are replayed one by one, so that the module computes exactly what the ONNX file computes and accepts
 any input whose sides are multiples of 32. `export` puts trained weights into a copy of the file.
 """
+
 import numpy as np
 import onnx
 import torch
@@ -53,7 +54,9 @@ class Network(nn.Module):
                 self.register_buffer(key, torch.tensor(constants[inputs[1]].copy()))
                 self.steps.append((kind, inputs[:1], out, key))
             elif kind == "Conv":
-                self.steps.append(("Conv", inputs[:1], out, (parameter("kernel", inputs[1]), attributes["strides"][0])))
+                self.steps.append(
+                    ("Conv", inputs[:1], out, (parameter("kernel", inputs[1]), attributes["strides"][0]))
+                )
             elif kind == "Add" and inputs[1] in constants:
                 self.steps.append(("Bias", inputs[:1], out, parameter("bias", inputs[1])))
             elif kind == "Pad":
@@ -63,11 +66,15 @@ class Network(nn.Module):
             elif kind == "Resize":
                 self.steps.append(("Resize", inputs[:1], out, float(constants[inputs[1]][-1])))
             elif kind == "MaxPool":
-                self.steps.append(("MaxPool", inputs[:1], out, (attributes["kernel_shape"][0], attributes["strides"][0])))
+                self.steps.append(
+                    ("MaxPool", inputs[:1], out, (attributes["kernel_shape"][0], attributes["strides"][0]))
+                )
             elif kind in ("Add", "Concat", "LeakyRelu"):
                 self.steps.append((kind, inputs, out, attributes.get("alpha")))
             else:
-                raise ValueError(f"{path}: operation {kind} is not one of NanoDet-g's; give the model nanodet_g_416")
+                raise ValueError(
+                    f"{path}: operation {kind} is not one of NanoDet-g's; give the model nanodet_g_416"
+                )
         self.steps = _fused(self.steps)
         self.last_use = {name: k for k, step in enumerate(self.steps) for name in step[1]}
 
@@ -82,7 +89,9 @@ class Network(nn.Module):
                 r = a * getattr(self, p)
             elif kind == "ConvBias":
                 kernel, bias, stride, padding = p
-                r = F.conv2d(a, self.weights[kernel], self.weights[bias].reshape(-1), stride=stride, padding=padding)
+                r = F.conv2d(
+                    a, self.weights[kernel], self.weights[bias].reshape(-1), stride=stride, padding=padding
+                )
             elif kind == "LeakyRelu":
                 r = F.leaky_relu(a, p)
             elif kind == "Pad":
@@ -105,7 +114,9 @@ class Network(nn.Module):
             n, _, h, w = f.shape
             logits.append(f[:, 0].reshape(n, -1))
             sides.append(f[:, 1:].reshape(n, 4, BINS, -1).permute(0, 3, 1, 2))
-            ys, xs = torch.meshgrid(torch.arange(h, device=f.device) + 0.5, torch.arange(w, device=f.device) + 0.5, indexing="ij")
+            ys, xs = torch.meshgrid(
+                torch.arange(h, device=f.device) + 0.5, torch.arange(w, device=f.device) + 0.5, indexing="ij"
+            )
             points.append(torch.stack([xs, ys], -1).reshape(-1, 2) * stride)
             strides.append(torch.full((h * w,), float(stride), device=f.device))
         return torch.cat(logits, 1), torch.cat(sides, 1), torch.cat(points), torch.cat(strides)
@@ -121,7 +132,9 @@ def _fused(steps):
             if step[0] == "Pad":
                 sides, value = step[3]
                 if len(set(sides)) != 1 or value != 0:
-                    raise ValueError(f"padding {sides} of {value} before a convolution; it must be equal on all sides and 0")
+                    raise ValueError(
+                        f"padding {sides} of {value} before a convolution; it must be equal on all sides and 0"
+                    )
                 padding, i = sides[0], i + 1
             (kernel, stride), bias = steps[i][3], steps[i + 1]
             out.append(("ConvBias", source, bias[2], (kernel, bias[3], stride, padding)))
@@ -158,5 +171,7 @@ def export(network, source, target):
             tensor.CopyFrom(numpy_helper.from_array(np.ascontiguousarray(new), tensor.name))
             found.add(name)
     if missing := set(by_name) - found:
-        raise ValueError(f"{source} lacks the tensors {sorted(missing)[:3]}; export into the file that the network was read from")
+        raise ValueError(
+            f"{source} lacks the tensors {sorted(missing)[:3]}; export into the file that the network was read from"
+        )
     onnx.save(model, target)

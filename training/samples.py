@@ -5,6 +5,7 @@ A frame is turned by a multiple of 90°, so that axis-parallel boxes stay exact;
 
     python training/samples.py pack --frames WORK/frames/train --out WORK/packs/train --count 4000 --size 416
 """
+
 import argparse
 import json
 import math
@@ -34,7 +35,9 @@ def turned(width, height, boxes, angles, quarter):
 
 def cut(image, boxes, ignore, x, y, scale, size):
     """The square sample at (x, y) with `scale` sample pixels an image pixel. Boxes are clipped; scraps are ignored."""
-    matrix = np.array([[scale, 0, -x * scale + 0.5 * scale - 0.5], [0, scale, -y * scale + 0.5 * scale - 0.5]])
+    matrix = np.array(
+        [[scale, 0, -x * scale + 0.5 * scale - 0.5], [0, scale, -y * scale + 0.5 * scale - 0.5]]
+    )
     source = cv2.GaussianBlur(image, (0, 0), 0.45 / scale) if scale < 0.75 else image
     sample = cv2.warpAffine(source, matrix, (size, size), flags=cv2.INTER_LINEAR, borderValue=(0, 0, 0))
     moved = (boxes - (x, y, x, y)) * scale
@@ -70,30 +73,46 @@ class Frames:
         about = self.images[k]
         image = cv2.cvtColor(cv2.imread(str(self.folder / about["file_name"])), cv2.COLOR_BGR2RGB)
         found = self.annotations[about["id"]]
-        boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in (a["bbox"] for a in found)], float).reshape(-1, 4)
+        boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in (a["bbox"] for a in found)], float).reshape(
+            -1, 4
+        )
         lens = json.loads((self.folder / about["calibration"]).read_text())["lens"]
         radius = circle_radius(lens)
         angles = np.array([a["upright_deg"] if a["nadir_deg"] > BELOW_CAMERA else np.nan for a in found])
-        return image, boxes, angles, np.array([a["ignore"] for a in found], bool), (lens["cx"], lens["cy"], radius)
+        return (
+            image,
+            boxes,
+            angles,
+            np.array([a["ignore"] for a in found], bool),
+            (lens["cx"], lens["cy"], radius),
+        )
 
     def sample(self, rng, size, tile_share=0.5):
         """One random sample: image (size × size × 3), boxes, ignore flags."""
         image, boxes, angles, ignore, (cx, cy, radius) = self.load(int(rng.integers(len(self.images))))
         quarter = int(rng.integers(4))
-        centre = np.array([[cx, cy, cx, cy]]) + 0.5                       # Boxes count from a pixel's corner.
-        _, _, (*boxes, centre), angles = turned(image.shape[1], image.shape[0], np.concatenate([boxes, centre]), angles, quarter)
+        centre = np.array([[cx, cy, cx, cy]]) + 0.5  # Boxes count from a pixel's corner.
+        _, _, (*boxes, centre), angles = turned(
+            image.shape[1], image.shape[0], np.concatenate([boxes, centre]), angles, quarter
+        )
         boxes, (cx, cy) = np.array(boxes).reshape(-1, 4), centre[:2]
         image = np.ascontiguousarray(np.rot90(image, quarter))
         ignore = ignore | (np.abs(angles) > UPRIGHT_LIMIT)
         usable = np.flatnonzero(~ignore)
         if rng.random() < tile_share or not len(usable):
             scale = size / (TILE_WIDTH * radius) * rng.uniform(0.9, 1.15)
-            x, y = cx - TILE_WIDTH * radius / 2 + rng.normal() * 0.05 * radius, cy - radius + rng.normal() * 0.04 * radius
+            x, y = (
+                cx - TILE_WIDTH * radius / 2 + rng.normal() * 0.05 * radius,
+                cy - radius + rng.normal() * 0.04 * radius,
+            )
         else:
             x0, y0, x1, y1 = boxes[rng.choice(usable)]
             scale = size * math.exp(rng.uniform(math.log(0.12), math.log(0.7))) / max(x1 - x0, y1 - y0)
             scale = min(scale, 4.0)
-            x, y = (x0 + x1) / 2 - size / scale * rng.uniform(0.25, 0.75), (y0 + y1) / 2 - size / scale * rng.uniform(0.25, 0.75)
+            x, y = (
+                (x0 + x1) / 2 - size / scale * rng.uniform(0.25, 0.75),
+                (y0 + y1) / 2 - size / scale * rng.uniform(0.25, 0.75),
+            )
         sample, boxes, ignore = cut(image, boxes, ignore, x, y, scale, size)
         if rng.random() < 0.5:
             sample = sample[:, ::-1]
@@ -107,13 +126,16 @@ class Pack:
     def __init__(self, folder):
         self.files = [np.load(p, allow_pickle=False) for p in sorted(Path(folder).glob("*.npz"))]
         self.where = [(f, k) for f in self.files for k in range(len(f["start"]) - 1)]
-        self.cache = {id(f): {name: f[name] for name in ("bytes", "start", "boxes", "ignore", "first")} for f in self.files}
+        self.cache = {
+            id(f): {name: f[name] for name in ("bytes", "start", "boxes", "ignore", "first")}
+            for f in self.files
+        }
 
     def sample(self, rng, size, tile_share=None):
         file, k = self.where[int(rng.integers(len(self.where)))]
         c = self.cache[id(file)]
-        image = cv2.imdecode(c["bytes"][c["start"][k]:c["start"][k + 1]], cv2.IMREAD_COLOR)[..., ::-1]
-        boxes, ignore = (c[name][c["first"][k]:c["first"][k + 1]] for name in ("boxes", "ignore"))
+        image = cv2.imdecode(c["bytes"][c["start"][k] : c["start"][k + 1]], cv2.IMREAD_COLOR)[..., ::-1]
+        boxes, ignore = (c[name][c["first"][k] : c["first"][k + 1]] for name in ("boxes", "ignore"))
         if image.shape[0] != size:
             boxes = boxes * (size / image.shape[0])
             image = cv2.resize(np.ascontiguousarray(image), (size, size), interpolation=cv2.INTER_AREA)
@@ -140,7 +162,14 @@ def pack(frames, out, count, size, seed, per_file=500, quality=88):
             boxes.append(b)
             ignore.append(i)
             first.append(first[-1] + len(b))
-        np.savez(path, bytes=np.concatenate(data), start=np.array(start), boxes=np.concatenate(boxes), ignore=np.concatenate(ignore), first=np.array(first))
+        np.savez(
+            path,
+            bytes=np.concatenate(data),
+            start=np.array(start),
+            boxes=np.concatenate(boxes),
+            ignore=np.concatenate(ignore),
+            first=np.array(first),
+        )
         print(f"{path}: {start[-1] / 1e6:.1f} MB", flush=True)
 
 

@@ -5,6 +5,7 @@
 `--source` is a folder of frames or of packed samples (samples.py). Stopped runs go on from `OUT/last.pt`. Results: the tuned
 weights (`tuned.onnx`, an exponential moving average) and their average with the given model (`averaged.onnx`).
 """
+
 import argparse
 import copy
 import math
@@ -31,8 +32,12 @@ def options_of():
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--size", type=int, default=416)
     parser.add_argument("--rate", type=float, default=4e-4, help="largest learning rate")
-    parser.add_argument("--frozen", type=int, default=4, help="convolutions at the input that keep their weights")
-    parser.add_argument("--tiles", type=float, default=0.5, help="share of whole quarter-turn tiles; the rest are crops")
+    parser.add_argument(
+        "--frozen", type=int, default=4, help="convolutions at the input that keep their weights"
+    )
+    parser.add_argument(
+        "--tiles", type=float, default=0.5, help="share of whole quarter-turn tiles; the rest are crops"
+    )
     parser.add_argument("--share", type=float, default=0.5, help="share of the tuned weights in the average")
     parser.add_argument("--seed", type=int, default=1_000_000)
     parser.add_argument("--threads", type=int, default=1)
@@ -56,11 +61,16 @@ def feeder(source, o, workers=1):
 
 
 def optimiser_of(network, o):
-    for key in list(network.weights)[:2 * o.frozen]:
+    for key in list(network.weights)[: 2 * o.frozen]:
         network.weights[key].requires_grad_(False)
     trained = [p for p in network.parameters() if p.requires_grad]
-    return torch.optim.AdamW([dict(params=[p for p in trained if p.dim() == 4], weight_decay=0.02),
-                              dict(params=[p for p in trained if p.dim() != 4], weight_decay=0.0)], lr=o.rate), trained
+    return torch.optim.AdamW(
+        [
+            dict(params=[p for p in trained if p.dim() == 4], weight_decay=0.02),
+            dict(params=[p for p in trained if p.dim() != 4], weight_decay=0.0),
+        ],
+        lr=o.rate,
+    ), trained
 
 
 def step_loss(network, batch, device):
@@ -71,8 +81,13 @@ def step_loss(network, batch, device):
     found = boxes_of(sides, points, strides)
     parts, weight = torch.zeros(3, device=device), 0.0
     for n in range(len(images)):
-        all_boxes, flags = torch.as_tensor(boxes[n], dtype=torch.float32, device=device), torch.as_tensor(ignore[n], device=device).bool()
-        loss, w = sample_losses(logits[n], sides[n], found[n], points, strides, all_boxes[~flags], all_boxes[flags])
+        all_boxes, flags = (
+            torch.as_tensor(boxes[n], dtype=torch.float32, device=device),
+            torch.as_tensor(ignore[n], device=device).bool(),
+        )
+        loss, w = sample_losses(
+            logits[n], sides[n], found[n], points, strides, all_boxes[~flags], all_boxes[flags]
+        )
         parts, weight = parts + loss, weight + w
     parts = parts / max(weight, 2.0)
     return parts[0] + 2 * parts[1] + 0.25 * parts[2], parts.detach()
@@ -94,7 +109,16 @@ def train(o):
         optimiser.load_state_dict(kept["optimiser"])
         step, spent = kept["step"], kept["spent"]
     batches, start, sums = feeder(source, o, max(1, o.threads - 1)), time.time() - spent, np.zeros(4)
-    save = lambda: torch.save(dict(network=network.state_dict(), mean=mean.state_dict(), optimiser=optimiser.state_dict(), step=step, spent=time.time() - start), last)
+    save = lambda: torch.save(
+        dict(
+            network=network.state_dict(),
+            mean=mean.state_dict(),
+            optimiser=optimiser.state_dict(),
+            step=step,
+            spent=time.time() - start,
+        ),
+        last,
+    )
     progress = lambda: max((time.time() - start) / (60 * o.minutes), step / o.steps if o.steps else 0.0)
     while progress() < 1:
         step += 1
@@ -113,8 +137,11 @@ def train(o):
         sums += (*parts.cpu().numpy(), 1)
         if step % 20 == 0:
             each = (time.time() - start) / step / o.batch
-            print(f"step {step}, score {sums[0] / sums[3]:.3f}, box {sums[1] / sums[3]:.3f}, sides {sums[2] / sums[3]:.3f}, "
-                  f"{each:.3f} s an image, {max(0, o.minutes - (time.time() - start) / 60):.0f} min left", flush=True)
+            print(
+                f"step {step}, score {sums[0] / sums[3]:.3f}, box {sums[1] / sums[3]:.3f}, sides {sums[2] / sums[3]:.3f}, "
+                f"{each:.3f} s an image, {max(0, o.minutes - (time.time() - start) / 60):.0f} min left",
+                flush=True,
+            )
             sums[:] = 0
         if step % 200 == 0:
             save()

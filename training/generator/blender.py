@@ -1,4 +1,5 @@
 """Blender through `bpy`: scene settings, materials, simple solids, the straight-down panoramic camera, and one render."""
+
 import contextlib
 import glob
 import math
@@ -6,7 +7,7 @@ import os
 
 os.environ["OPENCV_IO_ENABLE_OPENEXR"] = "1"
 import bpy
-import bmesh   # Exists only once bpy is imported.
+import bmesh  # Exists only once bpy is imported.
 import cv2
 import numpy as np
 from mathutils import Matrix
@@ -62,17 +63,49 @@ def image(path, data=False):
     return _images[path, data]
 
 
-def material(colour=(0.5, 0.5, 0.5), rough=0.6, texture=None, scale=1.0, emit=0.0, metal=0.0, tint=None, specular=0.3, uv=False,
-             hsv=None, alpha=False, normal=None, uv_scale=None):
+def material(
+    colour=(0.5, 0.5, 0.5),
+    rough=0.6,
+    texture=None,
+    scale=1.0,
+    emit=0.0,
+    metal=0.0,
+    tint=None,
+    specular=0.3,
+    uv=False,
+    hsv=None,
+    alpha=False,
+    normal=None,
+    uv_scale=None,
+):
     """A Principled material. `texture` is box-projected in metres unless `uv`; `hsv` and `tint` recolour it."""
-    key = (tuple(colour), rough, texture, scale, emit, metal, tint and tuple(tint), specular, uv, hsv, alpha, normal, uv_scale)
+    key = (
+        tuple(colour),
+        rough,
+        texture,
+        scale,
+        emit,
+        metal,
+        tint and tuple(tint),
+        specular,
+        uv,
+        hsv,
+        alpha,
+        normal,
+        uv_scale,
+    )
     if key in _materials:
         return _materials[key]
     made = bpy.data.materials.new("m")
     made.use_nodes = True
     tree = made.node_tree
     shader = tree.nodes["Principled BSDF"]
-    for name, value in (("Base Color", (*colour, 1)), ("Roughness", rough), ("Metallic", metal), ("Specular IOR Level", specular)):
+    for name, value in (
+        ("Base Color", (*colour, 1)),
+        ("Roughness", rough),
+        ("Metallic", metal),
+        ("Specular IOR Level", specular),
+    ):
         shader.inputs[name].default_value = value
     if texture:
         node, where = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeTexCoord")
@@ -139,8 +172,13 @@ class Builder:
 
     def _place(self, mesh, x, y, z, rx=0.0, ry=0.0, rz=0.0):
         item = link(bpy.data.objects.new("solid", mesh))
-        item.matrix_world = (self.matrix @ Matrix.Translation((x, y, z)) @ Matrix.Rotation(rz, 4, "Z")
-                             @ Matrix.Rotation(ry, 4, "Y") @ Matrix.Rotation(rx, 4, "X"))
+        item.matrix_world = (
+            self.matrix
+            @ Matrix.Translation((x, y, z))
+            @ Matrix.Rotation(rz, 4, "Z")
+            @ Matrix.Rotation(ry, 4, "Y")
+            @ Matrix.Rotation(rx, 4, "X")
+        )
         item.pass_index = self.index
         return item
 
@@ -149,31 +187,61 @@ class Builder:
             bmesh.ops.create_cube(b, size=1)
             bmesh.ops.scale(b, vec=(sx, sy, sz), verts=b.verts)
             if bevel and min(sx, sy, sz) > 2.2 * bevel:
-                bmesh.ops.bevel(b, geom=b.edges[:] + b.verts[:], offset=bevel, segments=1 if bevel < 0.03 else 3, affect="EDGES", profile=0.5)
+                bmesh.ops.bevel(
+                    b,
+                    geom=b.edges[:] + b.verts[:],
+                    offset=bevel,
+                    segments=1 if bevel < 0.03 else 3,
+                    affect="EDGES",
+                    profile=0.5,
+                )
 
-        mesh = self._mesh(made, ("box", sx, sy, sz, bevel), build, (lambda _: True) if bevel >= 0.03 else None)
+        mesh = self._mesh(
+            made, ("box", sx, sy, sz, bevel), build, (lambda _: True) if bevel >= 0.03 else None
+        )
         return self._place(mesh, x, y, z, rx, ry, rz)
 
-    def cylinder(self, radius, height, x, y, z, made, top=None, segments=16, rx=0.0, ry=0.0, scale=(1, 1), capped=True):
+    def cylinder(
+        self, radius, height, x, y, z, made, top=None, segments=16, rx=0.0, ry=0.0, scale=(1, 1), capped=True
+    ):
         def build(b):
-            bmesh.ops.create_cone(b, cap_ends=capped, segments=segments, radius1=radius, radius2=radius if top is None else top, depth=height)
+            bmesh.ops.create_cone(
+                b,
+                cap_ends=capped,
+                segments=segments,
+                radius1=radius,
+                radius2=radius if top is None else top,
+                depth=height,
+            )
             bmesh.ops.scale(b, vec=(*scale, 1), verts=b.verts)
 
-        mesh = self._mesh(made, ("cylinder", radius, height, top, segments, scale, capped), build, lambda p: len(p.vertices) == 4)
+        mesh = self._mesh(
+            made,
+            ("cylinder", radius, height, top, segments, scale, capped),
+            build,
+            lambda p: len(p.vertices) == 4,
+        )
         return self._place(mesh, x, y, z, rx, ry)
 
     def sphere(self, radius, x, y, z, made, scale=(1, 1, 1), lower=-1.0, rx=0.0):
         """An ellipsoid; what lies below `lower` (in radii) is cut off."""
+
         def build(b):
             bmesh.ops.create_uvsphere(b, u_segments=16, v_segments=10, radius=radius)
             bmesh.ops.delete(b, geom=[v for v in b.verts if v.co.z < lower * radius], context="VERTS")
             bmesh.ops.scale(b, vec=scale, verts=b.verts)
 
-        return self._place(self._mesh(made, ("sphere", radius, scale, lower), build, lambda _: True), x, y, z, rx)
+        return self._place(
+            self._mesh(made, ("sphere", radius, scale, lower), build, lambda _: True), x, y, z, rx
+        )
 
     def plane(self, sx, sy, x, y, z, made, rx=0.0, ry=0.0, rz=0.0):
         mesh = bpy.data.meshes.new("plane")
-        mesh.from_pydata([(-sx / 2, -sy / 2, 0), (sx / 2, -sy / 2, 0), (sx / 2, sy / 2, 0), (-sx / 2, sy / 2, 0)], [], [(0, 1, 2, 3)])
+        mesh.from_pydata(
+            [(-sx / 2, -sy / 2, 0), (sx / 2, -sy / 2, 0), (sx / 2, sy / 2, 0), (-sx / 2, sy / 2, 0)],
+            [],
+            [(0, 1, 2, 3)],
+        )
         mesh.uv_layers.new().data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
         mesh.materials.append(made)
         return self._place(mesh, x, y, z, rx, ry, rz)
@@ -253,7 +321,12 @@ def render(scene, samples, scratch, border=None, threshold=0.08):
         tree.nodes.clear()
         layers, out = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("CompositorNodeOutputFile")
         out.name = "passes"
-        out.format.file_format, out.format.color_mode, out.format.color_depth, out.format.exr_codec = "OPEN_EXR", "RGBA", "32", "NONE"
+        out.format.file_format, out.format.color_mode, out.format.color_depth, out.format.exr_codec = (
+            "OPEN_EXR",
+            "RGBA",
+            "32",
+            "NONE",
+        )
         out.file_slots.clear()
         for name in ("Image", "Depth", "IndexOB"):
             out.file_slots.new(name)

@@ -3,6 +3,7 @@
 Frame of the body: x to the person's left, y up, z to the front, in decimetres. `Person` is in metres: x, -z, y, so that
 the person faces the negative y axis with the feet on z = 0.
 """
+
 import gzip
 import json
 import os
@@ -12,14 +13,34 @@ from pathlib import Path
 
 import numpy as np
 
-JOINTS = ("root", "spine02", "head", "neck01", "foot.L", "foot.R", "wrist.L", "wrist.R", "upperleg01.L", "upperleg01.R",
-          "lowerleg01.L", "lowerleg01.R", "upperarm01.L", "upperarm01.R")
-NEXT_JOINT = {"upperarm01": "lowerarm01", "lowerarm01": "wrist", "upperleg01": "lowerleg01", "lowerleg01": "foot"}
+JOINTS = (
+    "root",
+    "spine02",
+    "head",
+    "neck01",
+    "foot.L",
+    "foot.R",
+    "wrist.L",
+    "wrist.R",
+    "upperleg01.L",
+    "upperleg01.R",
+    "lowerleg01.L",
+    "lowerleg01.R",
+    "upperarm01.L",
+    "upperarm01.R",
+)
+NEXT_JOINT = {
+    "upperarm01": "lowerarm01",
+    "lowerarm01": "wrist",
+    "upperleg01": "lowerleg01",
+    "lowerleg01": "foot",
+}
 
 
 @dataclass
 class Part:
     """One textured mesh of a person: skin, hair, cloth, shoe or eye."""
+
     kind: str
     vertices: np.ndarray
     faces: list
@@ -59,6 +80,7 @@ def load_obj(path):
 @dataclass
 class Garment:
     """A MakeHuman proxy (.mhclo): each vertex hangs on three vertices of the body."""
+
     scales: dict
     anchors: np.ndarray
     weights: np.ndarray
@@ -78,7 +100,9 @@ def _material_textures(folder, material):
             words = line.split()
             if len(words) > 1 and words[0] in ("diffuseTexture", "normalmapTexture"):
                 path = Path(os.path.normpath((folder / material).parent / words[1]))
-                found[words[0]] = str(path) if path.exists() else None   # Textures of unsettled licence are absent.
+                found[words[0]] = (
+                    str(path) if path.exists() else None
+                )  # Textures of unsettled licence are absent.
     return found.get("diffuseTexture"), found.get("normalmapTexture")
 
 
@@ -116,7 +140,18 @@ def load_garment(path):
     rows, folder = np.array(rows), Path(path).parent
     _, uv, faces, uv_faces, _ = load_obj(folder / obj)
     texture, normal_map = _material_textures(folder, material) if material else (None, None)
-    return Garment(scales, rows[:, :3].astype(int), rows[:, 3:6], rows[:, 6:9], hidden, uv, faces, uv_faces, texture, normal_map)
+    return Garment(
+        scales,
+        rows[:, :3].astype(int),
+        rows[:, 3:6],
+        rows[:, 6:9],
+        hidden,
+        uv,
+        faces,
+        uv_faces,
+        texture,
+        normal_map,
+    )
 
 
 def rotation_between(a, b):
@@ -157,7 +192,9 @@ class Body:
                     skin[i, self.index[name]] = weight
         skin[skin.sum(1) == 0, self.index["root"]] = 1
         self.skin = skin / skin.sum(1)[:, None]
-        self.body_vertices = np.unique(np.concatenate([np.array(f) for f, g in zip(self.faces, self.groups) if g == "body"]))
+        self.body_vertices = np.unique(
+            np.concatenate([np.array(f) for f, g in zip(self.faces, self.groups) if g == "body"])
+        )
 
     def _add_bone(self, name):
         if name in self.names:
@@ -186,7 +223,12 @@ class Body:
                 for weight, w in _shares(who["weight"], "minweight", "averageweight", "maxweight").items():
                     tail = f"{who['sex']}-{age}-{muscle}-{weight}"
                     names.append((f"macrodetails/universal-{tail}", age_share * m * w))
-                    names.append((f"macrodetails/proportions/{tail}-idealproportions", age_share * m * w * who["ideal"]))
+                    names.append(
+                        (
+                            f"macrodetails/proportions/{tail}-idealproportions",
+                            age_share * m * w * who["ideal"],
+                        )
+                    )
             for name, share in names:
                 if abs(share) > 1e-3:
                     indices, moves = self.target(name)
@@ -224,7 +266,9 @@ class Body:
                 child = heads[self.index[f"{NEXT_JOINT[bone]}.{side}"]] - heads[i]
                 turn = rotation_between(turn @ child, value) @ turn
             rotations[i] = turn
-            posed[i] = heads[i] if parent < 0 else rotations[parent] @ (heads[i] - heads[parent]) + posed[parent]
+            posed[i] = (
+                heads[i] if parent < 0 else rotations[parent] @ (heads[i] - heads[parent]) + posed[parent]
+            )
         return np.array(rotations), posed
 
     def build(self, who, pose) -> Person:
@@ -248,20 +292,54 @@ class Body:
             fitted = np.einsum("vk,vkj->vj", g.weights, vertices[g.anchors]) + g.offsets * scale
             weights = np.maximum(np.einsum("vk,vkb->vb", g.weights, self.skin[g.anchors]), 0)
             weights /= np.maximum(weights.sum(1), 1e-9)[:, None]
-            parts.append(Part(kind, skinned(fitted, weights), g.faces, g.uv_faces, g.uv, g.texture, g.normal_map, share(fitted)))
+            parts.append(
+                Part(
+                    kind,
+                    skinned(fitted, weights),
+                    g.faces,
+                    g.uv_faces,
+                    g.uv,
+                    g.texture,
+                    g.normal_map,
+                    share(fitted),
+                )
+            )
             hidden |= g.hidden
         posed_skin = skinned(vertices, self.skin)
-        shown = [i for i, (f, g) in enumerate(zip(self.faces, self.groups)) if g == "body" and not all(v in hidden for v in f)]
+        shown = [
+            i
+            for i, (f, g) in enumerate(zip(self.faces, self.groups))
+            if g == "body" and not all(v in hidden for v in f)
+        ]
         eyes = [i for i, g in enumerate(self.groups) if g in ("helper-l-eye", "helper-r-eye")]
         for kind, chosen in (("skin", shown), ("eye", eyes)):
             used = np.unique(np.concatenate([np.array(self.faces[i]) for i in chosen]))
             renumber = {v: k for k, v in enumerate(used)}
-            parts.append(Part(kind, posed_skin[used], [[renumber[v] for v in self.faces[i]] for i in chosen],
-                              [self.uv_faces[i] for i in chosen], self.uv, None, None, share(vertices[used])))
-        origin = np.array([posed[self.index["root"]][0], min(p.vertices[:, 1].min() for p in parts), posed[self.index["root"]][2]])
+            parts.append(
+                Part(
+                    kind,
+                    posed_skin[used],
+                    [[renumber[v] for v in self.faces[i]] for i in chosen],
+                    [self.uv_faces[i] for i in chosen],
+                    self.uv,
+                    None,
+                    None,
+                    share(vertices[used]),
+                )
+            )
+        origin = np.array(
+            [
+                posed[self.index["root"]][0],
+                min(p.vertices[:, 1].min() for p in parts),
+                posed[self.index["root"]][2],
+            ]
+        )
         metres = who["stature"] / (high - low)
         convert = lambda points: ((points - origin) * metres)[:, [0, 2, 1]] * (1, -1, 1)
         for part in parts:
             part.vertices = convert(part.vertices)
-        return Person(parts, {name: convert(posed[self.index[name]][None])[0] for name in JOINTS},
-                      {name: rotations[self.index[name]] for name in ("head", "spine02")})
+        return Person(
+            parts,
+            {name: convert(posed[self.index[name]][None])[0] for name in JOINTS},
+            {name: rotations[self.index[name]] for name in ("head", "spine02")},
+        )

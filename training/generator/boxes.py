@@ -3,6 +3,7 @@
 An oriented box is [cx, cy, w, h, angle]: `angle` in degrees clockwise from upright, -90 to 90, `h` along the person.
 Pixel i covers [i, i + 1), so that a mask of one pixel at (3, 5) has the box [3, 5, 1, 1] and the centre (3.5, 5.5).
 """
+
 import math
 
 import cv2
@@ -24,7 +25,9 @@ def wrap_upright(angle):
 
 def _outline(mask):
     """The centres of all outline pixels of a mask (n × 2)."""
-    outlines, _ = cv2.findContours(np.ascontiguousarray(mask, np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outlines, _ = cv2.findContours(
+        np.ascontiguousarray(mask, np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+    )
     return np.concatenate(outlines)[:, 0].astype(np.float32) + 0.5
 
 
@@ -35,7 +38,13 @@ def box_along(mask, angle):
     points = _outline(mask)
     u, v = points @ across, points @ along
     centre = (u.min() + u.max()) / 2 * across + (v.min() + v.max()) / 2 * along
-    return [float(centre[0]), float(centre[1]), float(np.ptp(u)) + 1, float(np.ptp(v)) + 1, wrap_upright(angle)]
+    return [
+        float(centre[0]),
+        float(centre[1]),
+        float(np.ptp(u)) + 1,
+        float(np.ptp(v)) + 1,
+        wrap_upright(angle),
+    ]
 
 
 def oriented_box(mask, upright):
@@ -52,7 +61,7 @@ def person_boxes(ids, index, upright):
     if box is None:
         return None
     x, y, w, h = box
-    part = mask[y:y + h, x:x + w]
+    part = mask[y : y + h, x : x + w]
     oriented = oriented_box(part, upright)
     oriented[0] += x
     oriented[1] += y

@@ -2,6 +2,7 @@
 
 Occlusion follows from the distances along the rays. The frame is composed with `SUPERSAMPLING` subpixels a side and averaged.
 """
+
 import math
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ DEPTH_TOLERANCE = 0.03
 @dataclass
 class Composition:
     """A frame before the camera's look: linear colour, distance, ids, and the unoccluded pixels of every person."""
+
     colour: np.ndarray
     distance: np.ndarray
     ids: np.ndarray
@@ -45,19 +47,33 @@ def fill_depth(depth, alpha):
 
 
 def remap(image, x, y, method):
-    return cv2.remap(image, x.astype(np.float32), y.astype(np.float32), method, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+    return cv2.remap(
+        image,
+        x.astype(np.float32),
+        y.astype(np.float32),
+        method,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=0,
+    )
 
 
 def _window(calibration, placement, crop, factor):
     """The subpixel rectangle of the frame that a crop can reach."""
     h, w = crop.alpha.shape
     v = placement.view
-    edge = np.concatenate([np.stack(np.meshgrid(np.linspace(0, w, 24), (0, h)), -1).reshape(-1, 2), np.stack(np.meshgrid((0, w), np.linspace(0, h, 24)), -1).reshape(-1, 2)])
+    edge = np.concatenate(
+        [
+            np.stack(np.meshgrid(np.linspace(0, w, 24), (0, h)), -1).reshape(-1, 2),
+            np.stack(np.meshgrid((0, w), np.linspace(0, h, 24)), -1).reshape(-1, 2),
+        ]
+    )
     px, py = edge[:, 0] + v["left"], edge[:, 1] + v["top"]
     theta, phi = np.hypot(px, py) / v["focal"], np.arctan2(px, -py) + placement.azimuth
     rays = np.stack([np.sin(theta) * np.sin(phi), np.sin(theta) * np.cos(phi), -np.cos(theta)], 1)
     camera = rays @ calibration.rotation.T
-    if (np.arctan2(np.hypot(camera[:, 0], camera[:, 1]), camera[:, 2]) > calibration.lens["max_theta"] + 0.9).all():
+    if (
+        np.arctan2(np.hypot(camera[:, 0], camera[:, 1]), camera[:, 2]) > calibration.lens["max_theta"] + 0.9
+    ).all():
         return None
     pixels, _ = calibration.project(rays * 10 + (0, 0, calibration.height_m))
     low, high = np.floor(pixels.min(0)) - 2, np.ceil(pixels.max(0)) + 3
@@ -66,7 +82,9 @@ def _window(calibration, placement, crop, factor):
         low, high = np.minimum(low, nadir), np.maximum(high, nadir)
     x0, y0 = (max(0, int(v)) for v in low)
     x1, y1 = min(calibration.width, int(high[0])), min(calibration.height, int(high[1]))
-    return None if x0 >= x1 or y0 >= y1 else (slice(y0 * factor, y1 * factor), slice(x0 * factor, x1 * factor))
+    return (
+        None if x0 >= x1 or y0 >= y1 else (slice(y0 * factor, y1 * factor), slice(x0 * factor, x1 * factor))
+    )
 
 
 def _sample_crop(crop, placement, theta, phi, frame_focal):
@@ -79,8 +97,12 @@ def _sample_crop(crop, placement, theta, phi, frame_focal):
     if shrink > 1.2:
         colour, alpha = (cv2.GaussianBlur(a, (0, 0), 0.4 * shrink) for a in (colour, alpha))
     depth = fill_depth(crop.depth, crop.alpha) * placement.scale
-    return (remap(colour, x, y, cv2.INTER_LINEAR), remap(alpha, x, y, cv2.INTER_LINEAR), remap(depth, x, y, cv2.INTER_NEAREST),
-            remap(crop.index, x, y, cv2.INTER_NEAREST))
+    return (
+        remap(colour, x, y, cv2.INTER_LINEAR),
+        remap(alpha, x, y, cv2.INTER_LINEAR),
+        remap(depth, x, y, cv2.INTER_NEAREST),
+        remap(crop.index, x, y, cv2.INTER_NEAREST),
+    )
 
 
 def _count(mask, factor):
@@ -126,11 +148,27 @@ def compose(calibration, room, placements, rng=None, sun=False, factor=SUPERSAMP
             number += 1
             own = whole & (index == person["index"])
             ids[window][own & visible] = number
-            persons.append(dict(number=number, in_crop=_count(own, factor), placement=placement, about=person,
-                                crop_share=min(1.0, np.count_nonzero((crop.index == person["index"]) & (crop.alpha > 0.5)) / crop.view["whole"][str(person["index"])])))
+            persons.append(
+                dict(
+                    number=number,
+                    in_crop=_count(own, factor),
+                    placement=placement,
+                    about=person,
+                    crop_share=min(
+                        1.0,
+                        np.count_nonzero((crop.index == person["index"]) & (crop.alpha > 0.5))
+                        / crop.view["whole"][str(person["index"])],
+                    ),
+                )
+            )
     if sun and rng is not None:
         colour = sun_patches(rng, about, rays, distance, colour)
-    return Composition(_average(colour, factor), distance[factor // 2::factor, factor // 2::factor], ids[factor // 2::factor, factor // 2::factor], persons)
+    return Composition(
+        _average(colour, factor),
+        distance[factor // 2 :: factor, factor // 2 :: factor],
+        ids[factor // 2 :: factor, factor // 2 :: factor],
+        persons,
+    )
 
 
 def _average(image, factor):

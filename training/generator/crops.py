@@ -1,4 +1,5 @@
 """Readers of what was rendered: person crops and rooms, each one packed file."""
+
 import json
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ def decode_radiance(stored):
 @dataclass
 class Crop:
     """One view of a piece: premultiplied linear colour, alpha, distance in metres, person index, and its place."""
+
     colour: np.ndarray
     alpha: np.ndarray
     depth: np.ndarray
@@ -38,8 +40,13 @@ class CropFile:
 
     def crop(self, k):
         with np.load(self.path) as a:
-            return Crop(decode_radiance(a[f"colour{k}"]), a[f"alpha{k}"].astype(np.float32) / 255, a[f"depth{k}"].astype(np.float32) / 1000,
-                        a[f"index{k}"], self.views[k])
+            return Crop(
+                decode_radiance(a[f"colour{k}"]),
+                a[f"alpha{k}"].astype(np.float32) / 255,
+                a[f"depth{k}"].astype(np.float32) / 1000,
+                a[f"index{k}"],
+                self.views[k],
+            )
 
     def cloud(self):
         """Points of the piece's surfaces about its centre, for shadows."""

@@ -1,4 +1,5 @@
 """Persons as Blender objects: meshes with recoloured clothes, and what they wear and carry beyond MakeHuman's clothes."""
+
 import math
 
 import bpy
@@ -66,18 +67,36 @@ class Figure:
             elif kind == "eye":
                 made = material((0.5, 0.45, 0.4), 0.3)
             elif kind == "hair":
-                made = (material(texture=texture, uv=True, rough=0.45, tint=colours["hair"], alpha=True) if texture
-                        else material(tuple(0.25 * c for c in colours["hair"]), 0.6))
+                made = (
+                    material(texture=texture, uv=True, rough=0.45, tint=colours["hair"], alpha=True)
+                    if texture
+                    else material(tuple(0.25 * c for c in colours["hair"]), 0.6)
+                )
             else:
                 g = colours["top"] if upper else colours["bottom"]
                 if kind == "cloth" and (g["fabric"] is not None or texture is None):
                     tone = hsv_to_rgb(g["hue"], min(1.0, g["saturation"]), 2.2 * g["value"])
-                    made = material(texture=f"{textures}/fabric{g['fabric'] or 0}.png", uv=True, rough=0.85, specular=0.2, tint=tone, uv_scale=3.0,
-                                    normal=normal)
+                    made = material(
+                        texture=f"{textures}/fabric{g['fabric'] or 0}.png",
+                        uv=True,
+                        rough=0.85,
+                        specular=0.2,
+                        tint=tone,
+                        uv_scale=3.0,
+                        normal=normal,
+                    )
                 elif texture is None:
                     made = material((0.05, 0.05, 0.05), 0.6)
                 else:
-                    made = material(texture=texture, uv=True, rough=0.85, specular=0.2, hsv=(g["hue"], g["saturation"], g["value"]), alpha=True, normal=normal)
+                    made = material(
+                        texture=texture,
+                        uv=True,
+                        rough=0.85,
+                        specular=0.2,
+                        hsv=(g["hue"], g["saturation"], g["value"]),
+                        alpha=True,
+                        normal=normal,
+                    )
             self.object.material_slots[i].material = made
 
     def wear_extras(self, colours, palette):
@@ -87,8 +106,16 @@ class Figure:
         b = Builder(matrix=self.matrix, index=index)
         tone = {name: material(tuple(colours["extra"][i]), 0.8) for i, name in enumerate(EXTRAS)}
         for i, name in enumerate(EXTRAS):
-            if name in ("skirt", "long_coat", "scarf", "backpack") and (fabric := colours["extra_fabric"]) is not None:
-                tone[name] = material(texture=f"{palette.textures}/fabric{fabric}.png", rough=0.9, scale=0.5, tint=tuple(2 * c for c in colours["extra"][i]))
+            if (
+                name in ("skirt", "long_coat", "scarf", "backpack")
+                and (fabric := colours["extra_fabric"]) is not None
+            ):
+                tone[name] = material(
+                    texture=f"{palette.textures}/fabric{fabric}.png",
+                    rough=0.9,
+                    scale=0.5,
+                    tint=tuple(2 * c for c in colours["extra"][i]),
+                )
         upright = self.person.rotations["spine02"]
         back = upright @ np.array([0, 0, -1.0])
         back = np.array([back[0], -back[2], back[1]])
@@ -105,28 +132,91 @@ class Figure:
             elif name == "shoulder_bag":
                 side = 1 if colours["extra"][0][0] > 0.2 else -1
                 hip = j["upperleg01.L" if side > 0 else "upperleg01.R"]
-                b.box(0.1 * k, 0.32 * k, 0.24 * k, hip[0] + side * 0.16 * k, hip[1], hip[2] + 0.02, tone[name], bevel=0.03)
+                b.box(
+                    0.1 * k,
+                    0.32 * k,
+                    0.24 * k,
+                    hip[0] + side * 0.16 * k,
+                    hip[1],
+                    hip[2] + 0.02,
+                    tone[name],
+                    bevel=0.03,
+                )
             elif name in ("cap", "hood", "helmet"):
                 size = {"cap": 0.1, "hood": 0.12, "helmet": 0.118}[name] * (0.9 + 0.1 * k)
-                b.sphere(size, head[0], head[1], min(head[2] + 0.02, top - size * 0.75), tone[name], scale=(0.92, 1.12, 1.0), lower=-0.05 if name != "hood" else -0.75)
+                b.sphere(
+                    size,
+                    head[0],
+                    head[1],
+                    min(head[2] + 0.02, top - size * 0.75),
+                    tone[name],
+                    scale=(0.92, 1.12, 1.0),
+                    lower=-0.05 if name != "hood" else -0.75,
+                )
                 if name == "cap":
-                    b.box(0.14, 0.1, 0.012, head[0], head[1] - 0.14, min(head[2] + 0.03, top - 0.07), tone[name], bevel=0)
+                    b.box(
+                        0.14,
+                        0.1,
+                        0.012,
+                        head[0],
+                        head[1] - 0.14,
+                        min(head[2] + 0.03, top - 0.07),
+                        tone[name],
+                        bevel=0,
+                    )
             elif name == "scarf":
-                b.cylinder(0.085 * k, 0.09 * k, *(j["neck01"] + np.array([0, -0.02, 0.03]) * k), tone[name], top=0.075 * k)
+                b.cylinder(
+                    0.085 * k,
+                    0.09 * k,
+                    *(j["neck01"] + np.array([0, -0.02, 0.03]) * k),
+                    tone[name],
+                    top=0.075 * k,
+                )
             elif name in ("skirt", "long_coat") and not sitting:
                 hips = (j["upperleg01.L"] + j["upperleg01.R"]) / 2
                 low = hips[2] * (0.5 if colours["extra"][1][0] > 0.2 else 0.2)
                 stride = float(np.hypot(*(j["foot.L"] - j["foot.R"])[:2]))
-                low = max(low, 0.42 * hips[2]) if stride > 0.45 * k else low             # Long skirts do not allow long steps.
+                low = (
+                    max(low, 0.42 * hips[2]) if stride > 0.45 * k else low
+                )  # Long skirts do not allow long steps.
                 feet = max(0.16, 0.12 + 0.42 * stride * (1 - low / hips[2]))
                 high = hips[2] + 0.12 * k
-                b.cylinder(feet * 1.35 * k, high - low, hips[0], hips[1] - 0.02, (high + low) / 2, tone[name], top=0.16 * k, segments=20, scale=(1, 0.85), capped=False)
+                b.cylinder(
+                    feet * 1.35 * k,
+                    high - low,
+                    hips[0],
+                    hips[1] - 0.02,
+                    (high + low) / 2,
+                    tone[name],
+                    top=0.16 * k,
+                    segments=20,
+                    scale=(1, 0.85),
+                    capped=False,
+                )
             elif name == "vest":
                 mid = shoulder * 0.5 + (j["upperleg01.L"] + j["upperleg01.R"]) / 4
-                b.cylinder(0.185 * k, 0.5 * k, *mid, material((0.75, 0.55 * colours["extra"][2][0] + 0.2, 0.02), 0.7), top=0.2 * k, scale=(1.0, 0.75), rx=-lean, capped=False)
+                b.cylinder(
+                    0.185 * k,
+                    0.5 * k,
+                    *mid,
+                    material((0.75, 0.55 * colours["extra"][2][0] + 0.2, 0.02), 0.7),
+                    top=0.2 * k,
+                    scale=(1.0, 0.75),
+                    rx=-lean,
+                    capped=False,
+                )
             elif name == "box":
                 hands = (j["wrist.L"] + j["wrist.R"]) / 2
-                Builder(matrix=self.matrix).box(0.36, 0.28, 0.26, hands[0], hands[1] - 0.12, hands[2] + 0.05, material((0.42, 0.3, 0.18), 0.9), bevel=0.005)
+                Builder(matrix=self.matrix).box(
+                    0.36,
+                    0.28,
+                    0.26,
+                    hands[0],
+                    hands[1] - 0.12,
+                    hands[2] + 0.05,
+                    material((0.42, 0.3, 0.18), 0.9),
+                    bevel=0.005,
+                )
             elif name == "suitcase":
                 hand = j["wrist.L"]
                 s = Builder(matrix=self.matrix @ Matrix.Translation((hand[0] + 0.15, hand[1] + 0.3, 0)))

@@ -2,6 +2,7 @@
 
 Boxes are axis-parallel and oriented, of the visible pixels. Finished frames are skipped.
 """
+
 import json
 import math
 
@@ -12,11 +13,11 @@ from .boxes import person_boxes
 from .compose import compose
 from .crops import CropFile, RoomFile
 from .geometry import Calibration, camera_rotation, make_lens
+from .indices import DISTRACTORS
 from .look import apply_look, random_look
 from .placement import place
 from .progress import Progress
 
-DISTRACTORS = {241: "chair_with_jacket", 242: "mannequin", 243: "picture_of_person", 244: "coats", 245: "pram"}
 SMALLEST_AREA, SMALLEST_SHARE = 40, 0.2
 """Persons with fewer visible pixels, or a smaller visible share, are marked `ignore`."""
 
@@ -34,7 +35,9 @@ def random_camera(rng, room):
         tilt = abs(float(rng.normal() * math.radians(3)))
     if all_round and rng.random() < 0.7:
         tilt = math.radians(float(rng.uniform(5, 62)))
-    rotation = camera_rotation(float(rng.uniform(0, 2 * math.pi)), tilt, float(rng.normal() * 0.02) if tilt else 0.0)
+    rotation = camera_rotation(
+        float(rng.uniform(0, 2 * math.pi)), tilt, float(rng.normal() * 0.02) if tilt else 0.0
+    )
     cx, cy = ((s - 1) / 2 + float(rng.normal() * 0.004 * diameter) for s in (width, height))
     return Calibration(width, height, lens, cx, cy, rotation, room["camera_height"])
 
@@ -60,10 +63,25 @@ def annotate(composition, calibration):
         placement, about = person["placement"], person["about"]
         x, y = placement.to_world(np.array([[about["x"], about["y"], 0.0]]))[0][:2]
         ignore = boxes["area"] < SMALLEST_AREA or share < SMALLEST_SHARE
-        out.append(dict(category_id=1, iscrowd=0, ignore=bool(ignore), bbox=boxes["bbox"], obb=[round(v, 2) for v in boxes["obb"]], area=boxes["area"],
-                        id_value=person["number"], visible_fraction=round(share, 3), upright_deg=round(upright, 2),
-                        nadir_deg=round(math.degrees(math.atan2(math.hypot(x, y), calibration.height_m)), 2), floor_xy=[round(float(x), 3), round(float(y), 3)],
-                        pose=about["kind"], child=about["child"], piece=placement.file.about["piece"], source=placement.file.about["seed"]))
+        out.append(
+            dict(
+                category_id=1,
+                iscrowd=0,
+                ignore=bool(ignore),
+                bbox=boxes["bbox"],
+                obb=[round(v, 2) for v in boxes["obb"]],
+                area=boxes["area"],
+                id_value=person["number"],
+                visible_fraction=round(share, 3),
+                upright_deg=round(upright, 2),
+                nadir_deg=round(math.degrees(math.atan2(math.hypot(x, y), calibration.height_m)), 2),
+                floor_xy=[round(float(x), 3), round(float(y), 3)],
+                pose=about["kind"],
+                child=about["child"],
+                piece=placement.file.about["piece"],
+                source=placement.file.about["seed"],
+            )
+        )
     return out
 
 
@@ -72,7 +90,11 @@ def distractors(ids):
     out = []
     for value, name in DISTRACTORS.items():
         count, labels, stats, _ = cv2.connectedComponentsWithStats((ids == value).astype(np.uint8))
-        out += [dict(kind=name, bbox=[int(v) for v in stats[k][:4]]) for k in range(1, count) if stats[k][4] >= SMALLEST_AREA]
+        out += [
+            dict(kind=name, bbox=[int(v) for v in stats[k][:4]])
+            for k in range(1, count)
+            if stats[k][4] >= SMALLEST_AREA
+        ]
     return out
 
 
@@ -89,9 +111,21 @@ def make_frame(seed, rooms, files, folder, split):
     cv2.imwrite(str(folder / "images" / f"{name}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, look["quality"]])
     cv2.imwrite(str(folder / "ids" / f"{name}.png"), composition.ids)
     (folder / "calibrations" / f"{name}.json").write_text(json.dumps(calibration.native(name), indent=1))
-    record = dict(image=dict(id=seed, file_name=f"images/{name}.jpg", id_mask=f"ids/{name}.png", calibration=f"calibrations/{name}.json",
-                             width=calibration.width, height=calibration.height, room=room.about["seed"], split=split, look=look),
-                  annotations=annotate(composition, calibration), distractors=distractors(composition.ids))
+    record = dict(
+        image=dict(
+            id=seed,
+            file_name=f"images/{name}.jpg",
+            id_mask=f"ids/{name}.png",
+            calibration=f"calibrations/{name}.json",
+            width=calibration.width,
+            height=calibration.height,
+            room=room.about["seed"],
+            split=split,
+            look=look,
+        ),
+        annotations=annotate(composition, calibration),
+        distractors=distractors(composition.ids),
+    )
     (folder / "records" / f"{name}.json").write_text(json.dumps(record))
 
 
@@ -104,7 +138,9 @@ def write_annotations(folder):
         for a in record["annotations"]:
             annotations.append(dict(a, id=len(annotations) + 1, image_id=record["image"]["id"]))
         others += [dict(d, image_id=record["image"]["id"]) for d in record["distractors"]]
-    content = dict(images=images, annotations=annotations, distractors=others, categories=[dict(id=1, name="person")])
+    content = dict(
+        images=images, annotations=annotations, distractors=others, categories=[dict(id=1, name="person")]
+    )
     (folder / "annotations.json").write_text(json.dumps(content))
     return len(images), len(annotations)
 
@@ -116,8 +152,12 @@ def make_frames(work, first_seed, count, split="train"):
     listed = lambda kind: [p for p in sorted((work / kind / split).glob("*.npz")) if "partial" not in p.name]
     rooms, files = listed("rooms"), [CropFile(p) for p in listed("persons")]
     if not rooms or not files:
-        raise SystemExit(f"{work} has {len(rooms)} rooms and {len(files)} person files of the split {split}; render both first")
-    todo = [s for s in range(first_seed, first_seed + count) if not (folder / "records" / f"{s}.json").exists()]
+        raise SystemExit(
+            f"{work} has {len(rooms)} rooms and {len(files)} person files of the split {split}; render both first"
+        )
+    todo = [
+        s for s in range(first_seed, first_seed + count) if not (folder / "records" / f"{s}.json").exists()
+    ]
     progress = Progress(f"frames {split}", len(todo), work / "log" / f"frames-{split}.log")
     for seed in todo:
         make_frame(seed, rooms, files, folder, split)

@@ -1,10 +1,11 @@
 """Furniture and clutter as simple solids: used in rooms and in the pieces that persons are rendered with."""
+
 import math
 
 import bpy
 import numpy as np
 
-from .blender import Builder, link, material
+from .blender import link, material
 
 
 class Palette:
@@ -12,13 +13,17 @@ class Palette:
 
     def __init__(self, rng, textures, split="train"):
         r, self.rng, self.textures = rng, rng, str(textures)
-        self.wood = [material(texture=f"{textures}/wood{i}.png", rough=0.45, scale=1.2) for i in r.permutation(6)[:3]]
+        self.wood = [
+            material(texture=f"{textures}/wood{i}.png", rough=0.45, scale=1.2) for i in r.permutation(6)[:3]
+        ]
         self.metal = material((0.55, 0.55, 0.57), 0.35, metal=0.8)
         self.black, self.white = material((0.03, 0.03, 0.035), 0.5), material((0.75, 0.75, 0.74), 0.4)
         self.cloth = material(self.colour(0.02, 0.5), 0.9)
         self.cloth2 = material(self.colour(0.02, 0.6), 0.9)
         self.seat = [self.cloth, self.black, self.wood[1], self.white, self.cloth2][r.integers(5)]
-        self.chair_style = str(r.choice(["four", "office", "shell", "arm"] if split == "train" else ["shell", "stool", "office"]))
+        self.chair_style = str(
+            r.choice(["four", "office", "shell", "arm"] if split == "train" else ["shell", "stool", "office"])
+        )
 
     def colour(self, low=0.03, high=0.7):
         grey, share = self.rng.uniform(low, high), self.rng.uniform(0, 0.8)
@@ -29,7 +34,9 @@ class Palette:
 
     def fabric(self, split="train"):
         low, high = (0, 24) if split == "train" else (24, 32)
-        return self.texture(f"fabric{self.rng.integers(low, high)}", rough=0.9, scale=0.6, tint=self.colour(0.1, 1.2))
+        return self.texture(
+            f"fabric{self.rng.integers(low, high)}", rough=0.9, scale=0.6, tint=self.colour(0.1, 1.2)
+        )
 
 
 def chair(b, p, seat_height=0.45, style=None, jacket=False):
@@ -42,7 +49,9 @@ def chair(b, p, seat_height=0.45, style=None, jacket=False):
             b.cylinder(0.03, seat_height - 0.1, 0, 0, seat_height / 2, p.metal)
             for k in range(5):
                 a = k * 1.2566
-                b.box(0.3, 0.04, 0.03, 0.15 * math.cos(a), 0.15 * math.sin(a), 0.06, p.black, bevel=0.005, rz=a)
+                b.box(
+                    0.3, 0.04, 0.03, 0.15 * math.cos(a), 0.15 * math.sin(a), 0.06, p.black, bevel=0.005, rz=a
+                )
         else:
             for x in (-0.2, 0.2):
                 for y in (-0.2, 0.2):
@@ -58,7 +67,17 @@ def chair(b, p, seat_height=0.45, style=None, jacket=False):
     else:
         legs = p.metal if style == "shell" else p.wood[1]
         b.box(0.43, 0.43, 0.045, 0, 0, seat_height - 0.022, m, bevel=0.018)
-        b.box(0.42, 0.035, 0.36 if style == "shell" else 0.42, 0, 0.215, seat_height + 0.24, m, bevel=0.012, rx=-0.14)
+        b.box(
+            0.42,
+            0.035,
+            0.36 if style == "shell" else 0.42,
+            0,
+            0.215,
+            seat_height + 0.24,
+            m,
+            bevel=0.012,
+            rx=-0.14,
+        )
         for x in (-0.18, 0.18):
             for y in (-0.18, 0.19):
                 b.cylinder(0.016, seat_height - 0.04, x, y, (seat_height - 0.04) / 2, legs, segments=8)
@@ -80,7 +99,16 @@ def table(b, p, width, depth, height=0.74, round_=False, top=None, things=None):
         b.box(width, depth, 0.03, 0, 0, height - 0.015, top, bevel=0.008)
         for x in (-1, 1):
             for y in (-1, 1):
-                b.box(0.045, 0.045, height - 0.03, x * (width / 2 - 0.06), y * (depth / 2 - 0.06), (height - 0.03) / 2, p.metal, bevel=0)
+                b.box(
+                    0.045,
+                    0.045,
+                    height - 0.03,
+                    x * (width / 2 - 0.06),
+                    y * (depth / 2 - 0.06),
+                    (height - 0.03) / 2,
+                    p.metal,
+                    bevel=0,
+                )
     things_on(b, p, width, depth, height, int(p.rng.integers(0, 6)) if things is None else things)
 
 
@@ -88,7 +116,11 @@ def things_on(b, p, width, depth, height, count):
     """Paper, cups, laptops, books, plates, bags and screens on a table top."""
     r = p.rng
     for _ in range(count):
-        x, y, a = float(r.uniform(-0.4, 0.4)) * width, float(r.uniform(-0.4, 0.4)) * depth * 0.8, float(r.uniform(0, 6.28))
+        x, y, a = (
+            float(r.uniform(-0.4, 0.4)) * width,
+            float(r.uniform(-0.4, 0.4)) * depth * 0.8,
+            float(r.uniform(0, 6.28)),
+        )
         kind = r.integers(7)
         if kind == 0:
             b.plane(0.21, 0.297, x, y, height + 0.002, p.white, rz=a)
@@ -96,7 +128,9 @@ def things_on(b, p, width, depth, height, count):
             b.cylinder(0.035, 0.09, x, y, height + 0.045, material(p.colour(), 0.4), top=0.04)
         elif kind == 2:
             b.box(0.33, 0.23, 0.015, x, y, height + 0.008, p.metal, bevel=0, rz=a)
-            b.child(x, y, math.degrees(a)).box(0.33, 0.01, 0.22, 0, 0.12, height + 0.11, p.black, bevel=0, rx=-0.25)
+            b.child(x, y, math.degrees(a)).box(
+                0.33, 0.01, 0.22, 0, 0.12, height + 0.11, p.black, bevel=0, rx=-0.25
+            )
         elif kind == 3:
             b.box(0.17, 0.24, 0.025, x, y, height + 0.012, material(p.colour(), 0.6), bevel=0, rz=a)
         elif kind == 4:
@@ -137,22 +171,41 @@ def shelf(b, p, width=None, height=None, y=0.18):
             if r.random() < 0.8 and x + thick < w / 2 - 0.02:
                 v = float(r.choice([0.06, 0.15, 0.3, 0.5, 0.65]))
                 tone = [(1, 1, 1), (1.25, 0.8, 0.7), (0.75, 0.9, 1.3), (0.8, 1.1, 0.8)][r.integers(4)]
-                b.box(thick * 0.95, float(r.uniform(0.15, 0.27)), tall, x + thick / 2, y + 0.02, i * h / levels + tall / 2 + 0.01,
-                      material(tuple(round(v * k, 3) for k in tone), 0.7), bevel=0)
+                b.box(
+                    thick * 0.95,
+                    float(r.uniform(0.15, 0.27)),
+                    tall,
+                    x + thick / 2,
+                    y + 0.02,
+                    i * h / levels + tall / 2 + 0.01,
+                    material(tuple(round(v * k, 3) for k in tone), 0.7),
+                    bevel=0,
+                )
             x += thick
 
 
 def plant(b, p):
     r = p.rng
-    b.cylinder(0.13, 0.3, 0, 0, 0.15, p.white if r.random() < 0.5 else material((0.4, 0.2, 0.12), 0.8), top=0.18)
+    b.cylinder(
+        0.13, 0.3, 0, 0, 0.15, p.white if r.random() < 0.5 else material((0.4, 0.2, 0.12), 0.8), top=0.18
+    )
     tall, vertices, faces = float(r.uniform(0.4, 1.3)), [], []
     for _ in range(int(r.integers(30, 70))):
-        a, share, long, wide = r.uniform(0, 6.28), r.uniform(0.2, 1), float(r.uniform(0.25, 0.5)), float(r.uniform(0.04, 0.1))
+        a, share, long, wide = (
+            r.uniform(0, 6.28),
+            r.uniform(0.2, 1),
+            float(r.uniform(0.25, 0.5)),
+            float(r.uniform(0.04, 0.1)),
+        )
         rise, base = r.uniform(0.2, 1.2), len(vertices)
         d = np.array([math.cos(a) * math.cos(rise), math.sin(a) * math.cos(rise), math.sin(rise)])
         n = np.array([-math.sin(a), math.cos(a), 0])
         for u, w in ((0.05, 0.1), (0.35, 1), (0.7, 0.8), (1, 0.02)):
-            centre = np.array([0, 0, 0.3 + tall * share * 0.6]) + d * long * u - np.array([0, 0, 0.375 * long * u * u])
+            centre = (
+                np.array([0, 0, 0.3 + tall * share * 0.6])
+                + d * long * u
+                - np.array([0, 0, 0.375 * long * u * u])
+            )
             vertices += [tuple(centre + n * wide * w), tuple(centre - n * wide * w)]
         faces += [(base + 2 * k, base + 2 * k + 1, base + 2 * k + 3, base + 2 * k + 2) for k in range(3)]
     mesh = bpy.data.meshes.new("plant")
@@ -186,7 +239,16 @@ def trolley(b, p):
         b.box(0.5, 0.012, 0.012, 0, -0.4 + 0.1 * k, 0.48, p.metal, bevel=0)
     b.box(0.55, 0.04, 0.04, 0, 0.48, 1.0, material(p.colour(), 0.5), bevel=0.01)
     for _ in range(int(p.rng.integers(0, 7))):
-        b.box(0.15, 0.2, 0.2, float(p.rng.uniform(-0.15, 0.15)), float(p.rng.uniform(-0.3, 0.3)), 0.6, material(p.colour(), 0.7), bevel=0.01)
+        b.box(
+            0.15,
+            0.2,
+            0.2,
+            float(p.rng.uniform(-0.15, 0.15)),
+            float(p.rng.uniform(-0.3, 0.3)),
+            0.6,
+            material(p.colour(), 0.7),
+            bevel=0.01,
+        )
 
 
 def coat_rack(b, p, coats=None):
@@ -212,15 +274,34 @@ def clothes_rail(b, p):
     b.cylinder(0.015, w, 0, 0, 1.5, p.metal, segments=8, ry=math.pi / 2)
     for k in range(int(w / 0.09)):
         long = float(p.rng.uniform(0.55, 1.0))
-        b.box(0.05, 0.42, long, -w / 2 + 0.06 + 0.09 * k, 0, 1.42 - long / 2, p.fabric() if k % 3 == 0 else material(p.colour(), 0.9),
-              bevel=0.02, rz=float(p.rng.normal() * 0.1))
+        b.box(
+            0.05,
+            0.42,
+            long,
+            -w / 2 + 0.06 + 0.09 * k,
+            0,
+            1.42 - long / 2,
+            p.fabric() if k % 3 == 0 else material(p.colour(), 0.9),
+            bevel=0.02,
+            rz=float(p.rng.normal() * 0.1),
+        )
 
 
 def boxes(b, p):
     z = 0.0
     for _ in range(int(p.rng.integers(1, 5))):
         h = float(p.rng.uniform(0.2, 0.45))
-        b.box(0.45, 0.38, h, float(p.rng.uniform(-0.04, 0.04)), 0, z + h / 2, material((0.45, 0.32, 0.2), 0.9), bevel=0.004, rz=float(p.rng.uniform(-0.2, 0.2)))
+        b.box(
+            0.45,
+            0.38,
+            h,
+            float(p.rng.uniform(-0.04, 0.04)),
+            0,
+            z + h / 2,
+            material((0.45, 0.32, 0.2), 0.9),
+            bevel=0.004,
+            rz=float(p.rng.uniform(-0.2, 0.2)),
+        )
         z += h
 
 

@@ -5,6 +5,7 @@ World: z up, the camera at (0, 0, height). Nadir angle `theta`: 0 straight down,
 camera at that place, however turned or tilted, is a remapping of the panorama, and turning a person about the vertical is
 a rotation of the panorama. Pixel centres are integers; boxes cover whole pixels, corner-origin.
 """
+
 import math
 from dataclasses import dataclass, field
 
@@ -23,7 +24,9 @@ def radius_of(lens, theta):
         return 2 * f * np.tan(theta / 2)
     if model == "kannala_brandt":
         return f * theta * (1 + sum(k * theta ** (2 * i + 2) for i, k in enumerate(lens["k"])))
-    raise ValueError(f"lens model {model!r} is unknown; use equidistant, equisolid, stereographic or kannala_brandt")
+    raise ValueError(
+        f"lens model {model!r} is unknown; use equidistant, equisolid, stereographic or kannala_brandt"
+    )
 
 
 def theta_of(lens, radius):
@@ -38,7 +41,12 @@ def make_lens(rng, circle_radius):
     max_theta = math.radians(float(rng.choice([85, 90, 90, 92, 95]) + rng.uniform(-1.5, 1.5)))
     lens = dict(model=model, focal=1.0, max_theta=max_theta)
     if model == "kannala_brandt":
-        lens["k"] = [float(x) for x in np.array([rng.uniform(-0.03, 0.03), rng.uniform(-0.008, 0.004), rng.uniform(-0.001, 0.002), 0.0])]
+        lens["k"] = [
+            float(x)
+            for x in np.array(
+                [rng.uniform(-0.03, 0.03), rng.uniform(-0.008, 0.004), rng.uniform(-0.001, 0.002), 0.0]
+            )
+        ]
     lens["focal"] = float(circle_radius / radius_of(lens, max_theta))
     return lens
 
@@ -62,6 +70,7 @@ def circle_radius(native_lens):
 @dataclass
 class Calibration:
     """A camera of one frame: lens, principal point, rotation and height."""
+
     width: int
     height: int
     lens: dict
@@ -76,7 +85,9 @@ class Calibration:
         rays = (np.atleast_2d(points) - np.array([0, 0, self.height_m])) @ self.rotation.T
         rho = np.hypot(rays[:, 0], rays[:, 1])
         theta = np.arctan2(rho, rays[:, 2])
-        scale = radius_of(self.lens, np.minimum(theta, self.lens["max_theta"] + 0.05)) / np.maximum(rho, 1e-12)
+        scale = radius_of(self.lens, np.minimum(theta, self.lens["max_theta"] + 0.05)) / np.maximum(
+            rho, 1e-12
+        )
         return np.stack([self.cx + scale * rays[:, 0], self.cy + scale * rays[:, 1]], 1), theta
 
     def rays(self, x, y):
@@ -93,8 +104,12 @@ class Calibration:
         if lens["model"] == "kannala_brandt":
             lens["fx"] = lens["fy"] = lens.pop("focal")
         up = self.rotation @ np.array([0, 0, 1.0])
-        return dict(id=identifier, image=dict(width=self.width, height=self.height), lens=dict(lens, cx=self.cx, cy=self.cy),
-                    mount=dict(world_up=[round(float(x), 9) for x in up], height_m=round(self.height_m, 4)))
+        return dict(
+            id=identifier,
+            image=dict(width=self.width, height=self.height),
+            lens=dict(lens, cx=self.cx, cy=self.cy),
+            mount=dict(world_up=[round(float(x), 9) for x in up], height_m=round(self.height_m, 4)),
+        )
 
 
 def nadir_angles(rays):
@@ -117,5 +132,8 @@ def panorama_of(points, camera_height, focal):
 def panorama_bounds(points, camera_height, focal, margin=3):
     """Whole-pixel bounds (left, top, right, bottom), relative to the nadir, of world points in the panorama."""
     at = panorama_of(points, camera_height, focal)
-    (left, top), (right, bottom) = np.floor(at.min(0)).astype(int) - margin, np.ceil(at.max(0)).astype(int) + margin + 1
+    (left, top), (right, bottom) = (
+        np.floor(at.min(0)).astype(int) - margin,
+        np.ceil(at.max(0)).astype(int) + margin + 1,
+    )
     return int(left), int(top), int(right), int(bottom)

@@ -1,4 +1,5 @@
 """Camera heights: one declaration for persons and rooms, so that every room finds crops that fit."""
+
 import math
 
 import numpy as np

@@ -1,4 +1,5 @@
 """Irradiance on the floor from area lights and ambient light: brings persons and rooms to the same exposure."""
+
 import numpy as np
 
 

@@ -1,4 +1,5 @@
 """The camera's look on a composed frame: light of the night, glare, optics, sensor, tone and JPEG. Numpy and OpenCV only."""
+
 import cv2
 import numpy as np
 
@@ -11,12 +12,24 @@ KINDS = {"day": 0.58, "dim": 0.14, "infrared": 0.18, "monochrome": 0.10}
 def random_look(rng):
     kind = str(rng.choice(list(KINDS), p=list(KINDS.values())))
     night = kind in ("dim", "infrared")
-    return dict(kind=kind, exposure=float(np.exp(rng.normal() * 0.35)), contrast=float(rng.uniform(0.8, 1.35)), vignette=float(rng.uniform(0, 0.6)),
-                blur=float(rng.choice([0.3, 0.5, 0.8, 1.2]) * rng.uniform(0.7, 1.2)), rim_blur=float(rng.uniform(0, 1.4)),
-                fringe=float(rng.uniform(-0.0015, 0.0015)), glare=float(rng.choice([0, 0.02, 0.08])), veil=float(rng.choice([0, 0, 0.02, 0.06])),
-                noise=float(rng.uniform(0.004, 0.014) * (rng.uniform(1.5, 4) if night else 1)), balance=[float(x) for x in rng.uniform(0.88, 1.12, 2)],
-                saturation=float(rng.uniform(0.55, 1.15)), sharpen=float(rng.choice([0, 0.3, 0.8])), quality=int(rng.integers(38, 96)),
-                detail=float(rng.choice([1, 1, 1, 0.75, 0.55])), sun=bool(kind == "day" and rng.random() < 0.3))
+    return dict(
+        kind=kind,
+        exposure=float(np.exp(rng.normal() * 0.35)),
+        contrast=float(rng.uniform(0.8, 1.35)),
+        vignette=float(rng.uniform(0, 0.6)),
+        blur=float(rng.choice([0.3, 0.5, 0.8, 1.2]) * rng.uniform(0.7, 1.2)),
+        rim_blur=float(rng.uniform(0, 1.4)),
+        fringe=float(rng.uniform(-0.0015, 0.0015)),
+        glare=float(rng.choice([0, 0.02, 0.08])),
+        veil=float(rng.choice([0, 0, 0.02, 0.06])),
+        noise=float(rng.uniform(0.004, 0.014) * (rng.uniform(1.5, 4) if night else 1)),
+        balance=[float(x) for x in rng.uniform(0.88, 1.12, 2)],
+        saturation=float(rng.uniform(0.55, 1.15)),
+        sharpen=float(rng.choice([0, 0.3, 0.8])),
+        quality=int(rng.integers(38, 96)),
+        detail=float(rng.choice([1, 1, 1, 0.75, 0.55])),
+        sun=bool(kind == "day" and rng.random() < 0.3),
+    )
 
 
 def infrared(rng, colour, distance, height):
@@ -56,7 +69,11 @@ def apply_look(rng, look, composition, calibration):
         colour = infrared(rng, colour, composition.distance, calibration.height_m)
     elif look["kind"] == "monochrome":
         colour = np.repeat(colour.mean(2, keepdims=True), 3, 2)
-    light = colour * (exposure_of(colour, inside & (composition.distance > 0)) * look["exposure"] * (0.45 if look["kind"] == "dim" else 1))
+    light = colour * (
+        exposure_of(colour, inside & (composition.distance > 0))
+        * look["exposure"]
+        * (0.45 if look["kind"] == "dim" else 1)
+    )
     if look["glare"]:
         bright = np.clip(light - 0.9, 0, 12)
         small = cv2.resize(bright, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)

@@ -3,6 +3,7 @@
 A crop is a rectangle of the panorama (geometry.py) about the piece at azimuth 0: linear colour with alpha, distance, and the
 index of the person (0: furniture). One file a body group; every view has another outfit. Finished files are skipped.
 """
+
 import json
 import math
 import os
@@ -49,29 +50,48 @@ def light_rig(rng, kind, camera):
     ambient, lights = float(rng.uniform(0.25, 0.7)), []
     if kind == "infrared":
         ambient = 0.03
-        bl.area_light(*camera, 0.1, 0.1, 60 * (camera[0] ** 2 + camera[1] ** 2 + camera[2] ** 2), (1, 1, 1),
-                      rotation=(math.atan2(math.hypot(camera[0], camera[1]), camera[2]), 0, math.atan2(-camera[0], camera[1]) + math.pi))
+        bl.area_light(
+            *camera,
+            0.1,
+            0.1,
+            60 * (camera[0] ** 2 + camera[1] ** 2 + camera[2] ** 2),
+            (1, 1, 1),
+            rotation=(
+                math.atan2(math.hypot(camera[0], camera[1]), camera[2]),
+                0,
+                math.atan2(-camera[0], camera[1]) + math.pi,
+            ),
+        )
     else:
         z = float(rng.uniform(2.6, 6))
         for _ in range(int(rng.integers(1, 5))):
-            x, y, power = float(rng.uniform(-3, 3)), float(rng.uniform(-3, 3)), float(rng.uniform(15, 60)) * (z / 2.7) ** 2
+            x, y, power = (
+                float(rng.uniform(-3, 3)),
+                float(rng.uniform(-3, 3)),
+                float(rng.uniform(15, 60)) * (z / 2.7) ** 2,
+            )
             bl.area_light(x, y, z, 0.6, 1.0, power, tint)
             lights.append((x, y, z, power))
     bl.ambient(ambient, tint)
     total = floor_irradiance(lights, ambient)
     if kind in ("side", "sun"):
         data = bpy.data.lights.new("sun", "SUN")
-        data.energy, data.angle = float(rng.uniform(2, 5) if kind == "sun" else rng.uniform(0.8, 2)), math.radians(0.6 if kind == "sun" else 40)
+        data.energy, data.angle = (
+            float(rng.uniform(2, 5) if kind == "sun" else rng.uniform(0.8, 2)),
+            math.radians(0.6 if kind == "sun" else 40),
+        )
         item = bl.link(bpy.data.objects.new("sun", data))
         item.rotation_euler = (float(rng.uniform(0.5, 1.2)), 0, float(rng.uniform(0, 6.28)))
     if kind == "infrared":
-        total = math.pi * ambient + 60 / math.pi                         # On a surface that faces the lamp beside the lens.
+        total = math.pi * ambient + 60 / math.pi  # On a surface that faces the lamp beside the lens.
     return total
 
 
 def whole_area(points, triangles):
     """Pixels that a body covers when nothing stands before it: what the visible share is counted from."""
-    fine = 4 if np.ptp(points, axis=0).max() < 120 else 2                # Filled triangles include the pixels that they touch.
+    fine = (
+        4 if np.ptp(points, axis=0).max() < 120 else 2
+    )  # Filled triangles include the pixels that they touch.
     low = np.floor(points.min(0)) - 1
     size = (np.ceil(points.max(0) - low).astype(int) + 2) * fine
     mask, corners = np.zeros(size[::-1], np.uint8), np.rint((points - low) * fine * 16).astype(np.int32)
@@ -87,13 +107,19 @@ def render_group(scene, body, seed, work, split, scratch, samples):
     textures = work / "textures"
     maker = Maker(body, rng, work / "assets", textures, split)
     name = make_piece(maker)
-    ground = bl.Builder().plane(60, 60, 0, 0, 0, bl.material(tuple(float(x) for x in rng.uniform(0.15, 0.5) * np.ones(3)), 0.9))
+    ground = bl.Builder().plane(
+        60, 60, 0, 0, 0, bl.material(tuple(float(x) for x in rng.uniform(0.15, 0.5) * np.ones(3)), 0.9)
+    )
     ground.visible_camera = False
     for figure in maker.figures:
         figure.wear_extras(random_colours(rng, figure.who, split), maker.palette)
     points = np.concatenate([figure.world_vertices() for figure in maker.figures])
-    solids = [np.array(o.matrix_world @ v.co) for o in bpy.data.objects if o.type == "MESH" and o != ground and len(o.data.vertices) < 2000
-              for v in o.data.vertices]
+    solids = [
+        np.array(o.matrix_world @ v.co)
+        for o in bpy.data.objects
+        if o.type == "MESH" and o != ground and len(o.data.vertices) < 2000
+        for v in o.data.vertices
+    ]
     outline = np.concatenate([points] + ([np.array(solids)] if solids else []))
     arrays, views = {}, []
     for k in range(VIEWS):
@@ -102,7 +128,9 @@ def render_group(scene, body, seed, work, split, scratch, samples):
         height, distance, bearing = random_viewpoint(rng, k)
         light = str(rng.choice(list(LIGHTS), p=list(LIGHTS.values())))
         at = (distance * math.sin(bearing), -distance * math.cos(bearing), height)
-        turn = np.array([[math.cos(bearing), math.sin(bearing), 0], [-math.sin(bearing), math.cos(bearing), 0], [0, 0, 1]]).T
+        turn = np.array(
+            [[math.cos(bearing), math.sin(bearing), 0], [-math.sin(bearing), math.cos(bearing), 0], [0, 0, 1]]
+        ).T
         turned = outline @ turn + (0, distance, 0)
         size = max(np.ptp(np.array(panorama_bounds(turned, height, 1000.0, 0)).reshape(2, 2), axis=0)) / 1000
         focal = float(np.clip(LONGEST_SIDE / size, 220, 400))
@@ -119,16 +147,48 @@ def render_group(scene, body, seed, work, split, scratch, samples):
         arrays[f"alpha{k}"] = np.rint(np.clip(rgba[..., 3], 0, 1) * 255).astype(np.uint8)
         arrays[f"depth{k}"] = np.clip(np.rint(depth * 1000), 0, 65535).astype(np.uint16)
         arrays[f"index{k}"] = index
-        views.append(dict(camera_height=height, distance=distance, bearing=bearing, focal=focal, light=light, left=border[0] - (side - 1) / 2,
-                          top=border[1] - (side - 1) / 2,
-                          whole={f.index: whole_area(panorama_of(f.world_vertices() @ turn + (0, distance, 0), height, focal), f.triangles)
-                                 for f in maker.figures}))
+        views.append(
+            dict(
+                camera_height=height,
+                distance=distance,
+                bearing=bearing,
+                focal=focal,
+                light=light,
+                left=border[0] - (side - 1) / 2,
+                top=border[1] - (side - 1) / 2,
+                whole={
+                    f.index: whole_area(
+                        panorama_of(f.world_vertices() @ turn + (0, distance, 0), height, focal), f.triangles
+                    )
+                    for f in maker.figures
+                },
+            )
+        )
     step = max(1, len(outline) // 1500)
     arrays["cloud"] = outline[rng.permutation(len(outline))[::step]].astype(np.float16)
-    about = dict(seed=seed, split=split, piece=name, views=views, reach=float(np.hypot(outline[:, 0], outline[:, 1]).max()),
-                 persons=[dict(index=f.index, kind=f.kind, arms=f.arms, child=f.who["child"], stature=f.who["stature"], sex=f.who["sex"],
-                               suit=f.who["suit"], extras=f.who["extras"], x=float(f.matrix.translation.x), y=float(f.matrix.translation.y),
-                               heading=f.degrees) for f in maker.figures])
+    about = dict(
+        seed=seed,
+        split=split,
+        piece=name,
+        views=views,
+        reach=float(np.hypot(outline[:, 0], outline[:, 1]).max()),
+        persons=[
+            dict(
+                index=f.index,
+                kind=f.kind,
+                arms=f.arms,
+                child=f.who["child"],
+                stature=f.who["stature"],
+                sex=f.who["sex"],
+                suit=f.who["suit"],
+                extras=f.who["extras"],
+                x=float(f.matrix.translation.x),
+                y=float(f.matrix.translation.y),
+                heading=f.degrees,
+            )
+            for f in maker.figures
+        ],
+    )
     arrays["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     return arrays
 

@@ -2,6 +2,7 @@
 
 Each maker returns the figures. Figures have object index 1, 2, …; furniture has index 0.
 """
+
 import math
 
 from . import furniture as f
@@ -22,7 +23,9 @@ class Maker:
     def person(self, kind, x=0.0, y=0.0, degrees=0.0, arms=None, seat_height=None, child=None):
         child = self.rng.random() < 0.14 if child is None else child
         who = random_person(self.rng, self.assets, self.split, child)
-        figure = add_figure(self.body, self.rng, who, kind, len(self.figures) + 1, x, y, degrees, arms, seat_height)
+        figure = add_figure(
+            self.body, self.rng, who, kind, len(self.figures) + 1, x, y, degrees, arms, seat_height
+        )
         self.figures.append(figure)
         return figure
 
@@ -33,7 +36,12 @@ class Maker:
             if self.rng.random() < 0.5 and seat < 0.44:
                 figure.lift(0.44 - seat)
                 seat = 0.44
-            f.chair(Builder(x, y, degrees + float(self.rng.normal() * 5)), self.palette, seat, jacket=self.rng.random() < 0.2)
+            f.chair(
+                Builder(x, y, degrees + float(self.rng.normal() * 5)),
+                self.palette,
+                seat,
+                jacket=self.rng.random() < 0.2,
+            )
         return figure
 
 
@@ -51,7 +59,13 @@ def at_desk(m):
     """A person who sits at a table with things on it; sometimes a second one opposite."""
     width, depth = float(m.rng.uniform(0.8, 1.7)), float(m.rng.uniform(0.6, 0.9))
     m.seated(0, 0, 0, "table")
-    f.table(Builder(float(m.rng.normal() * 0.1), -0.3 - depth / 2, 0), m.palette, width, depth, things=int(m.rng.integers(1, 6)))
+    f.table(
+        Builder(float(m.rng.normal() * 0.1), -0.3 - depth / 2, 0),
+        m.palette,
+        width,
+        depth,
+        things=int(m.rng.integers(1, 6)),
+    )
     if m.rng.random() < 0.35:
         m.seated(0.0, -0.6 - depth, 180)
 
@@ -75,7 +89,13 @@ def sofa_group(m):
     f.sofa(Builder(), m.palette, seats)
     for k in range(seats):
         if k == 0 or m.rng.random() < 0.6:
-            m.person("sitting", (k + 0.5) * 0.68 - 0.34 * seats, -0.08, float(m.rng.normal() * 10), seat_height=0.455)
+            m.person(
+                "sitting",
+                (k + 0.5) * 0.68 - 0.34 * seats,
+                -0.08,
+                float(m.rng.normal() * 10),
+                seat_height=0.455,
+            )
 
 
 def pair(m):
@@ -103,11 +123,22 @@ def with_trolley(m):
 
 def behind_counter(m):
     f.counter(Builder(0, -0.62, 0), m.palette, float(m.rng.uniform(1.0, 2.0)))
-    m.person("standing", 0, 0, float(m.rng.normal() * 20), str(m.rng.choice(["carry", "none", "table", "point"])))
+    m.person(
+        "standing", 0, 0, float(m.rng.normal() * 20), str(m.rng.choice(["carry", "none", "table", "point"]))
+    )
 
 
-MAKERS = {single: 0.40, seated: 0.12, at_desk: 0.12, table_group: 0.09, sofa_group: 0.05, pair: 0.12, with_pram: 0.03, with_trolley: 0.04,
-          behind_counter: 0.03}
+MAKERS = {
+    single: 0.40,
+    seated: 0.12,
+    at_desk: 0.12,
+    table_group: 0.09,
+    sofa_group: 0.05,
+    pair: 0.12,
+    with_pram: 0.03,
+    with_trolley: 0.04,
+    behind_counter: 0.03,
+}
 
 
 def make_piece(m):
@@ -120,4 +151,8 @@ def make_piece(m):
 
 def reach(figures):
     """How far the piece reaches from its centre on the floor, in metres."""
-    return max(float(abs(figure.world_vertices()[:, :2]).max()) for figure in figures) + 0.1 if figures else math.nan
+    return (
+        max(float(abs(figure.world_vertices()[:, :2]).max()) for figure in figures) + 0.1
+        if figures
+        else math.nan
+    )

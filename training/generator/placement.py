@@ -1,4 +1,5 @@
 """Chooses crops for a room and places them on its floor without collisions. Numpy only."""
+
 import math
 from dataclasses import dataclass
 
@@ -38,7 +39,10 @@ class Placement:
         b, a, d = self.view["bearing"], self.azimuth, self.view["distance"]
         x = math.cos(b) * points[:, 0] + math.sin(b) * points[:, 1]
         y = -math.sin(b) * points[:, 0] + math.cos(b) * points[:, 1] + d
-        return np.stack([x * math.cos(a) + y * math.sin(a), -x * math.sin(a) + y * math.cos(a), points[:, 2]], 1) * self.scale
+        return (
+            np.stack([x * math.cos(a) + y * math.sin(a), -x * math.sin(a) + y * math.cos(a), points[:, 2]], 1)
+            * self.scale
+        )
 
 
 def free(room, x, y, margin):
@@ -48,7 +52,10 @@ def free(room, x, y, margin):
         return False
     for ox, oy, hx, hy, degrees in room["occupied"]:
         t = math.radians(-degrees)
-        u, v = (x - ox) * math.cos(t) - (y - oy) * math.sin(t), (x - ox) * math.sin(t) + (y - oy) * math.cos(t)
+        u, v = (
+            (x - ox) * math.cos(t) - (y - oy) * math.sin(t),
+            (x - ox) * math.sin(t) + (y - oy) * math.cos(t),
+        )
         if abs(u) < hx + margin and abs(v) < hy + margin:
             return False
     return True
@@ -56,12 +63,18 @@ def free(room, x, y, margin):
 
 def place(rng, room, files, wanted, prefer_light=None, tries=400):
     """Placements with about `wanted` persons. Each file is used at most twice in a frame."""
-    fits = [(f, k) for f in files for k, v in enumerate(f.views)
-            if abs(math.log(room["camera_height"] / v["camera_height"])) < math.log(LARGEST_SCALE)]
+    fits = [
+        (f, k)
+        for f in files
+        for k, v in enumerate(f.views)
+        if abs(math.log(room["camera_height"] / v["camera_height"])) < math.log(LARGEST_SCALE)
+    ]
     if prefer_light is not None:
         chosen = [(f, k) for f, k in fits if f.views[k]["light"] == prefer_light]
         fits = chosen * 4 + fits if len(chosen) > 3 else fits
-    angles = np.array([math.degrees(math.atan2(f.views[k]["distance"], f.views[k]["camera_height"])) for f, k in fits])
+    angles = np.array(
+        [math.degrees(math.atan2(f.views[k]["distance"], f.views[k]["camera_height"])) for f, k in fits]
+    )
     placed, taken, used, persons = [], [], {}, 0
     for _ in range(tries if fits else 0):
         if persons >= wanted:
@@ -71,7 +84,7 @@ def place(rng, room, files, wanted, prefer_light=None, tries=400):
         if used.get(id(file), 0) >= 2 or persons + len(file.about["persons"]) > wanted + 3:
             continue
         azimuth = float(rng.uniform(0, 2 * math.pi))
-        if taken and rng.random() < 0.3:                                  # Near another one: people stand in groups and occlude.
+        if taken and rng.random() < 0.3:  # Near another one: people stand in groups and occlude.
             azimuth = math.atan2(taken[-1][0], taken[-1][1]) + float(rng.normal() * 0.25)
         candidate = Placement(file, k, azimuth, room["camera_height"] / file.views[k]["camera_height"])
         x, y = candidate.position

@@ -1,4 +1,5 @@
 """Pictures of persons for posters and screens: our own persons before a plain ground. Detectors take such pictures for people."""
+
 import math
 import os
 import tempfile
@@ -23,7 +24,11 @@ def _camera(scene, rng, close):
     data = bpy.data.cameras.new("camera")
     item = bl.link(bpy.data.objects.new("camera", data))
     item.location = (float(rng.uniform(-0.6, 0.6)), -2.6 if close else -3.6, 1.5 if close else 1.1)
-    item.rotation_euler = (math.pi / 2 - float(rng.uniform(-0.02, 0.08)), 0, math.atan2(item.location.x, -item.location.y))
+    item.rotation_euler = (
+        math.pi / 2 - float(rng.uniform(-0.02, 0.08)),
+        0,
+        math.atan2(item.location.x, -item.location.y),
+    )
     data.angle = math.radians(38)
     scene.camera = item
     scene.render.resolution_x, scene.render.resolution_y = 288, 384
@@ -41,7 +46,12 @@ def render_portraits(work, first_seed, count, threads=1):
             bl.clear()
             maker = Maker(body, rng, work / "assets", work / "textures", split)
             for i in range(int(rng.choice([1, 1, 2, 3]))):
-                figure = maker.person(str(rng.choice(["standing", "walking", "standing"])), (i - 0.5) * 0.55 if i else 0.0, 0.0, float(rng.normal() * 25))
+                figure = maker.person(
+                    str(rng.choice(["standing", "walking", "standing"])),
+                    (i - 0.5) * 0.55 if i else 0.0,
+                    0.0,
+                    float(rng.normal() * 25),
+                )
                 colours = random_colours(rng, figure.who, split)
                 figure.wear_extras(colours, maker.palette)
                 figure.colour(colours, work / "textures")
@@ -49,7 +59,9 @@ def render_portraits(work, first_seed, count, threads=1):
             bl.ambient(0.6, (1, 1, 1))
             _camera(scene, rng, rng.random() < 0.5)
             rgba, _, _ = bl.render(scene, 12, scratch)
-            ground = np.linspace(0, 1, 384)[:, None, None] * rng.uniform(0.02, 0.8, 3) + rng.uniform(0.02, 0.5, 3)
+            ground = np.linspace(0, 1, 384)[:, None, None] * rng.uniform(0.02, 0.8, 3) + rng.uniform(
+                0.02, 0.5, 3
+            )
             picture = display(rgba[..., :3] + ground * (1 - rgba[..., 3:]), 1.0)
             if rng.random() < 0.5:
                 y = int(rng.choice([20, 330]))

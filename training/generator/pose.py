@@ -3,17 +3,28 @@
 A pose maps a bone to ("direction", vector), ("relative", rotation) or ("absolute", rotation), in the body's frame:
 x to the person's left, y up, z to the front.
 """
+
 import numpy as np
 
-KINDS = {"standing": 0.34, "walking": 0.30, "sitting": 0.24, "bending": 0.05, "crouching": 0.04, "reaching": 0.03}
+KINDS = {
+    "standing": 0.34,
+    "walking": 0.30,
+    "sitting": 0.24,
+    "bending": 0.05,
+    "crouching": 0.04,
+    "reaching": 0.03,
+}
 SIDES = ((1, "L"), (-1, "R"))
 
 
 def turn(axis, degrees):
     t = np.deg2rad(degrees)
     c, s = np.cos(t), np.sin(t)
-    return {"x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]), "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
-            "z": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])}[axis]
+    return {
+        "x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
+        "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
+        "z": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]),
+    }[axis]
 
 
 def _walking_legs(pose, rng):
@@ -21,7 +32,10 @@ def _walking_legs(pose, rng):
     for s, side in SIDES:
         angle = phase + (0 if s > 0 else np.pi)
         swing, speed = np.sin(angle), np.cos(angle)
-        thigh, knee = np.deg2rad(stride * swing + 3), np.deg2rad(8 + 38 * max(speed, 0) + (6 if swing < 0 else 0))
+        thigh, knee = (
+            np.deg2rad(stride * swing + 3),
+            np.deg2rad(8 + 38 * max(speed, 0) + (6 if swing < 0 else 0)),
+        )
         pose[f"upperleg01.{side}"] = ("direction", [0.05 * s, -np.cos(thigh), np.sin(thigh)])
         pose[f"lowerleg01.{side}"] = ("direction", [0.02 * s, -np.cos(thigh - knee), np.sin(thigh - knee)])
         pose[f"foot.{side}"] = ("absolute", turn("x", 18 * max(-swing, 0) - 6 * max(swing, 0)))
@@ -92,10 +106,17 @@ def random_pose(kind, rng, arms=None):
         arms = arms or "up"
     arms = arms or str(rng.choice(STANDING_ARMS))
     if arms in ARMS:
-        sides = [SIDES[rng.integers(2)]] if arms in ONE_SIDED or (arms in ("phone", "hips") and rng.random() < 0.5) else SIDES
+        sides = (
+            [SIDES[rng.integers(2)]]
+            if arms in ONE_SIDED or (arms in ("phone", "hips") and rng.random() < 0.5)
+            else SIDES
+        )
         for s, side in sides:
             upper, lower = ARMS[arms](s, u)
-            pose[f"upperarm01.{side}"], pose[f"lowerarm01.{side}"] = ("direction", upper), ("direction", lower)
+            pose[f"upperarm01.{side}"], pose[f"lowerarm01.{side}"] = (
+                ("direction", upper),
+                ("direction", lower),
+            )
     if arms == "phone":
         pose["head"] = ("relative", turn("x", u(12, 24)))
     return pose, arms

@@ -1,4 +1,5 @@
 """Shadows of persons on the floor, and patches of sun, from the distances of a composed frame. Numpy and OpenCV only."""
+
 import math
 
 import cv2
@@ -34,7 +35,9 @@ class FloorShadow:
         part = image[y0:y1, x0:x1]
         part[r - y0, c - x0] = 1
         part = cv2.dilate(part, np.ones((3, 3), np.uint8))
-        return (slice(y0, y0 + part.shape[0]), slice(x0, x0 + part.shape[1])), cv2.GaussianBlur(part, (0, 0), max(blur / CELL, 0.6))
+        return (slice(y0, y0 + part.shape[0]), slice(x0, x0 + part.shape[1])), cv2.GaussianBlur(
+            part, (0, 0), max(blur / CELL, 0.6)
+        )
 
     def _darken(self, cover, share):
         if cover is not None:
@@ -42,13 +45,18 @@ class FloorShadow:
 
     def _add(self, points, room):
         centre = points[:, :2].mean(0)
-        lights = [(lx, ly, lz, p / math.pi * (lz**2 / r2) / r2) for lx, ly, lz, p in room["lights"]
-                  if (r2 := (lx - centre[0]) ** 2 + (ly - centre[1]) ** 2 + lz**2) < 200]
+        lights = [
+            (lx, ly, lz, p / math.pi * (lz**2 / r2) / r2)
+            for lx, ly, lz, p in room["lights"]
+            if (r2 := (lx - centre[0]) ** 2 + (ly - centre[1]) ** 2 + lz**2) < 200
+        ]
         total = sum(light[3] for light in lights) + math.pi * room["ambient"]
         for lx, ly, lz, strength in sorted(lights, key=lambda light: -light[3])[:3]:
             low = points[points[:, 2] < 0.95 * lz]
             t = (lz / (lz - low[:, 2]))[:, None]
-            self._darken(self._cover(np.array([lx, ly]) + (low[:, :2] - (lx, ly)) * t, 0.1), 0.85 * strength / total)
+            self._darken(
+                self._cover(np.array([lx, ly]) + (low[:, :2] - (lx, ly)) * t, 0.1), 0.85 * strength / total
+            )
         self._darken(self._cover(points[points[:, 2] < 0.35], 0.08), 0.35)
         self._darken(self._cover(points, 0.25), 0.5 * math.pi * room["ambient"] / total)
 
@@ -56,15 +64,24 @@ class FloorShadow:
         """The share of light at each pixel: below 1 on shaded floor, 1 elsewhere."""
         x, y, z = (rays[..., i] * distance for i in range(3))
         floor = (z + self.height) < 0.06
-        share = cv2.remap(self.light, ((x - self.x0) / CELL).astype(np.float32), ((y - self.y0) / CELL).astype(np.float32), cv2.INTER_LINEAR,
-                          borderMode=cv2.BORDER_CONSTANT, borderValue=1.0)
+        share = cv2.remap(
+            self.light,
+            ((x - self.x0) / CELL).astype(np.float32),
+            ((y - self.y0) / CELL).astype(np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=1.0,
+        )
         return np.where(floor, share, 1.0)
 
 
 def sun_patches(rng, room, rays, distance, colour):
     """Brightens what a low sun reaches through windows: a point is lit where the ray towards the sun leaves by a window."""
     bearing, height = rng.uniform(0, 2 * math.pi), math.radians(rng.uniform(18, 60))
-    sun = np.array([math.cos(bearing) * math.cos(height), math.sin(bearing) * math.cos(height), math.sin(height)], np.float32)
+    sun = np.array(
+        [math.cos(bearing) * math.cos(height), math.sin(bearing) * math.cos(height), math.sin(height)],
+        np.float32,
+    )
     (cx, cy), (width, depth) = room["centre"], room["size"]
     side, half, across = (0, width / 2, 1) if abs(sun[0]) * depth > abs(sun[1]) * width else (1, depth / 2, 0)
     centre = (cx, cy)

@@ -1,10 +1,9 @@
 """Zones of a room: office desks, canteen, class, shop, lounge, waiting area, library, hall. Each fills a rectangle."""
+
 import math
 
 from . import furniture as f
-
-CHAIR_WITH_JACKET, MANNEQUIN, PICTURE_OF_PERSON, COATS, PRAM = 241, 242, 243, 244, 245
-"""Object indices of things that detectors take for persons; persons are 1 to 200 in the id masks."""
+from .indices import CHAIR_WITH_JACKET, COATS, PICTURE_OF_PERSON, PRAM
 
 
 def chair(room, b, height=0.45, style=None):
@@ -24,8 +23,10 @@ def grid(room, b, width, depth, pitch_x, pitch_y, skip=0.2):
     for i in range(columns):
         for j in range(rows):
             if room.rng.random() >= skip:
-                yield b.child((i + 0.5) / columns * width - width / 2 + float(room.rng.normal() * 0.06),
-                              (j + 0.5) / rows * depth - depth / 2 + float(room.rng.normal() * 0.06))
+                yield b.child(
+                    (i + 0.5) / columns * width - width / 2 + float(room.rng.normal() * 0.06),
+                    (j + 0.5) / rows * depth - depth / 2 + float(room.rng.normal() * 0.06),
+                )
 
 
 def office(room, b, width, depth):
@@ -34,7 +35,11 @@ def office(room, b, width, depth):
         table(room, desk, 1.5, 0.75, things=2)
         for k in range(int(room.rng.integers(1, 3))):
             screen(room, desk.child(-0.3 + 0.6 * k, -0.2), 0.74)
-        chair(room, desk.child(float(room.rng.uniform(-0.2, 0.2)), 0.62, float(room.rng.normal() * 20)), style="office")
+        chair(
+            room,
+            desk.child(float(room.rng.uniform(-0.2, 0.2)), 0.62, float(room.rng.normal() * 20)),
+            style="office",
+        )
 
 
 def screen(room, b, z, person=0.1):
@@ -42,7 +47,9 @@ def screen(room, b, z, person=0.1):
     name = room.portrait() if room.rng.random() < person else f"screen{room.rng.integers(4)}"
     made = p.texture(name, uv=True, emit=0.7)
     b.box(0.55, 0.03, 0.33, 0, 0, z + 0.32, p.black, bevel=0)
-    b.child(0, 0, index=PICTURE_OF_PERSON if "portrait" in name else 0).plane(0.52, 0.3, 0, 0.017, z + 0.32, made, rx=math.pi / 2, rz=math.pi)
+    b.child(0, 0, index=PICTURE_OF_PERSON if "portrait" in name else 0).plane(
+        0.52, 0.3, 0, 0.017, z + 0.32, made, rx=math.pi / 2, rz=math.pi
+    )
     b.box(0.04, 0.03, 0.2, 0, -0.01, z + 0.09, p.black, bevel=0)
 
 
@@ -53,7 +60,12 @@ def canteen(room, b, width, depth):
         table(room, cell.child(0, 0, turned), size, size, round_=round_)
         for a in (0, 90, 180, 270):
             if room.rng.random() < 0.7:
-                chair(room, cell.child(0, 0, a + turned).child(0, size / 2 + float(room.rng.uniform(0.1, 0.4)), float(room.rng.normal() * 15)))
+                chair(
+                    room,
+                    cell.child(0, 0, a + turned).child(
+                        0, size / 2 + float(room.rng.uniform(0.1, 0.4)), float(room.rng.normal() * 15)
+                    ),
+                )
 
 
 def class_rows(room, b, width, depth):
@@ -92,7 +104,16 @@ def shop(room, b, width, depth):
 def lounge(room, b, width, depth):
     for cell in grid(room, b, width, depth, 4.2, 4.2, 0.1):
         p = room.palette
-        cell.box(2.6, 1.8, 0.012, 0, 0, 0.006, p.texture(f"rug{room.rng.integers(9)}", rough=0.95, scale=2.7), bevel=0)
+        cell.box(
+            2.6,
+            1.8,
+            0.012,
+            0,
+            0,
+            0.006,
+            p.texture(f"rug{room.rng.integers(9)}", rough=0.95, scale=2.7),
+            bevel=0,
+        )
         table(room, cell, 1.1, 0.6, 0.42)
         for side in (0, 180):
             if room.rng.random() < 0.8:
@@ -147,4 +168,7 @@ def hall(room, b, width, depth):
             room.mannequin(place)
 
 
-ZONES = {"train": (office, canteen, class_rows, meeting, shop, lounge, hall, hall), "unseen": (waiting, library, canteen, shop, hall, hall)}
+ZONES = {
+    "train": (office, canteen, class_rows, meeting, shop, lounge, hall, hall),
+    "unseen": (waiting, library, canteen, shop, hall, hall),
+}

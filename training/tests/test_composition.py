@@ -1,7 +1,8 @@
 """Tests of the composition's mathematics: need numpy and OpenCV, not Blender.
 
-    cd training && python -m unittest discover -s tests -t .
+cd training && python -m unittest discover -s tests -t .
 """
+
 import math
 import unittest
 from types import SimpleNamespace
@@ -11,7 +12,16 @@ import numpy as np
 
 from generator.boxes import axis_box, box_along, oriented_box
 from generator.compose import compose
-from generator.geometry import Calibration, camera_rotation, circle_radius, make_lens, nadir_angles, panorama_of, radius_of, theta_of
+from generator.geometry import (
+    Calibration,
+    camera_rotation,
+    circle_radius,
+    make_lens,
+    nadir_angles,
+    panorama_of,
+    radius_of,
+    theta_of,
+)
 from generator.placement import Placement
 
 FOCAL, HEIGHT, SIDE = 100.0, 3.0, 401
@@ -24,21 +34,52 @@ def calibration(yaw=0.0, tilt=0.0):
 
 def empty_room(distance=50.0):
     """A grey room whose every ray ends at one distance."""
-    about = dict(focal=FOCAL, nadir=(SIDE - 1) / 2, max_theta=math.radians(110), camera_height=HEIGHT, centre=(0, 0), size=(40, 40), lights=[], ambient=1.0,
-                 occupied=[], ceiling=3.1)
-    return SimpleNamespace(about=about, colour=np.full((SIDE, SIDE, 3), 0.2, np.float32), depth=np.full((SIDE, SIDE), distance, np.float32),
-                           index=np.zeros((SIDE, SIDE), np.uint8))
+    about = dict(
+        focal=FOCAL,
+        nadir=(SIDE - 1) / 2,
+        max_theta=math.radians(110),
+        camera_height=HEIGHT,
+        centre=(0, 0),
+        size=(40, 40),
+        lights=[],
+        ambient=1.0,
+        occupied=[],
+        ceiling=3.1,
+    )
+    return SimpleNamespace(
+        about=about,
+        colour=np.full((SIDE, SIDE, 3), 0.2, np.float32),
+        depth=np.full((SIDE, SIDE), distance, np.float32),
+        index=np.zeros((SIDE, SIDE), np.uint8),
+    )
 
 
 def block(distance=4.0, depth=3.0, width=21, height=41):
     """A piece: an opaque rectangle about azimuth 0, standing at a floor distance, everywhere at one depth."""
     middle = FOCAL * math.atan2(distance, HEIGHT)
-    view = dict(camera_height=HEIGHT, distance=distance, bearing=0.0, focal=FOCAL, left=-(width // 2), top=round(-middle) - height // 2,
-                whole={"1": width * height}, light="soft")
-    crop = SimpleNamespace(colour=np.ones((height, width, 3), np.float32), alpha=np.ones((height, width), np.float32),
-                           depth=np.full((height, width), depth, np.float32), index=np.ones((height, width), np.uint8), view=view)
-    about = dict(persons=[dict(index=1, kind="standing", x=0.0, y=0.0, child=False)], reach=0.5, seed=1, piece="block")
-    return SimpleNamespace(views=[view], about=about, crop=lambda k: crop, cloud=lambda: np.zeros((4, 3), np.float32))
+    view = dict(
+        camera_height=HEIGHT,
+        distance=distance,
+        bearing=0.0,
+        focal=FOCAL,
+        left=-(width // 2),
+        top=round(-middle) - height // 2,
+        whole={"1": width * height},
+        light="soft",
+    )
+    crop = SimpleNamespace(
+        colour=np.ones((height, width, 3), np.float32),
+        alpha=np.ones((height, width), np.float32),
+        depth=np.full((height, width), depth, np.float32),
+        index=np.ones((height, width), np.uint8),
+        view=view,
+    )
+    about = dict(
+        persons=[dict(index=1, kind="standing", x=0.0, y=0.0, child=False)], reach=0.5, seed=1, piece="block"
+    )
+    return SimpleNamespace(
+        views=[view], about=about, crop=lambda k: crop, cloud=lambda: np.zeros((4, 3), np.float32)
+    )
 
 
 class Lenses(unittest.TestCase):
@@ -63,7 +104,6 @@ class Lenses(unittest.TestCase):
     def test_native_calibration_has_up_against_the_axis(self):
         native = calibration().native("a")
         np.testing.assert_allclose(native["mount"]["world_up"], [0, 0, -1], atol=1e-9)
-
 
     def test_native_calibration_keeps_the_circle_of_every_model(self):
         for seed in range(12):
@@ -106,7 +146,9 @@ class Occlusion(unittest.TestCase):
     def test_nearer_piece_hides_the_farther_one(self):
         near, far = block(distance=3.8, depth=3.0), block(distance=4.2, depth=5.0)
         both = compose(calibration(), empty_room(), [Placement(near, 0, 0, 1.0), Placement(far, 0, 0, 1.0)])
-        self.assertEqual(both.ids[160 - round(FOCAL * math.atan2(3.8, HEIGHT)), 160], 2)   # Numbered from far to near.
+        self.assertEqual(
+            both.ids[160 - round(FOCAL * math.atan2(3.8, HEIGHT)), 160], 2
+        )  # Numbered from far to near.
         far_visible = np.count_nonzero(both.ids == 1)
         self.assertLess(far_visible, 0.3 * both.persons[0]["in_crop"])
 

@@ -1,4 +1,5 @@
 """Tests of the training samples: quarter turns and cuts keep boxes exact."""
+
 import unittest
 
 import numpy as np
@@ -29,7 +30,15 @@ class Samples(unittest.TestCase):
         np.testing.assert_allclose(boxes[0], [x, y, x + w, y + h], atol=1)
 
     def test_cut_ignores_what_is_mostly_outside(self):
-        _, boxes, ignore = cut(np.zeros((80, 80, 3), np.uint8), np.array([[0.0, 0, 20, 20], [30, 30, 50, 50]]), np.zeros(2, bool), 15, 15, 1.0, 60)
+        _, boxes, ignore = cut(
+            np.zeros((80, 80, 3), np.uint8),
+            np.array([[0.0, 0, 20, 20], [30, 30, 50, 50]]),
+            np.zeros(2, bool),
+            15,
+            15,
+            1.0,
+            60,
+        )
         self.assertEqual(list(ignore), [True, False])
 
 
