@@ -120,7 +120,7 @@ pub fn evaluation_engine(
             Some(name) => vec![name.as_str()],
             None => [
                 Some(defaults.of(request.profile)),
-                defaults.second_model(request.profile),
+                defaults.second_opinion(request.profile),
             ]
             .into_iter()
             .flatten()

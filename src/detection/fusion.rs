@@ -177,16 +177,16 @@ impl Cluster {
             })
             .collect();
         votes.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        let mut voted: Vec<usize> = Vec::with_capacity(MAX_SUPPORTING_VIEWS);
+        let mut seen_views: Vec<usize> = Vec::with_capacity(MAX_SUPPORTING_VIEWS);
         let mut sum = 0.0;
         let required = self.required_votes();
         // The order is descending, so the first vote of a view is its best.
         for (vote, view) in votes {
-            if voted.len() == required {
+            if seen_views.len() == required {
                 break;
             }
-            if !voted.contains(&view) {
-                voted.push(view);
+            if !seen_views.contains(&view) {
+                seen_views.push(view);
                 sum += vote;
             }
         }

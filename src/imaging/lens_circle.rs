@@ -2,9 +2,9 @@
 //!
 //! 1. The corners give the brightness of the surround (`surround`).
 //! 2. Scans along rows and columns, from the border inward, reach the disc. A consensus circle
-//! through those points ignores captions and unlit parts of the room (`outline`, `consensus`).
+//!    through those points ignores captions and unlit parts of the room (`outline`, `consensus`).
 //! 3. Along rays near that circle the rim is located to a fraction of a pixel, and a robust
-//! least-squares circle is fitted to it (`rim`, `least_squares`).
+//!    least-squares circle is fitted to it (`rim`, `least_squares`).
 
 mod agreement;
 mod consensus;

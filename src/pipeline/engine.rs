@@ -156,7 +156,7 @@ impl Engine {
             calibration,
             image_width: observation.frame.width(),
             image_height: observation.frame.height(),
-            second_model: observation.second_model().map(ModelUsed::from),
+            second_opinion: observation.second_opinion().map(ModelUsed::from),
             model: ModelUsed::from(observation.model()),
             profile: parameters.profile,
             refinement: parameters.refinement,

@@ -36,7 +36,7 @@ pub struct DetectionReport {
     /// The detector used.
     pub model: ModelUsed,
     /// The detector that took some of the closer passes, where the profile asks a second one.
-    pub second_model: Option<ModelUsed>,
+    pub second_opinion: Option<ModelUsed>,
     /// The profile used.
     pub profile: Profile,
     /// The refinement used, with all its parameters.

@@ -7,8 +7,8 @@ use strum::Display;
 
 use crate::imaging::ChannelOrder;
 
-/// Conversion of pixels to network input. With pixels 0 to 255, each value is either `pixel · scale
-/// + offset` or `(pixel − mean) / std`, per plane in the network's plane order.
+/// Conversion of pixels to network input. With pixels 0 to 255, each value is either
+/// `pixel · scale + offset` or `(pixel − mean) / std`, per plane in the network's plane order.
 ///
 /// ```toml
 /// [input]                    # optional

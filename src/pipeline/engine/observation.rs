@@ -60,7 +60,7 @@ impl Observation {
     }
 
     /// Another model that looked as well, if there was anything to look at again.
-    pub(super) fn second_model(&self) -> Option<&Model> {
+    pub(super) fn second_opinion(&self) -> Option<&Model> {
         let mut models = self.passes.iter().map(|look| &*look.model);
         models.find(|model| model.name() != self.model.name())
     }

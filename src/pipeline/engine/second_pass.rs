@@ -66,7 +66,7 @@ impl Engine {
         let outlines = merge::outlines(&observation.passes, back_projection, &closer.first_look);
         let mut models = vec![Arc::clone(&observation.model)];
         if job.parameters.model.is_none() {
-            let second = self.options.default_models.second_model(profile);
+            let second = self.options.default_models.second_opinion(profile);
             models.extend(second.and_then(|name| self.models.get(name)));
         }
         let most_views = closer.most_views / models.len();

@@ -168,6 +168,11 @@ fn a_crop_of_scale_one_is_the_turned_frame() {
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let middle = Pixel::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
             let place = crop.frame_from_crop(&middle);
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "the place lies within the frame"
+            )]
             let pixel = frame.pixel(place.x as u32, place.y as u32);
             for (channel, expected) in pixel.into_iter().enumerate() {
                 let found = slot[channel * input.plane_len() + (y * width + x) as usize];
