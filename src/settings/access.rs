@@ -14,7 +14,7 @@ settings! {
     /// API keys, and the web pages that may call the server.
     #[derive(Debug, Clone, PartialEq)]
     pub struct AccessSettings in "access" {
-        /// The file of API keys, one line each as `lookdown key new` prints it (docs/operations.md). With
+        /// The file of API keys, one line each as `lookdown key new` prints it (docs/deployment.md). With
         /// keys, every request except health checks, metrics and the API page needs one. Without keys,
         /// only clients on the same machine should reach the server. Leave it out for none: an empty
         /// value is refused.

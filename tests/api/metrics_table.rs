@@ -1,4 +1,4 @@
-//! The table of metrics in docs/operations.md says what the server shows, no more and no less.
+//! The table of metrics in docs/observability.md says what the server shows, no more and no less.
 
 use std::collections::BTreeSet;
 
@@ -44,7 +44,7 @@ async fn the_table_of_metrics_in_the_documentation_is_true_and_whole() {
         .await;
     let metrics = service.get("/metrics").await.text();
     let shown = rows(&metrics);
-    let document = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations.md");
+    let document = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/observability.md");
     let document = std::fs::read_to_string(document).unwrap();
     let (_, section) = document.split_once("\n## Metrics\n").unwrap();
     let section = section.split("\n## ").next().unwrap();
