@@ -1,4 +1,5 @@
-//! The only place that knows HTTP. One page of routes; every failure leaves as one envelope.
+//! The HTTP API: the table of routes and the layers around them. No other module uses HTTP. Every
+//! failure is returned as a problem document.
 
 mod accept;
 mod access;
@@ -54,7 +55,7 @@ pub use rate_limit::RequestRate;
 pub use report::Report;
 pub use state::{ApiOptions, ApiState};
 
-/// Every route, with its entry in the OpenAPI document.
+/// All routes with their entries in the OpenAPI document.
 fn routes() -> OpenApiRouter<ApiState> {
     client_routes()
         .merge(deepstack_routes())
@@ -63,7 +64,7 @@ fn routes() -> OpenApiRouter<ApiState> {
         .merge(metrics())
 }
 
-/// The routes that serve clients.
+/// The routes of the native API.
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
         .routes(routes!(detect::detect_persons))
@@ -94,7 +95,7 @@ fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(repository::unload))
 }
 
-/// The routes that serve clients of DeepStack.
+/// The routes of the DeepStack API.
 fn deepstack_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(deepstack::detect_as_deepstack))
@@ -122,7 +123,7 @@ fn metrics() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new().routes(routes!(health::metrics))
 }
 
-/// The whole service.
+/// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
     let options = &state.options;
     let own_pages = OwnPages::of(options).map(|own| from_fn_with_state(own, foreign_pages::refuse));
@@ -139,13 +140,13 @@ pub fn router(state: ApiState) -> Router {
     surrounded(router.with_state(state.clone()).merge(pages()), state)
 }
 
-/// What is there for operators alone, on a port of its own: metrics and probes.
+/// The router of the metrics port: metrics and health checks for operators.
 pub fn operation_router(state: ApiState) -> Router {
     surrounded(operation(false).with_state(state.clone()), state)
 }
 
-/// What answers a connection beyond the limit: probes as ever, and metrics where they are; everything
-/// else is refused.
+/// The router for connections beyond the limit: health checks, and metrics unless they have a port
+/// of their own. All other requests are refused.
 pub fn crowded_router(state: ApiState) -> Router {
     let router = operation(state.options.metrics_elsewhere).with_state(state.clone());
     surrounded(router.fallback(crowd::refuse), state)
@@ -159,14 +160,15 @@ fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
     }
 }
 
-/// What people look at.
+/// The pages for browsers.
 fn pages() -> Router {
     let api_page = api_page().route_layer(map_response(page_headers::of_api_page));
     web_page::router().merge(api_page)
 }
 
-/// What holds for every route, the outermost first. A router clones and boxes each of its layers for each
-/// request, so all of these are one. A handler that panics costs its own request only.
+/// Adds the layers of every route, the outermost first. A router clones and boxes each of its
+/// layers for each request, so all of these are one layer. A panic of a handler fails only its own
+/// request.
 fn surrounded(router: Router, state: ApiState) -> Router {
     let surroundings = Surroundings {
         metrics: state.metrics.clone(),
@@ -182,7 +184,7 @@ fn surrounded(router: Router, state: ApiState) -> Router {
     router.layer(layers)
 }
 
-/// The API page, from files inside the executable; it asks for nothing beyond this server.
+/// The API page, from files inside the executable. It loads nothing from other hosts.
 fn api_page() -> Router {
     let config = Config::from("../openapi.json")
         .validator_url("none")

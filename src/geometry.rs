@@ -6,20 +6,23 @@
 //! * Boxes are corner-origin: pixel `i` covers `[i, i + 1)`. [`pixels`] crosses the half pixel.
 //! * Angles are radians; `theta` is the angle from the optical axis.
 
+pub mod crop_placement;
 pub mod floor;
 pub mod footprint;
+pub mod frame_crop;
+pub mod height_ratio;
 pub mod lens;
 pub mod mount;
 pub mod oriented_box;
 pub mod pixels;
 pub mod polygon;
-pub mod stature;
 pub mod view_plan;
 pub mod virtual_view;
 pub mod zone;
 pub mod zoom;
 
 pub use footprint::{BackProjection, Footprint};
+pub use frame_crop::{FrameCrop, QuarterTurn};
 pub use lens::{Lens, LensError};
 pub use mount::Mount;
 pub use oriented_box::OrientedBox;

@@ -1,12 +1,12 @@
-//! Text that a client sent, as problems and log lines repeat it.
+//! Text from a client, as problems and log lines repeat it.
 
 use std::fmt;
 
-/// Most characters of a client's text that are repeated.
+/// Largest number of characters of a client's text that are repeated.
 const MAX_CHARS: usize = 64;
 
-/// Shows a text in quotation marks with its control characters escaped, cut after 64 characters: enough to
-/// recognise it, not enough to fill a log.
+/// Displays a text in quotation marks with its control characters escaped, cut after 64 characters:
+/// enough to recognise it, too short to fill a log.
 #[derive(Debug, Clone, Copy)]
 pub struct Quoted<'a>(pub &'a str);
 

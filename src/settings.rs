@@ -146,8 +146,9 @@ fn entries() -> Vec<Entry> {
     .concat()
 }
 
-/// Loads and checks the settings: defaults, then `file` (TOML), then `environment`. A variable that is
-/// set to nothing counts as not set, except `LOOKDOWN__ACCESS__KEYS_FILE`, where that is refused.
+/// Loads and checks the settings: defaults, then `file` (TOML), then `environment`. A variable that
+/// is set to nothing counts as not set, except `LOOKDOWN__ACCESS__KEYS_FILE`, where that is
+/// refused.
 ///
 /// # Errors
 /// [`SettingsError`] when the file cannot be read, a key is unknown or a value cannot be used.

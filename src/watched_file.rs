@@ -53,8 +53,9 @@ mod tests {
     #[test]
     fn a_problem_is_reported_once_until_it_changes_or_ends() {
         let mut complaint = Complaint::default();
-        let told = ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_news(problem));
-        assert_eq!(told, [true, false, true, true]);
+        let reported =
+            ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_news(problem));
+        assert_eq!(reported, [true, false, true, true]);
         complaint.settle();
         assert!(complaint.is_news("empty"));
     }

@@ -1,6 +1,7 @@
-//! Generated parts of the documentation. Each stands in its file between `<!-- generated: NAME -->` and
-//! `<!-- /generated -->`, and equals what the code says. With `BLESS=1` (`make bless`) the test rewrites the parts.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! Generated parts of the documentation. Each part is in its file between `<!-- generated: NAME
+//! -->` and `<!-- /generated -->`, and equals the text that the code generates. With `BLESS=1`
+//! (`make bless`) the test rewrites the parts.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::{env, fs, path::Path};
 

@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 28] = [
+const MAY_USE: [(&str, &[&str]); 29] = [
     ("plain_name", &[]),
     ("quoted", &[]),
     ("watched_file", &[]),

@@ -1,5 +1,5 @@
-//! The checked-in API description: completeness and agreement with the code.
-#![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
+//! The checked-in OpenAPI document and its properties.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::{collections::BTreeSet, fs};
 
@@ -33,7 +33,7 @@ fn the_checked_in_document_matches_the_code() {
 }
 
 #[test]
-fn every_operation_has_name_summary_tag_and_own_responses() {
+fn every_operation_has_name_summary_tag_and_responses() {
     let document = document();
     let mut names = BTreeSet::new();
     for (path, operation) in operations(&document) {
@@ -107,17 +107,14 @@ fn detection_describes_every_status_and_every_parameter() {
     }
     let answers = detect["responses"]["200"]["content"].as_object().unwrap();
     for media_type in ["application/json", "image/jpeg", "image/png"] {
-        assert!(
-            answers.contains_key(media_type),
-            "{media_type} is not among the responses"
-        );
+        assert!(answers.contains_key(media_type), "{media_type} is missing");
     }
     let report = &answers["application/json"]["schema"]["$ref"];
     assert_eq!(report, "#/components/schemas/Report");
 }
 
 #[test]
-fn bodies_have_a_schema_and_no_parameter_is_sent_twice() {
+fn each_body_has_a_schema_and_no_parameter_has_a_default() {
     let document = document();
     for (path, operation) in operations(&document) {
         let bodies = operation["requestBody"]["content"].as_object();
@@ -125,7 +122,7 @@ fn bodies_have_a_schema_and_no_parameter_is_sent_twice() {
             assert!(body["schema"].is_object(), "{path} {media_type}");
         }
     }
-    // Generated clients send defaults by themselves, in the query and in the form.
+    // Generated clients send a parameter with a default on their own, in the query and in the form.
     let query = &document["paths"]["/detect"]["post"]["parameters"];
     let form = &document["components"]["schemas"]["DetectForm"];
     for described in [query, form] {
@@ -137,7 +134,7 @@ fn bodies_have_a_schema_and_no_parameter_is_sent_twice() {
 }
 
 #[test]
-fn choices_are_described_with_their_names() {
+fn choices_list_their_names() {
     let document = document();
     let parameters = &document["paths"]["/detect"]["post"]["parameters"];
     let schema = |name: &str| {

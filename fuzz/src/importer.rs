@@ -96,7 +96,7 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
 /// Rays and pixels are finite wherever the lens has any.
 fn look_through(calibration: &Calibration) {
     let (width, height) = calibration.image_size();
-    assert!(calibration.doubts().len() < 10);
+    assert!(calibration.warnings().len() < 10);
     // Half the size, as smaller frames of the same camera are.
     let halved = calibration.for_frame(width.div_ceil(2), height.div_ceil(2));
     let halved = halved.ok().map(|geometry| {

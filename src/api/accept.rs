@@ -1,4 +1,4 @@
-//! What a client wants to be answered with: the header `Accept` (RFC 9110, section 12.5.1).
+//! Content negotiation with the header `Accept` (RFC 9110, section 12.5.1).
 
 use axum::http::{HeaderMap, header::ACCEPT};
 
@@ -10,18 +10,18 @@ pub(super) struct Accepted {
     ranges: Vec<MediaRange>,
 }
 
-/// `type/subtype`, either of them perhaps `*`, and how much it is wanted. Parameters are not looked
-/// at: nothing that is offered has any.
+/// A media range `type/subtype` with its weight; either part may be `*`. Parameters are ignored: no
+/// offered media type has any.
 struct MediaRange {
     main: String,
     sub: String,
-    /// 0 to [`FULL_WEIGHT`]; 0 is not wanted.
+    /// 0 to [`FULL_WEIGHT`]; 0 excludes the range.
     weight: u16,
 }
 
 impl Accepted {
-    /// What the headers name. Parts that are no media range are passed over; where nothing is left,
-    /// anything is accepted, as without the header.
+    /// Parses the headers and ignores invalid parts. Without a valid range, everything is accepted,
+    /// as without the header.
     pub(super) fn of(headers: &HeaderMap) -> Self {
         let values = headers.get_all(ACCEPT).iter();
         let texts = values.filter_map(|value| value.to_str().ok());
@@ -37,20 +37,20 @@ impl Accepted {
         Self { ranges }
     }
 
-    /// The offer that is wanted most; among equals one that was named, then the first. `None` where
-    /// nothing offered is wanted.
+    /// Returns the offer with the largest weight. Among equal offers, a type named exactly wins,
+    /// then the first one. `None` if no offer is acceptable.
     pub(super) fn best_of<T: Copy>(&self, offers: &[(T, &str)]) -> Option<T> {
         let wanted = offers.iter().rev().filter_map(|(offer, media_type)| {
             let (precision, weight) = self.weight_of(media_type)?;
             (weight > 0).then_some((weight, precision, *offer))
         });
-        // Of equals, the last is found: the first of the offers.
+        // `max_by_key` returns the last of equal offers: here the first one offered.
         let best = wanted.max_by_key(|(weight, precision, _)| (*weight, *precision));
         best.map(|(_, _, offer)| offer)
     }
 
-    /// How precisely a media type is named, and how much it is wanted: the most precise range that
-    /// it lies in decides.
+    /// Returns the precision and the weight of a media type. The most precise matching range
+    /// decides.
     fn weight_of(&self, media_type: &str) -> Option<(u8, u16)> {
         let ranges = self.ranges.iter();
         let matching =
@@ -86,7 +86,7 @@ impl MediaRange {
         })
     }
 
-    /// How precisely the range names a media type; `None` if it does not.
+    /// Returns how precisely the range matches a media type; `None` if it does not match.
     fn precision(&self, media_type: &str) -> Option<u8> {
         let (main, sub) = media_type.split_once('/')?;
         match (self.main.as_str(), self.sub.as_str()) {
@@ -98,7 +98,7 @@ impl MediaRange {
     }
 }
 
-/// `0`, `1`, or either with up to three decimals, in thousandths.
+/// Parses `0`, `1`, or either with up to three decimals, into thousandths.
 fn parse_weight(text: &str) -> Option<u16> {
     let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
     let is_short = decimals.len() <= 3 && decimals.bytes().all(|byte| byte.is_ascii_digit());
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn the_offer_that_is_wanted_most_is_found() {
+    fn the_offer_with_the_largest_weight_wins() {
         for (accept, expected) in [
             ("image/png", Some("png")),
             ("IMAGE/Jpeg", Some("jpeg")),
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn anything_is_the_first_offer_and_a_name_wins_over_anything() {
+    fn a_wildcard_selects_the_first_offer_and_a_name_wins() {
         assert_eq!(best(&[]), Some("json"));
         assert_eq!(best(&["*/*"]), Some("json"));
         assert_eq!(best(&["image/png, */*"]), Some("png"));
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_add_up_and_what_is_no_range_is_passed_over() {
+    fn lines_are_combined_and_invalid_ranges_are_ignored() {
         assert_eq!(best(&["image/webp", "image/png"]), Some("png"));
         assert_eq!(best(&["nonsense, */json, image/png;q=2, ;"]), Some("json"));
         assert_eq!(best(&["nonsense, image/png"]), Some("png"));

@@ -1,5 +1,5 @@
-//! Who may do what: with keys, whoever shows one with the scope; without, all who can reach the
-//! server may find and read, and its own machine alone may change it.
+//! Authorization. With API keys, a request needs a key with the required scope. Without keys, every
+//! client may detect and read, and only clients on the same machine may make changes.
 
 use std::sync::Arc;
 
@@ -14,32 +14,32 @@ use super::{
 };
 use crate::access::{AccessKeys, Holder, Scope};
 
-/// The header of a key alone.
+/// The header that holds a key alone.
 pub(super) const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
 const BEARER: &[u8] = b"bearer ";
 
-/// Who may do what.
+/// The access rules of the server.
 #[derive(Debug, Clone)]
 pub enum Access {
-    /// There are no keys.
+    /// The server has no keys.
     Open {
-        /// Whether only the server's own machine reaches it, and may change it therefore.
+        /// `true` if only clients on the same machine reach the server. They may then make changes.
         own_machine_only: bool,
     },
-    /// Every request shows a key.
+    /// Every request needs a key.
     Keys(Arc<AccessKeys>),
 }
 
-/// Whoever sent the request may find persons.
+/// Proof that the request may detect persons.
 pub(super) struct Finder;
 
-/// Whoever sent the request may read calibrations and reports.
+/// Proof that the request may read calibrations and reports.
 pub(super) struct Reader;
 
-/// Whoever sent the request may list models, which tells of files of the server's machine.
+/// Proof that the request may list models, which reveals file names of the server's machine.
 pub(super) struct ModelReader;
 
-/// Whoever sent the request may change the models and the calibrations of the server.
+/// Proof that the request may change the models and the calibrations of the server.
 pub(super) struct Administrator;
 
 impl FromRequestParts<ApiState> for Finder {
@@ -80,7 +80,7 @@ impl FromRequestParts<ApiState> for Administrator {
 }
 
 impl Reader {
-    /// Whether whoever sent these headers may read now. Keys go, also while their holders listen.
+    /// Checks the read scope again for a running request: its key may have been removed.
     pub(super) fn check(state: &ApiState, headers: &HeaderMap) -> Result<Self, Problem> {
         state.options.access.check(headers, Scope::Read)?;
         Ok(Self)
@@ -88,12 +88,12 @@ impl Reader {
 }
 
 impl Access {
-    /// Whether the request with these headers may do what `wanted` opens, as far as keys decide.
+    /// Checks that the keys allow `wanted` to the request with these headers.
     pub(super) fn check(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
         self.check_with(headers, None, wanted)
     }
 
-    /// The same for a request that may show its key in a form.
+    /// Like [`Self::check`], for a request whose key may be in a form.
     pub(super) fn check_with(
         &self,
         headers: &HeaderMap,
@@ -105,7 +105,7 @@ impl Access {
         };
         let key = only_key(shown_keys(headers).chain(in_form.map(str::as_bytes)))?;
         let holder = keys.holder_of(key).ok_or_else(|| {
-            let detail = "the key is not known here: it was mistyped, or the server's operator \
+            let detail = "the key is not valid: it was mistyped, or the server's operator \
                           has removed it";
             Problem::new(ProblemKind::KeyRequired, detail)
         })?;
@@ -120,12 +120,12 @@ impl Access {
         Err(Problem::new(ProblemKind::Forbidden, detail))
     }
 
-    /// Whether every request shows a key.
+    /// Returns `true` if every request needs a key.
     pub(super) fn needs_keys(&self) -> bool {
         matches!(self, Self::Keys(_))
     }
 
-    /// Whose key the request with these headers shows, if it shows one that is known.
+    /// Returns the holder of the request's key, if the key is valid.
     pub(super) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
         match self {
             Self::Open { .. } => None,
@@ -133,14 +133,15 @@ impl Access {
         }
     }
 
-    /// The same for what is open to nobody but the server's own machine where there are no keys.
+    /// Like [`Self::check`]. Without keys, only a server that no other machine can reach allows the
+    /// request.
     fn check_of_its_own(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
         match self {
             Self::Open {
                 own_machine_only: false,
             } => {
                 let detail = "without keys (access.keys_file), models and calibrations are \
-                              changed on the server's own machine only: this server listens to \
+                              changed on the server's own machine only: this server listens on \
                               others, too (server.listen)";
                 Err(Problem::new(ProblemKind::Forbidden, detail))
             }
@@ -149,12 +150,13 @@ impl Access {
     }
 }
 
-/// Whether these headers show a key, of whomever.
+/// Returns `true` if these headers hold any key, valid or not.
 pub(super) fn shows_key(headers: &HeaderMap) -> bool {
     shown_keys(headers).next().is_some()
 }
 
-/// The keys in the headers. Another scheme of `Authorization` is for somebody else on the way.
+/// Returns the keys in the headers. Other schemes of `Authorization` are ignored: they may be meant
+/// for a proxy.
 fn shown_keys(headers: &HeaderMap) -> impl Iterator<Item = &[u8]> {
     let bearers = headers.get_all(AUTHORIZATION).iter().filter_map(|value| {
         let (scheme, key) = value.as_bytes().split_at_checked(BEARER.len())?;
@@ -166,13 +168,13 @@ fn shown_keys(headers: &HeaderMap) -> impl Iterator<Item = &[u8]> {
     bearers.chain(plain.map(HeaderValue::as_bytes))
 }
 
-/// The one key of a request.
+/// Returns the single key of a request.
 fn only_key<'a>(mut keys: impl Iterator<Item = &'a [u8]>) -> Result<&'a [u8], Problem> {
     match (keys.next(), keys.next()) {
         (Some(key), None) => Ok(key),
         (None, _) => Err(Problem::new(
             ProblemKind::KeyRequired,
-            "this needs a key: send it as Authorization: Bearer KEY or as X-API-Key: KEY",
+            "the request needs a key: send it as Authorization: Bearer KEY or as X-API-Key: KEY",
         )),
         (Some(_), Some(_)) => Err(Problem::new(
             ProblemKind::KeyRequired,

@@ -1,5 +1,5 @@
-//! What a frame is answered with: the report as JSON, the frame with boxes drawn into it, or a file
-//! for annotation tools.
+//! The response to a frame: the report as JSON, the annotated image, or a file for annotation
+//! tools.
 
 mod format;
 
@@ -18,25 +18,25 @@ use crate::{
     pipeline::{Detected, PipelineError},
 };
 
-/// What a frame is called whose sender gave it no name.
+/// The name of a frame that was sent without a file name.
 const NAMELESS: &str = "frame";
 
-/// What a request wants to be answered with.
+/// The requested form of the response.
 pub(super) struct AnswerOptions {
     format: AnswerFormat,
     picture: PictureOptions,
-    /// The frame's, as it was sent.
+    /// The file name of the frame as the client sent it.
     file_name: Option<String>,
 }
 
-/// An answer's content.
+/// The content of a response.
 pub(super) struct Content {
     pub(super) media_type: &'static str,
     pub(super) bytes: Bytes,
 }
 
 impl AnswerOptions {
-    /// Takes the parameters about the answer out of those of a request.
+    /// Takes the parameters of the response out of those of a request.
     pub(super) fn take_from(
         given: &mut Vec<(String, String)>,
         headers: &HeaderMap,
@@ -51,8 +51,8 @@ impl AnswerOptions {
         })
     }
 
-    /// The answer about a frame whose report is `json`. Drawing takes its time: call it where that is
-    /// allowed.
+    /// Builds the response for a frame whose report is `json`. Drawing blocks: call it on a worker
+    /// thread.
     pub(super) fn content(self, detected: Detected, json: &Bytes) -> Result<Content, Problem> {
         let report = &detected.report;
         let bytes = match self.format {

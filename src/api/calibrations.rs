@@ -1,4 +1,4 @@
-//! Calibrations as resources: read by readers, changed by administrators.
+//! The calibration resources: the scope `read` reads them, the scope `admin` changes them.
 
 mod address;
 mod conditions;
@@ -32,9 +32,9 @@ use super::{
 };
 use crate::calibration::ChangeError;
 
-/// Which calibrations are there?
+/// List calibrations
 ///
-/// Also those whose file cannot be used, with the reason.
+/// Includes calibrations whose file cannot be used, with the reason.
 #[utoipa::path(
     get, path = "/calibrations", tag = "calibrations", operation_id = "list_calibrations",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
@@ -50,18 +50,18 @@ pub(super) async fn list(
     Json(rows.into_iter().map(CalibrationInfo::from).collect())
 }
 
-/// Get a calibration.
+/// Get a calibration
 ///
-/// Always in the native format, whatever its file is in. `If-None-Match` is answered 304 while the
-/// revision is the same.
+/// Returns the native format, whatever the format of the file. `If-None-Match` returns 304 while
+/// the revision is unchanged.
 #[utoipa::path(
     get, path = "/calibrations/{id}", tag = "calibrations", operation_id = "get_calibration",
     params(("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID.")),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
-        (status = OK, description = "The native file.", body = Object,
+        (status = OK, description = "The calibration in the native format.", body = Object,
          headers(("ETag" = String, description = "The revision, as in reports."))),
-        (status = NOT_MODIFIED, description = "The revision is the one asked with."),
+        (status = NOT_MODIFIED, description = "The revision is unchanged."),
     )
 )]
 pub(super) async fn get(
@@ -82,26 +82,26 @@ pub(super) async fn get(
     Ok((tag, content_type, entry.native_file()).into_response())
 }
 
-/// Create or replace a calibration.
+/// Create or replace a calibration
 ///
-/// Takes the native format as JSON, YAML or TOML, or the file of another program as it is; of
-/// several cameras in a file, `camera` chooses one, and `size` tells what a format does not. It is checked, stored in the native format and
-/// serves when this is answered. `If-Match` replaces only the revision it names, `If-None-Match: *`
-/// only creates.
+/// Accepts the native format as JSON, YAML or TOML, or the file of another program. `camera`
+/// selects a camera of a file with several; `size` states the frame size for formats without one.
+/// The calibration is checked, stored in the native format and in use when the response arrives.
+/// `If-Match` replaces only the given revision, `If-None-Match: *` only creates.
 #[utoipa::path(
     put, path = "/calibrations/{id}", tag = "calibrations", operation_id = "put_calibration",
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
-        ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
+        ("camera" = Option<String>, Query, description = "The name of the camera in the file."),
         ("size" = Option<String>, Query, description = "The size of the camera's frames in pixels, such as \
-            `1280x960`, for formats that do not tell it.", pattern = "^[0-9]+x[0-9]+$"),
+            `1280x960`, for formats that do not state it.", pattern = "^[0-9]+x[0-9]+$"),
         ("If-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
-            description = "The revision to replace, or `*`. Not together with `If-None-Match`."),
+            description = "The revision to replace, or `*`. Cannot be combined with `If-None-Match`."),
         ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r"^\*$",
             description = "`*`: create only."),
     ),
     request_body(
-        description = "A calibration file, recognised from its content, whatever the content type says; at most 1 MiB.",
+        description = "A calibration file of at most 1 MiB. Its content decides the format, not the content type.",
         content((Object = "application/json"), (inline(RawBytes) = "application/octet-stream")),
     ),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
@@ -136,9 +136,9 @@ pub(super) async fn put(
     })
 }
 
-/// Delete a calibration.
+/// Delete a calibration
 ///
-/// Frames that began with it are finished. With `If-Match` only at the revision it names.
+/// Frames that were accepted earlier still use it. `If-Match` deletes only the given revision.
 #[utoipa::path(
     delete, path = "/calibrations/{id}", tag = "calibrations", operation_id = "delete_calibration",
     params(
@@ -147,7 +147,7 @@ pub(super) async fn put(
             description = "The revision to delete, or `*`."),
     ),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
-    responses((status = NO_CONTENT, description = "It is gone."))
+    responses((status = NO_CONTENT, description = "The calibration is deleted."))
 )]
 pub(super) async fn delete(
     State(state): State<ApiState>,
@@ -162,7 +162,7 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// No calibration of that ID serves.
+/// Returns the problem of a calibration ID that is not in use.
 fn unknown(state: &ApiState, id: &crate::calibration::CalibrationId) -> Problem {
     let rows = state.calibrations.rows();
     let row = rows.into_iter().find(|row| row.id == *id);

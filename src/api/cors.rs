@@ -1,4 +1,4 @@
-//! Which web pages of other origins may call the server from a browser.
+//! CORS: the origins of web pages that may call the server from a browser.
 
 use axum::http::{
     HeaderName, HeaderValue, Method,
@@ -18,10 +18,10 @@ use super::{
 };
 use crate::open_inference::HEAD_LENGTH;
 
-/// The layer that lets pages of these origins call; none when there are none.
+/// Returns the CORS layer for these origins; `None` if there are none.
 pub(super) fn layer(origins: &[String]) -> Option<CorsLayer> {
     let origins = origins.iter();
-    // The settings let only origins through, which are all header values.
+    // The settings check the origins: each is a valid header value.
     let origins: Vec<_> = origins
         .filter_map(|origin| HeaderValue::from_str(origin).ok())
         .collect();

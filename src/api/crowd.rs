@@ -1,9 +1,9 @@
-//! What a connection beyond the limit is told.
+//! The response to connections beyond the limit.
 
 use super::problem::{Problem, ProblemKind};
 
-/// Refuses whatever is asked.
+/// Refuses every request.
 pub(super) async fn refuse() -> Problem {
-    let detail = "too many connections are open: close those that are not needed, or try again";
+    let detail = "too many connections are open: close those that are not needed, or retry";
     Problem::new(ProblemKind::TooManyConnections, detail)
 }

@@ -1,4 +1,4 @@
-//! How long a request may take. Whatever waits on its behalf waits no longer than that.
+//! The deadline of a request. All work for the request ends there.
 
 use std::{convert::Infallible, future::Future, time::Duration};
 
@@ -14,7 +14,7 @@ use super::{
 };
 use crate::pipeline::PipelineError;
 
-/// When a request must have been answered.
+/// The time at which a response must be complete.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Deadline {
     began: Instant,
@@ -22,25 +22,25 @@ pub(super) struct Deadline {
 }
 
 impl Deadline {
-    /// `limit` from now.
+    /// Returns the deadline `limit` from now.
     pub(super) fn begin(limit: Duration) -> Self {
         let began = Instant::now();
         Self { began, limit }
     }
 
-    /// That of a request with this head: the one it got when it came.
+    /// Returns the deadline of the request with this head, set when the request arrived.
     pub(super) fn of(parts: &Parts, state: &ApiState) -> Self {
         let begun = parts.extensions.get().copied();
         begun.unwrap_or_else(|| Self::begin(state.options.request_timeout))
     }
 
-    /// The same, but no later than `limit` after the request came.
+    /// Returns this deadline, but at most `limit` after the request arrived.
     pub(super) fn within(self, limit: Duration) -> Self {
         let limit = limit.min(self.limit);
         Self { limit, ..self }
     }
 
-    /// When the request came.
+    /// Returns the time at which the request arrived.
     pub(super) fn began(self) -> Instant {
         self.began
     }
@@ -49,13 +49,13 @@ impl Deadline {
         self.began + self.limit
     }
 
-    /// How long the request may take in all, seconds.
+    /// Returns the longest duration of the request in seconds.
     pub(super) fn limit_seconds(self) -> f64 {
         self.limit.as_secs_f64()
     }
 
-    /// Waits for work that has a place among the frames; what of it has not begun by then never will. `undone`
-    /// begins the sentence for whoever is told so.
+    /// Waits for work that holds a permit of the frame queue. Work that has not begun at the
+    /// deadline never begins. `undone` is the start of the error sentence.
     pub(super) async fn wait<T>(
         self,
         undone: &str,
@@ -65,15 +65,15 @@ impl Deadline {
         let done = done.map_err(|_| {
             let seconds = self.limit_seconds();
             let detail = format!(
-                "{undone} within {seconds} s: ask less often, or raise server.request_timeout_millis"
+                "{undone} within {seconds} s: send fewer requests, or raise server.request_timeout_millis"
             );
             Problem::new(ProblemKind::Timeout, detail)
         })?;
         Ok(done?)
     }
 
-    /// Does work that blocks, away from the async runtime; what it logs is still the request's. Work
-    /// that has begun is never cut off: it goes on when its request is given up.
+    /// Runs blocking work on a thread outside the async runtime, in the span of the request. Work
+    /// that has begun is never interrupted: it continues after the request has timed out.
     pub(super) async fn blocking<T, E>(
         self,
         work: impl FnOnce() -> Result<T, E> + Send + 'static,

@@ -1,6 +1,6 @@
-//! The routes of DeepStack, as its clients know them: Home Assistant, Blue Iris and the like point
-//! here and find people in fisheye frames. What they send and read is what DeepStack's server (Go,
-//! `server/server.go`) and its clients `deepstack-python` and `deepstack-sdk` do.
+//! The DeepStack API, for clients such as Home Assistant and Blue Iris. Requests and responses
+//! follow DeepStack's server (Go, `server/server.go`) and its clients `deepstack-python` and
+//! `deepstack-sdk`.
 
 mod answer;
 mod failures;
@@ -26,10 +26,10 @@ use crate::{calibration::CalibrationId, telemetry::RequestTrace};
 
 pub(super) use failures::with_failures;
 
-/// Find the persons in a frame, as DeepStack answers.
+/// Detect persons (DeepStack)
 ///
-/// Without a calibration the lens circle is found in the frame and an ideal 180° equidistant lens
-/// that looks straight down is assumed. Further fields are passed over.
+/// Without a calibration, the lens circle is detected in the frame. An ideal 180° equidistant lens
+/// that points straight down is assumed. Unknown fields are ignored.
 #[utoipa::path(
     post, path = "/v1/vision/detection", tag = "deepstack", operation_id = "detect_as_deepstack",
     request_body(content = DeepStackForm, content_type = "multipart/form-data"),
@@ -47,9 +47,9 @@ pub(super) async fn detect_as_deepstack(
     answer(&state, &trace, upload, None, &request_id).await
 }
 
-/// Find the persons in a frame of a calibrated camera, as DeepStack answers.
+/// Detect persons with a calibration (DeepStack)
 ///
-/// The calibration takes the place of DeepStack's custom model.
+/// The calibration ID replaces the name of DeepStack's custom model.
 #[utoipa::path(
     post, path = "/v1/vision/custom/{calibration}", tag = "deepstack",
     operation_id = "detect_as_deepstack_with",
@@ -67,7 +67,7 @@ pub(super) async fn detect_as_deepstack_with(
     Extension(trace): Extension<RequestTrace>,
     upload: DeepStackUpload,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
-    // What is no ID is a model that is not there.
+    // A name that is not a valid ID is reported as an unknown model.
     let calibration: CalibrationId = calibration
         .parse()
         .map_err(|error| Problem::new(ProblemKind::UnknownCalibration, format!("{error}")))?;
@@ -91,14 +91,14 @@ async fn answer(
     Ok(Json(answer))
 }
 
-/// Which calibrations can be named, as DeepStack's custom models are listed.
+/// List calibrations (DeepStack)
 ///
-/// DeepStack itself has no such route, but what has taken its place does, and Blue Iris asks for it.
+/// The original DeepStack has no such route. Its successors have it, and Blue Iris calls it.
 #[utoipa::path(
     post, path = "/v1/vision/custom/list", tag = "deepstack", operation_id = "list_as_deepstack",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
-        (status = OK, description = "The IDs of the calibrations that serve.", body = DeepStackModels),
+        (status = OK, description = "The IDs of the calibrations in use.", body = DeepStackModels),
     )
 )]
 pub(super) async fn list_as_deepstack(

@@ -1,4 +1,4 @@
-//! One frame in, its persons out.
+//! `POST /detect`: detects the persons in one frame.
 
 use axum::{
     Extension,
@@ -29,15 +29,15 @@ pub(super) const INFERENCE_TIME: HeaderName = HeaderName::from_static("x-inferen
 pub(super) const TOTAL_TIME: HeaderName = HeaderName::from_static("x-total-time");
 pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-count");
 
-/// Find the persons in a frame.
+/// Detect persons
 ///
 /// Send the frame as the form field `img` with parameters as further fields, or as the body with
-/// parameters in the query. JPEG, PNG and WebP are read, whatever the content type says. Without
-/// `calibration` the lens circle is found in the frame and an ideal 180° equidistant lens that
-/// looks straight down is assumed.
+/// parameters in the query. JPEG, PNG and WebP are accepted, whatever the content type. Without
+/// `calibration`, the lens circle is detected in the frame, and an ideal 180° equidistant lens that
+/// points straight down is assumed.
 ///
-/// The answer is the report as JSON unless `format` or `Accept` asks for another: the frame with boxes
-/// drawn into it, or a file for annotation tools.
+/// The response is the report as JSON. `format` or `Accept` selects the annotated image or a file
+/// for annotation tools instead.
 #[utoipa::path(
     post, path = "/detect", tag = "detection", operation_id = "detect_persons",
     params(DetectQuery),
@@ -58,12 +58,12 @@ pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-co
             (String = "application/xml"), (String = "text/plain"),
          ),
          headers(
-            ("X-Person-Count" = u64, description = "How many persons were found."),
-            ("X-Request-Id" = String, description = "The request's own, or a new one."),
+            ("X-Person-Count" = u64, description = "The number of detected persons."),
+            ("X-Request-Id" = String, description = "The ID of the request, or a generated one."),
             ("Server-Timing" = String, description = "The stages, milliseconds."),
-            ("X-Queue-Time" = f64, description = "How long views waited for the network, milliseconds."),
-            ("X-Inference-Time" = f64, description = "How long the network ran, milliseconds."),
-            ("X-Total-Time" = f64, description = "From the frame's arrival to its report, milliseconds."),
+            ("X-Queue-Time" = f64, description = "Time that views waited for the model, milliseconds."),
+            ("X-Inference-Time" = f64, description = "Time that the model ran, milliseconds."),
+            ("X-Total-Time" = f64, description = "Time from the arrival of the frame to its report, milliseconds."),
          )),
     )
 )]
@@ -82,7 +82,7 @@ pub(super) async fn detect_persons(
     Ok((AppendHeaders(facts(&report)), media_type, content.bytes))
 }
 
-/// What the sender of a frame is told beside the answer.
+/// Returns the headers about a report: the number of persons and the times of the stages.
 pub(super) fn facts(report: &DetectionReport) -> [(HeaderName, HeaderValue); 5] {
     let [stages, queue, inference, total] = timing_headers(&ReportTimings::from(&report.timings));
     let count = (PERSON_COUNT, HeaderValue::from(report.persons.len()));
@@ -96,8 +96,8 @@ fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerO
     Ok((upload.job(parameters, request_id), answer))
 }
 
-/// The stages as `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), and those that say how
-/// busy the server is as plain numbers; all in milliseconds.
+/// Returns the stages as `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), and the stages
+/// that measure the load as plain numbers; all in milliseconds.
 fn timing_headers(timings: &ReportTimings) -> [(HeaderName, HeaderValue); 4] {
     let stages = timings
         .stages()

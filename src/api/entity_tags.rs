@@ -1,22 +1,22 @@
-//! Entity tags, and readers that have something already (RFC 9110, sections 8.8.3 and 13.1.2).
+//! Entity tags and conditional requests (RFC 9110, sections 8.8.3 and 13.1.2).
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header::IF_NONE_MATCH};
 
 use super::problem::{Problem, ProblemKind};
 
-/// What a header names.
+/// The entity tags that a header lists.
 pub(super) enum Named {
     Any,
     Tags(Vec<String>),
 }
 
-/// The entity tag around an opaque value.
+/// Returns the entity tag of an opaque value.
 pub(super) fn entity_tag(value: &str) -> HeaderValue {
     // Revisions and report IDs are digits.
     HeaderValue::from_str(&format!("\"{value}\"")).unwrap_or(HeaderValue::from_static("\"\""))
 }
 
-/// Whether a reader has what this value stands for already.
+/// Returns `true` if `If-None-Match` lists this value: the client has the current version.
 pub(super) fn is_unmodified(headers: &HeaderMap, value: &str) -> Result<bool, Problem> {
     Ok(match named(headers, &IF_NONE_MATCH, true)? {
         None => false,
@@ -25,8 +25,8 @@ pub(super) fn is_unmodified(headers: &HeaderMap, value: &str) -> Result<bool, Pr
     })
 }
 
-/// The entity tags in a header. Weak ones are equal to nothing unless `weak` allows them. Empty elements are
-/// passed over (RFC 9110, section 5.6.1.2), but not a header without any other: its sender has lost the tag.
+/// Parses the entity tags of a header. Weak tags match nothing unless `weak` allows them. Empty
+/// list elements are ignored (RFC 9110, section 5.6.1.2). A header without any tag is an error.
 pub(super) fn named(
     headers: &HeaderMap,
     header: &HeaderName,
@@ -39,7 +39,7 @@ pub(super) fn named(
     let mut any = false;
     let mut is_empty = true;
     for value in headers.get_all(header) {
-        // A comma may also be a character of a tag.
+        // A comma may be part of a tag.
         let mut in_tag = false;
         let is_between = |byte: &u8| {
             in_tag ^= *byte == b'"';
@@ -58,7 +58,7 @@ pub(super) fn named(
                 .and_then(|opaque| opaque.strip_suffix('"'));
             match inner {
                 Some(inner) if weak || !is_weak => tags.push(inner.to_owned()),
-                // A weak tag is no promise about every byte.
+                // A weak tag does not promise equal bytes.
                 Some(_) => {}
                 None if tag == "*" => any = true,
                 None => return Err(no_entity_tag(header, tag)),
@@ -73,7 +73,7 @@ pub(super) fn named(
 
 fn no_entity_tag(header: &HeaderName, text: &str) -> Problem {
     let detail = format!(
-        "{header}: {text:?} is no entity tag: repeat the ETag of an answer with its quotes, or give *"
+        "{header}: {text:?} is not an entity tag: repeat the ETag of a response with its quotes, or send *"
     );
     Problem::new(ProblemKind::MalformedRequest, detail)
 }

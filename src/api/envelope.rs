@@ -1,4 +1,4 @@
-//! What surrounds every request: its ID, its log line, its metrics, and the one shape of failures.
+//! The layer around every request: request ID, log line, metrics and problem documents.
 
 use std::{any::Any, sync::Arc, time::Instant};
 
@@ -22,32 +22,32 @@ use crate::{
     telemetry::{RequestTrace, Tracer},
 };
 
-/// The route of requests that no route matches.
+/// The route label of requests that match no route.
 const UNMATCHED: &str = "unmatched";
-/// The name under which `log.filter` knows the line that each request gets.
+/// The log target of the access log, for `log.filter`.
 const ACCESS_LOG: &str = "lookdown::access";
 
-/// Where requests leave their marks.
+/// The state of this layer: metrics and traces.
 #[derive(Clone)]
 pub(super) struct Surroundings {
     pub(super) metrics: Arc<Metrics>,
     pub(super) tracer: Tracer,
 }
 
-/// The problem of a failed request, as the log names it.
+/// The problem of a failed request, for the log.
 struct Failure {
     /// The name of its kind.
     reason: &'static str,
-    /// Identifies the occurrence: the `instance` of the problem document.
+    /// The ID of the occurrence: the `instance` of the problem document.
     occurrence: Uuid,
 }
 
-/// The answer to a request whose handler has panicked.
+/// Returns the response to a request whose handler panicked.
 pub(super) fn of_panic(_: Box<dyn Any + Send>) -> Response {
     Problem::fault().into_response()
 }
 
-/// Puts every answer into its envelope.
+/// Adds the request ID, the access log line, the metrics and the problem document.
 pub(super) async fn wrap(
     State(Surroundings { metrics, tracer }): State<Surroundings>,
     mut request: Request,
@@ -63,7 +63,7 @@ pub(super) async fn wrap(
     let trace = incoming_trace::begin(&tracer, || format!("{method} {route}"), request.headers());
     request.extensions_mut().insert(trace.clone());
 
-    // Of the highest level, so that no filter which shows a line hides whose it is.
+    // The span has the highest level, so no filter removes the request ID from a line.
     let span = tracing::error_span!(
         "request",
         request_id = request_id.as_str(),
@@ -107,7 +107,7 @@ pub(super) async fn wrap(
     response
 }
 
-/// The line that each request gets: on our failures wherever anything is logged, else for who asks.
+/// Writes the access log line: level info for server errors, otherwise debug.
 fn log_answer(status: StatusCode, seconds: f64, failure: Option<&Failure>) {
     let code = status.as_u16();
     let reason = failure.map(|failure| failure.reason);
@@ -119,7 +119,7 @@ fn log_answer(status: StatusCode, seconds: f64, failure: Option<&Failure>) {
     }
 }
 
-/// Ends the request's span, in which only our own failures are errors.
+/// Ends the span of the request. Only server errors set its error status.
 fn end(trace: &RequestTrace, status: StatusCode, reason: Option<&'static str>) {
     if let Some(reason) = reason {
         trace.note("error.type", reason);
@@ -128,7 +128,7 @@ fn end(trace: &RequestTrace, status: StatusCode, reason: Option<&'static str>) {
     trace.end(fault);
 }
 
-/// The same response (`Allow`, `Retry-After` …) with the problem as its body.
+/// Writes the problem as the body and keeps the headers of the response (`Allow`, `Retry-After` …).
 fn write_problem(
     response: Response,
     problem: Problem,
@@ -145,7 +145,7 @@ fn write_problem(
     Response::from_parts(parts, body.into_body())
 }
 
-/// A label from a fixed list: clients can invent methods.
+/// Returns a metric label from a fixed list: clients can send arbitrary methods.
 fn method_label(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",

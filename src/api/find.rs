@@ -1,5 +1,5 @@
-//! What every route that finds people does with a frame: it waits for the report as long as it may,
-//! counts, traces and keeps it.
+//! Detection for all routes: waits for the report until the deadline, and counts, traces and stores
+//! it.
 
 use std::sync::Arc;
 
@@ -14,17 +14,18 @@ use crate::{
     telemetry::RequestTrace,
 };
 
-/// What an answer can be written from.
+/// The input of a response writer.
 pub(super) struct Found<'a> {
-    /// The frame and what was found in it.
+    /// The frame and its detections.
     pub(super) detected: Detected,
-    /// What was found as it is told.
+    /// The report.
     pub(super) report: &'a Report,
-    /// The same as JSON, as it is kept.
+    /// The report as stored JSON.
     pub(super) json: &'a Bytes,
 }
 
-/// Finds the persons in a frame and has the answer written while the frame still has its place.
+/// Detects the persons in a frame. `write` builds the response while the frame still holds its
+/// permit.
 pub(super) async fn find<T: Send + 'static>(
     state: &ApiState,
     trace: &RequestTrace,
@@ -36,7 +37,7 @@ pub(super) async fn find<T: Send + 'static>(
     let timeline = job.ticket.timeline.clone();
     let pictures_of = Arc::clone(&state.options.pictures_of);
     let work = state.workers.detect_and(job, move |detected| {
-        // The frame is kept for as long as the answer needs it, which a report does not.
+        // Drawing needs the frame after the report has been taken.
         let report = detected.report.clone();
         let is_kept = pictures_of.include(&report.camera);
         let picture = is_kept.then(|| picture(&detected)).flatten();
@@ -61,7 +62,7 @@ pub(super) async fn find<T: Send + 'static>(
     Ok((report, answer))
 }
 
-/// The report as it is kept, and what its sender is answered.
+/// Serialises the report for the result store and the response.
 fn written<T>(
     detected: Detected,
     write: impl FnOnce(Found<'_>) -> Result<T, Problem>,
@@ -77,7 +78,7 @@ fn written<T>(
     Ok((json, answer))
 }
 
-/// The picture that is kept of the frame. One that cannot be kept costs nobody the report.
+/// Returns the image to store with the report. A failure here does not fail the request.
 fn picture(detected: &Detected) -> Option<NewPicture> {
     match KeptFrame::of(detected) {
         Ok(kept) => Some(NewPicture {
@@ -85,13 +86,13 @@ fn picture(detected: &Detected) -> Option<NewPicture> {
             sketch: kept.sketch,
         }),
         Err(error) => {
-            tracing::warn!("no picture is kept of this frame: {error}");
+            tracing::warn!("the image of this frame is not stored: {error}");
             None
         }
     }
 }
 
-/// What may explain how long a frame took.
+/// Adds attributes that may explain the duration to the span.
 fn describe(trace: &RequestTrace, report: &DetectionReport) {
     trace.note("lookdown.camera", report.camera.clone());
     trace.note("lookdown.calibration", report.calibration.id.clone());

@@ -1,12 +1,13 @@
-//! Web pages of other origins, where there are no keys. A browser on the server's machine reaches a
-//! server that only listens there, and runs the pages of strangers. It does not let them read the
-//! answers (CORS), but it does send their requests; and a stranger who lets the name of his own host
-//! lead to this machine (DNS rebinding) is no other origin for it.
+//! CSRF and DNS rebinding protection for servers without API keys. A browser on the server's
+//! machine can reach a server that listens only there, and runs web pages of any origin. CORS
+//! prevents such a page from reading responses, but not from sending requests. With DNS rebinding,
+//! an attacker's host name resolves to this machine, and its page has the same origin as the
+//! server.
 //!
-//! So a request that may change anything is refused when its `Origin` is neither the server itself
-//! nor in `access.cors_origins`; and a server that only its own machine reaches answers no request
-//! for a public host name, nor any that a proxy passed on: the proxy's clients are not on this machine.
-//! Keys make all of this unnecessary: no browser adds them by itself.
+//! So a request that may make changes is refused unless its `Origin` is the server itself or one of
+//! `access.cors_origins`. A server that only its own machine reaches also refuses requests for a
+//! public host name, and requests that a proxy forwarded: the clients of a proxy are on other
+//! machines. API keys make these checks unnecessary: browsers do not add them on their own.
 
 use std::{net::IpAddr, sync::Arc};
 
@@ -23,8 +24,8 @@ use super::{
     problem::{Problem, ProblemKind},
 };
 
-/// The headers by which proxies say that they pass a request on (RFC 7239; RFC 9110, section 7.6.3;
-/// `X-Real-IP` and `X-Forwarded-…` by convention).
+/// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` and
+/// `X-Forwarded-…` by convention).
 const FORWARDING_HEADERS: [&str; 8] = [
     "forwarded",
     "via",
@@ -35,19 +36,19 @@ const FORWARDING_HEADERS: [&str; 8] = [
     "x-forwarded-server",
     "x-real-ip",
 ];
-/// Most characters of a header that are repeated to its sender.
+/// Largest number of characters of a header that an error message repeats.
 const MAX_SHOWN_CHARS: usize = 128;
 
-/// The pages that are not foreign.
+/// The origins that may make changes.
 #[derive(Clone)]
 pub(super) struct OwnPages {
     own_machine_only: bool,
-    /// The origins that may call.
+    /// The origins in `access.cors_origins`.
     allowed: Arc<[String]>,
 }
 
 impl OwnPages {
-    /// `None` where there are keys.
+    /// Returns `None` if there are API keys.
     pub(super) fn of(options: &ApiOptions) -> Option<Self> {
         match options.access {
             Access::Open { own_machine_only } => Some(Self {
@@ -59,7 +60,7 @@ impl OwnPages {
     }
 }
 
-/// Lets no request of a foreign page through.
+/// Refuses requests of other origins.
 pub(super) async fn refuse(
     State(own_pages): State<OwnPages>,
     request: Request,
@@ -83,7 +84,7 @@ fn check(request: &Request, own_pages: &OwnPages) -> Result<(), Problem> {
         );
         return Err(Problem::new(ProblemKind::Forbidden, detail));
     }
-    // Every browser sends a host; a client that sends none is no browser.
+    // Every browser sends a host, so a client without one is not a browser.
     let host = host_of(request.uri(), request.headers());
     if let Some(host) = &host
         && *own_machine_only
@@ -93,7 +94,7 @@ fn check(request: &Request, own_pages: &OwnPages) -> Result<(), Problem> {
         let host = shown(host.as_str());
         let detail = format!(
             "without keys (access.keys_file), this server answers on its own machine only, and \
-             {host} may be the name of another: ask localhost, or add the origin to \
+             {host} may be another machine: use localhost, or add the origin to \
              access.cors_origins"
         );
         return Err(Problem::new(ProblemKind::Forbidden, detail));
@@ -109,19 +110,19 @@ fn check(request: &Request, own_pages: &OwnPages) -> Result<(), Problem> {
     let origin = shown(origin);
     let detail = format!(
         "without keys (access.keys_file), web pages of other origins may only read, and this \
-         request is from a page of {origin}: add it to access.cors_origins if it is yours"
+         request is from a page of {origin}: add a trusted origin to access.cors_origins"
     );
     Err(Problem::new(ProblemKind::Forbidden, detail))
 }
 
-/// Returns the first header that a proxy adds to the requests which it passes on.
+/// Returns the first header that a forwarding proxy adds.
 fn forwarding_header(headers: &HeaderMap) -> Option<&'static str> {
     FORWARDING_HEADERS
         .into_iter()
         .find(|name| headers.contains_key(*name))
 }
 
-/// Whether an origin is that of a host.
+/// Returns `true` if an origin has this host.
 fn names(origin: &str, host: &Authority) -> bool {
     let Ok(origin) = origin.parse::<Uri>() else {
         return false;
@@ -137,8 +138,8 @@ fn names(origin: &str, host: &Authority) -> bool {
     })
 }
 
-/// Whether no stranger can own a name: it is an address, has no dot, or ends as RFC 6761 (section
-/// 6.3) reserves for one's own machine.
+/// Returns `true` if an attacker cannot own the name: it is an address, has no dot, or has a suffix
+/// that RFC 6761 (section 6.3) reserves for the local machine.
 fn is_private(host: &str) -> bool {
     let name = host.trim_end_matches('.').to_ascii_lowercase();
     let address = name.trim_start_matches('[').trim_end_matches(']');
@@ -154,7 +155,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn addresses_and_names_without_a_dot_are_private_and_others_may_be_anybodys() {
+    fn addresses_and_names_without_a_dot_are_private() {
         for host in [
             "localhost",
             "LOCALHOST",
@@ -176,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn an_origin_is_that_of_a_host_with_the_same_name_and_port() {
+    fn an_origin_matches_a_host_with_the_same_name_and_port() {
         let names = |origin: &str, host: &str| names(origin, &host.parse().unwrap());
         assert!(names("http://localhost:8080", "localhost:8080"));
         assert!(names("http://LocalHost", "localhost:80"));

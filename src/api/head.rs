@@ -1,5 +1,5 @@
-//! Heads of requests that are too large are refused. Much larger ones never come here: the server
-//! answers them by itself, with the status alone.
+//! Limits of request heads. The HTTP parser refuses much larger heads before this layer, with a
+//! status and without a problem document.
 
 use axum::{
     extract::{Request, State},
@@ -12,10 +12,10 @@ use super::{
     problem::{Problem, ProblemKind},
 };
 
-/// What a header takes beside its name and value: `: ` and the end of the line.
+/// Bytes of a header line besides name and value: `: ` and the line end.
 const SEPARATORS: usize = 4;
 
-/// Refuses a request with too many headers, or too long ones.
+/// Refuses a request with too many headers or too large a head.
 pub(super) async fn within_bounds(
     State(state): State<ApiState>,
     request: Request,

@@ -1,4 +1,4 @@
-//! Probes: alive, ready, and what the metrics say.
+//! Health checks and metrics.
 
 use std::collections::BTreeSet;
 
@@ -12,17 +12,17 @@ use crate::{
     pipeline::PipelineError,
 };
 
-/// Most broken files told.
+/// Largest number of invalid files in a response.
 const MAX_PROBLEMS: usize = 100;
 
-/// Where the server is between its start and its end.
+/// The phase of the server's life.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// The network has not run yet.
+    /// The models have not run yet.
     WarmingUp,
-    /// Frames are welcome.
+    /// The server accepts frames.
     Ready,
-    /// The server was told to stop: what has arrived is finished.
+    /// The server is shutting down and finishes the requests that have arrived.
     Stopping,
 }
 
@@ -37,7 +37,7 @@ impl Default for Readiness {
 }
 
 impl Readiness {
-    /// The warm-up has ended. Does not call back a server that was told to stop meanwhile.
+    /// Marks the end of the warm-up. A server that is already stopping stays in that phase.
     pub fn warmed_up(&self) {
         self.0.send_if_modified(|phase| {
             let warming_up = *phase == Phase::WarmingUp;
@@ -48,12 +48,12 @@ impl Readiness {
         });
     }
 
-    /// The server was told to stop.
+    /// Marks the beginning of the shutdown.
     pub fn stopping(&self) {
         self.0.send_replace(Phase::Stopping);
     }
 
-    /// The phase now.
+    /// Returns the current phase.
     #[must_use]
     pub fn phase(&self) -> Phase {
         *self.0.borrow()
@@ -61,7 +61,7 @@ impl Readiness {
 
     /// Waits for the end of the warm-up.
     pub async fn ready(&self) {
-        // The sender is `self`, so the channel cannot close meanwhile.
+        // `self` holds the sender, so the channel stays open.
         let _ = self
             .0
             .subscribe()
@@ -70,7 +70,7 @@ impl Readiness {
     }
 }
 
-/// How the server is.
+/// The liveness of the server.
 #[derive(serde::Serialize, ToSchema)]
 pub(super) struct Health {
     /// `alive`.
@@ -78,37 +78,37 @@ pub(super) struct Health {
     status: &'static str,
 }
 
-/// How a server is that takes frames.
+/// The readiness of the server.
 #[derive(serde::Serialize, ToSchema)]
 pub(super) struct Ready {
     /// `ready`.
     #[schema(example = "ready")]
     status: &'static str,
-    /// How its calibrations are.
+    /// The state of the calibrations.
     calibrations: CalibrationHealth,
-    /// How the place of its results is.
+    /// The state of the result store.
     results: ResultsHealth,
 }
 
-/// How the place of the results is.
+/// The state of the result store.
 #[derive(serde::Serialize, ToSchema)]
 struct ResultsHealth {
-    /// Why it cannot be reached, if it cannot. Reports wait for it meanwhile.
+    /// The reason why the store cannot be reached, if it cannot. Reports are queued until it can.
     #[serde(skip_serializing_if = "Option::is_none")]
     store_problem: Option<String>,
 }
 
-/// How the calibrations are.
+/// The state of the calibrations.
 #[derive(serde::Serialize, ToSchema)]
 #[schema(example = json!({ "serving": 12, "problems": [
     { "file": "lobby.json", "problem": "image: 4×4 pixels; each side must be 16 to 65536" }
 ] }))]
 struct CalibrationHealth {
-    /// How many serve.
+    /// Number of calibrations in use.
     serving: usize,
-    /// Files whose newest version cannot be used; at most 100 are told.
+    /// Files whose newest version cannot be used; at most 100.
     problems: Vec<FileProblem>,
-    /// Why their place cannot be looked at, if it cannot.
+    /// The reason why the calibration store cannot be read, if it cannot.
     #[serde(skip_serializing_if = "Option::is_none")]
     store_problem: Option<String>,
 }
@@ -116,9 +116,9 @@ struct CalibrationHealth {
 /// A file that cannot be used.
 #[derive(serde::Serialize, ToSchema)]
 struct FileProblem {
-    /// Its name.
+    /// The name of the file.
     file: String,
-    /// Why.
+    /// The reason.
     problem: String,
 }
 
@@ -135,27 +135,26 @@ impl From<CalibrationsHealth> for CalibrationHealth {
     }
 }
 
-/// Is the process alive?
+/// Check liveness
 ///
-/// Says nothing about whether frames can be answered: restart the process only when this fails.
+/// Independent of readiness: restart the process only when this check fails.
 #[utoipa::path(
     get, path = "/livez", tag = "operation", operation_id = "get_liveness",
-    responses((status = OK, description = "The process answers.", body = Health))
+    responses((status = OK, description = "The process is alive.", body = Health))
 )]
 pub(super) async fn livez() -> Json<Health> {
     Json(Health { status: "alive" })
 }
 
-/// Can frames be sent?
+/// Check readiness
 ///
-/// Not before the network has run once, not while the server that it runs on does not answer, and no
-/// longer when this server was told to stop. Files of
-/// calibrations that cannot be used are told, but stop nothing: what was known of them goes on. Nor does a
-/// place of results that cannot be reached.
+/// Ready after the first run of the models, unless the inference server does not respond or the
+/// server is shutting down. Invalid calibration files and an unreachable result store are reported,
+/// but the server stays ready: the previous calibrations remain in use.
 #[utoipa::path(
     get, path = "/readyz", tag = "operation", operation_id = "get_readiness",
     responses(
-        (status = OK, description = "Frames can be sent.", body = Ready),
+        (status = OK, description = "The server accepts frames.", body = Ready),
     )
 )]
 pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>, Problem> {
@@ -169,7 +168,7 @@ pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>,
     }))
 }
 
-/// Refuses while frames cannot be sent, and says why.
+/// Returns the problem while the server is not ready.
 pub(super) fn require_ready(state: &ApiState) -> Result<(), Problem> {
     let remote = state.models.remote();
     match state.readiness.phase() {
@@ -180,7 +179,9 @@ pub(super) fn require_ready(state: &ApiState) -> Result<(), Problem> {
     }
 }
 
-/// Metrics in the Prometheus text format.
+/// Get metrics
+///
+/// Returns the Prometheus text format.
 #[utoipa::path(
     get, path = "/metrics", tag = "operation", operation_id = "get_metrics",
     responses(
@@ -207,7 +208,7 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
 
-/// The kept reports, and who listens, as they are at this scrape.
+/// Updates the metrics of the result store and of its subscribers.
 async fn show_results(state: &ApiState) {
     let metrics = &state.metrics;
     if let Ok(kept) = state.results.usage().await {
@@ -220,7 +221,7 @@ async fn show_results(state: &ApiState) {
     metrics.show_listeners(listeners.count(), listeners.dropped());
 }
 
-/// The models as they are at this scrape.
+/// Updates the metrics of the models.
 fn show_models(state: &ApiState) {
     let models = state.models.registry().all();
     let rows: Vec<_> = models
@@ -232,7 +233,7 @@ fn show_models(state: &ApiState) {
     state.metrics.show_models(&rows, &loads);
 }
 
-/// The server that networks run on, if there is one.
+/// Updates the metrics of the inference server, if there is one.
 fn show_remote(state: &ApiState) {
     let Some(remote) = state.models.remote() else {
         return;
@@ -247,7 +248,7 @@ fn show_remote(state: &ApiState) {
     state.metrics.show_remote(remote.is_available(), &requests);
 }
 
-/// Of the zones, those that their calibrations still have.
+/// Removes the metrics of zones that no calibration has any longer.
 fn forget_zones(state: &ApiState) {
     state.metrics.retain_zones(|calibration, zone| {
         let entry = calibration.parse::<CalibrationId>().ok();
@@ -259,7 +260,7 @@ fn forget_zones(state: &ApiState) {
     });
 }
 
-/// The calibrations as they are at this scrape.
+/// Updates the metrics of the calibrations.
 fn show_calibrations(state: &ApiState) {
     let health = state.calibrations.health();
     let files: BTreeSet<_> = health.problems.iter().map(|(file, _)| file).collect();

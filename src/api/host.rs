@@ -1,7 +1,7 @@
 //! The `Host` header: HTTP/1.1 requires exactly one valid value (RFC 9112, section 3.2).
 //!
-//! The check protects the rules that depend on the host, such as those against DNS rebinding: a host
-//! that cannot be parsed must not count as none.
+//! The check protects the rules that depend on the host, such as the DNS rebinding protection: an
+//! invalid host must not count as a missing one.
 
 use axum::{
     extract::Request,
@@ -22,8 +22,8 @@ pub(super) async fn require(request: Request, next: Next) -> Response {
     next.run(request).await
 }
 
-/// Returns the host that the request is meant for: that of its target, or else the only `Host`
-/// header. HTTP/1.0 needs none.
+/// Returns the host of the request: that of the request target, or else the only `Host` header.
+/// HTTP/1.0 requires none.
 pub(super) fn host_of(uri: &Uri, headers: &HeaderMap) -> Option<Authority> {
     uri.authority().cloned().or_else(|| only_host(headers))
 }

@@ -1,10 +1,10 @@
-//! The trace that a request says it belongs to.
+//! The trace context of an incoming request.
 
 use axum::http::HeaderMap;
 
 use crate::telemetry::{RequestTrace, Tracer};
 
-/// The request's place in its trace; its span gets that name, if it has one.
+/// Begins the span of a request in the trace of its `traceparent` header, if there is one.
 pub(super) fn begin(
     tracer: &Tracer,
     name: impl FnOnce() -> String,

@@ -1,5 +1,5 @@
-//! How long a client waits for what the workers do: as long as any request may take, or less if it
-//! said so.
+//! The time that a request waits for the workers: the deadline of every request, or a shorter one
+//! that the request sets.
 
 use std::{future::Future, time::Duration, time::Instant};
 
@@ -14,15 +14,15 @@ use crate::{
     telemetry::RequestTrace,
 };
 
-/// How long somebody waits.
+/// The time limit of a wait.
 pub(super) struct Limit {
     deadline: Deadline,
-    /// What to raise if it is too short.
+    /// The setting or parameter that raises the limit.
     set_by: &'static str,
 }
 
 impl Limit {
-    /// The server's limit, or the request's own if that is shorter.
+    /// Returns the shorter of the server's limit and the request's own.
     pub(super) fn of(server: Deadline, own: Option<Duration>) -> Self {
         let deadline = own.map_or(server, |own| server.within(own));
         let set_by = if deadline.at() < server.at() {
@@ -33,7 +33,7 @@ impl Limit {
         Self { deadline, set_by }
     }
 
-    /// Waits for work, and tells the trace in which stages it was.
+    /// Waits for work and adds its stages to the trace.
     pub(super) async fn wait<T>(
         &self,
         trace: &RequestTrace,
@@ -50,7 +50,7 @@ impl Limit {
     fn timed_out(&self) -> Problem {
         let (seconds, set_by) = (self.deadline.limit_seconds(), self.set_by);
         let detail = format!(
-            "there was no result within {seconds} s: send fewer frames or views at a time, use a faster \
+            "no result within {seconds} s: send fewer frames or views at a time, use a faster \
              profile for frames, or raise {set_by}"
         );
         Problem::new(ProblemKind::Timeout, detail)

@@ -1,5 +1,5 @@
-//! The API's own description. What a route takes and answers stands with the route; here is what
-//! they share.
+//! The OpenAPI document. Each route describes its own parameters and responses. This module adds
+//! the common parts.
 
 mod failures;
 mod parameters;
@@ -17,25 +17,25 @@ pub(super) use parameters::{DetectForm, DetectQuery, PictureQuery, RawBytes, fie
 #[openapi(
     info(
         title = "Lookdown",
-        description = "Finds people in the frames of ceiling fisheye cameras. Every failure is a \
+        description = "Detects persons in the frames of ceiling fisheye cameras. Every failure is a \
                        problem document (RFC 9457)."
     ),
     servers((url = "/", description = "This server")),
     tags(
         (name = "detection", description = "Frames in, persons out."),
-        (name = "deepstack", description = "The same for clients of DeepStack, such as Home Assistant and Blue Iris."),
-        (name = "inference", description = "The same for clients of the Open Inference Protocol (KServe V2)."),
-        (name = "results", description = "What was found last, for dashboards. Kept within limits, in memory or in a Redis that servers share."),
-        (name = "calibrations", description = "The cameras. Changes are for administrators."),
-        (name = "models", description = "Which models answer. Changes are for administrators."),
-        (name = "operation", description = "Probes, metrics and documentation."),
+        (name = "deepstack", description = "Detection for clients of DeepStack, such as Home Assistant and Blue Iris."),
+        (name = "inference", description = "Detection for clients of the Open Inference Protocol (KServe V2)."),
+        (name = "results", description = "Stored reports and images, for dashboards. In memory or in a shared Redis, within limits."),
+        (name = "calibrations", description = "Calibrations of the cameras. Changes need the scope `admin`."),
+        (name = "models", description = "Loaded models. Changes need the scope `admin`."),
+        (name = "operation", description = "Health checks, metrics and documentation."),
     ),
     components(schemas(ProblemBody)),
     modifiers(&Keys)
 )]
 pub(super) struct Common;
 
-/// The OpenAPI document of every route.
+/// Returns the OpenAPI document of all routes.
 #[must_use]
 pub fn document() -> openapi::OpenApi {
     let mut document = super::routes().into_openapi();
@@ -43,7 +43,7 @@ pub fn document() -> openapi::OpenApi {
     document
 }
 
-/// This document.
+/// Get the OpenAPI document
 #[utoipa::path(
     get, path = "/openapi.json", tag = "operation", operation_id = "get_openapi",
     responses((status = OK, description = "OpenAPI 3.1.", body = Object))

@@ -1,4 +1,4 @@
-//! Headers that tell browsers what not to do with an answer.
+//! Security headers for browsers.
 
 use axum::{
     http::{
@@ -10,20 +10,21 @@ use axum::{
     response::Response,
 };
 
-/// What the web page may load: scripts, styles and data of this server alone, and the pictures that were given
-/// to it or answered.
+/// The content security policy of the web page: scripts, styles and data of this server alone, and
+/// images that the user opened or the server returned.
 const WEB_PAGE_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src \
      'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
 
-/// What the API page may load: it sets styles from its script, too, and has pictures inside its styles.
+/// The content security policy of the API page. Its script sets styles, and its styles contain
+/// images.
 const API_PAGE_POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' \
      blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
 
-/// An answer that is no page loads nothing.
+/// The headers of every response. A response that is not a page loads nothing.
 const ALWAYS: [(HeaderName, HeaderValue); 4] = [
     (
         CONTENT_SECURITY_POLICY,
@@ -34,12 +35,12 @@ const ALWAYS: [(HeaderName, HeaderValue); 4] = [
     (X_FRAME_OPTIONS, HeaderValue::from_static("DENY")),
 ];
 
-/// Lets the web page load what belongs to it.
+/// Adds the policy of the web page.
 pub(super) async fn of_web_page(response: Response) -> Response {
     with_policy(response, WEB_PAGE_POLICY)
 }
 
-/// Lets the API page load what belongs to it.
+/// Adds the policy of the API page.
 pub(super) async fn of_api_page(response: Response) -> Response {
     with_policy(response, API_PAGE_POLICY)
 }
@@ -50,7 +51,7 @@ fn with_policy(mut response: Response, policy: HeaderValue) -> Response {
     response
 }
 
-/// Adds to the headers of any answer what it does not say itself.
+/// Adds default headers that the response does not set itself.
 pub(super) fn complete(headers: &mut HeaderMap) {
     for (name, value) in ALWAYS {
         headers.entry(name).or_insert(value);

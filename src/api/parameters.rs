@@ -1,4 +1,4 @@
-//! The parameters of `POST /detect`: those of the detection, and those of its answer.
+//! The parameters of `POST /detect`: those of the detection and those of the response.
 
 #[cfg(test)]
 mod reference;
@@ -9,7 +9,7 @@ use crate::{
     pipeline::{DetectParameters, ParameterSpec},
 };
 
-/// Lists every parameter, in the order in which they are listed to users.
+/// Lists all parameters in the order of the documentation.
 pub(super) fn all() -> impl Iterator<Item = &'static ParameterSpec> {
     let tables = [
         DetectParameters::TABLE,
@@ -29,7 +29,7 @@ pub(super) fn take(
     taken.collect()
 }
 
-/// Borrows the parameters of a request as a parser takes them.
+/// Borrows the parameters of a request for a parser.
 pub(super) fn pairs(given: &[(String, String)]) -> impl Iterator<Item = (&str, &str)> {
     given
         .iter()

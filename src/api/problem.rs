@@ -1,7 +1,7 @@
 //! Failures as problem documents (RFC 9457).
 //!
-//! A handler returns a [`Problem`]. The [envelope](super::envelope) writes it with a request ID and an ID of the
-//! occurrence, logs its cause and counts it. The [table](kind) declares the kinds.
+//! A handler returns a [`Problem`]. The [envelope](super::envelope) writes it with a request ID and
+//! an ID of the occurrence, logs its cause and counts it. The [table](kind) declares the kinds.
 
 mod calibration;
 mod kind;
@@ -82,7 +82,7 @@ impl Problem {
     pub(super) fn warming_up() -> Self {
         Self::new(
             ProblemKind::WarmingUp,
-            "the server is warming up: try again in a second",
+            "the server is warming up: retry in a second",
         )
     }
 
@@ -92,8 +92,8 @@ impl Problem {
         Self::new(ProblemKind::ShuttingDown, detail)
     }
 
-    /// Returns the problem of a failed response: the one that the handler returned, or one for a failure of the
-    /// framework.
+    /// Returns the problem of a failed response: the one that the handler returned, or one for a
+    /// failure of the framework.
     pub(super) fn take_from(response: &mut Response, method: &str, path: &str) -> Option<Self> {
         if let Some(problem) = response.extensions_mut().remove::<Self>() {
             return Some(problem);
@@ -101,7 +101,7 @@ impl Problem {
         match response.status() {
             StatusCode::NOT_FOUND => Some(Self::new(
                 ProblemKind::NotFound,
-                format!("there is nothing at {path}: GET /docs lists all paths"),
+                format!("there is no resource at {path}: GET /docs lists all paths"),
             )),
             StatusCode::METHOD_NOT_ALLOWED => Some(Self::new(
                 ProblemKind::MethodNotAllowed,

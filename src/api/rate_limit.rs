@@ -1,7 +1,6 @@
-//! How often a client may ask: a token bucket for each API key, and for each address that shows no
-//! key that is known here.
+//! Rate limits: a token bucket for each API key, and for each address without a valid key.
 //!
-//! Answers say how it stands in the fields `RateLimit-Policy` and `RateLimit` of
+//! Responses report the state in the fields `RateLimit-Policy` and `RateLimit` of
 //! draft-ietf-httpapi-ratelimit-headers-11 (23 May 2026).
 
 mod buckets;
@@ -29,17 +28,17 @@ use super::{
 pub(super) const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 pub(super) const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 
-/// How often a client may ask.
+/// The rate limit of a client.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RequestRate {
-    /// Requests a second in the long run, more than 0.
+    /// Sustained requests per second, more than 0.
     pub per_second: f64,
     /// Requests at once after a pause.
     pub burst: NonZeroU32,
 }
 
 impl RequestRate {
-    /// The time that a request costs.
+    /// Returns the time between two requests at the sustained rate.
     fn interval(&self) -> Duration {
         let seconds = Duration::try_from_secs_f64(self.per_second.recip());
         seconds
@@ -48,7 +47,7 @@ impl RequestRate {
     }
 }
 
-/// The buckets of all clients, and who they are. Clones share them.
+/// The token buckets of all clients. Clones share them.
 #[derive(Clone)]
 pub(super) struct RateLimiter {
     access: Access,
@@ -57,7 +56,7 @@ pub(super) struct RateLimiter {
 }
 
 impl RateLimiter {
-    /// Full buckets; `None` where everybody may ask as often as he wants.
+    /// Returns full buckets; `None` without a rate limit.
     pub(super) fn of(options: &ApiOptions) -> Option<Self> {
         let rate = options.request_rate?;
         let (interval, burst) = (rate.interval(), rate.burst.get());
@@ -71,7 +70,7 @@ impl RateLimiter {
         })
     }
 
-    /// Whose bucket a request is taken from.
+    /// Returns the client whose bucket the request uses.
     fn client_of(&self, request: &Request) -> Client {
         let address = || {
             let address = request.extensions().get::<SocketAddr>();
@@ -84,13 +83,13 @@ impl RateLimiter {
     }
 
     fn take(&self, client: Client) -> Standing {
-        // No change can panic half-way.
+        // The change under this lock cannot panic half-way.
         let mut buckets = self.buckets.lock().unwrap_or_else(PoisonError::into_inner);
         buckets.take(client, Instant::now())
     }
 }
 
-/// Lets through who may ask, and says on every answer how often that is.
+/// Refuses requests beyond the rate limit and adds its headers to every response.
 pub(super) async fn apply(
     State(limiter): State<RateLimiter>,
     request: Request,
@@ -118,13 +117,13 @@ pub(super) async fn apply(
 fn too_fast(next_in: Duration) -> Problem {
     let seconds = whole_seconds(next_in);
     let detail = format!(
-        "more requests came than this client may send: the next is welcome in {seconds} s (limits.\
+        "the client exceeds its rate limit: retry in {seconds} s (limits.\
          requests_per_second, limits.request_burst)"
     );
     Problem::new(ProblemKind::RateLimited, detail).with_retry_after(next_in)
 }
 
-/// Rounded up, at least one: shorter times cannot be said in these fields.
+/// Rounds up to at least one second: these fields hold whole seconds.
 fn whole_seconds(time: Duration) -> u64 {
     let begun = u64::from(time.subsec_nanos() > 0);
     (time.as_secs() + begun).max(1)

@@ -1,4 +1,4 @@
-//! The report as it is sent: degrees, milliseconds, and no more digits than mean something.
+//! The report in the format of the API: degrees, milliseconds and rounded numbers.
 
 mod conversion;
 mod rounding;
@@ -46,51 +46,51 @@ use utoipa::ToSchema;
 pub struct Report {
     /// Identifies the request in logs; also in the header X-Request-Id.
     pub request_id: String,
-    /// Which camera the frame came from; the calibration's ID unless the request named one.
+    /// The camera of the frame; the calibration's ID unless the request named a camera.
     pub camera: String,
-    /// When the request arrived (RFC 3339).
+    /// Time at which the request arrived (RFC 3339).
     #[schema(format = DateTime)]
     pub received_at: String,
-    /// When the frame was taken, if the request said so (RFC 3339).
+    /// Time at which the frame was captured, if the request stated it (RFC 3339).
     #[schema(format = DateTime)]
     pub captured_at: Option<String>,
-    /// The calibration used.
+    /// The calibration.
     pub calibration: ReportCalibration,
     /// The frame, its EXIF orientation applied.
     pub image: ReportImage,
-    /// The detector used.
+    /// The model.
     pub model: ReportModel,
-    /// The detector that took some of the closer looks; absent where nobody else was asked.
+    /// The model of some second passes; absent when no other model was used.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub second_opinion: Option<ReportModel>,
-    /// The profile used.
+    /// The profile.
     pub profile: &'static str,
-    /// The refinement used, with all its parameters.
+    /// The refinement with all its parameters.
     pub refinement: ReportRefinement,
-    /// What became of the views.
+    /// The numbers of views by outcome.
     pub views: ReportViews,
     /// Persons, highest score first.
     pub persons: Vec<ReportPerson>,
-    /// How many of them are in each zone of the calibration, in its order; absent when it has none.
+    /// Number of persons in each zone of the calibration, in its order; absent without zones.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub zones: Option<Vec<ReportZone>>,
-    /// Where the time went. The stages are disjoint; together they make the total but for
+    /// Duration of each stage. The stages are disjoint. Their sum is the total except for
     /// scheduling gaps.
     pub timings_ms: ReportTimings,
     /// Circumstances that the client should consider.
     pub warnings: Vec<ReportWarning>,
 }
 
-/// The calibration used.
+/// The calibration of a report.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportCalibration {
-    /// Its ID; `assumed` when none was named.
+    /// The ID; `assumed` when the request named no calibration.
     pub id: String,
-    /// Changes whenever its content does.
+    /// The revision; it changes with the content.
     pub revision: String,
-    /// Whether the lens was assumed because the request named no calibration.
+    /// `true` if the request named no calibration and the lens was assumed.
     pub assumed: bool,
     /// The lens circle of the frame, from which the lens was assumed; absent with a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -132,69 +132,69 @@ pub struct ReportImage {
     pub height: u32,
 }
 
-/// The detector used.
+/// The model of a report.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportModel {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Changes whenever its weights do.
+    /// The revision; it changes with the weights.
     pub revision: String,
 }
 
-/// How overlapping boxes became persons.
+/// The method that merges overlapping boxes into persons.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportRefinement {
     /// `nms`, `soft_nms_linear`, `soft_nms_gaussian` or `fusion`.
     pub name: &'static str,
-    /// Persons with a lower score are left out.
+    /// Least score; persons with a lower one are omitted.
     pub score_threshold: f64,
-    /// Boxes that overlap at least this much are the same person.
+    /// Least overlap (IoU) of boxes that are merged into one person.
     pub iou_threshold: f64,
     /// σ of Gaussian Soft-NMS.
     pub sigma: f64,
-    /// Most persons in a report.
+    /// Largest number of persons in a report.
     pub max_detections: usize,
 }
 
-/// What became of the views.
+/// The numbers of views by outcome.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportViews {
-    /// The detector looked at these.
+    /// Views that the model processed.
     pub inferred: usize,
-    /// Nothing had moved in these since they were looked at: what was found in them stands.
+    /// Views without motion since the model processed them: their detections are reused.
     pub unchanged: usize,
-    /// These lie outside the lens image.
+    /// Views outside the lens image.
     pub outside: usize,
-    /// These see nothing but what the calibration's masks hide.
+    /// Views that the masks of the calibration hide completely.
     pub masked: usize,
 }
 
 /// A zone of the calibration.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportZone {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// How many persons are in it; one may be in several zones.
+    /// Number of persons in the zone; a person may be in several zones.
     pub persons: usize,
 }
 
 /// One person.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportPerson {
-    /// Axis-parallel box.
+    /// Axis-aligned box.
     #[serde(rename = "box")]
     pub bbox: ReportBox,
     /// Confidence, 0 to 1.
     pub score: f64,
-    /// The box turned so that its height axis is the projected vertical.
+    /// The box rotated so that its height axis is the projected vertical.
     pub oriented_box: ReportOrientedBox,
-    /// The direction of the box centre; null when it lies outside the lens image.
+    /// Direction of the box centre; null outside the lens image.
     pub bearing: Option<ReportBearing>,
-    /// Where the person stands; null when the camera's height is unknown.
+    /// Position of the person on the floor; null when the height of the camera is unknown.
     pub floor: Option<ReportFloor>,
-    /// How many views agreed.
+    /// Number of views that detected the person.
     pub views: usize,
-    /// The names of the zones that the person's foot is in; absent when the calibration has none.
+    /// Names of the zones that contain the person's foot point; absent without zones.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub zones: Option<Vec<String>>,
@@ -216,9 +216,9 @@ pub struct ReportBox {
 /// Corner-origin frame pixels.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportOrientedBox {
-    /// Centre, to the right.
+    /// Horizontal position of the centre.
     pub cx: f64,
-    /// Centre, down.
+    /// Vertical position of the centre.
     pub cy: f64,
     /// Extent across the height axis.
     pub width: f64,
@@ -228,7 +228,7 @@ pub struct ReportOrientedBox {
     pub angle_deg: f64,
 }
 
-/// A direction as seen from the camera.
+/// A direction from the camera.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportBearing {
     /// 0 toward image right, growing clockwise on the screen, 0 to 360.
@@ -237,8 +237,8 @@ pub struct ReportBearing {
     pub off_axis_deg: f64,
 }
 
-/// A place on the floor: origin below the camera, x toward image right and y toward image down of
-/// a camera that looks straight down.
+/// A position on the floor: origin below the camera, x toward image right and y toward image down
+/// of a camera that points straight down.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportFloor {
     /// Metres.
@@ -247,27 +247,27 @@ pub struct ReportFloor {
     pub y_m: f64,
 }
 
-/// Wall-clock spans, milliseconds.
+/// Wall-clock durations, milliseconds.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct ReportTimings {
-    /// Bytes to pixels.
+    /// Decoding of the file to pixels.
     pub decode: f64,
-    /// Finding the camera: calibration, lens circle, tables when they are new.
+    /// Selection of the camera: calibration, lens circle, and lookup tables on first use.
     pub calibrate: f64,
-    /// Waiting for a worker and for the network.
+    /// Waiting for a worker and for the model.
     pub queue: f64,
-    /// Frame to network input.
+    /// Rendering of the model input from the frame.
     pub remap: f64,
-    /// The network.
+    /// Inference.
     pub inference: f64,
-    /// Back-projection and merge.
+    /// Back-projection and merging.
     pub refine: f64,
-    /// From the whole request in memory to the report.
+    /// From the complete request in memory to the report.
     pub total: f64,
 }
 
 impl ReportTimings {
-    /// Every stage by name, and last the total.
+    /// Returns every stage by name, the total last.
     pub(super) fn stages(&self) -> [(&'static str, f64); 7] {
         [
             ("decode", self.decode),

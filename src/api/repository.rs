@@ -1,5 +1,5 @@
 //! The models of the server: the model repository extension of the Open Inference Protocol, as
-//! Triton describes it. Only administrators change anything.
+//! Triton describes it. Changes need the scope `admin`.
 
 mod body;
 
@@ -23,14 +23,14 @@ use body::{IndexRequest, LoadRequest, SmallBody, UnloadRequest};
 #[derive(Serialize, ToSchema)]
 #[schema(example = json!({ "name": "nanodet_g_416", "version": "3f1c22ab90de", "state": "READY" }))]
 pub(super) struct RepositoryEntry {
-    /// The model's name.
+    /// The name of the model.
     name: String,
-    /// The revision that answers, as in reports.
+    /// The revision in use, as in reports.
     #[serde(skip_serializing_if = "Option::is_none")]
     version: Option<String>,
-    /// `READY` when it answers, else `UNAVAILABLE`.
+    /// `READY` when the model is in use, else `UNAVAILABLE`.
     state: &'static str,
-    /// Why it does not answer, or why its last load failed.
+    /// The reason why the model is not in use, or why its last load failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
 }
@@ -60,12 +60,12 @@ impl From<&Model> for RepositoryEntry {
     }
 }
 
-/// Which models are there?
+/// List models
 ///
-/// Those that are loaded, and those in the repository's folder that can be.
+/// Returns the loaded models and the models of the repository folder that can be loaded.
 #[utoipa::path(
     post, path = "/v2/repository/index", tag = "models", operation_id = "list_models",
-    request_body(content = Option<IndexRequest>, description = "May be left out."),
+    request_body(content = Option<IndexRequest>, description = "Optional."),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
         (status = OK, description = "The models, by name.", body = Vec<RepositoryEntry>),
@@ -85,18 +85,18 @@ pub(super) async fn index(
     Ok(Json(rows.map(RepositoryEntry::from).collect()))
 }
 
-/// Load a model, or load it again.
+/// Load a model
 ///
-/// It takes its place when it has passed its check and run once; until then, and when it fails,
-/// the one that answers now goes on.
+/// Loads or reloads a model. It comes into use after its check and a first run. Until then, and if
+/// that fails, the current revision stays in use.
 #[utoipa::path(
     post, path = "/v2/repository/models/{name}/load", tag = "models",
     operation_id = "load_model",
     params(("name" = String, Path, description = "The model's name.")),
-    request_body(content = Option<LoadRequest>, description = "May be left out."),
+    request_body(content = Option<LoadRequest>, description = "Optional."),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(
-        (status = OK, description = "The model answers.", body = RepositoryEntry),
+        (status = OK, description = "The model is loaded.", body = RepositoryEntry),
     )
 )]
 pub(super) async fn load(
@@ -110,17 +110,17 @@ pub(super) async fn load(
     Ok(Json(RepositoryEntry::from(&*model)))
 }
 
-/// Unload a model.
+/// Unload a model
 ///
-/// Frames that began with it are finished. Models that answer requests which name none stay.
+/// Frames that were accepted earlier still use it. The models of the profiles cannot be unloaded.
 #[utoipa::path(
     post, path = "/v2/repository/models/{name}/unload", tag = "models",
     operation_id = "unload_model",
     params(("name" = String, Path, description = "The model's name.")),
-    request_body(content = Option<UnloadRequest>, description = "May be left out."),
+    request_body(content = Option<UnloadRequest>, description = "Optional."),
     security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
     responses(
-        (status = OK, description = "The model answers no more.", body = RepositoryEntry),
+        (status = OK, description = "The model is unloaded.", body = RepositoryEntry),
     )
 )]
 pub(super) async fn unload(

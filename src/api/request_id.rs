@@ -1,9 +1,9 @@
-//! Request IDs: the client's own when it is sane, otherwise a new one.
+//! Request IDs: the client's own if it is valid, otherwise a generated one.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use uuid::Uuid;
 
-/// The header that carries the ID, in both directions.
+/// The header of the ID, in requests and responses.
 pub(super) const HEADER: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_CHARS: usize = 128;
 
@@ -12,7 +12,7 @@ const MAX_CHARS: usize = 128;
 pub(super) struct RequestId(String);
 
 impl RequestId {
-    /// The ID of the request with these headers.
+    /// Returns the ID of the request with these headers.
     pub(super) fn of(headers: &HeaderMap) -> Self {
         let given = headers.get(HEADER).and_then(|value| value.to_str().ok());
         match given {
@@ -46,7 +46,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sane_id_is_kept_and_any_other_replaced() {
+    fn a_valid_id_is_kept_and_any_other_is_replaced() {
         assert_eq!(id_for("camera-7/0001").as_str(), "camera-7/0001");
         let long: &'static str = Box::leak("x".repeat(129).into_boxed_str());
         for insane in ["", "two words", "tab\there", long] {

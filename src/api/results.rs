@@ -1,5 +1,5 @@
-//! Reports that are kept, for dashboards: the latest of each camera, those before it, and each as it
-//! comes.
+//! Stored reports, for dashboards: the latest one of each camera, earlier ones, and a stream of new
+//! ones.
 
 mod address;
 pub(super) mod events;
@@ -28,12 +28,12 @@ use crate::{
     results::{ListenError, Unreachable},
 };
 
-/// May be kept, but not shown before the server was asked whether it is still right.
+/// Clients may cache the response, but must revalidate it before use.
 const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 
-/// Of which cameras are there reports?
+/// List cameras with reports
 ///
-/// With the age of each camera's latest report and how many persons are in it.
+/// Each entry has the age of the latest report and its number of persons.
 #[utoipa::path(
     get, path = "/results", tag = "results", operation_id = "list_results",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
@@ -53,20 +53,20 @@ pub(super) async fn list(
     Ok(([(CACHE_CONTROL, NO_CACHE)], Json(rows)))
 }
 
-/// No report of that camera is kept.
+/// Returns the problem of a camera without a stored report.
 fn unknown(camera: &str) -> Problem {
     let camera = Quoted(camera);
     let detail = format!(
-        "no report of the camera {camera} is kept: GET /results lists the cameras, and a frame sent to \
-         /detect with this name as the parameter camera makes it one of them"
+        "there is no report of the camera {camera}: GET /results lists the cameras; a frame sent to \
+         /detect with this name as the parameter camera adds a report"
     );
     Problem::new(ProblemKind::UnknownCamera, detail)
 }
 
-/// Why it does not answer is the operator's business, who finds it in the log and in `/readyz`.
+/// The cause is not sent to the client: the log and `/readyz` report it to the operator.
 impl From<Unreachable> for Problem {
     fn from(_: Unreachable) -> Self {
-        let detail = "the place of the results does not answer now: try again; frames are looked at all the same";
+        let detail = "the result store does not respond: retry; detection still works";
         Self::new(ProblemKind::ResultsUnreachable, detail)
     }
 }
@@ -76,7 +76,7 @@ impl From<ListenError> for Problem {
         match error {
             ListenError::Ended => Self::shutting_down(),
             ListenError::Full { .. } => {
-                let detail = format!("{error}: ask without wait, or again in a while");
+                let detail = format!("{error}: omit wait, or retry later");
                 Self::new(ProblemKind::TooManyListeners, detail)
             }
         }

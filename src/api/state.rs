@@ -1,4 +1,4 @@
-//! What the handlers share.
+//! The shared state of the handlers.
 
 use std::{num::NonZeroU64, ops::Deref, sync::Arc, time::Duration};
 
@@ -17,42 +17,42 @@ use crate::{
     telemetry::Tracer,
 };
 
-/// Bodies whose key is not known yet may hold one part in so many of `max_upload_bytes`.
+/// Divisor of `max_upload_bytes` for the memory of bodies whose key has not been checked.
 const UNAUTHENTICATED_SHARE: usize = 8;
 
-/// Who may do what, and what a request may cost.
+/// The options of the API: access rules and limits.
 #[derive(Debug, Clone)]
 pub struct ApiOptions {
     /// Largest request body, bytes.
     pub max_body_bytes: usize,
-    /// Most bytes that all request bodies, and tensors unpacked from them, may hold in memory together.
+    /// Largest sum of all request bodies, and of the tensors unpacked from them, in memory, bytes.
     pub max_upload_bytes: usize,
-    /// Most bytes of a request's head.
+    /// Largest head of a request, bytes.
     pub max_header_bytes: usize,
-    /// Most headers of a request.
+    /// Largest number of headers of a request.
     pub max_headers: usize,
-    /// Whether the persons in each zone are shown as a metric.
+    /// `true` if the number of persons in each zone is a metric.
     pub zone_metrics: bool,
-    /// The cameras whose latest picture is kept.
+    /// The cameras whose latest image is stored.
     pub pictures_of: Arc<PicturesOf>,
-    /// Whether metrics are on a port of their own, and not among the other routes.
+    /// `true` if the metrics have a port of their own.
     pub metrics_elsewhere: bool,
-    /// Longest a request may take, from its first byte to its answer.
+    /// Longest duration of a request, from its first byte to its response.
     pub request_timeout: Duration,
-    /// A body that comes more slowly is given up; `None` for none.
+    /// Least upload rate of a request body; `None` for no limit.
     pub min_upload_bytes_per_second: Option<NonZeroU64>,
-    /// How often a client may ask; `None` for as often as it wants.
+    /// Rate limit of each client; `None` for no limit.
     pub request_rate: Option<RequestRate>,
-    /// Who may do what.
+    /// The access rules.
     pub access: Access,
     /// Origins of web pages that may call the server from a browser.
     pub cors_origins: Vec<String>,
-    /// Makes the spans of requests.
+    /// Creates the spans of requests.
     pub tracer: Tracer,
 }
 
 impl ApiOptions {
-    /// Options for tests: small bodies, and every client may do everything.
+    /// Options for tests: small bodies, and no access control.
     #[must_use]
     pub fn for_testing() -> Self {
         Self {
@@ -75,11 +75,12 @@ impl ApiOptions {
     }
 }
 
-/// What the handlers share. Every layer of every request clones it: one count goes up, whatever is in it.
+/// The shared state of the handlers. Every layer clones it for every request, which only increments
+/// a reference count.
 #[derive(Clone)]
 pub struct ApiState(Arc<Shared>);
 
-/// What is in it.
+/// The content of [`ApiState`].
 pub struct Shared {
     pub(super) workers: Arc<WorkerPool>,
     pub(super) models: Arc<ModelRepository>,
@@ -88,13 +89,13 @@ pub struct Shared {
     pub(super) metrics: Arc<Metrics>,
     pub(super) readiness: Readiness,
     pub(super) uploads: UploadBudget,
-    /// The memory of bodies whose key is not known yet: they cannot take that of the others.
+    /// The memory for bodies whose key has not been checked, apart from that of the others.
     pub(super) unauthenticated_uploads: UploadBudget,
     pub(super) options: ApiOptions,
 }
 
 impl ApiState {
-    /// A state around the workers that answer.
+    /// Creates the state around the workers.
     #[must_use]
     pub fn new(
         workers: Arc<WorkerPool>,
@@ -105,7 +106,7 @@ impl ApiState {
         readiness: Readiness,
         options: ApiOptions,
     ) -> Self {
-        // An alert must see the first failure, too: every counter is there from the start.
+        // An alert must see the first failure, so every counter exists from the start.
         for kind in ProblemKind::ALL {
             metrics.failures.with_label_values(&[kind.name()]);
         }
@@ -125,7 +126,7 @@ impl ApiState {
         }))
     }
 
-    /// Reads bodies of up to `max_bytes`; `remedy` says what to do about larger ones.
+    /// Returns a reader of bodies up to `max_bytes`; `remedy` is the advice for larger ones.
     pub(super) fn body_reader(
         &self,
         max_bytes: usize,

@@ -1,6 +1,6 @@
-//! What a refused client still sends. In the middle of sending, many HTTP/1 clients look for an
-//! answer only when they have sent everything, and lose it when the connection is closed on them. So
-//! what a refused request has left unread is read and thrown away, within bounds.
+//! Draining of unread request bodies. Many HTTP/1 clients read the response only after they have
+//! sent the whole body, and lose it if the connection closes before that. So the unread body of a
+//! refused request is read and discarded, within limits.
 
 use std::{
     pin::Pin,
@@ -27,10 +27,10 @@ use super::{
     upload::{Pace, next_chunk},
 };
 
-/// This many times the largest body is thrown away at most.
+/// Largest number of discarded bytes, as a multiple of the body limit.
 const DISCARDED_LIMITS: usize = 4;
 
-/// Starts the request's time, and discards what its answer leaves unread.
+/// Sets the deadline of the request, and drains the body that the handler left unread.
 pub(super) async fn discard(
     State(state): State<ApiState>,
     request: Request,
@@ -40,16 +40,16 @@ pub(super) async fn discard(
     let deadline = Deadline::begin(state.options.request_timeout);
     parts.extensions.insert(deadline);
     if body.is_end_stream() || parts.version >= Version::HTTP_2 {
-        // A stream of HTTP/2 is answered while its client sends.
+        // An HTTP/2 client receives the response while it sends.
         return next.run(Request::from_parts(parts, body)).await;
     }
-    // Such a client has not begun to send unless somebody has begun to read.
+    // A client with `Expect: 100-continue` sends nothing until the server starts to read.
     let asks_first = parts.headers.contains_key(EXPECT);
     let (lent, mut returned) = LentBody::new(body);
     let mut response = next.run(Request::from_parts(parts, Body::new(lent))).await;
     let status = response.status();
     if status == StatusCode::REQUEST_TIMEOUT {
-        // What comes later would be taken for another request.
+        // The rest of the body would be parsed as another request.
         let close = HeaderValue::from_static("close");
         response.headers_mut().insert(CONNECTION, close);
     } else if (status.is_client_error() || status.is_server_error())
@@ -78,7 +78,7 @@ async fn throw_away(mut body: Body, most: usize, mut pace: Pace, deadline: Deadl
     }
 }
 
-/// A body that comes back when whoever it is lent to has done with it.
+/// A body that is returned when its reader drops it.
 struct LentBody {
     returned: Option<ReturnedBody>,
     back: Option<oneshot::Sender<ReturnedBody>>,
@@ -86,7 +86,7 @@ struct LentBody {
 
 struct ReturnedBody {
     body: Body,
-    /// Whether any of it was asked for.
+    /// `true` if the reader has polled the body.
     begun: bool,
 }
 
@@ -105,7 +105,7 @@ impl LentBody {
 impl Drop for LentBody {
     fn drop(&mut self) {
         if let (Some(body), Some(back)) = (self.returned.take(), self.back.take()) {
-            // Nobody wants it back when the request was given up.
+            // The receiver is gone if the request was abandoned.
             let _ = back.send(body);
         }
     }

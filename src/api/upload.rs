@@ -1,8 +1,8 @@
-//! A frame and its parameters, however they were sent: `multipart/form-data`, or the frame as the
-//! body with the parameters in the query.
+//! A frame and its parameters: `multipart/form-data`, or the frame as the body with the parameters
+//! in the query.
 //!
-//! The whole body is read first, within bounds: its size, the rate at which it comes, the deadline of
-//! the request, and the memory that all requests together may hold.
+//! The whole body is read first, within limits: its size, its rate, the deadline of the request,
+//! and the memory of all requests together.
 
 mod arrival;
 mod body;
@@ -40,21 +40,21 @@ use crate::{
     pipeline::{DetectJob, DetectParameters, ParameterError},
 };
 
-/// A frame in memory and what its sender wants of it.
+/// A frame in memory with the parameters of its request.
 pub(super) struct Upload {
     /// The encoded frame.
     pub(super) image: Bytes,
     /// The name of its file, if it was sent.
     pub(super) file_name: Option<String>,
-    /// What the client accepts, among other things.
+    /// The headers of the request, such as `Accept`.
     pub(super) headers: HeaderMap,
-    /// Parameters by name, all of which there are; their values are not checked yet.
+    /// Parameters by name. The names are checked, the values are not.
     pub(super) parameters: Vec<(String, String)>,
-    /// When its report must be there.
+    /// The deadline of the response.
     pub(super) deadline: Deadline,
-    /// When the request came.
+    /// Time at which the request arrived.
     pub(super) received_at: Timestamp,
-    /// When the whole body was in memory.
+    /// Time at which the whole body was in memory.
     pub(super) arrived: Instant,
 }
 
@@ -77,14 +77,14 @@ impl FromRequest<ApiState> for Upload {
 }
 
 impl Upload {
-    /// The frame with parameters that were read from those that came with it.
+    /// Returns the detection job with the parsed parameters.
     pub(super) fn job(self, parameters: DetectParameters, request_id: &RequestId) -> DetectJob {
         let id = request_id.as_str();
         DetectJob::sent(self.image, parameters, id, self.received_at, self.arrived)
     }
 
-    /// Reads a frame, alone or in a form whose fields are used as `use_of` says by their names. The body
-    /// counts against `budget`. The key is not checked here.
+    /// Reads a frame, alone or in a form whose fields `use_of` classifies by name. The body uses
+    /// memory of `budget`. The key is not checked here.
     pub(super) async fn receive(
         request: Request,
         state: &ApiState,
@@ -117,10 +117,10 @@ impl Upload {
     }
 }
 
-/// The parameters of a query, names and values.
+/// Returns the names and values of the query parameters.
 pub(super) fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Problem> {
     let pairs = Query::try_from_uri(uri).ok().map(|Query(pairs)| pairs);
-    // Bytes that are not UTF-8 come out of the decoder as this character.
+    // The decoder replaces bytes that are not UTF-8 by this character.
     let is_text = |text: &String| !text.contains(char::REPLACEMENT_CHARACTER);
     pairs
         .filter(|pairs: &Vec<(String, String)>| {
@@ -135,7 +135,7 @@ pub(super) fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Probl
         })
 }
 
-/// The values of the parameters that a query may have, each at most once.
+/// Returns the values of the named query parameters, each at most once.
 pub(super) fn parameters_named<const COUNT: usize>(
     uri: &Uri,
     names: [&str; COUNT],
@@ -144,7 +144,7 @@ pub(super) fn parameters_named<const COUNT: usize>(
     for (given, value) in query_parameters(uri)? {
         let Some(index) = names.iter().position(|name| *name == given) else {
             let known = names.join(", ");
-            let problem = format!("there is no such parameter here; there is {known}");
+            let problem = format!("there is no such parameter; the parameters are {known}");
             return Err(ParameterError::unknown(&given, problem).into());
         };
         if values[index].replace(value).is_some() {
@@ -154,7 +154,7 @@ pub(super) fn parameters_named<const COUNT: usize>(
     Ok(values)
 }
 
-/// Whether the body is a form with files.
+/// Returns `true` if the body is a multipart form.
 pub(super) fn is_multipart(headers: &HeaderMap) -> bool {
     let content_type = headers.get(CONTENT_TYPE);
     content_type.is_some_and(|value| {

@@ -1,9 +1,9 @@
-//! The Open Inference Protocol (KServe V2) over HTTP, with tensors as JSON or as bytes behind it (the
-//! extension `binary_tensor_data`). Source: the protocol's repository `open-inference-protocol`, and the
+//! The Open Inference Protocol (KServe V2) over HTTP, with tensors as JSON or as bytes after it
+//! (the extension `binary_tensor_data`). Source: the repository `open-inference-protocol`, and the
 //! extensions as Triton Inference Server describes them.
 //!
-//! The model `lookdown` takes a frame and answers with the persons in it; every detector that is loaded
-//! takes views and answers with what it finds in each.
+//! The model `lookdown` accepts a frame and returns its persons. Each loaded detector accepts views
+//! and returns its detections.
 
 mod answer;
 pub(super) mod describe;
@@ -26,19 +26,19 @@ use super::{
 use crate::{inference::Model, quoted::Quoted};
 use metadata::ModelMetadata;
 
-/// The model that finds the persons in frames.
+/// The model that detects persons in frames.
 const FRAME_MODEL: &str = "lookdown";
 /// The version of its inputs and outputs.
 const FRAME_MODEL_VERSION: &str = "1";
 
-/// A model that can be asked.
+/// A model that accepts requests.
 enum Asked {
     Frames,
     Views(Arc<Model>),
 }
 
 impl Asked {
-    /// The model of that name, and of that version, if one is named.
+    /// Returns the model of this name, and of this version, if one is named.
     fn find(state: &ApiState, name: &str, version: Option<&str>) -> Result<Self, Problem> {
         let unknown = |detail| Problem::new(ProblemKind::UnknownModel, detail);
         let found = if name == FRAME_MODEL {
@@ -50,8 +50,8 @@ impl Asked {
                 let loaded: Vec<_> = loaded.iter().map(|model| model.name()).collect();
                 let (name, loaded) = (Quoted(name), loaded.join(", "));
                 unknown(format!(
-                    "model: {name} is not there; there are {FRAME_MODEL}, which takes frames, and \
-                     the detectors that are loaded: {loaded}"
+                    "model: there is no model {name}: use {FRAME_MODEL}, which accepts frames, or one of \
+                     the loaded detectors: {loaded}"
                 ))
             })?)
         };
@@ -59,7 +59,7 @@ impl Asked {
             Some(wanted) if wanted != found.version() => {
                 let (wanted, version) = (Quoted(wanted), found.version());
                 Err(unknown(format!(
-                    "model: {name} has the version {version}, and no {wanted}"
+                    "model: {name} has the version {version}, but not {wanted}"
                 )))
             }
             _ => Ok(found),

@@ -1,5 +1,5 @@
-//! The web page at `/`: files of the folder `web` and the samples, inside the executable. It needs nothing
-//! beyond this server, and asks the same API as everybody else.
+//! The web page at `/`: the files of the folder `web` and the samples, inside the executable. It
+//! loads nothing from other hosts and uses the public API.
 
 use std::sync::LazyLock;
 
@@ -27,7 +27,7 @@ struct Asset {
     name: &'static str,
     media_type: &'static str,
     content: &'static [u8],
-    /// Changes whenever the content does.
+    /// The revision; it changes with the content.
     revision: String,
 }
 
@@ -42,7 +42,7 @@ macro_rules! assets {
     };
 }
 
-/// Every file of the page. A test finds those that were forgotten.
+/// All files of the page. A test checks that none is missing.
 static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
     assets![
         "index.html" from "web",
@@ -92,7 +92,7 @@ impl Asset {
     }
 }
 
-/// The page and what belongs to it.
+/// Returns the routes of the page and its files.
 pub(super) fn router() -> Router {
     let page = async |headers: HeaderMap| answer(PAGE, &headers, "/");
     let asset = async |Path(name): Path<String>, uri: Uri, headers: HeaderMap| {
@@ -107,10 +107,13 @@ pub(super) fn router() -> Router {
 fn answer(name: &str, headers: &HeaderMap, path: &str) -> Result<Response, Problem> {
     let asset = ASSETS.iter().find(|asset| asset.name == name);
     let asset = asset.ok_or_else(|| {
-        Problem::new(ProblemKind::NotFound, format!("there is nothing at {path}"))
+        Problem::new(
+            ProblemKind::NotFound,
+            format!("there is no resource at {path}"),
+        )
     })?;
-    // A browser may keep it and asks each time whether it is still right: after an update of the server,
-    // no old script meets a new one.
+    // Browsers may cache the file but must revalidate it: after an update of the server, old and
+    // new scripts must not mix.
     let kept = [
         (ETAG, entity_tag(&asset.revision)),
         (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
@@ -132,7 +135,7 @@ mod tests {
         for file in fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/web")).unwrap() {
             let name = file.unwrap().file_name().into_string().unwrap();
             let is_served = ASSETS.iter().any(|asset| asset.name == name);
-            // It tells Node, which runs the tests, what the scripts are.
+            // This file tells Node the module type for tests and is not served.
             assert_eq!(is_served, name != "package.json", "{name}");
         }
     }

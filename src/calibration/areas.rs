@@ -14,17 +14,17 @@ use crate::{
 /// Most zones of a calibration, and most masks.
 const MAX_AREAS: usize = 32;
 
-/// Areas that somebody has drawn into the frames or onto the floor of a camera.
+/// Areas that are drawn into the frames or onto the floor of a camera.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Areas {
-    /// Where persons are counted; their names differ.
+    /// Areas in which persons are counted; their names differ.
     pub zones: Vec<Zone>,
-    /// What nobody looks at, corner-origin frame pixels.
+    /// Areas that are blanked before detection, corner-origin frame pixels.
     pub masks: Vec<Polygon>,
 }
 
 impl Areas {
-    /// Checks what a file tells about frames of the size `image` of a camera that hangs as `mount`
+    /// Checks the areas of a file for frames of the size `image` of a camera that hangs as `mount`
     /// says.
     pub(super) fn checked(
         zones: &[NativeZone],

@@ -28,7 +28,7 @@ pub struct Calibration {
 pub struct CameraGeometry {
     /// The lens, in pixels of the frame.
     pub lens: Lens,
-    /// How the camera hangs.
+    /// The mount of the camera.
     pub mount: Mount,
     /// Its zones and masks, in pixels of the frame.
     pub areas: Areas,
@@ -100,7 +100,7 @@ impl Calibration {
         &self.lens
     }
 
-    /// How the camera hangs.
+    /// The mount of the camera.
     #[must_use]
     pub fn mount(&self) -> &Mount {
         &self.mount

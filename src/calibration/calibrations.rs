@@ -1,5 +1,5 @@
 //! The calibrations of a store in memory: looked up without blocking, and replaced when their files
-//! change. A broken new version leaves the old one serving and is told until it is mended.
+//! change. A broken new version leaves the old one serving and is reported until it is fixed.
 
 mod change;
 mod content;
@@ -71,7 +71,7 @@ impl Calibrations {
         }
     }
 
-    /// What is known of the calibration `id` that serves. Does not block.
+    /// Returns the entry of the calibration `id` that serves. Does not block.
     #[must_use]
     pub fn entry(&self, id: &CalibrationId) -> Option<Arc<CalibrationEntry>> {
         self.now().entry(id).cloned()
@@ -83,7 +83,7 @@ impl Calibrations {
         self.now().rows()
     }
 
-    /// How the calibrations are. Does not block.
+    /// Returns the health of the calibrations. Does not block.
     #[must_use]
     pub fn health(&self) -> CalibrationsHealth {
         CalibrationsHealth {

@@ -1,4 +1,4 @@
-//! Why a calibration cannot be used.
+//! Reasons for which a calibration cannot be used.
 
 use std::path::{Path, PathBuf};
 
@@ -10,15 +10,15 @@ pub enum CalibrationError {
     /// The file or folder cannot be read.
     #[error("{path}: cannot be read: {source}")]
     Unreadable {
-        /// Which file or folder.
+        /// The file or folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// Its content cannot be used.
     #[error("{path}: {problem}")]
     Unusable {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// The field, its value and what would be right.
         problem: FormatError,
@@ -26,7 +26,7 @@ pub enum CalibrationError {
     /// Its file in a store cannot be used.
     #[error("{place}: {problem}")]
     Stored {
-        /// Which file.
+        /// The file.
         place: String,
         /// The field, its value and what would be right.
         problem: String,
@@ -37,7 +37,7 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
-    /// What is wrong with the content of a file.
+    /// Creates the error for the content of a file.
     pub(super) fn in_file(path: &Path, problem: FormatError) -> Self {
         Self::Unusable {
             path: path.to_owned(),

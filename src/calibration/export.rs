@@ -30,7 +30,7 @@ pub enum Target {
 pub struct Exported {
     /// The content of the file.
     pub content: String,
-    /// What the format has no place for, a sentence each.
+    /// Content that the format cannot hold, one sentence each.
     pub lost: Vec<String>,
 }
 

@@ -14,7 +14,7 @@ use crate::geometry::{Lens, Mount};
 
 /// Image sides accepted, pixels.
 const IMAGE_SIDE: std::ops::RangeInclusive<u32> = 16..=65_536;
-/// How far from unit length `world_up` may be.
+/// The largest deviation of `world_up` from unit length.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
 /// The content of a calibration file, at most a byte more than [`CalibrationFile::parse`] accepts.
@@ -65,7 +65,7 @@ type Checked = (String, Result<Calibration, FormatError>);
 
 impl CalibrationFile {
     /// The file's cameras, checked, under the IDs they have when the file is called `stem`: a
-    /// native file tells its ID, a single camera has the name of its file, and one of several the
+    /// native file has its ID, a single camera has the name of its file, and one of several the
     /// file's and its own, as in `lobby-cam0`.
     #[must_use]
     pub fn calibrations(&self, stem: &str, content: &[u8]) -> Vec<Checked> {

@@ -1,7 +1,7 @@
 //! Calibration files of every kind: the format is recognised from the content, each has one small
 //! reader that turns the file into cameras of the native shape, and some have a writer.
 //!
-//! What each format means, with its traps, is said at its reader; `docs/calibrate.md` has the table.
+//! Each reader documents its format and the usual mistakes; `docs/calibrate.md` has the table.
 
 mod basalt;
 mod camera_intrinsic_model;
@@ -44,7 +44,7 @@ use crate::warning::Warning;
 /// Most cameras taken from one file.
 const MAX_CAMERAS: usize = 256;
 
-/// What a calibration file holds.
+/// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationFile {
     /// The format that was recognised.
@@ -62,14 +62,14 @@ pub struct FileCamera {
     pub camera: Result<Camera, FormatError>,
 }
 
-/// A camera as a file tells it, not checked yet.
+/// A camera as written in a file, not checked yet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// The size of the frames it was calibrated with; some formats do not tell.
+    /// The size of the frames it was calibrated with; some formats have none.
     pub image: Option<NativeImage>,
     /// The lens.
     pub lens: LensModel,
-    /// How it hangs; only native files tell, others mean straight down.
+    /// Its mount; only native files have one, others mean straight down.
     pub mount: NativeMount,
     /// Its zones; only native files have some.
     pub zones: Vec<NativeZone>,
@@ -128,19 +128,19 @@ impl CalibrationFile {
         }
     }
 
-    /// Gives every camera the size of its frames, where the file does not tell it.
+    /// Gives every camera the size of its frames, where the file has none.
     ///
     /// # Errors
-    /// [`FormatError`] when the file tells another one.
+    /// [`FormatError`] when the file has another one.
     pub fn assume_size(&mut self, size: NativeImage) -> Result<(), FormatError> {
         for camera in &mut self.cameras {
             // A camera that cannot be used says so when it is asked for.
             let Ok(camera) = &mut camera.camera else {
                 continue;
             };
-            let told = *camera.image.get_or_insert(size);
-            if told != size {
-                let NativeImage { width, height } = told;
+            let stated = *camera.image.get_or_insert(size);
+            if stated != size {
+                let NativeImage { width, height } = stated;
                 let problem = format!("the file itself says {width}x{height}: leave the size out");
                 return Err(FormatError::invalid("image", problem));
             }

@@ -22,13 +22,13 @@ pub struct NativeCalibration {
     pub image: NativeImage,
     /// The lens.
     pub lens: LensModel,
-    /// How the camera hangs; straight down unless said otherwise.
+    /// The mount of the camera; straight down by default.
     #[serde(default)]
     pub mount: NativeMount,
     /// Areas that persons are counted in.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zones: Vec<NativeZone>,
-    /// Areas that nobody looks at.
+    /// Areas that are blanked before detection.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masks: Vec<NativeMask>,
 }
@@ -62,7 +62,7 @@ impl FromStr for NativeImage {
 #[error("give the width and height in pixels, such as 640x480")]
 pub struct NotAFrameSize;
 
-/// How the camera hangs.
+/// The mount of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeMount {

@@ -1,5 +1,5 @@
-//! Whether a lens and a frame belong together: most wrong calibrations are right ones for another
-//! size of the picture.
+//! The check that a lens and a frame belong together: most wrong calibrations are right ones for
+//! another frame size.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -9,14 +9,15 @@ use crate::geometry::{Lens, Pixel, Ray};
 const MAX_PIXEL_ASPECT: f64 = 2.5;
 /// The lens image is at least this large, in units of the frame's shorter side.
 const MIN_RIM_RADIUS: f64 = 0.125;
-/// A frame whose corners are less off the axis than this was not made by a wide-angle lens, radians.
+/// A frame whose corners are less off the axis than this was not made by a wide-angle lens,
+/// radians.
 const MIN_CORNER_THETA: f64 = 0.2;
 /// A frame shows at least this share of the half space that its lens claims to see.
 const MIN_CORNER_SHARE: f64 = 1.0 / 3.0;
 /// An angle near the axis, where every lens is affine, radians.
 const NEAR_AXIS: f64 = 1e-4;
 
-/// What is wrong with `lens` for frames of `width` × `height` pixels, of whose image the farthest
+/// Checks `lens` for frames of `width` × `height` pixels, of whose image the farthest
 /// point is `corner_theta` radians off the axis.
 pub(super) fn check(lens: &Lens, width: u32, height: u32, corner_theta: f64) -> Result<(), String> {
     let centre = lens.principal_point();
@@ -57,7 +58,8 @@ pub(super) fn check(lens: &Lens, width: u32, height: u32, corner_theta: f64) -> 
     Ok(())
 }
 
-/// How far from the centre the lens shows `ray`, pixels; beyond all bounds where it does not.
+/// Returns the distance from the centre at which the lens shows `ray`, pixels; infinite where it
+/// does not show it.
 fn distance(lens: &Lens, centre: Pixel, ray: &Ray) -> f64 {
     lens.project_to_rim(ray)
         .map_or(f64::INFINITY, |pixel| (pixel - centre).norm())

@@ -1,4 +1,4 @@
-//! Where calibration files are kept: one trait, and the stores that have it.
+//! Stores of calibration files: one trait and its implementations.
 
 mod bucket;
 mod folder;
@@ -27,7 +27,7 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
     /// file cannot be read, for example because it has gone meanwhile.
     fn read(&self, names: &[&str], at_most: usize) -> Vec<Result<Vec<u8>, StoreError>>;
 
-    /// Creates or replaces a file at once: whoever reads, and whatever is left after a crash, sees
+    /// Creates or replaces a file atomically: a reader, also after a crash, sees
     /// the old file or the new one.
     ///
     /// # Errors
@@ -47,7 +47,7 @@ pub const MAX_FILES: usize = 50_000;
 /// Most files read at once: bounds the memory and the connections that reading takes.
 pub const READ_AT_ONCE: usize = 16;
 
-/// What a write may take the place of.
+/// The content that a write may replace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Replaces<'a> {
     /// Whatever there is.
@@ -67,39 +67,39 @@ pub struct StoredFile {
     pub stamp: String,
 }
 
-/// A store that did not do what it was told.
+/// A failed operation of a store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The place is not there or does not answer.
     #[error("{place}: {problem}")]
     Failed {
-        /// Where.
+        /// The store.
         place: String,
-        /// What the operating system or the service said.
+        /// The error of the operating system or the service.
         problem: String,
     },
     /// The place may be read only.
     #[error("{place} cannot be written to: {problem}")]
     ReadOnly {
-        /// Where.
+        /// The store.
         place: String,
-        /// What the operating system or the service said.
+        /// The error of the operating system or the service.
         problem: String,
     },
     /// The place does not answer, for whatever file.
     #[error("{place} cannot be reached: {problem}")]
     Unreachable {
-        /// Where.
+        /// The store.
         place: String,
-        /// What the operating system or the service said.
+        /// The error of the operating system or the service.
         problem: String,
     },
-    /// Somebody else has changed the file meanwhile.
+    /// Another writer has changed the file meanwhile.
     #[error("{place}/{name} was changed by somebody else meanwhile")]
     Changed {
-        /// Where.
+        /// The store.
         place: String,
-        /// Which file.
+        /// The file.
         name: String,
     },
 }

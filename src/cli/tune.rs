@@ -149,14 +149,14 @@ mod tests {
     #[test]
     fn the_choice_is_printed_as_loadable_settings() {
         let three = NonZeroUsize::new(3).unwrap();
-        let told = toml(Choice {
+        let text = toml(Choice {
             sessions: three,
             threads: NonZeroUsize::MIN,
             batch_views: three,
         });
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("tuned.toml");
-        std::fs::write(&file, told).unwrap();
+        std::fs::write(&file, text).unwrap();
         let settings = crate::settings::load(Some(&file), []).unwrap();
         assert_eq!(settings.threads.sessions, three);
         assert_eq!(settings.threads.batch_views, three);

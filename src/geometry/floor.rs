@@ -38,8 +38,9 @@ pub fn bearing(point: Pixel, lens: &Lens) -> Option<Bearing> {
     })
 }
 
-/// Where the ray through `point` (corner-origin frame pixels) meets the floor; `None` when the
-/// height is unknown, the point lies outside the lens image, or the ray does not fall.
+/// Returns the place at which the ray through `point` (corner-origin frame pixels) meets the floor;
+/// `None` when the height is unknown, the point lies outside the lens image, or the ray does not
+/// fall.
 #[must_use]
 pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorPosition> {
     let height_m = mount.height_m()?;
@@ -51,8 +52,8 @@ pub fn floor_position(point: Pixel, lens: &Lens, mount: &Mount) -> Option<FloorP
     })
 }
 
-/// Where the lens shows a place on the floor, corner-origin frame pixels; `None` when the height is
-/// unknown or the lens does not see it.
+/// Returns the pixel at which the lens shows a place on the floor, corner-origin frame pixels;
+/// `None` when the height is unknown or the lens does not see it.
 #[must_use]
 pub fn pixel_of(place: FloorPosition, lens: &Lens, mount: &Mount) -> Option<Pixel> {
     let levelled = Ray::new(place.x_m, place.y_m, mount.height_m()?);

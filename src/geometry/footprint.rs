@@ -5,9 +5,9 @@ use std::{f64::consts::TAU, sync::LazyLock};
 use nalgebra::Vector2;
 
 use super::{
-    Lens, Mount, Pixel, Ray, VirtualView,
+    FrameCrop, Lens, Mount, Pixel, Ray, VirtualView,
+    height_ratio::Extremities,
     pixels::{PixelConvention, cross_half_pixel},
-    stature::Extremities,
 };
 
 /// Points on an inscribed ellipse: more change the hull by less than 0.2 % of its size.
@@ -25,12 +25,12 @@ static ELLIPSE_ANGLES: LazyLock<[(f64, f64); ELLIPSE_POINTS]> = LazyLock::new(||
 const MIN_TILT_DETERMINANT: f64 = 0.18;
 /// A tilted ellipse thinner than this (ratio of squared axes) is not a person.
 const MIN_SQUARED_AXIS_RATIO: f64 = 0.04;
-/// Of every so many outline points the ray is kept.
+/// The ray of one in this many outline points is kept.
 const RAY_STRIDE: usize = 4;
 /// A box of which less than this share of the outline lies in the lens image is not mapped.
 const MIN_INSIDE_SHARE: f64 = 0.5;
 
-/// How a box is taken back to the frame.
+/// The method by which a box is taken back to the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BackProjection {
     /// The axis-parallel hull of the four mapped corners: the paper's way, oversized at oblique
@@ -103,6 +103,30 @@ impl Footprint {
             outline,
             rays,
             extremities,
+        })
+    }
+
+    /// Maps the box `[x_min, y_min, x_max, y_max]` of a crop to the frame. Its bounds are exact: the
+    /// outline is the inscribed ellipse, which touches all four sides. `None` when the middle of
+    /// the box lies beyond the lens image.
+    #[must_use]
+    pub fn of_crop_box(crop_box: [f64; 4], crop: &FrameCrop, lens: &Lens) -> Option<Self> {
+        let [x_min, y_min, x_max, y_max] = crop.frame_box(crop_box);
+        let center = Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max));
+        let half = Vector2::new(x_max - x_min, y_max - y_min) / 2.0;
+        let ray = |point: &Pixel| {
+            let pixel = cross_half_pixel(*point, PixelConvention::PixelCentre);
+            lens.unproject(&pixel)
+        };
+        ray(&center)?;
+        let outline = ELLIPSE_ANGLES
+            .map(|(sin, cos)| center + Vector2::new(half.x * sin, -half.y * cos))
+            .to_vec();
+        let rays = outline.iter().step_by(RAY_STRIDE).filter_map(ray).collect();
+        Some(Self {
+            outline,
+            rays,
+            extremities: None,
         })
     }
 

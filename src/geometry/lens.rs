@@ -1,4 +1,4 @@
-//! Lens models: where a ray meets the image, and which ray a pixel saw.
+//! Lens models: the pixel that sees a ray, and the ray that a pixel sees.
 //!
 //! Three stages make every lens: the curve of its [`LensModel`] gives the radius in the normalised
 //! plane for the angle `theta` from the optical axis, `mei` then distorts that plane
@@ -108,7 +108,7 @@ impl Lens {
         self.curve.model()
     }
 
-    /// Where the lens image ends: the largest angle from the optical axis, in radians.
+    /// Returns the end of the lens image: the largest angle from the optical axis, in radians.
     #[must_use]
     pub fn max_theta(&self) -> f64 {
         self.max_theta
@@ -189,7 +189,7 @@ impl Lens {
         &self.plane
     }
 
-    /// Whether the lens is the same in every azimuth, but for its image plane.
+    /// Returns true for a lens that is the same in every azimuth, apart from its image plane.
     #[must_use]
     pub fn is_symmetric(&self) -> bool {
         self.distortion
@@ -218,7 +218,8 @@ impl Lens {
     }
 }
 
-/// Why `max_theta` is refused. The limit is rounded down, so that it may be copied.
+/// Returns the reason for which `max_theta` is refused. The limit is rounded down, so that it may
+/// be copied.
 fn beyond_limit(curve: &AnyCurve, value: f64, limit: f64) -> LensError {
     let model = curve.model();
     let turns_back = curve.is_polynomial() && value > limit && limit < PI;

@@ -1,4 +1,4 @@
-//! How a camera hangs: the direction of up in its frame, and its height above the floor.
+//! The mount of a camera: the direction of up in its frame, and its height above the floor.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
@@ -50,7 +50,8 @@ impl Mount {
         self.height_m
     }
 
-    /// Whether the camera looks down to within 30°: view plans are then centred on the nadir.
+    /// Returns true when the camera looks down to within 30°: view plans are then centred on the
+    /// nadir.
     #[must_use]
     pub fn is_near_nadir(&self) -> bool {
         self.nadir().angle(&Ray::z()) <= NEAR_NADIR

@@ -27,7 +27,7 @@ pub struct OrientedBox {
 
 impl OrientedBox {
     /// The box of these extents whose height axis is turned clockwise from image up by `angle`,
-    /// radians; its head is at the upper end, as an axis alone does not tell.
+    /// radians; its head is at the upper end, which the axis alone leaves open.
     #[must_use]
     pub fn turned(center: Pixel, width: f64, height: f64, angle: f64) -> Self {
         Self {
@@ -43,6 +43,39 @@ impl OrientedBox {
     #[must_use]
     pub fn foot(&self) -> Pixel {
         self.center - self.up * (self.height / 2.0)
+    }
+
+    /// The box with the same axis whose inscribed ellipse has the bounds `[x_min, y_min, x_max,
+    /// y_max]` (corner-origin frame pixels) as nearly as the axis allows.
+    ///
+    /// With the semi-axes `p` along and `q` across an axis at the angle `a` from a side, the half
+    /// extents `w`, `h` of the bounds fulfil `p² + q² = w² + h²`, always, and
+    /// `(p² − q²) cos(2a) = h² − w²`, which says nothing at 45°. So the sum is taken from the
+    /// bounds, and the difference from the bounds in the share `cos²(2a)` and from this box's own
+    /// proportions in the rest. `docs/geometry.md` has the derivation.
+    #[must_use]
+    pub fn fitted_to(&self, [x_min, y_min, x_max, y_max]: [f64; 4]) -> Self {
+        let (half_width, half_height) = ((x_max - x_min) / 2.0, (y_max - y_min) / 2.0);
+        let (w2, h2) = (half_width.powi(2), half_height.powi(2));
+        let sum = w2 + h2;
+        let cos2 = self.up.y.powi(2) - self.up.x.powi(2);
+        let (along2, across2) = (self.height.powi(2), self.width.powi(2));
+        let proportion = (along2 - across2) / (along2 + across2);
+        let own = if proportion.is_finite() {
+            proportion * sum
+        } else {
+            0.0
+        };
+        // cos²(2a) · (h² − w²) / cos(2a), without the division.
+        let difference = own * (1.0 - cos2.powi(2)) + cos2 * (h2 - w2);
+        // No thinner than the own proportions or the bounds make it.
+        let difference = difference.clamp(-sum, sum);
+        Self {
+            center: Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max)),
+            width: 2.0 * f64::midpoint(sum, -difference).max(0.0).sqrt(),
+            height: 2.0 * f64::midpoint(sum, difference).max(0.0).sqrt(),
+            ..*self
+        }
     }
 
     /// The box with its height axis along `up` that averages the extents of several outlines.

@@ -29,7 +29,7 @@ pub enum PolygonError {
          side of 0"
     )]
     Coordinate {
-        /// Which corner.
+        /// The index of the corner.
         number: usize,
         /// Its first coordinate.
         x: f64,
@@ -54,8 +54,8 @@ impl Polygon {
     /// The area within `corners`, which follow each other along its outline, either way around.
     ///
     /// # Errors
-    /// [`PolygonError`] when there are fewer than three corners or more than [`MAX_CORNERS`], one is
-    /// not finite or beyond a million, or the outline meets itself.
+    /// [`PolygonError`] when there are fewer than three corners or more than [`MAX_CORNERS`], one
+    /// is not finite or beyond a million, or the outline meets itself.
     pub fn new(corners: &[[f64; 2]]) -> Result<Self, PolygonError> {
         if !(3..=MAX_CORNERS).contains(&corners.len()) {
             return Err(PolygonError::Count(corners.len()));
@@ -97,7 +97,7 @@ impl Polygon {
         self.corners.iter().zip(following).map(|(&a, &b)| [a, b])
     }
 
-    /// Whether a point lies inside: where a ray from it toward growing x crosses the outline an odd
+    /// Returns true for a point inside: a ray from it toward growing x crosses the outline an odd
     /// number of times (the even-odd rule). Of areas with a common edge, one holds a point on it.
     #[must_use]
     pub fn holds(&self, point: Point2<f64>) -> bool {
@@ -108,7 +108,7 @@ impl Polygon {
         crossed.count() % 2 == 1
     }
 
-    /// Whether two areas have a point in common, be it one of their outlines.
+    /// Returns true when two areas have a point in common, be it one of their outlines.
     #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
         let crosses = |edge: Edge| other.edges().any(|another| meet(edge, another));
@@ -158,8 +158,8 @@ impl Polygon {
     }
 }
 
-/// Where an edge passes the height `y`, if it does; its upper end belongs to it, its lower one does
-/// not, so that of two edges which meet there one passes.
+/// Returns the place at which an edge passes the height `y`, if it does; its upper end belongs to
+/// it, its lower one does not, so that of two edges which meet there one passes.
 #[must_use]
 pub fn crossing([a, b]: Edge, y: f64) -> Option<f64> {
     // The same number whichever way the edge leads: areas side by side have it both ways.
@@ -174,8 +174,8 @@ fn side([a, b]: Edge, point: Point2<f64>) -> i8 {
     i8::from(turn > 0.0) - i8::from(turn < 0.0)
 }
 
-/// Whether two edges have a point in common: each has its ends on both sides of the other's line or
-/// on it, and, for those on one line, their bounding boxes meet.
+/// Returns true when two edges have a point in common: each has its ends on both sides of the
+/// other's line or on it, and, for those on one line, their bounding boxes meet.
 fn meet(one: Edge, other: Edge) -> bool {
     let straddles = |edge: Edge, [a, b]: Edge| side(edge, a) * side(edge, b) <= 0;
     let overlap = |axis: usize| {
@@ -188,7 +188,7 @@ fn meet(one: Edge, other: Edge) -> bool {
     overlap(0) && overlap(1) && straddles(one, other) && straddles(other, one)
 }
 
-/// Whether the second of two edges that follow each other leads back along the first.
+/// Returns true when the second of two consecutive edges leads back along the first.
 fn folds_back(one: Edge, [from, to]: Edge) -> bool {
     side(one, to) == 0 && (to - from).dot(&(one[0] - one[1])) > 0.0
 }

@@ -8,8 +8,8 @@ pub use coverage::Coverage;
 
 use super::{Mount, VirtualView, virtual_view::ViewDirection};
 
-/// How the paper's field of view is read (Seidel et al., section III; their formula for the field
-/// of view contradicts its own symbols, so three readings exist).
+/// The reading of the paper's field of view (Seidel et al., section III; their formula for the
+/// field of view contradicts its own symbols, so three readings exist).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FieldOfViewReading {
@@ -41,7 +41,7 @@ impl FieldOfViewReading {
 pub struct Ring {
     /// Angle from the plan's axis, radians.
     pub elevation: f64,
-    /// How many views.
+    /// The number of views.
     pub count: u32,
     /// Full horizontal opening angle of each, radians.
     pub field_of_view: f64,
@@ -100,16 +100,26 @@ impl ViewPlan {
         }
     }
 
-    /// Four wide views, the least that sees everything from close to the nadir to the rim.
+    /// Five wide views: one more than the least that sees everything from close to the nadir to the
+    /// rim.
     #[must_use]
     pub fn fast() -> Self {
-        Self::rings(&[Ring::of_degrees(0.9, 4, 95.0)])
+        Self::rings(&[Ring::of_degrees(0.9, 5, 90.0)])
     }
 
-    /// 24 views from wide near the nadir to narrow at the rim, where people are small: the best of
-    /// the plans of at most 24 views that were tried on real and on rendered frames.
+    /// 18 views: wide around the nadir, and narrow at the rim, where people are small.
     #[must_use]
     pub fn balanced() -> Self {
+        Self::rings(&[
+            Ring::of_degrees(0.05, 2, 75.0),
+            Ring::of_degrees(0.8, 8, 90.0),
+            Ring::of_degrees(1.25, 8, 45.0),
+        ])
+    }
+
+    /// 24 views from wide near the nadir to narrow at the rim.
+    #[must_use]
+    pub fn quality() -> Self {
         Self::rings(&[
             Ring::of_degrees(0.05, 2, 75.0),
             Ring::of_degrees(0.8, 12, 90.0),

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 
 use super::{Mount, Pixel, Ray};
 
-/// Where a view looks, relative to the axis its plan is centred on.
+/// The direction of a view, relative to the axis its plan is centred on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewDirection {
     /// Angle from the plan's axis, radians. Positive tilts toward image up, then `azimuth` spins.
@@ -130,8 +130,8 @@ impl VirtualView {
         )
     }
 
-    /// Where a ray (camera frame) meets the view (pixel centres), also beyond its borders; `None`
-    /// for rays that point away from it.
+    /// Returns the point at which a ray (camera frame) meets the view (pixel centres), also beyond
+    /// its borders; `None` for rays that point away from it.
     #[must_use]
     pub fn project(&self, ray_in_camera: &Ray) -> Option<Pixel> {
         let ray = self
@@ -146,7 +146,7 @@ impl VirtualView {
         })
     }
 
-    /// Whether a ray (camera frame) meets the view within its borders.
+    /// Returns true when a ray (camera frame) meets the view within its borders.
     #[must_use]
     pub fn holds(&self, ray_in_camera: &Ray) -> bool {
         let (right, bottom) = (f64::from(self.width) - 0.5, f64::from(self.height) - 0.5);
@@ -180,7 +180,7 @@ impl VirtualView {
         direction.try_normalize(f64::EPSILON)
     }
 
-    /// Where the axis meets the view: its middle, pixel centres.
+    /// Returns the point at which the axis meets the view: its middle, pixel centres.
     #[must_use]
     pub fn principal_point(&self) -> Pixel {
         Pixel::new(

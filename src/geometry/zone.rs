@@ -11,11 +11,11 @@ use super::{
 pub struct Zone {
     /// Its name.
     pub name: String,
-    /// Where it is.
+    /// Its area.
     pub area: ZoneArea,
 }
 
-/// Where a zone is.
+/// The area of a zone.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ZoneArea {
     /// Corner-origin frame pixels.
@@ -25,8 +25,8 @@ pub enum ZoneArea {
 }
 
 impl Zone {
-    /// Whether one stands in it whose foot is seen at `foot` (corner-origin frame pixels), which is
-    /// `floor`. What meets no floor is in no zone of it.
+    /// Returns true when a person stands in it whose foot is seen at `foot` (corner-origin frame
+    /// pixels), which is `floor`. What meets no floor is in no zone of it.
     #[must_use]
     pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
         match &self.area {
@@ -51,8 +51,8 @@ impl Zone {
     }
 
     /// Points along its outline, `points_per_edge` on each edge and the first one once more at the
-    /// end, corner-origin frame pixels; `None` where the lens does not see the floor. Straight edges
-    /// on the floor are curves in the frame.
+    /// end, corner-origin frame pixels; `None` where the lens does not see the floor. Straight
+    /// edges on the floor are curves in the frame.
     #[must_use]
     pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
         let (ZoneArea::Frame(area) | ZoneArea::Floor(area)) = &self.area;
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_zone_of_the_floor_is_asked_for_the_place_and_one_of_the_frame_for_the_pixel() {
+    fn floor_zones_test_the_place_and_frame_zones_the_pixel() {
         let zone = |area| Zone {
             name: "door".to_owned(),
             area,
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn the_outline_of_a_zone_of_the_floor_lies_where_its_floor_is_seen() {
+    fn outline_of_a_floor_zone_lies_where_its_floor_is_seen() {
         for tilt in [0.0, 0.3] {
             let (lens, mount) = camera(tilt);
             let zone = Zone {

@@ -14,10 +14,10 @@ const WITHIN: f64 = 0.95;
 /// for.
 const SERVED_FILL: RangeInclusive<f64> = 0.6..=1.6;
 
-/// Places up to `most` upright views of `width` × `height` pixels, each so that the larger extent of
-/// one outline fills the share `fill` of the view's shorter side. Outlines (rays in the camera frame, each non-empty)
-/// come best first; those that an earlier view shows whole and at a similar size need none of
-/// their own.
+/// Places up to `most` upright views of `width` × `height` pixels, each so that the larger extent
+/// of one outline fills the share `fill` of the view's shorter side. Outlines (rays in the camera
+/// frame, each non-empty) come best first; those that an earlier view shows whole and at a similar
+/// size need none of their own.
 #[must_use]
 pub fn zoomed_views(
     outlines: &[Vec<Ray>],
@@ -61,7 +61,7 @@ fn zoomed(
     Some(along(&axis, half_angle_tangent))
 }
 
-/// Whether the view shows the outline whole, about as large as it was placed for.
+/// Returns true when the view shows the outline whole, about as large as it was placed for.
 fn serves(view: &VirtualView, outline: &[Ray], fill: f64) -> bool {
     let half_side = f64::from(view.width().min(view.height())) / 2.0 / view.focal();
     Extent::of(outline, view).is_some_and(|extent| {
@@ -70,7 +70,7 @@ fn serves(view: &VirtualView, outline: &[Ray], fill: f64) -> bool {
     })
 }
 
-/// What an outline covers in a view, in tangents of the angle from its axis.
+/// The extent of an outline in a view, in tangents of the angle from its axis.
 struct Extent {
     low: [f64; 2],
     high: [f64; 2],

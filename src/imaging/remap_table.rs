@@ -24,7 +24,7 @@ use self::{
     whole_patches::WholePatches,
 };
 use super::{Frame, MaskedPixels, NetworkInput};
-use crate::geometry::{Lens, Pixel, VirtualView};
+use crate::geometry::{FrameCrop, Lens, Pixel, VirtualView};
 
 /// One view's sampling positions.
 ///
@@ -77,19 +77,35 @@ impl RemapTable {
             .map(|view| Arc::new(NodeGrid::new(view, lens)))
             .collect();
         let table = |(grid, turn): (usize, f64)| {
-            let grid = Arc::clone(&grids[grid]);
             let frame_from_plane = FrameFromPlane::new(lens.image_plane(), turn);
-            let whole_patches =
-                WholePatches::new(&grid, &frame_from_plane, frame_width, frame_height);
-            Self {
-                grid,
-                frame_from_plane,
-                whole_patches,
-                frame_width,
-                frame_height,
-            }
+            let grid = Arc::clone(&grids[grid]);
+            Self::of_grid(grid, frame_from_plane, frame_width, frame_height)
         };
         shared.into_iter().map(table).collect()
+    }
+
+    /// The table of a crop of frames of `frame_width` × `frame_height` pixels. Positions are exact
+    /// between nodes as well; what lies beyond the lens image is shown as the frame has it.
+    #[must_use]
+    pub fn of_crop(crop: &FrameCrop, frame_width: u32, frame_height: u32) -> Self {
+        let grid = Arc::new(NodeGrid::of_crop(crop));
+        Self::of_grid(grid, FrameFromPlane::identity(), frame_width, frame_height)
+    }
+
+    fn of_grid(
+        grid: Arc<NodeGrid>,
+        frame_from_plane: FrameFromPlane,
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let whole_patches = WholePatches::new(&grid, &frame_from_plane, frame_width, frame_height);
+        Self {
+            grid,
+            frame_from_plane,
+            whole_patches,
+            frame_width,
+            frame_height,
+        }
     }
 
     /// Returns the position in the frame (pixel centres) that the view's pixel (`x`, `y`) samples,

@@ -85,7 +85,7 @@ impl Publisher {
         })
     }
 
-    /// Publishes until the results end, and then tells the broker that the server is offline.
+    /// Publishes until the results end, and then publishes the status "offline".
     pub async fn run(self) {
         let (sender, queue) = broadcast::channel(QUEUE);
         tokio::join!(hear(&self.results, sender), self.publish(queue));

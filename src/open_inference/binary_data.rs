@@ -130,10 +130,10 @@ mod tests {
 
     #[test]
     fn a_truncated_element_is_refused_with_both_lengths() {
-        let told = only_element(&Bytes::from_static(b"\x09\0\0\0abc")).unwrap_err();
+        let error = only_element(&Bytes::from_static(b"\x09\0\0\0abc")).unwrap_err();
         assert!(
-            told.contains("its length is 9, but 3 bytes follow"),
-            "{told}"
+            error.contains("its length is 9, but 3 bytes follow"),
+            "{error}"
         );
     }
 }

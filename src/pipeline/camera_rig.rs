@@ -1,13 +1,13 @@
-//! Camera rigs: a camera's geometry with the views of a plan and their remap tables, immutable
-//! and shared by every frame of that camera.
+//! Camera rigs: a camera's geometry with the views of a plan or the crops of a frame and their remap
+//! tables, immutable; those of a plan are shared by every frame of that camera.
 
 use std::sync::Arc;
 
-use super::planned_views::view_outline;
+use super::planned_views::{crop_outline, view_outline};
 use crate::{
     calibration::CameraGeometry,
     detection::{BBox, FramePixels, ViewPixels},
-    geometry::{BackProjection, Footprint, Pixel, Ray, ViewPlan, VirtualView},
+    geometry::{BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView},
     imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable},
 };
 
@@ -27,6 +27,8 @@ pub(super) struct CameraRig {
 enum Views {
     /// Through virtual views.
     Virtual(Vec<(VirtualView, RemapTable)>),
+    /// In upright crops of it.
+    Crops(Vec<(FrameCrop, RemapTable)>),
     /// As it is.
     Direct(Letterbox),
 }
@@ -66,6 +68,31 @@ impl CameraRig {
     ) -> Self {
         let (geometry, masked) = (self.geometry.clone(), Arc::clone(&self.masked));
         Self::of_views(geometry, masked, views, frame_width, frame_height)
+    }
+
+    /// The same camera with crops of the frame instead of views.
+    pub(super) fn with_crops(
+        &self,
+        crops: &[FrameCrop],
+        frame_width: u32,
+        frame_height: u32,
+    ) -> Self {
+        let tabulated = crops.iter().map(|crop| {
+            let table = RemapTable::of_crop(crop, frame_width, frame_height);
+            (*crop, table)
+        });
+        let shows_something = |(_, table): &(_, RemapTable)| match self.masked.is_empty() {
+            true => table.sees_anything(),
+            false => table.sees_beside(&self.masked),
+        };
+        Self {
+            geometry: self.geometry.clone(),
+            frame: BBox::of_frame(frame_width, frame_height),
+            masked: Arc::clone(&self.masked),
+            views: Views::Crops(tabulated.filter(shows_something).collect()),
+            views_outside: 0,
+            views_masked: 0,
+        }
     }
 
     /// Views with their tables, without those that see nothing.
@@ -119,6 +146,7 @@ impl CameraRig {
     pub(super) fn view_count(&self) -> usize {
         match &self.views {
             Views::Virtual(views) => views.len(),
+            Views::Crops(crops) => crops.len(),
             Views::Direct(_) => 1,
         }
     }
@@ -135,18 +163,22 @@ impl CameraRig {
 
     /// The borders of the views, corner-origin frame pixels.
     pub(super) fn view_outlines(&self) -> Vec<Vec<Pixel>> {
-        let Views::Virtual(views) = &self.views else {
-            return Vec::new();
-        };
-        let outlines = views.iter();
-        let outlines = outlines.map(|(view, _)| view_outline(view, &self.geometry.lens));
-        outlines.collect()
+        match &self.views {
+            Views::Virtual(views) => {
+                let outlines = views.iter();
+                let outlines = outlines.map(|(view, _)| view_outline(view, &self.geometry.lens));
+                outlines.collect()
+            }
+            Views::Crops(crops) => crops.iter().map(|(crop, _)| crop_outline(crop)).collect(),
+            Views::Direct(_) => Vec::new(),
+        }
     }
 
     /// Memory held by the tables and masks, bytes; what several of them share counts once.
     pub(super) fn bytes(&self) -> usize {
         let tables = match &self.views {
             Views::Virtual(views) => RemapTable::bytes(views.iter().map(|(_, table)| table)),
+            Views::Crops(crops) => RemapTable::bytes(crops.iter().map(|(_, table)| table)),
             Views::Direct(_) => 0,
         };
         tables + self.masked.bytes()
@@ -164,6 +196,7 @@ impl CameraRig {
         match &self.views {
             Views::Direct(letterbox) => letterbox.render(frame, input, slot),
             Views::Virtual(views) => views[view].1.render(frame, input, slot),
+            Views::Crops(crops) => crops[view].1.render(frame, input, slot),
         }
     }
 
@@ -182,18 +215,44 @@ impl CameraRig {
                 &self.geometry.lens,
                 &self.geometry.mount,
             ),
+            Views::Crops(crops) => {
+                Footprint::of_crop_box(bbox.corners(), &crops[view].0, &self.geometry.lens)
+            }
             Views::Direct(letterbox) => Some(Footprint::of_frame_box(
                 bbox.corners().map(|side| letterbox.frame_from_input(side)),
             )),
         }
     }
 
-    /// How many views show the whole outline (rays); the frame itself shows everything.
-    pub(super) fn views_holding(&self, outline: &[Ray]) -> usize {
-        let Views::Virtual(views) = &self.views else {
-            return 1;
+    /// The crops; none of a rig of virtual views.
+    pub(super) fn crops(&self) -> impl Iterator<Item = &FrameCrop> {
+        let crops = match &self.views {
+            Views::Crops(crops) => crops.as_slice(),
+            Views::Virtual(_) | Views::Direct(_) => &[],
         };
-        let holds = |view: &VirtualView| outline.iter().all(|ray| view.holds(ray));
-        views.iter().filter(|(view, _)| holds(view)).count()
+        crops.iter().map(|(crop, _)| crop)
+    }
+
+    /// Whether boxes of the views are exact in the frame, as those of crops are.
+    pub(super) fn is_exact(&self) -> bool {
+        matches!(self.views, Views::Crops(_))
+    }
+
+    /// How many views show the whole footprint; the frame itself shows everything.
+    pub(super) fn views_holding(&self, footprint: &Footprint) -> usize {
+        match &self.views {
+            Views::Virtual(views) => {
+                let outline = footprint.rays();
+                let holds = |view: &VirtualView| outline.iter().all(|ray| view.holds(ray));
+                views.iter().filter(|(view, _)| holds(view)).count()
+            }
+            Views::Crops(crops) => {
+                let [x_min, y_min, x_max, y_max] = footprint.bounds();
+                let corners = [Pixel::new(x_min, y_min), Pixel::new(x_max, y_max)];
+                let holds = |crop: &FrameCrop| corners.iter().all(|corner| crop.holds(corner));
+                crops.iter().filter(|(crop, _)| holds(crop)).count()
+            }
+            Views::Direct(_) => 1,
+        }
     }
 }

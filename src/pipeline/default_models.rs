@@ -5,12 +5,14 @@ use strum::VariantArray;
 use super::Profile;
 use crate::inference::Device;
 
-/// A profile's model: the one table of them.
-fn preferred(profile: Profile, device: Device) -> &'static str {
+/// The models of a profile, the preferred one first: the one table of them. Those that were not
+/// fetched are passed over; [`STAND_IN`] comes after all.
+fn preferred(profile: Profile, device: Device) -> &'static [&'static str] {
     match (profile, device) {
-        (Profile::Paper | Profile::Direct, Device::Cpu) => SSDLITE_INT8,
-        (Profile::Paper | Profile::Direct, _) => STAND_IN,
-        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => "nanodet_g_416",
+        (Profile::Paper | Profile::Direct, Device::Cpu) => &[SSDLITE_INT8],
+        (Profile::Paper | Profile::Direct, _) => &[STAND_IN],
+        (Profile::Fast, Device::Cpu) => &[NANODET_INT8, NANODET],
+        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[NANODET],
     }
 }
 
@@ -18,6 +20,11 @@ fn preferred(profile: Profile, device: Device) -> &'static str {
 fn second_opinion_of(profile: Profile) -> Option<Profile> {
     (profile == Profile::Quality).then_some(Profile::Paper)
 }
+
+const NANODET: &str = "nanodet_g_416";
+
+/// ONNX Runtime has integer kernels for it on processors alone.
+const NANODET_INT8: &str = "nanodet_g_416_int8";
 
 /// ONNX Runtime has integer kernels for it on processors alone.
 const SSDLITE_INT8: &str = "ssdlite_mobilenet_v2_int8";
@@ -45,7 +52,8 @@ impl DefaultModels {
     pub fn per_profile(device: Device, is_fetched: impl Fn(&str) -> bool) -> Self {
         let mut missing: Vec<_> = Profile::VARIANTS
             .iter()
-            .map(|profile| preferred(*profile, device))
+            .flat_map(|&profile| preferred(profile, device))
+            .copied()
             .filter(|name| *name != STAND_IN && !is_fetched(name))
             .collect();
         missing.sort_unstable();
@@ -59,12 +67,9 @@ impl DefaultModels {
         match self {
             Self::One(name) => name,
             Self::PerProfile { device, missing } => {
-                let name = preferred(profile, *device);
-                if missing.contains(&name) {
-                    STAND_IN
-                } else {
-                    name
-                }
+                let mut models = preferred(profile, *device).iter();
+                let fetched = models.find(|name| !missing.contains(name));
+                fetched.copied().unwrap_or(STAND_IN)
             }
         }
     }
@@ -98,10 +103,9 @@ mod tests {
     #[test]
     fn a_model_that_was_not_fetched_has_a_stand_in() {
         let all = DefaultModels::per_profile(Device::Cpu, |_| true);
-        assert_eq!(
-            all.names(),
-            [all.of(Profile::Balanced), all.of(Profile::Paper)]
-        );
+        assert_eq!(all.names(), [NANODET, SSDLITE_INT8, NANODET_INT8]);
+        let without = DefaultModels::per_profile(Device::Cpu, |name| name != NANODET_INT8);
+        assert_eq!(without.of(Profile::Fast), NANODET);
         let few = DefaultModels::per_profile(Device::Cpu, |_| false);
         assert_eq!(few.names(), [STAND_IN]);
     }
@@ -112,6 +116,10 @@ mod tests {
         assert_eq!(gpu.of(Profile::Paper), STAND_IN);
         let cpu = DefaultModels::per_profile(Device::Cpu, |_| true);
         assert_eq!(cpu.of(Profile::Paper), SSDLITE_INT8);
+        assert_eq!(
+            (cpu.of(Profile::Fast), gpu.of(Profile::Fast)),
+            (NANODET_INT8, NANODET)
+        );
         assert_eq!(cpu.of(Profile::Quality), gpu.of(Profile::Quality));
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::camera_rig::CameraRig;
 use crate::{
-    geometry::Ray,
+    geometry::Footprint,
     inference::{Model, ViewDetection},
 };
 
@@ -49,8 +49,8 @@ pub(super) fn finds(looks: &[Look]) -> impl Iterator<Item = Find<'_>> {
     })
 }
 
-/// In how many views of all rounds a person with this outline (rays) is wholly visible.
-pub(super) fn views_holding(looks: &[Look], outline: &[Ray]) -> usize {
-    let holding = looks.iter().map(|look| look.rig.views_holding(outline));
+/// In how many views of all rounds a person with this footprint is wholly visible.
+pub(super) fn views_holding(looks: &[Look], footprint: &Footprint) -> usize {
+    let holding = looks.iter().map(|look| look.rig.views_holding(footprint));
     holding.sum()
 }

@@ -13,6 +13,7 @@ use crate::{
     },
     geometry::{
         BackProjection, Footprint, OrientedBox, Ray,
+        crop_placement::CropTarget,
         floor::{bearing, floor_position},
         oriented_box::vertical_in_frame,
     },
@@ -23,6 +24,11 @@ use crate::{
 const BORDER_SHARE: f64 = 0.0125;
 /// How much less the coordinates of a cut-off box count when boxes are averaged.
 const BORDER_WEIGHT: f64 = 0.1;
+/// How much less the coordinates of a box of a virtual view count than the exact ones of a crop.
+const VIRTUAL_VIEW_WEIGHT: f64 = 0.1;
+/// The factor for scores from crops, in which people lean by up to 45° and more: whether there is a
+/// person is better seen in upright views, and where the person ends in crops.
+const CROP_VOTE: f64 = 0.7;
 
 /// From the score of a merge to the one that is reported.
 ///
@@ -59,6 +65,8 @@ struct Mapped {
     candidate: Candidate,
     footprint: Footprint,
     cut_off: bool,
+    /// Whether it is from a crop of the frame.
+    is_exact: bool,
 }
 
 impl Mapped {
@@ -66,15 +74,20 @@ impl Mapped {
     /// should have seen that person counted.
     fn weighed(&self, looks: &[Look], rig: &CameraRig) -> Candidate {
         let mount = &rig.geometry().mount;
-        let stature = self
+        let height_ratio = self
             .footprint
             .extremities()
-            .and_then(|extremities| extremities.stature(mount));
-        let holding = views_holding(looks, self.footprint.rays());
+            .and_then(|extremities| extremities.height_ratio(mount));
+        let holding = views_holding(looks, &self.footprint);
         #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
         let expected_views = holding.max(1) as f64;
+        let (vote, weight) = match self.is_exact {
+            true => (CROP_VOTE, 1.0),
+            false => (1.0, VIRTUAL_VIEW_WEIGHT),
+        };
         Candidate {
-            score: self.candidate.score * worth(self.cut_off, stature, mount),
+            score: self.candidate.score * worth(self.cut_off, height_ratio, mount) * vote,
+            coordinate_weight: self.candidate.coordinate_weight * weight,
             expected_views,
             ..self.candidate
         }
@@ -125,6 +138,29 @@ pub(super) fn outlines(
         .collect()
 }
 
+/// The boxes of what may be persons, the likeliest first, for crops to be placed around them.
+pub(super) fn crop_targets(
+    looks: &[Look],
+    back_projection: BackProjection,
+    parameters: &RefinementParameters,
+) -> Vec<CropTarget> {
+    let Some(Look { rig, .. }) = looks.first() else {
+        return Vec::new();
+    };
+    let (_, merged) = merged(looks, rig, back_projection, parameters);
+    let within = merged.iter().filter_map(|merged| {
+        let bbox = merged.bbox.clipped_to(rig.frame())?;
+        let center = nalgebra::Point2::from(bbox.center());
+        let geometry = rig.geometry();
+        Some(CropTarget {
+            bbox: bbox.corners(),
+            score: merged.score,
+            up: vertical_in_frame(center, &geometry.lens, &geometry.mount),
+        })
+    });
+    within.collect()
+}
+
 fn merged(
     looks: &[Look],
     rig: &CameraRig,
@@ -152,6 +188,7 @@ fn map(find: &Find<'_>, back_projection: BackProjection) -> Option<Mapped> {
     let Look { rig, model, .. } = find.look;
     let found = find.detection;
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
+    let is_exact = rig.is_exact();
     let bbox = BBox::new(footprint.bounds()).ok()?;
     let cut_off = touches_border(&found.bbox, model.input());
     let candidate = Candidate {
@@ -165,6 +202,7 @@ fn map(find: &Find<'_>, back_projection: BackProjection) -> Option<Mapped> {
         candidate,
         footprint,
         cut_off,
+        is_exact,
     })
 }
 
@@ -185,15 +223,26 @@ fn person(
     rig: &CameraRig,
 ) -> Option<Person> {
     let geometry = rig.geometry();
+    let bounds = bbox.corners();
     let bbox = bbox.clipped_to(rig.frame())?;
     let center = nalgebra::Point2::from(bbox.center());
     let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
-    let outlines = members.iter().map(|member| {
+    // Upright views give the proportions, crops the extent.
+    let has_exact = members.iter().any(|member| member.is_exact);
+    let has_upright = members.iter().any(|member| !member.is_exact);
+    let proportioned = members
+        .iter()
+        .filter(|member| !(has_upright && member.is_exact));
+    let outlines = proportioned.map(|member| {
         let weight = member.candidate.score.powi(3) * member.candidate.coordinate_weight;
         // A score of 0 is allowed; its outline still has to count for something.
         (weight.max(f64::MIN_POSITIVE), member.footprint.outline())
     });
-    let oriented_box = OrientedBox::averaging(up, outlines)?;
+    let averaged = OrientedBox::averaging(up, outlines)?;
+    let oriented_box = match has_exact {
+        true => averaged.fitted_to(bounds),
+        false => averaged,
+    };
     let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
     views.sort_unstable();
     views.dedup();

@@ -4,7 +4,7 @@ use super::{Engine, PipelineError, Profile};
 use crate::{
     calibration::Calibration,
     geometry::{
-        Lens, Pixel, VirtualView,
+        FrameCrop, Lens, Pixel, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
         view_plan::Coverage,
     },
@@ -104,7 +104,7 @@ impl Engine {
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
             pictures,
-            zoomed_pictures_at_most: profile.closer_look().map_or(0, |closer| closer.most_views),
+            zoomed_pictures_at_most: profile.most_zoomed_views(),
             batches: pictures.div_ceil(options.batches.max_views.get()),
             pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),
             views: views
@@ -139,4 +139,12 @@ pub(super) fn view_outline(view: &VirtualView, lens: &Lens) -> Vec<Pixel> {
     rays.filter_map(|ray| lens.project_to_rim(&ray))
         .map(|pixel| cross_half_pixel(pixel, PixelConvention::CornerOrigin))
         .collect()
+}
+
+/// The border of a crop, clockwise from its top left corner, corner-origin frame pixels.
+pub(super) fn crop_outline(crop: &FrameCrop) -> Vec<Pixel> {
+    let (width, height) = (f64::from(crop.width), f64::from(crop.height));
+    let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
+    let corners = corners.map(|[x, y]| crop.frame_from_crop(&Pixel::new(x, y)));
+    corners.to_vec()
 }

@@ -1,7 +1,7 @@
 //! How much a box's score is worth, given where it lies in its view and how large a person it
 //! would make.
 
-use crate::geometry::{Mount, stature::Stature};
+use crate::geometry::{Mount, height_ratio::HeightRatio};
 
 /// What is left of the score of a box cut off by its view's border: its other views know better.
 const CUT_OFF_WORTH: f64 = 0.7;
@@ -16,14 +16,14 @@ const WIDTH: [f64; 4] = [0.03, 0.12, 0.7, 1.1];
 const HEIGHTS_TELL: [f64; 2] = [0.15, 0.45];
 
 /// The factor, above 0 and at most 1, for the score of a box.
-pub(super) fn worth(cut_off: bool, stature: Option<Stature>, mount: &Mount) -> f64 {
+pub(super) fn worth(cut_off: bool, height_ratio: Option<HeightRatio>, mount: &Mount) -> f64 {
     let whole = if cut_off { CUT_OFF_WORTH } else { 1.0 };
     // Only a camera that looks down is above everybody's head.
-    match stature {
-        Some(stature) if mount.is_near_nadir() => {
-            let telling = rise(stature.off_nadir, HEIGHTS_TELL);
-            let height = 1.0 - telling * (1.0 - trapezium(stature.height, HEIGHT));
-            let width = trapezium(stature.width, WIDTH);
+    match height_ratio {
+        Some(height_ratio) if mount.is_near_nadir() => {
+            let telling = rise(height_ratio.off_nadir, HEIGHTS_TELL);
+            let height = 1.0 - telling * (1.0 - trapezium(height_ratio.height, HEIGHT));
+            let width = trapezium(height_ratio.width, WIDTH);
             whole * doubted(height) * doubted(width)
         }
         _ => whole,
@@ -49,8 +49,8 @@ mod tests {
 
     use super::*;
 
-    fn stature(height: f64, width: f64, off_nadir: f64) -> Stature {
-        Stature {
+    fn height_ratio(height: f64, width: f64, off_nadir: f64) -> HeightRatio {
+        HeightRatio {
             height,
             width,
             off_nadir,
@@ -60,19 +60,19 @@ mod tests {
     #[test]
     fn people_keep_their_score_and_the_impossible_loses_most_of_it() {
         let mount = Mount::default();
-        assert_eq!(worth(false, Some(stature(0.6, 0.2, 1.0)), &mount), 1.0);
-        assert!((worth(false, Some(stature(0.05, 0.2, 1.0)), &mount) - 0.3).abs() < 1e-12);
-        assert!((worth(false, Some(stature(0.6, 2.0, 1.0)), &mount) - 0.3).abs() < 1e-12);
+        assert_eq!(worth(false, Some(height_ratio(0.6, 0.2, 1.0)), &mount), 1.0);
+        assert!((worth(false, Some(height_ratio(0.05, 0.2, 1.0)), &mount) - 0.3).abs() < 1e-12);
+        assert!((worth(false, Some(height_ratio(0.6, 2.0, 1.0)), &mount) - 0.3).abs() < 1e-12);
         assert!((worth(true, None, &mount) - 0.7).abs() < 1e-12);
     }
 
     #[test]
     fn heights_tell_nothing_below_the_camera_or_for_a_camera_on_a_wall() {
         assert_eq!(
-            worth(false, Some(stature(0.0, 0.2, 0.1)), &Mount::default()),
+            worth(false, Some(height_ratio(0.0, 0.2, 0.1)), &Mount::default()),
             1.0
         );
         let wall = Mount::new(-Vector3::y_axis(), None);
-        assert_eq!(worth(false, Some(stature(1.0, 0.2, 1.0)), &wall), 1.0);
+        assert_eq!(worth(false, Some(height_ratio(1.0, 0.2, 1.0)), &wall), 1.0);
     }
 }

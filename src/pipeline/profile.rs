@@ -29,12 +29,13 @@ use crate::{
 pub enum Profile {
     /// The paper's 128 views with corner back-projection and Soft-NMS.
     Paper,
-    /// Four wide views.
+    /// Five wide views and up to 5 upright crops of the frame; on a CPU by a model in INT8.
     Fast,
-    /// 24 views, wide near the nadir and narrow at the rim.
+    /// 18 views, wide around the nadir and narrow at the rim, and up to 6 upright crops of the frame.
     #[default]
     Balanced,
-    /// The views of `balanced` and up to 40 closer looks, half of them by a second model.
+    /// 24 views, up to 20 closer looks, half of them by a second model, and up to 20 upright crops
+    /// of the frame.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -54,7 +55,8 @@ impl Profile {
         match self {
             Self::Paper => Some(ViewPlan::paper(paper_reading)),
             Self::Fast => Some(ViewPlan::fast()),
-            Self::Balanced | Self::Quality => Some(ViewPlan::balanced()),
+            Self::Balanced => Some(ViewPlan::balanced()),
+            Self::Quality => Some(ViewPlan::quality()),
             Self::Direct => None,
         }
     }
@@ -62,16 +64,31 @@ impl Profile {
     /// The closer look that follows the plan's views, if any.
     pub(super) fn closer_look(self) -> Option<CloserLook> {
         (self == Self::Quality).then_some(CloserLook {
-            most_views: 40,
+            most_views: 20,
             fill: 1.0 / 3.0,
-            first_look: RefinementParameters {
-                refinement: Refinement::Fusion,
-                iou_threshold: 0.5,
-                sigma: 0.3,
-                score_threshold: 0.03,
-                max_detections: 500,
-            },
+            first_look: FIRST_PASS_CANDIDATES,
         })
+    }
+
+    /// The upright crops of the frame that follow the plan's views, if any.
+    pub(super) fn crop_pass(self) -> Option<CropPass> {
+        let most_crops = match self {
+            Self::Fast => 5,
+            Self::Balanced => 6,
+            Self::Quality => 20,
+            Self::Paper | Self::Direct => return None,
+        };
+        Some(CropPass {
+            most_crops,
+            fill: 0.3,
+            candidates: FIRST_PASS_CANDIDATES,
+        })
+    }
+
+    /// Most runs of the network that follow the plan's views.
+    pub(super) fn most_zoomed_views(self) -> usize {
+        let closer = self.closer_look().map_or(0, |closer| closer.most_views);
+        closer + self.crop_pass().map_or(0, |crops| crops.most_crops)
     }
 
     /// How boxes are taken back to the frame.
@@ -92,6 +109,25 @@ impl Profile {
             Self::Fast | Self::Balanced | Self::Quality => Refinement::Fusion,
         }
     }
+}
+
+/// How the boxes of the first pass become places for a second one.
+const FIRST_PASS_CANDIDATES: RefinementParameters = RefinementParameters {
+    refinement: Refinement::Fusion,
+    iou_threshold: 0.5,
+    sigma: 0.3,
+    score_threshold: 0.03,
+    max_detections: 500,
+};
+
+/// A second pass through upright crops of the frame around possible persons.
+pub(super) struct CropPass {
+    /// Most crops.
+    pub(super) most_crops: usize,
+    /// The share of a crop's side that the larger side of a person's box fills.
+    pub(super) fill: f64,
+    /// How the boxes of the first pass become places of crops.
+    pub(super) candidates: RefinementParameters,
 }
 
 /// A closer look at whatever may be a person after the first one.

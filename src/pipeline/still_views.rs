@@ -13,6 +13,7 @@ use std::{
 
 use super::camera_rig::CameraRig;
 use crate::{
+    geometry::FrameCrop,
     imaging::ViewSignature,
     inference::{Model, ViewDetection},
 };
@@ -30,7 +31,14 @@ pub(super) struct StillViews {
 
 struct Remembered {
     views: Arc<CameraViews>,
+    /// The crops of the last second pass.
+    crops: Option<CameraCrops>,
     last_used: Instant,
+}
+
+struct CameraCrops {
+    crops: Vec<FrameCrop>,
+    views: Arc<CameraViews>,
 }
 
 /// What one camera saw last, by the views of one rig and through one model.
@@ -41,6 +49,7 @@ pub(super) struct CameraViews {
     views: Mutex<Vec<Option<SeenView>>>,
 }
 
+#[derive(Clone)]
 struct SeenView {
     signature: ViewSignature,
     found: Vec<ViewDetection>,
@@ -77,17 +86,51 @@ impl StillViews {
         });
         let entry = Remembered {
             views: Arc::clone(&views),
+            crops: None,
             last_used: now,
         };
         cameras.insert(camera.to_owned(), entry);
         views
     }
+
+    /// What this camera saw in crops that the last second pass had as well; `None` for a camera
+    /// that is not remembered.
+    pub(super) fn of_crops(
+        &self,
+        camera: &str,
+        rig: &Arc<CameraRig>,
+        model: &Arc<Model>,
+    ) -> Option<Arc<CameraViews>> {
+        let mut cameras = self.cameras.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = cameras.get_mut(camera)?;
+        let before = known.crops.take();
+        let before = before.filter(|before| before.views.are_of_model(model));
+        let crops: Vec<FrameCrop> = rig.crops().copied().collect();
+        let seen = crops.iter().map(|crop| {
+            let before = before.as_ref()?;
+            let same = before.crops.iter().position(|other| other == crop)?;
+            before.views.lock()[same].clone()
+        });
+        let views = Arc::new(CameraViews {
+            rig: Arc::downgrade(rig),
+            model: Arc::downgrade(model),
+            views: Mutex::new(seen.collect()),
+        });
+        known.crops = Some(CameraCrops {
+            crops,
+            views: Arc::clone(&views),
+        });
+        Some(views)
+    }
 }
 
 impl CameraViews {
     fn are_of(&self, rig: &Arc<CameraRig>, model: &Arc<Model>) -> bool {
-        std::ptr::eq(self.rig.as_ptr(), Arc::as_ptr(rig))
-            && std::ptr::eq(self.model.as_ptr(), Arc::as_ptr(model))
+        std::ptr::eq(self.rig.as_ptr(), Arc::as_ptr(rig)) && self.are_of_model(model)
+    }
+
+    fn are_of_model(&self, model: &Arc<Model>) -> bool {
+        std::ptr::eq(self.model.as_ptr(), Arc::as_ptr(model))
     }
 
     /// What was found in the view, if nothing has moved in it since.

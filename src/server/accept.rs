@@ -101,8 +101,8 @@ mod tests {
     fn an_outage_is_reported_once() {
         let mut outage = Outage::default();
         let start = Instant::now();
-        let told = (0..1000).filter(|tenth| outage.begins(start + PAUSE * *tenth));
-        assert_eq!(told.count(), 1);
+        let reported = (0..1000).filter(|tenth| outage.begins(start + PAUSE * *tenth));
+        assert_eq!(reported.count(), 1);
         let later = start + PAUSE * 1000 + OUTAGE;
         assert!(outage.begins(later));
         assert!(!outage.begins(later + OUTAGE));

@@ -14,13 +14,13 @@ settings! {
     /// API keys, and the web pages that may call the server.
     #[derive(Debug, Clone, PartialEq)]
     pub struct AccessSettings in "access" {
-        /// The file of API keys, one line each as `lookdown key new` prints it (docs/deployment.md). With
-        /// keys, every request except health checks, metrics and the API page needs one. Without keys,
-        /// only clients on the same machine should reach the server. Leave it out for none: an empty
-        /// value is refused.
+        /// The file of API keys, one line each as `lookdown key new` prints it
+        /// (docs/deployment.md). With keys, every request except health checks, metrics and the API
+        /// page needs one. Without keys, only clients on the same machine should reach the server.
+        /// Leave it out for none: an empty value is refused.
         keys_file: Option<PathBuf> = None => given_path("/etc/lookdown/keys.toml");
-        /// The interval in seconds at which that file is checked for changes. 0: never. An invalid new
-        /// version leaves the old keys in use and shows in the log.
+        /// The interval in seconds at which that file is checked for changes. 0: never. An invalid
+        /// new version leaves the old keys in use and shows in the log.
         poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
         /// Keys in addition to those of the file, each as `name:scope+scope:sha256`.
         keys: KeyList = KeyList::default() => keys();

@@ -14,32 +14,33 @@ settings! {
     /// The calibration store.
     #[derive(Debug, Clone, PartialEq)]
     pub struct CalibrationSettings in "calibrations" {
-        /// The folder of calibration files (docs/calibrate.md). The default folder may be missing, any
-        /// other must exist. Or the URL of a bucket: `s3://bucket/prefix`, `gs://bucket/prefix` or
-        /// `az://container/prefix`; its credentials come from the provider's variables, such as
+        /// The folder of calibration files (docs/calibrate.md). The default folder may be missing,
+        /// any other must exist. Or the URL of a bucket: `s3://bucket/prefix`, `gs://bucket/prefix`
+        /// or `az://container/prefix`; its credentials come from the provider's variables, such as
         /// `AWS_ACCESS_KEY_ID`.
         path: CalibrationPlace = CalibrationPlace::Folder(DEFAULT_CALIBRATIONS.into()) => place();
-        /// The interval in seconds at which the store is checked for changes. 0: never. Each check of a
-        /// bucket is one request or more, for which providers charge. An invalid new version leaves the
-        /// old one in use and shows in `/readyz`, in the metrics and in the log.
+        /// The interval in seconds at which the store is checked for changes. 0: never. Each check
+        /// of a bucket is one request or more, for which providers charge. An invalid new version
+        /// leaves the old one in use and shows in `/readyz`, in the metrics and in the log.
         poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
-        /// `true` if calibrations can be changed over HTTP by clients with the scope `admin`; `false`
-        /// for replicas that only read.
+        /// `true` if calibrations can be changed over HTTP by clients with the scope `admin`;
+        /// `false` for replicas that only read.
         writable: bool = true => flag();
         /// `true` if `/metrics` shows the number of persons in each zone, with the names of its
         /// calibration and of the zone as labels: 1000 zones at most.
         zone_metrics: bool = false => flag();
-        /// The most memory for the remap tables of cameras, in bytes. The least recently used go first.
+        /// The most memory for the remap tables of cameras, in bytes. The least recently used go
+        /// first.
         cache_bytes: usize = 1 << 30 => whole(0..=MAX_BYTES);
     }
 }
 
-/// The place of calibrations.
+/// The location of the calibrations.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CalibrationPlace {
-    /// A folder. At its default place it may be missing.
+    /// A folder. The default folder may be missing.
     Folder(PathBuf),
-    /// A bucket of an object store, or a level of one, by its URL, which holds no secrets.
+    /// A bucket of an object store, or a prefix in one, by its URL, which holds no secrets.
     Bucket(Url),
 }
 
@@ -65,7 +66,7 @@ fn parse(text: &str) -> Result<CalibrationPlace, Refusal> {
         let remedy = format!("{error}: give one such as s3://bucket/calibrations");
         refused("a URL that cannot be read", &remedy)
     })?;
-    // abfs://container@account.dfs.core.windows.net has a name there.
+    // The user name of abfs://container@account.dfs.core.windows.net is the container.
     let has_user = !url.username().is_empty() && !url.scheme().starts_with("abfs");
     if has_user || url.password().is_some() || url.query().is_some() || url.fragment().is_some() {
         return Err(refused(

@@ -1,5 +1,5 @@
-//! The declaration of settings: `settings!` makes the struct, its defaults, its reader and its rows of
-//! the reference from one list.
+//! The declaration of settings: `settings!` makes the struct, its defaults, its reader and its rows
+//! of the reference from one list.
 
 use super::{SettingsError, form::Form, values::Values};
 

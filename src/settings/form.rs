@@ -1,5 +1,5 @@
-//! Forms of values: the text or TOML value that a setting is written as, and the checked type that it
-//! becomes.
+//! Forms of values: the text or TOML value that a setting is written as, and the checked type that
+//! it becomes.
 
 mod numbers;
 mod texts;

@@ -22,8 +22,8 @@ settings! {
         /// The ONNX Runtime library. The default path is also searched for in the folders above the
         /// executable.
         library_path: PathBuf = DEFAULT_LIBRARY.into() => path();
-        /// The device that runs models: `cpu`, or a GPU by its number as `cuda:0` or `tensorrt:0`. For a
-        /// GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
+        /// The device that runs models: `cpu`, or a GPU by its number as `cuda:0` or `tensorrt:0`.
+        /// For a GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
         /// `onnxruntime-gpu`.
         device: Device = Device::Cpu => device();
         /// The least score of a candidate. Candidates below it are dropped first of all.
@@ -31,8 +31,8 @@ settings! {
         /// The most candidates kept of one view, best first.
         max_detections_per_view: NonZeroUsize = NonZeroUsize::new(300).unwrap_or(NonZeroUsize::MIN)
             => count();
-        /// The most frames whose candidates are kept for requests with `remember=true`: with another
-        /// refinement these need no new inference. They hold 32 MiB at most.
+        /// The most frames whose candidates are kept for requests with `remember=true`: with
+        /// another refinement these need no new inference. They hold 32 MiB at most.
         remembered_frames: usize = 32 => count();
     }
 }

@@ -21,19 +21,20 @@ settings! {
         max_image_pixels: u64 = 50_000_000 => whole(1..=MAX_IMAGE_SIDE * MAX_IMAGE_SIDE);
         /// The most memory for decoding one frame, in bytes.
         max_decode_bytes: u64 = 512 << 20 => whole(1..=MAX_BYTES);
-        /// The most frames that wait for a worker or are processed. Further ones are answered with 429.
+        /// The most frames that wait for a worker or are processed. Further ones are answered with
+        /// 429.
         max_frames_in_flight: NonZeroUsize = NonZeroUsize::new(16).unwrap_or(NonZeroUsize::MIN)
             => count();
-        /// The most memory for all request bodies together, and for the tensors that are unpacked from
-        /// them (four bytes a number), in bytes. Further ones are answered with 429. At least
+        /// The most memory for all request bodies together, and for the tensors that are unpacked
+        /// from them (four bytes a number), in bytes. Further ones are answered with 429. At least
         /// `server.max_body_bytes`.
         max_upload_bytes: usize = 256 << 20 => whole(1024..=MAX_BYTES);
-        /// The least bytes a second of a request body, over five seconds. A slower one is answered with
-        /// 408. 0: no limit.
+        /// The least bytes a second of a request body, over five seconds. A slower one is answered
+        /// with 408. 0: no limit.
         min_upload_bytes_per_second: Option<NonZeroU64> = NonZeroU64::new(1024) => whole(0..=2 << 30);
-        /// The requests a second that a client may send in the long run. Further ones are answered with
-        /// 429. 0: no limit. A client is an API key, and without one an address. Health checks, metrics
-        /// and pages are not counted.
+        /// The requests a second that a client may send in the long run. Further ones are answered
+        /// with 429. 0: no limit. A client is an API key, and without one an address. Health
+        /// checks, metrics and pages are not counted.
         requests_per_second: Option<f64> = None => rate(0.02..=100_000.0);
         /// The requests that a client may send at once after a pause.
         request_burst: NonZeroU32 = NonZeroU32::new(20).unwrap_or(NonZeroU32::MIN) => count();

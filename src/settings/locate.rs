@@ -1,4 +1,4 @@
-//! Finding the files that settings name, and those at their default places.
+//! Locates the files that settings name, and those at their default paths.
 
 use std::path::{Path, PathBuf};
 
@@ -8,13 +8,13 @@ use super::{InferenceSettings, ModelSettings, SettingsError};
 pub(super) const DEFAULT_CALIBRATIONS: &str = "calibrations";
 /// Default folder of models.
 pub(super) const DEFAULT_REPOSITORY: &str = "models";
-/// Default ONNX Runtime library, where `make setup` puts it.
+/// Default ONNX Runtime library, installed by `make setup`.
 pub(super) const DEFAULT_LIBRARY: &str = "runtime/libonnxruntime.so";
 
-/// The folder of calibrations; `None` when none is set and there is none at the default place.
+/// Returns the folder of calibrations; `None` if none is set and the default folder does not exist.
 ///
 /// # Errors
-/// [`SettingsError::Missing`] when one is set that is not there.
+/// [`SettingsError::Missing`] when the given folder does not exist.
 pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError> {
     let found = locate(folder, DEFAULT_CALIBRATIONS);
     if found.is_none() && folder != Path::new(DEFAULT_CALIBRATIONS) {
@@ -29,10 +29,10 @@ pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError
 }
 
 impl ModelSettings {
-    /// The folder or file of the one model for all profiles, when one is set.
+    /// Returns the folder or file of the single model for all profiles, if it is set.
     ///
     /// # Errors
-    /// [`SettingsError::Missing`] when it is not there.
+    /// [`SettingsError::Missing`] when it does not exist.
     pub fn find_one(&self) -> Result<Option<PathBuf>, SettingsError> {
         match &self.path {
             Some(path) if !path.exists() => Err(SettingsError::Missing {
@@ -45,11 +45,11 @@ impl ModelSettings {
         }
     }
 
-    /// The folder of models. May be missing at its default place when there is one model for all
-    /// profiles.
+    /// Returns the folder of models. The default folder may be missing if there is a single model
+    /// for all profiles.
     ///
     /// # Errors
-    /// [`SettingsError::Missing`] when it is not there.
+    /// [`SettingsError::Missing`] when it does not exist.
     pub fn find_repository(&self) -> Result<PathBuf, SettingsError> {
         let is_default = self.repository == Path::new(DEFAULT_REPOSITORY);
         match locate(&self.repository, DEFAULT_REPOSITORY) {
@@ -67,10 +67,10 @@ impl ModelSettings {
 }
 
 impl InferenceSettings {
-    /// The ONNX Runtime library.
+    /// Returns the path of the ONNX Runtime library.
     ///
     /// # Errors
-    /// [`SettingsError::Missing`] when it is not there.
+    /// [`SettingsError::Missing`] when it does not exist.
     pub fn find_library(&self) -> Result<PathBuf, SettingsError> {
         locate(&self.library_path, DEFAULT_LIBRARY).ok_or_else(|| SettingsError::Missing {
             key: "inference.library_path",
@@ -83,8 +83,8 @@ impl InferenceSettings {
     }
 }
 
-/// The existing file or folder at `path` in the current directory, or else beside the executable or
-/// in the folders above it.
+/// Returns the existing file or folder at `path` in the current directory, or else beside the
+/// executable or in the folders above it.
 #[must_use]
 pub fn find_beside_executable(path: &Path) -> Option<PathBuf> {
     if path.exists() {
@@ -95,11 +95,11 @@ pub fn find_beside_executable(path: &Path) -> Option<PathBuf> {
     candidates.find(|candidate| candidate.exists())
 }
 
-/// The existing file or folder that `path` means.
+/// Returns the existing file or folder for `path`.
 ///
-/// A path that is set is taken as it is. The default one is looked for in the current directory
-/// and then beside the executable and in the folders above it, so that
-/// `/anywhere/lookdown/target/release/lookdown` finds what belongs to it from any current directory.
+/// A given path is used unchanged. The default path is searched for in the current directory, then
+/// beside the executable and in the folders above it. So
+/// `/anywhere/lookdown/target/release/lookdown` finds its files from any current directory.
 fn locate(path: &Path, default: &str) -> Option<PathBuf> {
     if path == Path::new(default) {
         return find_beside_executable(path);

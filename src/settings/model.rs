@@ -12,10 +12,11 @@ settings! {
     /// The models.
     #[derive(Debug, Clone, PartialEq)]
     pub struct ModelSettings in "model" {
-        /// One model for all profiles: a model folder or an ONNX file. Empty: each profile has its own.
+        /// One model for all profiles: a model folder or an ONNX file. Empty: each profile has its
+        /// own.
         path: Option<PathBuf> = None => optional(path());
-        /// The folder of models, each in a folder of its name. The default folder is also searched for
-        /// in the folders above the executable.
+        /// The folder of models, each in a folder of its name. The default folder is also searched
+        /// for in the folders above the executable.
         repository: PathBuf = DEFAULT_REPOSITORY.into() => path();
         /// Names of models to load at the start in addition to those of the profiles.
         also_load: Vec<String> = Vec::new() => names();

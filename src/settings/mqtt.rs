@@ -1,4 +1,4 @@
-//! The MQTT broker: with a URL there is one, without none.
+//! The MQTT broker; enabled by its URL.
 
 use std::{num::NonZeroUsize, path::PathBuf};
 
@@ -19,8 +19,8 @@ settings! {
     #[derive(Debug, Clone)]
     pub(super) struct MqttKeys in "mqtt" {
         /// The broker that counts and reports are published to (docs/home-automation.md), such as
-        /// `mqtt://user:password@192.168.1.10:1883`, or `mqtts://` for TLS. Empty: none. A URL with a
-        /// password is better kept in the variable than in a file.
+        /// `mqtt://user:password@192.168.1.10:1883`, or `mqtts://` for TLS. Empty: none. A URL with
+        /// a password is better kept in the variable than in a file.
         url: Option<SecretString> = None => secret("URL of a broker");
         /// The PEM file of the certificate authorities of a broker with TLS. Empty: those that the
         /// system trusts.
@@ -30,8 +30,8 @@ settings! {
         /// The prefix of the topics on which Home Assistant discovers entities. Empty: nothing is
         /// announced.
         discovery_prefix: Option<String> = Some("homeassistant".to_owned()) => optional(topic());
-        /// The most cameras that are published: the first that send frames. Each is a device in Home
-        /// Assistant.
+        /// The most cameras that are published: the first that send frames. Each is a device in
+        /// Home Assistant.
         max_cameras: NonZeroUsize = NonZeroUsize::new(100).unwrap_or(NonZeroUsize::MIN) => count();
     }
 }

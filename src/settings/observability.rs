@@ -15,8 +15,8 @@ settings! {
         /// The format of a log line: `text` for reading, `json` for machines.
         format: LogFormat = LogFormat::Text
             => choice(&[("text", LogFormat::Text), ("json", LogFormat::Json)]);
-        /// The events that are logged: a level, or levels per module. `ort` is ONNX Runtime, which logs
-        /// much. `object_store` logs each request to a bucket that is repeated.
+        /// The events that are logged: a level, or levels per module. `ort` is ONNX Runtime, which
+        /// logs much. `object_store` logs each request to a bucket that is repeated.
         filter: String = "info,ort=warn,object_store=warn".to_owned() => filter();
     }
 }
@@ -26,10 +26,11 @@ settings! {
     #[derive(Debug, Clone, PartialEq)]
     pub struct TraceSettings in "telemetry" {
         /// The collector of traces with OTLP over HTTP, such as `http://127.0.0.1:4318`, without
-        /// `/v1/traces` (docs/observability.md). Empty: no traces. Its credentials come from the variable
-        /// `OTEL_EXPORTER_OTLP_HEADERS`.
+        /// `/v1/traces` (docs/observability.md). Empty: no traces. Its credentials come from the
+        /// variable `OTEL_EXPORTER_OTLP_HEADERS`.
         otlp_endpoint: Option<Url> = None => optional(endpoint());
-        /// The share of the requests that is traced, where the caller's `traceparent` does not decide.
+        /// The share of the requests that is traced, where the caller's `traceparent` does not
+        /// decide.
         sample_ratio: f64 = 1.0 => share();
         /// The service name of the traces.
         service_name: String = "lookdown".to_owned() => text("a name", |name| !name.trim().is_empty());

@@ -117,8 +117,8 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Compares a file with its generated text; with `INSTA_UPDATE=always`, as `make bless` sets it for the
-/// snapshots, writes the text.
+/// Compares a file with its generated text; with `INSTA_UPDATE=always`, as `make bless` sets it for
+/// the snapshots, writes the text.
 fn assert_generated(file: &str, text: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {

@@ -29,16 +29,16 @@ settings! {
     /// The inference server as it is written.
     #[derive(Debug, Clone)]
     pub(super) struct RemoteKeys in "inference" {
-        /// The program that runs models: `onnx` is ONNX Runtime in this process, `v2` a server of the
-        /// Open Inference Protocol, also called KServe V2 (docs/open-inference-protocol.md).
+        /// The program that runs models: `onnx` is ONNX Runtime in this process, `v2` a server of
+        /// the Open Inference Protocol, also called KServe V2 (docs/open-inference-protocol.md).
         backend: Backend = Backend::Onnx => choice(&[("onnx", Backend::Onnx), ("v2", Backend::V2)]);
         /// The address of that server, `http://` or `https://`.
         url: Option<Url> = None => optional(address());
-        /// The token for that server, if it needs one, sent as `Authorization: Bearer …`. It is better
-        /// kept in the variable than in a file.
+        /// The token for that server, if it needs one, sent as `Authorization: Bearer …`. It is
+        /// better kept in the variable than in a file.
         bearer_token: Option<SecretString> = None => secret("token");
-        /// The name of the model on that server. Its manifest is `model.path`, or the folder of that
-        /// name in `model.repository`. Empty: the name in the manifest at `model.path`.
+        /// The name of the model on that server. Its manifest is `model.path`, or the folder of
+        /// that name in `model.repository`. Empty: the name in the manifest at `model.path`.
         model: Option<String> = None => optional(text("a name", |_| true));
         /// The longest time for one request to that server.
         timeout as "timeout_millis": Duration = Duration::from_secs(10) => millis(1..=MAX_TIMEOUT_MILLIS);

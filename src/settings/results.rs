@@ -11,9 +11,9 @@ use super::{
 };
 use crate::results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
 
-/// 8 MiB: any one report has room.
+/// 8 MiB: enough for any single report.
 const MIN_BYTES: u64 = 8 << 20;
-/// A minute to a year.
+/// From a minute to a year.
 const AGES: RangeInclusive<u64> = 60..=366 * 86_400;
 
 /// The result store.
@@ -39,8 +39,8 @@ settings! {
         key_prefix: String = "lookdown".to_owned() => key_prefix();
         /// The longest time that a report is kept in that Redis.
         max_age as "max_age_seconds": Duration = Duration::from_hours(24) => seconds(AGES);
-        /// The cameras whose latest image is kept for `/results/{camera}/latest.jpg`, by name; `"*"` is
-        /// all. Images show persons. Each takes 4 MiB at most.
+        /// The cameras whose latest image is kept for `/results/{camera}/latest.jpg`, by name;
+        /// `"*"` is all. Images show persons. Each takes 4 MiB at most.
         pictures: PicturesOf = PicturesOf::default() => pictures();
     }
 }
@@ -55,10 +55,11 @@ settings! {
         max_reports => count();
         /// The most bytes of all reports. The oldest that is not its camera's latest goes first.
         max_bytes => whole(MIN_BYTES..=MAX_BYTES);
-        /// The most cameras whose latest image is kept. The one without reports for longest goes first.
+        /// The most cameras whose latest image is kept. The one without reports for longest goes
+        /// first.
         max_pictures => count();
-        /// The most event streams and requests that wait for a newer report. Further ones are answered
-        /// with 429.
+        /// The most event streams and requests that wait for a newer report. Further ones are
+        /// answered with 429.
         max_listeners => count();
     }
 }

@@ -14,11 +14,12 @@ settings! {
     pub struct ServerSettings in "server" {
         /// The IP address and port to listen on. `[::]:8080` is every address of the machine.
         listen: SocketAddr = SocketAddr::from(([127, 0, 0, 1], 8080)) => address();
-        /// The IP address and port for `/metrics` and the health checks alone; `/metrics` is then not
-        /// served elsewhere. Empty: `/metrics` is served with all other routes.
+        /// The IP address and port for `/metrics` and the health checks alone; `/metrics` is then
+        /// not served elsewhere. Empty: `/metrics` is served with all other routes.
         metrics_listen: Option<SocketAddr> = None => optional(address());
-        /// The largest request body in bytes. A larger one is answered with 413. The smallest setting
-        /// still holds an image, and the largest, 2 GiB, is more than any image within the pixel limits.
+        /// The largest request body in bytes. A larger one is answered with 413. The smallest
+        /// setting still holds an image, and the largest, 2 GiB, is more than any image within the
+        /// pixel limits.
         max_body_bytes: usize = 32 << 20 => whole(1024..=2 << 30);
         /// The longest time for a request. A slower upload is answered with 408, a slower detection
         /// with 504.
@@ -29,8 +30,8 @@ settings! {
 
 settings! {
     in "server" fill ConnectionLimits {
-        /// The largest number of open connections. On further ones health checks are answered, and all
-        /// else is refused with 503.
+        /// The largest number of open connections. On further ones health checks are answered, and
+        /// all else is refused with 503.
         max_connections => count();
         /// The longest time for the path and the headers of a request to arrive.
         header_timeout as "header_timeout_millis" => millis(1..=MAX_TIMEOUT_MILLIS);
@@ -48,8 +49,8 @@ settings! {
     /// The end of the server.
     #[derive(Debug, Clone, PartialEq)]
     pub struct ShutdownSettings in "shutdown" {
-        /// The time after a termination signal (SIGTERM) during which everything is still served while
-        /// `/readyz` answers 503, so that load balancers notice. Ctrl-C skips it.
+        /// The time after a termination signal (SIGTERM) during which everything is still served
+        /// while `/readyz` answers 503, so that load balancers notice. Ctrl-C skips it.
         grace as "grace_millis": Duration = Duration::from_secs(5) => millis(0..=MAX_TIMEOUT_MILLIS);
         /// The longest time after that for the requests that have arrived. 0: as long as for any
         /// request.

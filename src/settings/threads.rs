@@ -1,22 +1,22 @@
-//! How the cores are shared between decoding, remapping and the network: the one place that
-//! decides.
+//! The thread plan: the shares of decoding, remapping and inference in the cores. No other module
+//! decides them.
 //!
-//! On a processor the network runs in as many sessions as there are cores, each on one thread and
-//! on one view at a time: sessions need not wait for each other, while the threads of one session
-//! do so at every layer, and a batch of views takes no less time than its views one by one.
-//! Measured in benches/NOTES.md; `lookdown tune` measures it on the machine at hand.
+//! On a CPU there are as many sessions as cores, each with one thread and one view at a time.
+//! Sessions do not wait for each other, while the threads of one session synchronise at every
+//! layer. A batch of views takes as long as its views one by one. Measured in benches/NOTES.md;
+//! `lookdown tune` measures it on the current machine.
 //!
-//! Counts come from what this process may use, not from what the machine has:
-//! [`std::thread::available_parallelism`] knows the affinity mask and the CPU quota of the control
-//! group, versions 1 and 2, rounded down. None of the threads spins while it has nothing to do, so
-//! stages that take turns may each have all the cores.
+//! The counts follow from the cores that this process may use:
+//! [`std::thread::available_parallelism`] respects the affinity mask and the CPU quota of the
+//! control group (versions 1 and 2), rounded down. Idle threads do not spin, so stages that
+//! alternate may each use all cores.
 
 use std::num::NonZeroUsize;
 
 use super::{declare::settings, form::count};
 use crate::inference::Device;
 
-/// One session uploads and renders while the other one computes.
+/// Two sessions: one uploads and renders while the other one computes.
 const SESSIONS_ELSEWHERE: NonZeroUsize = NonZeroUsize::new(2).unwrap();
 /// Views in one run on a GPU or another server.
 const BATCH_VIEWS_ELSEWHERE: NonZeroUsize = NonZeroUsize::new(8).unwrap();
@@ -25,15 +25,15 @@ settings! {
     /// The use of the cores as it is written.
     #[derive(Debug, Clone)]
     pub(super) struct ThreadKeys in "inference" {
-        /// The sessions of each model, which run side by side. 0: on a CPU one for each core that the
-        /// machine or the container's CPU limit gives, on a GPU or another server two. `lookdown tune`
-        /// measures the best number.
+        /// The sessions of each model, which run side by side. 0: on a CPU one for each core that
+        /// the machine or the container's CPU limit gives, on a GPU or another server two.
+        /// `lookdown tune` measures the best number.
         sessions: Option<NonZeroUsize> = None => count();
-        /// The threads of each session. 0: one; where `inference.sessions` is set, their share of the
-        /// cores.
+        /// The threads of each session. 0: one; where `inference.sessions` is set, their share of
+        /// the cores.
         threads: Option<NonZeroUsize> = None => count();
-        /// The most views in one run of the network, of one or several frames. 0: one on a CPU, where
-        /// more is not faster, eight on a GPU or another server.
+        /// The most views in one run of the network, of one or several frames. 0: one on a CPU,
+        /// where more is not faster, eight on a GPU or another server.
         max_batch_views: Option<NonZeroUsize> = None => count();
     }
 }
@@ -46,12 +46,12 @@ impl ThreadKeys {
     }
 }
 
-/// The processor that runs the network.
+/// The processor that runs the models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Computing {
     /// The cores of this process.
     Here,
-    /// A GPU or another server: the processor only sends views and receives boxes.
+    /// A GPU or another server: the CPU only sends views and receives boxes.
     Elsewhere,
 }
 
@@ -67,16 +67,16 @@ impl Computing {
 /// The numbers of threads of each stage, and of views in a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ThreadPlan {
-    /// Frames worked on at once; each is decoded and merged on one thread. One more than there are
-    /// cores, so that the network always finds the next frame ready.
+    /// Frames processed at once; each is decoded and merged on one thread. One more than there are
+    /// cores, so that inference always has a next frame.
     pub frame_workers: NonZeroUsize,
     /// Threads that build tables, and render batches of several views, for all frames together.
     pub remapping: NonZeroUsize,
-    /// Sessions of each model, which run side by side.
+    /// Sessions of each model, which run in parallel.
     pub sessions: NonZeroUsize,
-    /// Threads within one run of the network.
+    /// Threads of each session.
     pub per_session: NonZeroUsize,
-    /// Most views in one run of the network.
+    /// Largest number of views in one batch.
     pub batch_views: NonZeroUsize,
 }
 
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gpu_and_another_server_take_turns_in_two_sessions() {
+    fn a_gpu_and_another_server_use_two_sessions() {
         assert_eq!(plan(Device::Cuda(0), false, 0, 0), (2, 1));
         assert_eq!(plan(Device::TensorRt(0), false, 1, 2), (1, 2));
         assert_eq!(plan(Device::Cpu, true, 0, 0), (2, 1));

@@ -16,16 +16,16 @@ settings! {
     /// TLS as it is written.
     #[derive(Debug, Clone)]
     pub(super) struct TlsKeys in "server.tls" {
-        /// The PEM file of the server's certificate, followed by the intermediate certificates. With a
-        /// certificate and a private key the server speaks HTTPS, without them plain HTTP.
+        /// The PEM file of the server's certificate, followed by the intermediate certificates.
+        /// With a certificate and a private key the server speaks HTTPS, without them plain HTTP.
         certificate: Option<PathBuf> = None => optional(path());
         /// The PEM file of the certificate's private key.
         private_key: Option<PathBuf> = None => optional(path());
-        /// The PEM file of certificate authorities. Each client must then show a certificate of one of
-        /// them.
+        /// The PEM file of certificate authorities. Each client must then show a certificate of one
+        /// of them.
         client_certificates: Option<PathBuf> = None => optional(path());
-        /// The interval in seconds at which these files are checked for changes. 0: never. An invalid
-        /// new version leaves the old one in use and shows in the metrics and in the log.
+        /// The interval in seconds at which these files are checked for changes. 0: never. An
+        /// invalid new version leaves the old one in use and shows in the metrics and in the log.
         poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
         /// The longest time for a TLS handshake.
         handshake_timeout as "handshake_timeout_millis": Duration = Duration::from_secs(10)

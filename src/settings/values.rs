@@ -1,4 +1,5 @@
-//! Values by their keys: those of the settings file, and the environment variables that take precedence.
+//! Values by their keys: those of the settings file, and the environment variables that take
+//! precedence.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -65,8 +66,8 @@ impl Values {
         Ok(())
     }
 
-    /// The value of `key`; `None` where none was given. A variable that is set to nothing counts as not
-    /// given, unless the form refuses an empty value.
+    /// The value of `key`; `None` where none was given. A variable that is set to nothing counts as
+    /// not given, unless the form refuses an empty value.
     pub(super) fn get<T>(
         &self,
         key: &'static str,

@@ -3,8 +3,8 @@
 use super::{SettingsError, declare::Entry, entries, values::unknown};
 
 const PREFIX: &str = "LOOKDOWN__";
-/// Variables that begin like this but with one underscore are no settings, such as the
-/// `LOOKDOWN_PORT=tcp://…` that Kubernetes sets for a Service called `lookdown`.
+/// The prefix of variables with a single underscore, which are not settings, such as
+/// `LOOKDOWN_PORT=tcp://…`. Kubernetes sets it for a Service called `lookdown`.
 const NEARLY: &str = "LOOKDOWN_";
 /// The separator of tables and keys.
 const SEPARATOR: &str = "__";
@@ -51,8 +51,8 @@ pub(super) fn key_of(name: &str, entries: &[Entry]) -> Result<Option<String>, Se
     }
 }
 
-/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with the
-/// setting that each may have been meant for; `None` when there are none.
+/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with
+/// the setting that each may have been meant for; `None` when there are none.
 pub fn ignored_variables(names: impl IntoIterator<Item = String>) -> Option<String> {
     let entries = entries();
     let ignored = names.into_iter().filter(|name| {

@@ -21,7 +21,7 @@ const MAX_ANSWER_BYTES: usize = 64 * 1024;
 #[derive(Debug)]
 pub(super) struct Collector {
     client: Client,
-    /// The exporter's thread has no runtime of its own.
+    /// The exporter's thread has no runtime.
     runtime: Handle,
     is_down: AtomicBool,
 }

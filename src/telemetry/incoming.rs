@@ -64,9 +64,9 @@ mod tests {
         let parent = Some(parent);
         let context = IncomingTrace { parent, state }.context();
         let span = context.span();
-        let told = span.span_context();
-        told.is_valid()
-            .then(|| (told.trace_id().to_string(), told.trace_state().header()))
+        let span = span.span_context();
+        span.is_valid()
+            .then(|| (span.trace_id().to_string(), span.trace_state().header()))
     }
 
     #[test]

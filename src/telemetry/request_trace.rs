@@ -31,9 +31,9 @@ impl RequestTrace {
     /// Creates a request without spans. Its trace ID may still be known.
     pub(super) fn not_recorded(context: &Context) -> Self {
         let span = context.span();
-        let told = span.span_context();
+        let span = span.span_context();
         Self {
-            id: told.is_valid().then(|| told.trace_id()),
+            id: span.is_valid().then(|| span.trace_id()),
             recording: None,
         }
     }

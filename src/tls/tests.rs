@@ -247,7 +247,7 @@ fn errors_of_files_name_setting_file_and_remedy() {
     let (pair, other) = (authority.issue(), authority.issue());
     let half = |pem: &str| pem[..pem.len() / 2].to_owned();
     let junk = pair.certificate.replace("MII", "AAA");
-    for (certificate, private_key, told) in [
+    for (certificate, private_key, expected) in [
         (
             "",
             &*pair.private_key,
@@ -291,7 +291,7 @@ fn errors_of_files_name_setting_file_and_remedy() {
             private_key: private_key.to_owned(),
         });
         let message = refusal(&files);
-        assert!(message.contains(told), "{message}");
+        assert!(message.contains(expected), "{message}");
         assert!(
             message.contains("server.pem") || message.contains("server.key"),
             "{message}"
@@ -303,7 +303,7 @@ fn errors_of_files_name_setting_file_and_remedy() {
 fn errors_of_missing_or_large_files_and_authorities_name_them() {
     let pair = Authority::new().issue();
     let mut files = Files::of(&pair);
-    for (authorities, told) in [
+    for (authorities, expected) in [
         (
             "",
             "server.tls.client_certificates: there is no certificate in",
@@ -315,7 +315,7 @@ fn errors_of_missing_or_large_files_and_authorities_name_them() {
         files.ask_clients(authorities);
         let message = refusal(&files);
         assert!(
-            message.contains(told) && message.contains("clients.pem"),
+            message.contains(expected) && message.contains("clients.pem"),
             "{message}"
         );
     }

@@ -1,4 +1,4 @@
-//! Who may do what.
+//! Authorization: keys, scopes and origins.
 
 use std::{collections::HashMap, fs, path::Path, sync::Arc};
 
@@ -18,7 +18,7 @@ const READER: &str = "lookdown_reader";
 const ADMINISTRATOR: &str = "lookdown_administrator";
 const BOTH: &str = "lookdown_both";
 
-/// Every route that needs a scope.
+/// All routes that need a scope.
 const GUARDED: [(&str, &str, &str); 24] = [
     ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
     ("POST", "/v1/vision/detection", "detect"),
@@ -41,7 +41,7 @@ const GUARDED: [(&str, &str, &str); 24] = [
     ("GET", "/events", "read"),
     ("POST", "/v2/repository/index", "read"),
     ("PUT", "/calibrations/lobby", "admin"),
-    ("DELETE", "/calibrations/nobody", "admin"),
+    ("DELETE", "/calibrations/missing", "admin"),
     ("POST", "/v2/repository/models/eager/load", "admin"),
     ("POST", "/v2/repository/models/eager/unload", "admin"),
 ];
@@ -87,7 +87,7 @@ async fn reads_with(service: &Service, key: &str) -> u16 {
 }
 
 #[tokio::test]
-async fn every_guarded_route_needs_a_key_of_its_scope_and_admin_opens_all() {
+async fn every_guarded_route_needs_its_scope_or_admin() {
     let service = guarded();
     for (method, path, scope) in GUARDED {
         let none = service.ask(method, path, &[]).await;
@@ -138,7 +138,7 @@ async fn probes_metrics_and_pages_never_need_a_key() {
 }
 
 #[tokio::test]
-async fn a_key_is_sent_as_a_bearer_token_or_alone_and_only_once() {
+async fn a_key_is_a_bearer_token_or_a_header_and_sent_once() {
     let service = guarded();
     let bearer = format!("Bearer {READER}");
     let lower = format!("bearer  {READER}");
@@ -149,7 +149,7 @@ async fn a_key_is_sent_as_a_bearer_token_or_alone_and_only_once() {
     ] {
         assert_eq!(reads(&service, &[header]).await, 200, "{header:?}");
     }
-    // Basic is for a proxy on the way.
+    // The scheme Basic may be meant for a proxy.
     let headers = [("authorization", "Basic dTpw"), ("x-api-key", READER)];
     assert_eq!(reads(&service, &headers).await, 200);
 
@@ -171,7 +171,7 @@ async fn a_key_is_sent_as_a_bearer_token_or_alone_and_only_once() {
 }
 
 #[tokio::test]
-async fn no_part_of_a_key_nor_its_digest_is_a_key() {
+async fn parts_and_digests_of_keys_are_refused() {
     let service = guarded();
     for end in 0..READER.len() {
         assert_eq!(reads_with(&service, &READER[..end]).await, 401, "{end}");
@@ -186,7 +186,7 @@ async fn no_part_of_a_key_nor_its_digest_is_a_key() {
 }
 
 #[tokio::test]
-async fn a_replaced_file_shuts_the_old_key_out_and_lets_the_new_one_in() {
+async fn a_replaced_keys_file_revokes_the_old_key() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("keys.toml");
     write_keys(&file);
@@ -206,13 +206,13 @@ async fn a_replaced_file_shuts_the_old_key_out_and_lets_the_new_one_in() {
     assert_eq!(
         reads_with(&service, "new").await,
         401,
-        "an empty file opens nothing"
+        "an empty file grants no access"
     );
     assert_eq!(reads_with(&service, "lasting").await, 200);
 }
 
 #[tokio::test]
-async fn a_broken_file_keeps_the_old_keys_and_shows_in_the_log_once() {
+async fn an_invalid_keys_file_keeps_the_keys_and_is_logged_once() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("keys.toml");
     write_keys(&file);
@@ -241,7 +241,7 @@ async fn a_broken_file_keeps_the_old_keys_and_shows_in_the_log_once() {
 }
 
 #[test]
-fn nothing_of_a_key_is_in_the_debug_output_of_keys_and_settings() {
+fn debug_output_reveals_no_keys() {
     let digest = KeyDigest::of(b"secret").hexadecimal();
     let variable = "LOOKDOWN__ACCESS__KEYS".to_owned();
     let environment = HashMap::from([(variable, format!("gate:detect:{digest}"))]);
@@ -254,7 +254,7 @@ fn nothing_of_a_key_is_in_the_debug_output_of_keys_and_settings() {
 }
 
 #[tokio::test]
-async fn without_keys_others_may_find_and_read_but_change_nothing() {
+async fn without_keys_remote_clients_may_detect_and_read_only() {
     let service = Service::within(&Bounds {
         access: Access::Open {
             own_machine_only: false,
@@ -263,14 +263,14 @@ async fn without_keys_others_may_find_and_read_but_change_nothing() {
     });
     for (method, path, scope) in GUARDED {
         let answer = service.ask(method, path, &[]).await;
-        // Which models could be loaded is only of use to who may load them.
+        // The list of loadable models is only useful to clients that may load them.
         let closed = scope == "admin" || path == "/v2/repository/index";
         assert_eq!(answer.status == 403, closed, "{method} {path}");
     }
 }
 
 #[tokio::test]
-async fn pages_of_the_origins_named_may_call_and_no_others() {
+async fn only_pages_of_configured_origins_may_call() {
     let service = Service::within(&Bounds {
         cors_origins: vec!["https://dashboard.example".to_owned()],
         ..Bounds::default()
@@ -300,7 +300,7 @@ async fn pages_of_the_origins_named_may_call_and_no_others() {
 
     let allowed = "access-control-allow-origin";
     let page = [("origin", "https://dashboard.example")];
-    let refused = service.ask("GET", "/calibrations/nobody", &page).await;
+    let refused = service.ask("GET", "/calibrations/missing", &page).await;
     assert_eq!(
         (refused.status.as_u16(), refused.header(allowed)),
         (404, page[0].1)

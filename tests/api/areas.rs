@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::service::{Bounds, Service, frame};
 
-/// A calibration `lobby` for the frames of the service with these areas.
+/// A calibration `lobby` with these areas for the frames of the service.
 fn lobby(zones: &Value, masks: &Value) -> Value {
     json!({
         "id": "lobby", "image": { "width": 200, "height": 200 },
@@ -24,7 +24,7 @@ fn zones() -> Value {
 }
 
 #[tokio::test]
-async fn what_is_put_is_got_again() {
+async fn get_returns_what_put_stored() {
     let service = Service::start();
     let masks = json!([{ "frame_px": [[0.0, 0.0], [50.0, 0.0], [0.0, 50.5]] }]);
     let sent = lobby(&zones(), &masks);
@@ -34,7 +34,7 @@ async fn what_is_put_is_got_again() {
 }
 
 #[tokio::test]
-async fn a_zone_that_crosses_itself_is_refused_in_a_sentence() {
+async fn a_self_intersecting_zone_is_refused() {
     let service = Service::start();
     let zones = json!([{ "name": "a", "frame_px": [[0, 0], [9, 9], [9, 0], [0, 9]] }]);
     let sent = lobby(&zones, &json!([]));
@@ -48,7 +48,7 @@ async fn a_zone_that_crosses_itself_is_refused_in_a_sentence() {
 }
 
 #[tokio::test]
-async fn a_report_tells_who_is_in_which_zone_only_where_there_are_some() {
+async fn reports_list_zones_only_if_the_calibration_has_them() {
     let service = Service::start();
     let report = async || {
         let answer = service.post_raw("calibration=lobby&profile=fast", frame());
@@ -78,7 +78,7 @@ async fn a_report_tells_who_is_in_which_zone_only_where_there_are_some() {
 }
 
 #[tokio::test]
-async fn zones_are_a_metric_when_asked_for_and_for_as_long_as_they_are_there() {
+async fn zone_metrics_are_optional_and_follow_the_zones() {
     for zone_metrics in [false, true] {
         let service = Service::within(&Bounds {
             zone_metrics,
@@ -119,7 +119,7 @@ async fn zones_are_a_metric_when_asked_for_and_for_as_long_as_they_are_there() {
 }
 
 #[tokio::test]
-async fn views_under_a_mask_are_counted_in_the_report_and_left_out_of_the_plan() {
+async fn masked_views_are_counted_and_not_in_the_plan() {
     let service = Service::start();
     let masks = json!([{ "frame_px": [[100, 0], [200, 0], [200, 200], [100, 200]] }]);
     let sent = lobby(&json!([]), &masks);

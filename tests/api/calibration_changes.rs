@@ -35,7 +35,7 @@ async fn change(service: &Service, method: &str, header: (&str, &str), body: Str
 }
 
 #[tokio::test]
-async fn a_calibration_is_created_used_replaced_and_deleted_without_a_restart() {
+async fn calibrations_change_without_a_restart() {
     let service = Service::start();
     let created = service
         .put("/calibrations/hall", &native("hall", 60.0))
@@ -71,7 +71,7 @@ async fn a_calibration_is_created_used_replaced_and_deleted_without_a_restart() 
 }
 
 #[tokio::test]
-async fn a_change_made_for_another_revision_is_refused() {
+async fn a_change_of_another_revision_is_refused() {
     let service = Service::start();
     let old = service
         .get("/calibrations/lobby")
@@ -117,11 +117,11 @@ async fn a_revision_that_was_edited_in_the_folder_counts_at_once() {
     assert_eq!(fs::read_to_string(&file).unwrap(), native("lobby", 59.5));
 }
 
-/// py-OCamCalib's format does not tell the size of the frames.
+/// py-OCamCalib's format has no frame size.
 const WITHOUT_SIZE: &str = include_str!("../fixtures/calibrations/py_ocamcalib.json");
 
 #[tokio::test]
-async fn the_address_tells_the_frame_size_that_a_file_leaves_out() {
+async fn the_query_states_a_missing_frame_size() {
     let service = Service::start();
     let put = async |query: &str, content: &str| {
         let path = format!("/calibrations/hall{query}");
@@ -146,7 +146,7 @@ async fn the_address_tells_the_frame_size_that_a_file_leaves_out() {
 }
 
 #[tokio::test]
-async fn files_of_other_programs_are_taken_and_one_of_several_cameras_is_chosen_by_name() {
+async fn files_of_other_programs_are_accepted_and_a_camera_selected() {
     let service = Service::start();
     let several = service.put("/calibrations/hall", KALIBR).await;
     assert_eq!(several.status, 422);
@@ -168,7 +168,7 @@ async fn files_of_other_programs_are_taken_and_one_of_several_cameras_is_chosen_
         (&native.json()["id"], native.header("etag")),
         (&json!("hall"), put.header("etag"))
     );
-    // What GET gives can be PUT, and changes nothing.
+    // The response to GET is accepted by PUT without a change.
     let again = service.put("/calibrations/hall", &native.text()).await;
     assert_eq!(
         (again.status.as_u16(), again.header("etag")),
@@ -183,7 +183,7 @@ async fn files_of_other_programs_are_taken_and_one_of_several_cameras_is_chosen_
 }
 
 #[tokio::test]
-async fn what_makes_no_calibration_is_refused_with_the_field_and_changes_nothing() {
+async fn an_invalid_calibration_is_refused_and_changes_nothing() {
     let service = Service::start();
     let before = service.get("/calibrations/lobby").await.body;
     for (id, content, part) in [
@@ -207,11 +207,11 @@ async fn what_makes_no_calibration_is_refused_with_the_field_and_changes_nothing
     assert_eq!(large.status, 413);
     assert_eq!(service.get("/calibrations/lobby").await.body, before);
     let files = fs::read_dir(service.folder.path()).unwrap().count();
-    assert_eq!(files, 1, "something was left behind");
+    assert_eq!(files, 1, "files were left behind");
 }
 
 #[tokio::test]
-async fn a_put_takes_the_place_of_a_file_in_another_format() {
+async fn put_replaces_a_file_in_another_format() {
     let service = Service::start();
     let colmap = "1 OPENCV_FISHEYE 200 200 60 60 100 100 0 0 0 0\n";
     let path = service.folder.path().join("yard.txt");
@@ -224,7 +224,7 @@ async fn a_put_takes_the_place_of_a_file_in_another_format() {
 }
 
 #[tokio::test]
-async fn a_camera_that_shares_its_file_can_be_overruled_but_not_deleted() {
+async fn a_camera_of_a_shared_file_can_be_replaced_but_not_deleted() {
     let service = Service::start();
     fs::write(service.folder.path().join("rig.yaml"), KALIBR).unwrap();
     let delete = async |id: &str| {
@@ -257,7 +257,7 @@ async fn a_camera_that_shares_its_file_can_be_overruled_but_not_deleted() {
 }
 
 #[tokio::test]
-async fn nothing_is_changed_from_afar_or_where_changes_are_switched_off() {
+async fn remote_and_disabled_changes_are_refused() {
     let afar = Service::within(&Bounds {
         access: Access::Open {
             own_machine_only: false,
@@ -300,7 +300,7 @@ async fn replacing_a_calibration_under_load_fails_no_request() {
         let service = Arc::clone(&service);
         tokio::spawn(async move {
             let mut revisions = BTreeSet::new();
-            // Until nobody waits for answers any more.
+            // Until no client waits for responses any more.
             while !answered.is_closed() {
                 let query = "calibration=lobby&profile=fast";
                 let answer = service.post_raw(query, frame()).await;
@@ -317,7 +317,7 @@ async fn replacing_a_calibration_under_load_fails_no_request() {
         let put = service.put("/calibrations/lobby", &content).await;
         assert_eq!(put.status, 200, "{}", put.text());
         known.insert(put.header("etag").to_owned());
-        // The second answer from here is that of a frame that was sent after the change.
+        // The second response from here on is that of a frame that was sent after the change.
         let seen = *answers.borrow();
         answers.wait_for(|count| *count >= seen + 2).await.unwrap();
     }

@@ -1,4 +1,4 @@
-//! Reading calibrations over HTTP, and what becomes of files that change.
+//! Reading calibrations over HTTP, and changed files.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ use crate::service::{Service, frame};
 const PATH: &str = "/calibrations/lobby";
 
 #[tokio::test]
-async fn the_list_and_the_resource_tell_the_same_revision_as_reports() {
+async fn list_resource_and_reports_have_the_same_revision() {
     let service = Service::start();
     let report = service
         .post_raw("calibration=lobby&profile=fast", frame())
@@ -34,7 +34,7 @@ async fn the_list_and_the_resource_tell_the_same_revision_as_reports() {
 }
 
 #[tokio::test]
-async fn a_reader_that_has_the_revision_is_told_so_without_a_body() {
+async fn a_known_revision_returns_304_without_a_body() {
     let service = Service::start();
     let tag = service.get(PATH).await.header("etag").to_owned();
     for (asked, status) in [
@@ -53,7 +53,7 @@ async fn a_reader_that_has_the_revision_is_told_so_without_a_body() {
 }
 
 #[tokio::test]
-async fn what_is_not_there_is_404_and_says_where_to_look() {
+async fn an_unknown_calibration_is_404_with_a_remedy() {
     let service = Service::start();
     for path in [
         "/calibrations/hall",
@@ -68,7 +68,7 @@ async fn what_is_not_there_is_404_and_says_where_to_look() {
 }
 
 #[tokio::test]
-async fn a_frame_for_a_file_that_gives_no_calibration_is_told_what_to_name() {
+async fn frames_for_unusable_files_are_refused_with_a_remedy() {
     let service = Service::start();
     let rig = include_str!("../fixtures/calibrations/kalibr_camchain.yaml");
     fs::write(service.folder.path().join("rig.yaml"), rig).unwrap();
@@ -90,7 +90,7 @@ async fn a_frame_for_a_file_that_gives_no_calibration_is_told_what_to_name() {
 }
 
 #[tokio::test]
-async fn a_broken_new_version_is_told_everywhere_and_the_old_one_serves() {
+async fn an_invalid_new_version_is_reported_and_the_old_one_used() {
     let service = Service::start();
     let before = service.get(PATH).await;
     fs::write(service.folder.path().join("lobby.json"), "{ broken").unwrap();
@@ -145,7 +145,7 @@ async fn a_broken_new_version_is_told_everywhere_and_the_old_one_serves() {
 }
 
 #[tokio::test]
-async fn the_view_plan_has_every_view_that_the_network_sees() {
+async fn the_view_plan_has_every_view_of_the_model() {
     let service = Service::start();
     for (query, plan) in [
         ("?profile=fast", ViewPlan::fast()),
@@ -193,13 +193,13 @@ async fn the_view_plan_has_every_view_that_the_network_sees() {
 }
 
 #[tokio::test]
-async fn a_view_looks_where_it_says() {
+async fn the_direction_of_a_view_matches_its_pose() {
     let service = Service::start();
     let plan = service
         .get("/calibrations/lobby/views?profile=paper")
         .await
         .json();
-    // The paper's rings: 32 views each, 0, 0.3, 0.6 and 0.9 rad off the axis, 53.13° wide.
+    // The rings of the paper: 32 views each, 0, 0.3, 0.6 and 0.9 rad off the axis, 53.13° wide.
     for (index, view) in plan["views"].as_array().unwrap().iter().enumerate() {
         let number = |name: &str| view[name].as_f64().unwrap();
         let ring = [0.0_f64, 0.3, 0.6, 0.9][index / 32];
@@ -211,7 +211,7 @@ async fn a_view_looks_where_it_says() {
             (number("field_of_view_deg") - 53.130_102).abs() < 1e-5,
             "{view}"
         );
-        // Its axis is the last column of its pose, and the lens maps it near the outline's middle.
+        // Its axis is the last column of its pose; the lens maps it near the middle of the outline.
         let axis = [0, 1, 2].map(|row| view["camera_from_view"][row][2].as_f64().unwrap());
         let off_axis = axis[0].hypot(axis[1]).atan2(axis[2]);
         assert!((off_axis - ring).abs() < 1e-9, "{view}");
@@ -231,7 +231,7 @@ async fn a_view_looks_where_it_says() {
 }
 
 #[tokio::test]
-async fn a_plan_for_the_frame_itself_has_no_views_and_odd_requests_are_refused() {
+async fn direct_plans_have_no_views_and_invalid_queries_are_refused() {
     let service = Service::start();
     let plan = service
         .get("/calibrations/lobby/views?profile=direct")
@@ -254,7 +254,7 @@ async fn a_plan_for_the_frame_itself_has_no_views_and_odd_requests_are_refused()
 }
 
 #[tokio::test]
-async fn a_calibration_is_tried_before_it_is_stored() {
+async fn a_view_plan_is_previewed_without_storing() {
     let service = Service::start();
     let saved = service.get(PATH).await.text();
     let trial = saved.replace("\"lobby\"", "\"trial\"");
@@ -298,7 +298,7 @@ async fn a_calibration_is_tried_before_it_is_stored() {
 }
 
 #[tokio::test]
-async fn a_grid_says_where_a_view_looks_without_knowing_the_lens() {
+async fn a_grid_maps_a_view_to_the_frame() {
     let service = Service::start();
     let path = format!("{PATH}/views?profile=fast&grid=16");
     let plan = service.get(&path).await.json();
@@ -306,14 +306,14 @@ async fn a_grid_says_where_a_view_looks_without_knowing_the_lens() {
     for view in plan["views"].as_array().unwrap() {
         let grid = view["grid"].as_array().unwrap();
         assert_eq!(grid.len(), 17 * 17);
-        // What the lens does not see has no place.
+        // Nodes that the lens does not see have no position.
         let (seen, unseen): (Vec<_>, Vec<_>) = grid.iter().partition(|node| node.is_array());
         assert!(seen.len() > 100 && !unseen.is_empty(), "{}", seen.len());
         for node in seen {
             let at = [0, 1].map(|side| node[side].as_f64().unwrap());
             assert!((0..2).all(|side| (-1.0..=image[side] + 1.0).contains(&at[side])));
         }
-        // Its middle is where the axis points: 63.66 pixels per radian around (100, 100).
+        // The middle node is on the axis: 63.66 pixels per radian around (100, 100).
         let middle = &grid[8 * 17 + 8];
         let [azimuth, off_axis] =
             ["azimuth_deg", "off_axis_deg"].map(|name| view[name].as_f64().unwrap().to_radians());

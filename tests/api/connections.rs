@@ -1,8 +1,8 @@
-//! How many connections there may be, and how large the heads of their requests.
+//! Limits of connections and of request heads.
 
 use crate::server::{Server, rest_of};
 
-/// A request with so many headers of so many bytes each, beside `Host`.
+/// A request with this number of headers of this size, besides `Host`.
 fn with_headers(count: usize, bytes: usize) -> String {
     let value = "v".repeat(bytes - 9);
     let headers: Vec<_> = (0..count)
@@ -13,7 +13,7 @@ fn with_headers(count: usize, bytes: usize) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn heads_that_are_too_large_are_refused_with_a_problem_and_much_larger_ones_without() {
+async fn too_large_heads_are_refused_with_431() {
     let server = Server::start(&[
         ("SERVER__MAX_HEADERS", "100"),
         ("SERVER__MAX_HEADER_BYTES", "4096"),
@@ -45,7 +45,7 @@ async fn heads_that_are_too_large_are_refused_with_a_problem_and_much_larger_one
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn beyond_the_limit_of_connections_probes_are_answered_and_everything_else_is_refused() {
+async fn beyond_the_connection_limit_only_health_checks_succeed() {
     let server = Server::start(&[("SERVER__MAX_CONNECTIONS", "2")]).await;
     let held = [server.connect_and_ask(), server.connect_and_ask()];
     for path in ["/livez", "/readyz", "/metrics"] {
@@ -62,7 +62,8 @@ async fn beyond_the_limit_of_connections_probes_are_answered_and_everything_else
     ] {
         assert!(refused.contains(part), "{refused}");
     }
-    // More than the sockets hold: it must be taken off the client for it to read the answer.
+    // More than the socket buffers hold: the client only reads the response if the server drains
+    // the body.
     let large = vec![0; 16 << 20];
     let post = format!("POST /detect HTTP/1.1\r\nContent-Length: {}", large.len());
     let refused = server.exchange(&post, large).await.unwrap().unwrap();
@@ -73,8 +74,9 @@ async fn beyond_the_limit_of_connections_probes_are_answered_and_everything_else
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn probes_are_answered_beside_silent_connections() {
-    // The header timeout is far longer than a test may take: silent connections do not delay a probe.
+async fn silent_connections_do_not_delay_health_checks() {
+    // The header timeout is far longer than this test: silent connections must not delay a health
+    // check.
     let chosen = [
         ("SERVER__MAX_CONNECTIONS", "1"),
         ("SERVER__HEADER_TIMEOUT_MILLIS", "600000"),
@@ -91,7 +93,7 @@ async fn probes_are_answered_beside_silent_connections() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn metrics_on_a_port_of_their_own_are_there_with_the_probes_and_nowhere_else() {
+async fn the_metrics_port_serves_metrics_and_health_checks_only() {
     let server = Server::start(&[("SERVER__METRICS_LISTEN", "127.0.0.1:0")]).await;
     let get = async |path| crate::server::get(server.metrics_address, path).await;
     for path in ["/metrics", "/livez", "/readyz"] {

@@ -1,4 +1,4 @@
-//! What DeepStack's clients send and read.
+//! The DeepStack API.
 
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ async fn post(service: &Service, path: &str, parts: &[(&str, &[u8])]) -> Answer 
     service.send(form_to(path, parts)).await
 }
 
-/// The answer must be a problem of this status that DeepStack's clients understand, too.
+/// Asserts a problem of this status that DeepStack's clients understand, too.
 #[track_caller]
 fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
     assert_eq!(answer.status, status, "{}", answer.text());
@@ -56,7 +56,7 @@ fn guarded_within(scope: &str, bounds: Bounds) -> Service {
 }
 
 #[tokio::test]
-async fn a_frame_is_answered_in_deepstacks_shape_with_the_persons_that_detect_finds() {
+async fn deepstack_detection_returns_the_persons_of_detect() {
     let service = Service::start();
     let image = frame();
     let answer = post(
@@ -99,7 +99,7 @@ async fn a_frame_is_answered_in_deepstacks_shape_with_the_persons_that_detect_fi
 }
 
 #[tokio::test]
-async fn without_a_calibration_the_circle_is_looked_for_and_reports_are_kept_for_both() {
+async fn reports_are_stored_with_and_without_a_calibration() {
     let service = Service::start();
     for path in [ANYWHERE, LOBBY] {
         let answer = post(&service, path, &[("image", &frame())]).await;
@@ -120,7 +120,7 @@ async fn without_a_calibration_the_circle_is_looked_for_and_reports_are_kept_for
 }
 
 #[tokio::test]
-async fn the_least_confidence_is_theirs_by_default_and_an_empty_one_is_none() {
+async fn the_default_min_confidence_is_that_of_deepstack() {
     let service = Service::start();
     for (sent, used) in [
         (None, 0.4),
@@ -138,7 +138,7 @@ async fn the_least_confidence_is_theirs_by_default_and_an_empty_one_is_none() {
 }
 
 #[tokio::test]
-async fn a_least_confidence_of_zero_costs_no_more_than_it_may() {
+async fn a_min_confidence_of_zero_has_bounded_cost() {
     let service = Service::start();
     service.gate.crowd(299);
     for path in [ANYWHERE, LOBBY] {
@@ -156,11 +156,11 @@ async fn a_least_confidence_of_zero_costs_no_more_than_it_may() {
 }
 
 #[tokio::test]
-async fn fields_that_are_not_known_are_passed_over() {
+async fn unknown_fields_are_ignored() {
     let service = Service::start();
     let image = frame();
     let parts: [(&str, &[u8]); 4] = [
-        ("userid", b"nobody"),
+        ("userid", b"anonymous"),
         ("image\"; filename=\"image", &image),
         ("admin_key", b"\xff\xfe"),
         ("api_key", b""),
@@ -170,7 +170,7 @@ async fn fields_that_are_not_known_are_passed_over() {
 }
 
 #[tokio::test]
-async fn what_is_wrong_with_frame_or_field_is_told_with_deepstacks_statuses() {
+async fn invalid_frames_and_fields_have_the_statuses_of_deepstack() {
     let service = Service::start();
     let good = frame();
     let cut = &good[..good.len() - 20];
@@ -224,7 +224,7 @@ async fn what_is_wrong_with_frame_or_field_is_told_with_deepstacks_statuses() {
         .body(Body::from(good.clone()))
         .unwrap();
     assert_refused(&service.send(raw).await, 400, "missing-image", "form");
-    for path in ["/v1/vision/custom/nobody", "/v1/vision/custom/No%20ID"] {
+    for path in ["/v1/vision/custom/missing", "/v1/vision/custom/No%20ID"] {
         let answer = post(&service, path, &[("image", &good)]).await;
         assert_refused(&answer, 404, "unknown-calibration", "");
     }
@@ -240,14 +240,14 @@ async fn what_is_wrong_with_frame_or_field_is_told_with_deepstacks_statuses() {
 }
 
 #[tokio::test]
-async fn elsewhere_problems_say_nothing_of_success() {
+async fn other_routes_have_no_member_success() {
     let answer = Service::start().post_raw("", b"no picture".to_vec()).await;
     assert_eq!(answer.status, 415);
     assert!(answer.problem()["success"].is_null());
 }
 
 #[tokio::test]
-async fn a_frame_that_is_not_done_in_time_is_a_fault_of_the_server() {
+async fn a_frame_past_its_deadline_is_a_server_error() {
     let service = Service::within(&Bounds {
         request_timeout: std::time::Duration::from_millis(300),
         ..Bounds::default()
@@ -259,7 +259,7 @@ async fn a_frame_that_is_not_done_in_time_is_a_fault_of_the_server() {
 }
 
 #[tokio::test]
-async fn frames_share_the_places_of_all_others() {
+async fn frames_share_the_queue_of_other_routes() {
     let service = Service::within(&Bounds {
         frames_in_flight: 1,
         ..Bounds::default()
@@ -284,7 +284,7 @@ async fn frames_share_the_places_of_all_others() {
 }
 
 #[tokio::test]
-async fn the_key_may_be_in_the_form_or_in_a_header_but_in_one_of_them_only() {
+async fn the_key_is_in_the_form_or_in_a_header_but_not_in_both() {
     let service = guarded("detect");
     let image = frame();
     let image: (&str, &[u8]) = ("image", &image);
@@ -332,7 +332,7 @@ async fn forms_without_a_known_key_leave_memory_to_others() {
     let service = guarded_within(
         "detect",
         Bounds {
-            // The share of forms whose key is in the form takes one of them.
+            // The share of forms with the key inside holds one of them.
             max_upload_bytes: 8 * image.len() * 3 / 2,
             ..Bounds::default()
         },
@@ -365,7 +365,7 @@ async fn a_key_of_another_scope_is_not_enough() {
 }
 
 #[tokio::test]
-async fn the_calibrations_that_serve_are_listed_as_models() {
+async fn calibrations_in_use_are_listed_as_models() {
     let service = Service::start();
     std::fs::write(service.folder.path().join("broken.json"), "{").unwrap();
     service.calibrations.refresh();

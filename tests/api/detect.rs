@@ -1,4 +1,4 @@
-//! Frames that are answered.
+//! Successful detection requests.
 
 use axum::{body::Body, http::Request};
 
@@ -26,7 +26,7 @@ async fn a_form_and_a_raw_body_get_the_same_persons() {
 }
 
 #[tokio::test]
-async fn parameters_may_come_before_and_after_the_frame_and_in_the_query() {
+async fn parameters_are_read_from_form_and_query() {
     let service = Service::start();
     let mut request = form(&[
         ("camera", b"north"),
@@ -45,7 +45,7 @@ async fn parameters_may_come_before_and_after_the_frame_and_in_the_query() {
 }
 
 #[tokio::test]
-async fn a_person_carries_its_box_direction_and_place() {
+async fn a_person_has_a_box_a_direction_and_a_floor_position() {
     let service = Service::start();
     let report = service
         .post_raw("calibration=lobby&profile=fast", frame())
@@ -102,7 +102,7 @@ async fn the_request_id_is_echoed_in_header_and_report() {
 }
 
 #[tokio::test]
-async fn the_stages_are_told_in_headers() {
+async fn the_stages_are_in_headers() {
     let service = Service::start();
     let answer = service
         .post_raw("calibration=lobby&profile=fast", frame())
@@ -138,7 +138,7 @@ async fn the_stages_are_told_in_headers() {
 }
 
 #[tokio::test]
-async fn the_default_threshold_is_that_of_live_pictures() {
+async fn the_default_threshold_is_that_of_live_detection() {
     let report = Service::start()
         .post_raw("profile=fast", frame())
         .await

@@ -1,4 +1,5 @@
-//! A detector that sees a person in the middle of every view, or a crowd, and does so when it is told.
+//! A fake detector that returns one or many persons in the middle of every view, when its gate
+//! opens.
 
 use std::{
     sync::{Arc, Condvar, Mutex},
@@ -14,14 +15,14 @@ use lookdown::{
 /// A test that waits longer than this has failed.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Sees a person in every view.
+/// Returns a person in every view.
 pub(crate) struct EagerDetector {
     pub(crate) name: String,
     pub(crate) input: NetworkInput,
     pub(crate) gate: Arc<Gate>,
 }
 
-/// Holds back the detector, and counts its runs.
+/// Blocks the detector and counts its runs.
 #[derive(Default)]
 pub(crate) struct Gate {
     state: Mutex<GateState>,
@@ -34,7 +35,7 @@ struct GateState {
     panics: bool,
     fails: Option<InferenceError>,
     runs: usize,
-    /// How many persons every view has besides the one in the middle.
+    /// Number of persons in every view besides the one in the middle.
     crowd: u32,
 }
 
@@ -57,17 +58,17 @@ impl Gate {
         self.change(|state| state.fails = Some(error));
     }
 
-    /// Makes the next runs see as many persons more in every view.
+    /// Makes the next runs return this number of additional persons in every view.
     pub(crate) fn crowd(&self, persons: u32) {
         self.change(|state| state.crowd = persons);
     }
 
-    /// Counts from here.
+    /// Resets the count of runs.
     pub(crate) fn forget_runs(&self) {
         self.change(|state| state.runs = 0);
     }
 
-    /// How many runs have begun.
+    /// Returns the number of runs that have begun.
     pub(crate) fn runs(&self) -> usize {
         self.state.lock().unwrap().runs
     }
@@ -90,7 +91,7 @@ impl Gate {
         self.changed.notify_all();
     }
 
-    /// Waits for a state; returns whether the run is to panic.
+    /// Waits for a state; returns `true` if the run must panic.
     fn wait(&self, reached: impl Fn(&GateState) -> bool) -> bool {
         let state = self.state.lock().unwrap();
         let (mut state, waited) = self

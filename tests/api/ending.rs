@@ -1,4 +1,4 @@
-//! How the server ends, and that nothing is lost by it.
+//! The shutdown of the server: no request is lost.
 
 use std::{net::TcpStream, time::Duration};
 
@@ -11,7 +11,7 @@ const LONG_GRACE: (&str, &str) = ("SHUTDOWN__GRACE_MILLIS", "600000");
 const LIVEZ: &[u8] = b"GET /livez HTTP/1.1\r\nHost: lookdown\r\n\r\n";
 
 impl Server {
-    /// Asks for an end and waits until that is known.
+    /// Requests the shutdown and waits until it has begun.
     async fn is_told_to_stop(&self) {
         self.shutdown.request();
         while self.readiness.phase() != Phase::Stopping {
@@ -20,14 +20,14 @@ impl Server {
     }
 }
 
-/// A test that would hang otherwise.
+/// Fails a test that would hang otherwise.
 async fn soon<T>(work: impl Future<Output = T>) -> T {
     let waited = timeout(Duration::from_secs(30), work).await;
     waited.unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn in_its_grace_period_the_server_is_not_ready_but_serves_everybody_once_more() {
+async fn in_the_grace_period_the_server_is_not_ready_but_serves() {
     let server = Server::start(&[LONG_GRACE]).await;
     let mut known = server.connect_and_ask();
     server.is_told_to_stop().await;
@@ -48,7 +48,7 @@ async fn in_its_grace_period_the_server_is_not_ready_but_serves_everybody_once_m
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_server_that_is_told_to_stop_finishes_what_has_arrived_and_nothing_else() {
+async fn a_stopping_server_finishes_only_the_requests_that_arrived() {
     let server = Server::start(&[]).await;
     let idle = server.connect_and_ask();
     let silent = server.connect(b"");
@@ -68,7 +68,7 @@ async fn a_server_that_is_told_to_stop_finishes_what_has_arrived_and_nothing_els
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn whoever_has_connected_before_the_end_is_served() {
+async fn a_client_connected_before_the_shutdown_is_served() {
     for _ in 0..10 {
         let server = Server::start(&[]).await;
         let connections: Vec<_> = (0..50).map(|_| server.connect(LIVEZ)).collect();
@@ -81,7 +81,7 @@ async fn whoever_has_connected_before_the_end_is_served() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn who_stops_the_server_by_hand_need_not_wait_for_the_grace_period() {
+async fn ctrl_c_skips_the_grace_period() {
     let server = Server::start(&[LONG_GRACE]).await;
     server.shutdown.request_without_pause();
     soon(server.has_ended()).await;
@@ -103,13 +103,13 @@ async fn the_second_request_to_stop_ends_at_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn draining_takes_no_longer_than_it_may() {
+async fn draining_ends_at_its_timeout() {
     for patience in [
         ("SHUTDOWN__DRAIN_TIMEOUT_MILLIS", "200"),
         ("SERVER__REQUEST_TIMEOUT_MILLIS", "200"),
     ] {
         let server = Server::start(&[patience]).await;
-        // In the middle of a request, and never leaves.
+        // In the middle of a request, and never closed.
         let stuck = server.connect(b"GET /livez HTTP/1.1\r\n");
         assert!(server.get("/livez").await.contains("200 OK"));
         server.shutdown.request();

@@ -1,4 +1,4 @@
-//! Requests at the edge of what is allowed.
+//! Requests at the limits.
 
 use axum::{
     body::{Body, Bytes},
@@ -8,11 +8,11 @@ use http_body_util::channel::Channel;
 
 use crate::service::{Bounds, Service, frame, frame_of};
 
-/// As many candidates as a view can have by default.
+/// The default limit of candidates per view, less one.
 const CROWD: u32 = 299;
 
 #[tokio::test]
-async fn no_threshold_makes_a_crowd_cost_more_than_it_may() {
+async fn any_threshold_has_bounded_cost_for_a_crowd() {
     let service = Service::start();
     service.gate.crowd(CROWD);
     for refine in ["nms", "soft_nms_linear", "soft_nms_gaussian", "fusion"] {
@@ -51,19 +51,19 @@ async fn a_report_holds_as_many_persons_as_its_request_allows() {
         );
         let report = service.post_raw(&query, frame()).await.json();
         let persons = report["persons"].as_array().unwrap().len();
-        // Four views, not all of whose candidates lie in the lens image.
+        // Four views, of whose candidates some are outside the lens image.
         let there = persons == most || most == 10_000 && (100..=4 * 300).contains(&persons);
         assert!(there, "{persons} of at most {most}");
     }
 }
 
 #[tokio::test]
-async fn the_limit_of_the_body_is_the_one_that_is_set() {
+async fn the_body_limit_is_the_configured_one() {
     let service = Service::within(&Bounds {
         max_body_bytes: 4 << 20,
         ..Bounds::default()
     });
-    // What follows the end of a picture is no part of it.
+    // Bytes after the end of an image are ignored.
     let mut image = frame();
     image.resize(3 << 20, 0);
     let parameters: [(&str, &[u8]); 2] = [("calibration", b"lobby"), ("profile", b"fast")];
@@ -80,7 +80,7 @@ async fn the_limit_of_the_body_is_the_one_that_is_set() {
 }
 
 #[tokio::test]
-async fn a_body_may_come_in_very_many_parts() {
+async fn a_body_may_arrive_in_many_parts() {
     let service = Service::start();
     let image = frame();
     let (mut sender, channel) = Channel::<Bytes, axum::Error>::new(1);
@@ -101,7 +101,7 @@ async fn a_body_may_come_in_very_many_parts() {
 }
 
 #[tokio::test]
-async fn values_and_names_of_a_form_are_bounded_to_the_byte() {
+async fn form_values_and_names_have_exact_limits() {
     let service = Service::start();
     let image = frame();
     let of = |length: usize| vec![b'x'; length];
@@ -130,7 +130,7 @@ async fn values_and_names_of_a_form_are_bounded_to_the_byte() {
 }
 
 #[tokio::test]
-async fn a_compressed_body_is_not_unpacked() {
+async fn a_compressed_body_is_not_decompressed() {
     let request = Request::post("/detect")
         .header("content-encoding", "gzip")
         .body(Body::from(b"\x1f\x8b\x08\0\0\0\0\0\0\xff".to_vec()))
@@ -141,7 +141,7 @@ async fn a_compressed_body_is_not_unpacked() {
 }
 
 #[tokio::test]
-async fn a_frame_of_one_row_is_refused_and_harms_nothing() {
+async fn a_frame_of_one_row_is_refused() {
     let service = Service::start();
     for (width, height) in [(1, 1), (1, 4000), (4000, 1)] {
         let answer = service

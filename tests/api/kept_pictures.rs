@@ -1,4 +1,4 @@
-//! The latest picture of a camera.
+//! The latest annotated image of a camera.
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ use crate::service::{Answer, Bounds, FRAME_SIDE, Service, frame, frame_of};
 
 const PATH: &str = "/results/hall/latest.jpg";
 
-/// A service that keeps pictures of the camera `hall`.
+/// A service that stores images of the camera `hall`.
 fn keeping() -> Service {
     Service::within(&Bounds {
         pictures_of: PicturesOf::Some(BTreeSet::from(["hall".to_owned()])),
@@ -42,7 +42,7 @@ fn picture(answer: &Answer) -> Frame {
         .frame
 }
 
-/// Whether the grey of the frame is what is seen there.
+/// Returns `true` if the pixel has the grey of the frame.
 fn is_grey(frame: &Frame, x: u32, y: u32) -> bool {
     let pixel = frame.pixel(x, y);
     pixel.iter().all(|value| value.abs_diff(128) < 12)
@@ -53,7 +53,7 @@ fn is_plain(frame: &Frame) -> bool {
 }
 
 #[tokio::test]
-async fn no_picture_is_kept_unless_the_settings_name_its_camera() {
+async fn no_image_is_stored_unless_the_settings_name_its_camera() {
     for (service, camera) in [(Service::start(), "hall"), (keeping(), "stairs")] {
         service.detect_in(camera).await;
         let path = format!("/results/{camera}/latest.jpg");
@@ -64,12 +64,12 @@ async fn no_picture_is_kept_unless_the_settings_name_its_camera() {
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains("results.pictures"), "{detail}");
     }
-    let nobody = keeping().get(PATH).await.problem();
-    assert_eq!(nobody["type"], "/problems/unknown-camera");
+    let unknown = keeping().get(PATH).await.problem();
+    assert_eq!(unknown["type"], "/problems/unknown-camera");
 }
 
 #[tokio::test]
-async fn all_cameras_may_have_pictures() {
+async fn all_cameras_may_have_images() {
     let service = Service::within(&Bounds {
         pictures_of: PicturesOf::All,
         ..Bounds::default()
@@ -82,7 +82,7 @@ async fn all_cameras_may_have_pictures() {
 }
 
 #[tokio::test]
-async fn a_picture_is_drawn_as_whoever_asks_wants_it() {
+async fn an_image_is_drawn_as_the_request_specifies() {
     let service = keeping();
     service.detect_in("hall").await;
     let mut seen = Vec::new();
@@ -125,7 +125,7 @@ async fn a_picture_is_drawn_as_whoever_asks_wants_it() {
 }
 
 #[tokio::test]
-async fn a_picture_is_sent_again_only_when_there_is_a_newer_one() {
+async fn an_image_is_sent_again_only_if_there_is_a_newer_one() {
     let service = keeping();
     service.detect_in("hall").await;
     let first = service.get(PATH).await;
@@ -144,7 +144,7 @@ async fn a_picture_is_sent_again_only_when_there_is_a_newer_one() {
 }
 
 #[tokio::test]
-async fn zones_are_drawn_and_what_is_masked_is_black() {
+async fn zones_are_drawn_and_masked_areas_are_black() {
     let service = keeping();
     let lobby = json!({
         "id": "lobby", "image": { "width": 200, "height": 200 },
@@ -162,7 +162,7 @@ async fn zones_are_drawn_and_what_is_masked_is_black() {
     let plain = picture(&service.get(&format!("{PATH}?draw=none")).await);
     assert!(plain.pixel(20, 20).iter().all(|value| *value < 16));
     let drawn = picture(&service.get(&format!("{PATH}?draw=zones")).await);
-    // The left border of the one, and that of the other: a metre beside the camera, 3 m below it.
+    // The left border of each zone: a metre beside the camera, 3 m below it.
     for (x, y) in [(100, 150), (79, 99)] {
         assert!(is_grey(&plain, x, y) && !is_grey(&drawn, x, y), "{x}, {y}");
     }
@@ -170,7 +170,7 @@ async fn zones_are_drawn_and_what_is_masked_is_black() {
 }
 
 #[tokio::test]
-async fn a_jpeg_is_kept_as_it_was_sent_unless_something_of_it_is_hidden() {
+async fn a_jpeg_is_stored_unchanged_unless_it_is_masked() {
     let service = keeping();
     let side = FRAME_SIDE as usize;
     let grey = Frame::new(FRAME_SIDE, FRAME_SIDE, vec![128; 3 * side * side]).unwrap();
@@ -193,7 +193,7 @@ async fn a_jpeg_is_kept_as_it_was_sent_unless_something_of_it_is_hidden() {
 }
 
 #[tokio::test]
-async fn a_large_frame_is_kept_smaller() {
+async fn a_large_frame_is_stored_at_a_smaller_size() {
     let service = keeping();
     let query = "profile=fast&camera=hall";
     let answer = service.post_raw(query, frame_of(3000, 1500)).await;

@@ -1,4 +1,4 @@
-//! More than the service can do, clients that leave, and faults of its own.
+//! Overload, clients that disconnect, and internal errors.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::service::{Bounds, Service, frame, incompressible_frame, with_host};
 const FAST: &str = "calibration=lobby&profile=fast";
 const VIEWS: &str = "/calibrations/lobby/views?profile=fast";
 
-/// Sends a good frame and does not wait for the answer.
+/// Sends a valid frame without waiting for the response.
 fn begin(service: &Service, image: Vec<u8>) -> JoinHandle<StatusCode> {
     let request = Request::post(format!("/detect?{FAST}"));
     send(service, request.body(Body::from(image)).unwrap())
@@ -25,7 +25,7 @@ fn send(service: &Service, request: Request<Body>) -> JoinHandle<StatusCode> {
     tokio::spawn(async { answer.await.unwrap().status() })
 }
 
-/// Somebody asks while a frame is worked on, and leaves before it is his turn.
+/// Sends a request while a frame is processed, and disconnects before its turn.
 async fn ask_and_leave(service: &Service, request: Request<Body>) {
     service.gate.close();
     let first = begin(service, frame());
@@ -42,7 +42,7 @@ async fn ask_and_leave(service: &Service, request: Request<Body>) {
 }
 
 #[tokio::test]
-async fn a_frame_without_a_place_is_refused_at_once_and_may_retry() {
+async fn a_frame_beyond_the_queue_is_refused_at_once_and_may_retry() {
     let service = Service::within(&Bounds {
         frames_in_flight: 1,
         ..Bounds::default()
@@ -83,7 +83,7 @@ async fn all_bodies_together_stay_within_their_memory() {
 }
 
 #[tokio::test]
-async fn a_view_plan_has_a_place_among_the_frames_or_may_retry() {
+async fn a_view_plan_needs_a_permit_of_the_queue_or_may_retry() {
     let service = Service::within(&Bounds {
         frames_in_flight: 1,
         ..Bounds::default()
@@ -106,7 +106,7 @@ async fn a_view_plan_has_a_place_among_the_frames_or_may_retry() {
 }
 
 #[tokio::test]
-async fn a_view_plan_that_has_no_turn_in_time_is_given_up() {
+async fn a_view_plan_past_its_deadline_is_abandoned() {
     let service = Service::within(&Bounds {
         request_timeout: Duration::from_millis(50),
         ..Bounds::default()
@@ -118,13 +118,13 @@ async fn a_view_plan_that_has_no_turn_in_time_is_given_up() {
     assert_eq!(late.status, 504);
     let problem = late.problem();
     let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.starts_with("the view plan was not made within 0.05 s"));
+    assert!(detail.starts_with("the view plan was not finished within 0.05 s"));
     assert_eq!(first.await.unwrap(), 504);
     service.gate.open();
 }
 
 #[tokio::test]
-async fn a_view_plan_whose_client_left_is_never_made() {
+async fn a_view_plan_of_a_disconnected_client_is_not_built() {
     let service = Service::start();
     let request = Request::get(VIEWS).body(Body::empty()).unwrap();
     ask_and_leave(&service, request).await;
@@ -132,7 +132,7 @@ async fn a_view_plan_whose_client_left_is_never_made() {
 }
 
 #[tokio::test]
-async fn a_frame_whose_client_left_is_not_worked_on() {
+async fn a_frame_of_a_disconnected_client_is_not_processed() {
     let service = Service::start();
     let request = Request::post(format!("/detect?{FAST}"));
     ask_and_leave(&service, request.body(Body::from(frame())).unwrap()).await;
@@ -145,7 +145,7 @@ async fn a_frame_whose_client_left_is_not_worked_on() {
 }
 
 #[tokio::test]
-async fn a_frame_that_takes_too_long_is_given_up() {
+async fn a_frame_past_its_deadline_is_abandoned() {
     let service = Service::within(&Bounds {
         request_timeout: Duration::from_millis(50),
         ..Bounds::default()
@@ -158,7 +158,7 @@ async fn a_frame_that_takes_too_long_is_given_up() {
 }
 
 #[tokio::test]
-async fn a_request_may_ask_for_a_shorter_time() {
+async fn a_request_may_set_a_shorter_timeout() {
     let service = Service::start();
     service.gate.close();
     let query = format!("{FAST}&timeout_millis=50");
@@ -171,7 +171,7 @@ async fn a_request_may_ask_for_a_shorter_time() {
 }
 
 #[tokio::test]
-async fn a_panic_in_the_detector_costs_one_answer_and_reveals_nothing() {
+async fn a_panic_in_the_detector_fails_one_request_without_details() {
     let service = Service::start();
     service.gate.panic_once();
     let answer = service.post_raw(FAST, frame()).await;

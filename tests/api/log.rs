@@ -1,4 +1,4 @@
-//! What is logged.
+//! Log output.
 
 use std::{
     io::{self, Write},
@@ -10,7 +10,7 @@ use tracing::subscriber::DefaultGuard;
 
 use crate::service::{Service, frame};
 
-/// What this thread logs while this lives.
+/// Captures the log of this thread while it lives.
 pub(crate) struct Log {
     lines: Lines,
     _listening: DefaultGuard,
@@ -46,7 +46,7 @@ impl Write for Lines {
 }
 
 #[tokio::test]
-async fn the_cause_of_a_fault_is_logged_once_under_its_request_and_a_refusal_not_at_all() {
+async fn internal_errors_are_logged_once_and_refusals_are_not() {
     let service = Service::start();
     let log = Log::begin();
     service.gate.panic_once();

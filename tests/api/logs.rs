@@ -1,4 +1,4 @@
-//! Whatever is logged within a request says whose it is, on whichever thread.
+//! Log lines of a request have its request ID, on every thread.
 
 use std::{
     io::{self, Write},
@@ -16,7 +16,7 @@ use crate::service::{FRAME_SIDE, Service, frame};
 
 const TRACE: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
 
-/// What all tests of this process log.
+/// The log of all tests of this process.
 #[derive(Clone, Copy)]
 struct Log(&'static Mutex<Vec<u8>>);
 
@@ -51,7 +51,7 @@ impl Log {
         })
     }
 
-    /// The lines of a request; those of others must be JSON, too.
+    /// Returns the lines of a request; those of others must be JSON, too.
     fn of(self, request_id: &str) -> Vec<Value> {
         let text = String::from_utf8(self.0.lock().unwrap().clone()).unwrap();
         let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
@@ -79,7 +79,7 @@ fn levels(lines: &[Value]) -> Vec<&str> {
 }
 
 #[tokio::test]
-async fn a_panic_far_from_the_request_is_logged_with_its_ids_and_once_more_as_its_answer() {
+async fn a_panic_on_another_thread_is_logged_with_the_request_id() {
     let log = Log::start();
     let service = Service::start();
     service.gate.panic_once();
@@ -101,7 +101,7 @@ async fn a_panic_far_from_the_request_is_logged_with_its_ids_and_once_more_as_it
 }
 
 #[tokio::test]
-async fn what_a_change_of_a_calibration_logs_belongs_to_its_request() {
+async fn log_lines_of_a_calibration_change_have_the_request_id() {
     let log = Log::start();
     let service = Service::start();
     let calibration = format!(

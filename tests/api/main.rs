@@ -1,5 +1,5 @@
-//! The HTTP API around a real engine; only the network is a stand-in.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+//! The HTTP API around a real engine with a fake detector.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod access;
 mod areas;

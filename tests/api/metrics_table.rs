@@ -1,10 +1,10 @@
-//! The table of metrics in docs/observability.md says what the server shows, no more and no less.
+//! The table of metrics in docs/observability.md lists exactly the metrics that the server exports.
 
 use std::collections::BTreeSet;
 
 use crate::service::{Service, frame};
 
-/// A row of the table for each metric in this text, in the order of the text.
+/// Returns a table row for each metric in this text, in the order of the text.
 fn rows(metrics: &str) -> Vec<String> {
     let helps = metrics
         .lines()
@@ -24,7 +24,7 @@ fn rows(metrics: &str) -> Vec<String> {
     rows.collect()
 }
 
-/// The names of the labels of a metric's samples.
+/// Returns the names of the labels of a metric's samples.
 fn labels<'a>(metrics: &'a str, name: &str) -> BTreeSet<&'a str> {
     let samples = metrics.lines().filter_map(|line| line.strip_prefix(name));
     let samples = samples.map(|rest| rest.strip_prefix("_bucket").unwrap_or(rest));
@@ -37,7 +37,7 @@ fn labels<'a>(metrics: &'a str, name: &str) -> BTreeSet<&'a str> {
 }
 
 #[tokio::test]
-async fn the_table_of_metrics_in_the_documentation_is_true_and_whole() {
+async fn the_documentation_lists_exactly_the_exported_metrics() {
     let service = Service::start();
     service
         .post_raw("calibration=lobby&profile=fast", frame())
@@ -48,10 +48,15 @@ async fn the_table_of_metrics_in_the_documentation_is_true_and_whole() {
     let document = std::fs::read_to_string(document).unwrap();
     let (_, section) = document.split_once("\n## Metrics\n").unwrap();
     let section = section.split("\n## ").next().unwrap();
-    let told = section
+    let documented = section
         .lines()
         .filter(|line| line.starts_with("| `"))
         .collect::<Vec<_>>();
-    assert_eq!(told, shown, "the table should be:\n{}", shown.join("\n"));
+    assert_eq!(
+        documented,
+        shown,
+        "the table should be:\n{}",
+        shown.join("\n")
+    );
     assert!(shown.len() > 30, "{shown:?}");
 }

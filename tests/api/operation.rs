@@ -1,11 +1,11 @@
-//! Probes, metrics, and the pages that explain the API.
+//! Health checks, metrics and the API page.
 
 use lookdown::api::Readiness;
 
 use crate::service::{Service, frame};
 
 #[tokio::test]
-async fn readiness_follows_the_life_of_the_server_and_liveness_does_not() {
+async fn readiness_follows_the_phase_and_liveness_does_not() {
     let service = Service::start();
     assert_eq!(service.get("/readyz").await.json()["status"], "ready");
     service.readiness.stopping();
@@ -17,7 +17,7 @@ async fn readiness_follows_the_life_of_the_server_and_liveness_does_not() {
 }
 
 #[test]
-fn a_warm_up_that_ends_after_the_order_to_stop_makes_nothing_ready() {
+fn a_warm_up_that_ends_during_shutdown_does_not_make_it_ready() {
     let readiness = Readiness::default();
     readiness.stopping();
     readiness.warmed_up();
@@ -65,18 +65,21 @@ async fn metrics_count_frames_views_persons_and_failures() {
 }
 
 #[tokio::test]
-async fn the_api_page_needs_nothing_from_elsewhere() {
+async fn the_api_page_loads_nothing_from_other_hosts() {
     let service = Service::start();
     let page = service.get("/docs/").await.text();
     assert!(page.contains("swagger-ui"), "{page}");
-    assert!(!page.contains("http"), "the page asks other hosts: {page}");
+    assert!(
+        !page.contains("http"),
+        "the page loads from other hosts: {page}"
+    );
     let script = service.get("/docs/swagger-initializer.js").await.text();
     assert!(script.contains("\"../openapi.json\""), "{script}");
     assert_eq!(service.get("/docs/swagger-ui-bundle.js").await.status, 200);
 }
 
 #[tokio::test]
-async fn the_server_hands_out_its_own_description() {
+async fn the_server_serves_its_openapi_document() {
     let answer = Service::start().get("/openapi.json").await;
     let document: serde_json::Value = answer.json();
     assert!(document["paths"]["/detect"]["post"].is_object());

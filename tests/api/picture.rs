@@ -1,4 +1,4 @@
-//! Answers other than the report: pictures and files for annotation tools.
+//! Responses other than the report: annotated images and files for annotation tools.
 
 use axum::{body::Body, http::Request};
 use lookdown::imaging::{
@@ -42,7 +42,7 @@ fn is_plain(frame: &Frame) -> bool {
 }
 
 #[tokio::test]
-async fn a_picture_is_answered_to_who_accepts_one_or_asks_for_one() {
+async fn an_image_is_returned_for_accept_or_format() {
     let service = Service::start();
     for (accept, query, media_type, magic) in [
         ("image/jpeg", "", "image/jpeg", &b"\xff\xd8\xff"[..]),
@@ -80,7 +80,7 @@ async fn a_picture_is_answered_to_who_accepts_one_or_asks_for_one() {
 }
 
 #[tokio::test]
-async fn boxes_are_drawn_where_the_report_has_them() {
+async fn boxes_are_drawn_at_the_positions_of_the_report() {
     let service = Service::start();
     let report = accepting(&service, "*/*", "").await.json();
     let drawn = picture(&accepting(&service, "image/png", "draw=boxes").await);
@@ -94,7 +94,7 @@ async fn boxes_are_drawn_where_the_report_has_them() {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
-                reason = "a place in the frame"
+                reason = "a position in the frame"
             )]
             let (x, y) = (inside as u32, middle as u32);
             assert!(!grey(&drawn, x, y), "nothing is drawn at {x}, {y}");
@@ -107,10 +107,11 @@ async fn boxes_are_drawn_where_the_report_has_them() {
 }
 
 #[tokio::test]
-async fn each_layer_draws_something_of_its_own() {
+async fn each_layer_changes_the_image() {
     let service = Service::start();
     let mut pictures = Vec::new();
-    // Persons on the axes of the frame are upright or lie: their turned boxes are the others.
+    // Persons on the axes of the frame are upright or horizontal. The oriented boxes are those of
+    // the others.
     for layer in ["boxes", "boxes,oriented", "scores", "views", "timestamp"] {
         let query = format!("draw={layer}&captured_at=2026-11-21T09:30:00Z");
         let drawn = picture(&accepting(&service, "image/png", &query).await);
@@ -123,7 +124,7 @@ async fn each_layer_draws_something_of_its_own() {
 }
 
 #[tokio::test]
-async fn a_picture_is_as_wide_as_asked_for_and_no_wider_than_its_frame() {
+async fn an_image_has_the_requested_width_up_to_that_of_its_frame() {
     let service = Service::start();
     for (frame, width, expected) in [
         ((200, 200), 100, (100, 100)),
@@ -150,7 +151,7 @@ async fn a_picture_is_as_wide_as_asked_for_and_no_wider_than_its_frame() {
 }
 
 #[tokio::test]
-async fn the_reports_facts_are_headers_of_every_answer() {
+async fn every_response_has_the_report_headers() {
     let service = Service::start();
     let report = accepting(&service, "*/*", "").await;
     let count = report.json()["persons"]
@@ -168,7 +169,7 @@ async fn the_reports_facts_are_headers_of_every_answer() {
 }
 
 #[tokio::test]
-async fn files_of_annotation_tools_name_the_frame_as_it_was_sent() {
+async fn annotation_files_have_the_name_of_the_uploaded_file() {
     let service = Service::start();
     let image = frame();
     let named = "img\"; filename=\"C:\\rooms/hall 1.png";
@@ -207,7 +208,7 @@ async fn files_of_annotation_tools_name_the_frame_as_it_was_sent() {
 }
 
 #[tokio::test]
-async fn geojson_can_be_accepted_and_has_a_polygon_per_person() {
+async fn geojson_is_negotiable_and_has_a_polygon_per_person() {
     let service = Service::start();
     let report = accepting(&service, "application/json", "").await.json();
     let answer = accepting(&service, "application/geo+json", "").await;
@@ -225,7 +226,7 @@ async fn geojson_can_be_accepted_and_has_a_polygon_per_person() {
 }
 
 #[tokio::test]
-async fn bad_options_are_problems_that_name_them() {
+async fn invalid_options_are_refused_by_name() {
     let service = Service::start();
     for (query, status, kind, detail) in [
         ("format=gif", 422, "invalid-parameter", "json, image, coco"),
@@ -252,7 +253,7 @@ async fn bad_options_are_problems_that_name_them() {
 }
 
 #[tokio::test]
-async fn what_nobody_offers_is_not_acceptable_and_costs_no_inference() {
+async fn unavailable_formats_are_refused_with_406_before_inference() {
     let service = Service::start();
     for accept in ["image/webp", "text/html", "application/json;q=0"] {
         let answer = accepting(&service, accept, "").await;
@@ -262,7 +263,7 @@ async fn what_nobody_offers_is_not_acceptable_and_costs_no_inference() {
         assert!(problem["detail"].as_str().unwrap().contains("image/jpeg"));
     }
     assert_eq!(service.gate.runs(), 0);
-    // Failures are problems, whatever is accepted.
+    // Failures are problem documents, whatever the client accepts.
     let answer = accepting(&service, "image/png", "score_threshold=2").await;
     assert_eq!(answer.problem()["status"], 422);
     service.still_works().await;

@@ -37,7 +37,7 @@ async fn browsers_get_pages_in_html() {
 }
 
 #[tokio::test]
-async fn the_list_names_every_problem_and_no_page_is_made_up() {
+async fn the_list_has_every_problem_and_unknown_names_are_404() {
     let service = Service::start();
     let list = service.get("/problems").await.text();
     let paths = list
@@ -59,7 +59,7 @@ async fn the_parameter_at_fault_is_a_field_of_the_problem() {
     for (query, parameter) in [
         ("sigma=0", "sigma"),
         ("colour=red", "colour"),
-        ("calibration=nobody", "calibration"),
+        ("calibration=missing", "calibration"),
         ("format=pdf", "format"),
     ] {
         let problem = service.post_raw(query, frame()).await.problem();

@@ -1,4 +1,4 @@
-//! How often a client may ask.
+//! Rate limits.
 
 use std::{
     io::{Read, Write},
@@ -19,7 +19,7 @@ use crate::{
     service::{Answer, Bounds, OPEN_PATHS, Service, frame},
 };
 
-/// Two requests, and the next in 50 seconds: no test takes as long.
+/// Two requests, and the next one after 50 seconds, longer than any test.
 const TWO: Option<RequestRate> = Some(RequestRate {
     per_second: 0.02,
     burst: NonZeroU32::new(2).unwrap(),
@@ -44,7 +44,7 @@ async fn ask(service: &Service, path: &str, from: &str, key: Option<&str>) -> An
 }
 
 #[tokio::test]
-async fn a_client_that_asks_too_fast_is_told_when_to_come_again() {
+async fn too_many_requests_are_refused_with_retry_after() {
     let service = open_service();
     for left in [1, 0] {
         let answer = ask(&service, "/calibrations", "192.0.2.1:1000", None).await;
@@ -63,7 +63,7 @@ async fn a_client_that_asks_too_fast_is_told_when_to_come_again() {
 }
 
 #[tokio::test]
-async fn every_route_of_clients_counts_and_tells_whatever_it_answers() {
+async fn every_client_route_counts_and_reports_the_limit() {
     let service = Service::within(&Bounds {
         request_rate: Some(RequestRate {
             per_second: 0.02,
@@ -76,15 +76,15 @@ async fn every_route_of_clients_counts_and_tells_whatever_it_answers() {
         service
             .post_raw("calibration=lobby&profile=fast", frame())
             .await,
-        service.get("/calibrations/nobody").await,
+        service.get("/calibrations/missing").await,
         service.get("/calibrations/lobby/views").await,
         service.put("/calibrations/lobby", "nonsense").await,
         service.get("/v2/models/lookdown/ready").await,
         service.post("/v2/models/lookdown/infer", "").await,
         service.post("/v2/repository/index", "").await,
-        service.post("/v2/repository/models/nobody/load", "").await,
+        service.post("/v2/repository/models/missing/load", "").await,
         service
-            .post("/v2/repository/models/nobody/unload", "")
+            .post("/v2/repository/models/missing/unload", "")
             .await,
     ] {
         left -= 1;
@@ -94,7 +94,7 @@ async fn every_route_of_clients_counts_and_tells_whatever_it_answers() {
 }
 
 #[tokio::test]
-async fn probes_metrics_and_pages_are_not_counted() {
+async fn health_checks_metrics_and_pages_are_not_counted() {
     let service = open_service();
     for _ in 0..3 {
         for path in OPEN_PATHS {
@@ -106,7 +106,7 @@ async fn probes_metrics_and_pages_are_not_counted() {
 }
 
 #[tokio::test]
-async fn each_key_has_its_own_rate_wherever_it_is_used_and_guesses_count_for_the_address() {
+async fn each_key_has_its_own_rate_and_invalid_keys_share_the_address() {
     let digest = |key: &str| KeyDigest::of(key.as_bytes()).hexadecimal();
     let [gate, office] = [digest("gate-key"), digest("office-key")];
     let keys = format!("gate:read:{gate},office:read:{office}").parse();
@@ -143,7 +143,8 @@ async fn without_the_setting_nothing_is_counted() {
     }
 }
 
-/// The status of an answer to a new connection from an address of the loopback interface.
+/// Returns the status of the response to a new connection from an address of the loopback
+/// interface.
 async fn asked_from(source: &str, server: SocketAddr) -> String {
     let socket = TcpSocket::new_v4().unwrap();
     socket.bind(format!("{source}:0").parse().unwrap()).unwrap();
@@ -161,7 +162,7 @@ async fn asked_from(source: &str, server: SocketAddr) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_server_knows_its_clients_by_the_addresses_of_their_connections() {
+async fn clients_are_distinguished_by_their_connection_address() {
     let server = Server::start(&[
         ("LIMITS__REQUESTS_PER_SECOND", "0.02"),
         ("LIMITS__REQUEST_BURST", "1"),

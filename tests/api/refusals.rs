@@ -1,4 +1,4 @@
-//! Requests that cannot be answered: each gets a problem that names the field, and harms nothing.
+//! Invalid requests: each returns a problem that names the field, and has no other effect.
 
 use axum::{
     body::Body,
@@ -8,23 +8,26 @@ use serde_json::Value;
 
 use crate::service::{Answer, Bounds, Service, form, frame, frame_of};
 
-/// A valid PNG header of a picture of 100,000 × 100,000 pixels, without any.
+/// A valid PNG header of an image of 100,000 × 100,000 pixels, without pixels.
 const HUGE_PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\x01\x86\xa0\0\x01\x86\xa0\x08\x02\0\0\0\
     \x6a\x1b\x5f\x7e\0\0\0\0IDAT\x35\xaf\x06\x1e";
 
-/// The problem must have this status and kind, and its sentence must say `part`.
+/// Asserts a problem of this status and kind whose detail contains `part`.
 #[track_caller]
 fn assert_refused(answer: &Answer, status: u16, kind: &str, part: &str) {
     assert_eq!(answer.status, status, "{}", answer.text());
     let problem = answer.problem();
     assert_eq!(problem["type"], format!("/problems/{kind}"));
     let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.contains(part), "{detail:?} does not say {part:?}");
-    assert!(!detail.contains('\n'), "{detail:?} is more than a line");
+    assert!(
+        detail.contains(part),
+        "{detail:?} does not contain {part:?}"
+    );
+    assert!(!detail.contains('\n'), "{detail:?} is more than one line");
 }
 
 #[tokio::test]
-async fn what_is_no_usable_picture_is_refused() {
+async fn unusable_images_are_refused() {
     let service = Service::start();
     let good = frame();
     let truncated = &good[..good.len() - 20];
@@ -79,7 +82,7 @@ async fn a_parameter_that_cannot_be_used_is_refused_by_name() {
 }
 
 #[tokio::test]
-async fn a_frame_that_does_not_fit_is_refused() {
+async fn a_frame_that_does_not_match_is_refused() {
     let service = Service::start();
     let oblong = service
         .post_raw("calibration=lobby", frame_of(200, 150))
@@ -132,7 +135,7 @@ async fn a_form_with_the_wrong_fields_is_refused_by_their_name() {
 }
 
 #[tokio::test]
-async fn a_parameter_in_form_and_query_is_given_twice() {
+async fn a_parameter_in_form_and_query_is_repeated() {
     let service = Service::start();
     let mut request = form(&[("img", &frame()), ("profile", b"fast")]);
     *request.uri_mut() = "/detect?profile=fast".parse().unwrap();
@@ -183,7 +186,7 @@ async fn a_body_that_is_too_large_is_refused_however_it_is_sent() {
 }
 
 #[tokio::test]
-async fn what_the_framework_refuses_is_a_problem_too() {
+async fn refusals_of_the_framework_are_problem_documents() {
     let service = Service::start();
     let nowhere = service.get("/nowhere").await;
     assert_refused(&nowhere, 404, "not-found", "/nowhere");
@@ -197,7 +200,7 @@ async fn what_the_framework_refuses_is_a_problem_too() {
 }
 
 #[tokio::test]
-async fn an_insane_request_id_is_replaced() {
+async fn an_invalid_request_id_is_replaced() {
     let service = Service::start();
     let request = Request::get("/nowhere")
         .header("X-Request-Id", "two words")

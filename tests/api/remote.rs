@@ -1,4 +1,4 @@
-//! What clients hear of the server that networks run on.
+//! Responses to clients about the inference server.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::service::{Service, frame};
 const FAST: &str = "calibration=lobby&profile=fast";
 
 #[tokio::test]
-async fn an_inference_server_without_a_place_is_ours_without_a_place() {
+async fn an_overloaded_inference_server_is_reported_as_overload() {
     let service = Service::start();
     let retry_after = Duration::from_secs(6);
     service
@@ -30,7 +30,7 @@ async fn an_inference_server_without_a_place_is_ours_without_a_place() {
 }
 
 #[tokio::test]
-async fn an_inference_server_that_is_away_is_no_fault_of_ours_and_its_address_is_not_told() {
+async fn an_unreachable_inference_server_is_503_without_its_address() {
     let service = Service::start();
     let away = || InferenceError::Remote {
         url: "http://10.1.2.3:8000/".to_owned(),

@@ -107,6 +107,6 @@ fn report() -> DetectionReport {
 }
 
 #[test]
-fn a_report_has_these_fields_units_and_digits() {
+fn a_report_has_these_fields_units_and_decimals() {
     insta::assert_json_snapshot!("report", Report::from(&report()));
 }

@@ -10,7 +10,7 @@ use crate::service::{Bounds, Service, frame, with_host};
 
 const INDEX: &str = "/v2/repository/index";
 
-/// Puts a model into the service's folder.
+/// Adds a model to the folder of the service.
 fn add(service: &Service, name: &str) {
     let folder = service.folder.path().join("models").join(name);
     fs::create_dir_all(&folder).unwrap();
@@ -53,7 +53,7 @@ async fn a_model_can_be_loaded_used_by_name_and_unloaded() {
 }
 
 #[tokio::test]
-async fn the_index_lists_what_answers_and_what_could() {
+async fn the_index_lists_loaded_and_loadable_models() {
     let service = Service::start();
     add(&service, "other");
     let all = service.post(INDEX, "").await.json();
@@ -76,7 +76,7 @@ async fn the_index_lists_what_answers_and_what_could() {
 }
 
 #[tokio::test]
-async fn a_model_that_fails_its_check_is_told_about_and_the_old_one_goes_on() {
+async fn an_invalid_model_is_reported_and_the_old_one_stays_in_use() {
     let service = Service::start();
     add(&service, "other");
     service.post(&path("other", "load"), "").await;
@@ -112,7 +112,7 @@ async fn a_model_that_fails_its_check_is_told_about_and_the_old_one_goes_on() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_done_is_refused_with_the_reason() {
+async fn impossible_changes_are_refused_with_the_reason() {
     let service = Service::start();
     for (path, body, status, kind) in [
         (path("nothing", "load"), "", 404, "unknown-model"),
@@ -173,7 +173,7 @@ async fn one_model_is_loaded_at_a_time() {
 }
 
 #[tokio::test]
-async fn a_server_that_others_can_reach_changes_no_models() {
+async fn a_remotely_reachable_server_without_keys_changes_no_models() {
     let service = Service::within(&Bounds {
         access: Access::Open {
             own_machine_only: false,

@@ -1,4 +1,4 @@
-//! What was found last: the latest report of each camera, and those before it.
+//! Stored reports: the latest one of each camera, and earlier ones.
 
 use std::num::NonZeroUsize;
 
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::service::{Answer, Bounds, Service, frame};
 
-/// A report that is nothing but a number.
+/// A report that consists of a number.
 pub(crate) fn report(camera: &str, number: usize) -> NewReport {
     NewReport {
         camera: camera.to_owned(),
@@ -21,7 +21,7 @@ pub(crate) fn report(camera: &str, number: usize) -> NewReport {
 }
 
 impl Service {
-    /// Publishes a report that is nothing but a number.
+    /// Publishes a report that consists of a number.
     pub(crate) fn publish(&self, camera: &str, number: usize) -> ReportId {
         self.results.store(report(camera, number), None).id
     }
@@ -33,7 +33,7 @@ impl Service {
 }
 
 #[tokio::test]
-async fn the_latest_report_is_what_its_sender_was_answered_to_the_byte() {
+async fn the_latest_report_has_the_bytes_of_the_response() {
     let service = Service::start();
     let path = "/results/hall/latest";
     let query = "calibration=lobby&profile=fast&camera=hall";
@@ -57,7 +57,7 @@ async fn the_latest_report_is_what_its_sender_was_answered_to_the_byte() {
 }
 
 #[tokio::test]
-async fn a_camera_without_a_name_is_its_calibration_and_without_that_the_assumed_one() {
+async fn the_camera_name_defaults_to_the_calibration_id() {
     let service = Service::start();
     for query in [
         "profile=fast",
@@ -69,7 +69,7 @@ async fn a_camera_without_a_name_is_its_calibration_and_without_that_the_assumed
     }
     assert_eq!(
         service
-            .post_raw("sigma=0&camera=nobody", frame())
+            .post_raw("sigma=0&camera=missing", frame())
             .await
             .status,
         422
@@ -94,7 +94,7 @@ async fn a_camera_without_a_name_is_its_calibration_and_without_that_the_assumed
 }
 
 #[tokio::test]
-async fn a_camera_without_reports_is_404_and_says_where_to_look() {
+async fn a_camera_without_reports_is_404_with_a_remedy() {
     let service = Service::start();
     assert_eq!(service.get("/results").await.json(), json!([]));
     for path in [
@@ -112,7 +112,7 @@ async fn a_camera_without_reports_is_404_and_says_where_to_look() {
 }
 
 #[tokio::test]
-async fn a_camera_may_be_called_whatever_the_parameter_lets_through() {
+async fn every_valid_camera_name_works_in_the_path() {
     let service = Service::start();
     let query = "calibration=lobby&profile=fast&camera=hall%2Fnorth%20%C3%A9";
     let sent = service.post_raw(query, frame()).await;
@@ -121,7 +121,7 @@ async fn a_camera_may_be_called_whatever_the_parameter_lets_through() {
     assert_eq!(kept.body, sent.body);
 }
 
-/// The reports in an answer, which are numbers, and the ID of the last.
+/// Returns the reports of a response, which are numbers, and the ID of the last one.
 fn page(answer: &Answer) -> (Vec<u64>, Option<String>) {
     assert_eq!(answer.status, 200, "{}", answer.text());
     assert_eq!(answer.header("content-type"), "application/json");
@@ -135,7 +135,7 @@ fn page(answer: &Answer) -> (Vec<u64>, Option<String>) {
 }
 
 #[tokio::test]
-async fn history_is_read_page_by_page_to_its_end() {
+async fn history_is_read_page_by_page() {
     let service = Service::start();
     for number in 0..5 {
         service.publish("lobby", number);
@@ -156,7 +156,7 @@ async fn history_is_read_page_by_page_to_its_end() {
 }
 
 #[tokio::test]
-async fn history_begins_after_a_time_as_well_as_after_an_id() {
+async fn history_begins_after_a_time_or_an_id() {
     let service = Service::start();
     let id = service.publish("lobby", 1);
     let since = async |time: Timestamp| {
@@ -170,7 +170,7 @@ async fn history_begins_after_a_time_as_well_as_after_an_id() {
 }
 
 #[tokio::test]
-async fn what_history_cannot_begin_with_or_count_to_is_refused_by_name() {
+async fn invalid_history_parameters_are_refused_by_name() {
     let service = Service::start();
     service.publish("lobby", 1);
     for (query, status, part) in [
@@ -178,7 +178,7 @@ async fn what_history_cannot_begin_with_or_count_to_is_refused_by_name() {
         ("since=", 422, "since"),
         ("limit=0", 422, "limit"),
         ("limit=1001", 422, "1 to 1000"),
-        ("until=1", 400, "until: there is no such parameter here"),
+        ("until=1", 400, "until: there is no such parameter"),
         ("limit=1&limit=2", 400, "twice"),
     ] {
         let answer = service
@@ -210,7 +210,7 @@ async fn a_page_of_large_reports_ends_early() {
 }
 
 #[tokio::test]
-async fn no_more_is_kept_than_the_limits_let() {
+async fn the_limits_bound_the_stored_reports() {
     let count = |number| NonZeroUsize::new(number).unwrap();
     let service = Service::within(&Bounds {
         results: ResultLimits {

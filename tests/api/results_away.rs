@@ -1,4 +1,4 @@
-//! Results whose place does not answer: nobody listens on the first port.
+//! An unreachable result store: nothing listens on the first port.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use tokio::time::timeout;
 use crate::server::Server;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_are_answered_while_the_place_of_the_results_does_not_answer() {
+async fn detection_works_while_the_result_store_is_unreachable() {
     let url = "redis://:s3cret@127.0.0.1:1";
     let server = Server::start(&[("RESULTS__URL", url)]).await;
     assert!(server.detect().await.unwrap().unwrap().contains("200 OK"));

@@ -1,4 +1,4 @@
-//! Reports as they come: server-sent events.
+//! Streams of reports: server-sent events.
 
 use std::{io::Read, time::Duration};
 
@@ -14,7 +14,7 @@ use crate::{
 };
 
 const EVENTS: &str = "/results/lobby/events";
-/// More than are fetched, or wait for a listener, at a time.
+/// More reports than one read fetches, and more than wait for one subscriber.
 const MANY: usize = 100;
 
 /// A stream of events.
@@ -46,14 +46,14 @@ impl Stream {
         Self(response)
     }
 
-    /// The next event or comment; `None` at the end.
+    /// Returns the next event or comment; `None` at the end.
     pub(crate) async fn next(&mut self) -> Option<String> {
         let frame = self.0.body_mut().frame().await?;
         let bytes = frame.unwrap().into_data().unwrap();
         Some(String::from_utf8(bytes.to_vec()).unwrap())
     }
 
-    /// The data of the next event, which is a number.
+    /// Returns the data of the next event, which is a number.
     pub(crate) async fn number(&mut self) -> usize {
         let event = self.next().await.unwrap();
         let data = event.lines().find_map(|line| line.strip_prefix("data: "));
@@ -62,7 +62,7 @@ impl Stream {
 }
 
 #[tokio::test]
-async fn a_stream_begins_with_the_latest_report_and_goes_on_with_each_new_one() {
+async fn a_stream_has_the_latest_report_and_then_each_new_one() {
     let service = Service::start();
     service.publish("lobby", 1);
     let first = service.publish("lobby", 2);
@@ -88,7 +88,7 @@ async fn a_stream_begins_with_the_latest_report_and_goes_on_with_each_new_one() 
 }
 
 #[tokio::test]
-async fn who_listens_to_all_hears_the_latest_of_each_camera_and_then_everything() {
+async fn the_stream_of_all_cameras_begins_with_the_latest_of_each() {
     let service = Service::start();
     for (camera, number) in [("lobby", 1), ("hall", 2), ("lobby", 3)] {
         service.publish(camera, number);
@@ -102,7 +102,7 @@ async fn who_listens_to_all_hears_the_latest_of_each_camera_and_then_everything(
 }
 
 #[tokio::test]
-async fn who_comes_back_hears_what_was_missed_once_and_then_goes_on() {
+async fn a_reconnected_client_receives_missed_reports_once() {
     let service = Service::start();
     let mut ids = Vec::new();
     for number in 0..MANY {
@@ -123,7 +123,7 @@ async fn who_comes_back_hears_what_was_missed_once_and_then_goes_on() {
 }
 
 #[tokio::test]
-async fn who_comes_from_elsewhere_begins_with_the_latest() {
+async fn an_unknown_last_event_id_begins_with_the_latest_report() {
     let service = Service::start();
     service.publish("lobby", 1);
     service.publish("lobby", 2);
@@ -137,7 +137,7 @@ async fn who_comes_from_elsewhere_begins_with_the_latest() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_silent_stream_gives_signs_of_life_that_are_no_events() {
+async fn a_silent_stream_sends_keep_alive_comments() {
     let service = Service::start();
     let mut stream = Stream::open(&service, EVENTS, None).await;
     let began = Instant::now();
@@ -152,7 +152,7 @@ async fn a_silent_stream_gives_signs_of_life_that_are_no_events() {
 }
 
 #[tokio::test]
-async fn a_listener_that_leaves_makes_room() {
+async fn a_disconnected_subscriber_frees_its_permit() {
     let service = Service::start();
     let stream = Stream::open(&service, EVENTS, None).await;
     assert_eq!(service.results.listeners().count(), 1);
@@ -161,7 +161,7 @@ async fn a_listener_that_leaves_makes_room() {
 }
 
 #[tokio::test]
-async fn a_listener_that_does_not_keep_up_is_given_up_and_can_come_back_for_the_rest() {
+async fn a_slow_subscriber_is_disconnected_and_can_resume() {
     let service = Service::start();
     let mut stream = Stream::open(&service, EVENTS, None).await;
     for number in 0..MANY {
@@ -187,7 +187,7 @@ async fn a_listener_that_does_not_keep_up_is_given_up_and_can_come_back_for_the_
 }
 
 impl Server {
-    /// A connection that listens, and was told so.
+    /// Returns a connection with an open event stream.
     async fn listen(&self) -> std::net::TcpStream {
         let request = format!("GET {EVENTS} HTTP/1.1\r\nHost: lookdown\r\n\r\n");
         let mut connection = self.connect(request.as_bytes());
@@ -200,14 +200,14 @@ impl Server {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_listener_that_vanishes_from_the_network_is_noticed() {
+async fn a_vanished_subscriber_is_detected() {
     let server = Server::start(&[]).await;
     drop(server.listen().await);
     server.shows("results_listeners", 0).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn at_the_end_of_the_server_streams_end_in_order_and_nobody_waits_any_longer() {
+async fn streams_and_waits_end_at_shutdown() {
     let server = Server::start(&[]).await;
     let stream = server.listen().await;
     assert!(server.detect().await.unwrap().unwrap().contains("200 OK"));

@@ -1,4 +1,4 @@
-//! Keys that go while somebody listens with them.
+//! Keys that are removed during a stream or a wait.
 
 use std::{fs, sync::Arc};
 
@@ -36,7 +36,7 @@ impl Keyed {
         }
     }
 
-    /// The file has this line instead of that of the key that goes.
+    /// Replaces the line of the removed key by this one.
     fn replace_key(&self, by: &str) {
         write(&self.folder, by);
         self.keys.refresh();
@@ -46,7 +46,7 @@ impl Keyed {
         Stream::open_with(&self.service, path, Some(("x-api-key", key))).await
     }
 
-    /// What a wait is answered whose key is replaced before there is a report.
+    /// Returns the response to a wait whose key is replaced before there is a report.
     async fn wait_while_replaced(&self, by: &str) -> Answer {
         let headers = [("x-api-key", GOING)];
         let path = "/results/lobby/latest?wait=10";
@@ -66,7 +66,7 @@ fn write(folder: &TempDir, going: &str) {
 }
 
 #[tokio::test]
-async fn a_stream_ends_with_its_key_and_is_not_told_the_next_report() {
+async fn a_stream_ends_with_its_key_before_the_next_report() {
     for path in STREAMS {
         let keyed = Keyed::start();
         keyed.service.publish("lobby", 1);
@@ -84,7 +84,7 @@ async fn a_stream_ends_with_its_key_and_is_not_told_the_next_report() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_stream_whose_key_may_read_no_more_ends_instead_of_giving_a_sign_of_life() {
+async fn a_stream_whose_key_lost_its_scope_ends() {
     let keyed = Keyed::start();
     let mut stream = keyed.listen(STREAMS[0], GOING).await;
     assert!(stream.next().await.is_some());
@@ -93,7 +93,7 @@ async fn a_stream_whose_key_may_read_no_more_ends_instead_of_giving_a_sign_of_li
 }
 
 #[tokio::test]
-async fn a_wait_whose_key_goes_is_answered_no_report() {
+async fn a_wait_whose_key_is_removed_returns_no_report() {
     let detect = line("going", "\"detect\"", GOING);
     for (by, status, kind) in [("", 401, "key-required"), (&*detect, 403, "forbidden")] {
         let answer = Keyed::start().wait_while_replaced(by).await;

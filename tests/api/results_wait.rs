@@ -1,5 +1,5 @@
-//! Waiting for a report that is newer than the one at hand. The clock of most tests stands still until
-//! all tasks wait.
+//! Waiting for a report that is newer than the known one. In most tests the clock is paused and
+//! advances only while all tasks wait.
 
 use std::{num::NonZeroUsize, time::Duration};
 
@@ -17,7 +17,7 @@ use crate::{
 const WAIT: &str = "/results/lobby/latest?wait=10";
 
 impl Service {
-    /// Waits until so many listen.
+    /// Waits until there are this many subscribers.
     pub(crate) async fn has_listeners(&self, count: usize) {
         while self.results.listeners().count() != count {
             yield_now().await;
@@ -26,7 +26,7 @@ impl Service {
 }
 
 #[tokio::test]
-async fn whoever_waits_is_answered_as_soon_as_there_is_something_newer() {
+async fn a_wait_ends_with_a_newer_report() {
     let service = Service::start();
     let tag = format!("\"{}\"", service.publish("lobby", 1));
     let (answer, id) = tokio::join!(service.get_if_none_match(WAIT, &tag), async {
@@ -43,13 +43,13 @@ async fn whoever_waits_is_answered_as_soon_as_there_is_something_newer() {
 }
 
 #[tokio::test]
-async fn an_older_report_that_is_told_late_is_no_news() {
+async fn a_late_notification_of_an_older_report_is_ignored() {
     let service = Service::start();
     let older = service.results.store(report("lobby", 1), None);
     let tag = format!("\"{}\"", service.publish("lobby", 2));
     let (answer, id) = tokio::join!(service.get_if_none_match(WAIT, &tag), async {
         service.has_listeners(1).await;
-        // As a Redis does whose followers lag behind.
+        // As a Redis does whose replicas lag behind.
         service.results.listeners().tell(&older);
         service.publish("lobby", 3)
     });
@@ -61,7 +61,7 @@ async fn an_older_report_that_is_told_late_is_no_news() {
 }
 
 #[tokio::test]
-async fn whoever_waits_for_a_cameras_first_report_gets_it() {
+async fn a_wait_for_the_first_report_of_a_camera_returns_it() {
     let service = Service::start();
     let (answer, _) = tokio::join!(service.get(WAIT), async {
         service.has_listeners(1).await;
@@ -74,7 +74,7 @@ async fn whoever_waits_for_a_cameras_first_report_gets_it() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn without_anything_newer_the_wait_ends_when_asked_and_no_later_than_any_request() {
+async fn without_a_newer_report_the_wait_ends_at_its_limit() {
     let service = Service::within(&Bounds {
         request_timeout: Duration::from_secs(20),
         ..Bounds::default()
@@ -94,7 +94,7 @@ async fn without_anything_newer_the_wait_ends_when_asked_and_no_later_than_any_r
 }
 
 #[tokio::test(start_paused = true)]
-async fn whoever_does_not_have_the_latest_need_not_wait_for_it() {
+async fn a_client_without_the_latest_report_does_not_wait() {
     let service = Service::start();
     service.publish("lobby", 1);
     let began = Instant::now();
@@ -110,17 +110,17 @@ async fn whoever_does_not_have_the_latest_need_not_wait_for_it() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_reader_that_gives_up_waiting_leaves_nothing_behind() {
+async fn an_abandoned_wait_frees_its_permit() {
     let service = Service::start();
     tokio::select! {
-        _ = service.get(WAIT) => panic!("there was nothing to answer"),
+        _ = service.get(WAIT) => panic!("the wait returned without a report"),
         () = sleep(Duration::from_secs(1)) => {}
     }
     assert_eq!(service.results.listeners().count(), 0);
 }
 
 #[tokio::test]
-async fn no_more_wait_than_there_are_places_and_the_others_are_told_so() {
+async fn waits_beyond_the_limit_are_refused() {
     let service = Service::within(&Bounds {
         results: ResultLimits {
             max_listeners: NonZeroUsize::MIN,

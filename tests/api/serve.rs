@@ -1,4 +1,4 @@
-//! The service on a real socket: from its start on, and what it does to clients that take too long.
+//! The service on a real socket: its start, and its timeouts for slow clients.
 
 use std::{
     io::{Read, Write},
@@ -38,7 +38,7 @@ async fn the_server_is_ready_only_after_the_network_has_run() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_body_that_does_not_arrive_is_given_up() {
+async fn a_body_that_does_not_arrive_is_refused_with_408() {
     let server = Server::start(&[("SERVER__REQUEST_TIMEOUT_MILLIS", "100")]).await;
     let slow = server.exchange("POST /detect HTTP/1.1\r\nContent-Length: 1000", vec![1; 10]);
     let answer = slow.await.unwrap().unwrap();
@@ -47,7 +47,7 @@ async fn a_body_that_does_not_arrive_is_given_up() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn heads_that_come_a_byte_at_a_time_are_cut_off_while_others_are_served() {
+async fn slow_loris_heads_are_disconnected_while_others_are_served() {
     let server = Server::start(&[("SERVER__HEADER_TIMEOUT_MILLIS", "300")]).await;
     let begun = Instant::now();
     let tricklers: Vec<_> = (0..20)
@@ -57,7 +57,7 @@ async fn heads_that_come_a_byte_at_a_time_are_cut_off_while_others_are_served() 
             connection.set_read_timeout(Some(pause)).unwrap();
             spawn_blocking(move || {
                 let mut byte = [0];
-                // The pause between two bytes is the wait for an answer; 0 is the end.
+                // The read timeout is the pause between two bytes; a read of 0 bytes is the end.
                 while !matches!(connection.read(&mut byte), Ok(0))
                     && connection.write_all(b"d").is_ok()
                 {}
@@ -75,7 +75,7 @@ async fn heads_that_come_a_byte_at_a_time_are_cut_off_while_others_are_served() 
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn whoever_connects_and_says_nothing_is_cut_off() {
+async fn a_silent_connection_is_closed() {
     let server = Server::start(&[("SERVER__HEADER_TIMEOUT_MILLIS", "100")]).await;
     let silent = server.connect(b"");
     assert_eq!(rest_of(silent).await, "");
@@ -83,7 +83,7 @@ async fn whoever_connects_and_says_nothing_is_cut_off() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn between_requests_a_connection_may_rest_for_longer_than_a_head_may_take() {
+async fn the_idle_timeout_is_longer_than_the_header_timeout() {
     let chosen = [
         ("SERVER__HEADER_TIMEOUT_MILLIS", "50"),
         ("SERVER__IDLE_TIMEOUT_MILLIS", "400"),
@@ -96,18 +96,18 @@ async fn between_requests_a_connection_may_rest_for_longer_than_a_head_may_take(
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_head_of_a_later_request_may_take_no_longer_than_that_of_the_first() {
+async fn the_header_timeout_holds_for_later_requests() {
     let server = Server::start(&[("SERVER__HEADER_TIMEOUT_MILLIS", "100")]).await;
     let mut connection = server.connect_and_ask();
     let answered = Instant::now();
     connection.write_all(PART_OF_A_HEAD).unwrap();
     assert_eq!(rest_of(connection).await, "");
-    // The connection itself might have stayed for 75 seconds.
+    // The connection itself could have stayed open for 75 seconds.
     assert!(answered.elapsed() < Duration::from_secs(20));
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn several_requests_in_one_packet_are_answered_in_turn() {
+async fn pipelined_requests_are_answered_in_order() {
     let server = Server::start(&[]).await;
     let one = b"GET /livez HTTP/1.1\r\nHost: lookdown\r\n\r\n";
     let mut connection = server.connect(&one.repeat(3));
@@ -117,10 +117,10 @@ async fn several_requests_in_one_packet_are_answered_in_turn() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn whoever_does_not_take_its_answers_is_cut_off() {
+async fn a_client_that_does_not_read_is_disconnected() {
     let server = Server::start(&[("SERVER__IDLE_TIMEOUT_MILLIS", "200")]).await;
     let one = b"GET /openapi.json HTTP/1.1\r\nHost: lookdown\r\n\r\n";
-    // More than the sockets of both sides can hold.
+    // More than the socket buffers of both sides can hold.
     let hoarder = server.connect(&one.repeat(1000));
     server.shows("connections", 1).await;
     server.shows("connections", 0).await;
@@ -128,7 +128,7 @@ async fn whoever_does_not_take_its_answers_is_cut_off() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn clients_that_vanish_leave_no_connection_and_no_frame_behind() {
+async fn vanished_clients_leave_no_connection_and_no_frame() {
     let server = Server::start(&[]).await;
     let upload = b"POST /detect HTTP/1.1\r\nHost: lookdown\r\nContent-Length: 1000\r\n\r\n012345";
     let in_the_middle: Vec<_> = (0..20).map(|_| server.connect(upload)).collect();

@@ -1,4 +1,4 @@
-//! The whole server on real sockets, only the network is a stand-in; and clients that are not polite.
+//! The whole server on real sockets with a fake detector, and misbehaving clients.
 
 use std::{
     collections::HashMap,
@@ -27,7 +27,7 @@ pub(crate) type Chosen = [(&'static str, &'static str)];
 /// A running server.
 pub(crate) struct Server {
     pub(crate) address: SocketAddr,
-    /// Where the metrics are.
+    /// The address of the metrics.
     pub(crate) metrics_address: SocketAddr,
     pub(crate) gate: Arc<Gate>,
     pub(crate) readiness: Readiness,
@@ -37,14 +37,14 @@ pub(crate) struct Server {
 }
 
 impl Server {
-    /// A server that is ready, and at its end takes no pause unless a test wants one.
+    /// Starts a server and waits until it is ready. Its grace period is 0 unless a test sets one.
     pub(crate) async fn start(chosen: &Chosen) -> Self {
         let server = Self::start_behind(Arc::default(), chosen).await;
         server.readiness.ready().await;
         server
     }
 
-    /// A server whose network runs when the gate is open.
+    /// Starts a server whose detector waits for the gate.
     pub(crate) async fn start_behind(gate: Arc<Gate>, chosen: &Chosen) -> Self {
         let mut environment = HashMap::from([
             (
@@ -80,21 +80,21 @@ impl Server {
         }
     }
 
-    /// A connection on which something was sent already.
+    /// Opens a connection and sends these bytes.
     pub(crate) fn connect(&self, bytes: &[u8]) -> TcpStream {
         let mut connection = TcpStream::connect(self.address).unwrap();
         connection.write_all(bytes).unwrap();
         connection
     }
 
-    /// A connection that was answered once and may ask again.
+    /// Opens a connection with one completed request.
     pub(crate) fn connect_and_ask(&self) -> TcpStream {
         let mut connection = self.connect(b"GET /livez HTTP/1.1\r\nHost: lookdown\r\n\r\n");
         assert!(read_one_answer(&mut connection).contains("200 OK"));
         connection
     }
 
-    /// Sends `head` and `body` on a connection of their own and reads the answer to its end.
+    /// Sends `head` and `body` on a new connection and reads the response to its end.
     pub(crate) fn exchange(&self, head: &str, body: Vec<u8>) -> JoinHandle<io::Result<String>> {
         exchange(self.address, head, body)
     }
@@ -113,7 +113,8 @@ impl Server {
         )
     }
 
-    /// Waits until a metric, without labels, has this value. What it takes to ask does not count.
+    /// Waits until a metric without labels has this value. The connections of this check are not
+    /// counted.
     pub(crate) async fn shows(&self, metric: &str, value: i64) {
         let own = i64::from(metric == "connections");
         let line = format!("\nlookdown_{metric} {}\n", value + own);
@@ -122,7 +123,7 @@ impl Server {
         }
     }
 
-    /// Waits for the end, which is a good one.
+    /// Waits for the end of the server, which must succeed.
     pub(crate) async fn has_ended(self) {
         self.ended.await.unwrap().unwrap();
     }
@@ -145,7 +146,7 @@ fn exchange(address: SocketAddr, head: &str, body: Vec<u8>) -> JoinHandle<io::Re
     })
 }
 
-/// An answer on a connection that stays open; the answer must have a length.
+/// Reads a response on a connection that stays open; the response must have a length.
 pub(crate) fn read_one_answer(connection: &mut TcpStream) -> String {
     let mut answer = Vec::new();
     let mut byte = [0];
@@ -161,11 +162,11 @@ pub(crate) fn read_one_answer(connection: &mut TcpStream) -> String {
     head + str::from_utf8(&body).unwrap()
 }
 
-/// Everything until the server ends the connection, however it does.
+/// Reads everything until the server closes or resets the connection.
 pub(crate) async fn rest_of(mut connection: TcpStream) -> String {
     let reading = spawn_blocking(move || {
         let mut bytes = Vec::new();
-        // What came before a reset counts.
+        // Bytes received before a reset count.
         let _ = connection.read_to_end(&mut bytes);
         String::from_utf8(bytes).unwrap()
     });

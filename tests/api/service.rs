@@ -1,4 +1,4 @@
-//! The service under test, and how to talk to it.
+//! The service under test and its clients.
 
 use std::{
     num::{NonZeroU64, NonZeroUsize},
@@ -37,7 +37,7 @@ pub(crate) const FRAME_SIDE: u32 = 200;
 const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
   "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707},
   "mount": {"world_up": [0, 0, -1], "height_m": 3} }"#;
-/// What is answered to everybody, always.
+/// The routes that are always open to all clients.
 pub(crate) const OPEN_PATHS: [&str; 9] = [
     "/livez",
     "/readyz",
@@ -58,11 +58,11 @@ pub(crate) struct Service {
     pub(crate) readiness: Readiness,
     pub(crate) calibrations: Arc<Calibrations>,
     pub(crate) results: Arc<MemoryResults>,
-    /// The calibration `lobby`, and models in `models/`. Goes when the test does.
+    /// The calibration `lobby`, and models in `models/`. Removed at the end of the test.
     pub(crate) folder: TempDir,
 }
 
-/// What a test may want to be tight.
+/// The limits that a test may lower.
 pub(crate) struct Bounds {
     pub(crate) frames_in_flight: usize,
     pub(crate) max_body_bytes: usize,
@@ -99,7 +99,7 @@ impl Default for Bounds {
     }
 }
 
-/// An answer, read to its end if it has one.
+/// A response, read to its end if it has one.
 pub(crate) struct Answer {
     pub(crate) status: StatusCode,
     pub(crate) headers: HeaderMap,
@@ -119,7 +119,7 @@ impl Answer {
         self.headers[name].to_str().unwrap()
     }
 
-    /// The problem it is; checks the envelope.
+    /// Returns the problem document and checks its members.
     pub(crate) fn problem(&self) -> Value {
         assert_eq!(self.header("content-type"), "application/problem+json");
         let problem = self.json();
@@ -135,7 +135,7 @@ impl Answer {
     }
 }
 
-/// An engine with the stand-in detector, not loaded yet, and the calibration `lobby`.
+/// An engine with the fake detector, not loaded yet, and the calibration `lobby`.
 pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("lobby.json"), LOBBY).unwrap();
@@ -185,14 +185,14 @@ impl Service {
         Self::within(&Bounds::default())
     }
 
-    /// A warm service with one worker.
+    /// A warm service with one worker and these limits.
     pub(crate) fn within(bounds: &Bounds) -> Self {
         let gate = Arc::new(Gate::default());
         let (assembly, folder) = assembly(&gate);
         Self::around(assembly, folder, gate, bounds)
     }
 
-    /// A warm service with one worker, around what a test has put together.
+    /// A warm service with one worker around an assembly.
     pub(crate) fn around(
         assembly: Assembly,
         folder: TempDir,
@@ -244,7 +244,7 @@ impl Service {
         }
     }
 
-    /// Asks for `path`; what finds people gets a frame to find them in.
+    /// Sends a request to `path`; detection routes get a frame.
     pub(crate) async fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
         let mut request = Request::builder().method(method).uri(path);
         for (name, value) in headers {
@@ -288,7 +288,7 @@ impl Service {
         self.send(Request::post(path).body(body).unwrap()).await
     }
 
-    /// Sends a form; a part is a name, perhaps with `; filename=…`, and its content.
+    /// Sends a form; a part is a name, optionally with `; filename=…`, and its content.
     pub(crate) async fn post_form(&self, parts: &[(&str, &[u8])]) -> Answer {
         self.send(form(parts)).await
     }
@@ -300,7 +300,7 @@ impl Service {
             .await
     }
 
-    /// A good request still works.
+    /// Asserts that a valid request still succeeds.
     pub(crate) async fn still_works(&self) {
         let answer = self
             .post_raw("calibration=lobby&profile=fast", frame())
@@ -346,7 +346,7 @@ pub(crate) fn frame_of(width: u32, height: u32) -> Vec<u8> {
     encode_png(&Frame::new(width, height, pixels).unwrap()).unwrap()
 }
 
-/// A PNG that takes about as many bytes as it has pixels, times three.
+/// A PNG with about three bytes per pixel.
 pub(crate) fn incompressible_frame() -> Vec<u8> {
     let mut state = 1_u32;
     let noise = std::iter::repeat_with(|| {

@@ -1,5 +1,5 @@
-//! Bodies that come slowly, and work that takes long. The clock of most tests stands still until all
-//! tasks wait.
+//! Slow bodies and slow work. In most tests the clock is paused and advances only while all tasks
+//! wait.
 
 use std::{
     num::NonZeroU64,
@@ -45,14 +45,14 @@ fn assert_too_slow(answer: &Answer, part: &str) {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_body_that_stands_still_is_given_up_after_seconds_on_every_route() {
+async fn a_stalled_body_is_refused_after_seconds_on_every_route() {
     let service = Service::start();
     for (method, path) in WITH_BODY {
         let (request, mut sender) = request(method, path);
         sender.send_data(Bytes::from_static(b"{")).await.unwrap();
         let began = tokio::time::Instant::now();
         let answer = service.send(request).await;
-        assert_too_slow(&answer, "1024 bytes a second");
+        assert_too_slow(&answer, "1024 bytes per second");
         let waited = began.elapsed();
         let patience = Duration::from_secs(5);
         assert!(
@@ -64,7 +64,7 @@ async fn a_body_that_stands_still_is_given_up_after_seconds_on_every_route() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn without_a_least_rate_the_deadline_ends_the_wait_on_every_route() {
+async fn without_a_minimum_rate_the_deadline_ends_the_wait() {
     let limit = Duration::from_mins(1);
     let service = Service::within(&Bounds {
         min_upload_bytes_per_second: None,
@@ -80,7 +80,7 @@ async fn without_a_least_rate_the_deadline_ends_the_wait_on_every_route() {
     }
 }
 
-/// Sends a calibration, some bytes a second.
+/// Sends a calibration at this number of bytes per second.
 async fn upload_at(bytes_per_second: usize) -> Answer {
     let service = Service::within(&Bounds {
         min_upload_bytes_per_second: NonZeroU64::new(10),
@@ -102,14 +102,14 @@ async fn upload_at(bytes_per_second: usize) -> Answer {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_steady_body_is_waited_for_as_long_as_it_keeps_the_rate() {
+async fn a_steady_body_at_the_minimum_rate_is_accepted() {
     let fast_enough = upload_at(10).await;
     assert_eq!(fast_enough.status, 200, "{}", fast_enough.text());
-    assert_too_slow(&upload_at(5).await, "10 bytes a second");
+    assert_too_slow(&upload_at(5).await, "10 bytes per second");
 }
 
 #[tokio::test]
-async fn work_that_takes_too_long_is_given_up_on_every_route_that_waits() {
+async fn work_past_its_deadline_is_abandoned_on_every_route() {
     let service = Service::within(&Bounds {
         request_timeout: Duration::from_millis(50),
         ..Bounds::default()

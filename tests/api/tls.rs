@@ -17,7 +17,7 @@ use crate::server::Server;
 
 const ASK: &[u8] = b"GET /livez HTTP/1.1\r\nHost: lookdown\r\n\r\n";
 
-/// A client that trusts this certificate alone.
+/// A client that trusts only this certificate.
 async fn connect(server: &Server, certificate: &CertificateDer<'static>) -> TlsStream<TcpStream> {
     let mut roots = RootCertStore::empty();
     roots.add(certificate.clone()).unwrap();
@@ -33,7 +33,7 @@ async fn connect(server: &Server, certificate: &CertificateDer<'static>) -> TlsS
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn everything_is_served_over_tls_to_its_orderly_end_and_metrics_elsewhere_without() {
+async fn all_routes_use_tls_and_the_metrics_port_does_not() {
     let folder = tempfile::tempdir().unwrap();
     let pair = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
     let certificate = folder.path().join("server.pem");
@@ -59,7 +59,7 @@ async fn everything_is_served_over_tls_to_its_orderly_end_and_metrics_elsewhere_
     assert!(server.get("/livez").await.starts_with("HTTP/1.1 400 "));
 
     server.shutdown.request();
-    // The end is announced, or this would fail: nobody can cut an answer short unnoticed.
+    // This fails without a close_notify alert, which protects against truncation.
     connection.read_to_end(&mut answer).await.unwrap();
     server.has_ended().await;
 }

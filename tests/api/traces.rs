@@ -1,4 +1,4 @@
-//! Traces, as a collector receives them.
+//! Traces, as an OTLP collector receives them.
 
 use std::{
     collections::BTreeMap,
@@ -34,7 +34,7 @@ struct Collector {
 }
 
 impl Collector {
-    /// Starts it; deliveries are answered with `status`.
+    /// Starts the collector; it answers exports with `status`.
     async fn start(status: StatusCode) -> (Self, TraceSettings) {
         let collector = Self::default();
         let receiving = collector.clone();
@@ -61,7 +61,7 @@ impl Collector {
         }
     }
 
-    /// All spans so far: the request's, and those within it in the order of their beginnings.
+    /// Returns the span of the request, and the spans within it in the order of their start times.
     fn request(&self) -> (Span, Vec<Span>) {
         let spans = self.spans.lock().unwrap().clone();
         let (mut requests, mut stages): (Vec<_>, Vec<_>) = spans
@@ -128,7 +128,7 @@ fn attributes(attributes: &[KeyValue]) -> BTreeMap<&str, String> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_traced_request_is_a_span_of_the_caller_s_with_a_span_for_each_stage() {
+async fn a_request_has_a_span_in_the_trace_of_its_caller() {
     let (collector, settings) = Collector::start(StatusCode::OK).await;
     let tracer = Tracer::start(&settings).unwrap();
     let service = service(&tracer, Duration::from_secs(20));
@@ -170,7 +170,7 @@ async fn a_traced_request_is_a_span_of_the_caller_s_with_a_span_for_each_stage()
             "calibrate",
             "queue",
             "remap",
-            "inference", // Whatever may be a person is looked at again.
+            "inference", // The second pass.
             "refine",
             "remap",
             "queue",
@@ -205,14 +205,14 @@ async fn a_traced_request_is_a_span_of_the_caller_s_with_a_span_for_each_stage()
         );
     }
     let within = stages.windows(2).all(|pair| {
-        // A microsecond for the rounding of two clocks.
+        // One microsecond for the rounding of two clocks.
         pair[1].start_time_unix_nano + 1000 >= pair[0].end_time_unix_nano
     });
     assert!(within, "stages overlap: {stages:?}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_frame_that_took_too_long_shows_where_it_was_stuck() {
+async fn the_trace_of_a_late_frame_has_its_last_stage() {
     let (collector, settings) = Collector::start(StatusCode::OK).await;
     let tracer = Tracer::start(&settings).unwrap();
     let service = service(&tracer, Duration::from_millis(300));
@@ -230,7 +230,7 @@ async fn a_frame_that_took_too_long_shows_where_it_was_stuck() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_refusal_is_a_span_without_error_and_a_caller_that_does_not_record_is_followed() {
+async fn refusals_are_no_span_errors_and_unsampled_callers_are_obeyed() {
     let (collector, settings) = Collector::start(StatusCode::OK).await;
     let tracer = Tracer::start(&settings).unwrap();
     let service = service(&tracer, Duration::from_secs(20));
@@ -247,7 +247,7 @@ async fn a_refusal_is_a_span_without_error_and_a_caller_that_does_not_record_is_
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn without_a_sample_nothing_is_sent() {
+async fn an_unsampled_request_exports_nothing() {
     let (collector, settings) = Collector::start(StatusCode::OK).await;
     let tracer = Tracer::start(&TraceSettings {
         sample_ratio: 0.0,
@@ -261,13 +261,13 @@ async fn without_a_sample_nothing_is_sent() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_collector_that_says_nothing_slows_nobody_and_holds_up_the_end_for_seconds_only() {
-    // Connections are taken by the system, and nobody reads them.
+async fn a_silent_collector_delays_only_the_shutdown_by_seconds() {
+    // The operating system accepts the connections, and no process reads them.
     let silent = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = silent.local_addr().unwrap();
     let tracer = Tracer::start(&settings(&format!("http://{address}"))).unwrap();
     let service = service(&tracer, Duration::from_secs(20));
-    // More spans than the queue holds.
+    // More spans than fit into the queue.
     for _ in 0..3000 {
         let began = Instant::now();
         assert_eq!(service.get("/livez").await.status, 200);

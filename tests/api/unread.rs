@@ -1,4 +1,4 @@
-//! Refusals while the client is still sending.
+//! Refusals while the client still sends.
 
 use std::{
     io::{Read, Write},
@@ -37,7 +37,7 @@ fn with_keys() -> Service {
     })
 }
 
-/// Sends a body in parts of 100 bytes; tells how many were taken.
+/// Sends a body in parts of 100 bytes; returns the number of parts that were read.
 async fn send(
     service: &Service,
     request: axum::http::request::Builder,
@@ -63,7 +63,7 @@ async fn send(
 }
 
 #[tokio::test]
-async fn what_a_refused_client_is_sending_is_read_on_every_route() {
+async fn the_body_of_a_refused_request_is_drained_on_every_route() {
     let no_key = with_keys();
     let open = Service::within(&tight());
     let rare = Service::within(&Bounds {
@@ -96,7 +96,7 @@ async fn what_a_refused_client_is_sending_is_read_on_every_route() {
 }
 
 #[tokio::test]
-async fn no_more_than_a_few_times_the_limit_is_read() {
+async fn draining_stops_at_a_multiple_of_the_body_limit() {
     let service = Service::within(&tight());
     for path in ["/detect", "/nowhere"] {
         let (_, taken) = send(&service, Request::post(path), 1_000_000).await;
@@ -109,7 +109,7 @@ async fn no_more_than_a_few_times_the_limit_is_read() {
 }
 
 #[tokio::test]
-async fn clients_that_ask_first_and_those_of_http_2_are_answered_at_once() {
+async fn expect_continue_and_http_2_are_answered_without_draining() {
     let service = with_keys();
     let asking = Request::post("/detect").header("expect", "100-continue");
     let streaming = Request::post("/detect").version(Version::HTTP_2);
@@ -118,7 +118,7 @@ async fn clients_that_ask_first_and_those_of_http_2_are_answered_at_once() {
         assert_eq!(answer.status, 401);
         assert!(taken < 5, "{taken}");
     }
-    // It was told to go on, and is sending therefore.
+    // The client received 100 Continue and therefore sends.
     let service = Service::within(&tight());
     let asking = Request::post("/detect").header("expect", "100-continue");
     let (answer, taken) = send(&service, asking, 300).await;
@@ -140,7 +140,7 @@ fn rest(connection: &mut TcpStream) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_client_that_sends_everything_before_it_looks_reads_why_it_was_refused() {
+async fn a_client_that_sends_first_can_read_the_refusal() {
     let max_body_bytes = 1 << 20;
     let service = Service::within(&Bounds {
         max_body_bytes,
@@ -179,7 +179,7 @@ async fn a_client_that_sends_everything_before_it_looks_reads_why_it_was_refused
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn nothing_hangs_when_the_client_asks_before_it_sends() {
+async fn expect_continue_does_not_hang() {
     let service = Service::start();
     let address = listen(&service).await;
     let accepted = spawn_blocking(move || {
@@ -204,7 +204,7 @@ async fn nothing_hangs_when_the_client_asks_before_it_sends() {
     for path in [
         "/nowhere",
         "/calibrations",
-        "/v2/repository/models/nobody/load?",
+        "/v2/repository/models/missing/load?",
     ] {
         let refused = spawn_blocking(move || {
             let mut connection = TcpStream::connect(address).unwrap();

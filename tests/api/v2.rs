@@ -15,7 +15,7 @@ const VIEWS: &str = "/v2/models/eager/infer";
 const FAST: [(&str, &str); 2] = [("calibration", "lobby"), ("profile", "fast")];
 const HEAD_LENGTH: &str = "inference-header-content-length";
 
-/// Base64 (RFC 4648, section 4), written here once more so that the server's is not asked.
+/// Base64 (RFC 4648, section 4), independent of the server's implementation.
 fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::new();
@@ -36,7 +36,7 @@ fn fast() -> Value {
         .collect()
 }
 
-/// A request for the persons in a frame, the frame in its JSON.
+/// An inference request for a frame inside its JSON.
 fn in_json(parameters: &Value) -> Value {
     let input =
         json!({ "name": "image", "datatype": "BYTES", "shape": [1], "data": [base64(&frame())] });
@@ -49,7 +49,7 @@ fn element(content: &[u8]) -> Vec<u8> {
     [&length.to_le_bytes(), content].concat()
 }
 
-/// Sends JSON with bytes behind it.
+/// Sends JSON followed by bytes.
 async fn send(service: &Service, path: &str, head: &Value, behind: &[u8]) -> Answer {
     let head = head.to_string();
     let request = Request::post(path).header(HEAD_LENGTH, head.len());
@@ -57,7 +57,7 @@ async fn send(service: &Service, path: &str, head: &Value, behind: &[u8]) -> Ans
     service.send(request.body(Body::from(body)).unwrap()).await
 }
 
-/// A request for the persons in a frame, the frame behind its JSON.
+/// An inference request for a frame after its JSON.
 fn in_bytes(frame: &[u8], parameters: &Value) -> (Value, Vec<u8>) {
     let behind = element(frame);
     let input = json!({
@@ -70,7 +70,7 @@ fn in_bytes(frame: &[u8], parameters: &Value) -> (Value, Vec<u8>) {
     )
 }
 
-/// The output of that name in an answer, and its bytes if it came as bytes.
+/// Returns the output of that name in a response, and its bytes if it was sent as bytes.
 fn output(answer: &Answer, name: &str) -> (Value, Vec<u8>) {
     let length = answer.headers.get(HEAD_LENGTH);
     let length = length.map_or(answer.body.len(), |length| {

@@ -1,4 +1,4 @@
-//! Browsers: pages of strangers, and what a page of ours may do.
+//! Browsers: CSRF, DNS rebinding, CORS, and the security headers of our pages.
 
 use lookdown::api::Access;
 
@@ -7,7 +7,7 @@ use crate::service::{Answer, Bounds, Service};
 const CHANGING: [(&str, &str); 7] = [
     ("POST", "/detect?calibration=lobby&profile=fast"),
     ("PUT", "/calibrations/lobby"),
-    ("DELETE", "/calibrations/nobody"),
+    ("DELETE", "/calibrations/missing"),
     ("POST", "/v2/models/lookdown/infer"),
     ("POST", "/v2/repository/index"),
     ("POST", "/v2/repository/models/eager/load"),
@@ -31,7 +31,7 @@ fn assert_refused(answer: &Answer, part: &str) {
 }
 
 #[tokio::test]
-async fn a_page_of_a_stranger_changes_nothing_and_finds_nobody_where_there_are_no_keys() {
+async fn cross_origin_requests_are_refused_without_keys() {
     let service = open(true);
     for (method, path) in CHANGING {
         for origin in ["https://evil.example", "http://localhost:9090", "null"] {
@@ -49,7 +49,7 @@ async fn a_page_of_a_stranger_changes_nothing_and_finds_nobody_where_there_are_n
         ("host", "localhost:8080"),
         ("origin", "https://evil.example"),
     ];
-    // What a page cannot read does no harm.
+    // A response that a page cannot read does no harm.
     assert_eq!(
         service.ask("GET", "/calibrations", &stranger).await.status,
         200
@@ -63,7 +63,7 @@ async fn a_page_of_a_stranger_changes_nothing_and_finds_nobody_where_there_are_n
 }
 
 #[tokio::test]
-async fn requests_passed_on_by_a_proxy_are_refused_on_loopback() {
+async fn forwarded_requests_are_refused_on_loopback() {
     let service = open(true);
     for header in [
         "Forwarded",
@@ -106,7 +106,7 @@ async fn requests_without_exactly_one_valid_host_are_refused() {
 }
 
 #[tokio::test]
-async fn a_name_that_a_stranger_lets_lead_here_is_not_answered_on_the_own_machine() {
+async fn dns_rebinding_is_refused_on_loopback() {
     let service = open(true);
     let rebound = [
         ("host", "evil.example:8080"),
@@ -134,7 +134,7 @@ async fn a_name_that_a_stranger_lets_lead_here_is_not_answered_on_the_own_machin
             "{path}"
         );
     }
-    // Whoever lets others reach a server gives it a name.
+    // A server that other machines reach may have any name.
     assert_eq!(
         open(false)
             .ask("GET", "/calibrations", &rebound)
@@ -145,7 +145,7 @@ async fn a_name_that_a_stranger_lets_lead_here_is_not_answered_on_the_own_machin
 }
 
 #[tokio::test]
-async fn pages_load_nothing_from_elsewhere_and_nobody_frames_or_sniffs_an_answer() {
+async fn every_response_has_the_security_headers() {
     let service = Service::start();
     for path in [
         "/",
@@ -170,12 +170,12 @@ async fn pages_load_nothing_from_elsewhere_and_nobody_frames_or_sniffs_an_answer
     let page = service.get("/docs/").await.text();
     assert!(
         !page.contains("<script>"),
-        "a script that the policy stops: {page}"
+        "the policy blocks this script: {page}"
     );
 }
 
 #[tokio::test]
-async fn pages_that_may_call_may_read_every_header_of_ours() {
+async fn allowed_pages_may_read_every_response_header() {
     let service = open(true);
     let page = [
         ("host", "localhost"),
@@ -205,14 +205,14 @@ async fn pages_that_may_call_may_read_every_header_of_ours() {
 }
 
 #[tokio::test]
-async fn the_web_page_is_whole_and_its_styles_and_scripts_are_files() {
+async fn the_web_page_is_complete_without_inline_scripts() {
     let service = Service::start();
     let page = service.get("/").await;
     assert_eq!(page.header("content-type"), "text/html; charset=utf-8");
     let policy = page.header("content-security-policy");
     assert!(!policy.contains("unsafe"), "{policy}");
     let text = page.text();
-    assert!(!text.contains("http"), "the page asks other hosts");
+    assert!(!text.contains("http"), "the page loads from other hosts");
     assert!(!text.contains("style=") && !text.contains("<style"));
     let links = text.split('"').filter(|part| part.starts_with("assets/"));
     let links: Vec<_> = links.collect();
@@ -220,7 +220,7 @@ async fn the_web_page_is_whole_and_its_styles_and_scripts_are_files() {
     for link in links {
         let asset = service.get(&format!("/{link}")).await;
         assert_eq!(asset.status, 200, "{link}");
-        // A script that imports another names a file that is there.
+        // A script imports only files that exist.
         for import in asset.text().split("from \"./").skip(1) {
             let name = import.split('"').next().unwrap();
             let imported = service.get(&format!("/assets/{name}")).await;
@@ -237,7 +237,7 @@ async fn the_web_page_is_whole_and_its_styles_and_scripts_are_files() {
 }
 
 #[tokio::test]
-async fn a_browser_asks_whether_what_it_has_of_the_page_is_still_right() {
+async fn browsers_revalidate_the_web_page() {
     let service = Service::start();
     for path in ["/", "/assets/office.jpg"] {
         let first = service.get(path).await;

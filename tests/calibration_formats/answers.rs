@@ -115,7 +115,7 @@ fn every_file_is_recognised_and_projects_as_its_camera() {
             assert_eq!(size[0], image.width, "{file}");
             assert_eq!(size[1], image.height, "{file}");
         }
-        let lens = lens(camera);
+        let lens = lens(&camera);
         let points = answers["project"].as_array().unwrap();
         let valid: Vec<_> = points.iter().filter(|point| is_valid(point)).collect();
         assert!(valid.len() > 20, "{vector} has few answers");

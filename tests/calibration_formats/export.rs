@@ -90,7 +90,7 @@ fn every_target_holds_its_lenses_and_refuses_the_others() {
                 let read = camera(content.as_bytes(), 0);
                 let image = read.image.unwrap();
                 assert_eq!((image.width, image.height), (512, 520), "{content}");
-                let read = lens(read);
+                let read = lens(&read);
                 for step in 0..60 {
                     let theta = original.max_theta().min(1.4) * f64::from(step) / 60.0;
                     let azimuth = TAU * f64::from(step) / 7.0;

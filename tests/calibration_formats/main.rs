@@ -44,7 +44,7 @@ fn refusal(content: &[u8]) -> String {
     }
 }
 
-fn lens(camera: Camera) -> Lens {
+fn lens(camera: &Camera) -> Lens {
     Lens::new(&camera.lens).unwrap()
 }
 

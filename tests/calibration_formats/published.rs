@@ -19,7 +19,7 @@ fn published(name: &str) -> Value {
 /// Asserts that the file projects the set's rays to its pixels.
 #[track_caller]
 fn assert_projects(content: &str, set: &Value, tolerance: f64, convention: PixelConvention) {
-    let lens = lens(camera(content.as_bytes(), 0));
+    let lens = lens(&camera(content.as_bytes(), 0));
     let rays = set["rays"].as_array().unwrap();
     let mut compared = 0;
     for (ray_fields, pixel) in rays.iter().zip(set["pixels"].as_array().unwrap()) {
@@ -174,7 +174,7 @@ fn ocamcalib() {
 /// Asserts that the file unprojects the set's pixels to its rays.
 #[track_caller]
 fn assert_unprojects(content: &str, set: &Value) {
-    let lens = lens(camera(content.as_bytes(), 0));
+    let lens = lens(&camera(content.as_bytes(), 0));
     let pixels = set["inverse_pixels"].as_array().unwrap();
     for (pixel, expected) in pixels.iter().zip(set["inverse_rays"].as_array().unwrap()) {
         let pixel = Pixel::new(pixel[0].as_f64().unwrap(), pixel[1].as_f64().unwrap());
@@ -220,7 +220,7 @@ fn basalt_double_sphere() {
 fn moil_radii() {
     let set = published("moil_axis_2880");
     let content = crate::fixture("calibrations/moil.json");
-    let lens = lens(camera(&content, 0));
+    let lens = lens(&camera(&content, 0));
     for (degrees, radius) in set["alpha_deg_to_r_px"].as_object().unwrap() {
         let theta = degrees.parse::<f64>().unwrap().to_radians();
         let ray = lookdown::geometry::Ray::new(theta.sin(), 0.0, theta.cos());

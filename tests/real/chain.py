@@ -1,4 +1,4 @@
-"""Replicas of Lookdown on hosts of their own, with HAProxy in front, and Redis and a bucket that they share."""
+"""Replicas of Lookdown on separate hosts behind HAProxy, with a shared Redis and a shared bucket."""
 
 import contextlib
 import hashlib
@@ -47,7 +47,7 @@ backend replicas
 
 
 class Chain:
-    """Everything that runs."""
+    """All processes."""
 
     def __init__(self, machines: dict[str, Host], folder: Path, settings: dict[str, str], cores: float | None):
         self._machines, self._folder, self._settings, self._cores = machines, folder, settings, cores
@@ -57,11 +57,11 @@ class Chain:
         self._redis: RedisServer
 
     def host(self, name: str) -> Host:
-        """The host a replica runs on."""
+        """The host of a replica."""
         return self._machines[name]
 
     def start(self, name: str) -> None:
-        """A replica, until it is ready; one that was there is gone already, or is ended."""
+        """Starts a replica and waits until it is ready. A previous one has ended or is stopped."""
         self.end(name)
         stack = self._stacks[name] = contextlib.ExitStack()
         host, store = self._machines[name], self._machines["store"].address
@@ -87,35 +87,35 @@ class Chain:
         )
 
     def end(self, name: str) -> None:
-        """A replica and all that is left of it."""
+        """Stops a replica and what is left of it."""
         if name in self._stacks:
             self._stacks.pop(name).close()
 
     def serve_with(self, count: int) -> None:
-        """Only so many replicas get requests."""
+        """Lets only this number of replicas get requests."""
         for number, name in enumerate(REPLICAS):
-            self._tell_front(f"set server replicas/{name} state {'ready' if number < count else 'maint'}")
+            self._command_front(f"set server replicas/{name} state {'ready' if number < count else 'maint'}")
 
     def wait_until(self, name: str, state: str) -> None:
-        """Until the front takes a replica for `UP` or `DOWN`."""
+        """Waits until HAProxy regards a replica as `UP` or `DOWN`."""
         wait_until(lambda: self._states()[name] == state, f"the front takes {name} for {state}")
 
     def _states(self) -> dict[str, str]:
-        rows = [line.split(",") for line in self._tell_front("show stat").splitlines()]
+        rows = [line.split(",") for line in self._command_front("show stat").splitlines()]
         return {row[1]: row[17].split()[0] for row in rows if row[0] == "replicas"}
 
-    def _tell_front(self, command: str) -> str:
+    def _command_front(self, command: str) -> str:
         with socket.socket(socket.AF_UNIX) as connection:
             connection.connect(str(self._folder / "front.socket"))
             connection.sendall(f"{command}\n".encode())
             return connection.makefile(encoding="utf-8").read()
 
     def start_shared_parts(self, stack: contextlib.ExitStack) -> None:
-        """What the replicas need before they start, and what stands before them."""
+        """Starts what the replicas need, and HAProxy in front of them."""
         store, front = self._machines["store"], self._machines["front"]
         self._redis = stack.enter_context(RedisServer(host=store.address, inside=store.inside))
         moto = [str(ROOT / ".setup" / "venv" / "bin" / "moto_server"), "-H", store.address, "-p", "5000"]
-        stack.enter_context(_beside([*store.inside, *moto], store, 5000))
+        stack.enter_context(_started([*store.inside, *moto], store, 5000))
         bucket = urllib.request.Request(f"http://{store.address}:5000/cameras", method="PUT")
         urllib.request.urlopen(bucket, timeout=30).close()
         servers = [f"    server {name} {self._machines[name].address}:{PORT}\n" for name in REPLICAS]
@@ -128,7 +128,7 @@ class Chain:
 
 @contextlib.contextmanager
 def chain(settings: dict[str, str], cores: float | None = None) -> Iterator[Chain]:
-    """Three replicas with these settings, each with so many cores, or all with those that there are."""
+    """Starts three replicas with these settings, each with this number of cores, or all with those of the machine."""
     with (
         tempfile.TemporaryDirectory() as folder,
         hosts("store", "front", *REPLICAS) as machines,
@@ -145,8 +145,8 @@ def chain(settings: dict[str, str], cores: float | None = None) -> Iterator[Chai
 
 
 @contextlib.contextmanager
-def _beside(command: list[str], host: Host, port: int) -> Iterator[None]:
-    """A server that speaks no HTTP of ours, from when it can be connected to."""
+def _started(command: list[str], host: Host, port: int) -> Iterator[None]:
+    """Starts a server that speaks another protocol, and waits until it accepts connections."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def listens() -> bool:

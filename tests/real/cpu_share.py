@@ -1,4 +1,4 @@
-"""A control group of Linux with a limit on CPU time (cgroups(7)), of version 2 or 1: a machine of a size we choose."""
+"""A Linux control group with a limit on CPU time (cgroups(7)), version 2 or 1: a machine of a chosen size."""
 
 import contextlib
 import os
@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path("/sys/fs/cgroup")
 PERIOD_MICROS = 20_000
-"""Short, so that a frame's time does not come in steps of a tenth of a second."""
+"""Short, so that the time of a frame does not come in steps of a tenth of a second."""
 VERSIONS = (
     (ROOT, {"cpu.max": "{quota} {period}"}),
     (ROOT / "cpu", {"cpu.cfs_period_us": "{period}", "cpu.cfs_quota_us": "{quota}"}),
@@ -16,7 +16,7 @@ VERSIONS = (
 
 @contextlib.contextmanager
 def cpu_share(name: str, cores: float) -> Iterator[list[str]]:
-    """The command that runs another with so many cores, while this is open."""
+    """The command that runs another one with this number of cores, while this is open."""
     for root, files in VERSIONS:
         folder = root / f"lookdown-{os.getpid()}-{name}"
         try:
@@ -34,4 +34,4 @@ def cpu_share(name: str, cores: float) -> Iterator[list[str]]:
         finally:
             with contextlib.suppress(OSError):
                 folder.rmdir()
-    raise OSError("this machine gives no control group for CPU time")
+    raise OSError("this machine permits no control group for CPU time")

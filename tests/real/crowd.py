@@ -1,4 +1,4 @@
-"""Clients that ask over and over until they are told to stop, and what became of each request."""
+"""Clients that send requests continuously until they are stopped, with the outcome of each request."""
 
 import collections
 import contextlib
@@ -8,11 +8,11 @@ import time
 from collections.abc import Iterator
 
 LOST = {0, 502, 503, 504}
-"""No answer at all, or one in which the front says that it got none."""
+"""No answer, or an answer of HAProxy that it got none."""
 
 
 class Crowd:
-    """What the clients saw."""
+    """The outcomes that the clients observed."""
 
     def __init__(self):
         self.statuses: collections.Counter[int] = collections.Counter()
@@ -22,17 +22,17 @@ class Crowd:
 
     @property
     def lost(self) -> int:
-        """Requests without an answer from a replica."""
+        """The number of requests without an answer from a replica."""
         return sum(count for status, count in self.statuses.items() if status in LOST)
 
     def count(self, status: int, replica: str) -> None:
-        """One request more."""
+        """Counts a request."""
         with self._lock:
             self.statuses[status] += 1
             self.replicas[replica] += 1
 
     def ask(self, address: str, path: str, body: bytes, headers: dict[str, str]) -> None:
-        """One client, on a connection that it keeps for as long as it can."""
+        """Runs one client, on a connection that it keeps for as long as possible."""
         connection = http.client.HTTPConnection(address, timeout=30)
         while not self.stopped.is_set():
             try:
@@ -47,7 +47,7 @@ class Crowd:
 
 @contextlib.contextmanager
 def crowd(address: str, path: str, body: bytes, headers: dict[str, str], clients: int) -> Iterator[Crowd]:
-    """Clients that ask while this is open; all have their last answer when it closes."""
+    """Runs clients while this is open. All have their last answer when it closes."""
     seen = Crowd()
     threads = [threading.Thread(target=seen.ask, args=(address, path, body, headers)) for _ in range(clients)]
     for thread in threads:
@@ -61,7 +61,7 @@ def crowd(address: str, path: str, body: bytes, headers: dict[str, str], clients
 
 
 def rate(seen: Crowd, seconds: float) -> float:
-    """Requests a second that were answered with success, from now on."""
+    """The number of successful answers per second, from now on."""
     before = seen.statuses[200]
     time.sleep(seconds)
     return (seen.statuses[200] - before) / seconds

@@ -1,7 +1,7 @@
-"""Asks with real clients of DeepStack: `deepstack_client.py CLIENT PORT IMAGE MODEL KEY MIN_CONFIDENCE`.
+"""Sends requests with real clients of DeepStack: `deepstack_client.py CLIENT PORT IMAGE MODEL KEY MIN_CONFIDENCE`.
 
-`CLIENT` is `python` (deepstack-python, which Home Assistant's integration uses) or `sdk` (deepstack-sdk); an empty
-model or key is none. Prints what the client makes of the answer, or what it raises, as JSON.
+`CLIENT` is `python` (deepstack-python, which Home Assistant's integration uses) or `sdk` (deepstack-sdk). An empty
+model or key means none. Prints the client's result, or its exception, as JSON.
 """
 
 import json
@@ -27,7 +27,7 @@ def main(client: str, port: str, image: str, model: str, key: str, confidence: s
     detect = {"python": with_python, "sdk": with_sdk}[client]
     try:
         answer = {"predictions": detect(port, Path(image), model, key, float(confidence))}
-    except Exception as error:  # noqa: BLE001: the test looks at whatever a client raises
+    except Exception as error:  # noqa: BLE001: the test checks any exception of a client
         answer = {"raised": f"{type(error).__name__}: {error}"}
     print(json.dumps(answer))
 

@@ -1,4 +1,4 @@
-"""Hosts of our own: network namespaces of Linux on one switch, each with an address. Needs root and iproute2."""
+"""Separate hosts: network namespaces of Linux on one switch, each with an address. Needs root and iproute2."""
 
 import contextlib
 import os
@@ -8,27 +8,27 @@ from dataclasses import dataclass
 
 PREFIX = f"ld{os.getpid() % 100_000}"
 NETWORK = "10.213.77"
-"""Addresses that no network of the machine should have."""
+"""Addresses that are not in use on the machine's networks."""
 
 
 @dataclass(frozen=True)
 class Host:
-    """A host, which other hosts and this machine reach by its address."""
+    """A host that other hosts and this machine reach by its address."""
 
     name: str
     address: str
 
     @property
     def inside(self) -> list[str]:
-        """The command that runs another on the host."""
+        """The command that runs another one on the host."""
         return ["ip", "netns", "exec", self._namespace]
 
     def cut_off(self) -> None:
-        """Pulls its cable: nothing is refused, nothing arrives."""
+        """Disconnects its cable: packets are lost without an error."""
         _ip("link", "set", self._cable, "down")
 
     def back(self) -> None:
-        """Plugs it in again."""
+        """Connects it again."""
         _ip("link", "set", self._cable, "up")
 
     @property
@@ -40,7 +40,7 @@ class Host:
         return f"{PREFIX}{self.name}"
 
     def build(self, switch: str) -> None:
-        """Makes it, and plugs it into the switch."""
+        """Creates it and connects it to the switch."""
         _ip("netns", "add", self._namespace)
         _ip("link", "add", self._cable, "type", "veth", "peer", "name", "eth0", "netns", self._namespace)
         _ip("link", "set", self._cable, "master", switch, "up")
@@ -49,14 +49,14 @@ class Host:
         _ip("-n", self._namespace, "link", "set", "lo", "up")
 
     def remove(self) -> None:
-        """As far as it was made. Its cable first: the kernel takes its time over what is left in a namespace."""
+        """Removes what was created. The cable comes first: the kernel removes the rest of a namespace with a delay."""
         subprocess.run(["ip", "link", "del", self._cable], stderr=subprocess.DEVNULL, check=False)
         subprocess.run(["ip", "netns", "del", self._namespace], stderr=subprocess.DEVNULL, check=False)
 
 
 @contextlib.contextmanager
 def hosts(*names: str) -> Iterator[dict[str, Host]]:
-    """Hosts of these names, of at most six letters, while this is open; the switch is this machine."""
+    """Hosts of these names, of at most six letters, while this is open. This machine is the switch."""
     switch = f"{PREFIX}switch"
     with contextlib.ExitStack() as made:
         _ip("link", "add", switch, "type", "bridge")

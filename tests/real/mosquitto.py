@@ -1,4 +1,4 @@
-"""The broker of the tests, and who listens to it."""
+"""The MQTT broker of the tests, and its subscribers."""
 
 import contextlib
 import os
@@ -17,7 +17,7 @@ PASSWORD_IN_URL = "s%40cret%2Fof%3Ahome"
 
 @dataclass
 class Broker:
-    """A mosquitto that can be killed and started again at the same port. It keeps nothing on the disk."""
+    """A mosquitto that can be killed and restarted on the same port. It stores nothing on disk."""
 
     folder: Path
     tls: dict[str, Path] = field(default_factory=dict)
@@ -31,7 +31,7 @@ class Broker:
         return f"{scheme}://{USER}:{PASSWORD_IN_URL}@localhost:{self.port}"
 
     def start(self) -> None:
-        """Until it answers."""
+        """Starts it and waits until it answers."""
         passwords, config = self.folder / "passwords", self.folder / "mosquitto.conf"
         subprocess.run(["mosquitto_passwd", "-b", "-c", passwords, USER, PASSWORD], check=True, capture_output=True)
         lines = [f"listener {self.port} 127.0.0.1", "allow_anonymous false", f"password_file {passwords}"]
@@ -43,7 +43,7 @@ class Broker:
         wait_until(lambda: self.client("pub", "-t", "test", "-n").returncode == 0, "mosquitto answers")
 
     def stop(self, signal_number: int = signal.SIGTERM) -> None:
-        """Ends it."""
+        """Stops it."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.process.pid, signal_number)
         self.process.wait(timeout=PATIENCE_SECONDS)
@@ -54,18 +54,18 @@ class Broker:
         return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_SECONDS)
 
     def login(self) -> list[str]:
-        """How the clients of mosquitto get in."""
+        """The login options of mosquitto's clients."""
         authority = ["--cafile", str(self.tls["cafile"])] if self.tls else []
         return ["-h", "localhost", "-p", str(self.port), "-u", USER, "-P", PASSWORD, *authority]
 
     def retained(self) -> dict[str, str]:
-        """All that it keeps, by topic."""
+        """All retained messages by topic."""
         said = self.client("sub", "-t", "#", "--retained-only", "-W", "1", "-F", "%t %p").stdout
         return dict(line.split(" ", 1) for line in said.splitlines())
 
     @contextlib.contextmanager
     def listening(self, topic: str) -> Iterator[list[str]]:
-        """What is published meanwhile, a line of retained flag, topic and payload each."""
+        """The messages published while this is open, one line with retained flag, topic and payload each."""
         said: list[str] = []
         with subprocess.Popen(
             ["mosquitto_sub", *self.login(), "-v", "-t", topic, "-t", "test/begin", "-F", "%r %t %p"],
@@ -83,7 +83,7 @@ class Broker:
                 self.client("pub", "-t", "test/begin", "-n")
                 return any("test/begin" in line for line in hear())
 
-            wait_until(begun, "the listener hears")
+            wait_until(begun, "the subscriber receives")
             said.clear()
             try:
                 yield Heard(hear)
@@ -92,7 +92,7 @@ class Broker:
 
 
 class Heard:
-    """Lines that are heard while one looks."""
+    """Lines that are received during a test."""
 
     def __init__(self, hear):
         self.hear = hear

@@ -1,4 +1,4 @@
-"""Asks with the generated client: `python_client.py ADDRESS KEY IMAGE`. Prints what it got, as JSON."""
+"""Calls a server with the generated client: `python_client.py ADDRESS KEY IMAGE`. Prints the results as JSON."""
 
 import datetime
 import json
@@ -46,7 +46,7 @@ def main(address: str, key: str, image: str) -> None:
     assert isinstance(by_form, Report), by_form
     alone = detect_persons.sync(client=client, body=picture(), calibration="office", profile=DetectPersonsProfile.FAST)
     assert isinstance(alone, Report), alone
-    refused = detect_persons.sync(client=client, body=DetectForm(img=picture()), calibration="nobody")
+    refused = detect_persons.sync(client=client, body=DetectForm(img=picture()), calibration="unknown-id")
     assert isinstance(refused, Problem), refused
 
     rows = list_calibrations.sync(client=client)

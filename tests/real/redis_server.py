@@ -1,4 +1,4 @@
-"""A Redis of our own: started, killed, halted, and asked."""
+"""A Redis for tests: it can be started, killed, halted and queried."""
 
 import contextlib
 import shutil
@@ -14,12 +14,12 @@ from waiting import wait_until
 
 
 class RedisServer:
-    """A `redis-server` that keeps nothing on disk."""
+    """A `redis-server` that stores nothing on disk."""
 
     def __init__(self, *options: str, password: str = "", host: str = "127.0.0.1", inside: Sequence[str] = ()) -> None:
-        """`options` are those of its command line; the connection of this test sends `password`.
+        """`options` are command-line options; the connection of this test sends `password`.
 
-        `host` is the address it has, and the command `inside` starts another on the host with that address.
+        `host` is its address, and the command `inside` starts a program on the host with that address.
         """
         (self.port,) = free_ports(1)
         self.host, self.password = host, password
@@ -40,12 +40,12 @@ class RedisServer:
 
     @property
     def url(self) -> str:
-        """What `results.url` takes."""
+        """The value for `results.url`."""
         secret = f":{self.password}@" if self.password else ""
         return f"redis://{secret}{self.host}:{self.port}/0"
 
     def start(self) -> None:
-        """Until it answers."""
+        """Starts it and waits until it answers."""
         place = ["--port", str(self.port), "--bind", self.host, "--protected-mode", "no"]
         command = [*self._inside, "redis-server", *place, "--save", "", *self._options]
         self._process = subprocess.Popen(command, cwd=self._folder, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
@@ -57,18 +57,18 @@ class RedisServer:
         return False
 
     def kill(self) -> None:
-        """At once: what it knew is gone."""
+        """Kills it at once: its data are lost."""
         if self._process is not None:
             self._process.kill()
             self._process.wait()
             self._process = None
 
     def halt(self) -> None:
-        """Its connections stay, and nobody answers."""
+        """Halts it: its connections stay open, but it does not answer."""
         self._process.send_signal(signal.SIGSTOP)
 
     def go_on(self) -> None:
-        """After `halt`."""
+        """Continues after `halt`."""
         self._process.send_signal(signal.SIGCONT)
 
     def ask(self, *words: object):
@@ -89,11 +89,11 @@ class RedisServer:
 
 
 class RedisError(Exception):
-    """What Redis refused, and why."""
+    """A refusal of Redis, with its reason."""
 
 
 def _command(words: tuple) -> bytes:
-    """As Redis reads it (RESP)."""
+    """A command as bytes (RESP)."""
     parts = [word if isinstance(word, bytes) else str(word).encode() for word in words]
     lengths = b"".join(b"$%d\r\n%s\r\n" % (len(part), part) for part in parts)
     return b"*%d\r\n%s" % (len(parts), lengths)

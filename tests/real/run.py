@@ -1,7 +1,7 @@
-"""Runs the tests against real parts: `run.py [PART...]`, where `PART` is a `test_PART.py` beside this file; all by default.
+"""Runs the tests against real software: `run.py [PART...]`, where `PART` is a `test_PART.py` in this folder.
 
-Each starts the release binary and the part itself, talks to them as a user would, and stops them again. Exits with
-1 when a test fails.
+Each test starts the release binary and the other software, uses them like a user, and stops them. Exits with
+1 if a test fails. All parts are run by default.
 """
 
 import signal
@@ -15,13 +15,13 @@ for folder in (HERE, HERE.parent / "reliability", HERE.parents[1] / "benches"):
 
 
 def main(parts: list[str]) -> int:
-    """The exit status."""
+    """Returns the exit status."""
     there = sorted(file.stem.removeprefix("test_") for file in HERE.glob("test_*.py"))
     unknown = [part for part in parts if part not in there]
     if unknown:
         print(f"There is no part '{unknown[0]}'; the parts are {', '.join(there)}.", file=sys.stderr)
         return 2
-    # Servers that were started are stopped on the way out.
+    # Started servers are stopped on exit.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     tests = unittest.defaultTestLoader.loadTestsFromNames([f"test_{part}" for part in parts or there])
     result = unittest.TextTestRunner(verbosity=2).run(tests)

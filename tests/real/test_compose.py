@@ -1,4 +1,4 @@
-"""docker/compose.yaml: its settings are ones that the server knows, and its parts fit together."""
+"""docker/compose.yaml: the server accepts its settings, and its services are consistent."""
 
 import os
 import subprocess
@@ -32,19 +32,19 @@ class ComposeFile(unittest.TestCase):
         checked = subprocess.run(check, env=environment, capture_output=True, text=True, check=False)
         self.assertEqual(checked.returncode, 0, checked.stderr)
 
-    def test_whatever_is_mounted_is_there(self):
+    def test_all_mounted_files_exist(self):
         for name, service in self.services.items():
             for volume in service.get("volumes", []):
                 source = volume.split(":")[0]
                 if source.startswith("."):
                     self.assertTrue((DOCKER / source).exists(), f"{name}: {source}")
 
-    def test_only_this_machine_reaches_what_asks_for_no_key(self):
+    def test_services_without_a_key_listen_on_this_machine_only(self):
         for name, service in self.services.items():
             for port in service.get("ports", []):
                 self.assertTrue(port.startswith("127.0.0.1:"), f"{name}: {port}")
 
-    def test_prometheus_scrapes_the_server_and_grafana_asks_prometheus(self):
+    def test_prometheus_scrapes_lookdown_and_grafana_queries_it(self):
         (job,) = read_yaml(DOCKER / "prometheus.yaml")["scrape_configs"]
         self.assertEqual((job["job_name"], job["static_configs"]), ("lookdown", [{"targets": ["lookdown:8080"]}]))
         (source,) = read_yaml(DOCKER / "grafana" / "datasource.yaml")["datasources"]
@@ -53,7 +53,7 @@ class ComposeFile(unittest.TestCase):
         mounted = [volume.split(":")[1] for volume in self.services["grafana"]["volumes"]]
         self.assertIn(f"{provider['options']['path']}/dashboard.json", mounted)
 
-    def test_the_server_is_given_the_time_that_its_end_may_take(self):
+    def test_the_stop_timeout_covers_the_shutdown_of_the_server(self):
         defaults = tomllib.loads((ROOT / "config" / "lookdown.toml").read_text(encoding="utf-8"))
         millis = defaults["shutdown"]["grace_millis"] + defaults["server"]["request_timeout_millis"]
         given = self.services["lookdown"]["stop_grace_period"].removesuffix("s")

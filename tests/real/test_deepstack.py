@@ -18,7 +18,7 @@ KEY = "lookdown_of_home_assistant"
 
 
 def ask(client: str, server, image: Path = OFFICE, model: str = "", key: str = "", confidence: float = 0.4) -> dict:
-    """What a client makes of the answer."""
+    """The result of a client."""
     port = server.address.rpartition(":")[2]
     command = [PYTHON, HERE / "deepstack_client.py", client, port, image, model, key, str(confidence)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
@@ -26,7 +26,7 @@ def ask(client: str, server, image: Path = OFFICE, model: str = "", key: str = "
 
 
 class DeepStackClients(unittest.TestCase):
-    """What they get."""
+    """Detections and errors as the clients return them."""
 
     @classmethod
     def setUpClass(cls):
@@ -34,7 +34,7 @@ class DeepStackClients(unittest.TestCase):
         report = json.loads(cls.server.post("/detect?calibration=office&score_threshold=0.4", OFFICE.read_bytes()))
         cls.persons = len(report["persons"])
 
-    def test_both_find_the_persons_with_and_without_a_calibration(self):
+    def test_both_detect_persons_with_and_without_a_calibration(self):
         self.assertGreater(self.persons, 3)
         for client in CLIENTS:
             for model in ("", "office"):
@@ -49,7 +49,7 @@ class DeepStackClients(unittest.TestCase):
                         self.assertLess(edges[0], edges[2])
                         self.assertLess(edges[1], edges[3])
 
-    def test_confidence_counts_and_none_at_all_is_answered(self):
+    def test_confidence_filters_and_may_give_no_persons(self):
         for client in CLIENTS:
             found = {least: ask(client, self.server, confidence=least)["predictions"] for least in (0.0, 0.75, 1.0)}
             counts = {least: len(predictions) for least, predictions in found.items()}
@@ -57,17 +57,17 @@ class DeepStackClients(unittest.TestCase):
             self.assertTrue(0 < counts[0.75] <= self.persons, counts)
             self.assertEqual(counts[1.0], 0)
 
-    def test_failures_are_those_that_they_know(self):
+    def test_failures_have_the_forms_of_deepstack(self):
         with tempfile.NamedTemporaryFile(suffix=".jpg") as file:
             file.write(b"no picture")
             file.flush()
             invalid = Path(file.name)
             self.assertIn("Invalid image", ask("sdk", self.server, invalid)["raised"])
             self.assertIn("status code: 400", ask("python", self.server, invalid)["raised"])
-        self.assertIn("Bad url", ask("python", self.server, model="nobody")["raised"])
-        self.assertIn("404", ask("sdk", self.server, model="nobody")["raised"])
+        self.assertIn("Bad url", ask("python", self.server, model="unknown")["raised"])
+        self.assertIn("404", ask("sdk", self.server, model="unknown")["raised"])
 
-    def test_what_they_found_is_among_the_results(self):
+    def test_their_detections_are_stored_as_results(self):
         ask("python", self.server, model="office")
         report = json.loads(self.server.get("/results/office/latest"))
         self.assertEqual(len(report["persons"]), self.persons)
@@ -76,7 +76,7 @@ class DeepStackClients(unittest.TestCase):
 class Keys(unittest.TestCase):
     """The key that they send in the form."""
 
-    def test_a_known_key_opens_and_no_other(self):
+    def test_only_a_known_key_is_accepted(self):
         digest = hashlib.sha256(KEY.encode()).hexdigest()
         with lookdown({"ACCESS__KEYS": f"home:detect:{digest}", "LOG__FILTER": "trace"}) as server:
             for client in CLIENTS:

@@ -1,4 +1,4 @@
-"""The container image: built from its Dockerfile, and run as a container engine would run it."""
+"""The container image: built from its Dockerfile, and run like a container engine would."""
 
 import json
 import os
@@ -26,7 +26,7 @@ class ContainerImage(unittest.TestCase):
         cls.image = build()
         print(f"image: {cls.image.size() / 1e6:.1f} MB, built in {time.monotonic() - started:.0f} s", flush=True)
 
-    def test_it_says_how_it_is_run(self):
+    def test_its_configuration_describes_how_to_run_it(self):
         config = self.image.config
         self.assertEqual((config["User"], config["WorkingDir"]), ("65532:65532", "/opt/lookdown"))
         self.assertEqual((config["Entrypoint"], config["Cmd"]), ([PROGRAM], ["serve"]))
@@ -42,15 +42,15 @@ class ContainerImage(unittest.TestCase):
         writable = [file for file in self.image.root.rglob("*") if self.is_writable_by_the_user(file)]
         self.assertEqual({str(file.relative_to(self.image.root)) for file in writable}, {"tmp", "opt/lookdown/calibrations"})
 
-    def test_every_work_of_others_is_there_with_its_licence(self):
+    def test_third_party_software_has_its_licences(self):
         for name in ("libc6", "libgcc-s1", "libstdc++6", "ca-certificates"):
             self.assertTrue((self.image.root / "usr/share/doc" / name / "copyright").is_file(), name)
             self.assertTrue((self.image.root / "var/lib/dpkg/status.d" / name).is_file(), name)
         for name in ("LICENSE", "NOTICE", "runtime/LICENSE", "runtime/ThirdPartyNotices.txt", "lookdown.cdx.json"):
             self.assertTrue((self.image.root / "opt/lookdown" / name).is_file(), name)
 
-    def test_all_that_the_program_is_built_from_comes_into_the_image(self):
-        # Cargo lists the files that the binary was compiled from, what is embedded in it among them.
+    def test_all_sources_of_the_program_are_copied(self):
+        # Cargo lists the files that the binary was compiled from, including embedded ones.
         listed = LOOKDOWN.with_suffix(".d").read_text(encoding="utf-8").split(":", 1)[1].split()
         sources = {str(Path(file).relative_to(ROOT)) for file in listed if "/target/" not in file}
         self.assertIn("src/main.rs", sources)
@@ -63,7 +63,7 @@ class ContainerImage(unittest.TestCase):
             parts = [source, *map(str, Path(source).parents)]
             self.assertTrue(any(fnmatch(part, pattern) for part in parts for pattern in let_in), source)
 
-    def test_it_serves_without_writing_and_its_health_check_knows(self):
+    def test_it_serves_read_only_and_its_health_check_works(self):
         (port,) = free_ports(1)
         variables = {"LOOKDOWN__SERVER__LISTEN": f"0.0.0.0:{port}", "LOOKDOWN__SHUTDOWN__GRACE_MILLIS": "0"}
         self.assertEqual(self.health(variables).returncode, 1)
@@ -80,7 +80,7 @@ class ContainerImage(unittest.TestCase):
         self.assertEqual(self.health(variables).returncode, 1)
 
     def health(self, variables: dict[str, str]) -> subprocess.CompletedProcess:
-        """What the image's health check says, by the settings of the container."""
+        """The result of the image's health check with these variables."""
         check = self.image.config["Healthcheck"]["Test"][1:]
         command = self.image.inside(*check, **variables)
         return subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)

@@ -1,4 +1,4 @@
-"""The manifests of k8s: valid, consistent with each other, and with the server that they start."""
+"""The manifests of k8s: valid, and consistent with each other and with the server."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ class Manifests(unittest.TestCase):
     def setUpClass(cls):
         cls.all = {folder: manifests(folder) for folder in ("base", *OVERLAYS)}
 
-    def test_services_budgets_and_policies_mean_the_pods(self):
+    def test_services_budgets_and_policies_select_the_pods(self):
         for documents in self.all.values():
             deployment = only(documents, "Deployment")["spec"]
             labels = deployment["template"]["metadata"]["labels"]
@@ -30,7 +30,7 @@ class Manifests(unittest.TestCase):
             for constraint in deployment["template"]["spec"]["topologySpreadConstraints"]:
                 self.assertLessEqual(constraint["labelSelector"]["matchLabels"].items(), labels.items())
 
-    def test_ports_have_the_names_and_numbers_that_are_used(self):
+    def test_ports_have_consistent_names_and_numbers(self):
         for documents in self.all.values():
             settings = self.settings(documents)
             container = self.container(documents)
@@ -41,7 +41,7 @@ class Manifests(unittest.TestCase):
             for probe, path in (("startup", "/livez"), ("liveness", "/livez"), ("readiness", "/readyz")):
                 self.assertEqual(container[f"{probe}Probe"]["httpGet"], {"path": path, "port": "metrics"})
 
-    def test_a_pod_has_the_time_that_its_end_may_take(self):
+    def test_the_termination_period_covers_the_shutdown(self):
         defaults = tomllib.loads((ROOT / "config" / "lookdown.toml").read_text(encoding="utf-8"))
         millis = defaults["shutdown"]["grace_millis"] + defaults["server"]["request_timeout_millis"]
         for documents in self.all.values():
@@ -49,7 +49,7 @@ class Manifests(unittest.TestCase):
             before = self.container(documents)["lifecycle"]["preStop"]["sleep"]["seconds"]
             self.assertGreater(pod["terminationGracePeriodSeconds"], before + millis / 1000)
 
-    def test_a_pod_may_do_nothing_that_it_need_not(self):
+    def test_a_pod_has_minimal_privileges(self):
         for documents in self.all.values():
             pod = only(documents, "Deployment")["spec"]["template"]["spec"]
             self.assertEqual((pod["automountServiceAccountToken"], pod["enableServiceLinks"]), (False, False))
@@ -69,7 +69,7 @@ class Manifests(unittest.TestCase):
                 "LOOKDOWN__SERVER__LISTEN": f"127.0.0.1:{first}",
                 "LOOKDOWN__SERVER__METRICS_LISTEN": f"127.0.0.1:{second}",
                 "LOOKDOWN__CALIBRATIONS__PATH": str(calibrations),
-                # No GPU is needed to see that the rest is understood.
+                # The settings can be checked without a GPU.
                 "LOOKDOWN__INFERENCE__DEVICE": "cpu",
             }
             environment = os.environ | settings | here
@@ -78,7 +78,7 @@ class Manifests(unittest.TestCase):
             self.assertEqual(checked.returncode, 0, f"{folder}: {checked.stderr}")
             self.assertIn("1 calibrations can be used", checked.stdout)
 
-    def test_the_autoscaler_asks_for_the_metric_that_the_adapter_has(self):
+    def test_the_autoscaler_uses_the_metric_of_the_adapter(self):
         (rule,) = read_yaml(ROOT / "k8s" / "monitoring" / "prometheus-adapter.yaml")["rules"]
         metrics = only(self.all["overlays/ha"], "HorizontalPodAutoscaler")["spec"]["metrics"]
         asked = [metric["pods"]["metric"]["name"] for metric in metrics if metric["type"] == "Pods"]

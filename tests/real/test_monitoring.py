@@ -1,4 +1,4 @@
-"""Alerts, the dashboard and the autoscaler's metric: understood by Prometheus, and about metrics that there are."""
+"""Alerts, the dashboard and the autoscaler's metric: valid for Prometheus, and based on metrics that exist."""
 
 import http.client
 import json
@@ -18,7 +18,7 @@ MONITORING = ROOT / "k8s" / "monitoring"
 UNIT_TESTS = Path(__file__).with_name("kubernetes") / "alerts_test.yaml"
 SELECTOR = re.compile(r"\b(lookdown_\w+|process_\w+)(?:\{([^}]*)\})?")
 MATCHER = re.compile(r'(\w+)="([^"]+)"')
-# Those that Prometheus adds to what it scrapes.
+# Labels that Prometheus adds to what it scrapes.
 ITS_OWN = ("job", "instance", "namespace", "pod")
 
 
@@ -35,7 +35,7 @@ class Monitoring(unittest.TestCase):
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
 
-    def test_alerts_fire_on_what_they_are_for_and_on_nothing_else(self):
+    def test_alerts_fire_only_for_their_causes(self):
         self.write("rules.yaml", self.alerts)
         run(["promtool", "check", "rules", self.folder / "rules.yaml"])
         bare = [{part: rule[part] for part in rule if part != "annotations"} for rule in self.rules]
@@ -51,7 +51,7 @@ class Monitoring(unittest.TestCase):
         runbooks = {rule["annotations"]["runbook"] for rule in self.rules}
         self.assertEqual(runbooks, {f"docs/observability.md#{anchor}" for anchor in anchors})
 
-    def test_prometheus_understands_the_dashboard(self):
+    def test_prometheus_accepts_the_dashboard(self):
         self.assertTrue(self.panels)
         rules = [
             {"record": f"panel:{number}", "expr": expression.replace("$__rate_interval", "5m")}
@@ -60,7 +60,7 @@ class Monitoring(unittest.TestCase):
         self.write("panels.yaml", {"groups": [{"name": "panels", "rules": rules}]})
         run(["promtool", "check", "rules", self.folder / "panels.yaml"])
 
-    def test_the_autoscalers_metric_is_the_mean_wait_and_zero_without_frames(self):
+    def test_the_autoscalers_metric_is_the_mean_queue_time(self):
         query = self.adapter["metricsQuery"].replace("<<.GroupBy>>", "pod").replace("<<.LabelMatchers>>", 'pod=~"a|b"')
         series = {
             'lookdown_queue_duration_seconds_sum{pod="a"}': "0+30x10",
@@ -77,8 +77,8 @@ class Monitoring(unittest.TestCase):
         self.write("test.yaml", {"tests": [test]})
         run(["promtool", "test", "rules", self.folder / "test.yaml"])
 
-    def test_every_metric_and_label_that_is_asked_for_is_in_a_scrape(self):
-        scrape = self.scrape() + self.scrape_of_one_that_is_cut_off()
+    def test_every_queried_metric_and_label_is_in_a_scrape(self):
+        scrape = self.scrape() + self.scrape_without_the_inference_server()
         queries = [rule["expr"] for rule in self.rules] + self.panels
         queries += [self.adapter["seriesQuery"], self.adapter["metricsQuery"]]
         asked = {found.groups() for query in queries for found in SELECTOR.finditer(query)}
@@ -90,7 +90,7 @@ class Monitoring(unittest.TestCase):
                 if label not in ITS_OWN and not value.startswith("$"):
                     self.assertTrue(any(f'{label}="{value}"' in line for line in lines), f"{name}: {label}={value}")
 
-    def test_prometheus_takes_the_settings_beside_the_compose_file(self):
+    def test_prometheus_accepts_the_settings_for_compose(self):
         run(["promtool", "check", "config", ROOT / "docker" / "prometheus.yaml"])
 
     def scrape(self) -> str:
@@ -114,24 +114,24 @@ class Monitoring(unittest.TestCase):
             self.assertEqual(connection.getresponse().status, 200)
             return server.get("/metrics").decode()
 
-    def scrape_of_one_that_is_cut_off(self) -> str:
+    def scrape_without_the_inference_server(self) -> str:
         """The metrics of a server whose inference server does not answer."""
-        port, nobody = free_ports(2)
+        port, unused = free_ports(2)
         settings = {
             "SERVER__LISTEN": f"127.0.0.1:{port}",
             "INFERENCE__BACKEND": "v2",
-            "INFERENCE__URL": f"http://127.0.0.1:{nobody}",
+            "INFERENCE__URL": f"http://127.0.0.1:{unused}",
             "INFERENCE__MODEL": "nanodet_g_416",
             "MODEL__PATH": str(model("nanodet_g_416").parent),
             "SHUTDOWN__GRACE_MILLIS": "0",
         }
         environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
         with running("cut-off", [str(LOOKDOWN), "serve"], port, "/livez", environment) as server:
-            wait_until(lambda: b"\nlookdown_remote_up 0\n" in server.get("/metrics"), "the outage is known")
+            wait_until(lambda: b"\nlookdown_remote_up 0\n" in server.get("/metrics"), "the outage is detected")
             return server.get("/metrics").decode()
 
     def write(self, name: str, content: dict) -> None:
-        # YAML reads JSON.
+        # JSON is valid YAML.
         (self.folder / name).write_text(json.dumps(content), encoding="utf-8")
 
 

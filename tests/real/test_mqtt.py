@@ -1,4 +1,4 @@
-"""Lookdown with a real MQTT broker, mosquitto, as Home Assistant would find it there."""
+"""Lookdown with a real MQTT broker, mosquitto, as Home Assistant uses it."""
 
 import contextlib
 import json
@@ -25,16 +25,16 @@ CONFIGS = {
     "homeassistant/binary_sensor/lookdown_office_occupancy/config",
     "homeassistant/sensor/lookdown_office_persons/config",
     "homeassistant/sensor/lookdown_office_zone_left/config",
-    "homeassistant/sensor/lookdown_office_zone_nobody/config",
+    "homeassistant/sensor/lookdown_office_zone_empty/config",
 }
 AREAS = [
     {"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]},
-    {"name": "nobody", "frame_px": [[0, 0], [4, 0], [4, 4], [0, 4]]},
+    {"name": "empty", "frame_px": [[0, 0], [4, 0], [4, 4], [0, 4]]},
 ]
 
 
 class Mqtt(unittest.TestCase):
-    """What reaches the broker."""
+    """Messages at the broker."""
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
@@ -50,7 +50,7 @@ class Mqtt(unittest.TestCase):
         return lookdown(wanted, calibrations=self.calibrations)
 
     def until_status(self, wanted: str) -> None:
-        """Until whoever comes to the broker is told this."""
+        """Waits until the retained status is `wanted`."""
         wait_until(lambda: self.broker.retained().get(STATUS) == wanted, f"the status is {wanted}")
 
     def test_counts_reports_and_discovery(self):
@@ -58,7 +58,7 @@ class Mqtt(unittest.TestCase):
         with self.lookdown(**models) as server, self.broker.listening("lookdown/#") as heard:
             self.until_status("online")
             answer = server.post(DETECT, OFFICE)
-            wait_until(lambda: heard.of(REPORT) == [answer.decode()], "the report is heard")
+            wait_until(lambda: heard.of(REPORT) == [answer.decode()], "the report is received")
             report = json.loads(answer)
             self.assertGreater(len(report["persons"]), 3)
             kept = self.broker.retained()
@@ -66,7 +66,7 @@ class Mqtt(unittest.TestCase):
             self.assertNotIn(REPORT, kept)
             for zone in report["zones"]:
                 self.assertEqual(kept[f"{ZONES}/{zone['name']}"], str(zone["persons"]))
-            self.assertEqual(kept[f"{ZONES}/nobody"], "0")
+            self.assertEqual(kept[f"{ZONES}/empty"], "0")
             configs = {topic: json.loads(kept[topic]) for topic in kept if topic.startswith("homeassistant/")}
             self.assertEqual(set(configs), CONFIGS)
             self.assertEqual(len({config["unique_id"] for config in configs.values()}), len(CONFIGS))
@@ -77,7 +77,7 @@ class Mqtt(unittest.TestCase):
             self.assertEqual(metric(server, "mqtt_connected"), 1)
             self.assertEqual(metric(server, "mqtt_reports_sent_total"), 1)
 
-    def test_home_assistant_that_starts_is_told_everything_again(self):
+    def test_a_starting_home_assistant_gets_all_messages_again(self):
         with self.lookdown() as server:
             server.post(DETECT, OFFICE)
             wait_until(lambda: CONFIGS < set(self.broker.retained()), "discovery is published")
@@ -88,31 +88,31 @@ class Mqtt(unittest.TestCase):
             self.broker.client("pub", "-t", "homeassistant/status", "-m", "online")
             wait_until(lambda: {*CONFIGS, PERSONS} < set(self.broker.retained()), "discovery is published")
 
-    def test_a_killed_server_is_offline_by_its_will(self):
+    def test_the_will_of_a_killed_server_is_offline(self):
         with self.lookdown() as server:
             self.until_status("online")
             os.kill(server.pid, signal.SIGKILL)
             self.until_status("offline")
 
-    def test_a_stopped_server_says_that_it_is_offline(self):
+    def test_a_stopped_server_publishes_offline(self):
         with self.lookdown() as server:
             self.until_status("online")
             with self.broker.listening(STATUS) as heard:
                 os.kill(server.pid, signal.SIGTERM)
                 self.assertEqual(server.process.wait(timeout=20), 0)
-                wait_until(lambda: heard.of(STATUS)[-1:] == ["offline"], "the farewell is heard")
+                wait_until(lambda: heard.of(STATUS)[-1:] == ["offline"], "the last message is received")
         self.assertEqual(self.broker.retained()[STATUS], "offline")
 
-    def test_a_broker_that_was_killed_gets_what_is_true_now(self):
+    def test_a_restarted_broker_gets_the_current_state(self):
         with self.lookdown() as server:
             server.post(DETECT, OFFICE)
             wait_until(lambda: PERSONS in self.broker.retained(), "the count is right")
             self.broker.stop(signal.SIGKILL)
-            wait_until(lambda: metric(server, "mqtt_connected") == 0, "the outage is noticed")
+            wait_until(lambda: metric(server, "mqtt_connected") == 0, "the outage is detected")
             server.post(f"{DETECT}&camera=gate", OFFICE)
             last = json.loads(server.post(f"{DETECT}&score_threshold=1", OFFICE))
             self.broker.start()
-            wait_until(lambda: {STATUS, *CONFIGS, PERSONS} < set(self.broker.retained()), "all of it is there again")
+            wait_until(lambda: {STATUS, *CONFIGS, PERSONS} < set(self.broker.retained()), "all messages are back")
             kept = self.broker.retained()
             self.assertEqual(kept[STATUS], "online")
             self.assertEqual(kept[PERSONS], str(len(last["persons"])))
@@ -120,7 +120,7 @@ class Mqtt(unittest.TestCase):
             self.assertEqual(metric(server, "mqtt_connected"), 1)
             self.assertEqual(metric(server, "mqtt_reports_dropped_total"), 2)
 
-    def test_a_server_without_its_broker_serves_all_the_same(self):
+    def test_a_server_without_its_broker_still_serves(self):
         self.broker.stop()
         with self.lookdown() as server:
             for _ in range(100):
@@ -130,16 +130,16 @@ class Mqtt(unittest.TestCase):
             self.assertEqual(server.process.wait(timeout=20), 0)
         self.broker.start()
 
-    def test_the_end_of_one_of_two_servers_leaves_the_other_online(self):
+    def test_the_end_of_one_server_leaves_the_other_online(self):
         with self.lookdown(), contextlib.ExitStack() as other:
             server = other.enter_context(self.lookdown())
             self.until_status("online")
             with self.broker.listening(STATUS) as heard:
                 os.kill(server.pid, signal.SIGKILL)
-                wait_until(lambda: heard.of(STATUS)[-2:] == ["offline", "online"], "the end is contradicted")
+                wait_until(lambda: heard.of(STATUS)[-2:] == ["offline", "online"], "the status is corrected")
             self.assertEqual(self.broker.retained()[STATUS], "online")
 
-    def test_names_that_are_no_topics_are_published_and_a_flood_of_them_is_not(self):
+    def test_names_are_encoded_and_limited_in_number(self):
         with self.lookdown(MQTT__MAX_CAMERAS="3") as server:
             for camera in ("a%2Fb", "%23", "n%C3%B6rd+lich", "fourth", "fifth"):
                 server.post(f"{DETECT}&camera={camera}", OFFICE)
@@ -149,20 +149,20 @@ class Mqtt(unittest.TestCase):
             self.assertEqual(len(topics), 3)
             self.assertTrue(all(topic.count("/") == 3 for topic in topics), topics)
 
-    def test_a_wrong_password_is_told_once_and_never_shown(self):
+    def test_a_wrong_password_is_logged_once_and_never_shown(self):
         wrong = self.broker.url.replace(PASSWORD_IN_URL, "wr0ng")
         with self.lookdown(MQTT__URL=wrong, LOG__FILTER="trace") as server:
             server.post(DETECT, OFFICE)
             log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
             wait_until(lambda: "mqtt.url" in log.read_text(errors="replace"), "the warning is logged")
             text = log.read_text(errors="replace")
-        self.assertEqual(text.count("nothing is published"), 1)
+        self.assertEqual(text.count("not publishing"), 1)
         for secret in ("wr0ng", PASSWORD, PASSWORD_IN_URL):
             self.assertNotIn(secret, text)
 
 
 class MqttOverTls(unittest.TestCase):
-    """The same, encrypted."""
+    """MQTT over TLS."""
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
@@ -183,14 +183,14 @@ class MqttOverTls(unittest.TestCase):
         tls = {"certfile": certificate, "keyfile": key, "cafile": authority}
         self.broker = self.enterContext(broker(self.folder, tls))
 
-    def test_a_broker_of_the_authority_is_spoken_to(self):
+    def test_a_broker_with_a_trusted_certificate_is_used(self):
         settings = {"MQTT__URL": self.broker.url, "MQTT__AUTHORITIES": str(self.broker.tls["cafile"])}
         with lookdown(TINY | settings):
             wait_until(lambda: self.broker.retained().get(STATUS) == "online", "the status is online")
 
-    def test_another_is_told_nothing(self):
+    def test_a_broker_with_an_untrusted_certificate_is_refused(self):
         with lookdown(TINY | {"MQTT__URL": self.broker.url}) as server:
             server.post(DETECT, OFFICE)
             log = ROOT / ".setup" / "benches" / "work" / "lookdown.log"
-            wait_until(lambda: "nothing is published" in log.read_text(errors="replace"), "the warning is logged")
+            wait_until(lambda: "not publishing" in log.read_text(errors="replace"), "the warning is logged")
             self.assertEqual(self.broker.retained(), {})

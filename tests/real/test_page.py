@@ -1,6 +1,6 @@
-"""The web page in Debian's Chromium, driven by Playwright; what it computes, in Node.
+"""The web page in Debian's Chromium, driven by Playwright, and its calculations in Node.
 
-`LOOKDOWN_PAGE_PICTURES=docs/images make real PARTS=page` makes the pictures in docs/images anew.
+`LOOKDOWN_PAGE_PICTURES=docs/images make real PARTS=page` updates the screenshots in docs/images.
 """
 
 import hashlib
@@ -17,15 +17,15 @@ from support.places import FIXTURES, ROOT, SAMPLES
 HERE = Path(__file__).resolve().parent / "page"
 KEY = "a key that only this test knows"
 PICTURED = "gate,office,canteen,lounge"
-"""Cameras whose pictures are kept."""
+"""Cameras whose images are kept."""
 
 
 class Page(unittest.TestCase):
-    """What a visitor sees and does."""
+    """The actions and views of a visitor."""
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Fetches what the browser is driven with, as the lock file says."""
+        """Installs the browser driver according to the lock file."""
         environment = os.environ | {"PLAYWRIGHT_SKIP_BROWSER_DOWNLOAD": "1"}
         subprocess.run(
             ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"],
@@ -34,7 +34,7 @@ class Page(unittest.TestCase):
             check=True,
         )
 
-    def test_what_the_page_computes_by_itself(self) -> None:
+    def test_the_calculations_of_the_page(self) -> None:
         self.run_node("maths.test.js", {})
 
     def test_the_page_in_a_browser(self) -> None:

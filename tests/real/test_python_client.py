@@ -20,12 +20,12 @@ KEY = "lookdown_of_a_client"
 
 
 class GeneratedClient(unittest.TestCase):
-    """What it is, and what it does."""
+    """The generated client."""
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
         config = self.folder / "config.yml"
-        # As docs/python-client.md says. The hooks would format what is generated.
+        # As in docs/python-client.md. The hooks would format the generated code.
         config.write_text("content_type_overrides: {image/jpeg: application/octet-stream}\npost_hooks: []\n", encoding="utf-8")
         command = ["generate", "--fail-on-warning", "--config", config, "--output-path", self.folder / "client"]
         document = ROOT / "openapi" / "openapi.json"
@@ -34,7 +34,7 @@ class GeneratedClient(unittest.TestCase):
         )
 
     def python(self, *arguments: str) -> str:
-        """What a program with the client prints."""
+        """The output of a program that uses the client."""
         environment = os.environ | {"PYTHONPATH": str(self.folder / "client")}
         done = subprocess.run(
             [BIN / "python", *arguments], capture_output=True, text=True, check=False, timeout=120, env=environment
@@ -42,7 +42,7 @@ class GeneratedClient(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         return done.stdout
 
-    def test_it_is_made_without_a_warning_and_does_what_it_says(self):
+    def test_it_is_generated_without_warnings_and_works(self):
         said = self.generated.stdout + self.generated.stderr
         self.assertEqual(self.generated.returncode, 0, said)
         self.assertNotIn("warning", said.lower())
@@ -57,7 +57,7 @@ class GeneratedClient(unittest.TestCase):
         self.assertEqual(set(answer["persons"]), {len(report["persons"])})
         self.assertGreater(answer["predictions"], 0)
         self.assertEqual(answer["best"], report["persons"][0])
-        self.assertIn("nobody", answer["refused"])
+        self.assertIn("unknown-id", answer["refused"])
         self.assertIn("office", answer["calibrations"])
         self.assertEqual(set(answer["cameras"]), {"office", "copy"})
         self.assertEqual(answer["past"], 3)

@@ -1,4 +1,4 @@
-"""Two servers that share a Redis: any answers for any camera, and none needs Redis to find persons."""
+"""Two servers that share a Redis: each answers for any camera, and detection does not need Redis."""
 
 import contextlib
 import http.client
@@ -25,7 +25,7 @@ from waiting import PATIENCE_SECONDS, wait_until
 
 PICTURE = OFFICE.read_bytes()
 RECORD = (ROOT / "src" / "results" / "redis" / "record.lua").read_text(encoding="utf-8")
-"""What Redis does with a report."""
+"""The script that stores a report."""
 MOST_PICTURES = 2
 
 
@@ -43,17 +43,17 @@ def replica(name: str, url: str, **settings: str) -> Iterator[Server]:
     }
     environment = {f"LOOKDOWN__{key}": value for key, value in wanted.items()}
     with running(name, [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
-        wait_until(lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "nobody" in name, "Redis is found")
+        wait_until(lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "unreachable" in name, "Redis is connected")
         yield server
 
 
 def log_of(name: str) -> str:
-    """What a replica has said so far."""
+    """The log of a replica."""
     return (LOGS / f"{name}.log").read_text(encoding="utf-8")
 
 
 def get(server: Server, path: str, **headers: str) -> Answer:
-    """The answer to a question."""
+    """The answer to a GET request."""
     return ask(server.address, "GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
 
 
@@ -74,7 +74,7 @@ class Stream:
         assert self._answer.status == 200, self._answer.read()
 
     def next(self) -> tuple[str, bytes]:
-        """ID and data of the next event; comments are passed over."""
+        """ID and data of the next event. Comments are skipped."""
         found = {}
         while True:
             line = self._answer.readline()
@@ -86,7 +86,7 @@ class Stream:
                 return found[b"id"].decode(), found[b"data"]
 
     def close(self) -> None:
-        """Leaves."""
+        """Disconnects."""
         self._connection.close()
 
 
@@ -95,18 +95,18 @@ class Shared(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """One for all."""
+        """Starts one Redis and two servers for all tests."""
         cls.redis = cls.enterClassContext(RedisServer())
         cls.one = cls.enterClassContext(replica("redis-one", cls.redis.url))
         cls.other = cls.enterClassContext(replica("redis-other", cls.redis.url))
 
     def latest(self, server: Server, camera: str, report: bytes) -> Answer:
-        """The latest report of a camera, when it is this one."""
+        """Waits until this is the latest report of a camera, and returns the answer."""
         path = f"/results/{camera}/latest"
         wait_until(lambda: get(server, path).body == report, "the report is the latest")
         return get(server, path)
 
-    def test_a_report_is_the_same_on_every_server_to_the_byte_and_to_its_id(self) -> None:
+    def test_reports_and_ids_are_identical_on_every_server(self) -> None:
         """Latest, history, list and 304."""
         sent = [detect(server, "hall").body for server in (self.one, self.other, self.one)]
         one, other = (self.latest(server, "hall", sent[-1]) for server in (self.one, self.other))
@@ -129,7 +129,7 @@ class Shared(unittest.TestCase):
         ]
         self.assertEqual(rows[0], rows[1])
 
-    def test_whoever_waits_at_one_server_is_answered_when_another_has_news(self) -> None:
+    def test_long_polls_are_answered_by_reports_of_other_servers(self) -> None:
         """Long polls, also for the first report of a camera."""
         for before in (None, "known"):
             tag = '"0"'
@@ -140,14 +140,14 @@ class Shared(unittest.TestCase):
             path = "/results/stairs/latest?wait=10"
             waiting = threading.Thread(target=lambda: answers.append(get(self.other, path, If_None_Match=tag)))
             waiting.start()
-            wait_until(lambda: metric(self.other, "results_listeners") >= 1.0, "somebody listens")
+            wait_until(lambda: metric(self.other, "results_listeners") >= 1.0, "a client listens")
             began = time.monotonic()
             sent = detect(self.one, "stairs")
             waiting.join(PATIENCE_SECONDS)
             self.assertEqual((answers[0].status, answers[0].body), (200, sent.body))
             self.assertLess(time.monotonic() - began, 3.0)
 
-    def test_events_go_on_at_another_server_where_they_ended_at_one(self) -> None:
+    def test_event_streams_can_be_resumed_on_another_server(self) -> None:
         """`Last-Event-ID`, and both kinds of streams."""
         first = detect(self.one, "yard").body
         self.latest(self.other, "yard", first)
@@ -166,16 +166,16 @@ class Shared(unittest.TestCase):
             sent.append(newest)
 
     def test_listeners_cost_redis_no_connections(self) -> None:
-        """Two for each server, whoever listens."""
+        """Two for each server, independent of the number of listeners."""
         streams = [Stream(self.one, f"/results/camera-{number}/events") for number in range(30)]
         clients = self.redis.ask("CLIENT", "LIST").decode().splitlines()
-        # This test is one of them.
+        # The connection of this test is one of them.
         self.assertEqual(len(clients) - 1, 4)
         for stream in streams:
             stream.close()
 
-    def test_nothing_stays_for_ever(self) -> None:
-        """Every key has an end."""
+    def test_every_key_expires(self) -> None:
+        """Every key has an expiry."""
         detect(self.one, "hall")
         keys = self.redis.ask("KEYS", "*")
         self.assertGreater(len(keys), 5)
@@ -183,7 +183,7 @@ class Shared(unittest.TestCase):
             self.assertIn(self.redis.ask("TTL", key), range(80_000, 86_401), key)
             self.assertTrue(key.startswith(b"lookdown:"), key)
 
-    def test_metrics_tell_what_is_in_redis(self) -> None:
+    def test_metrics_show_the_content_of_redis(self) -> None:
         """The same on both."""
         detect(self.one, "hall")
         wait_until(lambda: metric(self.one, "results_waiting") == 0.0, "all is stored")
@@ -197,8 +197,8 @@ class Shared(unittest.TestCase):
 class Away(unittest.TestCase):
     """A Redis that does not answer."""
 
-    def test_frames_are_answered_as_ever_and_results_come_back_by_themselves(self) -> None:
-        """Killed and started anew, and halted and let go on, in the middle of frames."""
+    def test_an_outage_delays_results_but_not_answers(self) -> None:
+        """Redis is killed and restarted, then halted and continued, during frames."""
         with RedisServer() as redis, replica("redis-left", redis.url) as server:
             stream = Stream(server, "/results/hall/events")
             statuses: list[int] = []
@@ -217,7 +217,7 @@ class Away(unittest.TestCase):
             usual = max(seconds[:20], default=0.0)
             for leave, come_back in ((redis.kill, redis.start), (redis.halt, redis.go_on)):
                 leave()
-                wait_until(lambda: get(server, "/results/hall/latest").status == 503, "the outage is noticed")
+                wait_until(lambda: get(server, "/results/hall/latest").status == 503, "the outage is detected")
                 for path in ("/results", "/results/hall/latest", "/results/hall/history", "/events"):
                     answer = get(server, path)
                     self.assertEqual(answer.status, 503, path)
@@ -229,16 +229,16 @@ class Away(unittest.TestCase):
                 self.assertEqual(metric(server, "results_store_up"), 0.0)
                 wait_until(lambda: metric(server, "results_waiting") > 0.0, "reports wait for Redis")
                 come_back()
-                wait_until(lambda: get(server, "/results/hall/latest").status == 200, "Redis is there again")
+                wait_until(lambda: get(server, "/results/hall/latest").status == 200, "Redis is connected again")
                 self.assertEqual(metric(server, "results_store_up"), 1.0)
-                wait_until(lambda: metric(server, "results_waiting") <= 1.0, "what waited is stored")
+                wait_until(lambda: metric(server, "results_waiting") <= 1.0, "the waiting reports are stored")
                 stream.next()
             over.set()
             sending.join(PATIENCE_SECONDS)
             print(f"{len(statuses)} frames, the slowest {max(seconds):.3f} s (before {usual:.3f} s)", end=" ... ")
             self.assertEqual(set(statuses), {200})
             self.assertLess(max(seconds), 2.0)
-            # What was found meanwhile is there, once.
+            # Reports of the outage are stored exactly once.
             wait_until(lambda: metric(server, "results_waiting") == 0.0, "all is stored")
             stored = [row["report"]["request_id"] for row in get(server, "/results/hall/history").json()]
             self.assertEqual(len(set(stored)), len(stored))
@@ -247,20 +247,20 @@ class Away(unittest.TestCase):
         self.assertEqual(told.count("does not answer"), 2, told)
         self.assertEqual(told.count("answers again"), 2, told)
 
-    def test_a_server_starts_without_redis_and_finds_it_when_it_comes(self) -> None:
+    def test_a_server_starts_without_redis_and_connects_later(self) -> None:
         """Reports wait for it, within limits."""
         redis = RedisServer()
-        with replica("redis-nobody", redis.url) as server:
+        with replica("redis-unreachable", redis.url) as server:
             sent = detect(server, "hall")
             self.assertEqual(sent.status, 200)
             self.assertEqual(get(server, "/results").status, 503)
             with redis:
                 wait_until(lambda: get(server, "/results/hall/latest").body == sent.body, "the report is the latest")
-                told = log_of("redis-nobody")
+                told = log_of("redis-unreachable")
         self.assertEqual((told.count("does not answer"), told.count("answers again")), (1, 1), told)
 
-    def test_what_was_found_last_is_kept_although_the_server_ends(self) -> None:
-        """The end waits for what is on its way."""
+    def test_the_last_reports_are_stored_before_the_server_ends(self) -> None:
+        """The shutdown waits for reports in flight."""
         with RedisServer() as redis:
             with replica("redis-ends", redis.url) as server:
                 sent = [detect(server, "hall").body for _ in range(5)]
@@ -271,26 +271,26 @@ class Away(unittest.TestCase):
 class Secrets(unittest.TestCase):
     """Passwords and TLS."""
 
-    def test_a_password_is_used_and_never_told(self) -> None:
-        """A wrong one is told as such; when it is right at last, all goes well."""
+    def test_a_password_is_used_and_never_shown(self) -> None:
+        """A wrong one is reported as such. When it is corrected, everything works."""
         with RedisServer("--requirepass", "s3cret-right", password="s3cret-right") as redis:
             with replica("redis-password", redis.url) as server:
                 sent = detect(server, "hall").body
                 wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
                 ready = get(server, "/readyz").body
             wrong = redis.url.replace("right", "wrong")
-            with replica("redis-nobody-wrong", wrong) as server:
-                wait_until(lambda: "WRONGPASS" in log_of("redis-nobody-wrong") or "assword" in log_of("redis-nobody-wrong"), "the wrong password is told")
+            with replica("redis-unreachable-wrong", wrong) as server:
+                wait_until(lambda: "WRONGPASS" in log_of("redis-unreachable-wrong") or "assword" in log_of("redis-unreachable-wrong"), "the wrong password is logged")
                 ready += get(server, "/readyz").body
                 redis.ask("CONFIG", "SET", "requirepass", "s3cret-wrong")
                 redis.password = "s3cret-wrong"
                 sent = detect(server, "hall").body
                 wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
-        self.assertNotIn("s3cret", log_of("redis-password") + log_of("redis-nobody-wrong") + ready.decode())
+        self.assertNotIn("s3cret", log_of("redis-password") + log_of("redis-unreachable-wrong") + ready.decode())
 
     @unittest.skipUnless(shutil.which("openssl"), "needs openssl")
-    def test_redis_may_speak_tls(self) -> None:
-        """With an authority that the machine knows; a stranger is not trusted."""
+    def test_redis_with_tls_is_supported(self) -> None:
+        """With an authority that the machine trusts. An unknown one is not trusted."""
         folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
         certificate, key = folder / "redis.pem", folder / "redis.key"
         make = "req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=localhost"
@@ -306,7 +306,7 @@ class Secrets(unittest.TestCase):
                 server = stack.enter_context(replica("redis-tls", url))
                 sent = detect(server, "hall").body
                 wait_until(lambda: get(server, "/results/hall/latest").body == sent, "the report is the latest")
-            with replica("redis-nobody-trusts", url) as server:
+            with replica("redis-unreachable-untrusted", url) as server:
                 self.assertEqual(get(server, "/results").status, 503)
 
 
@@ -317,10 +317,10 @@ def _variable(name: str, value: str) -> Iterator[None]:
 
 
 class Bounds(unittest.TestCase):
-    """How much there may be."""
+    """The limits."""
 
-    def test_a_picture_is_drawn_by_any_server(self) -> None:
-        """The same everywhere, with its ETag; none of cameras that are not named."""
+    def test_an_image_is_drawn_by_any_server(self) -> None:
+        """Equal on every server, with its ETag. None for cameras that are not named."""
         with RedisServer() as redis:
             with (
                 replica("redis-camera", redis.url, RESULTS__PICTURES="hall") as one,
@@ -341,11 +341,11 @@ class Bounds(unittest.TestCase):
                 self.assertEqual(problem["type"], "/problems/picture-not-kept")
                 self.assertIn(redis.ask("TTL", "lookdown:picture:hall"), range(80_000, 86_401))
                 self.assertLess(redis.ask("MEMORY", "USAGE", "lookdown:picture:hall"), 4 << 20)
-                # A server that keeps none takes the one before away.
+                # A report from a server that keeps no images removes the previous one.
                 detect(other, "hall")
                 wait_until(lambda: get(one, path).status == 404, "the picture is gone")
 
-    def test_servers_keep_to_their_settings(self) -> None:
+    def test_limits_of_the_settings_hold(self) -> None:
         """Cameras, history and reports."""
         bounds = {"RESULTS__MAX_CAMERAS": "3", "RESULTS__HISTORY_PER_CAMERA": "4", "RESULTS__MAX_REPORTS": "8"}
         with RedisServer() as redis, replica("redis-bounds", redis.url, **bounds) as server:
@@ -360,8 +360,8 @@ class Bounds(unittest.TestCase):
             for camera in "acd":
                 self.assertEqual(get(server, f"/results/{camera}/latest").body, last[camera])
 
-    def test_a_report_and_what_it_displaces_are_one_step_that_is_done_once(self) -> None:
-        """The script alone, against the same rules in a few lines of Python."""
+    def test_storing_and_eviction_are_atomic_and_idempotent(self) -> None:
+        """Compares the script with the same rules in a few lines of Python."""
         chance = random.Random(20261121)
         with RedisServer() as redis:
             for _ in range(30):
@@ -371,7 +371,7 @@ class Bounds(unittest.TestCase):
                 pictured: list[str] = []
                 for number in range(1, 60):
                     report = (str(chance.randrange(8)), number, chance.randrange(200, 800))
-                    # Whoever gets no answer sends it again.
+                    # A sender without an answer sends the report again.
                     redis.ask_all([record(report, limits)] * chance.choice((1, 1, 2)))
                     kept = room_for(kept, report, limits)
                     pictured = [camera for camera in pictured if camera != report[0]] + [report[0]] * has_picture(number)
@@ -391,12 +391,12 @@ class Bounds(unittest.TestCase):
 
 
 def has_picture(number: int) -> bool:
-    """Whether the report of this number brings one."""
+    """Returns true if the report of this number has an image."""
     return number % 3 != 0
 
 
 def record(report: tuple[str, int, int], limits: list[int]) -> tuple:
-    """The command for a report of a camera, with its number and its bytes."""
+    """The command that stores a report of a camera, with its number and its size."""
     camera, number, size = report
     keys = [f"t:{name}" for name in ("reports", "earlier", "cameras", "totals", "pictures", "sender")]
     picture = ("frame", "sketch") if has_picture(number) else ("", "")
@@ -405,7 +405,7 @@ def record(report: tuple[str, int, int], limits: list[int]) -> tuple:
 
 
 def room_for(kept: list[tuple[str, int, int]], report: tuple[str, int, int], limits: list[int]) -> list[tuple[str, int, int]]:
-    """What is kept, in order, when a report has come."""
+    """The stored reports, in order, after this report."""
     most_cameras, most_of_camera, most_reports, most_bytes = limits
     kept = [*kept, report]
     own = [one for one in kept if one[0] == report[0]]
@@ -428,7 +428,7 @@ def _fields(report: tuple[str, int, int]) -> tuple[bytes, bytes]:
 
 
 def _contents(redis: RedisServer, entries: list) -> list:
-    """What the streams of the cameras have under the IDs of these entries."""
+    """The content of the cameras' streams under the IDs of these entries."""
     asked = [("XRANGE", b"t:camera:" + entry[1][1], entry[0], entry[0]) for entry in entries]
     found = redis.ask_all(asked) if asked else []
     return [(entry[0][0], entry[0][1][2:4]) for entry in found]

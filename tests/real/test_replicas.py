@@ -1,4 +1,4 @@
-"""Several replicas for real: they agree, they grow, and losing one loses only what it was doing."""
+"""Several real replicas: they agree, throughput grows with them, and a lost one loses only requests in flight."""
 
 import contextlib
 import json
@@ -19,15 +19,15 @@ CLIENTS = 12
 DETECT = "/detect?calibration=office&profile=fast"
 HEADERS = {"Content-Type": "image/jpeg", "X-API-Key": KEY}
 ENOUGH = 200
-"""Answers after which a change has been under load for a while."""
+"""Answers after which a change has been under load long enough."""
 CORES = 0.4
-"""Of each replica where their number counts: three of them, the front and the clients fit on two cores."""
+"""Cores of each replica when throughput is measured: three replicas, HAProxy and the clients fit on two cores."""
 LEAST_GROWTH = 2.2
-"""Of three replicas over one."""
+"""Minimum throughput of three replicas relative to one."""
 
 
 def send(server: Server, method: str, path: str, body: bytes | None = None) -> tuple[int, str, dict]:
-    """Status, entity tag and JSON of an answer; a refusal is an answer."""
+    """Status, entity tag and JSON of an answer, also of a refusal."""
     request = urllib.request.Request(f"http://{server.address}{path}", body, HEADERS, method=method)
     with contextlib.ExitStack() as stack:
         try:
@@ -39,14 +39,14 @@ def send(server: Server, method: str, path: str, body: bytes | None = None) -> t
 
 
 def office(focal_factor: float = 1.0) -> bytes:
-    """The calibration of the sample, or one that differs a little."""
+    """The calibration of the sample, or one that differs slightly."""
     told = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
     told["lens"]["focal"] *= focal_factor
     return json.dumps(told).encode()
 
 
 def put_everywhere(servers: dict[str, Server], content: bytes) -> str:
-    """Puts the calibration on the first replica and waits for it on all; its entity tag."""
+    """Puts the calibration on the first replica and waits for it on all. Returns its entity tag."""
     status, tag, told = send(servers["r1"], "PUT", "/calibrations/office", content)
     assert status in (200, 201), told
     for name, server in servers.items():
@@ -57,7 +57,7 @@ def put_everywhere(servers: dict[str, Server], content: bytes) -> str:
 
 @unittest.skipIf(os.geteuid(), "only root can make hosts")
 class Replicas(unittest.TestCase):
-    """With a network that takes no time, so that as many requests as possible are under way."""
+    """Tests without network latency, so that as many requests as possible are in flight."""
 
     chain: Chain
 
@@ -73,7 +73,7 @@ class Replicas(unittest.TestCase):
         self.assertNotEqual(before, after)
         reports = [send(server, "POST", DETECT, OFFICE.read_bytes())[2] for server in replicas.values()]
         self.assertEqual(len({report["calibration"]["revision"] for report in reports}), 1)
-        # Who overwrites must have seen what is there, whichever replica told.
+        # A conditional write needs the current tag, from any replica.
         status, _, problem = self._put_if_match("r2", before)
         self.assertEqual(status, 412, problem)
 
@@ -85,7 +85,7 @@ class Replicas(unittest.TestCase):
         with caught.exception as answer:
             return answer.status, "", json.loads(answer.read())
 
-    def test_any_replica_tells_what_any_other_has_found(self):
+    def test_any_replica_returns_the_reports_of_the_others(self):
         replicas = self.chain.replicas
         for finder in REPLICAS:
             status, _, report = send(replicas[finder], "POST", f"{DETECT}&camera=yard", OFFICE.read_bytes())
@@ -97,14 +97,14 @@ class Replicas(unittest.TestCase):
             for name in REPLICAS:
                 found = report["request_id"]
                 wait_until(
-                    lambda name=name, found=found: latest(name)[2].get("request_id") == found, f"{name} tells of it"
+                    lambda name=name, found=found: latest(name)[2].get("request_id") == found, f"{name} returns it"
                 )
             self.assertEqual(len({latest(name)[1] for name in REPLICAS}), 1)
 
-    def test_stopping_replicas_one_after_the_other_loses_nothing(self):
+    def test_stopping_replicas_in_turn_loses_no_requests(self):
         with self._load() as seen:
             for name in REPLICAS:
-                self._go_on(seen)
+                self._wait_for_answers(seen)
                 server = self.chain.replicas[name]
                 server.process.send_signal(signal.SIGTERM)
                 self.assertEqual(server.process.wait(timeout=30), 0)
@@ -113,24 +113,24 @@ class Replicas(unittest.TestCase):
         self.assertEqual(set(seen.statuses), {200}, seen.statuses)
         print(f"stopped in turns: {seen.statuses.total()} requests, {seen.lost} lost", flush=True)
 
-    def test_killing_a_replica_loses_at_most_what_it_was_doing(self):
+    def test_killing_a_replica_loses_only_requests_in_flight(self):
         with self._load() as seen:
-            self._go_on(seen)
+            self._wait_for_answers(seen)
             self.chain.replicas["r2"].process.kill()
             self.chain.wait_until("r2", "DOWN")
-            self._go_on(seen)
+            self._wait_for_answers(seen)
             self.chain.start("r2")
             self.chain.wait_until("r2", "UP")
             self._until_it_answers(seen, "r2")
         self._lost_at_most(seen, CLIENTS, "killed")
 
-    def test_a_replica_that_is_cut_off_loses_at_most_what_it_was_doing_and_comes_back(self):
+    def test_a_disconnected_replica_loses_little_and_recovers(self):
         with self._load() as seen:
-            self._go_on(seen)
+            self._wait_for_answers(seen)
             self.chain.host("r3").cut_off()
             self.addCleanup(self.chain.host("r3").back)
             self.chain.wait_until("r3", "DOWN")
-            self._go_on(seen)
+            self._wait_for_answers(seen)
             self.chain.host("r3").back()
             self.chain.wait_until("r3", "UP")
             self._until_it_answers(seen, "r3")
@@ -143,7 +143,7 @@ class Replicas(unittest.TestCase):
     def _load(self):
         return crowd(self.chain.front.address, DETECT, OFFICE.read_bytes(), HEADERS, CLIENTS)
 
-    def _go_on(self, seen):
+    def _wait_for_answers(self, seen):
         enough = seen.statuses[200] + ENOUGH
         wait_until(lambda: seen.statuses[200] >= enough, f"{ENOUGH} more answers have come")
 
@@ -159,7 +159,7 @@ class Replicas(unittest.TestCase):
 
 @unittest.skipIf(os.geteuid(), "only root can make hosts")
 class Growth(unittest.TestCase):
-    """With a real network."""
+    """Tests with a real network."""
 
     def test_throughput_grows_with_the_replicas(self):
         settings = {"INFERENCE__SESSIONS": "1", "INFERENCE__THREADS": "1"}

@@ -1,4 +1,4 @@
-"""Views are looked at by another server of the Open Inference Protocol: MLServer, and Lookdown itself."""
+"""Inference on another server of the Open Inference Protocol: MLServer, and Lookdown itself."""
 
 import contextlib
 import hashlib
@@ -29,12 +29,12 @@ FRAME = (SAMPLES / "office.jpg").read_bytes()
 FAST = "/detect?calibration=office&profile=fast"
 BALANCED = "/detect?calibration=office"
 NOTICED_SECONDS = 20.0
-"""Within this time a server must have noticed that the other is gone, or is there again."""
+"""Time within which a server must detect that the other has gone or returned."""
 
 
 @contextlib.contextmanager
 def mlserver(port: int) -> Iterator[Server]:
-    """MLServer with the default model, which is called `people` there."""
+    """MLServer with the default model under the name `people`."""
     grpc, metrics = free_ports(2)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -58,7 +58,7 @@ def mlserver(port: int) -> Iterator[Server]:
 
 
 def asking(url: str, name: str = "") -> dict[str, str]:
-    """Settings of a server that has no network of its own."""
+    """Settings of a server that uses another one for inference."""
     there = {"INFERENCE__BACKEND": "v2", "INFERENCE__URL": url, "INFERENCE__TIMEOUT_MILLIS": "60000"}
     return there | {"INFERENCE__MODEL": name or MODEL, "MODEL__PATH": str(model(MODEL).parent)}
 
@@ -74,7 +74,7 @@ def answer(server: Server, path: str, body: bytes | None = None) -> tuple[int, M
 
 
 def when_ready_is(server: Server, status: int) -> dict:
-    """What `/readyz` says when it has that status."""
+    """The answer of `/readyz` once it has that status."""
 
     def said() -> dict | None:
         found, _, told = answer(server, "/readyz")
@@ -84,10 +84,10 @@ def when_ready_is(server: Server, status: int) -> dict:
 
 
 class RemoteInference(unittest.TestCase):
-    """What is found does not depend on where the network runs, and an outage is clear and passes."""
+    """Detections do not depend on the location of the network, and outages are reported and recovered from."""
 
     def assert_same(self, report: dict, wanted: dict) -> None:
-        """Boxes equal to a hundredth of a pixel, scores to a thousandth."""
+        """Asserts that boxes agree to a hundredth of a pixel, and scores to a thousandth."""
         self.assertGreater(len(wanted["persons"]), 0)
         self.assertEqual(len(report["persons"]), len(wanted["persons"]))
         for person, other in zip(report["persons"], wanted["persons"]):
@@ -96,7 +96,7 @@ class RemoteInference(unittest.TestCase):
             for side, place in other["box"].items():
                 self.assertAlmostEqual(person["box"][side], place, delta=0.02, msg=side)
 
-    def test_mlserver_finds_what_is_found_here_and_may_go_and_come_back(self) -> None:
+    def test_mlserver_gives_the_same_detections_and_may_restart(self) -> None:
         with lookdown({"MODEL__PATH": str(model(MODEL).parent)}) as here:
             local = {path: json.loads(here.post(path, FRAME)) for path in (FAST, BALANCED)}
         (port,) = free_ports(1)
@@ -128,7 +128,7 @@ class RemoteInference(unittest.TestCase):
             when_ready_is(server, 200)
             self.assert_same(json.loads(server.post(FAST, FRAME)), local[FAST])
 
-    def test_a_server_that_starts_first_waits_for_the_other(self) -> None:
+    def test_a_server_that_starts_first_waits_for_mlserver(self) -> None:
         (port, own) = free_ports(2)
         variables = asking(f"http://127.0.0.1:{port}", "people") | {"SERVER__LISTEN": f"127.0.0.1:{own}"}
         variables |= {"CALIBRATIONS__PATH": str(SAMPLES / "calibrations"), "SHUTDOWN__GRACE_MILLIS": "0"}
@@ -141,13 +141,13 @@ class RemoteInference(unittest.TestCase):
                 when_ready_is(server, 200)
                 self.assertEqual(answer(server, FAST, FRAME)[0], 200)
 
-    def test_lookdown_itself_looks_for_another_with_views_as_bytes(self) -> None:
+    def test_lookdown_can_be_the_inference_server_with_bytes(self) -> None:
         with lookdown({"MODEL__PATH": str(model(MODEL).parent), "LIMITS__MAX_FRAMES_IN_FLIGHT": "64"}) as here:
             with lookdown(asking(f"http://{here.address}")) as front:
                 for path in (FAST, BALANCED):
                     self.assert_same(json.loads(front.post(path, FRAME)), json.loads(here.post(path, FRAME)))
 
-    def test_a_server_that_wants_a_key_gets_it(self) -> None:
+    def test_the_bearer_token_is_sent(self) -> None:
         keys = f"front:detect:{hashlib.sha256(b's3cret').hexdigest()}"
         with lookdown({"MODEL__PATH": str(model(MODEL).parent), "ACCESS__KEYS": keys}) as here:
             there = asking(f"http://{here.address}")

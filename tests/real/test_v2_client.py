@@ -1,4 +1,4 @@
-"""Triton's own client finds persons: `tritonclient[http]`, in an environment of its own."""
+"""Detection with Triton's own client, `tritonclient[http]`, in a separate environment."""
 
 import json
 import os
@@ -15,7 +15,7 @@ ASKING = HERE / "v2_client" / "ask.py"
 
 
 class TritonClient(unittest.TestCase):
-    """One server, asked by a program that knows nothing but the protocol."""
+    """One server, called by a client of the protocol."""
 
     @classmethod
     def setUpClass(cls) -> None:
@@ -34,14 +34,14 @@ class TritonClient(unittest.TestCase):
             raise AssertionError(f"the client failed: {ran.stderr[-3000:]}")
         cls.told = json.loads(ran.stdout)
 
-    def test_it_sees_a_server_that_is_alive_and_ready(self) -> None:
+    def test_it_reports_a_live_and_ready_server(self) -> None:
         self.assertEqual(self.told["health"], [True, True, True, True, False])
         self.assertEqual(self.told["server"]["name"], "lookdown")
         self.assertIn("binary_tensor_data", self.told["server"]["extensions"])
         self.assertEqual(self.told["model"]["inputs"], [{"name": "image", "datatype": "BYTES", "shape": [1]}])
         self.assertIn("READY", {row["state"] for row in self.told["index"]})
 
-    def test_json_and_bytes_both_ways_give_the_persons_of_the_report(self) -> None:
+    def test_json_and_bytes_give_the_persons_of_the_report(self) -> None:
         persons = self.report["persons"]
         self.assertGreater(len(persons), 0)
         self.assertEqual(len(self.told["found"]), 4)
@@ -56,7 +56,7 @@ class TritonClient(unittest.TestCase):
             self.assertEqual(len(json.loads(found["report"])["persons"]), len(persons))
             self.assertEqual((found["model"], found["id"]), ("lookdown", "17"))
 
-    def test_the_bare_detector_takes_views(self) -> None:
+    def test_the_bare_detector_accepts_views(self) -> None:
         for datatype, found in self.told["views"].items():
             boxes, scores = found
             self.assertEqual((boxes[0], boxes[2]), (2, 4), datatype)
@@ -66,14 +66,14 @@ class TritonClient(unittest.TestCase):
     def test_asynchronous_requests_are_answered(self) -> None:
         self.assertEqual(self.told["asynchronous"], [len(self.report["persons"])] * 3)
 
-    def test_refusals_reach_the_caller_as_one_sentence(self) -> None:
+    def test_refusals_are_returned_as_one_sentence(self) -> None:
         refused = self.told["refused"]
         for name, (status, part) in {
             "unknown model": ("404", "model: "),
             "no picture": ("415", "JPEG"),
             "two frames": ("422", "one frame"),
             "unknown parameter": ("400", "colour"),
-            "unknown calibration": ("404", "nobody"),
+            "unknown calibration": ("404", "unknown-id"),
             "score out of range": ("422", "score_threshold"),
             "sequence": ("400", "sequence_id"),
             "shared memory": ("422", "shared memory"),

@@ -1,4 +1,4 @@
-"""Waits for a state, never for a time."""
+"""Waits for a state instead of a fixed time."""
 
 import time
 from collections.abc import Callable
@@ -8,7 +8,7 @@ LOOKS_PER_SECOND = 50.0
 
 
 def wait_until(holds: Callable[[], object], what: str, seconds: float = PATIENCE_SECONDS) -> object:
-    """What holds at last; an `AssertionError` that says what was waited for if nothing does."""
+    """Waits until `holds` returns a true value and returns it. Otherwise an `AssertionError` names `what`."""
     deadline = time.monotonic() + seconds
     while not (found := holds()):
         if time.monotonic() > deadline:

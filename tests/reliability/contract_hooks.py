@@ -1,4 +1,4 @@
-"""What schemathesis cannot make up from the OpenAPI document: pictures, calibrations, and who may say what twice."""
+"""Hooks for schemathesis: data that it cannot generate from the OpenAPI document, such as images and calibrations."""
 
 import json
 import re
@@ -18,7 +18,7 @@ PICTURES = {
 
 
 def contents(files: list[Path]) -> strategies.SearchStrategy[bytes]:
-    """The content of one of the files."""
+    """A strategy for the content of one of the files."""
     return strategies.sampled_from([file.read_bytes() for file in files])
 
 
@@ -36,7 +36,7 @@ schemathesis.openapi.format("binary", ANY_PICTURE)
 
 @schemathesis.hook
 def filter_case(context, case):
-    """What violates nothing, though it was made up to."""
+    """Drops generated cases that were meant to be invalid but are valid."""
     if case.media_type != "multipart/form-data" or not isinstance(case.body, dict):
         return True
     fields = form_fields(case.operation)
@@ -50,8 +50,8 @@ def form_fields(operation):
 
 
 def reads_well(name, value, field):
-    """Whether a value that is no value of its field reads as one. In a form all is text: a list is nothing but its
-    items, null is a word, and digits in quotes are a number; and DeepStack's clients write nothing for a confidence that
+    """Returns true if a value of the wrong type is valid as form text. In a form everything is text: a list is its
+    items, null is a word, and quoted digits are a number. DeepStack's clients send an empty text for a confidence that
     they leave out."""
     if isinstance(value, list) or (name, value) == ("min_confidence", ""):
         return True
@@ -62,13 +62,13 @@ def reads_well(name, value, field):
 
 @schemathesis.hook
 def before_call(context, case, kwargs):
-    """Who means well gives a parameter in the form or in the query, and one condition at a time."""
+    """Keeps each parameter in the form or in the query only, and at most one condition."""
     if case.meta is None or not case.meta.generation.mode.is_positive:
         return
     if case.media_type == "multipart/form-data" and isinstance(case.body, dict):
         case.query = {name: value for name, value in (case.query or {}).items() if name not in case.body}
     if case.method == "PUT":
-        # No file has a camera of a made-up name, and most tell their size.
+        # No file has a camera with a generated name, and most contain their size.
         case.query = {}
     if case.operation.label in CALIBRATIONS_ARE_SENT:
         case.body = CALIBRATIONS[len(repr(case.body)) % len(CALIBRATIONS)].read_bytes()
@@ -77,13 +77,13 @@ def before_call(context, case, kwargs):
         send_tensors(case)
     conditions = [name for name in ("If-Match", "If-None-Match") if name in (case.headers or {})]
     for name in conditions:
-        # schemathesis 4.32 does not know patterns of headers.
+        # schemathesis 4.32 does not support patterns of headers.
         if len(conditions) > 1 or not CONDITION.fullmatch(case.headers[name]):
             case.headers.pop(name)
 
 
 def send_tensors(case):
-    """The length of the JSON is what it is; bytes are a picture behind the JSON that says so."""
+    """Sets the length of the JSON, and appends byte tensors with an image after the JSON."""
     if case.headers is None:
         case.headers = {}
     case.headers.pop(HEAD_LENGTH, None)

@@ -1,7 +1,7 @@
-"""Proves that nothing that is done to a server takes it down: `run.py short|long|tell [PART...]`, all parts by default.
+"""Proves that the server survives faults: `run.py short|long|tell [PART...]`, all parts by default.
 
-Each part prints a row for each thing it shows and keeps it; `tell` prints the rows that are kept, as Markdown. Exits
-with 1 when something does not hold.
+Each part prints and stores a row for each result; `tell` prints the stored rows as Markdown. Exits
+with 1 when a proof fails.
 """
 
 import json
@@ -18,16 +18,16 @@ from proofs import clock, contract, descriptors, disk, kill, memory, overload, r
 from support.effort import LONG, SHORT  # noqa: E402
 from support.places import WORK  # noqa: E402
 from support.row import Row  # noqa: E402
-from support.tell import told  # noqa: E402
+from support.tell import markdown  # noqa: E402
 
 PARTS = (contract, kill, stop, reload, disk, descriptors, memory, clock, rude, overload, soak)
 EFFORTS = {effort.name: effort for effort in (SHORT, LONG)}
 
 
 def main(arguments: list[str]) -> int:
-    """The exit status."""
+    """Returns the exit status."""
     named = {part.__name__.rpartition(".")[2]: part for part in PARTS}
-    # Servers that were started are stopped on the way out.
+    # Started servers are stopped on exit.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     wanted, *parts = arguments or [""]
     unknown = [name for name in parts if name not in named]
@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> int:
         print(f"usage: run.py short|long|tell [{'|'.join(named)}]...", file=sys.stderr)
         return 2
     if wanted == "tell":
-        print(told(WORK, named))
+        print(markdown(WORK, named))
         return 0
     try:
         rows = [row for name in parts or named for row in _prove(name, named[name], EFFORTS[wanted])]

@@ -1,5 +1,5 @@
 //! Settings: layers, limits and refusals.
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod places;
 mod refusals;
@@ -31,12 +31,12 @@ pub(crate) fn defaults() -> Settings {
 /// The message of a refusal, which must be one line.
 pub(crate) fn refusal(result: Result<Settings, SettingsError>) -> String {
     let message = result.unwrap_err().to_string();
-    assert!(!message.contains('\n'), "{message:?} is more than a line");
+    assert!(!message.contains('\n'), "{message:?} is more than one line");
     message
 }
 
 #[test]
-fn variables_come_before_the_file_and_that_before_defaults() {
+fn variables_override_the_file_and_the_file_overrides_defaults() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lookdown.toml");
     fs::write(
@@ -88,7 +88,7 @@ fn tls_is_on_with_a_certificate_and_its_key_and_off_without() {
 }
 
 #[test]
-fn half_of_what_tls_needs_is_refused_with_the_other_half() {
+fn incomplete_tls_settings_name_the_missing_half() {
     for (given, missing) in [
         ("CERTIFICATE", "server.tls.private_key is empty"),
         ("PRIVATE_KEY", "server.tls.certificate is empty"),
@@ -210,13 +210,13 @@ fn draining_takes_as_long_as_a_request_by_default() {
 }
 
 #[test]
-fn without_a_number_of_sessions_the_machine_decides() {
+fn the_default_number_of_sessions_follows_from_the_machine() {
     let sessions = defaults().threads.sessions;
     assert_eq!(sessions, std::thread::available_parallelism().unwrap());
 }
 
 #[test]
-fn pictures_are_kept_of_the_named_cameras_alone() {
+fn images_are_stored_for_the_named_cameras_only() {
     for (named, hall, stairs) in [
         ("", false, false),
         ("hall", true, false),

@@ -36,7 +36,7 @@ fn a_path_that_is_set_must_exist() {
         for part in parts {
             assert!(
                 refused.to_string().contains(part),
-                "{refused} does not say {part:?}"
+                "{refused} does not contain {part:?}"
             );
         }
     }
@@ -56,7 +56,7 @@ fn place(path: &str) -> Result<CalibrationPlace, SettingsError> {
 }
 
 #[test]
-fn calibrations_are_in_a_folder_or_in_the_bucket_of_a_url() {
+fn calibrations_are_in_a_folder_or_a_bucket() {
     let folder = CalibrationPlace::Folder("/srv/calibrations".into());
     assert_eq!(place("file:///srv/calibrations").unwrap(), folder);
     for url in [
@@ -97,9 +97,9 @@ fn credentials_in_the_url_of_a_bucket_are_not_repeated() {
 }
 
 #[test]
-fn what_belongs_to_the_executable_is_found_from_anywhere() {
+fn files_of_the_executable_are_found_from_any_directory() {
     let folders = fs::canonicalize(env!("CARGO_MANIFEST_DIR")).unwrap();
-    // The models' folder is checked in, and this test's executable lies below it.
+    // The models' folder is checked in, and this test's executable is in a folder below it.
     let found = defaults().model.find_repository().unwrap();
     assert_eq!(fs::canonicalize(found).unwrap(), folders.join("models"));
 }

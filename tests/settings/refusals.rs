@@ -303,7 +303,10 @@ fn an_invalid_value_is_refused_with_key_value_and_remedy() {
     for (variable, value, key, remedy) in UNUSABLE {
         let message = refusal(from_environment(&format!("LOOKDOWN__{variable}"), value));
         for part in [key, value, remedy] {
-            assert!(message.contains(part), "{message:?} does not say {part:?}");
+            assert!(
+                message.contains(part),
+                "{message:?} does not contain {part:?}"
+            );
         }
     }
 }
@@ -335,14 +338,14 @@ fn a_value_of_the_wrong_toml_type_is_refused() {
 }
 
 #[test]
-fn a_file_that_is_not_toml_is_refused_with_the_place() {
+fn a_file_that_is_not_toml_is_refused_with_the_line() {
     let message = refusal(from_file("[server]\nlisten = \n"));
     assert!(message.contains("lookdown.toml"), "{message}");
     assert!(message.contains("line 2"), "{message}");
 }
 
 #[test]
-fn a_file_that_is_not_there_is_refused_by_name() {
+fn a_missing_file_is_refused_by_name() {
     let message = refusal(load(Some(Path::new("/nowhere/l.toml")), HashMap::new()));
     assert!(
         message.contains("/nowhere/l.toml") && message.contains("--config"),
@@ -363,7 +366,7 @@ fn the_password_of_a_broker_is_neither_shown_nor_repeated() {
 }
 
 #[test]
-fn an_inference_server_is_an_address_without_a_password() {
+fn an_inference_server_url_must_not_have_a_password() {
     let with_url = |url: &str| {
         let text = format!("[inference]\nbackend = \"v2\"\nmodel = \"m\"\nurl = \"{url}\"\n");
         from_file(&text)

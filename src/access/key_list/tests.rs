@@ -54,7 +54,7 @@ fn only_the_whole_key_is_accepted() {
 fn errors_name_the_position_and_do_not_repeat_the_input() {
     let good = digest_of("one");
     let leak = "lookdown_do-not-show-me";
-    for (text, told) in [
+    for (text, expected) in [
         (format!("gate = \"{leak}\""), "line 1:"),
         (
             format!("\n\ngate = {{ scopes = \"{leak}\", sha256 = \"{good}\" }}"),
@@ -84,17 +84,17 @@ fn errors_name_the_position_and_do_not_repeat_the_input() {
         ),
     ] {
         let message = KeyList::from_toml(&text).unwrap_err().to_string();
-        assert!(message.contains(told), "{message}");
+        assert!(message.contains(expected), "{message}");
         assert!(!message.contains("do-not-show-me"), "{message}");
     }
-    for (text, told) in [
+    for (text, expected) in [
         (leak.to_owned(), "name:scope+scope:sha256"),
         (format!("gate:detect:{leak}"), "never the key itself"),
         (format!("gate:{leak}:{good}"), "detect, read and admin"),
         (format!("a:read:{good},a:read:{good}"), "key 2: its name"),
     ] {
         let message = text.parse::<KeyList>().unwrap_err().to_string();
-        assert!(message.contains(told), "{message}");
+        assert!(message.contains(expected), "{message}");
         assert!(!message.contains("do-not-show-me"), "{message}");
     }
 }

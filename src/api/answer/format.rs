@@ -1,4 +1,4 @@
-//! Which form an answer takes: the parameter `format`, or what the client accepts.
+//! The format of a response: the parameter `format`, or content negotiation.
 
 use axum::http::HeaderMap;
 use strum::VariantNames;
@@ -15,18 +15,18 @@ use crate::{
     },
 };
 
-/// A form of an answer.
+/// A format of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum AnswerFormat {
     /// The report.
     Report,
-    /// The frame with what was found drawn into it.
+    /// The annotated image.
     Picture(PictureFormat),
     /// A file for annotation tools.
     Annotations(AnnotationFormat),
 }
 
-/// The names of the report and of pictures.
+/// The names of the report and of the annotated image.
 const REPORT: &str = "json";
 const PICTURE: &str = "image";
 const ANNOTATIONS: &[&str] = <AnnotationFormat as VariantNames>::VARIANTS;
@@ -39,7 +39,7 @@ const NAMES: [&str; 2 + ANNOTATIONS.len()] = {
 };
 
 parameter_table! {
-    /// The parameter of the answer's format.
+    /// The parameter of the response format.
     pub(in crate::api) const TABLE;
 
     FORMAT = ParameterSpec {
@@ -59,7 +59,8 @@ const PICTURES: [(AnswerFormat, &str); 2] = [
     of_picture(PictureFormat::Jpeg),
     of_picture(PictureFormat::Png),
 ];
-/// What a media type is enough to ask for: those of the other files are not theirs alone.
+/// The formats that `Accept` can select. The media types of the other formats are not specific to
+/// them.
 const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
     (AnswerFormat::Report, AnswerFormat::Report.media_type()),
     PICTURES[0],
@@ -76,8 +77,8 @@ const fn of_picture(format: PictureFormat) -> (AnswerFormat, &'static str) {
 }
 
 impl AnswerFormat {
-    /// Reads the parameter `format`; without it, chooses the format that `Accept` prefers. The parameter
-    /// overrules `Accept`, which then only chooses between JPEG and PNG.
+    /// Reads the parameter `format`; without it, chooses the format that `Accept` prefers. The
+    /// parameter overrules `Accept`, which then only chooses between JPEG and PNG.
     pub(super) fn read<'a>(
         given: impl IntoIterator<Item = (&'a str, &'a str)>,
         headers: &HeaderMap,
@@ -91,7 +92,7 @@ impl AnswerFormat {
         }
     }
 
-    /// What an answer in this form says it is.
+    /// Returns the media type of a response in this format.
     pub(super) const fn media_type(self) -> &'static str {
         match self {
             Self::Report => "application/json",
@@ -109,8 +110,8 @@ impl AnswerFormat {
 fn not_acceptable() -> Problem {
     let offered = NEGOTIABLE.map(|(_, media_type)| media_type).join(", ");
     let detail = format!(
-        "Accept: nothing that it names is offered here: name one of {offered}, leave it out, or choose \
-         with the parameter format"
+        "Accept: none of its media types is available: use one of {offered}, omit the header, or set \
+         the parameter format"
     );
     Problem::new(ProblemKind::NotAcceptable, detail)
 }

@@ -1,4 +1,4 @@
-//! The ID in the address.
+//! The calibration ID in the path.
 
 use axum::{
     extract::{FromRequestParts, Path},
@@ -13,10 +13,10 @@ use crate::{
     calibration::CalibrationId,
 };
 
-/// The ID of a calibration that may be there.
+/// The ID of an existing calibration; it need not exist.
 pub(in crate::api) struct CalibrationAddress(pub(super) CalibrationId);
 
-/// The ID of a calibration that is to be there.
+/// The ID of a calibration to create or replace.
 pub(in crate::api) struct NewCalibrationAddress(pub(super) CalibrationId);
 
 impl FromRequestParts<ApiState> for CalibrationAddress {
@@ -44,7 +44,7 @@ async fn id(
     state: &ApiState,
     kind: ProblemKind,
 ) -> Result<CalibrationId, Problem> {
-    // Bytes that are no text are no ID either.
+    // A path segment that is not UTF-8 is not an ID.
     let id = Path::<String>::from_request_parts(parts, state).await;
     let id = id.map(|Path(id)| id).unwrap_or_default();
     id.parse()

@@ -1,4 +1,4 @@
-//! When a writer wants its change (RFC 9110, section 13.1). An entity tag is the calibration's revision.
+//! Conditional changes of calibrations (RFC 9110, section 13.1). The entity tag is the revision.
 
 use axum::http::{
     HeaderMap,
@@ -13,7 +13,7 @@ use crate::{
     calibration::WriteCondition,
 };
 
-/// When a writer wants its change.
+/// Returns the condition of a change.
 pub(super) fn write_condition(headers: &HeaderMap) -> Result<WriteCondition, Problem> {
     let if_match = named(headers, &IF_MATCH, false)?;
     let if_none_match = named(headers, &IF_NONE_MATCH, true)?;
@@ -23,7 +23,7 @@ pub(super) fn write_condition(headers: &HeaderMap) -> Result<WriteCondition, Pro
         (Some(Named::Any), None) => Ok(WriteCondition::IfPresent),
         (Some(Named::Tags(tags)), None) => Ok(WriteCondition::IfRevision(tags)),
         _ => {
-            let detail = "give If-Match with the ETag you know, or If-None-Match: *, or neither";
+            let detail = "send If-Match with the known ETag, or If-None-Match: *, or neither";
             Err(Problem::new(ProblemKind::MalformedRequest, detail))
         }
     }

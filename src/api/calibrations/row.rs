@@ -1,4 +1,4 @@
-//! What is told of a calibration.
+//! A calibration in the list of calibrations.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -15,23 +15,23 @@ use crate::{
     "image": { "width": 1680, "height": 1680 }, "lens": "equidistant"
 }))]
 pub(in crate::api) struct CalibrationInfo {
-    /// Its ID.
+    /// The ID of the calibration.
     id: String,
-    /// The revision that serves, as in reports; absent when none does.
+    /// The revision in use, as in reports; absent when no revision is in use.
     #[serde(skip_serializing_if = "Option::is_none")]
     revision: Option<String>,
-    /// The name of its file.
+    /// The name of the file.
     file: String,
-    /// The size of the frames it was made for.
+    /// The size of the frames that the calibration was made for.
     #[serde(skip_serializing_if = "Option::is_none")]
     image: Option<ImageSize>,
-    /// The model of its lens.
+    /// The lens model.
     #[serde(skip_serializing_if = "Option::is_none")]
     lens: Option<&'static str>,
-    /// Why the newest version of its file is not used.
+    /// The reason why the newest version of the file is not used.
     #[serde(skip_serializing_if = "Option::is_none")]
     problem: Option<String>,
-    /// Assumptions of the reader, and implausible properties.
+    /// Assumptions made when the file was read, and implausible properties.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     warnings: Vec<ReportWarning>,
 }

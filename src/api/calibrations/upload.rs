@@ -16,21 +16,21 @@ use crate::{
     calibration::{CalibrationFile, Reading, native::NotAFrameSize},
 };
 
-/// An uploaded calibration file.
+/// An uploaded calibration file with the options to read it.
 pub(in crate::api) struct CalibrationUpload {
-    /// The file.
+    /// The content of the file.
     pub(super) content: Bytes,
-    /// How to read it.
+    /// The options to read it.
     pub(super) reading: Reading,
 }
 
-/// A calibration file to look through, and how.
+/// An uploaded calibration file and the view plan to preview.
 pub(in crate::api) struct CalibrationTrial {
-    /// The file.
+    /// The uploaded file.
     pub(super) upload: CalibrationUpload,
-    /// The profile asked for.
+    /// The requested profile.
     pub(super) profile: Option<String>,
-    /// The grid asked for.
+    /// The requested grid.
     pub(super) grid: Option<String>,
 }
 
@@ -75,7 +75,7 @@ impl CalibrationUpload {
 async fn content(request: Request, state: &ApiState) -> Result<(Bytes, Uri), Problem> {
     let (parts, body) = request.into_parts();
     let deadline = Deadline::of(&parts, state);
-    let remedy = "a calibration file is far smaller";
+    let remedy = "send a calibration file";
     let reader = state.body_reader(CalibrationFile::MAX_BYTES, remedy, deadline);
     let content = reader.read(&parts.headers, body).await?;
     Ok((content.into_bytes(), parts.uri))

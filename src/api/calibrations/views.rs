@@ -24,45 +24,45 @@ use crate::{
     pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},
 };
 
-/// Most cells along each side of a grid.
+/// Largest number of cells along each side of a grid.
 const MAX_GRID_CELLS: u32 = 32;
 
-/// How a frame of a calibration is looked at.
+/// The view plan of a calibration.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct ViewPlanInfo {
-    /// The calibration's ID.
+    /// The ID of the calibration.
     calibration: String,
-    /// Its revision, as in reports.
+    /// The revision of the calibration, as in reports.
     revision: String,
     /// The profile.
     #[schema(example = "balanced")]
     profile: &'static str,
     /// The model that the views are made for.
     model: String,
-    /// The size of the frames that outlines are in, pixels.
+    /// Width and height of the frames in whose pixels the outlines are given.
     image: [u32; 2],
-    /// Share of the lens image that lies in at least one view, 0 to 1.
+    /// Fraction of the lens image that at least one view covers, 0 to 1.
     #[schema(example = 0.998)]
     coverage: f64,
-    /// In how many views a place of the lens image lies on average.
+    /// Mean number of views that cover a point of the lens image.
     #[schema(example = 3.1)]
     overlap: f64,
-    /// What a frame costs.
+    /// The cost of a frame.
     cost: PlanCost,
-    /// The views, in the order in which the network sees them; `direct` has none.
+    /// The views, in the order in which the model receives them; empty for `direct`.
     views: Vec<ViewInfo>,
 }
 
-/// What a frame costs.
+/// The cost of a frame.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct PlanCost {
-    /// How many pictures the network sees of every frame.
+    /// Number of images that the model receives for every frame.
     pictures: usize,
-    /// Most pictures it sees besides, zoomed in on what may be a person.
+    /// Largest number of additional zoomed images of possible persons.
     zoomed_pictures_at_most: usize,
-    /// How many times the network is run for the pictures of every frame.
+    /// Number of batches for the images of every frame.
     batches: usize,
-    /// Pixels of the pictures of every frame.
+    /// Number of pixels of the images of every frame.
     pixels: u64,
 }
 
@@ -72,50 +72,50 @@ pub(in crate::api) struct ViewInfo {
     /// Rotation from the view frame to the camera frame, row by row (x right, y down, z along the
     /// axis in both).
     camera_from_view: [[f64; 3]; 3],
-    /// Where it looks: from image right, clockwise, degrees.
+    /// Azimuth of the axis, clockwise from image right, degrees.
     azimuth_deg: f64,
-    /// Where it looks: from the optical axis, degrees.
+    /// Angle between the axis and the optical axis, degrees.
     off_axis_deg: f64,
-    /// Horizontal opening angle, degrees.
+    /// Horizontal field of view, degrees.
     field_of_view_deg: f64,
     /// Width and height, pixels.
     size: [u32; 2],
     /// Focal length, pixels.
     focal: f64,
-    /// Principal point, pixel centres.
+    /// Principal point, in pixels with integer coordinates at pixel centres.
     principal_point: [f64; 2],
-    /// Its border in the frame, clockwise from its top left corner, corner-origin pixels; what lies
-    /// beyond the lens image is pulled to its rim.
+    /// Border of the view in the frame, clockwise from its top left corner, corner-origin pixels.
+    /// Points beyond the lens image are moved to its rim.
     outline: Vec<[f64; 2]>,
-    /// Where the nodes of a grid over the view lie in the frame, row by row from its top left corner,
-    /// corner-origin pixels; null beyond the lens image. With it, a frame is straightened without knowing
-    /// the lens. Absent unless asked for.
+    /// Positions in the frame of the nodes of a grid over the view, row by row from its top left
+    /// corner, corner-origin pixels; null beyond the lens image. The grid suffices to undistort a
+    /// frame without the lens model. Absent unless requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     grid: Option<Vec<Option<[f64; 2]>>>,
 }
 
-/// What is asked about a view plan, in the query.
+/// The query parameters of a view plan.
 #[derive(IntoParams)]
 #[into_params(parameter_in = Query)]
-#[expect(dead_code, reason = "describes what Look reads")]
-struct LookQuery {
-    /// `balanced` by default.
+#[expect(dead_code, reason = "documents the query that ViewPlanRequest parses")]
+struct ViewPlanQuery {
+    /// The profile; `balanced` by default.
     profile: Option<String>,
-    /// Tell a grid of so many cells along each side of a view, too.
+    /// Adds a grid with this number of cells along each side of a view.
     #[param(minimum = 1, maximum = 32)]
     grid: Option<u32>,
 }
 
-/// How is a frame of this calibration looked at?
+/// Get the view plan
 ///
-/// Each view with its pose, intrinsics and outline in the frame; how much of the lens image the
-/// plan sees, how often, and what that costs.
+/// Returns the pose, the intrinsics and the outline of each view, the coverage of the lens image,
+/// and the cost of a frame.
 #[utoipa::path(
     get, path = "/calibrations/{id}/views", tag = "calibrations", operation_id = "get_views",
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
-        LookQuery,
+        ViewPlanQuery,
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses((status = OK, description = "The view plan.", body = ViewPlanInfo))
@@ -128,29 +128,30 @@ pub(in crate::api) async fn get_views(
     uri: Uri,
 ) -> Result<Response, Problem> {
     let [profile, grid] = parameters_named(&uri, ["profile", "grid"])?;
-    let look = Look::parse(profile.as_deref(), grid.as_deref())?;
+    let request = ViewPlanRequest::parse(profile.as_deref(), grid.as_deref())?;
     let calibrations = &state.calibrations;
     let entry = calibrations
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
-    let plan = move |engine: &Engine| look.plan(engine, &entry.calibration);
+    let plan = move |engine: &Engine| request.plan(engine, &entry.calibration);
     answered(&state, deadline, plan).await
 }
 
-/// How would a frame be looked at with this calibration?
+/// Preview a view plan
 ///
-/// Takes what `PUT /calibrations/{id}` takes, by the same rules, and tells the view plan. Nothing is stored.
+/// Accepts the same body and parameters as `PUT /calibrations/{id}` and returns the view plan.
+/// Nothing is stored.
 #[utoipa::path(
     post, path = "/calibrations/{id}/views", tag = "calibrations", operation_id = "try_views",
     params(
         ("id" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$", description = "The calibration's ID."),
-        LookQuery,
-        ("camera" = Option<String>, Query, description = "Which camera of the file, by its name there."),
+        ViewPlanQuery,
+        ("camera" = Option<String>, Query, description = "The name of the camera in the file."),
         ("size" = Option<String>, Query, description = "The size of the camera's frames in pixels, such as \
-            `1280x960`, for formats that do not tell it.", pattern = "^[0-9]+x[0-9]+$"),
+            `1280x960`, for formats that do not state it.", pattern = "^[0-9]+x[0-9]+$"),
     ),
     request_body(
-        description = "A calibration file, recognised from its content, whatever the content type says; at most 1 MiB.",
+        description = "A calibration file of at most 1 MiB. Its content decides the format, not the content type.",
         content((Object = "application/json"), (inline(RawBytes) = "application/octet-stream")),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
@@ -163,16 +164,17 @@ pub(in crate::api) async fn try_views(
     NewCalibrationAddress(id): NewCalibrationAddress,
     trial: CalibrationTrial,
 ) -> Result<Response, Problem> {
-    let look = Look::parse(trial.profile.as_deref(), trial.grid.as_deref())?;
+    let request = ViewPlanRequest::parse(trial.profile.as_deref(), trial.grid.as_deref())?;
     let CalibrationUpload { content, reading } = trial.upload;
     let plan = move |engine: &Engine| {
         let entry = Calibrations::check(&id, &content, &reading)?;
-        look.plan(engine, &entry.calibration)
+        request.plan(engine, &entry.calibration)
     };
     answered(&state, deadline, plan).await
 }
 
-/// A view plan as JSON. It may have megabytes: it is made and written in a place among the frames.
+/// Returns a view plan as JSON. A plan may have megabytes, so it is built and serialised under a
+/// permit of the frame queue.
 async fn answered(
     state: &ApiState,
     deadline: Deadline,
@@ -184,19 +186,19 @@ async fn answered(
         serde_json::to_vec(&plan).map_err(Problem::internal)
     });
     let json = deadline
-        .wait("the view plan was not made", planning)
+        .wait("the view plan was not finished", planning)
         .await??;
     Ok(([(CONTENT_TYPE, "application/json")], json).into_response())
 }
 
-/// How to look at a frame, and what to tell of it.
+/// The parsed query of a view plan.
 #[derive(Clone, Copy)]
-struct Look {
+struct ViewPlanRequest {
     profile: Profile,
     grid_cells: Option<u32>,
 }
 
-impl Look {
+impl ViewPlanRequest {
     fn parse(profile: Option<&str>, grid: Option<&str>) -> Result<Self, Problem> {
         let profile = profile.map(parse_profile).transpose()?;
         let cells = |text| whole_number("grid", text, 1..=MAX_GRID_CELLS);

@@ -1,4 +1,4 @@
-//! What DeepStack's clients read.
+//! The responses that DeepStack's clients read.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -11,7 +11,7 @@ use crate::{
 const LABEL: &str = "person";
 const MILLIS_PER_SECOND: f64 = 1000.0;
 
-/// The persons in one frame, as DeepStack tells them.
+/// The persons in one frame, in DeepStack's format.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(example = json!({
     "success": true,
@@ -22,11 +22,11 @@ const MILLIS_PER_SECOND: f64 = 1000.0;
     "duration": 0.614
 }))]
 pub(in crate::api) struct DeepStackAnswer {
-    /// Always true; failures say false.
+    /// Always true; failures have false.
     success: bool,
     /// Persons, highest confidence first.
     predictions: Vec<DeepStackPrediction>,
-    /// From the frame's arrival to its report, seconds.
+    /// Time from the arrival of the frame to its report, seconds.
     duration: f64,
 }
 
@@ -58,7 +58,7 @@ impl From<&Report> for DeepStackAnswer {
 }
 
 impl From<&ReportPerson> for DeepStackPrediction {
-    /// Edges are whole pixels to these clients; what is seen of the person stays inside.
+    /// These clients expect whole pixels. The box is rounded outwards, within the frame.
     fn from(person: &ReportPerson) -> Self {
         let bbox = &person.bbox;
         Self {
@@ -72,17 +72,20 @@ impl From<&ReportPerson> for DeepStackPrediction {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "boxes lie in their frame")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "boxes lie within the frame"
+)]
 fn whole(pixels: f64) -> i64 {
     pixels as i64
 }
 
-/// The calibrations, which take the place of custom models.
+/// The calibrations, in place of custom models.
 #[derive(Debug, Serialize, ToSchema)]
 pub(in crate::api) struct DeepStackModels {
-    /// Always true; failures say false.
+    /// Always true; failures have false.
     success: bool,
-    /// The IDs of the calibrations that serve.
+    /// The IDs of the calibrations in use.
     models: Vec<String>,
 }
 

@@ -1,6 +1,6 @@
-//! Failures in the form that DeepStack's clients expect: 400 for any fault of the frame or of a field, 500 for a
-//! deadline that has passed, and `success: false` in the body. Statuses without a counterpart in DeepStack (429, 503)
-//! stay, because they come with `Retry-After`.
+//! Failures in the form that DeepStack's clients expect: 400 for any fault of the frame or of a
+//! field, 500 for a deadline that has passed, and `success: false` in the body. Statuses without a
+//! counterpart in DeepStack (429, 503) stay, because they come with `Retry-After`.
 
 use axum::{
     Router,
@@ -16,10 +16,11 @@ use crate::api::{
     problem::{Problem, ProblemKind},
 };
 
-/// The paths below the routes of DeepStack that have no route.
+/// Paths of DeepStack without a route here.
 const OTHER_PATHS: &str = "/v1/vision/{*path}";
 
-/// Adds the response layer to the routes of DeepStack, and to the paths below them that have no route.
+/// Adds the response layer to the routes of DeepStack, and to the paths below them that have no
+/// route.
 pub(in crate::api) fn with_failures(routes: Router<ApiState>) -> Router<ApiState> {
     let not_found = any(async || StatusCode::NOT_FOUND);
     routes

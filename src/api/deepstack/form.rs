@@ -1,4 +1,4 @@
-//! What DeepStack's clients send: a form with the frame in `image`, `min_confidence` and `api_key`.
+//! The form that DeepStack's clients send: the frame in `image`, `min_confidence` and `api_key`.
 
 use axum::extract::{FromRequest, Request};
 use utoipa::ToSchema;
@@ -17,28 +17,28 @@ use crate::{
 
 const MIN_CONFIDENCE: &str = "min_confidence";
 const API_KEY: &str = "api_key";
-/// That of DeepStack's server for requests that name none.
+/// The default of DeepStack's server.
 const DEFAULT_MIN_CONFIDENCE: &str = "0.4";
-/// What `min_confidence` is called here.
+/// The name of `min_confidence` in this API.
 const SCORE_THRESHOLD: &str = "score_threshold";
 
-/// A frame as DeepStack's clients send it.
+/// A frame in DeepStack's form.
 #[derive(ToSchema)]
-#[expect(dead_code, reason = "describes what is read below")]
+#[expect(dead_code, reason = "documents the form that is parsed below")]
 pub(in crate::api) struct DeepStackForm {
     /// The frame: a JPEG, PNG or WebP file.
     #[schema(value_type = String, format = Binary, content_media_type = "application/octet-stream")]
     image: Vec<u8>,
-    /// Leave out persons with a lower confidence.
+    /// Least confidence; persons with a lower one are omitted.
     #[schema(nullable = false, minimum = 0, maximum = 1, default = 0.4)]
     min_confidence: Option<f64>,
-    /// A key with the scope `detect`, for clients that send it here instead of in a header; empty for
+    /// An API key with the scope `detect`, for clients that cannot send it in a header. Empty for
     /// none.
     #[schema(nullable = false)]
     api_key: Option<String>,
 }
 
-/// A frame of somebody who may have it looked at.
+/// A frame in DeepStack's form, whose key has been checked.
 pub(in crate::api) struct DeepStackUpload(pub(super) Upload);
 
 impl FromRequest<ApiState> for DeepStackUpload {
@@ -48,8 +48,9 @@ impl FromRequest<ApiState> for DeepStackUpload {
         let known = &state.options.access;
         let headers = request.headers();
         let is_form = is_multipart(headers);
-        // A key in a header is checked before anything is read. Other keys are in the form, which is read
-        // within a small budget of its own, so that clients without a key cannot crowd out the others.
+        // A key in a header is checked before the body is read. Other keys are in the form. That
+        // form is read within a small memory budget of its own, so clients without a key cannot use
+        // up the memory of the others.
         let mut budget = &state.uploads;
         if !is_form || access::shows_key(headers) {
             known.check(headers, Scope::Detect)?;
@@ -63,7 +64,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         let mut keys = upload
             .parameters
             .extract_if(.., |(name, _)| name == API_KEY);
-        // Clients that have none send it empty.
+        // Clients without a key send an empty field.
         let key = keys.next().filter(|(_, key)| !key.is_empty());
         if keys.next().is_some() {
             return Err(ParameterError::repeated(API_KEY).into());
@@ -79,24 +80,24 @@ fn use_of(name: &str) -> FieldUse {
     match name {
         "image" => FieldUse::Frame,
         MIN_CONFIDENCE | API_KEY => FieldUse::Parameter,
-        // DeepStack passes over what it does not know, and clients rely on that.
+        // DeepStack ignores unknown fields, and its clients rely on that.
         _ => FieldUse::None,
     }
 }
 
 fn no_form() -> Problem {
-    let fault = "the frame is to be sent in a form (multipart/form-data), as in curl -F \
+    let fault = "send the frame in a form (multipart/form-data), as in curl -F \
                  image=@frame.jpg";
     Problem::of_parameter(ProblemKind::MissingImage, "image", fault)
 }
 
-/// What is to be done.
+/// Returns the detection job of this form.
 pub(super) fn job(
     upload: Upload,
     calibration: Option<CalibrationId>,
     request_id: &RequestId,
 ) -> Result<DetectJob, Problem> {
-    // All that are left are called so.
+    // All remaining fields have this name.
     let thresholds = upload
         .parameters
         .iter()
@@ -115,7 +116,7 @@ pub(super) fn job(
     Ok(upload.job(parameters, request_id))
 }
 
-/// The same with the name that the sender knows.
+/// Replaces the parameter name in an error by the name that the client sent.
 fn renamed(error: ParameterError) -> ParameterError {
     ParameterError {
         name: MIN_CONFIDENCE.to_owned(),

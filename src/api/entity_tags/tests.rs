@@ -2,7 +2,7 @@ use axum::http::header::IF_MATCH;
 
 use super::*;
 
-/// What an `If-Match` of these lines names; `*` for any, `None` when it is refused.
+/// Parses `If-Match` from these lines: `*` for any, `None` when it is refused.
 fn named_in(lines: &[&'static str]) -> Option<Vec<String>> {
     let mut headers = HeaderMap::new();
     for line in lines {
@@ -15,7 +15,7 @@ fn named_in(lines: &[&'static str]) -> Option<Vec<String>> {
 }
 
 #[test]
-fn empty_elements_of_a_list_are_passed_over() {
+fn empty_list_elements_are_ignored() {
     for (lines, tags) in [
         (&["\"a\","][..], &["a"][..]),
         (&["\"a\",,\"b\""], &["a", "b"]),
@@ -32,7 +32,7 @@ fn empty_elements_of_a_list_are_passed_over() {
 }
 
 #[test]
-fn a_header_that_names_nothing_and_what_is_no_tag_are_refused() {
+fn empty_headers_and_invalid_tags_are_refused() {
     for lines in [
         &[""][..],
         &[" , "],

@@ -1,5 +1,5 @@
-//! Failures in the OpenAPI document: one response for all of them. A client branches on `type`, which says more than
-//! the status.
+//! Failures in the OpenAPI document: one response for all of them. A client branches on `type`,
+//! which says more than the status.
 
 use utoipa::{
     PartialSchema, ToSchema,

@@ -1,6 +1,6 @@
-//! The OpenAPI descriptions of the request parameters, from the tables of their specifications. Defaults are
-//! in the descriptions alone: generated clients would send a `default`, in the query and in the form, and a
-//! repeated parameter is refused.
+//! The OpenAPI descriptions of the request parameters, from the tables of their specifications.
+//! Defaults are in the descriptions alone: generated clients would send a `default`, in the query
+//! and in the form, and a repeated parameter is refused.
 
 use serde_json::Value;
 use utoipa::{
@@ -44,7 +44,7 @@ impl ToSchema for DetectForm {
 }
 
 impl PartialSchema for DetectForm {
-    /// The parameters of the query and the frame, and no other field.
+    /// Returns the schema with the query parameters and the frame, and no other field.
     fn schema() -> RefOr<Schema> {
         let frame = "The frame: a JPEG, PNG or WebP file. `image` is accepted as another name of this field.";
         let frame = binary()
@@ -61,7 +61,7 @@ impl PartialSchema for DetectForm {
     }
 }
 
-/// The parameters that an interface offers, as fields of an object.
+/// Returns the parameters of an interface as fields of an object.
 pub(in crate::api) fn fields(interface: Interface) -> impl Iterator<Item = (&'static str, Object)> {
     let offered = parameters::all().filter(move |spec| spec.is_offered_by(interface));
     offered.map(|spec| {
@@ -90,7 +90,7 @@ fn description(spec: &ParameterSpec) -> String {
     }
 }
 
-/// A value as JSON has it.
+/// Returns a value as JSON.
 fn json(kind: ParameterKind, value: &str) -> Value {
     let text = || Value::from(value);
     match kind.json_type() {
@@ -126,7 +126,7 @@ fn schema(kind: ParameterKind) -> ObjectBuilder {
     }
 }
 
-/// Bytes as they are, in a body of their own.
+/// A binary body.
 pub(in crate::api) struct RawBytes;
 
 impl ToSchema for RawBytes {

@@ -1,4 +1,4 @@
-//! How a key is sent.
+//! Authentication in the OpenAPI document.
 
 use utoipa::{
     Modify,
@@ -13,7 +13,7 @@ pub(super) struct Keys;
 
 impl Modify for Keys {
     fn modify(&self, document: &mut OpenApi) {
-        let description = "An API key. A server that has none configured asks for none.";
+        let description = "An API key. A server without configured keys does not require one.";
         let bearer = HttpBuilder::new()
             .scheme(HttpAuthScheme::Bearer)
             .description(Some(description))

@@ -76,7 +76,7 @@ fn documentation_lists_every_parameter() {
     if env::var_os("BLESS").is_some() {
         fs::write(&path, expected).unwrap();
     } else {
-        let hint = "run `make bless` and look at the difference";
+        let hint = "run `make bless` and review the difference";
         assert!(page == expected, "docs/parameters.md is outdated: {hint}");
     }
 }

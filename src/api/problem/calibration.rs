@@ -16,24 +16,25 @@ impl From<ChangeError> for Problem {
             ChangeError::Shared { .. } => ProblemKind::CalibrationConflict,
             ChangeError::Unseen(_) => {
                 tracing::warn!("{error}");
-                let detail = "the calibration was changed, but cannot be looked at now: get it \
+                let detail = "the calibration was changed, but cannot be read now: get it \
                               before you send the change again";
                 return Self::new(ProblemKind::CalibrationsUnreachable, detail);
             }
             ChangeError::Store(StoreError::ReadOnly { .. }) => {
                 tracing::warn!("a calibration was not changed: {error}");
-                let detail = "calibrations cannot be changed here: their store is read only";
+                let detail = "calibrations cannot be changed: their store is read-only";
                 return Self::new(ProblemKind::Forbidden, detail);
             }
             ChangeError::Store(StoreError::Unreachable { .. }) => {
                 tracing::warn!("a calibration was not changed: {error}");
-                let detail = "the place of the calibrations does not answer: try again";
+                let detail = "the calibration store does not respond: retry";
                 return Self::new(ProblemKind::CalibrationsUnreachable, detail);
             }
-            // A full disk, for one: no fault of the server's.
+            // A full disk, for example, is not a fault of the server.
             ChangeError::Store(StoreError::Failed { .. }) => {
                 tracing::error!("a calibration was not changed: {error}");
-                let detail = "the calibrations cannot be changed now: the server's log says why";
+                let detail =
+                    "the calibrations cannot be changed now: the server's log has the reason";
                 return Self::new(ProblemKind::CalibrationsUnreachable, detail);
             }
             ChangeError::Store(_) => return Self::internal(error),

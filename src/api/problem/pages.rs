@@ -1,5 +1,5 @@
-//! The documentation of problems: the pages that `type` of a problem document refers to, and the table in
-//! docs/http.md.
+//! The documentation of problems: the pages that `type` of a problem document refers to, and the
+//! table in docs/http.md.
 
 use std::fmt::Write;
 
@@ -58,7 +58,7 @@ pub(in crate::api) async fn get_problem(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let kind = ProblemKind::from_name(&name).ok_or_else(|| {
-        let detail = "there is no problem of this name: GET /problems lists all names";
+        let detail = "there is no problem with this name: GET /problems lists all names";
         Problem::new(ProblemKind::NotFound, detail)
     })?;
     let (title, name, status) = (kind.title(), kind.name(), kind.status().as_u16());
@@ -90,7 +90,7 @@ pub fn problem_table() -> String {
     let mut table =
         "| type | status | title | cause | remedy |\n|---|---|---|---|---|\n".to_owned();
     for kind in ProblemKind::ALL {
-        // Nothing fails that is written to a string.
+        // Writing to a string cannot fail.
         let _ = writeln!(
             table,
             "| `{}` | {} | {} | {} | {} |",
@@ -120,7 +120,8 @@ fn html_table() -> String {
     table + "</table>"
 }
 
-/// Replaces pairs of backticks by `code` elements. The texts of the table have no character to escape.
+/// Replaces pairs of backticks by `code` elements. The texts of the table have no character to
+/// escape.
 fn marked_up(text: &str) -> String {
     let mut parts = text.split('`');
     let mut marked = parts.next().unwrap_or_default().to_owned();

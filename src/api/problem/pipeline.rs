@@ -1,4 +1,4 @@
-//! The pipeline's errors as problems: the only place that decides their kind.
+//! Converts errors of the pipeline to problems. No other place decides their kind.
 
 use super::{Problem, ProblemKind};
 use crate::{

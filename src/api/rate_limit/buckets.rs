@@ -1,5 +1,5 @@
-//! Token buckets, each of which is one moment: when it will be full again. (The virtual scheduling
-//! form of the generic cell rate algorithm, ITU-T I.371.)
+//! Token buckets. Each bucket stores only the time at which it is full again: the virtual
+//! scheduling form of the generic cell rate algorithm, ITU-T I.371.
 
 use std::{
     collections::HashMap,
@@ -7,25 +7,25 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Most buckets before addresses that have none must share one.
+/// Largest number of buckets. Further addresses share one bucket.
 const MAX_BUCKETS: usize = 10_000;
-/// How often full buckets are looked for at most when there are that many.
+/// Shortest interval between two removals of full buckets at that number.
 const PURGE_EVERY: Duration = Duration::from_secs(1);
 
-/// Whose a bucket is.
+/// The owner of a bucket.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Client {
-    /// Whoever shows the key of this name.
+    /// The client with the key of this name.
     Key(String),
-    /// Whoever sends from here.
+    /// The client at this address.
     Address(IpAddr),
-    /// All who send from addresses that got no bucket.
+    /// All clients at addresses without a bucket of their own.
     Others,
 }
 
 impl Client {
-    /// Whoever sends from an address. A host has at least a /64 of IPv6 addresses to choose from, so
-    /// they are one client.
+    /// Returns the client at an address. A host has at least a /64 of IPv6 addresses, so such a
+    /// prefix is one client.
     pub(super) fn at(address: IpAddr) -> Self {
         Self::Address(match address.to_canonical() {
             IpAddr::V6(address) => {
@@ -37,30 +37,30 @@ impl Client {
     }
 }
 
-/// How a client stands.
+/// The state of a client's rate limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Standing {
-    /// Whether this request is let through.
+    /// `true` if the request is admitted.
     pub(super) admitted: bool,
-    /// How many more would be, now.
+    /// Number of further requests that would be admitted now.
     pub(super) remaining: u32,
-    /// When it will be one more.
+    /// Time until one more request is admitted.
     pub(super) next_in: Duration,
 }
 
 /// A bucket for each client.
 pub(super) struct Buckets {
-    /// In which a token comes back.
+    /// Time in which one token is added.
     interval: Duration,
     /// Tokens of a full bucket.
     burst: u32,
-    /// Buckets that are not known to be full.
+    /// Buckets that may not be full.
     full_at: HashMap<Client, Instant>,
     purged_at: Option<Instant>,
 }
 
 impl Buckets {
-    /// Full buckets of `burst` tokens, one of which comes back in each `interval`.
+    /// Creates full buckets of `burst` tokens. Each `interval` adds one token.
     pub(super) fn new(interval: Duration, burst: u32) -> Self {
         Self {
             interval,
@@ -91,7 +91,8 @@ impl Buckets {
         }
     }
 
-    /// The client whose bucket is used. There are few keys, but anybody may have many addresses.
+    /// Returns the client whose bucket is used. The number of keys is small, but a client may have
+    /// any number of addresses.
     fn placed(&mut self, client: Client, now: Instant) -> Client {
         let is_new_address =
             matches!(client, Client::Address(_)) && !self.full_at.contains_key(&client);
@@ -101,7 +102,7 @@ impl Buckets {
         let is_due = |at: Instant| now.saturating_duration_since(at) >= PURGE_EVERY;
         if self.purged_at.is_none_or(is_due) {
             self.purged_at = Some(now);
-            // A full bucket is like none.
+            // A full bucket needs no entry.
             self.full_at.retain(|_, full_at| *full_at > now);
         }
         if self.full_at.len() < MAX_BUCKETS {
@@ -127,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_burst_is_let_through_and_then_one_request_in_each_interval() {
+    fn a_burst_is_admitted_and_then_one_request_per_interval() {
         let second = Duration::from_secs(1);
         let mut buckets = Buckets::new(second, 3);
         let start = Instant::now();
@@ -144,7 +145,7 @@ mod tests {
         assert_eq!(almost.next_in, second / 10);
         assert!(buckets.take(key("gate"), start + second).admitted);
         assert!(!buckets.take(key("gate"), start + second).admitted);
-        // A long pause fills the bucket, and no more than that.
+        // A long pause fills the bucket, but not beyond its size.
         let rested = buckets.take(key("gate"), start + second * 100);
         assert_eq!((rested.admitted, rested.remaining), (true, 2));
     }
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_of_addresses_takes_bounded_memory_and_costs_no_key_its_bucket() {
+    fn many_addresses_use_bounded_memory_and_keys_keep_buckets() {
         let second = Duration::from_secs(1);
         let mut buckets = Buckets::new(second, 1);
         let start = Instant::now();
@@ -177,12 +178,12 @@ mod tests {
             let taken = numbers.map(|number| buckets.take(address(number), now));
             taken.filter(|standing| standing.admitted).count()
         };
-        // All who came too late share one token.
+        // All later addresses share one token.
         let flood = admitted(&mut buckets, 0..50_000, start);
         assert_eq!(flood, MAX_BUCKETS + 1);
         assert!(buckets.full_at.len() <= MAX_BUCKETS + 1);
         assert!(buckets.take(key("gate"), start).admitted);
-        // When the buckets are full again, they make room for others.
+        // Full buckets are removed, which makes room for others.
         let later = admitted(&mut buckets, 60_000..60_100, start + second);
         assert_eq!(later, 100);
         assert!(buckets.full_at.len() <= 101);
@@ -190,7 +191,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_stretch_of_time_lets_more_through_than_the_burst_and_the_rate(
+        fn no_period_admits_more_than_the_burst_and_the_rate(
             pauses in prop::collection::vec(0_u64..3_000, 1..200),
             interval_millis in 1_u64..2_000,
             burst in 1_u32..20,

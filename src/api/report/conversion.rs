@@ -1,4 +1,4 @@
-//! The pipeline's report in the units and digits of the sent one.
+//! Converts the report of the pipeline to the units and decimals of the API.
 
 use super::{
     Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportFloor, ReportImage,
@@ -58,7 +58,7 @@ impl From<&DetectionReport> for Report {
 }
 
 impl From<LensCircle> for ReportCircle {
-    /// From pixel centres to the corner-origin pixels of reports.
+    /// Converts pixel centres to the corner-origin pixels of reports.
     fn from(circle: LensCircle) -> Self {
         Self {
             cx: pixels(circle.cx + 0.5),

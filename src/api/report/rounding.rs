@@ -1,34 +1,34 @@
-//! As many decimals as mean something.
+//! Rounding to the significant decimals.
 
 use std::time::Duration;
 
-/// Two decimals: far below what a detector can tell.
+/// Rounds to two decimals, far below the precision of a detector.
 pub(in crate::api) fn pixels(value: f64) -> f64 {
     rounded(value, 100.0)
 }
 
-/// Four decimals of a share of 1.
+/// Rounds a fraction to four decimals.
 pub(super) fn share(value: f64) -> f64 {
     rounded(value, 10_000.0)
 }
 
-/// Three decimals: millimetres.
+/// Rounds to three decimals: millimetres.
 pub(super) fn metres(value: f64) -> f64 {
     rounded(value, 1_000.0)
 }
 
-/// Radians in degrees, two decimals.
+/// Converts radians to degrees with two decimals.
 pub(super) fn degrees(radians: f64) -> f64 {
     rounded(radians.to_degrees(), 100.0)
 }
 
-/// Radians in degrees from 0 to below 360, two decimals.
+/// Converts radians to degrees from 0 to below 360, with two decimals.
 pub(super) fn azimuth_degrees(radians: f64) -> f64 {
     let rounded = degrees(radians);
     if rounded < 360.0 { rounded } else { 0.0 }
 }
 
-/// Three decimals: microseconds.
+/// Rounds to three decimals: microseconds.
 pub(super) fn milliseconds(span: Duration) -> f64 {
     rounded(span.as_secs_f64() * 1_000.0, 1_000.0)
 }
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_keep_the_decimals_that_mean_something() {
+    fn values_keep_the_significant_decimals() {
         assert_eq!(pixels(12.345_678), 12.35);
         assert_eq!(share(0.876_543), 0.8765);
         assert_eq!(metres(-1.234_56), -1.235);
@@ -53,12 +53,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_minus_zero() {
+    fn minus_zero_becomes_zero() {
         assert!(pixels(-0.001).is_sign_positive());
     }
 
     #[test]
-    fn an_azimuth_just_below_a_full_turn_is_none() {
+    fn an_azimuth_rounded_to_a_full_turn_becomes_zero() {
         assert_eq!(azimuth_degrees(std::f64::consts::TAU - 1e-9), 0.0);
     }
 }

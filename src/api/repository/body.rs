@@ -1,4 +1,4 @@
-//! The small JSON bodies of these requests.
+//! The small JSON bodies of model repository requests.
 
 use axum::extract::{FromRequest, Request};
 use serde::{Deserialize, de::DeserializeOwned};
@@ -14,24 +14,24 @@ use crate::api::{
 /// Longest body, bytes.
 const MAX_BYTES: usize = 1 << 16;
 
-/// Which models to list.
+/// Options of the list of models.
 #[derive(Default, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub(in crate::api) struct IndexRequest {
-    /// Leave out those that do not answer.
+    /// Lists only loaded models.
     pub(super) ready: bool,
 }
 
-/// How to load: there is nothing to choose, as a model's manifest says it all.
+/// Options of a load. There are none: the manifest of the model defines everything.
 #[derive(Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::api) struct LoadRequest {}
 
-/// How to unload.
+/// Options of an unload.
 #[derive(Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::api) struct UnloadRequest {
-    #[expect(dead_code, reason = "clients send it, and it asks for nothing")]
+    #[expect(dead_code, reason = "clients send it, but it has no effect")]
     parameters: Option<UnloadParameters>,
 }
 
@@ -39,12 +39,12 @@ pub(in crate::api) struct UnloadRequest {
 #[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 struct UnloadParameters {
-    /// Changes nothing: no model depends on another.
-    #[expect(dead_code, reason = "clients send it, and it asks for nothing")]
+    /// Has no effect: no model depends on another.
+    #[expect(dead_code, reason = "clients send it, but it has no effect")]
     unload_dependents: Option<bool>,
 }
 
-/// A body; an empty one and `null` stand for the default.
+/// A JSON body. An empty body and `null` mean the default.
 pub(in crate::api) struct SmallBody<T>(pub(super) T);
 
 impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
@@ -53,12 +53,12 @@ impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
         let deadline = Deadline::of(&parts, state);
-        let reader = state.body_reader(MAX_BYTES, "a few words are enough", deadline);
+        let reader = state.body_reader(MAX_BYTES, "send a shorter body", deadline);
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();
         if bytes.is_empty() {
             return Ok(Self(T::default()));
         }
-        // Structs would be read from arrays as well.
+        // serde also deserialises structs from arrays.
         let fields: Result<Option<Map<String, Value>>, _> = serde_json::from_slice(&bytes);
         let read =
             fields.and_then(|fields| T::deserialize(Value::Object(fields.unwrap_or_default())));

@@ -1,4 +1,4 @@
-//! The camera in the address.
+//! The camera name in the path.
 
 use axum::{
     extract::{FromRequestParts, Path},
@@ -8,7 +8,7 @@ use axum::{
 use super::unknown;
 use crate::api::{ApiState, problem::Problem};
 
-/// The name of a camera that may have reports.
+/// The name of a camera; it need not have reports.
 pub(in crate::api) struct CameraAddress(pub(super) String);
 
 impl FromRequestParts<ApiState> for CameraAddress {
@@ -16,7 +16,7 @@ impl FromRequestParts<ApiState> for CameraAddress {
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
         let camera = Path::from_request_parts(parts, state).await;
-        // Bytes that are no text are no name.
+        // A path segment that is not UTF-8 is not a name.
         let Path(camera) = camera.map_err(|_| unknown(parts.uri.path()))?;
         Ok(Self(camera))
     }

@@ -1,4 +1,4 @@
-//! Reports as they come: server-sent events (HTML Living Standard, section 9.2).
+//! Streams of reports: server-sent events (HTML Living Standard, section 9.2).
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -20,23 +20,24 @@ use crate::{
 };
 
 pub(in crate::api) const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
-/// Tells nginx and what follows its example not to collect events.
+/// Disables the response buffering of nginx and compatible proxies.
 const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
 
-/// Listen to a camera.
+/// Stream the reports of a camera
 ///
-/// Server-sent events: the latest report at once, then each as it comes, with its ID. Who comes back
-/// with `Last-Event-ID`, as browsers do by themselves, is told what was missed and is still kept.
+/// Server-sent events: the latest report at once, then each new report with its ID. A client that
+/// reconnects with `Last-Event-ID`, as browsers do automatically, first receives the missed reports
+/// that are still stored.
 #[utoipa::path(
     get, path = "/results/{camera}/events", tag = "results", operation_id = "listen_to_camera",
     params(
-        ("camera" = String, Path, description = "The camera's name; it may be one that has no report yet."),
+        ("camera" = String, Path, description = "The name of the camera; it need not have a report yet."),
         ("Last-Event-ID" = Option<String>, Header, nullable = false,
-            description = "The ID of the last report that was heard."),
+            description = "The ID of the last report that the client received."),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
-        (status = OK, description = "A stream without an end; the data of each event is a report.",
+        (status = OK, description = "An unlimited stream; the data of each event is a report.",
          body = String, content_type = "text/event-stream"),
     )
 )]
@@ -49,18 +50,18 @@ pub(in crate::api) async fn of_camera(
     stream(state, Cameras::One(camera), headers).await
 }
 
-/// Listen to all cameras.
+/// Stream all reports
 ///
-/// Server-sent events: the latest report of each camera, then every report as it comes.
+/// Server-sent events: the latest report of each camera, then every new report.
 #[utoipa::path(
     get, path = "/events", tag = "results", operation_id = "listen_to_all",
     params(
         ("Last-Event-ID" = Option<String>, Header, nullable = false,
-            description = "The ID of the last report that was heard."),
+            description = "The ID of the last report that the client received."),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
-        (status = OK, description = "A stream without an end; the data of each event is a report.",
+        (status = OK, description = "An unlimited stream; the data of each event is a report.",
          body = String, content_type = "text/event-stream"),
     )
 )]
@@ -78,13 +79,13 @@ async fn stream(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let last_heard = headers.get(LAST_EVENT_ID);
-    // What is no ID of ours was not heard from us.
+    // An invalid ID does not come from this server and is ignored.
     let last_heard = last_heard.and_then(|id| id.to_str().ok()?.parse().ok());
     let feed = Feed::begin(Arc::clone(&state.results), cameras, last_heard).await?;
     let listener = (feed, state, headers);
     let events = unfold(listener, async |(mut feed, state, headers)| {
         let event = feed.next().await?;
-        // The stream must not outlive its key.
+        // A stream must not outlive its key.
         Reader::check(&state, &headers).ok()?;
         Some((Ok::<_, Infallible>(event), (feed, state, headers)))
     });

@@ -1,4 +1,5 @@
-//! What a listener is sent: what it has missed, then what comes, and a sign of life in between.
+//! The event source of a subscriber: missed reports, then new ones, with keep-alive comments in
+//! between.
 
 use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc, time::Duration};
 
@@ -10,46 +11,46 @@ use crate::{
     results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
 };
 
-/// After so long without a report a comment is sent: proxies close connections that are silent, and
-/// who has gone without a word is found out.
+/// Interval without a report after which a keep-alive comment is sent. Proxies close silent
+/// connections, and the comment detects clients that have disconnected.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 const SIGN_OF_LIFE: Bytes = Bytes::from_static(b": nothing new\n\n");
-/// Until a place of reports that does not answer is asked again.
+/// Pause before a retry when the result store does not respond.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Missed reports that are fetched at a time.
+/// Largest number of missed reports per read.
 const PAGE: usize = 32;
 
-/// A listener's view of the reports.
+/// The position of a subscriber in the reports.
 pub(super) struct Feed {
     results: Arc<dyn ResultStore>,
     cameras: Cameras,
     listening: Listening,
     /// The last report that was sent.
     last: ReportId,
-    /// Reports from before the listener came, to be sent first.
+    /// Reports from before the subscription, to be sent first.
     missed: VecDeque<Arc<StoredReport>>,
-    /// Whether there may be more of those.
+    /// `true` if the store may have more missed reports.
     behind: bool,
 }
 
 impl Feed {
-    /// Goes on after the report that was heard last, or begins with the latest of each camera.
+    /// Continues after the last received report, or begins with the latest one of each camera.
     ///
     /// # Errors
-    /// [`Problem`] when there is no place to listen, or nobody who knows the reports.
+    /// [`Problem`] when there are too many subscribers, or the result store does not respond.
     pub(super) async fn begin(
         results: Arc<dyn ResultStore>,
         cameras: Cameras,
         last_heard: Option<ReportId>,
     ) -> Result<Self, Problem> {
-        // Listens before it looks: nothing is missed in between.
+        // Subscribes before the first read, so no report is missed in between.
         let listening = results.listeners().listen(cameras.clone())?;
         let latest = match &cameras {
             Cameras::All => results.latest_of_all().await?,
             Cameras::One(camera) => results.latest(camera).await?.into_iter().collect(),
         };
         let newest = latest.last().map(|report| report.id).unwrap_or_default();
-        // What is ahead of all reports is an ID from elsewhere: nothing here comes after it.
+        // An ID later than all reports is from another server: no report here follows it.
         let last_heard = last_heard.filter(|id| *id <= newest);
         Ok(Self {
             results,
@@ -64,7 +65,7 @@ impl Feed {
         })
     }
 
-    /// The next event or comment; `None` when there will be none.
+    /// Returns the next event or comment; `None` at the end of the stream.
     pub(super) async fn next(&mut self) -> Option<Bytes> {
         loop {
             if let Some(missed) = self.missed.pop_front() {
@@ -85,7 +86,7 @@ impl Feed {
                 Err(_) => return Some(SIGN_OF_LIFE),
                 Ok(None) => return None,
                 Ok(Some(report)) if report.id > self.last => return Some(self.event(&report)),
-                // It was sent with what was missed.
+                // The report was already sent with the missed ones.
                 Ok(Some(_)) => {}
             }
         }

@@ -1,4 +1,4 @@
-//! The reports of a camera that are still kept, page by page.
+//! The stored reports of a camera, page by page.
 
 use std::num::NonZeroUsize;
 
@@ -23,24 +23,24 @@ use crate::{
 
 const DEFAULT_LIMIT: usize = 100;
 const MAX_LIMIT: usize = 1000;
-/// A page ends when it has this many bytes: an answer costs no more memory than that and a report.
+/// Size at which a page ends. A response holds at most this size plus one report in memory.
 const PAGE_BYTES: usize = 4 << 20;
 
-/// A report of the past.
+/// A stored report.
 #[derive(ToSchema)]
-#[expect(dead_code, reason = "describes what `write` writes")]
+#[expect(dead_code, reason = "documents the output of `write`")]
 pub(in crate::api) struct PastReport {
-    /// Its ID: what `since` takes, and its `ETag` when it was the latest.
+    /// The ID: the value for `since`, and the `ETag` of the latest report.
     #[schema(example = "1763717400412345")]
     id: String,
     /// The report.
     report: Report,
 }
 
-/// Get the reports of a camera that are still kept.
+/// List past reports
 ///
-/// Oldest first. A page ends after `limit` reports or 4 MiB; the ID of its last one is `since` of the
-/// next page, and an empty page is the end.
+/// Returns the stored reports of a camera, oldest first. A page ends after `limit` reports or 4
+/// MiB. The ID of its last report is `since` of the next page. An empty page is the end.
 #[utoipa::path(
     get, path = "/results/{camera}/history", tag = "results", operation_id = "list_past_results",
     params(
@@ -49,7 +49,7 @@ pub(in crate::api) struct PastReport {
             description = "Only what was reported later: than the report of this ID, or than this time \
                 (RFC 3339)."),
         ("limit" = Option<u64>, Query, nullable = false, minimum = 1, maximum = 1000,
-            description = "Most reports; 100 by default."),
+            description = "Largest number of reports; 100 by default."),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
@@ -77,7 +77,8 @@ pub(in crate::api) async fn get_history(
     Ok((content_type, cache, body))
 }
 
-/// An array of the reports, each with its ID. They are JSON already, and stay the bytes they are.
+/// Writes a JSON array of the reports with their IDs. The stored JSON of each report is copied
+/// unchanged.
 fn write<'a>(page: impl Iterator<Item = &'a StoredReport>) -> Bytes {
     let mut text = BytesMut::new();
     for stored in page {

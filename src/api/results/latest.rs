@@ -1,4 +1,4 @@
-//! The latest report of a camera, at once or as soon as there is a newer one.
+//! The latest report of a camera, with an optional wait for a newer one.
 
 use std::{sync::Arc, time::Duration};
 
@@ -27,22 +27,22 @@ use crate::{
     results::{Cameras, StoredReport},
 };
 
-/// Ten minutes, as of `timeout_millis`.
+/// Ten minutes, as for `timeout_millis`.
 const MAX_WAIT_SECONDS: u64 = 600;
 
-/// Get the latest report of a camera.
+/// Get the latest report
 ///
-/// `If-None-Match` with the `ETag` of the report one has is answered 304 while that is the latest. With
-/// `wait`, the answer waits for a newer one; 304 then says that none has come.
+/// `If-None-Match` with the `ETag` of a known report returns 304 while that is the latest. With
+/// `wait`, the response waits for a newer report; 304 then means that none arrived in time.
 #[utoipa::path(
     get, path = "/results/{camera}/latest", tag = "results", operation_id = "get_latest_result",
     params(
         ("camera" = String, Path, description = "The camera's name."),
         ("wait" = Option<u64>, Query, nullable = false, minimum = 0, maximum = 600,
-            description = "How long to wait for a report that is not the one of `If-None-Match`, seconds; no \
-                longer than the server lets any request take."),
+            description = "Time to wait for a report other than that of `If-None-Match`, seconds; no \
+                longer than the server's request timeout."),
         ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
-            description = "The ETag of the report that is there already."),
+            description = "The ETag of the known report."),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
@@ -51,7 +51,7 @@ const MAX_WAIT_SECONDS: u64 = 600;
             ("ETag" = String, description = "The report's ID."),
             ("Cache-Control" = String, description = "`no-cache`."),
          )),
-        (status = NOT_MODIFIED, description = "There is none newer than the one asked with."),
+        (status = NOT_MODIFIED, description = "There is no newer report."),
     )
 )]
 pub(in crate::api) async fn get_latest(
@@ -71,8 +71,8 @@ pub(in crate::api) async fn get_latest(
         state.results.latest(&camera).await?
     } else {
         let limit = deadline.within(wait);
-        let report = news(&state, &camera, &headers, limit).await?;
-        // The key may have gone meanwhile.
+        let report = wait_for_newer(&state, &camera, &headers, limit).await?;
+        // The key may have been removed during the wait.
         Reader::check(&state, &headers)?;
         report
     };
@@ -86,27 +86,28 @@ pub(in crate::api) async fn get_latest(
     Ok((about, content_type, report.report.json.clone()).into_response())
 }
 
-/// The first report that the reader does not have, or the latest when none has come in time.
-async fn news(
+/// Returns the first report that the client does not have, or the latest one if none arrives in
+/// time.
+async fn wait_for_newer(
     state: &ApiState,
     camera: &str,
     headers: &HeaderMap,
     limit: Deadline,
 ) -> Result<Option<Arc<StoredReport>>, Problem> {
-    // Listens before it looks: nothing is missed in between.
+    // Subscribes before the first read, so no report is missed in between.
     let listeners = state.results.listeners();
     let mut listening = listeners.listen(Cameras::One(camera.to_owned()))?;
     let mut report = state.results.latest(camera).await?;
-    let is_news = |report: &StoredReport| {
+    let is_new = |report: &StoredReport| {
         let known = is_unmodified(headers, &report.id.to_string());
         known.map(|known| !known)
     };
-    while !report.as_deref().map_or(Ok(false), is_news)?
-        && let Ok(Some(told)) = timeout_at(limit.at(), listening.next()).await
+    while !report.as_deref().map_or(Ok(false), is_new)?
+        && let Ok(Some(notified)) = timeout_at(limit.at(), listening.next()).await
     {
-        // What is told may lag behind what was read.
-        if report.as_ref().is_none_or(|now| told.id > now.id) {
-            report = Some(told);
+        // A notification may be older than the report that was read.
+        if report.as_ref().is_none_or(|now| notified.id > now.id) {
+            report = Some(notified);
         }
     }
     Ok(report)

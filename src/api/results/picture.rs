@@ -1,4 +1,4 @@
-//! The latest picture of a camera, with what was found drawn into it as whoever asks wants it.
+//! The latest annotated image of a camera, drawn as the request specifies.
 
 use axum::{
     extract::State,
@@ -26,30 +26,31 @@ use crate::{
     quoted::Quoted,
 };
 
-/// For the eyes of who has asked, who may keep it, but must ask each time whether it is still right.
+/// Only the client may cache the image, and must revalidate it before use.
 const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
 
-/// Get the latest picture of a camera.
+/// Get the latest image
 ///
-/// The frame of its latest report as JPEG, upright, masked where the calibration says so, with boxes or
-/// whatever `draw` names. Pictures are kept only of the cameras that the setting `results.pictures` names.
-/// `If-None-Match` with the `ETag` of the picture one has is answered 304 while that is the latest.
+/// Returns the frame of the latest report as JPEG: upright, with the masks of the calibration, with
+/// boxes or the layers in `draw`. Images are stored only for the cameras in the setting
+/// `results.pictures`. `If-None-Match` with the `ETag` of a known image returns 304 while that is
+/// the latest.
 #[utoipa::path(
     get, path = "/results/{camera}/latest.jpg", tag = "results", operation_id = "get_latest_picture",
     params(
         ("camera" = String, Path, description = "The camera's name."),
         PictureQuery,
         ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
-            description = "The ETag of the picture that is there already."),
+            description = "The ETag of the known image."),
     ),
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
     responses(
-        (status = OK, description = "The picture.", content((inline(RawBytes) = "image/jpeg")),
+        (status = OK, description = "The annotated image.", content((inline(RawBytes) = "image/jpeg")),
          headers(
-            ("ETag" = String, description = "The ID of the picture's report."),
+            ("ETag" = String, description = "The ID of the report of the image."),
             ("Cache-Control" = String, description = "`private, no-cache`."),
          )),
-        (status = NOT_MODIFIED, description = "There is none newer than the one asked with."),
+        (status = NOT_MODIFIED, description = "There is no newer image."),
     )
 )]
 pub(in crate::api) async fn get_picture(
@@ -63,7 +64,7 @@ pub(in crate::api) async fn get_picture(
     let options = PictureOptions::parse(pairs(&query_parameters(&uri)?))?;
     let latest = state.results.latest(&camera).await?;
     let latest = latest.ok_or_else(|| unknown(&camera))?.id;
-    // Who has the latest report's picture needs no other, and Redis need not send it.
+    // A client that has the latest image needs no other, so the image is not fetched from Redis.
     if is_unmodified(&headers, &latest.to_string())? {
         return Ok((StatusCode::NOT_MODIFIED, about(&latest.to_string())).into_response());
     }
@@ -77,7 +78,7 @@ pub(in crate::api) async fn get_picture(
     let drawing = state
         .workers
         .run(move |withdrawn| frame.annotated(&options, &|| withdrawn.is_cancelled()));
-    let drawn = deadline.wait("the picture was not drawn", drawing).await?;
+    let drawn = deadline.wait("the image was not drawn", drawing).await?;
     let picture = Bytes::from(drawn.map_err(Problem::internal)?);
     Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], picture).into_response())
 }
@@ -89,8 +90,8 @@ fn about(id: &str) -> [(HeaderName, HeaderValue); 2] {
 fn none_kept(camera: &str) -> Problem {
     let camera = Quoted(camera);
     let detail = format!(
-        "no picture of the camera {camera} is kept: pictures are kept from the next frame on of the cameras that \
-         the setting results.pictures names (* is all of them), but of no more than results.max_pictures"
+        "there is no image of the camera {camera}: images are stored from the next frame on, for the cameras in \
+         the setting results.pictures (* for all), for at most results.max_pictures cameras"
     );
     Problem::new(ProblemKind::PictureNotKept, detail)
 }

@@ -1,4 +1,4 @@
-//! A camera with its latest report, in a line.
+//! A camera in the list of results.
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -6,22 +6,22 @@ use utoipa::ToSchema;
 
 use crate::results::StoredReport;
 
-/// A camera and what was seen last.
+/// A camera and its latest report.
 #[derive(Debug, Serialize, ToSchema)]
 pub(in crate::api) struct CameraRow {
-    /// The camera's name.
+    /// The name of the camera.
     #[schema(example = "lobby")]
     pub(super) camera: String,
-    /// The ID of its latest report: its `ETag`, without the quotes.
+    /// The ID of the latest report: its `ETag` without the quotes.
     #[schema(example = "1763717400412345")]
     id: String,
-    /// When the frame of that arrived (RFC 3339).
+    /// Time at which the frame of that report arrived (RFC 3339).
     #[schema(format = DateTime, example = "2025-11-21T09:30:00.412Z")]
     received_at: String,
-    /// Seconds since the report was there.
+    /// Age of the report in seconds.
     #[schema(minimum = 0, example = 0.731)]
     age_seconds: f64,
-    /// How many persons are in it.
+    /// Number of persons in the report.
     #[schema(example = 3)]
     persons: usize,
 }
@@ -33,7 +33,7 @@ impl CameraRow {
             camera: latest.report.camera.clone(),
             id: latest.id.to_string(),
             received_at: format!("{:.3}", latest.report.received_at),
-            // The clock may have been set back meanwhile.
+            // The clock may have been set back since.
             age_seconds: (age.max(0.0) * 1000.0).round() / 1000.0,
             persons: latest.report.persons,
         }

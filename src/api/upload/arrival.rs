@@ -1,4 +1,4 @@
-//! A request to find somebody, whose whole body is in memory.
+//! A detection request whose whole body is in memory.
 
 use std::time::Instant;
 
@@ -18,16 +18,15 @@ use crate::{
     api::{ApiState, Phase, deadline::Deadline, problem::Problem},
 };
 
-/// A request to find persons; all of it is there. Taken out of a request by a handler, it is of
-/// somebody who may.
+/// A complete detection request. As an extractor, it also checks the scope `detect`.
 pub(in crate::api) struct Arrival {
     pub(in crate::api) parts: Parts,
     pub(in crate::api) body: Held<Bytes>,
-    /// When its answer must be there.
+    /// The deadline of the response.
     pub(in crate::api) deadline: Deadline,
-    /// When it came.
+    /// Time at which the request arrived.
     pub(in crate::api) received_at: Timestamp,
-    /// When its body was in memory.
+    /// Time at which the whole body was in memory.
     pub(in crate::api) arrived: Instant,
 }
 
@@ -42,7 +41,7 @@ impl FromRequest<ApiState> for Arrival {
 }
 
 impl Arrival {
-    /// Reads the request, whose body counts against `budget`. The key is not checked here.
+    /// Reads the request, whose body uses memory of `budget`. The key is not checked here.
     pub(in crate::api) async fn receive(
         request: Request,
         state: &ApiState,
@@ -53,10 +52,10 @@ impl Arrival {
         if state.readiness.phase() == Phase::WarmingUp {
             return Err(Problem::warming_up());
         }
-        // A frame that has no place needs none in memory either.
+        // A frame that finds no place in the queue is refused before its body is read.
         state.workers.admits()?;
         let deadline = Deadline::of(&parts, state);
-        let remedy = "send a smaller picture or raise server.max_body_bytes";
+        let remedy = "send a smaller image or raise server.max_body_bytes";
         let reader = BodyReader {
             budget,
             ..state.body_reader(state.options.max_body_bytes, remedy, deadline)

@@ -1,4 +1,4 @@
-//! Reading a body within bounds.
+//! Reads a request body within limits.
 
 use std::{future::poll_fn, num::NonZeroU64, pin::Pin};
 
@@ -18,13 +18,13 @@ use crate::api::{
     problem::{Problem, ProblemKind},
 };
 
-/// What a body may cost.
+/// The limits of a body.
 pub(in crate::api) struct BodyReader<'a> {
     pub(in crate::api) max_bytes: usize,
-    /// What to do about a body that has more.
+    /// The advice for a larger body.
     pub(in crate::api) remedy: &'static str,
     pub(in crate::api) budget: &'a UploadBudget,
-    /// `None`: any rate will do.
+    /// Least rate; `None` for no limit.
     pub(in crate::api) least_bytes_per_second: Option<NonZeroU64>,
     pub(in crate::api) deadline: Deadline,
 }
@@ -61,7 +61,7 @@ impl BodyReader<'_> {
             Err(_) if late_at < deadline => {
                 let least = self.least_bytes_per_second.map_or(0, NonZeroU64::get);
                 let detail = format!(
-                    "the body comes more slowly than {least} bytes a second: send it over a \
+                    "the body arrives at less than {least} bytes per second: send it over a \
                      faster line, or lower limits.min_upload_bytes_per_second"
                 );
                 Err(Problem::new(ProblemKind::SlowUpload, detail))
@@ -88,7 +88,7 @@ fn announced_bytes(headers: &HeaderMap) -> Option<usize> {
     headers.get(CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
 }
 
-/// The next bytes of a body; `None` at its end.
+/// Returns the next bytes of a body; `None` at its end.
 pub(in crate::api) async fn next_chunk(body: &mut Body) -> Result<Option<Bytes>, Problem> {
     loop {
         match poll_fn(|context| Pin::new(&mut *body).poll_frame(context)).await {
@@ -97,7 +97,7 @@ pub(in crate::api) async fn next_chunk(body: &mut Body) -> Result<Option<Bytes>,
                 let detail = format!("the body ended early ({error}): send it again");
                 return Err(Problem::new(ProblemKind::MalformedRequest, detail));
             }
-            // Trailers carry nothing of ours.
+            // Trailers are ignored.
             Some(Ok(frame)) => {
                 if let Ok(chunk) = frame.into_data() {
                     return Ok(Some(chunk));

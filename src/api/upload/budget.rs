@@ -1,4 +1,4 @@
-//! The memory that requests may hold: their bodies, and what is unpacked from them.
+//! The memory budget of requests: their bodies, and the tensors unpacked from them.
 
 use std::sync::Arc;
 
@@ -7,12 +7,11 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::api::problem::{Problem, ProblemKind};
 
-/// The memory that all bodies, and tensors unpacked from them, may hold together, counted in bytes. Clones
-/// share it.
+/// The memory of all bodies and of the tensors unpacked from them, in bytes. Clones share it.
 #[derive(Clone)]
 pub(in crate::api) struct UploadBudget {
     bytes: Arc<Semaphore>,
-    /// The advice to clients for whose bodies nothing is left.
+    /// The advice for a client whose body finds no free memory.
     remedy: &'static str,
 }
 
@@ -25,7 +24,7 @@ impl UploadBudget {
         }
     }
 
-    /// A share of so many bytes, which is given back when it is dropped. Refused when fewer are free.
+    /// Reserves a number of bytes until the permit is dropped. Fails when fewer are free.
     pub(in crate::api) fn take(&self, bytes: usize) -> Result<OwnedSemaphorePermit, Problem> {
         let bytes = u32::try_from(bytes).map_err(|_| self.exhausted())?;
         let share = Arc::clone(&self.bytes).try_acquire_many_owned(bytes);
@@ -39,7 +38,7 @@ impl UploadBudget {
     }
 }
 
-/// Something in memory together with its share of the budget.
+/// A value in memory together with its permit.
 pub(in crate::api) struct Held<T> {
     content: T,
     _share: OwnedSemaphorePermit,
@@ -59,12 +58,12 @@ impl Held<Bytes> {
         self.content.clone()
     }
 
-    /// Other bytes, copied from these, in their place.
+    /// Replaces the bytes by a copied part of them.
     pub(super) fn with_bytes(self, content: Bytes) -> Self {
         Self { content, ..self }
     }
 
-    /// Plain bytes that give their share back when the last clone of them is gone.
+    /// Returns plain bytes that release the permit when their last clone is dropped.
     pub(in crate::api) fn into_bytes(self) -> Bytes {
         Bytes::from_owner(self)
     }

@@ -1,4 +1,4 @@
-//! `multipart/form-data`: the frame and parameters as text fields.
+//! Parses `multipart/form-data`: the frame, and parameters as text fields.
 
 use axum::{
     body::Body,
@@ -13,29 +13,29 @@ use bytes::Bytes;
 use super::names::unknown_parameter;
 use crate::api::problem::{Problem, ProblemKind};
 
-/// Most fields of a form: every parameter and the frame, with room for repetitions that deserve
-/// a better answer than this limit.
+/// Largest number of fields of a form: every parameter and the frame, with room for repeated
+/// fields, which have a better error message.
 const MAX_FIELDS: usize = 24;
-/// Most bytes of a parameter's value.
+/// Largest parameter value, bytes.
 const MAX_VALUE_BYTES: usize = 1024;
 
-/// Most characters of the name of the frame's file.
+/// Longest file name of a frame, characters.
 const MAX_FILE_NAME_CHARS: usize = 255;
 
-/// What a field is for, by its name.
+/// The use of a form field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::api) enum FieldUse {
-    /// It is the frame.
+    /// The frame.
     Frame,
-    /// It is a parameter.
+    /// A parameter.
     Parameter,
-    /// It is for others, and not looked at.
+    /// Not used and ignored.
     None,
-    /// There is no such field: the form is refused.
+    /// Not allowed: the form is refused.
     Refused,
 }
 
-/// What a form held.
+/// The content of a form.
 pub(super) struct Form {
     pub(super) image: Bytes,
     /// The name of the frame's file, without its folders.
@@ -43,14 +43,14 @@ pub(super) struct Form {
     pub(super) parameters: Vec<(String, String)>,
 }
 
-/// Takes a form apart. `body` is whole, so nothing here waits for the client.
+/// Parses a form. `body` is complete, so this never waits for the client.
 pub(super) async fn parse(
     parts: Parts,
     body: Bytes,
     use_of: fn(&str) -> FieldUse,
 ) -> Result<Form, Problem> {
     let mut request = Request::from_parts(parts, Body::from(body));
-    // The body was bounded when it was read.
+    // The body was limited when it was read.
     DefaultBodyLimit::disable().apply(&mut request);
     let mut multipart = Multipart::from_request(request, &())
         .await
@@ -114,7 +114,7 @@ fn second_image(name: &str) -> Problem {
     Problem::of_parameter(ProblemKind::RepeatedParameter, name, fault)
 }
 
-/// The last part of a path, of whichever system, as far as it is a name.
+/// Returns the last segment of a path of any operating system, if it is a name.
 fn name_of_file(path: &str) -> Option<String> {
     let name = path.rsplit(['/', '\\']).next().unwrap_or(path);
     let characters = name.chars().filter(|character| !character.is_control());

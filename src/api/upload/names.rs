@@ -1,4 +1,4 @@
-//! The parameters that may come with a frame.
+//! The parameters that may accompany a frame.
 
 use super::form::FieldUse;
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
 /// The names of the frame's field.
 const FRAME_NAMES: [&str; 2] = ["img", "image"];
 
-/// Returns whether there is a parameter of this name.
+/// Returns `true` if there is a parameter of this name.
 pub(super) fn is_parameter(name: &str) -> bool {
     parameters::all().any(|known| known.name == name)
 }
@@ -25,7 +25,7 @@ pub(super) fn use_of(name: &str) -> FieldUse {
     }
 }
 
-/// The refusal of any other name.
+/// Returns the problem of any other name.
 pub(super) fn unknown_parameter(name: &str) -> Problem {
     let known: Vec<_> = parameters::all().map(|spec| spec.name).collect();
     let problem = format!(

@@ -1,16 +1,16 @@
-//! How slowly a body may come: no stretch of a few seconds may bring fewer bytes than the least
-//! rate would.
+//! The minimum upload rate, the protection against slow-body (slow-loris) clients: a period of a
+//! few seconds must not bring fewer bytes than the rate requires.
 
 use std::{num::NonZeroU64, time::Duration};
 
 use tokio::time::Instant;
 
-/// How long nothing at all may come.
+/// Longest time without any bytes.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// How long the sender of a body may be waited for: each byte buys time, up to [`PATIENCE`].
+/// The time to wait for the next bytes. Each byte extends it, up to [`PATIENCE`].
 pub(in crate::api) struct Pace {
-    /// `None`: any rate will do.
+    /// Least rate; `None` for no limit.
     least_bytes_per_second: Option<NonZeroU64>,
     late_at: Instant,
 }
@@ -23,7 +23,7 @@ impl Pace {
         }
     }
 
-    /// Until when to wait for more: until the sender is too slow, or until `deadline`.
+    /// Returns the end of the wait: the time at which the client is too slow, or `deadline`.
     pub(in crate::api) fn late_at(&self, deadline: Instant) -> Instant {
         match self.least_bytes_per_second {
             Some(_) => self.late_at.min(deadline),
@@ -31,14 +31,14 @@ impl Pace {
         }
     }
 
-    /// Some bytes have come.
-    #[expect(clippy::cast_precision_loss, reason = "time bought, not bytes counted")]
+    /// Records received bytes.
+    #[expect(clippy::cast_precision_loss, reason = "a duration, not an exact count")]
     pub(in crate::api) fn came(&mut self, bytes: usize) {
         let Some(least) = self.least_bytes_per_second else {
             return;
         };
-        let bought = (bytes as f64 / least.get() as f64).min(PATIENCE.as_secs_f64());
+        let extension = (bytes as f64 / least.get() as f64).min(PATIENCE.as_secs_f64());
         let longest = Instant::now() + PATIENCE;
-        self.late_at = (self.late_at + Duration::from_secs_f64(bought)).min(longest);
+        self.late_at = (self.late_at + Duration::from_secs_f64(extension)).min(longest);
     }
 }

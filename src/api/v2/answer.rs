@@ -1,4 +1,4 @@
-//! What is answered: JSON, with the tensors in it or as bytes behind it.
+//! Inference responses: JSON with the tensors inside or as bytes after it.
 
 use axum::{
     http::{HeaderName, HeaderValue, header::CONTENT_TYPE},
@@ -14,31 +14,31 @@ use crate::{
     open_inference::{Datatype, HEAD_LENGTH, binary_data},
 };
 
-/// An answer to a request to infer.
+/// An inference response.
 pub(super) struct InferAnswer {
     body: Bytes,
-    /// The length of the JSON, where bytes follow it.
+    /// The length of the JSON, if bytes follow it.
     head: Option<usize>,
-    /// What is told beside it.
+    /// Additional headers, such as the durations of the stages.
     pub(super) facts: Vec<(HeaderName, HeaderValue)>,
 }
 
-/// An output.
+/// An output tensor.
 pub(super) struct Output {
     pub(super) name: &'static str,
     pub(super) shape: Vec<usize>,
     pub(super) values: OutputValues,
 }
 
-/// What an output holds, row-major.
+/// The values of an output, row-major.
 pub(super) enum OutputValues {
     Floats(Vec<f32>),
     Integers(Vec<i32>),
-    /// The one element of a tensor of `BYTES`.
+    /// The single element of a `BYTES` tensor.
     Text(Bytes),
 }
 
-/// Whose answer it is.
+/// The model that responds.
 pub(super) struct Answerer<'a> {
     pub(super) model: &'a str,
     pub(super) version: &'a str,
@@ -65,10 +65,10 @@ struct HeadOutput<'a> {
     data: Option<Data<'a>>,
 }
 
-/// Where an output comes as bytes.
+/// Parameters of an output that is sent as bytes.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct BinarySize {
-    /// How many bytes behind the JSON are this output's; they come in the order of the outputs.
+    /// Number of bytes of this output after the JSON, in the order of the outputs.
     binary_data_size: usize,
 }
 
@@ -114,7 +114,7 @@ impl OutputValues {
 }
 
 impl InferAnswer {
-    /// Writes those outputs that are wanted.
+    /// Writes the requested outputs.
     pub(super) fn write(
         answerer: &Answerer<'_>,
         outputs: &[Output],

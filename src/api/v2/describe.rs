@@ -1,4 +1,4 @@
-//! What the server and its models tell of themselves, and whether they can be asked.
+//! Metadata and health checks of the server and its models.
 
 use axum::{
     Json,
@@ -11,29 +11,33 @@ use super::{
 };
 use crate::api::{ApiState, access::Finder, health::require_ready, problem::Problem};
 
-/// What is this server?
+/// Get server metadata
 #[utoipa::path(
     get, path = "/v2", tag = "operation", operation_id = "get_server_metadata",
-    responses((status = OK, description = "Its name, version and extensions.", body = ServerMetadata))
+    responses((status = OK, description = "The name, version and extensions of the server.", body = ServerMetadata))
 )]
 pub(in crate::api) async fn server() -> Json<ServerMetadata> {
     Json(ServerMetadata::default())
 }
 
-/// Is the process alive? As `/livez`, for clients of the Open Inference Protocol.
+/// Check liveness (Open Inference Protocol)
+///
+/// Equivalent to `/livez`.
 #[utoipa::path(
     get, path = "/v2/health/live", tag = "operation", operation_id = "get_server_liveness",
-    responses((status = OK, description = "The process answers.", body = ServerLive))
+    responses((status = OK, description = "The process is alive.", body = ServerLive))
 )]
 pub(in crate::api) async fn live() -> Json<ServerLive> {
     Json(ServerLive { live: true })
 }
 
-/// Can frames be sent? As `/readyz`, for clients of the Open Inference Protocol.
+/// Check readiness (Open Inference Protocol)
+///
+/// Equivalent to `/readyz`.
 #[utoipa::path(
     get, path = "/v2/health/ready", tag = "operation", operation_id = "get_server_readiness",
     responses(
-        (status = OK, description = "Frames can be sent.", body = ServerReady),
+        (status = OK, description = "The server accepts frames.", body = ServerReady),
     )
 )]
 pub(in crate::api) async fn ready(
@@ -43,15 +47,15 @@ pub(in crate::api) async fn ready(
     Ok(Json(ServerReady { ready: true }))
 }
 
-/// What does a model take and answer?
+/// Get model metadata
 ///
-/// `lookdown` takes a frame and answers with persons; the detectors take views.
+/// `lookdown` accepts a frame and returns persons; the detectors accept views.
 #[utoipa::path(
     get, path = "/v2/models/{name}", tag = "inference", operation_id = "get_model",
     params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
-        (status = OK, description = "Its inputs and outputs.", body = ModelMetadata),
+        (status = OK, description = "The inputs and outputs of the model.", body = ModelMetadata),
     )
 )]
 pub(in crate::api) async fn model(
@@ -62,17 +66,17 @@ pub(in crate::api) async fn model(
     Ok(Json(Asked::find(&state, &name, None)?.metadata()))
 }
 
-/// What does this version of a model take and answer?
+/// Get metadata of a model version
 #[utoipa::path(
     get, path = "/v2/models/{name}/versions/{version}", tag = "inference",
     operation_id = "get_model_version",
     params(
         ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "Its one version, as its metadata tells it."),
+        ("version" = String, Path, description = "The version in the metadata of the model."),
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
-        (status = OK, description = "Its inputs and outputs.", body = ModelMetadata),
+        (status = OK, description = "The inputs and outputs of the model.", body = ModelMetadata),
     )
 )]
 pub(in crate::api) async fn model_version(
@@ -83,7 +87,7 @@ pub(in crate::api) async fn model_version(
     Ok(Json(Asked::find(&state, &name, Some(&version))?.metadata()))
 }
 
-/// Can a model be asked?
+/// Check the readiness of a model
 #[utoipa::path(
     get, path = "/v2/models/{name}/ready", tag = "inference", operation_id = "get_model_readiness",
     params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
@@ -102,13 +106,13 @@ pub(in crate::api) async fn model_ready(
     Ok(Json(ModelReady { name, ready: true }))
 }
 
-/// Can this version of a model be asked?
+/// Check readiness of a model version
 #[utoipa::path(
     get, path = "/v2/models/{name}/versions/{version}/ready", tag = "inference",
     operation_id = "get_model_version_readiness",
     params(
         ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "Its one version, as its metadata tells it."),
+        ("version" = String, Path, description = "The version in the metadata of the model."),
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(

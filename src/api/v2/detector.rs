@@ -1,4 +1,4 @@
-//! The detectors that are loaded: views in, what each of them holds out.
+//! The loaded detectors: accept views and return the detections in each.
 
 use std::{sync::Arc, time::Instant};
 
@@ -22,7 +22,7 @@ use crate::{
 const INPUT: &str = "views";
 const OUTPUTS: [&str; 2] = ["boxes", "scores"];
 
-/// What a detector takes and answers.
+/// Returns the inputs and outputs of a detector.
 pub(super) fn metadata(model: &Model) -> ModelMetadata {
     let input = model.input();
     let (width, height) = (input.width.into(), input.height.into());
@@ -69,7 +69,7 @@ pub(super) async fn infer(
     limit.wait(trace, &timeline, work).await?
 }
 
-/// The pixels of views of the model's size.
+/// Returns the pixels of views of the model's input size.
 fn pixels(views: Tensor, model: &Model) -> Result<Held<Vec<f32>>, Problem> {
     let (width, height) = (model.input().width, model.input().height);
     let sides = [3, height as usize, width as usize];
@@ -80,18 +80,18 @@ fn pixels(views: Tensor, model: &Model) -> Result<Held<Vec<f32>>, Problem> {
         }
         Values::Numbers(_) => {
             let wrong = format!(
-                "its shape is {shape:?}: [views, 3, {height}, {width}] is needed, with at least one view"
+                "its shape is {shape:?}: send [views, 3, {height}, {width}] with at least one view"
             );
             Err(misfit(INPUT, &wrong))
         }
         Values::Frame(_) => {
-            let wrong = "its datatype is FP32 or UINT8: planes of red, green and blue, 0 to 255";
+            let wrong = "send the datatype FP32 or UINT8: planes of red, green and blue, 0 to 255";
             Err(misfit(INPUT, wrong))
         }
     }
 }
 
-/// Checks the parameters of a request: a detector takes few of them.
+/// Checks the parameters of a request. A detector has few of them.
 fn view_parameters(request: &InferRequest) -> Result<DetectParameters, Problem> {
     let offered = DetectParameters::TABLE.iter();
     let offered = offered.filter(|spec| spec.is_offered_by(Interface::Detector));
@@ -105,8 +105,12 @@ fn view_parameters(request: &InferRequest) -> Result<DetectParameters, Problem> 
     Ok(persons::parameters(&request.parameters)?)
 }
 
-/// `[views, candidates, 4]` and `[views, candidates]`, as many candidates as the fullest view has.
-#[expect(clippy::cast_possible_truncation, reason = "this is what FP32 means")]
+/// Returns `[views, candidates, 4]` and `[views, candidates]`, padded to the largest number of
+/// candidates.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "FP32 outputs have this precision"
+)]
 fn outputs(found: &HeadOutput) -> [Output; 2] {
     let views = found.per_view.len();
     let candidates = found.per_view.iter().map(Vec::len).max().unwrap_or(0);

@@ -1,4 +1,5 @@
-//! Requests and answers as they are described. `request_head` reads the ones, `answer` writes the others.
+//! Inference requests and responses in the OpenAPI document. `request_head` reads the requests,
+//! `answer` writes the responses.
 
 use utoipa::{
     PartialSchema, ToSchema,
@@ -11,8 +12,8 @@ use utoipa::{
 use super::answer::BinarySize;
 use crate::{api::openapi::fields, pipeline::Interface};
 
-/// A request to infer, its tensors in it. Where they come as bytes behind it, `binary_data_size` is a
-/// parameter of theirs instead of `data`.
+/// An inference request with its tensors. A tensor whose bytes follow the JSON has the parameter
+/// `binary_data_size` instead of `data`.
 #[derive(ToSchema)]
 #[schema(example = json!({
     "id": "17",
@@ -21,28 +22,28 @@ use crate::{api::openapi::fields, pipeline::Interface};
     "outputs": [{"name": "boxes"}, {"name": "scores"}]
 }))]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "describes what request_head reads")]
+#[expect(dead_code, reason = "documents the input of request_head")]
 pub(in crate::api) struct InferRequestBody {
-    /// Is in the answer as well.
+    /// The ID of the request; the response repeats it.
     #[schema(max_length = 256)]
     id: Option<String>,
     /// The parameters of `/detect` and of the protocol.
     #[schema(nullable = false)]
     parameters: Option<InferParameters>,
-    /// The one that the model takes.
+    /// The input of the model.
     #[schema(max_items = 16)]
     inputs: Vec<InferInput>,
-    /// Those wanted; all of the model's when there are none.
+    /// The requested outputs; all of the model's by default.
     #[schema(max_items = 16)]
     outputs: Option<Vec<InferRequestedOutput>>,
 }
 
-/// A tensor that is sent.
+/// An input tensor.
 #[derive(ToSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "describes what request_head reads")]
+#[expect(dead_code, reason = "documents the input of request_head")]
 struct InferInput {
-    /// Its name.
+    /// The name.
     name: String,
     /// The size of each axis.
     #[schema(max_items = 16)]
@@ -50,28 +51,28 @@ struct InferInput {
     /// `BYTES`, `FP32` or `UINT8`.
     #[schema(example = "BYTES")]
     datatype: String,
-    /// Base64 for `BYTES`, numbers otherwise, row-major; lists may be nested as the shape is.
+    /// Base64 for `BYTES`, numbers otherwise, row-major. The lists may be nested like the shape.
     data: Vec<serde_json::Value>,
 }
 
-/// An output that is wanted.
+/// A requested output.
 #[derive(ToSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "describes what request_head reads")]
+#[expect(dead_code, reason = "documents the input of request_head")]
 struct InferRequestedOutput {
-    /// Its name.
+    /// The name.
     name: String,
-    /// How.
+    /// The parameters of the output.
     #[schema(nullable = false)]
     parameters: Option<InferOutputParameters>,
 }
 
-/// How an output is wanted.
+/// The parameters of a requested output.
 #[derive(ToSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "describes what request_head reads")]
+#[expect(dead_code, reason = "documents the input of request_head")]
 struct InferOutputParameters {
-    /// As bytes behind the JSON.
+    /// `true` to send the output as bytes after the JSON.
     binary_data: Option<bool>,
 }
 
@@ -83,7 +84,7 @@ impl ToSchema for InferParameters {
 }
 
 impl PartialSchema for InferParameters {
-    /// What the pipeline reads of the parameters of `/detect`, and the protocol's own.
+    /// Returns the schema of the parameters of `/detect` and of the protocol.
     fn schema() -> RefOr<Schema> {
         let description = "Parameters of `/detect`, and of the protocol. Detectors take the protocol's \
                            and `timeout_millis`.";
@@ -107,7 +108,7 @@ impl PartialSchema for InferParameters {
     }
 }
 
-/// What a model answers.
+/// An inference response.
 #[derive(ToSchema)]
 #[schema(example = json!({
     "model_name": "lookdown", "model_version": "1", "id": "17",
@@ -116,34 +117,34 @@ impl PartialSchema for InferParameters {
         {"name": "scores", "datatype": "FP32", "shape": [1], "data": [0.8731]}
     ]
 }))]
-#[expect(dead_code, reason = "describes what answer writes")]
+#[expect(dead_code, reason = "documents the output of answer")]
 pub(in crate::api) struct InferResponseBody {
-    /// The model.
+    /// The name of the model.
     model_name: String,
-    /// Its version.
+    /// The version of the model.
     model_version: String,
-    /// The request's, if it had one.
+    /// The ID of the request, if it had one.
     #[schema(nullable = false)]
     id: Option<String>,
     /// The outputs, in the order of the model's metadata.
     outputs: Vec<InferOutput>,
 }
 
-/// A tensor that is answered.
+/// An output tensor.
 #[derive(ToSchema)]
-#[expect(dead_code, reason = "describes what answer writes")]
+#[expect(dead_code, reason = "documents the output of answer")]
 struct InferOutput {
-    /// Its name.
+    /// The name.
     name: String,
-    /// Its datatype.
+    /// The datatype.
     #[schema(example = "FP32")]
     datatype: String,
     /// The size of each axis.
     shape: Vec<u32>,
-    /// Where it comes as bytes behind the JSON.
+    /// The parameters of an output that is sent as bytes after the JSON.
     #[schema(nullable = false)]
     parameters: Option<BinarySize>,
-    /// Its values otherwise, flat and row-major.
+    /// The values otherwise, flat and row-major.
     #[schema(nullable = false)]
     data: Option<Vec<serde_json::Value>>,
 }

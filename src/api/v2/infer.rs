@@ -1,4 +1,4 @@
-//! Asking a model.
+//! Inference requests.
 
 use axum::{
     Extension,
@@ -19,22 +19,23 @@ use crate::{
     telemetry::RequestTrace,
 };
 
-/// Find persons as clients of the Open Inference Protocol ask.
+/// Run inference
 ///
-/// `lookdown` takes `image` (`BYTES`, `[1]`): an encoded frame, base64 in JSON, as it is behind it. It
-/// answers with `boxes` (`[persons, 4]`), `scores`, `oriented_boxes` (`[persons, 5]`), `views` and
-/// `report`; the parameters of `/detect` are parameters of the request. A detector takes `views` (`FP32` or
-/// `UINT8`, `[views, 3, height, width]`, pixels 0 to 255) and answers with `boxes`
-/// (`[views, candidates, 4]`) and `scores` (`[views, candidates]`), filled up with zeros.
+/// `lookdown` accepts `image` (`BYTES`, `[1]`): an encoded frame, base64 in JSON, or unchanged
+/// bytes after it. It returns `boxes` (`[persons, 4]`), `scores`, `oriented_boxes` (`[persons,
+/// 5]`), `views` and `report`. The parameters of `/detect` are parameters of the request. A
+/// detector accepts `views` (`FP32` or `UINT8`, `[views, 3, height, width]`, pixels 0 to 255) and
+/// returns `boxes` (`[views, candidates, 4]`) and `scores` (`[views, candidates]`), padded with
+/// zeros.
 #[utoipa::path(
     post, path = "/v2/models/{name}/infer", tag = "inference", operation_id = "infer_with_model",
     params(
         ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
         ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
-         description = "Where tensors follow as bytes: the length of the JSON before them."),
+         description = "The length of the JSON, if tensors follow it as bytes."),
     ),
     request_body(
-        description = "JSON, or JSON with the bytes of tensors behind it.",
+        description = "JSON, or JSON followed by the bytes of tensors.",
         content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
@@ -54,20 +55,20 @@ pub(in crate::api) async fn infer(
     answered(&state, &request_id, &trace, asked, arrival).await
 }
 
-/// Find persons with this version of a model.
+/// Run inference with a model version
 ///
-/// As without a version.
+/// Equivalent to the route without a version.
 #[utoipa::path(
     post, path = "/v2/models/{name}/versions/{version}/infer", tag = "inference",
     operation_id = "infer_with_model_version",
     params(
         ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
-        ("version" = String, Path, description = "Its one version, as its metadata tells it."),
+        ("version" = String, Path, description = "The version in the metadata of the model."),
         ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
-         description = "Where tensors follow as bytes: the length of the JSON before them."),
+         description = "The length of the JSON, if tensors follow it as bytes."),
     ),
     request_body(
-        description = "JSON, or JSON with the bytes of tensors behind it.",
+        description = "JSON, or JSON followed by the bytes of tensors.",
         content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
     ),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),

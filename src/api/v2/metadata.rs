@@ -1,21 +1,21 @@
-//! What the server and its models tell of themselves.
+//! Metadata of the server and its models.
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::open_inference::{BINARY_EXTENSION, Datatype};
 
-/// The extensions of the protocol that are offered.
+/// The supported extensions of the protocol.
 const EXTENSIONS: [&str; 2] = [BINARY_EXTENSION, "model_repository"];
 
-/// A server.
+/// The metadata of the server.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct ServerMetadata {
-    /// `lookdown`.
+    /// Always `lookdown`.
     name: &'static str,
-    /// The server's version.
+    /// The version of the server.
     version: &'static str,
-    /// The extensions of the protocol that are offered.
+    /// The supported extensions of the protocol.
     extensions: [&'static str; 2],
 }
 
@@ -29,57 +29,57 @@ impl Default for ServerMetadata {
     }
 }
 
-/// Whether the process answers.
+/// The liveness of the server.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct ServerLive {
     /// Always true.
     pub(super) live: bool,
 }
 
-/// Whether frames can be sent.
+/// The readiness of the server.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct ServerReady {
-    /// Always true; otherwise the answer is a problem.
+    /// Always true; the response is a problem otherwise.
     pub(super) ready: bool,
 }
 
-/// Whether a model can be asked.
+/// The readiness of a model.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct ModelReady {
-    /// Its name.
+    /// The name.
     pub(super) name: String,
-    /// Always true; otherwise the answer is a problem.
+    /// Always true; the response is a problem otherwise.
     pub(super) ready: bool,
 }
 
-/// A model.
+/// The metadata of a model.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct ModelMetadata {
-    /// Its name.
+    /// The name.
     pub(super) name: String,
-    /// Its one version: of a detector the revision, as in reports.
+    /// The only version: for a detector its revision, as in reports.
     pub(super) versions: [String; 1],
-    /// `lookdown`.
+    /// Always `lookdown`.
     pub(super) platform: &'static str,
-    /// What it takes.
+    /// The inputs.
     pub(super) inputs: Vec<TensorMetadata>,
-    /// What it answers.
+    /// The outputs.
     pub(super) outputs: Vec<TensorMetadata>,
 }
 
-/// A tensor.
+/// The metadata of a tensor.
 #[derive(Serialize, ToSchema)]
 pub(in crate::api) struct TensorMetadata {
-    /// Its name.
+    /// The name.
     name: &'static str,
-    /// Its datatype.
+    /// The datatype.
     #[schema(value_type = String, example = "FP32")]
     datatype: Datatype,
-    /// Its shape, -1 where the size is not fixed.
+    /// The shape; -1 for an axis of variable size.
     shape: Vec<i64>,
 }
 
-/// A tensor of a model.
+/// Returns the metadata of a tensor.
 pub(super) fn tensor(
     name: &'static str,
     datatype: Datatype,

@@ -1,4 +1,4 @@
-//! The model `lookdown`: a frame in, its persons out.
+//! The model `lookdown`: accepts a frame and returns its persons.
 
 use std::time::Instant;
 
@@ -30,12 +30,12 @@ use crate::{
 
 const INPUT: &str = "image";
 const OUTPUTS: [&str; 5] = ["boxes", "scores", "oriented_boxes", "views", "report"];
-/// The protocol's own name of [`TIMEOUT_MILLIS`]; it counts microseconds.
+/// The name of [`TIMEOUT_MILLIS`] in the protocol; its unit is microseconds.
 pub(super) const TIMEOUT: &str = "timeout";
 const TIMEOUT_MILLIS: &str = "timeout_millis";
 const MICROS_PER_MILLI: u64 = 1000;
 
-/// What it takes and answers.
+/// Returns the inputs and outputs of the model.
 pub(super) fn metadata() -> ModelMetadata {
     let [boxes, scores, oriented_boxes, views, report] = OUTPUTS;
     ModelMetadata {
@@ -62,7 +62,7 @@ pub(super) async fn infer(
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
     let Values::Frame(image) = request.only_input(INPUT)?.values else {
-        return Err(misfit(INPUT, "its datatype is BYTES: an encoded frame"));
+        return Err(misfit(INPUT, "send the datatype BYTES: an encoded frame"));
     };
     if image.is_empty() {
         return Err(misfit(INPUT, "it is empty: send an encoded frame"));
@@ -84,7 +84,10 @@ pub(super) async fn infer(
     Ok(answer)
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "this is what FP32 means")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "FP32 outputs have this precision"
+)]
 fn outputs(persons: &[ReportPerson], report: OutputValues) -> Vec<Output> {
     let count = persons.len();
     let floats = |of: fn(&ReportPerson) -> Vec<f64>| {
@@ -118,7 +121,7 @@ fn outputs(persons: &[ReportPerson], report: OutputValues) -> Vec<Output> {
     named.map(output).collect()
 }
 
-/// The parameters of `/detect` from those of a request.
+/// Returns the parameters of `/detect` among those of a request.
 pub(super) fn parameters(
     given: &[(String, Parameter)],
 ) -> Result<DetectParameters, ParameterError> {
@@ -130,7 +133,8 @@ pub(super) fn parameters(
     DetectParameters::parse(pairs(&texts))
 }
 
-/// A parameter as it would be written in a query. The value of an unknown one is left out: its name is refused.
+/// Returns a parameter as text, as in a query. The value of an unknown one is omitted: its name is
+/// refused.
 fn as_text(name: &str, value: &Parameter) -> Result<(String, String), ParameterError> {
     let spec = DetectParameters::TABLE
         .iter()
@@ -142,7 +146,7 @@ fn as_text(name: &str, value: &Parameter) -> Result<(String, String), ParameterE
     Ok((name.to_owned(), text.to_owned()))
 }
 
-/// The protocol's `timeout` as `timeout_millis`.
+/// Converts the protocol's `timeout` to `timeout_millis`.
 fn timeout(value: &Parameter) -> Result<(String, String), ParameterError> {
     let text = text_of(TIMEOUT, value, JsonType::Number)?;
     let micros: u64 = text
@@ -152,7 +156,7 @@ fn timeout(value: &Parameter) -> Result<(String, String), ParameterError> {
     Ok((TIMEOUT_MILLIS.to_owned(), millis.to_string()))
 }
 
-/// The text of a value of a JSON type.
+/// Returns the text of a value of a JSON type.
 fn text_of<'a>(
     name: &str,
     value: &'a Parameter,

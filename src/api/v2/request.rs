@@ -1,4 +1,4 @@
-//! A request to infer, read: its inputs, what it wants to be answered, and its parameters.
+//! A parsed inference request: its inputs, its requested outputs and its parameters.
 
 use axum::http::{HeaderMap, header::CONTENT_ENCODING};
 use bytes::Bytes;
@@ -19,25 +19,25 @@ use crate::{
 
 /// Longest ID of a request, characters.
 pub(super) const MAX_ID_CHARS: usize = 256;
-/// Most characters that are told of what is wrong with JSON: it may quote what was sent.
-const MAX_TOLD_CHARS: usize = 300;
-/// Tells how long the part of a tensor behind the JSON is.
+/// Longest description of a JSON error, characters: it may quote the request.
+const MAX_MESSAGE_CHARS: usize = 300;
+/// The parameter with the number of bytes of a tensor after the JSON.
 const BINARY_SIZE: &str = "binary_data_size";
-/// What parameters of tensors begin with that lie in memory of the server's machine.
+/// The prefix of the parameters of tensors in the shared memory of the server's machine.
 const SHARED_MEMORY: &str = "shared_memory";
 
-/// A request to infer.
+/// An inference request.
 pub(super) struct InferRequest {
     pub(super) id: Option<String>,
-    /// Those that are none of the protocol's own.
+    /// The parameters except those of the protocol.
     pub(super) parameters: Vec<(String, Parameter)>,
     pub(super) inputs: Vec<Tensor>,
     pub(super) wanted: Wanted,
 }
 
 impl InferRequest {
-    /// Reads a request: JSON, or as much JSON as `Inference-Header-Content-Length` says and bytes of
-    /// tensors behind it. What is unpacked from it has its own share of the budget.
+    /// Reads a request: JSON, or as many bytes of JSON as `Inference-Header-Content-Length` states,
+    /// followed by the bytes of tensors. Unpacked tensors have their own share of the budget.
     pub(super) fn read(
         headers: &HeaderMap,
         body: &Bytes,
@@ -46,13 +46,15 @@ impl InferRequest {
         if let Some(encoding) = headers.get(CONTENT_ENCODING)
             && encoding != "identity"
         {
-            return Err(malformed("the body is compressed: send it as it is"));
+            return Err(malformed("the body is compressed: send it uncompressed"));
         }
         let length = head_length(headers, body)?;
         let mut behind = body.slice(length..);
         let mut head = request_head::read(&body[..length]).map_err(|error| {
-            let told: String = error.to_string().chars().take(MAX_TOLD_CHARS).collect();
-            malformed(&format!("the JSON of the request cannot be used: {told}"))
+            let message: String = error.to_string().chars().take(MAX_MESSAGE_CHARS).collect();
+            malformed(&format!(
+                "the JSON of the request cannot be used: {message}"
+            ))
         })?;
         let inputs = head.inputs.0.into_iter();
         let inputs = inputs.map(|Table(input)| read_input(input, &mut behind, budget));
@@ -60,7 +62,7 @@ impl InferRequest {
         if !behind.is_empty() {
             let spare = behind.len();
             return Err(malformed(&format!(
-                "{spare} bytes follow that are no input's: {BINARY_SIZE} says of each input how many are"
+                "{spare} bytes follow that belong to no input: {BINARY_SIZE} states the number of each input"
             )));
         }
         if let Some(id) = &head.id
@@ -81,40 +83,40 @@ impl InferRequest {
         })
     }
 
-    /// The one input of a model.
+    /// Returns the only input of a model.
     pub(super) fn only_input(&mut self, name: &str) -> Result<Tensor, Problem> {
         let mut inputs = self.inputs.drain(..);
         match (inputs.next(), inputs.next()) {
             (Some(only), None) if only.name == name => Ok(only),
             (None, _) => Err(misfit("inputs", &format!("{name} is missing"))),
             (Some(other), None) => {
-                let wrong = format!("there is no such input: {name} is the one there is");
+                let wrong = format!("there is no such input: the only input is {name}");
                 Err(misfit(&other.name, &wrong))
             }
             (Some(_), Some(_)) => Err(misfit(
                 "inputs",
-                &format!("{name} is the one input there is: send it once"),
+                &format!("{name} is the only input: send it once"),
             )),
         }
     }
 }
 
 fn head_length(headers: &HeaderMap, body: &Bytes) -> Result<usize, Problem> {
-    let Some(told) = headers.get(HEAD_LENGTH) else {
+    let Some(stated) = headers.get(HEAD_LENGTH) else {
         return Ok(body.len());
     };
-    let length = told.to_str().ok().and_then(|told| told.parse().ok());
+    let length = stated.to_str().ok().and_then(|stated| stated.parse().ok());
     length.filter(|length| *length <= body.len()).ok_or_else(|| {
-        let (told, sent) = (String::from_utf8_lossy(told.as_bytes()), body.len());
-        let told = Quoted(&told);
+        let (stated, sent) = (String::from_utf8_lossy(stated.as_bytes()), body.len());
+        let stated = Quoted(&stated);
         malformed(&format!(
-            "{HEAD_LENGTH} is {told}, and the body has {sent} bytes: it is the length of the JSON \
+            "{HEAD_LENGTH} is {stated}, and the body has {sent} bytes: it must be the length of the JSON \
              in it"
         ))
     })
 }
 
-/// Reads an input, whose bytes may be the next of those behind the JSON.
+/// Reads an input, whose values may be the next bytes after the JSON.
 fn read_input(
     mut input: InputHead<'_>,
     behind: &mut Bytes,
@@ -127,7 +129,7 @@ fn read_input(
         (None, Some(size)) => {
             let left = behind.len();
             let wrong = format!(
-                "its {BINARY_SIZE} is {size}, and {left} bytes are left behind the JSON, whose length is \
+                "its {BINARY_SIZE} is {size}, and {left} bytes are left after the JSON, whose length is \
                  said by {HEAD_LENGTH}"
             );
             return Err(misfit(&input.name, &wrong));
@@ -150,10 +152,10 @@ fn binary_size(tensor: &str, parameters: &mut Parameters) -> Result<Option<usize
         Some(other) => Err(format!("{other:?}")),
         None => Ok(None),
     };
-    let size = size.map_err(|told| {
+    let size = size.map_err(|stated| {
         let wrong = format!(
             "its {BINARY_SIZE} is {}: give a number of bytes",
-            shortened(&told)
+            shortened(&stated)
         );
         misfit(tensor, &wrong)
     })?;
@@ -161,7 +163,7 @@ fn binary_size(tensor: &str, parameters: &mut Parameters) -> Result<Option<usize
     Ok(size)
 }
 
-/// Refuses what is left of a tensor's parameters.
+/// Refuses the remaining parameters of a tensor.
 pub(super) fn refuse_others(
     tensor: &str,
     parameters: &Parameters,
@@ -171,10 +173,10 @@ pub(super) fn refuse_others(
         return Ok(());
     };
     let wrong = if name.starts_with(SHARED_MEMORY) {
-        "shared memory is not offered: send tensors in the body".to_owned()
+        "shared memory is not supported: send tensors in the body".to_owned()
     } else {
         let name = Quoted(name);
-        format!("there is no parameter {name} of a tensor: there is {known}")
+        format!("there is no tensor parameter {name}: use {known}")
     };
     Err(misfit(tensor, &wrong))
 }

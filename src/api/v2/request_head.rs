@@ -1,5 +1,5 @@
-//! The JSON of a request to infer, as it is written. Lists and tables are bounded while they are read;
-//! the data of tensors stay text.
+//! The JSON of an inference request. Lists and tables are limited while they are parsed. The data
+//! of tensors stays unparsed text.
 
 use std::{fmt, marker::PhantomData};
 
@@ -9,10 +9,10 @@ use serde::{
 };
 use serde_json::value::RawValue;
 
-/// Most inputs, outputs and sides of a shape.
+/// Largest number of inputs, of outputs and of axes.
 pub(super) const MAX_ENTRIES: usize = 16;
-/// Most parameters of anything: every parameter there is, with room for mistakes that deserve a better
-/// answer than this limit.
+/// Largest number of parameters of an object: all existing parameters, with room for mistakes,
+/// which have a better error message.
 const MAX_PARAMETERS: usize = 32;
 
 #[derive(Deserialize)]
@@ -79,7 +79,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for EntriesVisitor<T> {
     }
 }
 
-/// A struct that is written as an object; serde would read it from a list of its fields as well.
+/// A struct that must be a JSON object; serde would also accept a list of its fields.
 pub(super) struct Table<T>(pub(super) T);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Table<T> {
@@ -102,7 +102,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for TableVisitor<T> {
     }
 }
 
-/// Parameters in their order; those that are `null` are left out.
+/// Parameters in their order, without those that are `null`.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Parameters(pub(super) Vec<(String, Parameter)>);
 
@@ -110,13 +110,13 @@ pub(super) struct Parameters(pub(super) Vec<(String, Parameter)>);
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Parameter {
     Flag(bool),
-    /// As it would be written in a query.
+    /// The number as text, as in a query.
     Number(String),
     Text(String),
 }
 
 impl Parameters {
-    /// Takes the parameter of that name out, if it is there once or more; the last one counts.
+    /// Removes and returns the parameter of this name; the last one if it is repeated.
     pub(super) fn take(&mut self, name: &str) -> Option<Parameter> {
         let mut taken = self.0.extract_if(.., |(given, _)| given == name);
         taken.by_ref().last().map(|(_, value)| value)
@@ -192,7 +192,7 @@ impl Visitor<'_> for ParameterVisitor {
     }
 }
 
-/// Reads an object.
+/// Parses the JSON of a request.
 pub(super) fn read<'a>(json: &'a [u8]) -> Result<RequestHead<'a>, serde_json::Error> {
     serde_json::from_slice::<Table<RequestHead<'a>>>(json).map(|Table(head)| head)
 }

@@ -1,4 +1,4 @@
-//! Tensors as they are sent: a name, a shape, and one frame or many numbers.
+//! Input tensors: a name, a shape, and one frame or many numbers.
 
 use bytes::Bytes;
 use tokio::sync::OwnedSemaphorePermit;
@@ -12,32 +12,32 @@ use crate::{
     quoted::{Quoted, shortened},
 };
 
-/// An input as it was sent.
+/// An input tensor.
 pub(super) struct Tensor {
     pub(super) name: String,
     pub(super) shape: Vec<usize>,
     pub(super) values: Values,
 }
 
-/// What a tensor holds, with its share of the memory of requests.
+/// The values of a tensor, with their share of the memory budget.
 pub(super) enum Values {
-    /// The one element of a tensor of `BYTES`.
+    /// The single element of a `BYTES` tensor.
     Frame(Bytes),
     /// Finite numbers, row-major.
     Numbers(Held<Vec<f32>>),
 }
 
-/// A tensor's values as they were sent.
+/// The values of a tensor as the client sent them.
 pub(super) enum Sent<'a> {
     /// In the JSON.
     Json(&'a str),
-    /// Behind the JSON.
+    /// After the JSON.
     Binary(Bytes),
 }
 
 impl Tensor {
-    /// Reads the values of a tensor, if there is memory for them; otherwise the sentence says what is wrong
-    /// with them.
+    /// Reads the values of a tensor within the memory budget; otherwise the error sentence states
+    /// the fault.
     pub(super) fn read(
         name: String,
         datatype: &str,
@@ -58,13 +58,13 @@ impl Tensor {
     }
 }
 
-/// What the elements of a tensor are, and how many.
+/// Returns the datatype and the number of elements of a tensor.
 fn elements(datatype: &str, shape: &[u32]) -> Result<(Datatype, usize), String> {
     let known = datatype.parse().ok();
     let known = known.filter(|datatype| *datatype != Datatype::Int32);
     let datatype = known.ok_or_else(|| {
         let datatype = Quoted(datatype);
-        format!("its datatype is {datatype}: BYTES, FP32 and UINT8 are read")
+        format!("its datatype is {datatype}: send BYTES, FP32 or UINT8")
     })?;
     let mut sides = shape.iter().map(|side| *side as usize);
     let count = sides.try_fold(1_usize, usize::checked_mul);
@@ -72,19 +72,20 @@ fn elements(datatype: &str, shape: &[u32]) -> Result<(Datatype, usize), String> 
         count.ok_or_else(|| format!("its shape {shape:?} has more elements than memory"))?;
     if datatype == Datatype::Bytes && count != 1 {
         return Err(format!(
-            "its shape is {shape:?}: one frame is taken at a time, [1]"
+            "its shape is {shape:?}: send one frame at a time, [1]"
         ));
     }
     Ok((datatype, count))
 }
 
 impl Sent<'_> {
-    /// Most memory that `count` elements take beside the body, bytes: known before they are read.
+    /// Returns the largest memory that `count` elements need besides the body, in bytes, before
+    /// they are read.
     fn unpacked_bytes(&self, datatype: Datatype, count: usize) -> usize {
         let numbers = |count| count * size_of::<f32>();
         match (datatype, self) {
             (Datatype::Bytes, Self::Json(text)) => json_data::bytes_at_most(text),
-            // It is a part of the body.
+            // The values are a part of the body.
             (Datatype::Bytes, Self::Binary(_)) => 0,
             (_, Self::Json(text)) => numbers(json_data::numbers_at_most(text, count)),
             (_, Self::Binary(bytes)) => numbers(count.min(bytes.len())),
@@ -116,7 +117,7 @@ impl Sent<'_> {
     }
 }
 
-/// What the sender of a tensor that cannot be used is told.
+/// Returns the problem of an unusable tensor.
 pub(super) fn misfit(name: &str, wrong: &str) -> Problem {
     Problem::of_parameter(ProblemKind::InvalidTensor, shortened(name), wrong)
 }

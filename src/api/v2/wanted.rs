@@ -1,4 +1,4 @@
-//! Which outputs a request wants, and how.
+//! The requested outputs of an inference request and their encoding.
 
 use super::{
     request::refuse_others,
@@ -10,21 +10,21 @@ use crate::{
     quoted::Quoted,
 };
 
-/// Makes all outputs come as bytes.
+/// The request parameter that selects bytes for all outputs.
 const ALL_BINARY: &str = "binary_data_output";
-/// Says of one output whether it comes as bytes.
+/// The output parameter that selects bytes for one output.
 const BINARY: &str = "binary_data";
 
-/// Which outputs a request wants, and how.
+/// The requested outputs and their encoding.
 pub(super) struct Wanted {
-    /// Whether outputs of which nothing else is said come as bytes behind the JSON.
+    /// `true` if outputs without a parameter of their own are sent as bytes after the JSON.
     all_binary: bool,
-    /// Names, and whether they are to come as bytes; all outputs when there are none.
+    /// Output names with their own choice of bytes; empty for all outputs.
     named: Vec<(String, Option<bool>)>,
 }
 
 impl Wanted {
-    /// Takes the parameter that speaks of all outputs out of a request's.
+    /// Takes the parameter for all outputs out of those of a request.
     pub(super) fn read(
         parameters: &mut Parameters,
         outputs: impl Iterator<Item = OutputHead>,
@@ -42,7 +42,7 @@ impl Wanted {
             let binary = binary.map_err(|wrong| misfit(&name, &format!("{BINARY}: {wrong}")))?;
             refuse_others(&name, &parameters, BINARY)?;
             if named.iter().any(|(given, _)| *given == name) {
-                return Err(misfit(&name, "it is asked for twice: ask once"));
+                return Err(misfit(&name, "it is requested twice: request it once"));
             }
             named.push((name, binary));
         }
@@ -52,7 +52,7 @@ impl Wanted {
         })
     }
 
-    /// Refuses names that are not among those of a model's outputs.
+    /// Refuses names that the model's outputs do not have.
     pub(super) fn check(&self, outputs: &[&str]) -> Result<(), Problem> {
         let unknown = self
             .named
@@ -64,11 +64,11 @@ impl Wanted {
         let outputs = outputs.join(", ");
         Err(misfit(
             name,
-            &format!("there is no such output: there are {outputs}"),
+            &format!("there is no such output: the outputs are {outputs}"),
         ))
     }
 
-    /// Whether an output is wanted, and then whether it is to come as bytes.
+    /// Returns `None` if an output is not requested, otherwise `true` if it is sent as bytes.
     pub(super) fn how(&self, output: &str) -> Option<bool> {
         if self.named.is_empty() {
             return Some(self.all_binary);

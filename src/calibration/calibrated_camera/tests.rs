@@ -16,7 +16,7 @@ fn calibration() -> Calibration {
 fn frames_of_the_same_aspect_are_scaled() {
     let camera = calibration().for_frame(1600, 1200).unwrap();
     assert_eq!(camera.lens.principal_point(), Pixel::new(799.5, 599.5));
-    // One pixel of rounding by whoever scaled the frame is forgiven.
+    // One pixel of rounding by the program that scaled the frame is accepted.
     assert!(calibration().for_frame(401, 300).is_ok());
 }
 

@@ -24,14 +24,15 @@ pub enum WriteCondition {
 /// A calibration that was written.
 #[derive(Debug, Clone)]
 pub struct Put {
-    /// What serves now.
+    /// The calibration that serves now.
     pub entry: Arc<CalibrationEntry>,
-    /// Whether there was none before.
+    /// True when there was none before.
     pub created: bool,
 }
 
 impl Calibrations {
-    /// What `content` would be as the calibration `id`, by the rules of [`Calibrations::put`]; nothing is stored.
+    /// Reads `content` as the calibration `id`, by the rules of [`Calibrations::put`]; nothing is
+    /// stored.
     ///
     /// # Errors
     /// [`ChangeError`] for content that cannot be a calibration.
@@ -141,8 +142,8 @@ fn shared_file(file: &LoadedFile) -> ChangeError {
 }
 
 impl WriteCondition {
-    /// What the file called `name` may replace under this condition, when `known` is that of its
-    /// ID: nobody's change that was made after the condition was checked.
+    /// Returns the content that the file called `name` may replace under this condition, when
+    /// `known` is that of its ID: no change that was made after the condition was checked.
     fn replaces<'a>(&self, known: Option<&'a StoredFile>, name: &str) -> Replaces<'a> {
         match known {
             _ if *self == Self::Always => Replaces::Anything,

@@ -87,12 +87,12 @@ impl CalibrationEntry {
     }
 }
 
-/// How an uploaded file is to be read.
+/// The options for reading an uploaded file.
 #[derive(Debug, Clone, Default)]
 pub struct Reading {
-    /// Which camera of the file is meant, by its name there, if there are several.
+    /// The camera of the file that is meant, by its name there, if there are several.
     pub camera: Option<String>,
-    /// The size of the frames, for formats that do not tell it.
+    /// The size of the frames, for formats that do not have it.
     pub size: Option<NativeImage>,
 }
 

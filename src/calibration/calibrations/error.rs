@@ -1,9 +1,9 @@
-//! Why a calibration was not changed, or nobody knows.
+//! Reasons for which a calibration was not changed, or for which the outcome is unknown.
 
 use crate::calibration::{CalibrationId, FormatError, StoreError};
 
-/// A calibration that was not changed, or that could not be looked at afterwards. Every message is one
-/// sentence with the remedy.
+/// A calibration that was not changed, or that could not be looked at afterwards. Every message is
+/// one sentence with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
     /// The operator has switched changes off.
@@ -43,7 +43,7 @@ pub enum ChangeError {
          at what has changed, and send your change again"
     )]
     Outdated {
-        /// What it is.
+        /// The description of the problem.
         now: String,
     },
     /// The calibration shares its file with others.

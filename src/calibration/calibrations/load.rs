@@ -11,11 +11,11 @@ use crate::calibration::{CalibrationId, StoreError};
 /// A file of the store.
 #[derive(Debug)]
 pub(super) struct LoadedFile {
-    /// Which version was read.
+    /// The version that was read.
     pub(super) named: NamedFile,
     /// Its calibrations that serve, from this version or the last that could be used.
     pub(super) cameras: BTreeMap<CalibrationId, Arc<CalibrationEntry>>,
-    /// Whether the last version that could be read holds several cameras.
+    /// True when the last version that could be read holds several cameras.
     pub(super) holds_several: bool,
     /// Why this version, or cameras of it, cannot be used, a sentence each.
     pub(super) problems: Vec<String>,
@@ -84,14 +84,15 @@ impl LoadedFile {
         }
     }
 
-    /// Whether this says something that `before` did not: the same failure to read is no news.
+    /// Returns true for a result that differs from `before`: a repeated read failure does not
+    /// differ.
     pub(super) fn is_news(&self, before: Option<&Self>) -> bool {
         self.problems.is_empty()
             || before
                 .is_none_or(|before| before.problems != self.problems || before.named != self.named)
     }
 
-    /// Tells what this version changes.
+    /// Logs the changes of this version.
     pub(super) fn log(&self, before: Option<&Self>) {
         let file = &self.named.file.name;
         for problem in &self.problems {

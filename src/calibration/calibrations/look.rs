@@ -17,7 +17,7 @@ use crate::calibration::{CalibrationFile, CalibrationId, READ_AT_ONCE, StoreErro
 type Files = BTreeMap<CalibrationId, Arc<LoadedFile>>;
 
 impl Calibrations {
-    /// Looks at the store and reads the files that have changed. What fails is logged, told by
+    /// Looks at the store and reads the files that have changed. Failures are logged, reported by
     /// [`Calibrations::health`], and leaves the calibrations it concerns as they are. Blocks.
     pub fn refresh(&self) {
         let changing = self.lock();

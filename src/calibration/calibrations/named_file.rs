@@ -1,4 +1,4 @@
-//! Which files of a store are calibrations, and of which ID.
+//! The files of a store that are calibrations, and their IDs.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_whose_names_are_no_ids_are_left_out_and_endings_have_an_order() {
+    fn files_without_an_id_are_skipped_and_endings_are_ranked() {
         let names = [
             "lobby.yaml",
             "lobby.json",

@@ -26,16 +26,16 @@ pub struct CalibrationRow {
     pub id: CalibrationId,
     /// The name of its file in the store.
     pub file: String,
-    /// What serves; `None` when no version could be used so far.
+    /// The calibration that serves; `None` when no version could be used so far.
     pub entry: Option<Arc<CalibrationEntry>>,
     /// Why the newest version of its file, or a camera of it, is not used.
     pub problem: Option<String>,
 }
 
-/// How the calibrations of a store are.
+/// The health of the calibrations of a store.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CalibrationsHealth {
-    /// How many serve.
+    /// The number that serve.
     pub serving: usize,
     /// Changes whenever any of those that serve does; equal where equal ones serve.
     pub revision: String,

@@ -81,7 +81,7 @@ fn a_config_map_whose_link_turns_is_seen_at_the_next_look() {
 }
 
 #[test]
-fn a_broken_new_version_leaves_the_old_one_serving_until_it_is_mended() {
+fn invalid_new_version_leaves_the_old_one_serving() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lobby.json");
     fs::write(&file, content("lobby", 190.0)).unwrap();
@@ -108,7 +108,7 @@ fn a_broken_new_version_leaves_the_old_one_serving_until_it_is_mended() {
 }
 
 #[test]
-fn a_broken_camera_of_a_file_leaves_the_others_and_its_own_last_version() {
+fn invalid_camera_leaves_the_others_and_its_last_version() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lobby.yaml");
     fs::write(&file, TWO_CAMERAS).unwrap();
@@ -274,7 +274,7 @@ fn the_cameras_of_one_file_have_its_name_and_their_own() {
 }
 
 #[test]
-fn a_broken_file_says_nothing_about_calibrations_with_a_longer_name() {
+fn invalid_file_leaves_calibrations_with_longer_names_alone() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("lobby.json"), "{").unwrap();
     let calibrations = open(folder.path());

@@ -1,4 +1,4 @@
-//! What the names of distortion models mean, and why some describe no fisheye.
+//! Names of distortion models, and the reasons for which some describe no fisheye.
 
 /// A distortion model by any of its names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +71,7 @@ pub(super) fn four(coefficients: &[f64]) -> Result<[f64; 4], String> {
     }
 }
 
-/// Whether coefficients distort nothing.
+/// Returns true for coefficients without distortion.
 pub(super) fn are_all_zero(coefficients: &[f64]) -> bool {
     coefficients.iter().all(|&coefficient| coefficient == 0.0)
 }

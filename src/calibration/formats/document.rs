@@ -10,7 +10,7 @@ const MAX_DEPTH: usize = 32;
 /// Most values in one file.
 const MAX_NODES: usize = 100_000;
 
-/// What a file says, before any format is recognised.
+/// The content of a file before its format is recognised.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Document<'a> {
     /// Maps, lists, texts and numbers.
@@ -19,7 +19,7 @@ pub(super) enum Document<'a> {
     Lines(&'a str),
 }
 
-/// How a file is written.
+/// The syntax of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Syntax {
     Json,
@@ -81,8 +81,8 @@ pub(super) fn parse(text: &str, syntax: Syntax) -> Result<Document<'_>, FormatEr
     tree.map(Document::Tree).map_err(FormatError::malformed)
 }
 
-/// At most as many values has a text whose parser does not count them itself. In TOML a table, which
-/// takes a kibibyte, is as short as `.a`.
+/// At most as many values has a text whose parser does not count them itself. In TOML a table,
+/// which takes a kibibyte, is as short as `.a`.
 fn most_nodes(text: &str, syntax: Syntax) -> usize {
     let begins: &[u8] = match syntax {
         Syntax::Json => b"{[,",
@@ -113,7 +113,7 @@ pub(super) fn toml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Stri
     toml::from_str(text).map_err(|error| format!("{}: {}", first_line(&error), error.message()))
 }
 
-/// What a parser says before it draws the place.
+/// Returns the message of a parser without its drawing of the place.
 fn first_line(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
     text.lines().next().unwrap_or_default().to_owned()

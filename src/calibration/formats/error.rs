@@ -10,7 +10,7 @@ pub enum FormatError {
     /// A field makes no camera.
     #[error("{field}: {problem}")]
     Invalid {
-        /// Which field, with the fields it lies in.
+        /// The field, with the fields around it.
         field: String,
         /// The value and what would be right.
         problem: String,

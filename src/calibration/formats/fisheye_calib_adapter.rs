@@ -1,7 +1,7 @@
-//! fisheye-calib-adapter: `image` and `parameter`, the model told by the file's name alone
+//! fisheye-calib-adapter: `image` and `parameter`, the model given by the file's name alone
 //! (<https://github.com/eowjd0512/fisheye-calib-adapter>).
 //!
-//! Here it is told by which parameters there are. `unprojection` is Scaramuzza's direct polynomial
+//! Here the parameters that are present decide. `unprojection` is Scaramuzza's direct polynomial
 //! with x along the columns and z out of the lens.
 
 use super::{

@@ -1,4 +1,4 @@
-//! The native format, in JSON, YAML or TOML: the only one that tells an ID, a mount,
+//! The native format, in JSON, YAML or TOML: the only one with an ID, a mount,
 //! zones and masks.
 
 use super::{
@@ -7,7 +7,7 @@ use super::{
 };
 use crate::calibration::native::NativeCalibration;
 
-/// Reads the file once more from its text, so that a mistake is told with its place.
+/// Reads the file once more from its text, so that an error names its place.
 pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, FormatError> {
     let parsed: Result<NativeCalibration, String> = match syntax {
         Syntax::Toml => toml(text),

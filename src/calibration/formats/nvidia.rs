@@ -1,7 +1,7 @@
 //! NVIDIA's f-theta camera as `ncore` stores it (<https://github.com/NVIDIA/ncore>,
 //! `docs/data/sensor_models.rst`).
 //!
-//! Of the two polynomials only the one named by `reference_poly` is exact. The principal point
+//! Only the polynomial named by `reference_poly` is exact, not the other one. The principal point
 //! speaks of pixel centres, unlike that of ncore's other cameras.
 
 use serde_json::Value;

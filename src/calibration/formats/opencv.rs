@@ -1,8 +1,8 @@
 //! OpenCV's `FileStorage`: a camera matrix and distortion coefficients under names that every
 //! program chooses for itself.
 //!
-//! With `xi` it is `cv::omnidir` (`k1, k2, p1, p2`), else `cv::fisheye` (`k1` to `k4`) where the file
-//! says so, or has four coefficients and says nothing. Five and more are an ordinary camera.
+//! With `xi` it is `cv::omnidir` (`k1, k2, p1, p2`), else `cv::fisheye` (`k1` to `k4`) where the
+//! file says so, or has four coefficients and says nothing. Five and more are an ordinary camera.
 
 use serde_json::Value;
 
@@ -49,10 +49,10 @@ const SIZES: [(&str, &str); 4] = [
 ];
 /// Names of the frame size as one field.
 const SIZE_PAIRS: [&str; 4] = ["image_size", "imageSize", "img_size", "resolution"];
-/// What calibration programs store before they have a result.
+/// Fields that calibration programs store before they have a result.
 const CORNERS: [&str; 2] = ["imagePoints", "image_points"];
 
-/// Whether a file has any of the names by which OpenCV's files are known.
+/// Returns true for a file with any of the names by which OpenCV's files are known.
 pub(super) fn is_storage(fields: &Fields<'_>) -> bool {
     let mut names = MATRIX.iter().chain(&CORNERS);
     names.any(|name| fields.has(name))
@@ -111,7 +111,7 @@ fn without_xi(
     }
 }
 
-/// What the file says of its model, and in which field.
+/// Returns the model that the file states, and the field that states it.
 fn said_distortion(fields: &Fields<'_>) -> Result<(&'static str, Option<Distortion>), FormatError> {
     if let Some(key) = present(fields, &["distortion_model", "camera_model", "model"]) {
         let name = fields.text(key)?;

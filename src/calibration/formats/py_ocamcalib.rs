@@ -1,7 +1,8 @@
-//! py-OCamCalib's JSON (<https://github.com/jakarto3d/py-OCamCalib>): Scaramuzza's model with x along
-//! the columns and z out of the lens, so the polynomial has the opposite sign of `OCamCalib`'s.
+//! py-OCamCalib's JSON (<https://github.com/jakarto3d/py-OCamCalib>): Scaramuzza's model with x
+//! along the columns and z out of the lens, so the polynomial has the opposite sign of
+//! `OCamCalib`'s.
 //!
-//! It does not tell the frame size. Its `world2cam` applies `e` to the stretched x; the stretch
+//! It has no frame size. Its `world2cam` applies `e` to the stretched x; the stretch
 //! matrix is meant as it is written, which is what its `cam2world` inverts.
 
 use super::{

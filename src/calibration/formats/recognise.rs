@@ -1,4 +1,4 @@
-//! Which format a file is in, judged by its content alone.
+//! Recognition of a file's format from its content alone.
 
 use strum::IntoStaticStr;
 

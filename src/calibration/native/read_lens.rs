@@ -20,18 +20,16 @@ impl<'de> Deserialize<'de> for LensModel {
         let mut track = serde_path_to_error::Track::new();
         let parameters = Value::Object(parameters);
         let parameters = serde_path_to_error::Deserializer::new(parameters, &mut track);
-        match Self::deserialize_named(&name, parameters) {
-            Some(lens) => lens.map_err(|error| match track.path().to_string() {
-                path if path == "." => D::Error::custom(format!("lens: {error}")),
-                path => D::Error::custom(format!("lens.{path}: {error}")),
-            }),
-            None => {
-                // Enough to recognise it by, not enough to fill a log.
-                let name: String = name.chars().take(64).collect();
-                let known = Self::NAMES.join(", ");
-                let problem = format!("lens.model: {name:?} is none of {known}");
-                Err(D::Error::custom(problem))
-            }
-        }
+        let Some(lens) = Self::deserialize_named(&name, parameters) else {
+            // Enough to recognise it by, not enough to fill a log.
+            let name: String = name.chars().take(64).collect();
+            let known = Self::NAMES.join(", ");
+            let problem = format!("lens.model: {name:?} is none of {known}");
+            return Err(D::Error::custom(problem));
+        };
+        lens.map_err(|error| match track.path().to_string() {
+            path if path == "." => D::Error::custom(format!("lens: {error}")),
+            path => D::Error::custom(format!("lens.{path}: {error}")),
+        })
     }
 }

@@ -1,5 +1,5 @@
 //! A bucket of an object store: S3 and what speaks like it, Google Cloud Storage, Azure Blob
-//! Storage. An object's `ETag` is its stamp, so that one request per look tells what has changed.
+//! Storage. An object's `ETag` is its stamp, so that one request per poll finds all changes.
 
 mod background;
 mod connection;
@@ -16,7 +16,7 @@ use url::Url;
 use self::{background::Background, connection::Objects};
 use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
 
-/// What separates the levels of a bucket.
+/// The separator of the levels of a bucket.
 const LEVEL: &str = "/";
 
 /// A bucket, or one level of it. Credentials come from the variables of its provider.
@@ -195,7 +195,7 @@ impl From<Replaces<'_>> for Expected {
     }
 }
 
-/// Whether an object was written, or is not what was expected.
+/// The outcome of a conditional write.
 enum Written {
     Yes,
     Outdated,
@@ -241,7 +241,7 @@ async fn write(
     }
 }
 
-/// What tells an object's content from another. Listings and answers write `ETag`s with and without
+/// Returns the stamp of an object's content. Listings and answers write `ETag`s with and without
 /// quotes, and moments with and without fractions of a second.
 fn stamp(object: &ObjectMeta) -> String {
     object.e_tag.as_ref().map_or_else(

@@ -14,7 +14,7 @@ use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
 
 /// Files with this ending were about to take another's place when their writer was killed.
 const UNFINISHED: &str = "lookdown-unfinished";
-/// No writer takes this long for a file: an older unfinished one is nobody's.
+/// No writer takes this long for a file: an older unfinished one has no writer.
 const ABANDONED_AFTER: Duration = Duration::from_mins(10);
 
 /// A folder on this machine.
@@ -72,7 +72,7 @@ impl FolderStore {
         });
         let replaced = written.and_then(|()| fs::rename(&unfinished, self.path.join(name)));
         if replaced.is_err() {
-            // The first failure is the one to tell.
+            // The first failure is the one to report.
             let _ = fs::remove_file(&unfinished);
         }
         replaced?;
@@ -139,7 +139,7 @@ impl CalibrationStore for FolderStore {
     }
 
     fn write(&self, name: &str, content: &[u8], replaces: Replaces<'_>) -> Result<(), StoreError> {
-        // File systems have no conditional rename: whoever comes between this and that wins.
+        // File systems have no conditional rename: a writer between the check and the rename wins.
         let now = stamp(&self.path.join(name));
         let is_as_expected = match replaces {
             Replaces::Anything => true,
@@ -163,7 +163,7 @@ impl CalibrationStore for FolderStore {
     }
 }
 
-/// What tells a file's content from another, links followed: which file it is, how long, from when.
+/// Returns the stamp of a file's content, links followed: the file's identity, length and time.
 fn stamp(path: &Path) -> Option<String> {
     let metadata = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
     Some(format!(

@@ -86,8 +86,8 @@ fn views(calibration: &Calibration) -> Vec<VirtualView> {
 fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str, String)> {
     let lens = calibration.lens();
     let (width, height) = calibration.image_size();
-    let told = camera.told.camera.as_ref().ok();
-    let end = match told.and_then(|told| told.lens.max_theta()) {
+    let stated = camera.stated.camera.as_ref().ok();
+    let end = match stated.and_then(|stated| stated.lens.max_theta()) {
         Some(_) => "",
         None => ", up to the farthest corner of the frame or the end of the curve",
     };
@@ -114,7 +114,9 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
         ),
     ];
     lines.extend(areas(calibration));
-    let notes = told.into_iter().flat_map(|told| told.notes.iter().cloned());
+    let notes = stated
+        .into_iter()
+        .flat_map(|stated| stated.notes.iter().cloned());
     let warnings = notes.chain(calibration.warnings());
     lines.extend(warnings.map(|warning| ("  warning", warning.to_string())));
     lines

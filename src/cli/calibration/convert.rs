@@ -41,7 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = arguments.source.file.display();
     let (_, camera) = arguments.source.read_one()?;
     let calibration = camera.checked.with_context(|| path.to_string())?;
-    let told = camera.told.camera.with_context(|| path.to_string())?;
+    let stated = camera.stated.camera.with_context(|| path.to_string())?;
     let (width, height) = calibration.image_size();
     let id = match &arguments.id {
         Some(id) => id
@@ -52,12 +52,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let exported = arguments.to.write(&NativeCalibration {
         id: id.to_string(),
         image: NativeImage { width, height },
-        lens: told.lens,
-        mount: told.mount,
-        zones: told.zones,
-        masks: told.masks,
+        lens: stated.lens,
+        mount: stated.mount,
+        zones: stated.zones,
+        masks: stated.masks,
     })?;
-    let notes = told.notes.iter().map(ToString::to_string);
+    let notes = stated.notes.iter().map(ToString::to_string);
     for note in notes.chain(exported.lost) {
         eprintln!("lookdown: {path}: {note}");
     }

@@ -36,7 +36,7 @@ pub(super) struct Cameras {
 pub(super) struct NamedCamera {
     /// Its ID in a calibration folder.
     pub(super) id: String,
-    pub(super) told: FileCamera,
+    pub(super) stated: FileCamera,
     pub(super) checked: Result<Calibration, FormatError>,
 }
 
@@ -53,7 +53,11 @@ impl Source {
         let checked = file.calibrations(&stem, &content);
         let cameras = file.cameras.into_iter().zip(checked);
         let mut cameras: Vec<_> = cameras
-            .map(|(told, (id, checked))| NamedCamera { id, told, checked })
+            .map(|(stated, (id, checked))| NamedCamera {
+                id,
+                stated,
+                checked,
+            })
             .collect();
         if let Some(wanted) = &self.camera {
             let names: Vec<_> = cameras.iter().map(NamedCamera::name).collect();
@@ -88,6 +92,6 @@ impl Source {
 
 impl NamedCamera {
     fn name(&self) -> String {
-        self.told.name.clone().unwrap_or_else(|| self.id.clone())
+        self.stated.name.clone().unwrap_or_else(|| self.id.clone())
     }
 }

@@ -1,9 +1,7 @@
 use serde_json::json;
 
 use super::*;
-use crate::detection::Refinement;
-use crate::pipeline::Profile;
-use crate::pipeline::Profile;
+use crate::{detection::Refinement, pipeline::Profile};
 
 /// Two images, 7 and 8.
 fn data_set() -> (tempfile::TempDir, DataSet) {

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::{Ray, view_plan::ViewPlan};
+use crate::geometry::{QuarterTurn, Ray, view_plan::ViewPlan};
 
 fn lens() -> Lens {
     Lens::equidistant_circle(299.5, 299.5, 300.0, std::f64::consts::FRAC_PI_2).expect("plausible")
@@ -149,6 +149,36 @@ proptest! {
         if let Some(footprint) = footprint {
             let [x_min, y_min, x_max, y_max] = footprint.bounds();
             prop_assert!(x_min >= -1e-6 && y_min >= -1e-6 && x_max <= 600.0 + 1e-6 && y_max <= 600.0 + 1e-6);
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn the_footprint_of_a_crops_box_is_exact(
+        turn in prop::sample::select(QuarterTurn::ALL.to_vec()),
+        [x, y, width, height] in prop::array::uniform4(1.0..200.0_f64),
+        scale in 0.2..4.0_f64,
+    ) {
+        let crop = FrameCrop {
+            turn,
+            center: Pixel::new(300.0, 280.0),
+            scale,
+            width: 416,
+            height: 416,
+        };
+        let found = [x, y, x + width, y + height];
+        let expected = crop.frame_box(found);
+        let center = Pixel::new(
+            f64::midpoint(expected[0], expected[2]) - 0.5,
+            f64::midpoint(expected[1], expected[3]) - 0.5,
+        );
+        let footprint = Footprint::of_crop_box(found, &crop, &lens());
+        prop_assert_eq!(footprint.is_some(), lens().unproject(&center).is_some());
+        if let Some(footprint) = footprint {
+            for (side, expected) in footprint.bounds().into_iter().zip(expected) {
+                prop_assert!((side - expected).abs() < 1e-9, "{side} instead of {expected}");
+            }
         }
     }
 }

@@ -4,8 +4,8 @@ use super::{Lens, curve::Curve};
 use crate::geometry::{Pixel, Ray};
 
 impl Lens {
-    /// Where `ray` (camera frame) meets the normalised plane, which [`Lens::image_plane`] takes to
-    /// pixels. Beyond `max_theta` the curve is its own mirror image,
+    /// Returns the point at which `ray` (camera frame) meets the normalised plane, which
+    /// [`Lens::image_plane`] takes to pixels. Beyond `max_theta` the curve is its own mirror image,
     /// `r(max_theta + t) = 2 r(max_theta) − r(max_theta − t)`: smooth across the rim, but nothing
     /// that the lens sees. `None` exactly behind the camera and where nothing finite comes out.
     #[must_use]
@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn the_continuation_leaves_the_rim_as_steeply_as_the_curve_reaches_it() {
+    fn continuation_keeps_the_slope_at_the_rim() {
         let plane = ImagePlane::new(1.0, 1.0, 0.0, 0.0);
         let lens = stereographic(plane);
         let radius = |theta: f64| lens.continued_beyond_rim(&at(theta)).unwrap().coords.norm();

@@ -4,7 +4,7 @@ use super::{LensError, check::finite, inversion::rising_root};
 
 /// Bound on Newton steps in the plane; a handful suffice from the radial solution.
 const MAX_STEPS: usize = 32;
-/// How well an inverse must map back, relative to the distance from the axis.
+/// The largest residual of an inverse, relative to the distance from the axis.
 const RESIDUAL_TOLERANCE: f64 = 1e-10;
 
 /// `x (1 + k1 r² + k2 r⁴) + 2 p1 x y + p2 (r² + 2 x²)`, and for `y` likewise with `p1`, `p2`
@@ -31,7 +31,7 @@ impl RadialTangential {
             .try_for_each(|(name, value)| finite(name, value).map(drop))
     }
 
-    /// Whether every azimuth is distorted alike.
+    /// Returns true when every azimuth is distorted alike.
     pub(super) fn is_radial(&self) -> bool {
         self.p1 == 0.0 && self.p2 == 0.0
     }
@@ -45,7 +45,7 @@ impl RadialTangential {
         )
     }
 
-    /// How much a step outward is stretched at `radius`, in the azimuth in which that is least.
+    /// Returns the stretch of a step outward at `radius`, in the azimuth in which that is least.
     /// While it is positive the distortion is one-to-one: its Jacobian is symmetric, and against
     /// the vector (p2, p1) its radial eigenvalue is the derivative of the radial part less
     /// `6 |p| r`.

@@ -1,4 +1,4 @@
-//! Why a lens cannot be.
+//! Reasons for which parameters make no lens.
 
 /// A lens that cannot be. Parameters are named as in calibration files.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -19,7 +19,7 @@ pub enum LensError {
         /// Its value.
         value: f64,
     },
-    /// Of two ways to give the same thing both or none were chosen.
+    /// Both or none of two exclusive ways to give one parameter were used.
     #[error("give either {choice}")]
     EitherOr {
         /// The two ways, in words.
@@ -74,7 +74,7 @@ pub enum LensError {
     CoefficientCount {
         /// The polynomial.
         name: &'static str,
-        /// How many were given.
+        /// The number of entries given.
         count: usize,
         /// The fewest that are accepted.
         least: usize,

@@ -43,7 +43,7 @@ impl<F: Rising> Tabulated<F> {
         self.function.value(x)
     }
 
-    /// Where the function reaches `value`, which must lie within the table.
+    /// Returns the place at which the function reaches `value`, which must lie within the table.
     pub(super) fn invert(&self, value: f64) -> f64 {
         let above = self
             .values
@@ -66,13 +66,13 @@ impl<F: Rising> Tabulated<F> {
     }
 }
 
-/// Where the table entry `index` lies in a table that ends at `end`.
+/// Returns the place of the table entry `index` in a table that ends at `end`.
 fn place(end: f64, index: usize) -> f64 {
     end / fraction(TABLE_ENTRIES - 1) * fraction(index)
 }
 
-/// Where `function`, which rises from `low` to `high`, reaches `value`; the nearer end when it does
-/// not. Newton from `start`, kept within the bracket by bisection.
+/// Returns the place at which `function`, which rises from `low` to `high`, reaches `value`; the
+/// nearer end when it does not. Newton from `start`, kept within the bracket by bisection.
 pub(super) fn rising_root(
     function: impl Fn(f64) -> f64,
     slope: impl Fn(f64) -> f64,

@@ -228,7 +228,7 @@ fn the_optical_axis_meets_the_principal_point() {
 }
 
 #[test]
-fn a_max_theta_beyond_the_turning_point_is_refused_with_the_limit() {
+fn max_theta_beyond_the_turning_point_is_refused() {
     let curve = kannala_brandt([-0.3, 0.0, 0.0, 0.0]);
     let error = lens_of(curve, plane(), Some(1.5)).expect_err("turns over at 1.054 rad");
     assert_eq!(

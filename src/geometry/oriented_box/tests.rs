@@ -1,5 +1,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
+use proptest::prelude::*;
+
 use super::*;
 
 #[test]
@@ -13,7 +15,7 @@ fn the_height_axis_of_a_ceiling_camera_points_outward() {
 }
 
 #[test]
-fn angles_run_clockwise_from_image_up_and_forget_the_sign_of_the_axis() {
+fn angles_run_clockwise_from_up_and_ignore_the_axis_sign() {
     for (up, angle) in [
         ((0.0, -1.0), 0.0),
         ((1.0, 0.0), FRAC_PI_2),
@@ -47,4 +49,54 @@ fn the_average_of_two_outlines_lies_between_them() {
     assert!((average.center.x - 16.25).abs() < 1e-12);
     assert!((average.foot().y - 17.5).abs() < 1e-12);
     assert_eq!(OrientedBox::averaging(up, []), None);
+}
+
+/// The bounds of the ellipse inscribed in an oriented box.
+fn inscribed_bounds(oriented: &OrientedBox) -> [f64; 4] {
+    let (along, across) = (oriented.height / 2.0, oriented.width / 2.0);
+    let half = |on_axis: f64, off_axis: f64| (along * on_axis).hypot(across * off_axis);
+    let (x, y) = (
+        half(oriented.up.x, oriented.up.y),
+        half(oriented.up.y, oriented.up.x),
+    );
+    let center = oriented.center;
+    [center.x - x, center.y - y, center.x + x, center.y + y]
+}
+
+proptest! {
+    #[test]
+    fn a_box_fitted_to_its_own_bounds_stays_as_it_is(
+        angle in -1.5..1.5_f64, width in 5.0..100.0_f64, height in 5.0..200.0_f64,
+    ) {
+        let oriented = OrientedBox::turned(Pixel::new(300.0, 200.0), width, height, angle);
+        let fitted = oriented.fitted_to(inscribed_bounds(&oriented));
+        prop_assert!((fitted.width - width).abs() < 1e-6, "{fitted:?}");
+        prop_assert!((fitted.height - height).abs() < 1e-6, "{fitted:?}");
+        prop_assert!((fitted.center - oriented.center).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_fitted_box_has_the_diagonal_of_the_bounds(
+        angle in -1.5..1.5_f64,
+        [width, height, right, down] in prop::array::uniform4(5.0..100.0_f64),
+    ) {
+        let oriented = OrientedBox::turned(Pixel::new(0.0, 0.0), width, height, angle);
+        let fitted = oriented.fitted_to([0.0, 0.0, right, down]);
+        let [x_min, y_min, x_max, y_max] = inscribed_bounds(&fitted);
+        let diagonal = (x_max - x_min).hypot(y_max - y_min);
+        prop_assert!((diagonal - right.hypot(down)).abs() < 1e-6, "{fitted:?}");
+        prop_assert!(fitted.width >= 0.0 && fitted.height >= 0.0);
+    }
+
+    #[test]
+    fn an_upright_fitted_box_is_the_bounds(
+        turns in 0..4_i32, [right, down] in prop::array::uniform2(5.0..100.0_f64),
+    ) {
+        let angle = FRAC_PI_2 * f64::from(turns);
+        let oriented = OrientedBox::turned(Pixel::new(0.0, 0.0), 10.0, 20.0, angle);
+        let found = inscribed_bounds(&oriented.fitted_to([0.0, 0.0, right, down]));
+        for (side, expected) in found.into_iter().zip([0.0, 0.0, right, down]) {
+            prop_assert!((side - expected).abs() < 1e-6, "{found:?}");
+        }
+    }
 }

@@ -7,7 +7,7 @@ fn refusal(corners: &[[f64; 2]]) -> String {
 }
 
 #[test]
-fn an_area_that_is_not_convex_holds_what_lies_inside_and_nothing_else() {
+fn concave_area_holds_only_points_inside() {
     // A U, open at its top.
     let corners = [
         [0.0, 0.0],
@@ -114,7 +114,7 @@ fn star() -> impl Strategy<Value = Vec<[f64; 2]>> {
 
 proptest! {
     #[test]
-    fn an_area_is_the_same_wherever_its_outline_begins_and_whichever_way_it_goes(
+    fn area_is_independent_of_start_and_direction_of_outline(
         corners in star(), begin in 0..40_usize, x in -11.0..11.0, y in -11.0..11.0,
     ) {
         let area = Polygon::new(&corners).unwrap();
@@ -143,7 +143,7 @@ proptest! {
     }
 
     #[test]
-    fn whatever_the_corners_are_they_are_accepted_or_refused_with_a_sentence(
+    fn any_corners_are_accepted_or_refused_with_a_sentence(
         corners in prop::collection::vec(prop::array::uniform2(any::<f64>()), 0..70),
     ) {
         if let Err(refusal) = Polygon::new(&corners) {
@@ -152,7 +152,7 @@ proptest! {
     }
 
     #[test]
-    fn two_corners_exchanged_make_a_quadrilateral_that_crosses_itself(
+    fn quadrilateral_with_exchanged_corners_crosses_itself(
         left in 0.0..4.0, right in 6.0..10.0, top in 0.0..4.0, bottom in 6.0..10.0,
     ) {
         let whole = [[left, top], [right, top], [right, bottom], [left, bottom]];

@@ -1,11 +1,11 @@
-//! How well views cover what a lens sees.
+//! Coverage of the lens image by views.
 
 use super::super::{Lens, Pixel, VirtualView};
 
 /// Sample points along each side of the frame.
 const SAMPLES: u32 = 160;
 
-/// How much of a lens image some views see, by area of the frame.
+/// The share of a lens image that some views see, by area of the frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coverage {
     /// Share of the lens image that lies in at least one view, 0 to 1.

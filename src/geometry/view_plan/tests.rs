@@ -13,7 +13,7 @@ fn the_paper_plan_has_four_rings_of_thirty_two_views() {
 }
 
 #[test]
-fn the_three_readings_of_the_field_of_view_are_53_39_and_90_degrees() {
+fn readings_of_the_field_of_view_are_53_39_and_90_degrees() {
     let degrees = |reading: FieldOfViewReading| reading.radians().to_degrees();
     assert!((degrees(FieldOfViewReading::Horizontal) - 53.1301).abs() < 1e-4);
     assert!((degrees(FieldOfViewReading::Diagonal) - 38.9424).abs() < 1e-4);
@@ -22,7 +22,11 @@ fn the_three_readings_of_the_field_of_view_are_53_39_and_90_degrees() {
 
 #[test]
 fn the_rings_of_a_plan_reach_the_rim_of_a_180_degree_lens() {
-    for (plan, count) in [(ViewPlan::fast(), 4), (ViewPlan::balanced(), 24)] {
+    for (plan, count) in [
+        (ViewPlan::fast(), 5),
+        (ViewPlan::balanced(), 18),
+        (ViewPlan::quality(), 24),
+    ] {
         let views = plan.views(&Mount::default(), 301, 301);
         assert_eq!(views.len(), count);
         let reach = views

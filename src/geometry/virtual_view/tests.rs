@@ -68,7 +68,7 @@ fn a_wall_camera_keeps_the_plan_on_its_optical_axis() {
 }
 
 #[test]
-fn views_of_a_ring_around_the_optical_axis_are_turned_from_each_other() {
+fn ring_views_are_turns_of_each_other_about_the_axis() {
     let down = Mount::default();
     let first = VirtualView::new(&direction(0.8, 0.3), &down, 301, 201);
     let turned = VirtualView::new(&direction(0.8, 1.5), &down, 301, 201);

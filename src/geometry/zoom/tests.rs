@@ -25,7 +25,7 @@ fn views(outlines: &[Vec<Ray>], most: usize) -> Vec<VirtualView> {
 }
 
 #[test]
-fn a_person_stands_upright_in_the_middle_and_fills_the_share_asked_for() {
+fn person_is_upright_centred_and_fills_the_given_share() {
     let person = outline(FRAC_PI_3, 0.05);
     let view = &views(std::slice::from_ref(&person), 5)[0];
     let seen: Vec<_> = person

@@ -12,6 +12,14 @@ pub(super) struct FrameFromPlane {
 }
 
 impl FrameFromPlane {
+    /// The identity, for nodes that are pixels of the frame.
+    pub(super) fn identity() -> Self {
+        Self {
+            x: [1.0, 0.0, 0.0],
+            y: [0.0, 1.0, 0.0],
+        }
+    }
+
     /// A turn by `turn` radians (clockwise on the screen), then `image_plane`.
     #[expect(
         clippy::cast_possible_truncation,

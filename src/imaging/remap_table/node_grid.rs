@@ -1,7 +1,11 @@
-//! Node grids: where in the lens's normalised plane a view samples, at every eighth pixel.
+//! Node grids: where a view samples, at every eighth pixel: in the lens's normalised plane, or, of a
+//! frame crop, in the frame.
 
 use super::visibility::Visibility;
-use crate::geometry::{Lens, Pixel, VirtualView};
+use crate::geometry::{
+    FrameCrop, Lens, Pixel, VirtualView,
+    pixels::{PixelConvention, cross_half_pixel},
+};
 
 /// Positions are exact at every so many view pixels, across and down.
 pub(super) const NODE_STEP: u32 = 8;
@@ -26,15 +30,36 @@ pub(super) struct Nodes<'a> {
 
 impl NodeGrid {
     pub(super) fn new(view: &VirtualView, lens: &Lens) -> Self {
-        let patches_across = view.width().div_ceil(NODE_STEP);
-        let patches_down = view.height().div_ceil(NODE_STEP);
+        let size = [view.width(), view.height()];
+        Self::of_positions(size, Visibility::new(view, lens), |pixel| {
+            let place = lens.continued_beyond_rim(&view.ray_in_camera(pixel));
+            // A node without a place hides the four patches around it.
+            place.unwrap_or(Pixel::new(f64::NAN, f64::NAN))
+        })
+    }
+
+    /// The nodes of a crop, in pixels of the frame (pixel centres).
+    pub(super) fn of_crop(crop: &FrameCrop) -> Self {
+        let size = [crop.width, crop.height];
+        Self::of_positions(size, Visibility::everywhere(size), |pixel| {
+            let position = cross_half_pixel(*pixel, PixelConvention::CornerOrigin);
+            let position = crop.frame_from_crop(&position);
+            cross_half_pixel(position, PixelConvention::PixelCentre)
+        })
+    }
+
+    fn of_positions(
+        [width, height]: [u32; 2],
+        visibility: Visibility,
+        position: impl Fn(&Pixel) -> Pixel,
+    ) -> Self {
+        let (patches_across, patches_down) =
+            (width.div_ceil(NODE_STEP), height.div_ceil(NODE_STEP));
         let (mut x, mut y) = (Vec::new(), Vec::new());
         for row in 0..=patches_down {
             for column in 0..=patches_across {
                 let pixel = Pixel::new(f64::from(column * NODE_STEP), f64::from(row * NODE_STEP));
-                let place = lens.continued_beyond_rim(&view.ray_in_camera(&pixel));
-                // A node without a place hides the four patches around it.
-                let place = place.unwrap_or(Pixel::new(f64::NAN, f64::NAN));
+                let place = position(&pixel);
                 x.push(single(place.x));
                 y.push(single(place.y));
             }
@@ -43,7 +68,7 @@ impl NodeGrid {
             x,
             y,
             nodes_across: patches_across as usize + 1,
-            visibility: Visibility::new(view, lens),
+            visibility,
         }
     }
 

@@ -54,6 +54,14 @@ impl Visibility {
         }
     }
 
+    /// Every pixel of a view of `width` × `height` pixels.
+    pub(super) fn everywhere([width, height]: [u32; 2]) -> Self {
+        Self {
+            spans: vec![[0, width]; height as usize],
+            spans_are_hidden: false,
+        }
+    }
+
     pub(super) fn row(&self, y: usize) -> RowVisibility {
         let [start, end] = self.spans[y];
         RowVisibility {

@@ -1,46 +1,36 @@
-//! The closer looks that follow the first one.
+//! The second pass: closer looks and upright crops of the frame that follow the plan's views.
 
 use std::{sync::Arc, time::Instant};
 
 use super::{Engine, Observation};
 use crate::{
-    geometry::zoom::zoomed_views,
-    pipeline::{DetectJob, Stage, merge, network::LookTask},
+    geometry::{crop_placement::place_crops, zoom::zoomed_views},
+    inference::Model,
+    pipeline::{
+        DetectJob, Stage, camera_rig::CameraRig, merge, network::LookTask, still_views::CameraViews,
+    },
 };
 
+/// Views and the model that sees them.
+type Planned = (CameraRig, Arc<Model>);
+
 impl Engine {
-    /// Queues closer looks at whatever may be a person, where the profile has them: by the model that
-    /// looked first, or half by it and half by another, if the request leaves the choice.
+    /// Queues the second pass over whatever may be a person, where the profile has one.
     pub(super) fn closer(&self, job: &DetectJob, observation: &Observation) -> Vec<Arc<LookTask>> {
         let profile = observation.profile;
-        let Some(closer) = profile.closer_look() else {
+        if profile.most_zoomed_views() == 0 {
             return Vec::new();
-        };
+        }
         let timeline = &job.ticket.timeline;
         timeline.enter(Stage::Refine, Instant::now());
-        let back_projection = profile.back_projection();
-        let outlines = merge::outlines(&observation.looks, back_projection, &closer.first_look);
-        timeline.enter(Stage::Remap, Instant::now());
-        let mut models = vec![Arc::clone(&observation.model)];
-        if job.parameters.model.is_none() {
-            let second = self.options.default_models.second_opinion(profile);
-            models.extend(second.and_then(|name| self.models.get(name)));
-        }
-        let most_views = closer.most_views / models.len();
-        let rig = &observation.camera.rig;
-        let (width, height) = (observation.frame.width(), observation.frame.height());
-        let rigs = models.into_iter().filter_map(|model| {
-            let size = [model.input().width, model.input().height];
-            let mount = &rig.geometry().mount;
-            let views = zoomed_views(&outlines, most_views, closer.fill, mount, size);
-            let tabulate = || rig.with_views(views, width, height);
-            let rig = self.remappers.install(tabulate);
-            (rig.view_count() > 0).then_some((rig, model))
-        });
-        let tasks = rigs.map(|(rig, model)| {
+        let mut planned = self.zoomed(job, observation);
+        planned.extend(self.crops(observation));
+        let tasks = planned.into_iter().map(|(rig, model)| {
+            let rig = Arc::new(rig);
+            let seen_before = self.crops_seen_before(job, &rig, &model);
             let frame = Arc::clone(&observation.frame);
             let ticket = job.ticket.clone();
-            self.network.look(Arc::new(rig), model, frame, ticket, None)
+            self.network.look(rig, model, frame, ticket, seen_before)
         });
         let tasks: Vec<_> = tasks.collect();
         if tasks.is_empty() {
@@ -49,5 +39,64 @@ impl Engine {
             timeline.enter(Stage::Queue, Instant::now());
         }
         tasks
+    }
+
+    /// What the camera saw before in the same crops, if the request wants to rely on it.
+    fn crops_seen_before(
+        &self,
+        job: &DetectJob,
+        rig: &Arc<CameraRig>,
+        model: &Arc<Model>,
+    ) -> Option<Arc<CameraViews>> {
+        let parameters = &job.parameters;
+        let camera = parameters.camera_name().filter(|_| parameters.motion)?;
+        let _first = rig.crops().next()?;
+        self.still_views.of_crops(camera, rig, model)
+    }
+
+    /// Zoomed views: for the model of the first pass, or half for it and half for another, if the
+    /// request leaves the choice.
+    fn zoomed(&self, job: &DetectJob, observation: &Observation) -> Vec<Planned> {
+        let profile = observation.profile;
+        let Some(closer) = profile.closer_look() else {
+            return Vec::new();
+        };
+        let back_projection = profile.back_projection();
+        let outlines = merge::outlines(&observation.looks, back_projection, &closer.first_look);
+        let mut models = vec![Arc::clone(&observation.model)];
+        if job.parameters.model.is_none() {
+            let second = self.options.default_models.second_opinion(profile);
+            models.extend(second.and_then(|name| self.models.get(name)));
+        }
+        let most_views = closer.most_views / models.len();
+        let rig = &observation.camera.rig;
+        let (width, height) = (observation.frame.width(), observation.frame.height());
+        job.ticket.timeline.enter(Stage::Remap, Instant::now());
+        let rigs = models.into_iter().filter_map(|model| {
+            let size = [model.input().width, model.input().height];
+            let mount = &rig.geometry().mount;
+            let views = zoomed_views(&outlines, most_views, closer.fill, mount, size);
+            let tabulate = || rig.with_views(views, width, height);
+            let rig = self.remappers.install(tabulate);
+            (rig.view_count() > 0).then_some((rig, model))
+        });
+        rigs.collect()
+    }
+
+    /// Upright crops of the frame, for the model of the first pass.
+    fn crops(&self, observation: &Observation) -> Option<Planned> {
+        let profile = observation.profile;
+        let pass = profile.crop_pass()?;
+        let back_projection = profile.back_projection();
+        let targets = merge::crop_targets(&observation.looks, back_projection, &pass.candidates);
+        let model = &observation.model;
+        let side = model.input().width.min(model.input().height);
+        let crops = place_crops(&targets, pass.most_crops, pass.fill, side);
+        let (width, height) = (observation.frame.width(), observation.frame.height());
+        let rig = &observation.camera.rig;
+        let rig = self
+            .remappers
+            .install(|| rig.with_crops(&crops, width, height));
+        (rig.view_count() > 0).then(|| (rig, Arc::clone(model)))
     }
 }

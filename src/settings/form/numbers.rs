@@ -49,7 +49,7 @@ whole_types! {
     usize: |number| usize::try_from(number).ok(), |value| value as u64;
     NonZeroU32: |number| NonZeroU32::new(u32::try_from(number).ok()?), |value| u64::from(value.get());
     NonZeroUsize: |number| NonZeroUsize::new(usize::try_from(number).ok()?), |value| value.get() as u64;
-    // 0 stands for none.
+    // 0 means none.
     Option<NonZeroU64>: |number| Some(NonZeroU64::new(number)), |value| value.map_or(0, NonZeroU64::get);
     Option<NonZeroUsize>: |number| Some(NonZeroUsize::new(usize::try_from(number).ok()?)),
         |value| value.map_or(0, |value| value.get() as u64);
@@ -83,7 +83,7 @@ fn integer(number: u64) -> Value {
     Value::Integer(i64::try_from(number).unwrap_or(i64::MAX))
 }
 
-/// A number of things: at least one if the type cannot hold 0.
+/// A count: at least one if the type cannot hold 0.
 pub(in crate::settings) fn count<T: Whole>() -> Form<T> {
     let least = u64::from(T::from_u64(0).is_none());
     whole(least..=MAX_COUNT)
@@ -101,7 +101,7 @@ pub(in crate::settings) fn seconds(range: RangeInclusive<u64>) -> Form<Duration>
     within("seconds", range).map(Duration::from_secs, Duration::as_secs)
 }
 
-/// A time of which 0 stands for none.
+/// An optional time; 0 means none.
 pub(in crate::settings) fn zero_is_none(form: Form<Duration>) -> Form<Option<Duration>> {
     form.map(
         |time| (!time.is_zero()).then_some(time),
@@ -109,7 +109,7 @@ pub(in crate::settings) fn zero_is_none(form: Form<Duration>) -> Form<Option<Dur
     )
 }
 
-/// The interval at which files are checked for changes, in seconds; 0 stands for never.
+/// The interval at which files are checked for changes, in seconds; 0 means never.
 pub(in crate::settings) fn poll_seconds() -> Form<Option<NonZeroU64>> {
     within("seconds", 0..=MAX_POLL_SECONDS)
 }
@@ -121,7 +121,7 @@ pub(in crate::settings) fn share() -> Form<f64> {
     })
 }
 
-/// A rate of which 0 stands for none.
+/// An optional rate; 0 means none.
 pub(in crate::settings) fn rate(range: RangeInclusive<f64>) -> Form<Option<f64>> {
     let kind = format!("number from {} to {}, or 0", range.start(), range.end());
     number(kind, move |number| {

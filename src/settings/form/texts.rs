@@ -7,7 +7,7 @@ use toml::Value;
 
 use super::{Form, Refusal, Written};
 
-/// A text that `read` makes a value of.
+/// A text that `read` parses to a value.
 pub(in crate::settings) fn parsed<T: 'static>(
     kind: impl Into<String>,
     read: impl Fn(&str) -> Result<T, Refusal> + 'static,
@@ -25,7 +25,7 @@ pub(in crate::settings) fn parsed<T: 'static>(
     )
 }
 
-/// A text for which `check` is true.
+/// A text that `check` accepts.
 pub(in crate::settings) fn text(
     kind: &'static str,
     check: impl Fn(&str) -> bool + 'static,
@@ -40,7 +40,7 @@ pub(in crate::settings) fn text(
     )
 }
 
-/// A value of which the empty text stands for none.
+/// An optional value; the empty text means none.
 pub(in crate::settings) fn optional<T: 'static>(form: Form<T>) -> Form<Option<T>> {
     let (read, write) = (form.read, form.write);
     Form {
@@ -91,8 +91,8 @@ pub(in crate::settings) fn path() -> Form<PathBuf> {
     )
 }
 
-/// A path, or none where the key is left out: an empty one is refused, since it is a mistake that would
-/// switch something off. `example` stands in the settings file.
+/// An optional path, without a key for none. An empty path is refused: by mistake it would disable
+/// a feature. `example` appears in the settings file.
 pub(in crate::settings) fn given_path(example: &'static str) -> Form<Option<PathBuf>> {
     let mut form = path().map(Some, |path| path.clone().unwrap_or_default());
     form.example = Some(example);
@@ -122,7 +122,7 @@ pub(in crate::settings) fn choice<T: Copy + PartialEq + 'static>(
     )
 }
 
-/// A list of texts that `read` makes a value of: an array in TOML, separated by commas in a variable.
+/// A list of texts that `read` parses: an array in TOML, separated by commas in a variable.
 pub(in crate::settings) fn list<T: 'static>(
     items: &'static str,
     read: impl Fn(&[&str]) -> Result<T, Refusal> + 'static,
@@ -139,7 +139,7 @@ pub(in crate::settings) fn list<T: 'static>(
                 Written::Toml(Value::Array(values)) => values.iter().map(Value::as_str).collect(),
                 Written::Toml(_) => None,
             };
-            // Not repeated: it may hold an API key.
+            // The value is not repeated: it may hold an API key.
             let texts = texts.ok_or_else(|| {
                 let remedy =
                     format!("it must be an array of {items}, such as [\"a\", \"b\"] or []");
@@ -157,7 +157,7 @@ pub(in crate::settings) fn names() -> Form<Vec<String>> {
     list("names", owned, Vec::clone)
 }
 
-/// A text that no message and no log line shows; the empty text stands for none.
+/// A text that no message and no log line shows. The empty text means none.
 pub(in crate::settings) fn secret(kind: &'static str) -> Form<Option<SecretString>> {
     Form::new(
         format!("{kind}, or empty"),

@@ -1,4 +1,4 @@
-//! What the server and its models tell of themselves, and to whom.
+//! Metadata and health checks of the server and its models, and their access rules.
 
 use axum::http::StatusCode;
 use lookdown::api::Access;
@@ -59,8 +59,8 @@ async fn the_server_and_its_models_describe_themselves() {
         );
     }
     for path in [
-        "nobody",
-        "nobody/ready",
+        "missing",
+        "missing/ready",
         "eager/versions/2",
         "lookdown/versions/2/ready",
     ] {
@@ -70,7 +70,7 @@ async fn the_server_and_its_models_describe_themselves() {
 }
 
 #[tokio::test]
-async fn a_server_that_is_about_to_stop_is_not_ready_and_its_models_neither() {
+async fn a_stopping_server_and_its_models_are_not_ready() {
     let service = Service::start();
     service.readiness.stopping();
     for path in [
@@ -86,7 +86,7 @@ async fn a_server_that_is_about_to_stop_is_not_ready_and_its_models_neither() {
 }
 
 #[tokio::test]
-async fn without_keys_everybody_who_reaches_the_server_may_ask_its_models() {
+async fn without_keys_every_client_may_use_the_models() {
     let service = Service::within(&Bounds {
         access: Access::Open {
             own_machine_only: false,

@@ -1,4 +1,4 @@
-//! Frames in, persons out.
+//! The model `lookdown`: frames in, persons out.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use super::{
 use crate::service::{Service, frame};
 
 #[tokio::test]
-async fn a_frame_in_json_is_answered_as_detect_answers_it() {
+async fn a_frame_in_json_gives_the_result_of_detect() {
     let service = Service::start();
     let report = service
         .post_raw("calibration=lobby&profile=fast", frame())
@@ -66,12 +66,15 @@ async fn a_frame_in_json_is_answered_as_detect_answers_it() {
 }
 
 #[tokio::test]
-async fn a_frame_behind_json_is_answered_the_same_and_outputs_come_as_bytes_where_asked() {
+async fn a_frame_after_json_gives_the_same_result_also_as_bytes() {
     let service = Service::start();
     let wanted = service.post(FRAMES, &in_json(&fast()).to_string()).await;
     let (boxes, _) = output(&wanted, "boxes");
     let boxes = boxes["data"].as_array().unwrap().iter();
-    #[expect(clippy::cast_possible_truncation, reason = "they are FP32")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "FP32 outputs have this precision"
+    )]
     let boxes: Vec<_> = boxes.map(|side| side.as_f64().unwrap() as f32).collect();
 
     let mut parameters = fast();
@@ -109,7 +112,7 @@ async fn parameters_of_detect_are_parameters_of_the_request() {
             json!({ "score_threshold": 1.5 }),
             422,
             "invalid-parameter",
-            "score_threshold: 1.5",
+            "score_threshold: \"1.5\" is not a number from 0 to 1",
         ),
         (
             json!({ "score_threshold": "0.5" }),
@@ -161,12 +164,17 @@ async fn parameters_of_detect_are_parameters_of_the_request() {
             "twice",
         ),
         (
-            json!({ "calibration": "nobody" }),
+            json!({ "calibration": "missing" }),
             404,
             "unknown-calibration",
-            "nobody",
+            "missing",
         ),
-        (json!({ "model": "nobody" }), 404, "unknown-model", "nobody"),
+        (
+            json!({ "model": "missing" }),
+            404,
+            "unknown-model",
+            "missing",
+        ),
         (
             json!({ "calibration": [] }),
             400,

@@ -1,4 +1,4 @@
-//! Refused requests, with one sentence each.
+//! Invalid inference requests: each is refused in one sentence.
 
 use axum::{body::Body, http::Request};
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use super::{FRAMES, HEAD_LENGTH, assert_refused, base64, fast, in_bytes, in_json
 use crate::service::{Service, frame};
 
 #[tokio::test]
-async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
+async fn unusable_tensors_are_refused_in_one_sentence() {
     let service = Service::start();
     let image = base64(&frame());
     let input = |shape: Value, data: Value| json!({ "name": "image", "datatype": "BYTES", "shape": shape, "data": data });
@@ -26,12 +26,9 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
         ),
         (
             json!([input(json!([2]), json!([image, image]))]),
-            "one frame is taken at a time",
+            "one frame at a time",
         ),
-        (
-            json!([input(json!([0]), json!([]))]),
-            "one frame is taken at a time",
-        ),
+        (json!([input(json!([0]), json!([]))]), "one frame at a time"),
         (json!([input(json!([1]), json!([]))]), "empty"),
         (
             json!([input(json!([1]), json!([image, image]))]),
@@ -50,7 +47,7 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
         ),
         (
             json!([{ "name": "image", "datatype": "FP32", "shape": [1], "data": [1] }]),
-            "its datatype is BYTES",
+            "the datatype BYTES",
         ),
         (
             json!([{ "name": "image", "datatype": "FP32", "shape": [2], "data": [1] }]),
@@ -78,7 +75,7 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
         (
             json!([{ "name": "image", "datatype": "BYTES", "shape": [1],
                 "parameters": { "shared_memory_region": "pictures", "shared_memory_byte_size": 9 } }]),
-            "shared memory is not offered",
+            "shared memory is not supported",
         ),
         (
             json!([{ "name": "image", "datatype": "BYTES", "shape": [1], "data": [image],
@@ -91,17 +88,17 @@ async fn tensors_that_do_not_fit_are_told_in_one_sentence() {
             .await;
         assert_refused(&answer, 422, "invalid-tensor", part);
     }
-    assert_eq!(service.gate.runs(), 0, "nothing of that was looked at");
+    assert_eq!(service.gate.runs(), 0, "no request reached the model");
     service.still_works().await;
 }
 
 #[tokio::test]
-async fn outputs_that_there_are_not_are_told_in_one_sentence() {
+async fn unknown_outputs_are_refused_in_one_sentence() {
     let service = Service::start();
     for (outputs, part) in [
         (
             json!([{ "name": "masks" }]),
-            "no such output: there are boxes",
+            "no such output: the outputs are boxes",
         ),
         (json!([{ "name": "boxes" }, { "name": "boxes" }]), "twice"),
         (
@@ -114,7 +111,7 @@ async fn outputs_that_there_are_not_are_told_in_one_sentence() {
         ),
         (
             json!([{ "name": "boxes", "parameters": { "binary_data": false, "shared_memory_region": "r" } }]),
-            "shared memory is not offered",
+            "shared memory is not supported",
         ),
     ] {
         let mut request = in_json(&fast());
@@ -122,12 +119,12 @@ async fn outputs_that_there_are_not_are_told_in_one_sentence() {
         let answer = service.post(FRAMES, &request.to_string()).await;
         assert_refused(&answer, 422, "invalid-tensor", part);
     }
-    assert_eq!(service.gate.runs(), 0, "nothing of that was looked at");
+    assert_eq!(service.gate.runs(), 0, "no request reached the model");
     service.still_works().await;
 }
 
 #[tokio::test]
-async fn requests_that_are_none_are_malformed() {
+async fn invalid_requests_are_malformed() {
     let service = Service::start();
     let many = json!({ "inputs": vec![json!({}); 1000] }).to_string();
     for (body, part) in [
@@ -179,7 +176,7 @@ async fn requests_that_are_none_are_malformed() {
 }
 
 #[tokio::test]
-async fn bytes_that_do_not_add_up_are_told() {
+async fn inconsistent_byte_counts_are_refused() {
     let service = Service::start();
     let (head, behind) = in_bytes(&frame(), &fast());
     let answer = send(&service, FRAMES, &head, &[&behind[..], b"more"].concat()).await;

@@ -1,4 +1,4 @@
-//! Views in, what a detector finds out.
+//! The detectors: views in, detections out.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use super::{FRAMES, VIEWS, assert_refused, base64, in_json, output, send};
 use crate::service::{Bounds, Service, incompressible_frame};
 
 #[tokio::test]
-async fn a_detector_finds_what_is_in_each_view() {
+async fn a_detector_returns_the_detections_of_each_view() {
     let service = Service::start();
     let view = |datatype: &str, size: usize| {
         json!({
@@ -53,7 +53,7 @@ async fn a_detector_finds_what_is_in_each_view() {
 }
 
 #[tokio::test]
-async fn views_that_a_detector_cannot_look_at_are_told() {
+async fn unusable_views_are_refused() {
     let service = Service::start();
     let views = |shape: Value, data: Value| json!({ "inputs": [{ "name": "views", "datatype": "UINT8", "shape": shape, "data": data }] });
     for (request, part) in [
@@ -67,7 +67,7 @@ async fn views_that_a_detector_cannot_look_at_are_told() {
             views(json!([1, 3, 64, 64]), json!(vec![0; 12])),
             "asks for 12288",
         ),
-        (in_json(&json!({})), "views is the one there is"),
+        (in_json(&json!({})), "the only input is views"),
         (
             json!({ "inputs": [{ "name": "views", "datatype": "BYTES", "shape": [1], "data": ["AAAA"] }] }),
             "FP32 or UINT8",
@@ -81,7 +81,7 @@ async fn views_that_a_detector_cannot_look_at_are_told() {
     let answer = service.post(VIEWS, &request.to_string()).await;
     assert_refused(&answer, 400, "unknown-parameter", "priority, timeout");
     assert_refused(
-        &service.post("/v2/models/nobody/infer", "{}").await,
+        &service.post("/v2/models/missing/infer", "{}").await,
         404,
         "unknown-model",
         "eager",
@@ -103,7 +103,7 @@ async fn views_that_a_detector_cannot_look_at_are_told() {
 }
 
 #[tokio::test]
-async fn views_have_places_like_frames_and_bodies_have_limits() {
+async fn views_need_permits_and_bodies_have_limits() {
     let service = Service::within(&Bounds {
         frames_in_flight: 1,
         max_body_bytes: 100_000,
@@ -126,11 +126,11 @@ async fn views_have_places_like_frames_and_bodies_have_limits() {
     let answer = send(&service, VIEWS, &head, &[0; 12288]).await;
     assert_refused(&answer, 500, "internal", "failed");
     let answer = send(&service, VIEWS, &head, &[0; 12288]).await;
-    assert_eq!(answer.status, 200, "the place is free again");
+    assert_eq!(answer.status, 200, "the permit is free again");
 }
 
 #[tokio::test]
-async fn tensors_have_room_for_what_they_are_unpacked_to_or_may_retry() {
+async fn unpacked_tensors_count_against_the_memory_budget() {
     let (numbers, frame) = (3 * 64 * 64, incompressible_frame());
     let views = |datatype: &str, data: Option<Vec<u8>>| {
         let mut input = json!({ "name": "views", "datatype": datatype, "shape": [1, 3, 64, 64] });
@@ -160,7 +160,7 @@ async fn tensors_have_room_for_what_they_are_unpacked_to_or_may_retry() {
         ),
         (FRAMES, frames, vec![], frame.len()),
     ] {
-        // Room for one body and what it is unpacked to, whose padding is not known before.
+        // Memory for one body and its unpacked tensors, whose padding is not known in advance.
         let service = Service::within(&Bounds {
             max_upload_bytes: head.to_string().len() + behind.len() + unpacked + 8,
             ..Bounds::default()
@@ -176,6 +176,6 @@ async fn tensors_have_room_for_what_they_are_unpacked_to_or_may_retry() {
         assert_refused(&refused, 429, "overloaded", "bodies");
         assert_eq!(refused.header("retry-after"), "1");
         let answer = send(&service, path, &head, &behind).await;
-        assert_eq!(answer.status, 200, "the room is free again");
+        assert_eq!(answer.status, 200, "the memory is free again");
     }
 }

@@ -1,1 +1,1 @@
-"""What `test_image.py` builds and runs images with: no container engine is needed."""
+"""Builds and runs images for `test_image.py`, without a container engine."""

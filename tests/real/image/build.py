@@ -1,4 +1,4 @@
-"""Builds the image from docker/Dockerfile with buildah, around the release binary that is there."""
+"""Builds the image from docker/Dockerfile with buildah, with the existing release binary."""
 
 import json
 import shutil
@@ -11,15 +11,15 @@ from harness.places import LOOKDOWN, ROOT
 
 HERE = ROOT / ".setup" / "real" / "image"
 BASE = HERE / "debian"
-"""A Debian of the release that the Dockerfile names, as `debootstrap` makes it."""
+"""A Debian of the release named in the Dockerfile, as created by `debootstrap`."""
 STORE = HERE / "store"
-# As root in a container that is not privileged, buildah can do with this alone.
+# Required by buildah as root in a container that is not privileged.
 BUILDAH = ["buildah", f"--root={STORE}/images", f"--runroot={STORE}/run", "--storage-driver=vfs"]
 INSIDE = Path(__file__).with_name("inside.sh")
 
 
 class BuildError(Exception):
-    """A step that came to nothing, with what it said."""
+    """A step that failed, with its output."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Image:
         return ["env", "-i", *assignments, *isolated, *command]
 
     def size(self) -> int:
-        """The bytes of all files."""
+        """The total size of all files, bytes."""
         files = (file for file in self.root.rglob("*") if file.is_file() and not file.is_symlink())
         return sum(file.stat().st_size for file in files)
 
 
 def build() -> Image:
-    """The image, until `remove` is called."""
+    """Builds the image, which stays until `remove` is called."""
     remove()
     _run([sys.executable, ROOT / "scripts" / "dist.py", LOOKDOWN])
     _import_base("debian:12-slim", "bookworm")
@@ -60,7 +60,7 @@ def build() -> Image:
 
 
 def remove() -> None:
-    """Deletes all that was built, but for the base."""
+    """Deletes everything that was built, except the base."""
     shutil.rmtree(STORE, ignore_errors=True)
 
 

@@ -1,7 +1,7 @@
 #!/bin/sh
-# inside.sh ROOT COMMAND...: runs a command as an engine told `--read-only --cap-drop ALL` would, in mounts of its
-# own: ROOT cannot be written, the user is the image's, and nothing can be gained. Other programs are named in full,
-# as PATH is the image's.
+# inside.sh ROOT COMMAND...: runs a command like an engine with `--read-only --cap-drop ALL`, in
+# separate mounts: ROOT is read-only, the user is the image's, and no privileges can be gained.
+# Other programs are called by their full path, as PATH is the image's.
 set -eu
 root=$1
 shift
@@ -9,5 +9,5 @@ shift
 /bin/mount --bind /dev "$root/dev"
 /bin/mount --bind /proc "$root/proc"
 /bin/mount -o remount,bind,ro "$root"
-# Another user than root has no capabilities.
+# Users other than root have no capabilities.
 exec /usr/bin/setpriv --no-new-privs /usr/sbin/chroot --userspec=65532:65532 --groups= "$root" "$@"

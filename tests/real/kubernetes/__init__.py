@@ -1,1 +1,1 @@
-"""What `test_kubernetes.py` looks with: the cluster's own tools, and what is known of custom resources."""
+"""Tools of `test_kubernetes.py`: those of a cluster, and schemas of custom resources."""

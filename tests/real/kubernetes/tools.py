@@ -11,11 +11,11 @@ VALIDATE = Path(__file__).with_name("validate.py")
 
 
 class Refused(AssertionError):
-    """A tool does not take what it was given; the message is what it said."""
+    """A tool refuses its input. The message is its output."""
 
 
 def run(command: list, stdin: str | None = None) -> str:
-    """What a tool prints."""
+    """The output of a tool."""
     answer = subprocess.run(list(map(str, command)), input=stdin, capture_output=True, text=True, check=False)
     if answer.returncode:
         raise Refused(f"{Path(command[0]).name}: {answer.stdout}{answer.stderr}")
@@ -23,16 +23,16 @@ def run(command: list, stdin: str | None = None) -> str:
 
 
 def manifests(folder: str) -> list[dict]:
-    """What would be applied of a folder of `k8s`, each manifest valid."""
+    """The manifests of a folder of `k8s`, each validated."""
     return json.loads(run([PYTHON / "python", VALIDATE], run([PYTHON / "kubectl", "kustomize", ROOT / "k8s" / folder])))
 
 
 def read_yaml(file: Path) -> dict:
-    """A YAML file that is no manifest."""
+    """A YAML file that is not a manifest."""
     return json.loads(run([PYTHON / "python", VALIDATE, "--only-read"], file.read_text(encoding="utf-8")))[0]
 
 
 def only(documents: list[dict], kind: str) -> dict:
-    """The one manifest of a kind."""
+    """The only manifest of a kind."""
     (found,) = [document for document in documents if document["kind"] == kind]
     return found

@@ -1,6 +1,6 @@
-"""Reads manifests (YAML) and writes them as a list (JSON), once each is valid: run by the Python that has the schemas.
+"""Validates manifests (YAML) and prints them as a list (JSON). It is run by the Python that has the schemas.
 
-Kubernetes' own kinds are held against its schemas, strictly; custom resources against the schema beside this file.
+Kubernetes' own kinds are validated strictly against its schemas, custom resources against the schema in this folder.
 """
 
 import json
@@ -15,7 +15,7 @@ VERSION = kubernetes_validate.latest_version()
 
 
 def problem_of(document: dict) -> str | None:
-    """What is wrong with a manifest, if anything is."""
+    """The problem of a manifest, or None."""
     schema = Path(__file__).with_name(f"{document['kind']}.schema.json")
     try:
         if schema.exists():

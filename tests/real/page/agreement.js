@@ -1,4 +1,4 @@
-/** The page's lens and grids beside the server's own calibrations. */
+/** The page's lens and grids compared with the server's calibrations. */
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
@@ -15,7 +15,7 @@ async function plan(path, options) {
   return answer.json();
 }
 
-test("a lens of the page looks where the saved calibration of the same lens does", async () => {
+test("a lens of the page equals the saved calibration of the same lens", async () => {
   const body = JSON.stringify(calibrationOf({ id: "trial", ...circle }));
   const tried = await plan("calibrations/trial/views?profile=balanced", { method: "POST", body });
   const saved = await plan("calibrations/office/views?profile=balanced");
@@ -30,7 +30,7 @@ test("a lens of the page looks where the saved calibration of the same lens does
   assert.equal(after.status, 404, "nothing is stored");
 });
 
-test("the border of a grid is the outline of its view, where the lens reaches", async () => {
+test("the border of a grid is the outline of its view within the lens image", async () => {
   const { views } = await plan(`calibrations/office/views?profile=balanced&grid=${CELLS}`);
   const side = CELLS + 1;
   for (const { grid, outline } of views) {
@@ -42,7 +42,7 @@ test("the border of a grid is the outline of its view, where the lens reaches", 
   }
 });
 
-test("a saved calibration says of itself what the page would", async () => {
+test("a saved calibration equals that of the page", async () => {
   const { lens } = JSON.parse(await readFile(`${SAMPLES}/calibrations/office.json`, "utf8"));
   const own = calibrationOf({ id: "office", ...circle }).lens;
   assert.ok(Math.abs(own.focal - lens.focal) < 1e-3 && own.cx === lens.cx && own.cy === lens.cy);

@@ -1,4 +1,4 @@
-/** A browser with the page, and what every test holds against it: no complaint, no failed request. */
+/** A browser with the page, and the checks of every test: no console message, no failed request. */
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
@@ -12,7 +12,7 @@ const AXE = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 
 export const SERVER = process.env.LOOKDOWN_URL;
 export const SAMPLES = process.env.LOOKDOWN_SAMPLES;
-/** Where pictures of the page are kept; nowhere if unset. */
+/** The folder of screenshots. None are taken if it is unset. */
 const PICTURES = process.env.LOOKDOWN_PAGE_PICTURES;
 export const WIDE = { width: 1440, height: 900 };
 export const PHONE = { width: 390, height: 844 };
@@ -21,7 +21,7 @@ let browser;
 after(() => browser?.close());
 
 /**
- * A test of a fresh page at `path`. Whatever the browser complains of fails it, unless `expected` matches.
+ * A test of a fresh page at `path`. Any error or warning of the browser fails it, unless `expected` matches.
  * Options: `viewport`, `colorScheme`, `server`, `expected`.
  */
 export function pageTest(name, path, act, options = {}) {
@@ -32,12 +32,12 @@ export function pageTest(name, path, act, options = {}) {
     const page = await context.newPage();
     page.setDefaultTimeout(60_000);
     const complaints = [];
-    // Of cameras whose pictures are not kept there is none.
+    // Cameras without kept images give 404.
     const note = (text) => expected.test(text) || /status of 404 .*latest\.jpg/.test(text) || complaints.push(text);
     page.on("console", (message) => ["error", "warning"].includes(message.type()) && note(`${message.text()} ${message.location().url}`));
     page.on("pageerror", (error) => note(error.stack));
     page.on("requestfailed", (request) => {
-      // A newer question takes the place of one that is under way, and a stream ends with its section.
+      // A newer request replaces one in flight, and a stream ends with its section.
       const why = request.failure().errorText;
       if (why !== "net::ERR_ABORTED") note(`${request.url()}: ${why}`);
     });
@@ -56,7 +56,7 @@ export function pageTest(name, path, act, options = {}) {
   });
 }
 
-/** Shows a sample and waits for its persons; `lens` names a calibration. */
+/** Opens a sample and waits for its persons; `lens` names a calibration. */
 export async function detectSample(page, name, lens = "") {
   await page.locator(`#calibration option[value="${lens}"]`).waitFor({ state: "attached" });
   await page.selectOption("#calibration", lens);
@@ -64,7 +64,7 @@ export async function detectSample(page, name, lens = "") {
   await page.locator("#persons li").first().waitFor();
 }
 
-/** Sends a sample as a camera does. */
+/** Sends a sample like a camera. */
 export async function post(camera, sample, parameters = "profile=fast") {
   const body = await readFile(`${SAMPLES}/${sample}.jpg`);
   const answer = await fetch(`${SERVER}/detect?${parameters}&calibration=${sample}&camera=${camera}`, { method: "POST", body });
@@ -72,7 +72,7 @@ export async function post(camera, sample, parameters = "profile=fast") {
   return answer.json();
 }
 
-/** The report that the page has after `act` and did not have before. */
+/** The new report of the page after `act`. */
 export async function reportAfter(page, act) {
   await page.evaluate(async () => {
     window.shared = (await import("/assets/shared.js")).shared;
@@ -83,22 +83,22 @@ export async function reportAfter(page, act) {
   return report.jsonValue();
 }
 
-/** What axe-core finds wrong with what is shown now. */
+/** The violations that axe-core finds in the current state. */
 export async function assertAccessible(page) {
-  // The policy of the page lets no script in, but the debugger may evaluate one.
+  // The policy of the page forbids scripts, but the debugger may evaluate one.
   await page.evaluate(`(() => { ${AXE} })(); void 0`);
   const { violations } = await page.evaluate("axe.run(document)");
   const told = violations.map(({ id, impact, nodes }) => `${id} (${impact}): ${nodes.map((node) => node.target.join(" ")).join(", ")}`);
   assert.deepEqual(told, []);
 }
 
-/** Nothing reaches beyond the right edge. */
+/** Asserts that the page has no horizontal overflow. */
 export async function assertFits(page) {
   const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
   assert.ok(beyond <= 0, `${beyond} pixels beyond the right edge`);
 }
 
-/** Keeps a picture of the whole page, if pictures are wanted. */
+/** Takes a screenshot of the whole page, if screenshots are enabled. */
 export async function picture(page, name) {
   if (!PICTURES) return;
   await page.mouse.move(0, 0);

@@ -13,7 +13,7 @@ async function start(page, lens = "") {
   await page.locator("#previews canvas").nth(3).waitFor();
 }
 
-/** Waits until `act` has had views straightened anew. */
+/** Waits until the views are straightened again after `act`. */
 async function straightenedAfter(page, act) {
   const answered = page.waitForResponse((answer) => answer.url().includes("/views?profile=fast"));
   await act();
@@ -24,7 +24,7 @@ async function straightenedAfter(page, act) {
 
 const pixels = (page) => page.locator("#previews canvas").first().evaluate((canvas) => canvas.toDataURL());
 
-pageTest("the circle that was found is laid over the frame, and the views follow it", "", async (page) => {
+pageTest("the detected circle is drawn over the frame, and the views follow it", "", async (page) => {
   await start(page);
   for (const name of ["Centre, from the left", "Centre, from the top", "Radius"]) {
     assert.ok(Math.abs(Number(await page.getByRole("slider", { name }).inputValue()) - 480) < 1.5, name);
@@ -48,12 +48,12 @@ pageTest("the circle that was found is laid over the frame, and the views follow
   assert.ok(Math.abs(Number(await page.locator("output[for=calibrate-cx]").textContent()) - 480.1) < 1.5);
 });
 
-pageTest("a lens is saved with its height, serves at once and shows the floor", "", async (page) => {
+pageTest("a saved lens with a height is used at once and shows the floor", "", async (page) => {
   await start(page);
   await page.getByLabel("Height, metres").fill("2.9");
   await page.getByLabel("Name", { exact: true }).fill("lobby");
   await page.getByRole("button", { name: "Save", exact: true }).click();
-  await page.getByText("lobby is saved and serves.").waitFor();
+  await page.getByText("lobby is saved and in use.").waitFor();
   const { lens, mount } = await stored("lobby");
   assert.equal(mount.height_m, 2.9);
   assert.equal(lens.model, "equidistant");
@@ -63,30 +63,30 @@ pageTest("a lens is saved with its height, serves at once and shows the floor", 
   assert.equal(await page.locator("#calibration").inputValue(), "lobby");
   await go(page, "Floor");
   await page.locator(".dot-mark").first().waitFor();
-  // A second time it replaces what is there.
+  // The second save replaces the first.
   await go(page, "Calibrate");
   await page.getByLabel("Height, metres").fill("3.1");
   await page.getByRole("button", { name: "Replace lobby" }).click();
-  await page.getByText("lobby is saved and serves.").waitFor();
+  await page.getByText("lobby is saved and in use.").waitFor();
   assert.equal((await stored("lobby")).mount.height_m, 3.1);
 });
 
-pageTest("a file of another program is looked through and saved as it is", "", async (page) => {
+pageTest("a file of another program is previewed and saved unchanged", "", async (page) => {
   await start(page);
   const before = await pixels(page);
   await straightenedAfter(page, () => page.locator("#import-file").setInputFiles(`${FIXTURES}/adapter_ds.yml`));
-  await page.getByText("adapter_ds.yml is saved as it is.").waitFor();
+  await page.getByText("adapter_ds.yml is saved unchanged.").waitFor();
   assert.notEqual(await pixels(page), before);
   await assertAccessible(page);
   await page.getByLabel("Name", { exact: true }).fill("imported");
   await page.getByRole("button", { name: "Save", exact: true }).click();
-  await page.getByText("imported is saved and serves.").waitFor();
+  await page.getByText("imported is saved and in use.").waitFor();
   assert.equal((await stored("imported")).lens.model, "double_sphere");
   await straightenedAfter(page, () => page.getByRole("button", { name: "Back to the circle" }).click());
   assert.equal(await pixels(page), before);
 });
 
-pageTest("of several cameras in a file, one is named", "", async (page) => {
+pageTest("a camera of a file with several is selected by name", "", async (page) => {
   await start(page);
   await page.locator("#import-file").setInputFiles(`${FIXTURES}/kalibr_camchain.yaml`);
   await page.getByRole("alert").getByText("cam0, cam1").waitFor();
@@ -95,7 +95,7 @@ pageTest("of several cameras in a file, one is named", "", async (page) => {
   assert.equal(await page.getByRole("alert").count(), 0);
 }, { expected: /status of 422/ });
 
-pageTest("a file without the size of frames is read for that of this frame", "", async (page) => {
+pageTest("a file without a frame size is read with the size of this frame", "", async (page) => {
   await start(page);
   await page.locator("#import-file").setInputFiles(`${FIXTURES}/py_ocamcalib.json`);
   const saying = page.getByRole("alert");
@@ -104,7 +104,7 @@ pageTest("a file without the size of frames is read for that of this frame", "",
   assert.equal(await saying.count(), 0, (await saying.allTextContents()).join());
 }, { expected: /status of 422/ });
 
-pageTest("one that serves is opened and gone on from", "", async (page) => {
+pageTest("a calibration in use is opened and edited", "", async (page) => {
   await start(page, "office");
   const answer = await straightenedAfter(page, () => page.locator("#open-calibration").selectOption("canteen"));
   assert.equal(answer.status(), 200);
@@ -114,7 +114,7 @@ pageTest("one that serves is opened and gone on from", "", async (page) => {
 });
 
 pageTest(
-  "a file that makes no calibration is refused in the server's words",
+  "an invalid calibration file is refused with the server's message",
   "",
   async (page) => {
     await start(page);

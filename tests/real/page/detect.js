@@ -7,7 +7,7 @@ import { SAMPLES, assertAccessible, detectSample, pageTest, reportAfter } from "
 const count = (page) => page.locator("#persons li").count();
 const slide = (page, name, value) => page.getByRole("slider", { name }).fill(String(value));
 
-/** Hands a file to the page as the event `kind` does. */
+/** Passes a file to the page as the event `kind` does. */
 const hand = (page, kind, name, type, bytes) =>
   page.evaluate(
     ([kind, name, type, bytes]) => {
@@ -36,10 +36,10 @@ pageTest("a sample is picked with the keyboard, and its persons are found", "", 
   assert.match(await page.locator("#picture").getAttribute("alt"), /office\.jpg/);
 });
 
-pageTest("the marks lie where the report says", "", async (page) => {
+pageTest("the marks are at the positions of the report", "", async (page) => {
   const report = await reportAfter(page, () => detectSample(page, "office"));
   const [first] = report.persons;
-  // Both at one moment: what comes later on the page may move them.
+  // Measured at the same moment, as later layout may move them.
   const [picture, badge] = await page.evaluate(() =>
     ["#picture", "#marks [data-person='0'] circle"].map((name) => document.querySelector(name).getBoundingClientRect().toJSON()),
   );
@@ -61,27 +61,28 @@ pageTest("a frame is dropped, pasted or opened", "", async (page) => {
   await page.getByAltText("The frame canteen.jpg").waitFor();
 });
 
-pageTest("what is no picture is refused with a sentence, and the next frame is welcome", "", async (page) => {
+pageTest("other files are refused with a message, and the next frame is accepted", "", async (page) => {
   await hand(page, "drop", "notes.txt", "text/plain", Buffer.from("hello"));
-  await page.getByRole("alert").getByText("What was dropped is no picture.").waitFor();
+  await page.getByRole("alert").getByText("The dropped item is not an image.").waitFor();
   await hand(page, "drop", "broken.jpg", "image/jpeg", Buffer.from("hello"));
-  await page.getByRole("alert").getByText("broken.jpg is no picture that this browser can read").waitFor();
+  await page.getByRole("alert").getByText("broken.jpg is not an image that this browser can read").waitFor();
   await detectSample(page, "office");
   assert.equal(await page.getByRole("alert").count(), 0);
 });
 
-pageTest("every parameter looks again at once", "", async (page) => {
+pageTest("every parameter runs a new detection at once", "", async (page) => {
   const first = await reportAfter(page, () => detectSample(page, "office", "office"));
   const all = first.persons.length;
   const strict = await reportAfter(page, () => slide(page, "Score threshold", 0.6));
   assert.equal(strict.refinement.score_threshold, 0.6);
-  // The network has seen this frame.
-  assert.deepEqual([strict.views.inferred, strict.views.unchanged, strict.timings_ms.inference], [0, 24, 0]);
-  await page.getByText("24 views remembered").waitFor();
+  // The network has processed this frame before.
+  const seen = first.views.inferred;
+  assert.deepEqual([strict.views.inferred, strict.views.unchanged, strict.timings_ms.inference], [0, seen, 0]);
+  await page.getByText(`${seen} views cached`).waitFor();
   await page.locator("#persons li").nth(all - 1).waitFor({ state: "detached" });
   assert.equal(await count(page), strict.persons.length);
   assert.ok(strict.persons.length < all);
-  const overlapping = await reportAfter(page, () => slide(page, "Overlap of one person", 0.2));
+  const overlapping = await reportAfter(page, () => slide(page, "IoU threshold", 0.2));
   assert.equal(overlapping.refinement.iou_threshold, 0.2);
   assert.ok(await page.getByRole("slider", { name: "Softness" }).isDisabled());
   const soft = await reportAfter(page, () => page.locator("#refine").selectOption("soft_nms_gaussian"));
@@ -94,9 +95,9 @@ pageTest("every parameter looks again at once", "", async (page) => {
   assert.deepEqual([reset.profile, reset.refinement.name, reset.refinement.score_threshold], ["balanced", "fusion", 0.3]);
 });
 
-pageTest("the person in the list is the one in the picture", "", async (page) => {
+pageTest("persons in the list and in the image are linked", "", async (page) => {
   await detectSample(page, "office");
-  // Where the sample was clicked there may be a mark now, which is pointed at as soon as the browser notices.
+  // A mark may be under the pointer after the click, which the browser may notice late.
   await page.mouse.move(0, 0);
   const rows = page.locator("#persons button");
   await rows.nth(2).focus();
@@ -107,7 +108,7 @@ pageTest("the person in the list is the one in the picture", "", async (page) =>
   await page.locator("#persons button[data-person='4'].chosen").waitFor();
 });
 
-pageTest("whatever takes long is shown, and gone when it is done", "", async (page) => {
+pageTest("progress is shown and removed at the end", "", async (page) => {
   let release;
   const released = new Promise((resolve) => (release = resolve));
   await page.route("**/detect?*", async (route) => {
@@ -115,14 +116,14 @@ pageTest("whatever takes long is shown, and gone when it is done", "", async (pa
     await route.continue();
   });
   await page.getByRole("button", { name: "office", exact: true }).click();
-  await page.getByRole("progressbar", { name: "Looking for people" }).waitFor();
+  await page.getByRole("progressbar", { name: "Detecting persons" }).waitFor();
   release();
   await page.locator("#persons li").first().waitFor();
   assert.equal(await page.getByRole("progressbar").count(), 0);
 });
 
 pageTest(
-  "what the server refuses is told in its own words",
+  "refusals are shown with the server's message",
   "",
   async (page) => {
     const detail = "all 8 places are taken: come again in 2 s";
@@ -142,7 +143,7 @@ pageTest("the report is saved as a file", "", async (page) => {
   assert.equal(report.persons.length, 6);
 });
 
-pageTest("the picture that was shown before leaves nothing behind", "", async (page) => {
+pageTest("the previous image leaves no marks", "", async (page) => {
   await detectSample(page, "office");
   await page.route("**/detect?*", () => {});
   await page.getByRole("button", { name: "lounge", exact: true }).click();

@@ -1,5 +1,5 @@
-/** Every section at the width of a desk and of a telephone, in light and dark: nothing reaches beyond the edge, and
- * axe-core finds nothing. The pictures in docs/images are made here. */
+/** Every section on a wide screen and on a phone, in light and dark mode: no horizontal overflow, and no violation
+ * of axe-core. The screenshots in docs/images are made here. */
 
 import test from "node:test";
 import { PHONE, WIDE, assertAccessible, assertFits, detectSample, pageTest, picture, post } from "./browser.js";
@@ -20,7 +20,7 @@ test("cameras have something to show", async () => {
 for (const [device, viewport] of [["wide", WIDE], ["phone", PHONE]]) {
   for (const colorScheme of ["light", "dark"]) {
     const look = async (page) => {
-      // The desk by day, the telephone by night.
+      // The wide screen in light mode, the phone in dark mode.
       const isKept = (device === "wide") === (colorScheme === "light");
       const keep = (name) => isKept && picture(page, `${name}-${device}`);
       await assertFits(page);

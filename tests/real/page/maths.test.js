@@ -1,4 +1,4 @@
-/** What the page computes by itself. */
+/** The calculations of the page. */
 
 import assert from "node:assert/strict";
 import test from "node:test";
@@ -19,7 +19,7 @@ test("an oriented box turns clockwise on the screen", () => {
   near(topLeft[1], 18);
 });
 
-test("an outline holds what is inside, also when it is bent", () => {
+test("an outline contains inner points, also when it is concave", () => {
   const bent = [[0, 0], [10, 0], [10, 10], [5, 3], [0, 10]];
   assert.ok(holds(bent, [5, 2]));
   assert.ok(!holds(bent, [5, 6]));
@@ -30,7 +30,7 @@ test("steps of axes are round", () => {
   assert.deepEqual([[6, 3], [4.9, 6], [0.5, 5], [70, 6]].map(([length, most]) => roundStep(length, most)), [2, 1, 0.1, 20]);
 });
 
-test("a circle makes a lens that makes the circle again", () => {
+test("a circle survives conversion to a lens and back", () => {
   for (const model of ["equidistant", "equisolid", "stereographic", "orthographic"]) {
     const circle = { width: 960, height: 720, model, cx: 481.5, cy: 360.25, radius: 350, fieldOfView: 170, cameraHeight: 2.8 };
     const file = calibrationOf({ id: "lobby", ...circle });
@@ -43,25 +43,25 @@ test("a circle makes a lens that makes the circle again", () => {
   }
 });
 
-test("what no circle makes is left as it is", () => {
+test("lenses without a circle are left unchanged", () => {
   const file = calibrationOf({ id: "lobby", width: 10, height: 10, model: "equidistant", cx: 5, cy: 5, radius: 5, fieldOfView: 180 });
   assert.equal(circleOf({ ...file, lens: { ...file.lens, model: "mei" } }), null);
   assert.equal(circleOf({ ...file, mount: { world_up: [0, -1, 0] } }), null);
   assert.equal(circleOf({ ...file, masks: [{}] }), null);
 });
 
-test("a frame in which no circle was found has the largest that fits", () => {
+test("without a detected circle the largest one that fits is used", () => {
   const { cx, cy, radius } = assumedCircle({ image: { width: 800, height: 600 } });
   assert.deepEqual([cx, cy, radius], [400, 300, 300]);
 });
 
-test("the assumed circle of a report is taken over", () => {
+test("the assumed circle of a report is used", () => {
   const assumed_circle = { cx: 401.5, cy: 299, radius: 280.25 };
   const { cx, cy, radius } = assumedCircle({ image: { width: 800, height: 600 }, calibration: { assumed_circle } });
   assert.deepEqual({ cx, cy, radius }, assumed_circle);
 });
 
-test("straightening through a grid of the frame itself gives the frame", () => {
+test("straightening with an identity grid gives the frame", () => {
   const [side, cells] = [8, 4];
   const data = Uint8ClampedArray.from({ length: 4 * side * side }, (_, index) => (index % 4 === 3 ? 255 : (index * 7) % 251));
   const pixels = { width: side, height: side, data };
@@ -75,7 +75,7 @@ test("straightening through a grid of the frame itself gives the frame", () => {
   assert.deepEqual(target.data, data);
 });
 
-test("a grid goes on beyond the lens image as straight as before", () => {
+test("a grid is extrapolated linearly beyond the lens image", () => {
   const grid = Array.from({ length: 25 }, (_, node) => (node % 5 < 3 ? [node % 5, Math.floor(node / 5)] : null));
   const places = continued(grid, 4);
   assert.deepEqual(places[4], [4, 0]);

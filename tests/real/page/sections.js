@@ -5,9 +5,9 @@ import { assertAccessible, detectSample, pageTest, post, reportAfter } from "./b
 
 const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
 
-pageTest("an address names its section, and a section without a frame says what is missing", "#views", async (page) => {
+pageTest("an address selects its section, and a section without a frame shows a hint", "#views", async (page) => {
   await page.getByRole("heading", { name: "Views", level: 1 }).waitFor();
-  await page.getByText("Pick a frame in Detect first: what the network saw").waitFor();
+  await page.getByText("Pick a frame in Detect first: its views are shown here").waitFor();
   assert.equal(await page.title(), "Views – Lookdown");
   await go(page, "Floor");
   await page.getByText("its persons are shown here from above").waitFor();
@@ -19,14 +19,14 @@ pageTest("an address names its section, and a section without a frame says what 
 });
 
 for (const [lens, what] of [["", "a lens that was assumed"], ["office", "a calibration"]]) {
-  pageTest(`the views of ${what} are straightened, and tell who is in sight`, "", async (page) => {
+  pageTest(`the views of ${what} are straightened and highlighted for a selected person`, "", async (page) => {
     await detectSample(page, "office", lens);
     await go(page, "Views");
     const tiles = page.getByRole("group", { name: "Views", exact: true }).getByRole("button");
-    await tiles.nth(23).waitFor();
-    assert.equal(await page.locator("#outlines polygon").count(), 24);
-    await page.getByText("24 views of the profile balanced see 100 % of the lens image").waitFor();
-    // The person by the paintings is in some views, and the others step back.
+    await tiles.nth(17).waitFor();
+    assert.equal(await page.locator("#outlines polygon").count(), 18);
+    await page.getByText("18 views of the profile balanced see 100 % of the lens image").waitFor();
+    // The person by the paintings is in some views. The others are dimmed.
     await page.getByRole("button", { name: "2", exact: true }).click();
     await page.locator(".tile.dim").first().waitFor();
     const seeing = await page.locator(".tile:not(.dim)").count();
@@ -39,14 +39,14 @@ for (const [lens, what] of [["", "a lens that was assumed"], ["office", "a calib
   });
 }
 
-/** How many colours a canvas has: whether anything is in it. */
+/** The number of colours of a canvas, which shows if anything is drawn. */
 const colours = (page, selector) =>
   page.locator(selector).first().evaluate((canvas) => {
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
     return new Set(new Uint32Array(data.buffer)).size;
   });
 
-pageTest("a profile without views says so, and the paper's has all of its own", "", async (page) => {
+pageTest("a profile without views shows a hint, and the paper's shows all of its views", "", async (page) => {
   await detectSample(page, "office", "office");
   await reportAfter(page, () => page.getByRole("radio", { name: "direct" }).check());
   await go(page, "Views");
@@ -57,7 +57,7 @@ pageTest("a profile without views says so, and the paper's has all of its own", 
   await page.locator(".tile").nth(127).waitFor();
 });
 
-pageTest("persons stand on the floor map where the report says, if the height is known", "", async (page) => {
+pageTest("the floor map shows the positions of the report, if the height is known", "", async (page) => {
   const report = await reportAfter(page, () => detectSample(page, "office", "office"));
   await go(page, "Floor");
   await page.locator(".dot-mark").first().waitFor();
@@ -75,7 +75,7 @@ pageTest("persons stand on the floor map where the report says, if the height is
   await page.getByText("The height of this camera above the floor is not known").waitFor();
 });
 
-pageTest("a camera appears on the wall by itself, and its card follows it", "#live", async (page) => {
+pageTest("a new camera appears in Live, and its card is updated", "#live", async (page) => {
   await page.locator("#section-live").waitFor();
   const first = await post("hall 1", "office");
   const card = page.getByRole("article", { name: "Camera hall 1" });
@@ -90,12 +90,12 @@ pageTest("a camera appears on the wall by itself, and its card follows it", "#li
   assert.match(await plot.getAttribute("aria-label"), new RegExp(`${second.persons.length} persons? now, at most ${most} since`));
 });
 
-pageTest("a camera whose pictures are kept is shown with them", "#live", async (page) => {
+pageTest("a camera with kept images is shown with them", "#live", async (page) => {
   await post("gate", "office");
   await page.getByRole("article", { name: "Camera gate" }).getByAltText("The latest frame of gate").waitFor();
 });
 
-pageTest("whoever comes later sees what was seen before", "", async (page) => {
+pageTest("a later visitor sees earlier results", "", async (page) => {
   await post("yard", "office");
   await post("yard", "lounge");
   await go(page, "Live");
@@ -110,7 +110,7 @@ pageTest(
   async (page) => {
     const dialog = page.getByRole("dialog", { name: "Key" });
     await dialog.waitFor();
-    await dialog.getByText("This server wants a key").waitFor();
+    await dialog.getByText("This server requires a valid API key").waitFor();
     await assertAccessible(page);
     await dialog.getByLabel("API key").fill(process.env.LOOKDOWN_KEY);
     await page.keyboard.press("Enter");

@@ -1,4 +1,4 @@
-"""An ONNX model for MLServer that takes its views as numbers and answers with its outputs as they are: MODEL is its file."""
+"""An ONNX model for MLServer that takes views as numbers and returns its outputs unchanged: MODEL is its file."""
 
 import os
 
@@ -9,7 +9,7 @@ from mlserver.types import InferenceRequest, InferenceResponse
 
 
 class Network(MLModel):
-    """The network and nothing around it."""
+    """The network without pre- or post-processing."""
 
     async def load(self) -> bool:
         options = onnxruntime.SessionOptions()

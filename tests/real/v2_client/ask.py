@@ -1,4 +1,4 @@
-"""Asks a server with Triton's client whatever it can be asked, and prints what it said as JSON: `ask.py ADDRESS FRAME`."""
+"""Sends requests of all kinds with Triton's client, and prints the answers as JSON: `ask.py ADDRESS FRAME`."""
 
 import base64
 import json
@@ -16,7 +16,7 @@ FAST = {"calibration": "office", "profile": "fast"}
 
 
 def main(address: str, frame: bytes) -> dict:
-    """What the server said."""
+    """The answers of the server."""
     client = InferenceServerClient(address, network_timeout=120.0, concurrency=4)
     return {
         "health": [
@@ -24,7 +24,7 @@ def main(address: str, frame: bytes) -> dict:
             client.is_server_ready(),
             client.is_model_ready(MODEL),
             client.is_model_ready(MODEL, "1"),
-            client.is_model_ready("nobody"),
+            client.is_model_ready("unknown"),
         ],
         "server": client.get_server_metadata(),
         "model": client.get_model_metadata(MODEL),
@@ -41,7 +41,7 @@ def main(address: str, frame: bytes) -> dict:
 
 
 def image(content: bytes, binary: bool = True) -> InferInput:
-    """A frame as an input; as text it is base64."""
+    """A frame as an input. As text it is base64."""
     tensor = InferInput("image", [1], "BYTES")
     element = content if binary else base64.b64encode(content)
     return tensor.set_data_from_numpy(np.array([element], dtype=np.object_), binary_data=binary)
@@ -70,22 +70,22 @@ def views(client: InferenceServerClient, datatype: str) -> list:
 
 
 def asynchronous(client: InferenceServerClient, frame: bytes) -> list[int]:
-    """How many persons each of some requests at once found."""
+    """The number of persons of each of some concurrent requests."""
     waiting = [client.async_infer(MODEL, [image(frame)], parameters=FAST) for _ in range(3)]
     return [len(request.get_result().as_numpy("scores")) for request in waiting]
 
 
 def refused(client: InferenceServerClient, frame: bytes) -> dict:
-    """Status and sentence of requests that cannot be answered."""
+    """Status and sentence of requests that are refused."""
     good = [image(frame)]
     two = InferInput("image", [2], "BYTES").set_data_from_numpy(np.array([frame, frame], dtype=np.object_))
     shared = InferInput("image", [1], "BYTES").set_shared_memory("region", len(frame))
     requests = {
-        "unknown model": ("nobody", good, {}),
+        "unknown model": ("unknown", good, {}),
         "no picture": (MODEL, [image(b"no picture")], {}),
         "two frames": (MODEL, [two], {}),
         "unknown parameter": (MODEL, good, {"parameters": {"colour": "red"}}),
-        "unknown calibration": (MODEL, good, {"parameters": {"calibration": "nobody"}}),
+        "unknown calibration": (MODEL, good, {"parameters": {"calibration": "unknown-id"}}),
         "score out of range": (MODEL, good, {"parameters": {"score_threshold": 1.5}}),
         "sequence": (MODEL, good, {"sequence_id": 7, "sequence_start": True}),
         "shared memory": (MODEL, [shared], {}),
@@ -97,7 +97,7 @@ def refused(client: InferenceServerClient, frame: bytes) -> dict:
 
 
 def refusal(client: InferenceServerClient, model: str, inputs: list, options: dict) -> list[str]:
-    """What a request was refused with."""
+    """The refusal of a request."""
     try:
         client.infer(model, inputs, **options)
     except InferenceServerException as error:

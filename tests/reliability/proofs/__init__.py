@@ -1,1 +1,1 @@
-"""The proofs: each module has `prove(effort)`, which returns a row for each thing it has shown."""
+"""The proofs: each module has `prove(effort)`, which returns a row for each result."""

@@ -1,6 +1,6 @@
-"""The clock of the machine jumps, by an hour and by ten years, both ways: time limits count on.
+"""The machine's clock jumps by an hour and by ten years, in both directions: time limits stay correct.
 
-libfaketime stands between the process and its clock. The monotonic clock is left alone, as it is when a real clock is
+libfaketime replaces the clock of the process. The monotonic clock is not changed, as when a real clock is
 set.
 """
 
@@ -24,7 +24,7 @@ SLACK_SECONDS = 1.0
 
 
 def prove(effort: Effort) -> list[Row]:
-    """All jumps, one after the other, in one server."""
+    """Makes all jumps one after the other in one server."""
     del effort
     row = Row("clock jumps", f"{', '.join(JUMPS)}, back to the truth after each")
     library = next((found for folder in FOLDERS for found in sorted(Path(folder).rglob(LIBRARY))), None)
@@ -57,7 +57,7 @@ def prove(effort: Effort) -> list[Row]:
 
 
 def _jump(row: Row, address: str, clock: Path, jump: str) -> str:
-    """The year that a report after the jump is dated with."""
+    """Returns the year in the date of a report after the jump."""
     began = time.monotonic()
     picture = OFFICE.read_bytes()
     whole = request("POST", DETECT, picture, {"Content-Type": "image/jpeg", "Connection": "close"})

@@ -1,4 +1,4 @@
-"""The service is what its OpenAPI document says: schemathesis makes up requests, good and bad, and follows links."""
+"""The service conforms to its OpenAPI document: schemathesis generates valid and invalid requests and follows links."""
 
 import os
 import re
@@ -21,7 +21,7 @@ ENDS = {0: "held", 1: "failures"}
 
 
 def prove(effort: Effort) -> list[Row]:
-    """One run with all checks and in all phases."""
+    """Runs once with all checks and in all phases."""
     row = Row(
         "the OpenAPI document", f"schemathesis, all checks, up to {effort.examples} examples per operation and phase"
     )
@@ -36,7 +36,7 @@ def prove(effort: Effort) -> list[Row]:
     cases, links = CASES.search(said), LINKS.search(said)
     row.seen = f"{cases[1] if cases else 'no'} requests; links: {links[1] if links else 'none'}"
     row.faults += sorted(set(FAILURE.findall(said)))
-    row.faults += [f"schemathesis could not go on ({error})" for error in OWN_ERROR.findall(said)]
+    row.faults += [f"schemathesis failed ({error})" for error in OWN_ERROR.findall(said)]
     row.require(alive, "the server ended")
     row.require(code == 0 or bool(row.faults), f"schemathesis ended with {code}: see {WORK.relative_to(ROOT)}")
     return [row]

@@ -1,4 +1,4 @@
-"""More clients than the process may have descriptors: it goes on, idles, and serves again once they are gone."""
+"""More clients than the process has file descriptors: it stays idle, and serves again when they have disconnected."""
 
 import time
 
@@ -11,15 +11,15 @@ from support.row import Row
 
 DESCRIPTORS = 64
 CLIENTS = 150
-"""Fewer than the system lets wait besides."""
+"""Less than the additional backlog of the system."""
 WATCHED_SECONDS = 3.0
 MOST_CORES = 0.2
-"""Of a server that can accept nobody: it must not try without a pause."""
+"""Most CPU use of a server that cannot accept connections: it must pause between attempts."""
 RECOVERY_SECONDS = 5.0
 
 
 def prove(effort: Effort) -> list[Row]:
-    """Twice in a row, so that nothing is lost on the way."""
+    """Runs twice in a row to detect leaks."""
     del effort
     row = Row(
         "descriptors exhausted", f"{CLIENTS} connections to a server that may have {DESCRIPTORS} descriptors, twice"
@@ -48,5 +48,5 @@ def _exhaust(server, row: Row) -> tuple[float, float]:
         except (Lost, OSError):
             time.sleep(0.05)
     else:
-        row.faults.append(f"served nobody for {RECOVERY_SECONDS:.0f} s afterwards")
+        row.faults.append(f"served no request for {RECOVERY_SECONDS:.0f} s afterwards")
     return cores, time.monotonic() - began

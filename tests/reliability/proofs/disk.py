@@ -1,4 +1,4 @@
-"""A disk that is full, and one that is read-only: writes are refused, everything else goes on, nothing is damaged."""
+"""A full disk, and a read-only one: writes are refused, everything else works, no file is damaged."""
 
 import contextlib
 import json
@@ -19,7 +19,7 @@ REFUSALS = {403, 503}
 
 
 def prove(effort: Effort) -> list[Row]:
-    """A row for each."""
+    """Returns a row for each."""
     del effort
     return [
         _prove(Row("disk full", "a file system of 64 KiB, filled to the last byte"), _fill),
@@ -42,7 +42,7 @@ def _try(row: Row, address: str, folder: Path, spoil) -> None:
     old = (folder / "office.json").read_bytes()
     changed = json.loads(old)
     changed["lens"]["focal"] += 1.0
-    # Long enough that no block at hand can take it.
+    # Longer than the free space in any allocated block.
     new = (json.dumps(changed) + " " * 20000).encode()
     other = json.dumps(changed | {"id": "other"}).encode()
     tag = ask(address, "GET", "/calibrations/office").headers["etag"]

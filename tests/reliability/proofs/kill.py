@@ -1,4 +1,4 @@
-"""kill -9 while calibrations are written: a file is the old one or the new one, and what was answered is kept."""
+"""kill -9 during writes of calibrations: a file is the old or the new one, and acknowledged writes are kept."""
 
 import contextlib
 import itertools
@@ -20,24 +20,24 @@ from support.row import Row
 
 CAMERAS = ("north", "east", "south", "west")
 FOCAL = 300.0
-"""Of the first version of every camera; each later one has a little more."""
+"""The focal length of the first version. Each later version increases it."""
 OLD_SECONDS = 3600.0
 SETTINGS = TINY | {"LOG__FILTER": "warn", "CALIBRATIONS__POLL_SECONDS": "1"}
 
 
 @dataclass
 class Writer:
-    """Puts one version after the other of a calibration, and remembers how far it came."""
+    """Writes versions of a calibration one after the other, and records its progress."""
 
     camera: str
     answered: float | None = None
-    """The last version whose storing was answered."""
+    """The last version whose write was acknowledged."""
     sent: float | None = None
     """The last version that was sent."""
     refusals: list[str] = field(default_factory=list)
 
     def write(self, address: str, versions: itertools.count) -> None:
-        """Until the server is gone."""
+        """Runs until the server is gone."""
         template = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
         while True:
             focal = round(FOCAL + next(versions) / 1000, 3)
@@ -54,7 +54,7 @@ class Writer:
 
 
 def prove(effort: Effort) -> list[Row]:
-    """So many kills."""
+    """Kills the server `effort.kills` times."""
     row = Row("kill -9 while calibrations are written", f"{effort.kills} times, {len(CAMERAS)} writers without a pause")
     writers = [Writer(camera) for camera in CAMERAS]
     versions, in_between = itertools.count(), 0
@@ -75,7 +75,7 @@ def prove(effort: Effort) -> list[Row]:
         f"{written} writes, {len(row.faults)} lost or damaged; {in_between} times the one under way was stored; "
         f"{len(left)} unfinished files left"
     )
-    row.require(len(left) <= len(CAMERAS), f"unfinished files are never cleared away: {len(left)}, such as {left[:2]}")
+    row.require(len(left) <= len(CAMERAS), f"unfinished files are never removed: {len(left)}, such as {left[:2]}")
     return [row]
 
 
@@ -95,7 +95,7 @@ def _kill_once(folder: Path, writers: list[Writer], versions: itertools.count) -
 
 
 def _age(folder: Path) -> None:
-    """Lets what was left unfinished be old: later writes clear that away, and nothing younger."""
+    """Makes unfinished files old: later writes remove old ones only."""
     long_ago = time.time() - OLD_SECONDS
     for file in folder.iterdir():
         if file.stem not in CAMERAS:
@@ -103,7 +103,7 @@ def _age(folder: Path) -> None:
 
 
 def _check_served(address: str, folder: Path, writer: Writer) -> None:
-    """What is in the file is what a server that starts again has."""
+    """Checks that a restarted server serves the content of the file."""
     served = ask(address, "GET", f"/calibrations/{writer.camera}")
     focal = served.json()["lens"]["focal"] if served.status == 200 else f"status {served.status}"
     if focal != _stored(folder, writer):
@@ -116,7 +116,7 @@ def _stored(folder: Path, writer: Writer) -> float | None:
 
 
 def _check(folder: Path, writer: Writer, row: Row) -> bool:
-    """Whether the file holds a version that was sent and not answered; notes one that is neither that nor the last."""
+    """Returns true if the file holds an unacknowledged version. Records a fault if that is not the last sent one."""
     row.faults += writer.refusals
     writer.refusals.clear()
     stored = "no file"

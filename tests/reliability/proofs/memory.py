@@ -1,4 +1,4 @@
-"""Huge frames to a server that may have little memory: they are refused before they take any."""
+"""Huge frames to a server with little memory: they are refused before they use any."""
 
 import threading
 from collections import Counter
@@ -18,12 +18,12 @@ SETTINGS = TINY | {
     "LIMITS__MAX_DECODE_BYTES": "67108864",
     "LIMITS__MAX_UPLOAD_BYTES": "67108864",
 }
-"""What an operator of a small machine sets."""
+"""The settings for a small machine."""
 AT_ONCE = 16
 
 
 def frames() -> dict[str, tuple[bytes, set[int]]]:
-    """Frames and what they may be answered."""
+    """The frames, with the permitted statuses."""
     return {
         "of 50 000 × 50 000 pixels": (png(50_000, 50_000, rows=1), {413}),
         "of 8192 × 6000 pixels": (png(8192, 6000), {413}),
@@ -34,7 +34,7 @@ def frames() -> dict[str, tuple[bytes, set[int]]]:
 
 
 def prove(effort: Effort) -> list[Row]:
-    """All kinds, many at a time."""
+    """Sends all kinds, many at a time."""
     made = frames()
     row = Row(
         "memory limit", f"{LIMIT_MIB} MiB; {len(made)} kinds of huge frames, {effort.huge_frames} × {AT_ONCE} of each"

@@ -1,4 +1,4 @@
-"""Ten times the requests that can be served: as many as before are, others are refused quickly, nobody is cut off."""
+"""Ten times the load that can be served: goodput stays, other requests are refused quickly, none is cut off."""
 
 from harness.load import load
 from support.effort import Effort
@@ -10,14 +10,14 @@ from support.row import Row
 TIMES = 10
 CLIENTS = 8
 LEAST_GOODPUT = 0.7
-"""Of the capacity; the load generator and the refusals take their share of the same cores."""
+"""Fraction of the capacity. The load generator and the refusals use the same cores."""
 MOST_REFUSAL_MILLIS = 250.0
 MOST_GROWTH_MIB = 256.0
-"""What `limits.max_upload_bytes` lets bodies take."""
+"""The limit of request bodies, `limits.max_upload_bytes`."""
 
 
 def prove(effort: Effort) -> list[Row]:
-    """With the default settings and a real model."""
+    """Runs with the default settings and a real model."""
     row = Row("overload", f"{TIMES} times the capacity for {effort.overload_seconds:.0f} s, profile `fast`, open loop")
     with lookdown({"LOG__FILTER": "error"}) as server:
         with Watch(server.pid, 0.1) as calm_memory:

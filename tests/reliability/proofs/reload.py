@@ -1,4 +1,4 @@
-"""Files that are damaged while the server runs: the last good calibration and the last good model go on."""
+"""Files are damaged while the server runs: the last valid calibration and the last valid model stay in use."""
 
 import shutil
 import tempfile
@@ -14,11 +14,11 @@ from support.row import Row
 
 MANIFEST = 'name = "tiny"\nonnx = "model.onnx"\n'
 PATIENCE_SECONDS = 8.0
-"""Far longer than the server takes to look again."""
+"""Much longer than the polling interval."""
 
 
 def prove(effort: Effort) -> list[Row]:
-    """A row for each kind of file."""
+    """Returns a row for each kind of file."""
     del effort
     with tempfile.TemporaryDirectory() as name:
         calibrations, model = Path(name) / "calibrations", Path(name) / "tiny"
@@ -37,7 +37,7 @@ def prove(effort: Effort) -> list[Row]:
 
 
 def damages(whole: bytes) -> dict[str, bytes]:
-    """What can become of a file."""
+    """Damaged contents of a file."""
     return {
         "empty": b"",
         "cut off": whole[: len(whole) // 2],
@@ -55,13 +55,13 @@ def _calibration(address: str, file: Path) -> Row:
         if kind == "one byte changed":
             continue  # white space
         file.write_bytes(damage)
-        row.require(_comes(lambda: _told_broken(address)), f"{kind}: /readyz does not tell")
+        row.require(_becomes(lambda: _is_reported_invalid(address)), f"{kind}: /readyz does not report it")
         row.require(_revision(address) == revision, f"{kind}: another calibration is served")
         row.require(_detects(address), f"{kind}: frames are refused")
         file.write_bytes(whole)
-        row.require(_comes(lambda: not _told_broken(address)), f"{kind}: the good file is not taken up")
+        row.require(_becomes(lambda: not _is_reported_invalid(address)), f"{kind}: the valid file is not loaded")
     row.done = row.done.replace(str(len(damages(whole))), str(len(damages(whole)) - 1))
-    row.seen = "the old revision served throughout, /readyz told each, the good file was taken up again"
+    row.seen = "the old revision was served throughout, /readyz reported each damage, the valid file was loaded again"
     return row
 
 
@@ -77,18 +77,18 @@ def _model(address: str, folder: Path) -> Row:
             failures = _failed_loads(address)
             file.write_bytes(damage)
             row.require(
-                _comes(lambda before=failures: _failed_loads(address) > before), f"{file.name} {kind}: not noticed"
+                _becomes(lambda before=failures: _failed_loads(address) > before), f"{file.name} {kind}: not noticed"
             )
             row.require(_model_revision(address) == revision, f"{file.name} {kind}: another model answers")
             file.write_bytes(good)
     manifest.write_text(MANIFEST + "[input]\nscale = [0.5, 0.5, 0.5]\n", encoding="utf-8")
-    row.require(_comes(lambda: _model_revision(address) != revision), "a new good model is not taken up")
-    row.seen = "the old revision answered throughout, each damage was counted, a good new one was taken up"
+    row.require(_becomes(lambda: _model_revision(address) != revision), "a new valid model is not loaded")
+    row.seen = "the old revision answered throughout, each damage was counted, a new valid model was loaded"
     return row
 
 
-def _comes(holds: Callable[[], bool]) -> bool:
-    """Whether something holds before long."""
+def _becomes(holds: Callable[[], bool]) -> bool:
+    """Returns true if the condition becomes true in time."""
     deadline = time.monotonic() + PATIENCE_SECONDS
     while time.monotonic() < deadline:
         if holds():
@@ -101,7 +101,7 @@ def _revision(address: str) -> str | None:
     return ask(address, "GET", "/calibrations/office").headers.get("etag")
 
 
-def _told_broken(address: str) -> bool:
+def _is_reported_invalid(address: str) -> bool:
     return bool(ask(address, "GET", "/readyz").json()["calibrations"]["problems"])
 
 

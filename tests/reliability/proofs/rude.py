@@ -1,7 +1,7 @@
-"""Clients that mean no good, many at a time: they hold no place for long, and others are served beside them.
+"""Misbehaving clients, many at a time: they hold resources only for a short time, and other clients are served.
 
-Slow ones send a byte now and then, of the head or of the body; silent ones connect and say nothing; others vanish in
-the middle of an upload, or while they wait for their answer.
+Slow clients send single bytes of the head or of the body, silent ones connect and send nothing, others disconnect
+during an upload or while they wait for the answer.
 """
 
 import contextlib
@@ -28,18 +28,18 @@ SETTINGS = TINY | {
     "SERVER__IDLE_TIMEOUT_MILLIS": MILLIS,
 }
 PATIENCE_SECONDS = 2 * REQUEST_SECONDS + 4.0
-"""After this much time no rude client may hold anything."""
+"""After this time no misbehaving client may hold anything."""
 LONGEST_SECONDS = PATIENCE_SECONDS + 2.0
-"""So long a rude client goes on when it is let."""
+"""Time after which a misbehaving client gives up."""
 GOOD_SECONDS = 1.0
-"""Longest that a good client may wait beside them."""
+"""Longest wait of a well-behaved client."""
 BYTE_EVERY_SECONDS = 0.4
 VISITS = 10
-"""Of each client that vanishes at once."""
+"""Connections of each client that disconnects at once."""
 
 
 def prove(effort: Effort) -> list[Row]:
-    """A row for each kind of client."""
+    """Returns a row for each kind of client."""
     picture = OFFICE.read_bytes()
     whole = request("POST", DETECT, picture, {"Content-Type": "image/jpeg"})
     head = len(whole) - len(picture)
@@ -84,7 +84,7 @@ def _beside(server: Server, name: str, client: Callable, count: int, visits: int
         f"{before.descriptors} → {after.descriptors}, {before.resident_mib:.0f} → {after.resident_mib:.0f} MiB"
     )
     row.require(max(held) <= PATIENCE_SECONDS, f"held their places for {max(held):.1f} s")
-    # Uploads that are thrown away may fill the frames' places for a moment: 429 says so.
+    # Aborted uploads may use up the limit of frames for a moment, which gives 429.
     row.require(set(statuses) <= {200, 429} and statuses.get(200, 0) > 0, f"the good client was answered {statuses}")
     row.require(max(waits) <= GOOD_SECONDS, f"the good client waited {max(waits):.2f} s")
     row.require(after.descriptors <= before.descriptors + 2, "descriptors were not given back")
@@ -92,7 +92,7 @@ def _beside(server: Server, name: str, client: Callable, count: int, visits: int
 
 
 def _be(address: str, client: Callable[[socket.socket], None], visits: int, held: list[float]) -> None:
-    """Notes how long the server let the client be, each time that it came."""
+    """Records the duration of each of the client's connections."""
     for _ in range(visits):
         began = time.monotonic()
         with contextlib.suppress(OSError, Lost), contextlib.closing(connect(address, LONGEST_SECONDS)) as connection:
@@ -103,7 +103,7 @@ def _be(address: str, client: Callable[[socket.socket], None], visits: int, held
 
 
 def _drip(connection: socket.socket, sent: bytes, *, start: int) -> None:
-    """Sends the start at once and the rest byte by byte until the server has had enough."""
+    """Sends the start at once and the rest byte by byte until the server closes the connection."""
     connection.sendall(sent[:start])
     connection.settimeout(BYTE_EVERY_SECONDS)
     deadline = time.monotonic() + LONGEST_SECONDS

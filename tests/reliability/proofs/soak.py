@@ -1,4 +1,4 @@
-"""A long steady load, good and bad input mixed: memory, threads and descriptors do not grow."""
+"""A long steady load of valid and invalid input: memory, threads and descriptors do not grow."""
 
 import json
 import statistics
@@ -13,21 +13,21 @@ from support.places import OFFICE
 from support.row import Row
 
 LOAD = 0.8
-"""Of the capacity."""
+"""Fraction of the capacity."""
 BAD_PER_SECOND = 4.0
-"""Of each kind of bad input."""
+"""Requests of each kind of bad input."""
 CLIENTS = 64
-"""Of each stream. They take turns and keep their connections: together, fewer than `server.max_connections`."""
+"""Clients of each stream. They alternate and keep their connections: in total fewer than `server.max_connections`."""
 WARM_UP = 0.25
-"""Share of the time that is not counted: caches fill, the allocator finds its size."""
+"""Fraction of the time that is not counted: caches fill, and the allocator reaches its size."""
 MOST_GROWTH = 0.05
-"""Of memory, over the time that is counted."""
+"""Growth of memory over the counted time."""
 MOST_MORE = 3.0
-"""Threads and descriptors, over the same time: connections come and go."""
+"""Growth of threads and descriptors over the same time: connections open and close."""
 
 
 def prove(effort: Effort) -> list[Row]:
-    """With the default settings and a real model."""
+    """Runs with the default settings and a real model."""
     minutes = effort.soak_seconds / 60
     row = Row("soak", f"{minutes:.1f} min at {LOAD:.0%} of the capacity, profile `fast`, and four kinds of bad input")
     picture = OFFICE.read_bytes()
@@ -39,7 +39,7 @@ def prove(effort: Effort) -> list[Row]:
             ("415", DETECT, b"no picture at all", BAD_PER_SECOND),
             ("422", DETECT, picture[: len(picture) // 2], BAD_PER_SECOND),
             ("422", "/detect?score_threshold=2", picture, BAD_PER_SECOND),
-            ("404", "/detect?calibration=nobody", picture, BAD_PER_SECOND),
+            ("404", "/detect?calibration=unknown", picture, BAD_PER_SECOND),
         ]
         with Watch(server.pid, effort.soak_seconds / 200) as watch:
             statuses = [
@@ -81,7 +81,7 @@ def _ended(status: str, running) -> tuple[str, dict]:
 
 
 def _grown(samples: list[tuple[float, Holdings]], seconds: float) -> Holdings:
-    """What a straight line through the samples gains, once warm and before the load ends."""
+    """The growth of a regression line through the samples, between warm-up and the end of the load."""
     counted = [(at, seen) for at, seen in samples if WARM_UP * seconds <= at <= seconds]
     fields = ("resident_mib", "threads", "descriptors")
     return Holdings(*(growth([(at, getattr(seen, field)) for at, seen in counted]) for field in fields))

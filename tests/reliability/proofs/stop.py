@@ -1,9 +1,9 @@
-"""SIGTERM under load: nobody whose connection was taken is left without an answer.
+"""SIGTERM under load: every request on an accepted connection gets an answer.
 
-A request is lost when its client had a connection and no whole answer came back. Clients behave as behind a load
-balancer that only notices a refused connection: that alone sends them elsewhere, any other failure counts. Half of
-them open a connection for each request, half keep theirs; half of each send slowly, so that there are always bodies
-under way when the signal comes.
+A request is lost if its client had a connection and got no complete answer. Clients behave like a load balancer that
+detects only refused connections: these alone are retried elsewhere, any other failure counts. Half of the clients
+open a connection for each request, half keep theirs. Half of each send slowly, so that bodies are always in flight
+when the signal comes.
 """
 
 import random
@@ -30,13 +30,13 @@ SETTINGS = TINY | {
     "SHUTDOWN__GRACE_MILLIS": str(GRACE_SECONDS * 1000),
 }
 NOTICE_SECONDS = 0.5
-"""By then `/readyz` says that the end is near."""
+"""Time within which `/readyz` announces the shutdown."""
 WELCOME = {200, 429, 503}
-"""Answers; the latter two are refusals that say so."""
+"""Permitted answers. 429 and 503 are refusals."""
 
 
 def prove(effort: Effort) -> list[Row]:
-    """So many servers are stopped."""
+    """Stops `effort.stops` servers."""
     row = Row(
         "SIGTERM under load", f"{effort.stops} times, {CLIENTS} clients that never pause, {GRACE_SECONDS} s of grace"
     )
@@ -67,7 +67,7 @@ def prove(effort: Effort) -> list[Row]:
 
 
 def start_clients(server: Server, tally: Tally) -> list[Client]:
-    """Of every kind the same number."""
+    """Starts the same number of clients of every kind."""
     picture = OFFICE.read_bytes()
     headers = {"Content-Type": "image/jpeg"}
     kept = request("POST", DETECT, picture, headers)
@@ -83,7 +83,7 @@ def start_clients(server: Server, tally: Tally) -> list[Client]:
 
 
 def seconds_to_notice(server: Server) -> float:
-    """Until `/readyz` says 503."""
+    """The time until `/readyz` answers 503."""
     began = time.monotonic()
     while time.monotonic() - began <= NOTICE_SECONDS:
         try:
@@ -95,7 +95,7 @@ def seconds_to_notice(server: Server) -> float:
 
 
 def exit_status(server: Server) -> int | None:
-    """When the server is gone; `None` when it had to be killed."""
+    """The exit status of the server. `None` if it had to be killed."""
     try:
         return server.process.wait(timeout=2 * BOUND_SECONDS)
     except subprocess.TimeoutExpired:

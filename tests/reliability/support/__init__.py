@@ -1,1 +1,1 @@
-"""What the proofs share."""
+"""Shared code of the proofs."""

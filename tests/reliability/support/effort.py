@@ -1,26 +1,26 @@
-"""How long everything is tried."""
+"""The extent of the proofs."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How long everything is tried."""
+    """The extent of the proofs."""
 
     name: str
     examples: int
-    """Requests that schemathesis makes up for each operation, in each of its phases."""
+    """Generated requests of schemathesis for each operation, in each of its phases."""
     deterministic: bool
-    """Whether schemathesis makes up the same ones in every run."""
+    """True if schemathesis generates the same requests in every run."""
     kills: int
-    """Of the server while it writes calibrations."""
+    """Kills of the server while it writes calibrations."""
     stops: int
-    """Of the server under load."""
+    """Stops of the server under load."""
     overload_seconds: float
     rude_clients: int
-    """Of each kind, at the same time."""
+    """Clients of each kind at the same time."""
     huge_frames: int
-    """Of each kind."""
+    """Frames of each kind."""
     soak_seconds: float
 
 

@@ -1,11 +1,11 @@
-"""Pictures that cost a decoder far more than a sender."""
+"""Images that cost a decoder far more than their sender."""
 
 import struct
 import zlib
 
 
 def png(width: int, height: int, rows: int | None = None) -> bytes:
-    """A black RGB picture; with `rows`, its data end after so many."""
+    """A black RGB image. With `rows`, its data end after that many."""
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     packer = zlib.compressobj(9)
     row = bytes(1 + 3 * width)

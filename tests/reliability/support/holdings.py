@@ -1,4 +1,4 @@
-"""What a process holds, from /proc, and whether that grows."""
+"""The resources of a process, from /proc, and their growth."""
 
 import threading
 import time
@@ -12,7 +12,7 @@ PAGE_BYTES = 4096
 
 @dataclass(frozen=True)
 class Holdings:
-    """At one moment."""
+    """The resources at one moment."""
 
     resident_mib: float
     threads: int
@@ -20,7 +20,7 @@ class Holdings:
 
 
 def holdings(pid: int) -> Holdings:
-    """What a process holds now."""
+    """The current resources of a process."""
     folder = Path("/proc") / str(pid)
     status = dict(line.split(":", 1) for line in (folder / "status").read_text(encoding="utf-8").splitlines())
     resident = int(status["VmRSS"].split()[0]) / 1024
@@ -28,7 +28,7 @@ def holdings(pid: int) -> Holdings:
 
 
 class Watch:
-    """Looks at a process every so often while it is open."""
+    """Samples a process at intervals while it is open."""
 
     def __init__(self, pid: int, every_seconds: float):
         self.samples: list[tuple[float, Holdings]] = []
@@ -50,12 +50,12 @@ class Watch:
             self.samples.append((time.monotonic() - began, holdings(self._pid)))
 
     def peak_resident_mib(self) -> float:
-        """The most memory seen."""
+        """The maximum of the sampled memory."""
         return max(seen.resident_mib for _, seen in self.samples)
 
 
 def growth(points: Sequence[tuple[float, float]]) -> float:
-    """By how much a line through the points (least squares) rises from the first to the last."""
+    """The rise of the regression line (least squares) from the first to the last point."""
     count = len(points)
     mean_x, mean_y = (sum(point[axis] for point in points) / count for axis in (0, 1))
     spread = sum((x - mean_x) ** 2 for x, _ in points)

@@ -1,4 +1,4 @@
-"""The release binary, as the proofs start it."""
+"""Starts the release binary for the proofs."""
 
 import contextlib
 import os
@@ -12,7 +12,7 @@ from .places import SAMPLES, TINY_MODEL
 
 DETECT = "/detect?calibration=office&profile=fast"
 AT_ONCE = {"SHUTDOWN__GRACE_MILLIS": "0"}
-"""Who stops a server here waits for nobody."""
+"""Stops without a grace period."""
 TINY = {"MODEL__PATH": str(TINY_MODEL)}
 """Settings of a server whose network takes no time."""
 
@@ -25,19 +25,19 @@ def lookdown(
     inside: Sequence[str] = (),
     environment: dict[str, str] | None = None,
 ) -> Iterator[Server]:
-    """A server that is ready, until it is killed or no longer needed.
+    """Starts a server, waits until it is ready, and stops it at the end.
 
-    `inside` is a command that runs it in its own place, such as `prlimit`.
+    `inside` is a command that runs it in a separate environment, such as `prlimit`.
     """
     (port,) = free_ports(1)
     wanted = {"SERVER__LISTEN": f"127.0.0.1:{port}", "CALIBRATIONS__PATH": str(calibrations), **AT_ONCE, **settings}
     variables = {f"LOOKDOWN__{name}": value for name, value in wanted.items()} | (environment or {})
-    # As `make serve` starts it.
+    # Like `make serve`.
     variables["MALLOC_MMAP_THRESHOLD_"] = "131072"
     with running("lookdown", [*inside, str(LOOKDOWN), "serve"], port, "/readyz", variables) as server:
         yield server
 
 
 def is_root() -> bool:
-    """Whether mounts and control groups can be asked for."""
+    """Returns true if mounts and control groups are permitted."""
     return os.geteuid() == 0

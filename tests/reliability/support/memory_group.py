@@ -12,21 +12,21 @@ NAME = f"lookdown-proof-{os.getpid()}"
 
 @dataclass(frozen=True)
 class MemoryGroup:
-    """A group that processes can be put into."""
+    """A control group for processes."""
 
     folder: Path
     files: dict[str, str]
 
     def inside(self) -> list[str]:
-        """The command that runs another inside the group."""
+        """The command that runs another one inside the group."""
         return ["sh", "-c", f'echo $$ > "{self.folder}/cgroup.procs" && exec "$@"', "sh"]
 
     def peak_mib(self) -> float:
-        """The most memory that was ever used, page cache included."""
+        """The peak memory use, page cache included."""
         return int((self.folder / self.files["peak"]).read_text(encoding="ascii")) / 2**20
 
     def kills(self) -> int:
-        """Processes that were killed because there was no more."""
+        """The number of processes that were killed for lack of memory."""
         lines = (self.folder / self.files["events"]).read_text(encoding="ascii").splitlines()
         return next((int(line.split()[1]) for line in lines if line.startswith("oom_kill ")), 0)
 
@@ -42,7 +42,7 @@ VERSIONS = (
 
 @contextlib.contextmanager
 def memory_group(mib: int) -> Iterator[MemoryGroup | None]:
-    """A group with a limit while this is open; `None` where the machine gives none."""
+    """A group with a limit while this is open. `None` if the machine does not permit it."""
     for root, files in VERSIONS:
         folder = root / NAME
         try:

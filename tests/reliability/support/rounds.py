@@ -1,4 +1,4 @@
-"""Clients that ask again and again, until nobody listens any more."""
+"""Clients that send requests until the server no longer listens."""
 
 import collections
 import contextlib
@@ -12,7 +12,7 @@ from .exchange import Answer, Lost, connect, read_answer
 
 
 class Tally:
-    """What became of requests, counted by several clients at once."""
+    """Counts the outcomes of requests of several clients."""
 
     def __init__(self):
         self._lock = threading.Lock()
@@ -25,20 +25,20 @@ class Tally:
             self.statuses[answer.status] += 1
 
     def lose(self, how: str) -> None:
-        """Counts a request whose client was left without an answer."""
+        """Counts a request whose client got no answer."""
         with self._lock:
             self.lost.append(how)
 
     def asked(self) -> int:
-        """All requests."""
+        """The number of all requests."""
         return self.statuses.total() + len(self.lost)
 
 
 class Client(threading.Thread):
-    """Sends one request over and over, on a new connection each time or on one for as long as the server keeps it.
+    """Sends one request repeatedly, on a new connection each time or on one for as long as the server keeps it.
 
-    Its connections are refused when the server is gone: that is when it ends. Whatever else keeps a request from its
-    answer is a loss, also a reset of a connection that the server never took.
+    It ends when its connection is refused, as the server is gone then. Any other missing answer is a loss, including
+    the reset of a connection that the server never accepted.
     """
 
     def __init__(self, address: str, sent: Callable[[], bytes], tally: Tally, *, keeps: bool, slowly: bool = False):
@@ -48,7 +48,7 @@ class Client(threading.Thread):
         self._connection: socket.socket | None = None
 
     def run(self) -> None:
-        """Until the connection is refused."""
+        """Runs until the connection is refused."""
         kind = "kept" if self._keeps else "new"
         while True:
             reused = self._connection is not None

@@ -1,32 +1,32 @@
-"""What came of a proof."""
+"""The result of a proof."""
 
 from dataclasses import asdict, dataclass, field
 
 
 @dataclass
 class Row:
-    """What was done, what was seen, and what was wrong: nothing, if the proof holds."""
+    """What was done, the observations, and the faults: there are none if the proof holds."""
 
     name: str
     done: str
-    """What was done, and how often."""
+    """The description, with the number of repetitions."""
     seen: str = ""
     """Figures."""
     faults: list[str] = field(default_factory=list)
     skipped: str = ""
-    """Why it cannot be done on this machine."""
+    """The reason why this machine cannot run it."""
 
     def require(self, holds: bool, otherwise: str) -> None:
-        """Notes a fault unless something holds."""
+        """Records a fault unless the condition holds."""
         if not holds:
             self.faults.append(otherwise)
 
     def as_json(self) -> dict:
-        """For a file."""
+        """The row as JSON."""
         return asdict(self)
 
     def verdict(self) -> str:
-        """One word."""
+        """The verdict in one word."""
         if self.skipped:
             return "skipped"
         return "FAILED" if self.faults else "held"

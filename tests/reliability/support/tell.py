@@ -1,4 +1,4 @@
-"""The rows that were kept, as Markdown for docs/reliability.md."""
+"""The stored rows as Markdown for docs/reliability.md."""
 
 import json
 from collections.abc import Iterable
@@ -7,8 +7,8 @@ from pathlib import Path
 HEAD = "| proof | what was done | what was seen | wrong |\n|---|---|---|---:|"
 
 
-def told(folder: Path, parts: Iterable[str]) -> str:
-    """Of each part its long form, or else its short one, and what it ran on."""
+def markdown(folder: Path, parts: Iterable[str]) -> str:
+    """The table of each part's long form, or else its short form, with the machine it ran on."""
     kept = [read for part in parts if (read := _kept(folder, part))]
     lines = [HEAD]
     for part in kept:

@@ -1,4 +1,4 @@
-"""Tests of what the proofs share."""
+"""Tests of the shared code of the proofs."""
 
 import sys
 from pathlib import Path

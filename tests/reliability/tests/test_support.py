@@ -1,4 +1,4 @@
-"""Whoever watches a server must see right: growth, lost answers, and what is told of a run."""
+"""Tests of the measurements: growth, lost answers, and the Markdown of a run."""
 
 import contextlib
 import json
@@ -12,11 +12,11 @@ from support.exchange import Lost, ask, connect
 from support.frames import png
 from support.holdings import growth
 from support.row import Row
-from support.tell import told
+from support.tell import markdown
 
 
 def answering(sent: bytes):
-    """The address of a server that answers one connection with these bytes and closes it."""
+    """Starts a server that answers one connection with these bytes and closes it. Returns its address and thread."""
     listener = socket.create_server(("127.0.0.1", 0))
 
     def serve() -> None:
@@ -30,10 +30,10 @@ def answering(sent: bytes):
 
 
 class Growth(unittest.TestCase):
-    def test_a_line_grows_by_what_it_rises(self):
+    def test_growth_is_the_rise_of_the_line(self):
         self.assertAlmostEqual(growth([(second, 5.0 + 2.0 * second) for second in range(11)]), 20.0)
 
-    def test_what_goes_up_and_down_does_not_grow(self):
+    def test_fluctuation_is_no_growth(self):
         self.assertAlmostEqual(growth([(0, 1), (1, 2), (2, 1), (3, 2), (4, 1)]), 0.0)
 
 
@@ -51,7 +51,7 @@ class Exchange(unittest.TestCase):
         thread.join()
         self.assertEqual((answer.status, answer.headers["etag"], answer.json()), (404, "x", {}))
 
-    def test_a_server_that_is_gone_refuses(self):
+    def test_a_missing_server_refuses_connections(self):
         with socket.create_server(("127.0.0.1", 0)) as listener:
             port = listener.getsockname()[1]
         with self.assertRaises(ConnectionRefusedError):
@@ -59,12 +59,12 @@ class Exchange(unittest.TestCase):
 
 
 class Frames(unittest.TestCase):
-    def test_a_picture_of_many_pixels_is_short(self):
+    def test_an_image_of_many_pixels_is_small(self):
         self.assertLess(len(png(2000, 2000)), 20_000)
 
 
 class Told(unittest.TestCase):
-    def test_the_long_form_of_a_part_is_told_rather_than_the_short_one(self):
+    def test_the_long_form_of_a_part_is_preferred(self):
         made = dict.fromkeys(("commit", "cpu", "system", "onnx_runtime", "rust"), "x") | {"date": "2026-11-21 10:00"}
         made |= {"cores": 2, "memory_gib": 24.0}
         with tempfile.TemporaryDirectory() as name:
@@ -72,6 +72,6 @@ class Told(unittest.TestCase):
                 row = Row("kill", effort, "all|well")
                 kept = {"made": made | {"effort": effort}, "seconds": 1.0, "rows": [row.as_json()]}
                 (Path(name) / f"{effort}-kill.json").write_text(json.dumps(kept), encoding="utf-8")
-            table = told(Path(name), ["kill", "stop"])
+            table = markdown(Path(name), ["kill", "stop"])
         self.assertIn("| kill | long | all\\|well | 0 |", table)
         self.assertNotIn("short", table)

@@ -34,7 +34,7 @@ impl Background {
     ) -> Option<T> {
         let (done, outcome) = sync_channel(1);
         self.runtime.as_ref()?.spawn(async move {
-            // Whoever waits for it is there until it comes.
+            // The caller waits until it comes.
             let _ = done.send(work.await);
         });
         outcome.recv().ok()

@@ -24,7 +24,7 @@ const RETRY_FOR: Duration = Duration::from_secs(5);
 /// Longest pause before a request is sent again.
 const MAX_PAUSE: Duration = Duration::from_secs(1);
 
-/// What is asked of a provider's client.
+/// The options of a provider's client.
 pub(super) trait Objects: ObjectStore + PaginatedListStore {}
 impl<T: ObjectStore + PaginatedListStore> Objects for T {}
 

@@ -1,4 +1,4 @@
-//! What a provider's failures mean here, in words that hold no secrets and stay the same while the
+//! Meanings of a provider's failures, in words that hold no secrets and stay the same while the
 //! cause does: addresses with signatures, times and numbers of requests are left out.
 
 use std::error::Error as _;
@@ -10,9 +10,9 @@ use object_store::{
 
 use crate::calibration::StoreError;
 
-/// What comes before the status in the client's words.
+/// The text before the status in the client's message.
 const STATUS: &str = "status code: ";
-/// Longest status or code that is told.
+/// The longest status or code that is reported.
 const MAX_WORDS: usize = 64;
 
 /// The failure of a request to `place`.
@@ -58,7 +58,8 @@ fn transport(error: &Error) -> Option<String> {
     causes.last().map(ToString::to_string)
 }
 
-/// The status and the provider's code for the failure, as ` (403 Forbidden, SignatureDoesNotMatch)`.
+/// The status and the provider's code for the failure, as in
+/// ` (403 Forbidden, SignatureDoesNotMatch)`.
 fn answer(error: &Error) -> String {
     let text = causes(error).last().map(ToString::to_string);
     let text = text.unwrap_or_default();

@@ -31,7 +31,7 @@ fn a_file_is_written_read_replaced_and_deleted() {
 }
 
 #[test]
-fn what_a_killed_writer_left_goes_with_a_later_write_and_a_writer_at_work_is_left_alone() {
+fn later_write_removes_only_abandoned_temporary_files() {
     let folder = tempfile::tempdir().unwrap();
     let unfinished = |name: &str| folder.path().join(format!(".{name}.1-0.{UNFINISHED}"));
     for name in ["old.json", "young.json"] {

@@ -8,14 +8,15 @@ use crate::geometry::lens::{
     polynomial::{Polynomial, Rising},
 };
 
-/// How far from the centre the angle may still rise, in units of the focal length: the corner of a
+/// The radius up to which the angle may rise, in units of the focal length: the corner of a
 /// frame is never that far out.
 const REACH: f64 = 16.0;
 
 lens_parameters! {
-    /// The angle is that of the vector (`r`, `−(a0 + a1 r + a2 r² + …)`), `r` in pixels. Valid while
-    /// the angle rises, up to a radius of 16 `|a0|`. Scaramuzza, Martinelli and Siegwart 2006, with
-    /// `OCamCalib`'s signs. `column = e · y + x + cx`, `row = c · y + d · x + cy`, counted from 0.
+    /// The angle is that of the vector (`r`, `−(a0 + a1 r + a2 r² + …)`), `r` in pixels. Valid
+    /// while the angle rises, up to a radius of 16 `|a0|`. Scaramuzza, Martinelli and Siegwart
+    /// 2006, with `OCamCalib`'s signs. `column = e · y + x + cx`, `row = c · y + d · x + cy`,
+    /// counted from 0.
     pub struct Ocam: Centred {
         /// The direct polynomial, `a0 … an`; `a0` is negative.
         pub polynomial: Vec<f64>,

@@ -8,7 +8,7 @@ use super::{
     sampling::{noise, reference},
 };
 use crate::{
-    geometry::{Mount, Ray, ViewPlan},
+    geometry::{Mount, QuarterTurn, Ray, ViewPlan},
     imaging::ChannelOrder,
 };
 
@@ -30,7 +30,7 @@ fn a_view_shows_what_lies_at_its_positions() {
     let lens = Lens::equidistant_circle(99.5, 70.5, 100.0, 1.5).unwrap();
     let (width, height) = (45, 37);
     let input = NetworkInput::plain(width, height);
-    let views = ViewPlan::balanced().views(&Mount::default(), width, height);
+    let views = ViewPlan::quality().views(&Mount::default(), width, height);
     for table in RemapTable::of_views(&views, &lens, 200, 150) {
         let mut slot = vec![-1.0; input.view_len()];
         table.render(&frame, &input, &mut slot);
@@ -76,7 +76,7 @@ fn channel_order_scale_and_offset_are_applied_per_plane() {
 #[test]
 fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
     for lens in every_lens() {
-        let views = ViewPlan::balanced().views(&Mount::default(), 104, 104);
+        let views = ViewPlan::quality().views(&Mount::default(), 104, 104);
         let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
         let expected_grids = if lens.model() == "mei" { 24 } else { 3 };
         assert_eq!(grid_count(&tables), expected_grids, "{}", lens.model());
@@ -102,7 +102,7 @@ fn a_shared_grid_puts_every_view_of_a_ring_where_its_own_would() {
 #[test]
 fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
     for lens in every_lens() {
-        let views = ViewPlan::balanced().views(&Mount::default(), 100, 100);
+        let views = ViewPlan::quality().views(&Mount::default(), 100, 100);
         let tables = RemapTable::of_views(&views, &lens, FRAME_SIDE, FRAME_SIDE);
         let last = f64::from(FRAME_SIDE - 1);
         let mut whole = 0;
@@ -131,7 +131,7 @@ fn every_pixel_of_a_whole_patch_shows_the_lens_image() {
 #[test]
 fn views_not_rotated_about_the_optical_axis_share_nothing() {
     let lens = Lens::equidistant_circle(99.5, 99.5, 100.0, 1.5).unwrap();
-    let views = ViewPlan::balanced().views(&tilted(), 64, 64);
+    let views = ViewPlan::quality().views(&tilted(), 64, 64);
     let tables = RemapTable::of_views(&views, &lens, 200, 200);
     assert_eq!(grid_count(&tables), 24);
     let all = RemapTable::bytes(&tables);
@@ -147,4 +147,52 @@ fn shared_grids_count_once() {
     let one = RemapTable::bytes(&tables[..1]);
     let own = size_of::<RemapTable>() + tables[1].whole_patches.bytes();
     assert_eq!(RemapTable::bytes(&tables), one + 3 * own);
+}
+
+#[test]
+fn a_crop_of_scale_one_is_the_turned_frame() {
+    let frame = noise(60, 40);
+    let (width, height) = (24, 16);
+    let input = NetworkInput::plain(width, height);
+    for turn in QuarterTurn::ALL {
+        let crop = FrameCrop {
+            turn,
+            center: Pixel::new(30.0, 20.0),
+            scale: 1.0,
+            width,
+            height,
+        };
+        let table = RemapTable::of_crop(&crop, 60, 40);
+        let mut slot = vec![-1.0; input.view_len()];
+        table.render(&frame, &input, &mut slot);
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let middle = Pixel::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let place = crop.frame_from_crop(&middle);
+            let pixel = frame.pixel(place.x as u32, place.y as u32);
+            for (channel, expected) in pixel.into_iter().enumerate() {
+                let found = slot[channel * input.plane_len() + (y * width + x) as usize];
+                assert_eq!(found, f32::from(expected), "{turn:?} ({x}, {y})");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_crop_beyond_the_frame_is_black_there() {
+    let frame = Frame::new(40, 40, vec![200; 40 * 40 * 3]).unwrap();
+    let input = NetworkInput::plain(16, 16);
+    let crop = |x: f64| FrameCrop {
+        turn: QuarterTurn::None,
+        center: Pixel::new(x, 20.0),
+        scale: 1.0,
+        width: 16,
+        height: 16,
+    };
+    let table = RemapTable::of_crop(&crop(0.0), 40, 40);
+    let mut slot = vec![-1.0; input.view_len()];
+    table.render(&frame, &input, &mut slot);
+    let row = &slot[..16];
+    assert!(row[..8].iter().all(|&value| value == 0.0), "{row:?}");
+    assert!(row[8..].iter().all(|&value| value == 200.0), "{row:?}");
+    assert!(!RemapTable::of_crop(&crop(-100.0), 40, 40).sees_anything());
 }

@@ -114,7 +114,7 @@ fn a_manifest_that_contradicts_itself_is_refused() {
         ),
         (
             "head = 'ssd'\nperson_class = 0\nanchor_generator = { aspect_ratios = [nan] }",
-            "holds NaN",
+            "contains NaN",
         ),
         (
             "head = 'centernet'\nperson_class = 0\nheat_map = 'map'",

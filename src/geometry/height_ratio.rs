@@ -1,4 +1,4 @@
-//! How large a person would have to be: the plausibility of a box as a person on the floor.
+//! The size that a person would have to have: the plausibility of a box as a person on the floor.
 //!
 //! For a camera that looks down from height `H`, a vertical person whose feet are seen at the angle
 //! `foot` from straight down and whose head at `head` stands `H tan(foot)` away and is
@@ -25,7 +25,7 @@ pub struct Extremities {
 
 /// The size of a person standing where an outline's lower end is, in camera heights.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stature {
+pub struct HeightRatio {
     /// Height over the camera's height; 1 when the head is at the horizon or above.
     pub height: f64,
     /// Width over the camera's height.
@@ -35,10 +35,10 @@ pub struct Stature {
 }
 
 impl Extremities {
-    /// The stature of a standing person with this outline; `None` when the outline reaches across
-    /// the nadir, where heights cannot be told.
+    /// Returns the size ratios of a standing person with this outline; `None` when the outline
+    /// reaches across the nadir, where heights cannot be measured.
     #[must_use]
-    pub fn stature(&self, mount: &Mount) -> Option<Stature> {
+    pub fn height_ratio(&self, mount: &Mount) -> Option<HeightRatio> {
         let nadir = mount.nadir();
         let horizontal = |ray: &Ray| ray - nadir * ray.dot(&nadir);
         if horizontal(&self.head).dot(&horizontal(&self.foot)) <= 0.0 {
@@ -54,7 +54,7 @@ impl Extremities {
         };
         // Seen from the camera, the middle of the person is this far away.
         let middle_distance = floor_distance.hypot(1.0 - height.clamp(0.0, 1.0) / 2.0);
-        Some(Stature {
+        Some(HeightRatio {
             height,
             width: self.left.angle(&self.right) * middle_distance,
             off_nadir: f64::midpoint(head, foot),
@@ -70,7 +70,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_size_of_a_standing_person_is_found_again_at_any_camera_height(
+        fn size_of_a_standing_person_is_found_at_any_camera_height(
             distance in 0.5..6.0_f64, azimuth in -3.1..3.1_f64,
             height in 1.0..1.9_f64, width in 0.3..0.8_f64, camera in 2.2..5.0_f64,
         ) {
@@ -84,21 +84,21 @@ mod tests {
                 left: point(distance, -width / 2.0, height / 2.0),
                 right: point(distance, width / 2.0, height / 2.0),
             };
-            let stature = extremities.stature(&Mount::default()).expect("away from the nadir");
-            prop_assert!((stature.height * camera - height).abs() < 1e-9);
-            prop_assert!((stature.width * camera - width).abs() < 0.05 * width);
+            let height_ratio = extremities.height_ratio(&Mount::default()).expect("away from the nadir");
+            prop_assert!((height_ratio.height * camera - height).abs() < 1e-9);
+            prop_assert!((height_ratio.width * camera - width).abs() < 0.05 * width);
         }
     }
 
     #[test]
-    fn an_outline_across_the_nadir_has_no_stature() {
+    fn an_outline_across_the_nadir_has_no_height_ratio() {
         let extremities = Extremities {
             head: Ray::new(0.1, 0.0, 1.0),
             foot: Ray::new(-0.1, 0.0, 1.0),
             left: Ray::new(0.0, -0.1, 1.0),
             right: Ray::new(0.0, 0.1, 1.0),
         };
-        assert_eq!(extremities.stature(&Mount::default()), None);
+        assert_eq!(extremities.height_ratio(&Mount::default()), None);
     }
 
     #[test]
@@ -109,9 +109,9 @@ mod tests {
             left: Ray::new(1.0, -0.1, 0.2),
             right: Ray::new(1.0, 0.1, 0.2),
         };
-        let stature = extremities
-            .stature(&Mount::default())
+        let height_ratio = extremities
+            .height_ratio(&Mount::default())
             .expect("away from the nadir");
-        assert_eq!(stature.height, 1.0);
+        assert_eq!(height_ratio.height, 1.0);
     }
 }

@@ -1,0 +1,155 @@
+//! Crop placement: few frame crops in which possible persons have a size that suits the detector.
+
+use std::ops::RangeInclusive;
+
+use nalgebra::Vector2;
+
+use super::{FrameCrop, Pixel, QuarterTurn};
+
+/// The share of a crop's side within which a person must lie to be wholly in it.
+const WITHIN: f64 = 0.96;
+/// A crop also serves persons who fill between these multiples of the wanted share.
+const SERVED_FILL: RangeInclusive<f64> = 0.6..=1.6;
+/// A crop serves persons whose up is at most about 53° from its own (cosine): beyond 45°, so that
+/// neighbours on both sides of a diagonal may share a crop.
+const SERVED_COSINE: f64 = 0.6;
+/// The greatest enlargement, crop pixels per frame pixel: beyond it there is nothing to see.
+const MAX_SCALE: f64 = 3.0;
+/// Most neighbours that are considered for one crop; bounds the work.
+const MAX_NEIGHBOURS: usize = 32;
+/// Boxes smaller than this, pixels, are taken to be of this size.
+const MIN_EXTENT: f64 = 1.0;
+
+/// A possible person, for which a crop is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CropTarget {
+    /// Its box `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
+    pub bbox: [f64; 4],
+    /// How likely it is a person, above 0.
+    pub score: f64,
+    /// The direction in which it stands, frame pixels, unit length.
+    pub up: Vector2<f64>,
+}
+
+impl CropTarget {
+    fn center(&self) -> Pixel {
+        let [x_min, y_min, x_max, y_max] = self.bbox;
+        Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
+    }
+
+    /// The larger side.
+    fn extent(&self) -> f64 {
+        let [x_min, y_min, x_max, y_max] = self.bbox;
+        (x_max - x_min).max(y_max - y_min).max(MIN_EXTENT)
+    }
+}
+
+/// Places up to `most` crops of `side` × `side` pixels.
+///
+/// Targets come best first. Each one that no earlier crop serves gets a crop of its own turn, in
+/// which its larger side fills the share `fill`. That crop is moved to where it serves the
+/// greatest sum of scores of further targets of about the same size and direction.
+#[must_use]
+pub fn place_crops(targets: &[CropTarget], most: usize, fill: f64, side: u32) -> Vec<FrameCrop> {
+    let mut crops = Vec::with_capacity(most);
+    let mut unserved: Vec<&CropTarget> = targets.iter().collect();
+    while crops.len() < most && !unserved.is_empty() {
+        let first = unserved.remove(0);
+        let crop = crop_around(first, &unserved, fill, side);
+        unserved.retain(|target| !(suits(&crop, target, fill) && shows(&crop, target)));
+        crops.push(crop);
+    }
+    crops
+}
+
+/// A crop that serves `first` and as many of the others as it can.
+fn crop_around(first: &CropTarget, others: &[&CropTarget], fill: f64, side: u32) -> FrameCrop {
+    let mut crop = FrameCrop {
+        turn: QuarterTurn::nearest(first.up),
+        center: first.center(),
+        scale: (fill * f64::from(side) / first.extent()).min(MAX_SCALE),
+        width: side,
+        height: side,
+    };
+    let reach = WITHIN * f64::from(side) / crop.scale;
+    let may_share = |target: &&&CropTarget| {
+        suits(&crop, target, fill) && joint(first.bbox, target.bbox).fits(reach)
+    };
+    let neighbours = others.iter().filter(may_share).take(MAX_NEIGHBOURS);
+    let neighbours: Vec<&CropTarget> = neighbours.copied().collect();
+    crop.center = best_hull(first, &neighbours, reach).middle();
+    crop
+}
+
+/// The hull of `first` and of those neighbours that, within a square of side `reach`, have the
+/// greatest sum of scores. The square may be moved until the hull touches its left and upper
+/// sides, so that these need only be tried where boxes begin.
+fn best_hull(first: &CropTarget, neighbours: &[&CropTarget], reach: f64) -> Hull {
+    let begins = |axis: usize| {
+        let all = neighbours.iter().map(|target| target.bbox[axis]);
+        let all = all.chain([first.bbox[axis]]);
+        let holds_first = |&begin: &f64| {
+            begin <= first.bbox[axis]
+                && (first.bbox[axis + 2] <= begin + reach || begin == first.bbox[axis])
+        };
+        all.filter(holds_first).collect::<Vec<f64>>()
+    };
+    let mut best = (0.0, Hull(first.bbox));
+    for &left in &begins(0) {
+        for &top in &begins(1) {
+            let is_within = |target: &&&CropTarget| {
+                let [x_min, y_min, x_max, y_max] = target.bbox;
+                left <= x_min && x_max <= left + reach && top <= y_min && y_max <= top + reach
+            };
+            let mut found = (0.0, Hull(first.bbox));
+            for target in neighbours.iter().filter(is_within) {
+                found = (found.0 + target.score, joint(found.1.0, target.bbox));
+            }
+            if found.0 > best.0 {
+                best = found;
+            }
+        }
+    }
+    best.1
+}
+
+/// Whether a target has about the size and the direction for which the crop was made.
+fn suits(crop: &FrameCrop, target: &CropTarget, fill: f64) -> bool {
+    let filled = crop.scale * target.extent() / f64::from(crop.width);
+    SERVED_FILL.contains(&(filled / fill)) && crop.turn.up().dot(&target.up) >= SERVED_COSINE
+}
+
+/// Whether a target lies wholly in the crop.
+fn shows(crop: &FrameCrop, target: &CropTarget) -> bool {
+    let reach = WITHIN * f64::from(crop.width) / crop.scale / 2.0 + 1e-6;
+    let offsets = [0, 1, 2, 3].map(|side| target.bbox[side] - crop.center[side % 2]);
+    offsets.iter().all(|offset| offset.abs() <= reach)
+}
+
+/// A box around several.
+#[derive(Clone, Copy)]
+struct Hull([f64; 4]);
+
+impl Hull {
+    fn middle(self) -> Pixel {
+        let [x_min, y_min, x_max, y_max] = self.0;
+        Pixel::new(f64::midpoint(x_min, x_max), f64::midpoint(y_min, y_max))
+    }
+
+    fn fits(self, reach: f64) -> bool {
+        let [x_min, y_min, x_max, y_max] = self.0;
+        x_max - x_min <= reach && y_max - y_min <= reach
+    }
+}
+
+fn joint(one: [f64; 4], other: [f64; 4]) -> Hull {
+    Hull([
+        one[0].min(other[0]),
+        one[1].min(other[1]),
+        one[2].max(other[2]),
+        one[3].max(other[3]),
+    ])
+}
+
+#[cfg(test)]
+mod tests;
