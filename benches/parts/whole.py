@@ -1,4 +1,4 @@
-"""The whole service: closed and open loops per profile, and where a frame's time goes."""
+"""The whole service: closed and open loops per profile, and the time per stage."""
 
 from statistics import median
 
@@ -14,12 +14,12 @@ STAGES = ("decode", "calibrate", "queue", "remap", "inference", "refine", "total
 
 
 def measure(effort: Effort) -> dict:
-    """A server of its own for each profile and kind of loop."""
+    """Starts a server for each profile and kind of loop."""
     return {profile: of_profile(effort, profile) for profile in effort.profiles}
 
 
 def of_profile(effort: Effort, profile: str) -> dict:
-    """Stages, closed loops, then open loops at shares of what the closed ones reached."""
+    """Measures stages, closed loops, then open loops at fractions of the closed loops' throughput."""
     paths, picture = [detect(profile)], frame()
     with lookdown(ROOMY) as server:
         stages = stages_of(server, paths[0], effort.frames)
@@ -31,7 +31,7 @@ def of_profile(effort: Effort, profile: str) -> dict:
     capacity = max(told["succeeded_per_second"] for told in closed)
     opened = []
     with lookdown() as server:
-        report(server, paths[0], picture)  # makes the camera's tables
+        report(server, paths[0], picture)  # builds the remap tables of the camera
         for percent in effort.loads:
             rate = capacity * percent / 100
             enough = max(effort.seconds, 12 / capacity)
@@ -41,7 +41,7 @@ def of_profile(effort: Effort, profile: str) -> dict:
 
 
 def stages_of(server: Server, path: str, frames: int) -> dict[str, float]:
-    """Median milliseconds of each stage, frames one after the other, the tables already made."""
+    """Median milliseconds of each stage for consecutive frames with existing remap tables."""
     report(server, path, frame())
     timings = [report(server, path, frame())["timings_ms"] for _ in range(frames)]
     return {stage: median(timing[stage] for timing in timings) for stage in STAGES}
@@ -50,14 +50,14 @@ def stages_of(server: Server, path: str, frames: int) -> dict[str, float]:
 def tell(raw: dict) -> str:
     """The tables as Markdown."""
     open_loop = (
-        "Open loop: frames come at random times (Poisson), whatever the server does, up to 256 at a time; "
-        "latencies count from when a frame was due. Default settings: at most 16 frames in flight.\n"
+        "Open loop: frames are due at random times (Poisson), independent of the server, up to 256 at a time; "
+        "latencies count from the due time. Default settings: at most 16 frames in flight.\n"
     )
     return "\n".join(
         [
-            "Where a frame's time goes, ms, one client (median):\n",
+            "Time per stage of a frame, ms, one client (median):\n",
             table(("profile", *STAGES, "not the network"), [stage_row(name, part) for name, part in raw.items()]),
-            "Closed loop: each client asks again as soon as it is answered.\n",
+            "Closed loop: each client sends its next request after the response.\n",
             table(
                 ("profile", "clients", "frames/s", "p50, ms", "p95", "p99", "cores used", "memory, MiB"),
                 [closed_row(name, told) for name, part in raw.items() for told in part["closed"]],
