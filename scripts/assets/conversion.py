@@ -22,11 +22,11 @@ HOW_TO_RUN = (
 
 
 def command_line(description: str, sources: dict[str, str], note: str) -> argparse.ArgumentParser:
-    """The arguments that all converters share, after the files they read: their names and what each is."""
+    """The common arguments of the converters, after the input files with their names and descriptions."""
     made = argparse.ArgumentParser(description=description, epilog=HOW_TO_RUN + note)
     for name, meaning in sources.items():
         made.add_argument(name, type=Path, metavar=name.upper(), help=meaning)
-    made.add_argument("folder", type=Path, metavar="OUT_FOLDER", help="where model.onnx and model.toml go")
+    made.add_argument("folder", type=Path, metavar="OUT_FOLDER", help="the folder for model.onnx and model.toml")
     made.add_argument("--name", help="the model's name in reports; the folder's name by default")
     made.add_argument(
         "--class-names",
@@ -38,7 +38,7 @@ def command_line(description: str, sources: dict[str, str], note: str) -> argpar
 
 
 def main(script: str, convert: Callable[[], str]) -> int:
-    """Calls `convert` and prints the line it returns; in another Python than the private one, runs the script there."""
+    """Calls `convert` and prints its result; runs the script again in the private Python if needed."""
     places = Places(ROOT)
     try:
         if Path(sys.prefix).resolve() != places.python.resolve():

@@ -1,4 +1,4 @@
-"""Files that have to state a version state the one that is built."""
+"""Files that contain a version contain that of the crate."""
 
 import re
 import tomllib
