@@ -1,9 +1,9 @@
 """Simulates the number of replicas for cameras: `scaling.py FIGURES.json CORES [PROFILE...]` prints Markdown.
 
-FIGURES.json holds what was measured of one replica (docs/scaling.json). A replica of CORES cores is taken for a queue
-that works on one frame after the other with all of them, which is what Lookdown does with the views of a frame, so a
-frame takes its CPU time divided by the cores. Cameras send at their own phase, with a small jitter; the load balancer before the
-replicas sends each frame to one of them at random, in turns, or to the one that is done first.
+FIGURES.json has the measurements of one replica (docs/scaling.json). A replica of CORES cores is modelled as a queue
+that processes one frame after the other with all cores, as Lookdown does with the views of a frame. So a frame takes
+its CPU time divided by the cores. Cameras send at their own phase, with a small jitter. The load balancer sends each
+frame to a random replica, in turns, or to the replica that finishes first.
 """
 
 import heapq
@@ -21,7 +21,7 @@ JITTER_SECONDS = 0.05
 """The maximum jitter of a frame."""
 SECONDS, WARM_UP_SECONDS = 60.0, 20.0
 TARGET_SECONDS = 1.0
-"""The 99th percentile of the latency that must not be exceeded."""
+"""The limit of the 99th percentile of the latency."""
 MOST_BUSY = 0.8
 """The maximum planned load of the cores; the rest is for the failure of a replica."""
 SEED = 7
