@@ -113,7 +113,7 @@ fn router() -> Router {
             warm_up_views: one,
             kept: vec![MODEL.to_owned()],
         },
-        Box::new(|_| Ok(Model::new(Box::new(SilentDetector(NetworkInput::plain(16, 16)))))),
+        Box::new(|_| Ok(Model::new(Box::new(Silent(NetworkInput::plain(16, 16)))))),
     );
     models.load(MODEL).unwrap();
     let calibrations = Arc::new(Calibrations::open(Box::new(DiscardingStore), true).unwrap());
@@ -152,9 +152,9 @@ fn router() -> Router {
 }
 
 /// A detector that finds no persons.
-struct SilentDetector(NetworkInput);
+struct Silent(NetworkInput);
 
-impl Detector for SilentDetector {
+impl Detector for Silent {
     fn name(&self) -> &'static str {
         MODEL
     }
