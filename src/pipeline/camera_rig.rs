@@ -81,9 +81,12 @@ impl CameraRig {
             let table = RemapTable::of_crop(crop, frame_width, frame_height);
             (*crop, table)
         });
-        let shows_something = |(_, table): &(_, RemapTable)| match self.masked.is_empty() {
-            true => table.sees_anything(),
-            false => table.sees_beside(&self.masked),
+        let shows_something = |(_, table): &(_, RemapTable)| {
+            if self.masked.is_empty() {
+                table.sees_anything()
+            } else {
+                table.sees_beside(&self.masked)
+            }
         };
         Self {
             geometry: self.geometry.clone(),

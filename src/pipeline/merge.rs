@@ -81,9 +81,10 @@ impl Mapped {
         let holding = views_holding(looks, &self.footprint);
         #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
         let expected_views = holding.max(1) as f64;
-        let (vote, weight) = match self.is_exact {
-            true => (CROP_VOTE, 1.0),
-            false => (1.0, VIRTUAL_VIEW_WEIGHT),
+        let (vote, weight) = if self.is_exact {
+            (CROP_VOTE, 1.0)
+        } else {
+            (1.0, VIRTUAL_VIEW_WEIGHT)
         };
         Candidate {
             score: self.candidate.score * worth(self.cut_off, height_ratio, mount) * vote,
@@ -239,9 +240,10 @@ fn person(
         (weight.max(f64::MIN_POSITIVE), member.footprint.outline())
     });
     let averaged = OrientedBox::averaging(up, outlines)?;
-    let oriented_box = match has_exact {
-        true => averaged.fitted_to(bounds),
-        false => averaged,
+    let oriented_box = if has_exact {
+        averaged.fitted_to(bounds)
+    } else {
+        averaged
     };
     let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
     views.sort_unstable();

@@ -34,7 +34,7 @@ pub enum Profile {
     /// 18 views, wide around the nadir and narrow at the rim, and up to 6 upright crops of the frame.
     #[default]
     Balanced,
-    /// 24 views, up to 20 closer looks, half of them by a second model, and up to 20 upright crops
+    /// 24 views, up to 40 closer looks, half of them by a second model, and up to 16 upright crops
     /// of the frame.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
@@ -64,7 +64,7 @@ impl Profile {
     /// The closer look that follows the plan's views, if any.
     pub(super) fn closer_look(self) -> Option<CloserLook> {
         (self == Self::Quality).then_some(CloserLook {
-            most_views: 20,
+            most_views: 40,
             fill: 1.0 / 3.0,
             first_look: FIRST_PASS_CANDIDATES,
         })
@@ -75,7 +75,7 @@ impl Profile {
         let most_crops = match self {
             Self::Fast => 5,
             Self::Balanced => 6,
-            Self::Quality => 20,
+            Self::Quality => 16,
             Self::Paper | Self::Direct => return None,
         };
         Some(CropPass {

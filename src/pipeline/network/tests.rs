@@ -3,10 +3,10 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use super::*;
 use crate::{
     calibration::{Areas, CameraGeometry},
-    geometry::{FieldOfViewReading, Lens, Mount},
+    geometry::{Lens, Mount, ViewPlan, view_plan::Ring},
     imaging::NetworkInput,
     inference::{Detector, HeadOutput, InferenceError},
-    pipeline::{Priority, Profile},
+    pipeline::Priority,
 };
 
 /// Tells how many views each run has, and of which brightness the first is, and waits to be let go.
@@ -71,8 +71,12 @@ fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
         mount: Mount::default(),
         areas: Areas::default(),
     };
-    let plan = Profile::Fast.view_plan(FieldOfViewReading::Horizontal);
-    let rig = CameraRig::new(geometry, 64, 64, plan.as_ref(), &input);
+    let plan = ViewPlan::rings(&[Ring {
+        elevation: 0.9,
+        count: 4,
+        field_of_view: 1.6,
+    }]);
+    let rig = CameraRig::new(geometry, 64, 64, Some(&plan), &input);
     let remappers = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let options = BatchOptions {
         max_views: NonZeroUsize::new(max_views).unwrap(),

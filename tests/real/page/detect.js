@@ -90,7 +90,9 @@ pageTest("every parameter runs a new detection at once", "", async (page) => {
   const softer = await reportAfter(page, () => slide(page, "Softness", 0.8));
   assert.equal(softer.refinement.sigma, 0.8);
   const fast = await reportAfter(page, () => page.getByRole("radio", { name: "fast" }).check());
-  assert.deepEqual([fast.profile, fast.views.inferred], ["fast", 4]);
+  assert.equal(fast.profile, "fast");
+  // Five views, and up to five crops.
+  assert.ok(fast.views.inferred >= 5 && fast.views.inferred <= 10);
   const reset = await reportAfter(page, () => page.getByRole("button", { name: "Reset" }).click());
   assert.deepEqual([reset.profile, reset.refinement.name, reset.refinement.score_threshold], ["balanced", "fusion", 0.3]);
 });

@@ -1,0 +1,165 @@
+"""Writes composed frames with annotations: `WORK/frames/SPLIT/{images,ids,calibrations,records}` and `annotations.json`.
+
+Boxes are axis-parallel and oriented, of the visible pixels. Finished frames are skipped.
+"""
+
+import json
+import math
+
+import cv2
+import numpy as np
+
+from .boxes import person_boxes
+from .compose import compose
+from .crops import CropFile, RoomFile
+from .geometry import Calibration, camera_rotation, make_lens
+from .indices import DISTRACTORS
+from .look import apply_look, random_look
+from .placement import place
+from .progress import Progress
+
+SMALLEST_AREA, SMALLEST_SHARE = 40, 0.2
+"""Persons with fewer visible pixels, or a smaller visible share, are marked `ignore`."""
+
+
+def random_camera(rng, room):
+    """A random frame size, lens, place of the circle, turn and tilt that the room's panorama can serve."""
+    diameter = int(rng.choice([640, 720, 832, 960, 1080, 1200]))
+    lens = make_lens(rng, diameter / 2)
+    width = height = diameter + int(rng.choice([0, 8, 40]))
+    if rng.random() < 0.3:
+        width, height = int(diameter * 4 / 3), int(diameter * rng.choice([1.0, 1.0, 0.9]))
+    all_round = room["max_theta"] > math.radians(120)
+    tilt = 0.0
+    if rng.random() < 0.35:
+        tilt = abs(float(rng.normal() * math.radians(3)))
+    if all_round and rng.random() < 0.7:
+        tilt = math.radians(float(rng.uniform(5, 62)))
+    rotation = camera_rotation(
+        float(rng.uniform(0, 2 * math.pi)), tilt, float(rng.normal() * 0.02) if tilt else 0.0
+    )
+    cx, cy = ((s - 1) / 2 + float(rng.normal() * 0.004 * diameter) for s in (width, height))
+    return Calibration(width, height, lens, cx, cy, rotation, room["camera_height"])
+
+
+def wanted_persons(rng, room):
+    """5 to 40 persons, fewer in small rooms."""
+    area = room["size"][0] * room["size"][1]
+    return int(np.clip(np.exp(rng.uniform(math.log(5), math.log(40))), 3, max(5, area / 5)))
+
+
+def annotate(composition, calibration):
+    """Annotations of the persons with at least one visible pixel."""
+    out = []
+    nadir = calibration.project(np.array([[0, 0, 0.0]]))[0][0]
+    for person in composition.persons:
+        centre_mask = composition.ids == person["number"]
+        if not centre_mask.any():
+            continue
+        ys, xs = np.nonzero(centre_mask)
+        upright = math.degrees(math.atan2(xs.mean() - nadir[0], nadir[1] - ys.mean()))
+        boxes = person_boxes(composition.ids, person["number"], upright)
+        share = min(1.0, boxes["area"] / max(person["in_crop"], 1)) * person["crop_share"]
+        placement, about = person["placement"], person["about"]
+        x, y = placement.to_world(np.array([[about["x"], about["y"], 0.0]]))[0][:2]
+        ignore = boxes["area"] < SMALLEST_AREA or share < SMALLEST_SHARE
+        out.append(
+            dict(
+                category_id=1,
+                iscrowd=0,
+                ignore=bool(ignore),
+                bbox=boxes["bbox"],
+                obb=[round(v, 2) for v in boxes["obb"]],
+                area=boxes["area"],
+                id_value=person["number"],
+                visible_fraction=round(share, 3),
+                upright_deg=round(upright, 2),
+                nadir_deg=round(math.degrees(math.atan2(math.hypot(x, y), calibration.height_m)), 2),
+                floor_xy=[round(float(x), 3), round(float(y), 3)],
+                pose=about["kind"],
+                child=about["child"],
+                piece=placement.file.about["piece"],
+                source=placement.file.about["seed"],
+            )
+        )
+    return out
+
+
+def distractors(ids):
+    """Boxes of things that are easily taken for persons."""
+    out = []
+    for value, name in DISTRACTORS.items():
+        count, labels, stats, _ = cv2.connectedComponentsWithStats((ids == value).astype(np.uint8))
+        out += [
+            dict(kind=name, bbox=[int(v) for v in stats[k][:4]])
+            for k in range(1, count)
+            if stats[k][4] >= SMALLEST_AREA
+        ]
+    return out
+
+
+def make_frame(seed, rooms, files, folder, split):
+    rng = np.random.default_rng(seed)
+    room = RoomFile(rooms[rng.integers(len(rooms))])
+    calibration = random_camera(rng, room.about)
+    look = random_look(rng)
+    prefer = {"infrared": "infrared"}.get(look["kind"], "sun" if look["sun"] else None)
+    placements = place(rng, room.about, files, wanted_persons(rng, room.about), prefer)
+    composition = compose(calibration, room, placements, rng, look["sun"])
+    image = apply_look(rng, look, composition, calibration)
+    name = str(seed)
+    cv2.imwrite(str(folder / "images" / f"{name}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, look["quality"]])
+    cv2.imwrite(str(folder / "ids" / f"{name}.png"), composition.ids)
+    (folder / "calibrations" / f"{name}.json").write_text(json.dumps(calibration.native(name), indent=1))
+    record = dict(
+        image=dict(
+            id=seed,
+            file_name=f"images/{name}.jpg",
+            id_mask=f"ids/{name}.png",
+            calibration=f"calibrations/{name}.json",
+            width=calibration.width,
+            height=calibration.height,
+            room=room.about["seed"],
+            split=split,
+            look=look,
+        ),
+        annotations=annotate(composition, calibration),
+        distractors=distractors(composition.ids),
+    )
+    (folder / "records" / f"{name}.json").write_text(json.dumps(record))
+
+
+def write_annotations(folder):
+    """Gathers the records into one file in the manner of COCO."""
+    images, annotations, others = [], [], []
+    for path in sorted((folder / "records").glob("*.json")):
+        record = json.loads(path.read_text())
+        images.append(record["image"])
+        for a in record["annotations"]:
+            annotations.append(dict(a, id=len(annotations) + 1, image_id=record["image"]["id"]))
+        others += [dict(d, image_id=record["image"]["id"]) for d in record["distractors"]]
+    content = dict(
+        images=images, annotations=annotations, distractors=others, categories=[dict(id=1, name="person")]
+    )
+    (folder / "annotations.json").write_text(json.dumps(content))
+    return len(images), len(annotations)
+
+
+def make_frames(work, first_seed, count, split="train"):
+    folder = work / "frames" / split
+    for part in ("images", "ids", "calibrations", "records"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    listed = lambda kind: [p for p in sorted((work / kind / split).glob("*.npz")) if "partial" not in p.name]
+    rooms, files = listed("rooms"), [CropFile(p) for p in listed("persons")]
+    if not rooms or not files:
+        raise SystemExit(
+            f"{work} has {len(rooms)} rooms and {len(files)} person files of the split {split}; render both first"
+        )
+    todo = [
+        s for s in range(first_seed, first_seed + count) if not (folder / "records" / f"{s}.json").exists()
+    ]
+    progress = Progress(f"frames {split}", len(todo), work / "log" / f"frames-{split}.log")
+    for seed in todo:
+        make_frame(seed, rooms, files, folder, split)
+        progress.step()
+    print("%d frames, %d persons" % write_annotations(folder))
