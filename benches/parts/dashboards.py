@@ -142,7 +142,7 @@ def tell(raw: dict) -> str:
         ("**share of a core**, %", spread_cell(spread(raw["percent"]).as_json())),
         ("HAProxy's for as many fixed responses, alternating, %", spread_cell(spread(raw["least_percent"]).as_json())),
         ("ours ÷ HAProxy's", spread_cell(ratios(raw["percent"], raw["least_percent"]).as_json())),
-        (f"{LISTENERS} event streams (server-sent events): reports received of {LISTENERS * (REPORTS + 1)}", listening["heard"]),
+        (f"{LISTENERS} event streams: reports received of {LISTENERS * (REPORTS + 1)}", listening["heard"]),
         ("memory for each, KiB", listening["kib_each"]),
         ("memory with all of them, MiB", listening["mib"]),
         (f"… and after {REPORTS - REPORTS // 4} more reports, MiB", listening["mib_more"]),

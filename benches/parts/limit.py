@@ -37,8 +37,8 @@ def measure(effort: Effort) -> dict:
         ours, theirs = [], []
         for _ in range(effort.rounds):
             theirs.append(bare(views, *tried[best], effort.seconds) / count)
-            told = load(server, [path], frame(), clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
-            ours.append(told["succeeded_per_second"])
+            result = load(server, [path], frame(), clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
+            ours.append(result["succeeded_per_second"])
     return {"views": count, "tuning": tuning, "best": best, "ours": ours, "bare": theirs}
 
 

@@ -45,9 +45,9 @@ def cell(values: list[float]) -> str:
     return spread_cell(spread(values).as_json())
 
 
-def unanswered(told: dict) -> int:
+def unanswered(result: dict) -> int:
     """Requests without a response."""
-    return told["broken"] + told["timed_out"]
+    return result["broken"] + result["timed_out"]
 
 
 def draw(_raw: dict) -> str:

@@ -90,8 +90,8 @@ def tune(effort: Effort, start, what: dict, parallel: bool) -> list[dict]:
     rows = []
     for setting in peers.settings(parallel)[:: 1 if effort.name == "full" else 3]:
         with start(setting) as server:
-            told = load(server, clients=4, warm_up=2.0, seconds=2.0 * effort.tune_seconds, **what)
-        rows.append({"setting": vars(setting), "frames_per_second": told["succeeded_per_second"]})
+            result = load(server, clients=4, warm_up=2.0, seconds=2.0 * effort.tune_seconds, **what)
+        rows.append({"setting": vars(setting), "frames_per_second": result["succeeded_per_second"]})
     return rows
 
 
@@ -104,16 +104,16 @@ def tell(raw: dict) -> str:
     """The comparison as Markdown."""
     rows = []
     for name, rounds in raw["rounds"].items():
-        p99 = spread([told["succeeded"].get("p99_ms", float("nan")) for told in rounds])
-        per_second = spread([told["succeeded_per_second"] for told in rounds])
-        cpu = spread([told["cpu_seconds_per_frame"] for told in rounds])
+        p99 = spread([result["succeeded"].get("p99_ms", float("nan")) for result in rounds])
+        per_second = spread([result["succeeded_per_second"] for result in rounds])
+        cpu = spread([result["cpu_seconds_per_frame"] for result in rounds])
         clients = raw["clients"][name]
         rows.append((name, clients, per_second.median, p99.median, cpu.median, rounds[-1]["resident_mib"]))
     compared = []
     for ours, theirs in PAIRS:
         mine, other = raw["rounds"][ours], raw["rounds"][theirs]
-        faster = ratios(*[[told["succeeded_per_second"] for told in rounds] for rounds in (mine, other)])
-        later = ratios(*[[told["succeeded"]["p99_ms"] for told in rounds] for rounds in (mine, other)])
+        faster = ratios(*[[result["succeeded_per_second"] for result in rounds] for rounds in (mine, other)])
+        later = ratios(*[[result["succeeded"]["p99_ms"] for result in rounds] for rounds in (mine, other)])
         # Queueing times are comparable only for queues of the same length.
         same_queue = raw["clients"][ours] == raw["clients"][theirs]
         late = spread_cell(later.as_json()) if same_queue else "–"
@@ -136,7 +136,7 @@ def told_agreement(rows: list[dict]) -> str:
 def draw(raw: dict) -> str:
     """The comparison as a chart."""
     values = {
-        name.replace("`", ""): spread([told["succeeded_per_second"] for told in rounds]).median
+        name.replace("`", ""): spread([result["succeeded_per_second"] for result in rounds]).median
         for name, rounds in raw["rounds"].items()
     }
     return bars("peers", f"1680 × 1680 JPEG, {MODEL}", "frames per second", values)

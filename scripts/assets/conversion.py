@@ -16,8 +16,8 @@ from .private_python import PrivatePython, pip_environment
 
 ROOT = Path(__file__).resolve().parents[2]
 HOW_TO_RUN = (
-    "Any Python from 3.11 on runs this: it makes the private environment .setup/venv, if that is missing, and goes on "
-    "in it. OUT_FOLDER is then a model like those under models/; LOOKDOWN__MODEL__PATH=OUT_FOLDER has it used. "
+    "Any Python from 3.11 on can run this: it creates the private environment .setup/venv if needed, and continues "
+    "in it. OUT_FOLDER is then a model like those under models/; LOOKDOWN__MODEL__PATH=OUT_FOLDER selects it. "
 )
 
 

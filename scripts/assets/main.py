@@ -103,7 +103,7 @@ def chosen_models(models: tuple[Model | Quantised, ...], arguments: list[str]) -
 def _explain(error: OSError) -> str:
     place = error.filename or ROOT
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"There is no space left for {place}; free some and run the set-up again, it goes on where it stopped."
+        return f"There is no space left for {place}; free some and run the set-up again; it continues where it stopped."
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         return f"{place} cannot be written by this user; use a clone in a folder of your own, or make this one yours."
     return f"{error.strerror or error}: {place}"

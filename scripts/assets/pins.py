@@ -45,7 +45,7 @@ class Runtime:
 class Model:
     """A model, its converter, and the sum of the resulting ONNX file.
 
-    `converter` is a module and what it is told after the names of its source and its result. `registry` is where
+    `converter` is a module and its arguments after the names of its source and its result. `registry` is where
     the archive comes from. `default` models belong to every set-up. `caution` is what a user should know before
     using the weights, if anything.
     """
