@@ -5,16 +5,16 @@ mod accept;
 mod access;
 mod answer;
 mod calibrations;
+mod connection_limit;
 mod cors;
-mod crowd;
+mod csrf;
 mod deadline;
 mod deepstack;
 mod detect;
+mod drain_body;
 mod entity_tags;
 mod envelope;
-mod find;
-mod foreign_pages;
-mod head;
+mod header_limits;
 mod health;
 mod host;
 mod incoming_trace;
@@ -28,8 +28,8 @@ mod report;
 mod repository;
 mod request_id;
 mod results;
+mod run_detection;
 mod state;
-mod unread;
 mod upload;
 mod v2;
 mod web_page;
@@ -43,8 +43,8 @@ use tower_http::catch_panic::CatchPanicLayer;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
+use csrf::AllowedOrigins;
 use envelope::Surroundings;
-use foreign_pages::OwnPages;
 use rate_limit::RateLimiter;
 
 pub use access::Access;
@@ -126,7 +126,7 @@ fn metrics() -> OpenApiRouter<ApiState> {
 /// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
     let options = &state.options;
-    let own_pages = OwnPages::of(options).map(|own| from_fn_with_state(own, foreign_pages::refuse));
+    let own_pages = AllowedOrigins::of(options).map(|own| from_fn_with_state(own, csrf::refuse));
     let limiter = RateLimiter::of(options).map(|all| from_fn_with_state(all, rate_limit::apply));
     let guards = ServiceBuilder::new()
         .layer(option_layer(own_pages))
@@ -147,9 +147,9 @@ pub fn operation_router(state: ApiState) -> Router {
 
 /// The router for connections beyond the limit: health checks, and metrics unless they have a port
 /// of their own. All other requests are refused.
-pub fn crowded_router(state: ApiState) -> Router {
+pub fn overload_router(state: ApiState) -> Router {
     let router = operation(state.options.metrics_elsewhere).with_state(state.clone());
-    surrounded(router.fallback(crowd::refuse), state)
+    surrounded(router.fallback(connection_limit::refuse), state)
 }
 
 fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
@@ -178,8 +178,8 @@ fn surrounded(router: Router, state: ApiState) -> Router {
         .layer(from_fn_with_state(surroundings, envelope::wrap))
         .layer(option_layer(cors::layer(&state.options.cors_origins)))
         .layer(CatchPanicLayer::custom(envelope::of_panic))
-        .layer(from_fn_with_state(state.clone(), unread::discard))
-        .layer(from_fn_with_state(state, head::within_bounds))
+        .layer(from_fn_with_state(state.clone(), drain_body::discard))
+        .layer(from_fn_with_state(state, header_limits::within_bounds))
         .layer(from_fn(host::require));
     router.layer(layers)
 }

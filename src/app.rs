@@ -71,7 +71,7 @@ fn assemble_with(
         remap_threads: settings.threads.remapping,
         paper_field_of_view,
         rig_cache_bytes: settings.calibrations.cache_bytes,
-        remembered_frames: settings.inference.remembered_frames,
+        inference_cache_frames: settings.inference.inference_cache_frames,
     };
     let calibrations = Arc::new(open_calibrations(settings)?);
     let known = Some(Arc::clone(&calibrations));
@@ -120,7 +120,7 @@ pub fn evaluation_engine(
             Some(name) => vec![name.as_str()],
             None => [
                 Some(defaults.of(request.profile)),
-                defaults.second_opinion(request.profile),
+                defaults.second_model(request.profile),
             ]
             .into_iter()
             .flatten()
@@ -275,7 +275,7 @@ impl App {
         let remote = self.models.remote().cloned();
         let remote_poller = remote.map(|remote| {
             Poller::start("remote-watcher", REMOTE_EVERY, move || {
-                remote.look_after();
+                remote.check_health();
             })
         });
         let pollers = model_poller

@@ -2,14 +2,14 @@
 //! drawing.
 
 pub mod annotate;
+mod buffer_pool;
 pub mod decode;
 pub mod frame;
+pub mod image_grid;
 pub mod lens_circle;
 mod letterbox;
 mod masked_pixels;
 mod network_input;
-pub mod picture_grid;
-mod pixel_memory;
 mod remap_table;
 mod thumbnail;
 mod view_signature;

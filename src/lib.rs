@@ -6,7 +6,7 @@
 //! the modules point in one direction.
 
 pub mod access;
-pub mod annotated_picture;
+pub mod annotated_image;
 pub mod annotation_formats;
 pub mod api;
 pub mod app;

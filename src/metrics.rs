@@ -109,7 +109,7 @@ metrics! {
     /// Remap tables evicted from memory.
     rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
     /// Frames answered from the inference cache.
-    recalled_frames: IntCounter = "recalled_frames_total" [];
+    inference_cache_hits: IntCounter = "recalled_frames_total" [];
     /// Cameras with a stored report.
     results_cameras: IntGauge = "results_cameras" [];
     /// Stored reports.
@@ -282,7 +282,7 @@ impl Metrics {
     /// Sets the number of frames answered from the inference cache since the start.
     pub fn show_recalled(&self, frames: u64) {
         let _one_scrape = self.one_scrape();
-        raise_to(&self.recalled_frames, frames);
+        raise_to(&self.inference_cache_hits, frames);
     }
 
     /// Sets the numbers of stored cameras, reports, bytes and images.

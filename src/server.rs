@@ -4,8 +4,8 @@
 mod accept;
 mod connection;
 mod connection_permits;
-mod pace;
-mod watched;
+mod connection_timeouts;
+mod instrumented_io;
 
 use std::{convert::Infallible, num::NonZeroUsize, sync::Arc, time::Duration};
 

@@ -23,7 +23,7 @@ pub use error::TlsError;
 pub use options::TlsOptions;
 
 use self::{files::TlsFiles, handshake::shake_hands, identity::Identity};
-use crate::{metrics::Metrics, watched_file::Complaint};
+use crate::{metrics::Metrics, watched_file::LogOnce};
 
 /// The current certificate and private key.
 pub struct Tls {
@@ -31,7 +31,7 @@ pub struct Tls {
     metrics: Arc<Metrics>,
     serving: RwLock<Arc<Identity>>,
     /// The last logged problem of the files. Locked while the files are read.
-    complaint: Mutex<Complaint>,
+    complaint: Mutex<LogOnce>,
 }
 
 impl Tls {
@@ -74,7 +74,7 @@ impl Tls {
             }
             Err(error) => {
                 let problem = error.to_string();
-                if complaint.is_news(&problem) {
+                if complaint.is_changed(&problem) {
                     tracing::error!("{problem}; the previous certificate stays in use");
                     let loads = &self.metrics.tls_certificate_loads;
                     loads.with_label_values(&["failure"]).inc();

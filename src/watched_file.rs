@@ -28,21 +28,21 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 
 /// The last reported reason why the newest version of a file is not used.
 #[derive(Debug, Default)]
-pub struct Complaint(Option<String>);
+pub struct LogOnce(Option<String>);
 
-impl Complaint {
+impl LogOnce {
     /// Clears the problem: the next one is reported, even if it is the same.
     pub fn settle(&mut self) {
         self.0 = None;
     }
 
     /// Returns true if this problem is to be reported: it is not the last one reported.
-    pub fn is_news(&mut self, problem: &str) -> bool {
-        let is_news = self.0.as_deref() != Some(problem);
-        if is_news {
+    pub fn is_changed(&mut self, problem: &str) -> bool {
+        let is_changed = self.0.as_deref() != Some(problem);
+        if is_changed {
             self.0 = Some(problem.to_owned());
         }
-        is_news
+        is_changed
     }
 }
 
@@ -52,11 +52,11 @@ mod tests {
 
     #[test]
     fn a_problem_is_reported_once_until_it_changes_or_ends() {
-        let mut complaint = Complaint::default();
+        let mut complaint = LogOnce::default();
         let reported =
-            ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_news(problem));
+            ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_changed(problem));
         assert_eq!(reported, [true, false, true, true]);
         complaint.settle();
-        assert!(complaint.is_news("empty"));
+        assert!(complaint.is_changed("empty"));
     }
 }

@@ -65,12 +65,12 @@ const MAY_USE: [(&str, &[&str]); 29] = [
         ],
     ),
     ("annotation_formats", &["geometry", "detection", "pipeline"]),
-    ("annotated_picture", &["geometry", "imaging", "pipeline"]),
+    ("annotated_image", &["geometry", "imaging", "pipeline"]),
     (
         "api",
         &[
             "access",
-            "annotated_picture",
+            "annotated_image",
             "annotation_formats",
             "geometry",
             "detection",
@@ -113,7 +113,7 @@ const MAY_USE: [(&str, &[&str]); 29] = [
         "cli",
         &[
             "access",
-            "annotated_picture",
+            "annotated_image",
             "annotation_formats",
             "geometry",
             "detection",
@@ -146,7 +146,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
     (
         "serde_json",
         &[
-            "annotated_picture",
+            "annotated_image",
             "annotation_formats",
             "api",
             "calibration",

@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, fs};
 
 use lookdown::{
-    annotated_picture::PictureOptions, api::openapi_document, pipeline::DetectParameters,
+    annotated_image::AnnotationOptions, api::openapi_document, pipeline::DetectParameters,
 };
 use serde_json::Value;
 
@@ -89,7 +89,7 @@ fn detection_describes_every_status_and_every_parameter() {
         .iter()
         .map(|parameter| parameter["name"].as_str().unwrap())
         .collect();
-    let [detection, picture] = [DetectParameters::TABLE, PictureOptions::TABLE]
+    let [detection, picture] = [DetectParameters::TABLE, AnnotationOptions::TABLE]
         .map(|table| table.iter().map(|spec| spec.name));
     let names: Vec<_> = detection.chain(["format"]).chain(picture).collect();
     assert_eq!(query, names);

@@ -155,8 +155,8 @@ fn the_paper_s_refinements_differ_as_their_formulas_require() {
 #[test]
 fn quality_reports_both_models_and_other_profiles_report_one() {
     let report = detect("office", &["--profile", "quality"]);
-    let names = ["model", "second_opinion"].map(|part| report[part]["name"].as_str().unwrap());
+    let names = ["model", "second_model"].map(|part| report[part]["name"].as_str().unwrap());
     assert_eq!(names, ["nanodet_g_416", "ssdlite_mobilenet_v2_int8"]);
     let one = detect("office", &["--profile", "fast"]);
-    assert!(one.get("second_opinion").is_none());
+    assert!(one.get("second_model").is_none());
 }

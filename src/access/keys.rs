@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{Holder, KeyError, KeyList};
-use crate::watched_file::{self, Complaint};
+use crate::watched_file::{self, LogOnce};
 
 /// The current keys.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ pub struct AccessKeys {
     file: Option<PathBuf>,
     known: RwLock<Arc<KeyList>>,
     /// The last logged problem of the file. Locked while the file is read.
-    complaint: Mutex<Complaint>,
+    complaint: Mutex<LogOnce>,
 }
 
 impl AccessKeys {
@@ -56,7 +56,7 @@ impl AccessKeys {
             }
             Err(error) => {
                 let problem = error.to_string();
-                if complaint.is_news(&problem) {
+                if complaint.is_changed(&problem) {
                     tracing::error!("{problem}; the previous keys stay in use");
                 }
             }

@@ -31,18 +31,18 @@ pub enum Access {
 }
 
 /// Proof that the request may detect persons.
-pub(super) struct Finder;
+pub(super) struct RequireDetect;
 
 /// Proof that the request may read calibrations and reports.
-pub(super) struct Reader;
+pub(super) struct RequireRead;
 
 /// Proof that the request may list models, which reveals file names of the server's machine.
-pub(super) struct ModelReader;
+pub(super) struct RequireModelRead;
 
 /// Proof that the request may change the models and the calibrations of the server.
-pub(super) struct Administrator;
+pub(super) struct RequireAdmin;
 
-impl FromRequestParts<ApiState> for Finder {
+impl FromRequestParts<ApiState> for RequireDetect {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
@@ -51,7 +51,7 @@ impl FromRequestParts<ApiState> for Finder {
     }
 }
 
-impl FromRequestParts<ApiState> for Reader {
+impl FromRequestParts<ApiState> for RequireRead {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
@@ -59,7 +59,7 @@ impl FromRequestParts<ApiState> for Reader {
     }
 }
 
-impl FromRequestParts<ApiState> for ModelReader {
+impl FromRequestParts<ApiState> for RequireModelRead {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
@@ -69,7 +69,7 @@ impl FromRequestParts<ApiState> for ModelReader {
     }
 }
 
-impl FromRequestParts<ApiState> for Administrator {
+impl FromRequestParts<ApiState> for RequireAdmin {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
@@ -79,7 +79,7 @@ impl FromRequestParts<ApiState> for Administrator {
     }
 }
 
-impl Reader {
+impl RequireRead {
     /// Checks the read scope again for a running request: its key may have been removed.
     pub(super) fn check(state: &ApiState, headers: &HeaderMap) -> Result<Self, Problem> {
         state.options.access.check(headers, Scope::Read)?;

@@ -13,7 +13,7 @@ use super::{
     problem::{Problem, ProblemKind},
 };
 use crate::{
-    annotated_picture::{PictureError, PictureOptions, annotated_picture},
+    annotated_image::{AnnotationError, AnnotationOptions, annotated_image},
     annotation_formats::{AnnotatedImage, BoxKind},
     pipeline::{Detected, PipelineError},
 };
@@ -24,7 +24,7 @@ const NAMELESS: &str = "frame";
 /// The requested form of the response.
 pub(super) struct AnswerOptions {
     format: AnswerFormat,
-    picture: PictureOptions,
+    picture: AnnotationOptions,
     /// The file name of the frame as the client sent it.
     file_name: Option<String>,
 }
@@ -43,10 +43,10 @@ impl AnswerOptions {
         file_name: Option<String>,
     ) -> Result<Self, Problem> {
         let format = parameters::take(given, TABLE);
-        let picture = parameters::take(given, PictureOptions::TABLE);
+        let picture = parameters::take(given, AnnotationOptions::TABLE);
         Ok(Self {
             format: AnswerFormat::read(pairs(&format), headers)?,
-            picture: PictureOptions::parse(pairs(&picture))?,
+            picture: AnnotationOptions::parse(pairs(&picture))?,
             file_name,
         })
     }
@@ -58,7 +58,7 @@ impl AnswerOptions {
         let bytes = match self.format {
             AnswerFormat::Report => json.clone(),
             AnswerFormat::Picture(format) => {
-                let picture = annotated_picture(detected, format, &self.picture);
+                let picture = annotated_image(detected, format, &self.picture);
                 picture.map_err(not_drawn)?.into()
             }
             AnswerFormat::Annotations(format) => {
@@ -74,10 +74,10 @@ impl AnswerOptions {
     }
 }
 
-fn not_drawn(error: PictureError) -> Problem {
+fn not_drawn(error: AnnotationError) -> Problem {
     match error {
-        PictureError::Cancelled(_) => PipelineError::Withdrawn.into(),
-        PictureError::Encode(error) => {
+        AnnotationError::Cancelled(_) => PipelineError::Withdrawn.into(),
+        AnnotationError::Encode(error) => {
             Problem::new(ProblemKind::UnfitImage, format!("{error}: ask for a width"))
                 .with_parameter("width")
         }

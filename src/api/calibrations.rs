@@ -24,7 +24,7 @@ use self::{
 };
 use super::{
     ApiState,
-    access::{Administrator, Reader},
+    access::{RequireAdmin, RequireRead},
     deadline::Deadline,
     entity_tags::{entity_tag, is_unmodified},
     openapi::RawBytes,
@@ -44,7 +44,7 @@ use crate::calibration::ChangeError;
 )]
 pub(super) async fn list(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
 ) -> Json<Vec<CalibrationInfo>> {
     let rows = state.calibrations.rows();
     Json(rows.into_iter().map(CalibrationInfo::from).collect())
@@ -66,7 +66,7 @@ pub(super) async fn list(
 )]
 pub(super) async fn get(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     CalibrationAddress(id): CalibrationAddress,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
@@ -114,7 +114,7 @@ pub(super) async fn get(
 )]
 pub(super) async fn put(
     State(state): State<ApiState>,
-    _administrator: Administrator,
+    _administrator: RequireAdmin,
     deadline: Deadline,
     NewCalibrationAddress(id): NewCalibrationAddress,
     headers: HeaderMap,
@@ -151,7 +151,7 @@ pub(super) async fn put(
 )]
 pub(super) async fn delete(
     State(state): State<ApiState>,
-    _administrator: Administrator,
+    _administrator: RequireAdmin,
     deadline: Deadline,
     CalibrationAddress(id): CalibrationAddress,
     headers: HeaderMap,

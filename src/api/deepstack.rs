@@ -17,10 +17,10 @@ use self::{
 };
 use super::{
     ApiState,
-    access::Reader,
-    find::find,
+    access::RequireRead,
     problem::{Problem, ProblemKind},
     request_id::RequestId,
+    run_detection::run_detection,
 };
 use crate::{calibration::CalibrationId, telemetry::RequestTrace};
 
@@ -84,7 +84,7 @@ async fn answer(
     let limit = upload.deadline;
     trace.stage("upload", limit.began().into_std(), upload.arrived);
     let job = form::job(upload, calibration, request_id)?;
-    let written = find(state, trace, limit, job, |found| {
+    let written = run_detection(state, trace, limit, job, |found| {
         Ok(DeepStackAnswer::from(found.report))
     });
     let (_, answer) = written.await?;
@@ -103,7 +103,7 @@ async fn answer(
 )]
 pub(super) async fn list_as_deepstack(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
 ) -> Json<DeepStackModels> {
     Json(state.calibrations.rows().into_iter().collect())
 }

@@ -10,12 +10,12 @@ use axum::{
 use super::{
     ApiState,
     answer::AnswerOptions,
-    find::{Found, find},
     openapi::{DetectForm, DetectQuery, RawBytes},
     parameters::pairs,
     problem::Problem,
     report::{Report, ReportTimings},
     request_id::RequestId,
+    run_detection::{DetectionOutcome, run_detection},
     upload::Upload,
 };
 use crate::{
@@ -76,8 +76,8 @@ pub(super) async fn detect_persons(
     let deadline = upload.deadline;
     trace.stage("upload", deadline.began().into_std(), upload.arrived);
     let (job, answer) = job(upload, &request_id)?;
-    let write = move |found: Found<'_>| answer.content(found.detected, found.json);
-    let (report, content) = find(&state, &trace, deadline, job, write).await?;
+    let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
+    let (report, content) = run_detection(&state, &trace, deadline, job, write).await?;
     let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
     Ok((AppendHeaders(facts(&report)), media_type, content.bytes))
 }

@@ -201,7 +201,7 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     state
         .metrics
         .show_rig_cache(rigs.rigs, rigs.bytes, rigs.builds, rigs.evictions);
-    let recalled = state.workers.engine().recalled_frames();
+    let recalled = state.workers.engine().inference_cache_hits();
     state.metrics.show_recalled(recalled);
     show_results(&state).await;
     let text = state.metrics.render().map_err(Problem::internal)?;

@@ -11,7 +11,7 @@ use utoipa::{OpenApi, openapi};
 use security::Keys;
 
 use super::problem::ProblemBody;
-pub(super) use parameters::{DetectForm, DetectQuery, PictureQuery, RawBytes, fields};
+pub(super) use parameters::{AnnotationQuery, DetectForm, DetectQuery, RawBytes, fields};
 
 #[derive(OpenApi)]
 #[openapi(

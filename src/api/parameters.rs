@@ -5,7 +5,7 @@ mod reference;
 
 use super::answer;
 use crate::{
-    annotated_picture::PictureOptions,
+    annotated_image::AnnotationOptions,
     pipeline::{DetectParameters, ParameterSpec},
 };
 
@@ -14,7 +14,7 @@ pub(super) fn all() -> impl Iterator<Item = &'static ParameterSpec> {
     let tables = [
         DetectParameters::TABLE,
         answer::TABLE,
-        PictureOptions::TABLE,
+        AnnotationOptions::TABLE,
     ];
     tables.into_iter().flatten()
 }

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
     "calibration": {"id": "lobby", "revision": "9f86d081884c", "assumed": false},
     "image": {"width": 1680, "height": 1680},
     "model": {"name": "nanodet_g_416", "revision": "a3c2e9b54d10"},
-    "second_opinion": {"name": "ssdlite_mobilenet_v2_int8", "revision": "60303ae22b99"},
+    "second_model": {"name": "ssdlite_mobilenet_v2_int8", "revision": "60303ae22b99"},
     "profile": "quality",
     "refinement": {
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,
@@ -63,7 +63,7 @@ pub struct Report {
     /// The model of some second passes; absent when no other model was used.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub second_opinion: Option<ReportModel>,
+    pub second_model: Option<ReportModel>,
     /// The profile.
     pub profile: &'static str,
     /// The refinement with all its parameters.

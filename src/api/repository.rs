@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use super::{
     ApiState,
-    access::{Administrator, ModelReader},
+    access::{RequireAdmin, RequireModelRead},
     deadline::Deadline,
     problem::{Problem, ProblemKind},
 };
@@ -73,7 +73,7 @@ impl From<&Model> for RepositoryEntry {
 )]
 pub(super) async fn index(
     State(state): State<ApiState>,
-    _reader: ModelReader,
+    _reader: RequireModelRead,
     deadline: Deadline,
     SmallBody(IndexRequest { ready }): SmallBody<IndexRequest>,
 ) -> Result<Json<Vec<RepositoryEntry>>, Problem> {
@@ -101,7 +101,7 @@ pub(super) async fn index(
 )]
 pub(super) async fn load(
     State(state): State<ApiState>,
-    _administrator: Administrator,
+    _administrator: RequireAdmin,
     deadline: Deadline,
     Path(name): Path<String>,
     _: SmallBody<LoadRequest>,
@@ -125,7 +125,7 @@ pub(super) async fn load(
 )]
 pub(super) async fn unload(
     State(state): State<ApiState>,
-    _administrator: Administrator,
+    _administrator: RequireAdmin,
     deadline: Deadline,
     Path(name): Path<String>,
     _: SmallBody<UnloadRequest>,

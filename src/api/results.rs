@@ -20,7 +20,7 @@ use jiff::Timestamp;
 use self::row::CameraRow;
 use super::{
     ApiState,
-    access::Reader,
+    access::RequireRead,
     problem::{Problem, ProblemKind},
 };
 use crate::{
@@ -41,7 +41,7 @@ const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 )]
 pub(super) async fn list(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
 ) -> Result<impl IntoResponse, Problem> {
     let now = Timestamp::now();
     let latest = state.results.latest_of_all().await?;

@@ -4,12 +4,12 @@
 //! The whole body is read first, within limits: its size, its rate, the deadline of the request,
 //! and the memory of all requests together.
 
-mod arrival;
 mod body;
 mod budget;
 mod form;
+mod minimum_upload_rate;
 mod names;
-mod pace;
+mod received_request;
 
 use std::time::Instant;
 
@@ -20,10 +20,10 @@ use axum::{
 use bytes::Bytes;
 use jiff::Timestamp;
 
-pub(super) use arrival::Arrival;
 pub(super) use body::{BodyReader, next_chunk};
 pub(super) use budget::{Held, UploadBudget};
-pub(super) use pace::Pace;
+pub(super) use minimum_upload_rate::MinimumUploadRate;
+pub(super) use received_request::ReceivedRequest;
 
 use names::{is_parameter, unknown_parameter};
 
@@ -91,13 +91,13 @@ impl Upload {
         budget: &UploadBudget,
         use_of: fn(&str) -> FieldUse,
     ) -> Result<Self, Problem> {
-        let Arrival {
+        let ReceivedRequest {
             parts,
             body: held,
             deadline,
             received_at,
             arrived,
-        } = Arrival::receive(request, state, budget).await?;
+        } = ReceivedRequest::receive(request, state, budget).await?;
         let headers = parts.headers.clone();
         let (image, file_name, parameters) = if is_multipart(&headers) {
             let form = form::parse(parts, held.bytes(), use_of).await?;

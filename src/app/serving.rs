@@ -48,7 +48,7 @@ impl App {
             .map(|publisher| spawn(publisher.run()));
         let services = Services {
             regular: api::router(self.state.clone()),
-            beyond_limit: api::crowded_router(self.state.clone()),
+            beyond_limit: api::overload_router(self.state.clone()),
         };
         let limits = &self.settings.connections;
         let tls = self.tls.as_ref();

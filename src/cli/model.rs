@@ -15,7 +15,7 @@ use jiff::Timestamp;
 
 use super::{SettingsFile, annotate};
 use crate::{
-    annotated_picture::PictureOptions,
+    annotated_image::AnnotationOptions,
     app::{engine_for, onnx_options},
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
@@ -106,7 +106,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         .context(UNWRITABLE)?;
     }
     if let Some(path) = &arguments.annotate {
-        annotate::write(detected, &PictureOptions::parse([])?, path)?;
+        annotate::write(detected, &AnnotationOptions::parse([])?, path)?;
     }
     Ok(ExitCode::SUCCESS)
 }

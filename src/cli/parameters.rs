@@ -10,7 +10,7 @@ use clap::{
 use strum::VariantNames;
 
 use crate::{
-    annotated_picture::PictureOptions,
+    annotated_image::AnnotationOptions,
     pipeline::{
         DetectParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
     },
@@ -49,8 +49,8 @@ impl PictureFlags {
     ///
     /// # Errors
     /// [`ParameterError`] when a value cannot be used.
-    pub(super) fn check(&self) -> Result<PictureOptions, ParameterError> {
-        PictureOptions::parse(pairs(&self.0))
+    pub(super) fn check(&self) -> Result<AnnotationOptions, ParameterError> {
+        AnnotationOptions::parse(pairs(&self.0))
     }
 }
 
@@ -77,7 +77,7 @@ impl FromArgMatches for ParameterFlags {
 
 impl Args for PictureFlags {
     fn augment_args(command: Command) -> Command {
-        let flags = offered(PictureOptions::TABLE).map(flag);
+        let flags = offered(AnnotationOptions::TABLE).map(flag);
         command.args(flags.map(|flag| flag.requires(ANNOTATE)))
     }
 
@@ -88,7 +88,7 @@ impl Args for PictureFlags {
 
 impl FromArgMatches for PictureFlags {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        Ok(Self(given(PictureOptions::TABLE, matches)))
+        Ok(Self(given(AnnotationOptions::TABLE, matches)))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!(read.0, expected);
         assert!(read.check(Some("lobby")).is_ok());
 
-        let (mut flags, expected) = words(PictureOptions::TABLE);
+        let (mut flags, expected) = words(AnnotationOptions::TABLE);
         flags.extend(["--annotate", "out.jpg"].map(ToOwned::to_owned));
         let read = parsed::<PictureFlags>(&flags).unwrap();
         assert_eq!(read.0, expected);

@@ -13,7 +13,7 @@ use image::error::{LimitError, LimitErrorKind};
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Limits, RgbImage};
 
-use super::{frame::Frame, pixel_memory};
+use super::{buffer_pool, frame::Frame};
 pub use error::{DecodeError, ExceededLimit};
 
 /// Size limits of an image. All of them hold at once and are checked against the image's header,
@@ -201,7 +201,7 @@ fn read(decoder: impl ImageDecoder) -> Result<DynamicImage, ImageError> {
     let (width, height) = decoder.dimensions();
     let too_large = || ImageError::Limits(LimitError::from_kind(LimitErrorKind::DimensionError));
     let bytes = usize::try_from(decoder.total_bytes()).map_err(|_| too_large())?;
-    let pixels = pixel_memory::zeros(bytes);
+    let pixels = buffer_pool::zeros(bytes);
     let mut image = RgbImage::from_raw(width, height, pixels).ok_or_else(too_large)?;
     decoder.read_image(&mut image)?;
     Ok(DynamicImage::ImageRgb8(image))

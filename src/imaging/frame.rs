@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::pixel_memory::Pixels;
+use super::buffer_pool::Pixels;
 
 /// An image in 8-bit RGB, rows from top to bottom, without padding.
 ///

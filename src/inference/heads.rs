@@ -5,10 +5,10 @@
 //! pixels, clipped to the view and not deduplicated. The arithmetic uses `f64`.
 
 mod boxes_scores;
+mod candidate_collector;
 mod centernet;
 mod detr;
 mod end_to_end;
-mod finds;
 mod grid;
 mod nanodet;
 mod outputs;
@@ -23,7 +23,7 @@ mod yolox;
 
 use serde::Deserialize;
 
-use self::{finds::Finds, shape::Batch};
+use self::{candidate_collector::CandidateCollector, shape::Batch};
 use super::{InferenceError, ViewDetection};
 use crate::imaging::NetworkInput;
 
@@ -109,7 +109,7 @@ trait Decoder {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String>;
 }
 
@@ -145,7 +145,7 @@ impl Head {
             width: input.width,
             height: input.height,
         };
-        let mut finds = Finds::new(views, input, floor);
+        let mut finds = CandidateCollector::new(views, input, floor);
         outputs
             .iter()
             .try_for_each(TensorView::check_len)

@@ -14,7 +14,7 @@ use std::{num::NonZeroUsize, path::Path, sync::Arc};
 
 use self::{
     exchange::{Answer, Question},
-    understood::Understood,
+    understood::RemoteModel,
 };
 use super::{
     CandidateOptions, Detector, HeadOutput, InferenceError, ModelManifest,
@@ -29,7 +29,7 @@ pub use token::{BearerToken, InvalidToken};
 /// A model on an inference server.
 pub struct RemoteDetector {
     server: Arc<RemoteServer>,
-    understood: Arc<Understood>,
+    understood: Arc<RemoteModel>,
     staging: Staging,
     options: CandidateOptions,
 }
@@ -48,7 +48,7 @@ impl RemoteDetector {
         count: NonZeroUsize,
     ) -> Result<(Self, Vec<Self>), InferenceError> {
         let manifest = ModelManifest::locate(model)?;
-        let understood = Arc::new(Understood::ask(server, manifest)?);
+        let understood = Arc::new(RemoteModel::ask(server, manifest)?);
         let session = || Self {
             server: Arc::clone(server),
             understood: Arc::clone(&understood),
@@ -103,7 +103,7 @@ impl Detector for RemoteDetector {
 /// Sends one inference request.
 fn run(
     server: &RemoteServer,
-    understood: &Understood,
+    understood: &RemoteModel,
     staged: &Staged<'_>,
     score_floor: f64,
 ) -> Result<HeadOutput, InferenceError> {

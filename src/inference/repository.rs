@@ -199,9 +199,9 @@ impl ModelRepository {
             let Some(files) = model.files() else { continue };
             let name = model.name();
             let found = stamp(&files_of(&files.path));
-            let is_news =
+            let is_changed =
                 found.is_some() && found != files.stamp && memory.refused.get(name) != Some(&found);
-            if !is_news {
+            if !is_changed {
                 memory.changed.remove(name);
             } else if memory.changed.get(name) == Some(&found) {
                 memory.changed.remove(name);

@@ -103,7 +103,7 @@ impl Publisher {
         loop {
             let opened = tokio::select! {
                 opened = self.open() => opened,
-                () = self.go_without(&mut cameras, &mut queue) => return,
+                () = self.skip_reports(&mut cameras, &mut queue) => return,
             };
             let ended = match opened {
                 Ok(session) => {
@@ -131,7 +131,7 @@ impl Publisher {
             is_told = true;
             tokio::select! {
                 () = sleep(pause) => {}
-                () = self.go_without(&mut cameras, &mut queue) => return,
+                () = self.skip_reports(&mut cameras, &mut queue) => return,
             }
             pause = (2 * pause).min(LONGEST_PAUSE);
         }
@@ -153,7 +153,7 @@ impl Publisher {
     }
 
     /// Updates the cameras from the reports until they end, without sending anything.
-    async fn go_without(&self, cameras: &mut Cameras, queue: &mut Queue) {
+    async fn skip_reports(&self, cameras: &mut Cameras, queue: &mut Queue) {
         loop {
             match queue.recv().await {
                 Ok(report) => {

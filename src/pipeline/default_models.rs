@@ -16,7 +16,7 @@ fn preferred(profile: Profile, device: Device) -> &'static [&'static str] {
     }
 }
 
-/// Whose model takes half of a profile's closer looks.
+/// Whose model takes half of a profile's closer passes.
 fn second_opinion_of(profile: Profile) -> Option<Profile> {
     (profile == Profile::Quality).then_some(Profile::Paper)
 }
@@ -74,10 +74,10 @@ impl DefaultModels {
         }
     }
 
-    /// The model that gives a second opinion in a profile's closer looks, if that profile has one
+    /// The model that gives a second opinion in a profile's closer passes, if that profile has one
     /// and it is another than its own.
     #[must_use]
-    pub fn second_opinion(&self, profile: Profile) -> Option<&str> {
+    pub fn second_model(&self, profile: Profile) -> Option<&str> {
         let name = self.of(second_opinion_of(profile)?);
         (name != self.of(profile)).then_some(name)
     }
@@ -126,12 +126,12 @@ mod tests {
     #[test]
     fn a_second_opinion_is_another_model_s() {
         let all = DefaultModels::per_profile(Device::Cpu, |_| true);
-        assert_eq!(all.second_opinion(Profile::Quality), Some(SSDLITE_INT8));
-        assert_eq!(all.second_opinion(Profile::Balanced), None);
+        assert_eq!(all.second_model(Profile::Quality), Some(SSDLITE_INT8));
+        assert_eq!(all.second_model(Profile::Balanced), None);
         let few = DefaultModels::per_profile(Device::Cpu, |_| false);
-        assert_eq!(few.second_opinion(Profile::Quality), None);
+        assert_eq!(few.second_model(Profile::Quality), None);
         let one = DefaultModels::One("mine".to_owned());
-        assert_eq!(one.second_opinion(Profile::Quality), None);
+        assert_eq!(one.second_model(Profile::Quality), None);
     }
 
     #[test]

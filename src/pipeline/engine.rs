@@ -2,9 +2,9 @@
 //! merges; the threads of the network render and infer.
 
 mod camera;
-mod closer;
 mod given_views;
 mod observation;
+mod second_pass;
 
 use std::{
     num::NonZeroUsize,
@@ -17,12 +17,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub use self::observation::Observation;
 use super::{
     BatchOptions, DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person,
-    PipelineError, Profile, Stage, StageTimings, merge,
+    PipelineError, Profile, Stage, StageTimings,
+    inference_cache::{FrameKey, InferenceCache},
+    merge,
+    motion_cache::{CameraViews, MotionCache},
     network::Network,
-    remembered_frames::{FrameKey, RememberedFrames},
     report::{ModelUsed, ZoneCount},
     rig_cache::RigCache,
-    still_views::{CameraViews, StillViews},
 };
 use crate::{
     calibration::Calibrations,
@@ -58,7 +59,7 @@ pub struct EngineOptions {
     /// Most memory that remap tables may hold, bytes.
     pub rig_cache_bytes: usize,
     /// Most frames of which is remembered what was found in them, for requests that want it.
-    pub remembered_frames: usize,
+    pub inference_cache_frames: usize,
 }
 
 impl EngineOptions {
@@ -76,7 +77,7 @@ impl EngineOptions {
             remap_threads: NonZeroUsize::MIN,
             paper_field_of_view: FieldOfViewReading::default(),
             rig_cache_bytes: 256 << 20,
-            remembered_frames: 4,
+            inference_cache_frames: 4,
         }
     }
 }
@@ -88,15 +89,15 @@ pub struct Engine {
     remappers: Arc<ThreadPool>,
     calibrations: Option<Arc<Calibrations>>,
     rigs: RigCache,
-    still_views: StillViews,
+    still_views: MotionCache,
     /// Takes turns for views that do not come through the network's queue.
     next_session: AtomicUsize,
-    remembered: RememberedFrames,
+    remembered: InferenceCache,
     options: EngineOptions,
 }
 
 impl Engine {
-    /// An engine that looks with `models`; without `calibrations` every lens is assumed.
+    /// An engine that passes with `models`; without `calibrations` every lens is assumed.
     ///
     /// # Errors
     /// When the operating system gives no threads.
@@ -117,9 +118,9 @@ impl Engine {
             remappers,
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes),
-            still_views: StillViews::default(),
+            still_views: MotionCache::default(),
             next_session: AtomicUsize::new(0),
-            remembered: RememberedFrames::new(options.remembered_frames),
+            remembered: InferenceCache::new(options.inference_cache_frames),
             options,
         })
     }
@@ -155,7 +156,7 @@ impl Engine {
             calibration,
             image_width: observation.frame.width(),
             image_height: observation.frame.height(),
-            second_opinion: observation.second_opinion().map(ModelUsed::from),
+            second_model: observation.second_model().map(ModelUsed::from),
             model: ModelUsed::from(observation.model()),
             profile: parameters.profile,
             refinement: parameters.refinement,
@@ -170,7 +171,11 @@ impl Engine {
             },
             warnings: observation.warnings,
         };
-        let mut rigs: Vec<_> = observation.looks.into_iter().map(|look| look.rig).collect();
+        let mut rigs: Vec<_> = observation
+            .passes
+            .into_iter()
+            .map(|look| look.rig)
+            .collect();
         // Two models may have looked through the same views.
         rigs.dedup_by(|one, other| Arc::ptr_eq(one, other));
         let hides_nothing = observation.camera.rig.hides_nothing();
@@ -215,7 +220,7 @@ impl Engine {
         });
         let mut observation = Observation {
             profile: job.parameters.profile,
-            looks: Vec::with_capacity(3),
+            passes: Vec::with_capacity(3),
             still_views: 0,
             batch_count: 0,
             non_finite: 0,
@@ -228,8 +233,8 @@ impl Engine {
         let recalled = key
             .as_ref()
             .and_then(|key| self.remembered.recall(key, |model| self.serves(model)));
-        if let Some(looks) = recalled {
-            observation.looks = looks;
+        if let Some(passes) = recalled {
+            observation.passes = passes;
             observation.still_views = observation.view_count();
             timeline.leave(Instant::now());
             return Ok(observation);
@@ -246,7 +251,7 @@ impl Engine {
         let closer = self.closer(job, &observation);
         observation.take_in(&closer)?;
         if let Some(key) = key {
-            self.remembered.remember(key, &observation.looks);
+            self.remembered.remember(key, &observation.passes);
         }
         Ok(observation)
     }
@@ -259,7 +264,7 @@ impl Engine {
         refinement: &RefinementParameters,
     ) -> Vec<Person> {
         let back_projection = observation.profile.back_projection();
-        merge::persons(&observation.looks, back_projection, refinement)
+        merge::persons(&observation.passes, back_projection, refinement)
     }
 
     /// What the frame's camera saw before, if the request wants to rely on it.
@@ -275,7 +280,7 @@ impl Engine {
 
     /// How many frames were not looked at again, as what was found in them was remembered.
     #[must_use]
-    pub fn recalled_frames(&self) -> u64 {
+    pub fn inference_cache_hits(&self) -> u64 {
         self.remembered.recalled()
     }
 

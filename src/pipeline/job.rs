@@ -61,7 +61,7 @@ pub struct ViewsJob {
     pub arrived: Instant,
     /// Its turn, and whether anybody still waits for it.
     pub ticket: Ticket,
-    /// Who looks.
+    /// Who passes.
     pub model: Arc<Model>,
     /// `[views, 3, height, width]` at the size of the model's input: planes of red, green and blue,
     /// 0 to 255. What their owner holds besides goes with them, when the work on them has ended.
@@ -84,7 +84,7 @@ pub struct Detected {
 
 impl Detected {
     /// Where the views looked that the frame was seen through: their borders, corner-origin frame
-    /// pixels, closer looks after the plan's views; none when the detector saw the frame as it is.
+    /// pixels, closer passes after the plan's views; none when the detector saw the frame as it is.
     #[must_use]
     pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let rigs = self.rigs.iter();

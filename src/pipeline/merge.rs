@@ -3,8 +3,8 @@
 use super::{
     Person,
     camera_rig::CameraRig,
-    look::{Find, Look, finds, views_holding},
-    plausibility::worth,
+    pass::{Find, Pass, finds, views_holding},
+    plausibility::score_weight,
 };
 use crate::{
     detection::{
@@ -72,13 +72,13 @@ struct Mapped {
 impl Mapped {
     /// The candidate with its score weighed by how plausible a person it makes, and the views that
     /// should have seen that person counted.
-    fn weighed(&self, looks: &[Look], rig: &CameraRig) -> Candidate {
+    fn weighed(&self, passes: &[Pass], rig: &CameraRig) -> Candidate {
         let mount = &rig.geometry().mount;
         let height_ratio = self
             .footprint
             .extremities()
             .and_then(|extremities| extremities.height_ratio(mount));
-        let holding = views_holding(looks, &self.footprint);
+        let holding = views_holding(passes, &self.footprint);
         #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
         let expected_views = holding.max(1) as f64;
         let (vote, weight) = if self.is_exact {
@@ -87,7 +87,7 @@ impl Mapped {
             (1.0, VIRTUAL_VIEW_WEIGHT)
         };
         Candidate {
-            score: self.candidate.score * worth(self.cut_off, height_ratio, mount) * vote,
+            score: self.candidate.score * score_weight(self.cut_off, height_ratio, mount) * vote,
             coordinate_weight: self.candidate.coordinate_weight * weight,
             expected_views,
             ..self.candidate
@@ -97,11 +97,11 @@ impl Mapped {
 
 /// Maps the boxes of every view to the frame and merges them into persons.
 pub(super) fn persons(
-    looks: &[Look],
+    passes: &[Pass],
     back_projection: BackProjection,
     parameters: &RefinementParameters,
 ) -> Vec<Person> {
-    let Some(Look { rig, .. }) = looks.first() else {
+    let Some(Pass { rig, .. }) = passes.first() else {
         return Vec::new();
     };
     let scale = ScoreScale::of(parameters.refinement);
@@ -109,7 +109,7 @@ pub(super) fn persons(
         score_threshold: scale.merged(parameters.score_threshold),
         ..*parameters
     };
-    let (mapped, merged) = merged(looks, rig, back_projection, &parameters);
+    let (mapped, merged) = merged(passes, rig, back_projection, &parameters);
     merged
         .into_iter()
         .filter_map(|merged| {
@@ -125,14 +125,14 @@ pub(super) fn persons(
 
 /// The outlines (unit rays) of what may be persons, the likeliest first: each that of its best box.
 pub(super) fn outlines(
-    looks: &[Look],
+    passes: &[Pass],
     back_projection: BackProjection,
     parameters: &RefinementParameters,
 ) -> Vec<Vec<Ray>> {
-    let Some(Look { rig, .. }) = looks.first() else {
+    let Some(Pass { rig, .. }) = passes.first() else {
         return Vec::new();
     };
-    let (mapped, merged) = merged(looks, rig, back_projection, parameters);
+    let (mapped, merged) = merged(passes, rig, back_projection, parameters);
     let best = merged.iter().filter_map(|merged| merged.members.first());
     let unit = |rays: &[Ray]| rays.iter().map(Ray::normalize).collect();
     best.map(|&member| unit(mapped[member].footprint.rays()))
@@ -141,14 +141,14 @@ pub(super) fn outlines(
 
 /// The boxes of what may be persons, the likeliest first, for crops to be placed around them.
 pub(super) fn crop_targets(
-    looks: &[Look],
+    passes: &[Pass],
     back_projection: BackProjection,
     parameters: &RefinementParameters,
 ) -> Vec<CropTarget> {
-    let Some(Look { rig, .. }) = looks.first() else {
+    let Some(Pass { rig, .. }) = passes.first() else {
         return Vec::new();
     };
-    let (_, merged) = merged(looks, rig, back_projection, parameters);
+    let (_, merged) = merged(passes, rig, back_projection, parameters);
     let within = merged.iter().filter_map(|merged| {
         let bbox = merged.bbox.clipped_to(rig.frame())?;
         let center = nalgebra::Point2::from(bbox.center());
@@ -163,7 +163,7 @@ pub(super) fn crop_targets(
 }
 
 fn merged(
-    looks: &[Look],
+    passes: &[Pass],
     rig: &CameraRig,
     back_projection: BackProjection,
     parameters: &RefinementParameters,
@@ -171,13 +171,13 @@ fn merged(
     let is_fusion = parameters.refinement == Refinement::Fusion;
     // Suppression only lowers scores; in fusion, what lies below the threshold is a witness.
     let matters = |score: f64| is_fusion || score >= parameters.score_threshold;
-    let mapped: Vec<Mapped> = finds(looks)
+    let mapped: Vec<Mapped> = finds(passes)
         .filter(|find| matters(find.detection.score))
         .filter_map(|find| map(&find, back_projection))
         .collect();
     // Suppression compares what the detector said; fusion weighs it.
     let candidates: Vec<Candidate> = if is_fusion {
-        mapped.iter().map(|one| one.weighed(looks, rig)).collect()
+        mapped.iter().map(|one| one.weighed(passes, rig)).collect()
     } else {
         mapped.iter().map(|one| one.candidate).collect()
     };
@@ -186,7 +186,7 @@ fn merged(
 }
 
 fn map(find: &Find<'_>, back_projection: BackProjection) -> Option<Mapped> {
-    let Look { rig, model, .. } = find.look;
+    let Pass { rig, model, .. } = find.look;
     let found = find.detection;
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
     let is_exact = rig.is_exact();

@@ -5,7 +5,7 @@
 //! network reads them, and no core waits for another. Only batches of several views are rendered
 //! by the pool, side by side.
 
-mod look_task;
+mod pass_task;
 mod run;
 mod view_queue;
 mod work;
@@ -25,19 +25,19 @@ use super::{
     Ticket,
     camera_rig::CameraRig,
     error::{PipelineError, internal, of_inference},
-    still_views::CameraViews,
+    motion_cache::CameraViews,
 };
 use crate::{
     imaging::{Frame, ViewBatch},
     inference::Model,
 };
 
-pub(super) use look_task::LookTask;
+pub(super) use pass_task::PassTask;
 pub(super) use work::Work;
 
 /// Views of one round of looking that a thread has taken on.
 struct Claim {
-    task: Arc<LookTask>,
+    task: Arc<PassTask>,
     views: std::ops::Range<usize>,
 }
 
@@ -78,7 +78,7 @@ impl Network {
         Ok(network)
     }
 
-    /// Queues the views of a rig; [`LookTask::wait`] gives what was found in them. Views that
+    /// Queues the views of a rig; [`PassTask::wait`] gives what was found in them. Views that
     /// `seen_before` says nothing has moved in are not looked at.
     pub(super) fn look(
         &self,
@@ -87,8 +87,8 @@ impl Network {
         frame: Arc<Frame>,
         ticket: Ticket,
         seen_before: Option<Arc<CameraViews>>,
-    ) -> Arc<LookTask> {
-        let task = Arc::new(LookTask::new(rig, model, frame, ticket, seen_before));
+    ) -> Arc<PassTask> {
+        let task = Arc::new(PassTask::new(rig, model, frame, ticket, seen_before));
         self.queue.submit(Arc::clone(&task));
         task
     }

@@ -43,7 +43,7 @@ pub struct PlannedViews {
     pub pixels: u64,
 }
 
-/// A view and where it looks in the frame.
+/// A view and where it passes in the frame.
 #[derive(Debug, Clone)]
 pub struct PlannedView {
     /// The view.
@@ -104,7 +104,7 @@ impl Engine {
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
             pictures,
-            zoomed_pictures_at_most: profile.most_zoomed_views(),
+            zoomed_pictures_at_most: profile.max_second_pass_views(),
             batches: pictures.div_ceil(options.batches.max_views.get()),
             pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),
             views: views

@@ -16,9 +16,9 @@ const WIDTH: [f64; 4] = [0.03, 0.12, 0.7, 1.1];
 const HEIGHTS_TELL: [f64; 2] = [0.15, 0.45];
 
 /// The factor, above 0 and at most 1, for the score of a box.
-pub(super) fn worth(cut_off: bool, height_ratio: Option<HeightRatio>, mount: &Mount) -> f64 {
+pub(super) fn score_weight(cut_off: bool, height_ratio: Option<HeightRatio>, mount: &Mount) -> f64 {
     let whole = if cut_off { CUT_OFF_WORTH } else { 1.0 };
-    // Only a camera that looks down is above everybody's head.
+    // Only a camera that passes down is above everybody's head.
     match height_ratio {
         Some(height_ratio) if mount.is_near_nadir() => {
             let telling = rise(height_ratio.off_nadir, HEIGHTS_TELL);
@@ -60,19 +60,29 @@ mod tests {
     #[test]
     fn people_keep_their_score_and_the_impossible_loses_most_of_it() {
         let mount = Mount::default();
-        assert_eq!(worth(false, Some(height_ratio(0.6, 0.2, 1.0)), &mount), 1.0);
-        assert!((worth(false, Some(height_ratio(0.05, 0.2, 1.0)), &mount) - 0.3).abs() < 1e-12);
-        assert!((worth(false, Some(height_ratio(0.6, 2.0, 1.0)), &mount) - 0.3).abs() < 1e-12);
-        assert!((worth(true, None, &mount) - 0.7).abs() < 1e-12);
+        assert_eq!(
+            score_weight(false, Some(height_ratio(0.6, 0.2, 1.0)), &mount),
+            1.0
+        );
+        assert!(
+            (score_weight(false, Some(height_ratio(0.05, 0.2, 1.0)), &mount) - 0.3).abs() < 1e-12
+        );
+        assert!(
+            (score_weight(false, Some(height_ratio(0.6, 2.0, 1.0)), &mount) - 0.3).abs() < 1e-12
+        );
+        assert!((score_weight(true, None, &mount) - 0.7).abs() < 1e-12);
     }
 
     #[test]
     fn heights_tell_nothing_below_the_camera_or_for_a_camera_on_a_wall() {
         assert_eq!(
-            worth(false, Some(height_ratio(0.0, 0.2, 0.1)), &Mount::default()),
+            score_weight(false, Some(height_ratio(0.0, 0.2, 0.1)), &Mount::default()),
             1.0
         );
         let wall = Mount::new(-Vector3::y_axis(), None);
-        assert_eq!(worth(false, Some(height_ratio(1.0, 0.2, 1.0)), &wall), 1.0);
+        assert_eq!(
+            score_weight(false, Some(height_ratio(1.0, 0.2, 1.0)), &wall),
+            1.0
+        );
     }
 }

@@ -34,7 +34,7 @@ pub enum Profile {
     /// 18 views, wide around the nadir and narrow at the rim, and up to 6 upright crops of the frame.
     #[default]
     Balanced,
-    /// 24 views, up to 40 closer looks, half of them by a second model, and up to 16 upright crops
+    /// 24 views, up to 40 closer passes, half of them by a second model, and up to 16 upright crops
     /// of the frame.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
@@ -62,8 +62,8 @@ impl Profile {
     }
 
     /// The closer look that follows the plan's views, if any.
-    pub(super) fn closer_look(self) -> Option<CloserLook> {
-        (self == Self::Quality).then_some(CloserLook {
+    pub(super) fn zoom_pass(self) -> Option<ZoomPass> {
+        (self == Self::Quality).then_some(ZoomPass {
             most_views: 40,
             fill: 1.0 / 3.0,
             first_look: FIRST_PASS_CANDIDATES,
@@ -72,23 +72,23 @@ impl Profile {
 
     /// The upright crops of the frame that follow the plan's views, if any.
     pub(super) fn crop_pass(self) -> Option<CropPass> {
-        let most_crops = match self {
+        let max_crops = match self {
             Self::Fast => 5,
             Self::Balanced => 6,
             Self::Quality => 16,
             Self::Paper | Self::Direct => return None,
         };
         Some(CropPass {
-            most_crops,
+            max_crops,
             fill: 0.3,
             candidates: FIRST_PASS_CANDIDATES,
         })
     }
 
     /// Most runs of the network that follow the plan's views.
-    pub(super) fn most_zoomed_views(self) -> usize {
-        let closer = self.closer_look().map_or(0, |closer| closer.most_views);
-        closer + self.crop_pass().map_or(0, |crops| crops.most_crops)
+    pub(super) fn max_second_pass_views(self) -> usize {
+        let closer = self.zoom_pass().map_or(0, |closer| closer.most_views);
+        closer + self.crop_pass().map_or(0, |crops| crops.max_crops)
     }
 
     /// How boxes are taken back to the frame.
@@ -123,7 +123,7 @@ const FIRST_PASS_CANDIDATES: RefinementParameters = RefinementParameters {
 /// A second pass through upright crops of the frame around possible persons.
 pub(super) struct CropPass {
     /// Most crops.
-    pub(super) most_crops: usize,
+    pub(super) max_crops: usize,
     /// The share of a crop's side that the larger side of a person's box fills.
     pub(super) fill: f64,
     /// How the boxes of the first pass become places of crops.
@@ -131,11 +131,11 @@ pub(super) struct CropPass {
 }
 
 /// A closer look at whatever may be a person after the first one.
-pub(super) struct CloserLook {
+pub(super) struct ZoomPass {
     /// Most views it may take.
     pub(super) most_views: usize,
     /// The share of a view's shorter side that a person fills in it. More confirms mistakes: seen
-    /// from close by, a half person or a poster looks like a whole one.
+    /// from close by, a half person or a poster passes like a whole one.
     pub(super) fill: f64,
     /// How the first look's boxes become what is looked at.
     pub(super) first_look: RefinementParameters,

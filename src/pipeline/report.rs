@@ -35,8 +35,8 @@ pub struct DetectionReport {
     pub image_height: u32,
     /// The detector used.
     pub model: ModelUsed,
-    /// The detector that took some of the closer looks, where the profile asks a second one.
-    pub second_opinion: Option<ModelUsed>,
+    /// The detector that took some of the closer passes, where the profile asks a second one.
+    pub second_model: Option<ModelUsed>,
     /// The profile used.
     pub profile: Profile,
     /// The refinement used, with all its parameters.

@@ -100,7 +100,7 @@ pub(super) fn engine(detector: BlobDetector, calibrations: Option<Arc<Calibratio
             max_delay: Duration::ZERO,
         },
         remap_threads: NonZeroUsize::new(2).unwrap(),
-        remembered_frames: 2,
+        inference_cache_frames: 2,
         ..EngineOptions::for_testing("blob")
     };
     let models = ModelRegistry::default();

@@ -124,7 +124,7 @@ impl WorkerPool {
     ///
     /// # Errors
     /// As [`WorkerPool::detect`].
-    pub async fn look_and<T: Send + 'static>(
+    pub async fn infer_and<T: Send + 'static>(
         &self,
         job: ViewsJob,
         finish: impl FnOnce(HeadOutput) -> T + Send + 'static,

@@ -83,7 +83,7 @@ impl Listeners {
     }
 
     /// Returns true if any listener would receive a report of this camera.
-    pub(super) fn are_there_for(&self, camera: &str) -> bool {
+    pub(super) fn has_listener_for(&self, camera: &str) -> bool {
         let group = self.group();
         let one = Cameras::One(camera.to_owned());
         group.queues.contains_key(&Cameras::All) || group.queues.contains_key(&one)

@@ -18,14 +18,14 @@ use tower::{BoxError, Service, ServiceExt};
 
 use super::{
     ConnectionLimits,
-    pace::Pace,
-    watched::{WatchedBody, WatchedStream},
+    connection_timeouts::ConnectionTimeouts,
+    instrumented_io::{InstrumentedBody, InstrumentedStream},
 };
 use crate::shutdown::Shutdown;
 
 /// The connection passes heads of up to this multiple of the limit to the service, which refuses
 /// them with a description.
-const TOLD_LIMITS: usize = 2;
+const HEAD_LIMIT_FACTOR: usize = 2;
 /// Longest wait for the first request on a connection that was accepted just before draining.
 const LAST_CALL: Duration = Duration::from_millis(500);
 /// Longest time, and most bytes, for which input is discarded after a request that could not be
@@ -56,30 +56,30 @@ where
         client,
         shutdown,
     } = rules;
-    let pace = Arc::new(Pace::new(&limits));
+    let timeouts = Arc::new(ConnectionTimeouts::new(&limits));
     let service = service_fn(|mut request: Request<Incoming>| {
         if let Some(client) = client {
             request.extensions_mut().insert(client);
         }
-        pace.request_begins();
+        timeouts.request_begins();
         let answer = service.clone().oneshot(request);
-        let (pace, shutdown) = (Arc::clone(&pace), &shutdown);
+        let (timeouts, shutdown) = (Arc::clone(&timeouts), &shutdown);
         async move {
             let mut response = answer.await?;
             if one_request_only || shutdown.is_requested() {
                 let close = HeaderValue::from_static("close");
                 response.headers_mut().insert(CONNECTION, close);
             }
-            Ok::<_, Infallible>(response.map(|body| WatchedBody { body, pace }))
+            Ok::<_, Infallible>(response.map(|body| InstrumentedBody { body, timeouts }))
         }
     });
-    let mut stream = WatchedStream {
+    let mut stream = InstrumentedStream {
         stream,
-        pace: Arc::clone(&pace),
+        timeouts: Arc::clone(&timeouts),
     };
     let connection = http1::Builder::new()
-        .max_headers(limits.max_headers * TOLD_LIMITS)
-        .max_header_size(limits.max_header_bytes * TOLD_LIMITS)
+        .max_headers(limits.max_headers * HEAD_LIMIT_FACTOR)
+        .max_header_size(limits.max_header_bytes * HEAD_LIMIT_FACTOR)
         .serve_connection(TokioIo::new(&mut stream), service);
     let was_refused = {
         let mut connection = pin!(connection);
@@ -90,7 +90,7 @@ where
                 ended = connection.as_mut() => return ended,
                 () = shutdown.draining() => {}
             }
-            if pace.awaits_first_request()
+            if timeouts.awaits_first_request()
                 && let Ok(ended) = timeout(LAST_CALL, connection.as_mut()).await
             {
                 return ended;
@@ -103,7 +103,7 @@ where
                 tracing::debug!("a connection failed: {error}");
                 error.is_parse()
             }),
-            () = pace.overdue() => {
+            () = timeouts.overdue() => {
                 tracing::debug!("a connection exceeded a timeout and was closed");
                 false
             }

@@ -33,7 +33,7 @@ settings! {
             => count();
         /// The most frames whose candidates are kept for requests with `remember=true`: with
         /// another refinement these need no new inference. They hold 32 MiB at most.
-        remembered_frames: usize = 32 => count();
+        inference_cache_frames: usize = 32 => count();
     }
 }
 

@@ -4,7 +4,7 @@ use axum::http::HeaderMap;
 use strum::VariantNames;
 
 use crate::{
-    annotated_picture::PictureFormat,
+    annotated_image::ImageFormat,
     annotation_formats::AnnotationFormat,
     api::{
         accept::Accepted,
@@ -21,7 +21,7 @@ pub(super) enum AnswerFormat {
     /// The report.
     Report,
     /// The annotated image.
-    Picture(PictureFormat),
+    Picture(ImageFormat),
     /// A file for annotation tools.
     Annotations(AnnotationFormat),
 }
@@ -55,10 +55,8 @@ parameter_table! {
     };
 }
 
-const PICTURES: [(AnswerFormat, &str); 2] = [
-    of_picture(PictureFormat::Jpeg),
-    of_picture(PictureFormat::Png),
-];
+const PICTURES: [(AnswerFormat, &str); 2] =
+    [of_picture(ImageFormat::Jpeg), of_picture(ImageFormat::Png)];
 /// The formats that `Accept` can select. The media types of the other formats are not specific to
 /// them.
 const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
@@ -71,7 +69,7 @@ const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
     ),
 ];
 
-const fn of_picture(format: PictureFormat) -> (AnswerFormat, &'static str) {
+const fn of_picture(format: ImageFormat) -> (AnswerFormat, &'static str) {
     let format = AnswerFormat::Picture(format);
     (format, format.media_type())
 }
@@ -96,8 +94,8 @@ impl AnswerFormat {
     pub(super) const fn media_type(self) -> &'static str {
         match self {
             Self::Report => "application/json",
-            Self::Picture(PictureFormat::Jpeg) => "image/jpeg",
-            Self::Picture(PictureFormat::Png) => "image/png",
+            Self::Picture(ImageFormat::Jpeg) => "image/jpeg",
+            Self::Picture(ImageFormat::Png) => "image/png",
             // None is registered, and it must not be taken for the report.
             Self::Annotations(AnnotationFormat::Coco) => "application/x.coco+json",
             Self::Annotations(AnnotationFormat::Cvat | AnnotationFormat::Voc) => "application/xml",

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     api::{
-        ApiState, access::Reader, deadline::Deadline, openapi::RawBytes, problem::Problem,
+        ApiState, access::RequireRead, deadline::Deadline, openapi::RawBytes, problem::Problem,
         report::pixels, upload::parameters_named,
     },
     calibration::{Calibration, Calibrations},
@@ -122,7 +122,7 @@ struct ViewPlanQuery {
 )]
 pub(in crate::api) async fn get_views(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     deadline: Deadline,
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
@@ -159,7 +159,7 @@ pub(in crate::api) async fn get_views(
 )]
 pub(in crate::api) async fn try_views(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     deadline: Deadline,
     NewCalibrationAddress(id): NewCalibrationAddress,
     trial: CalibrationTrial,

@@ -13,7 +13,7 @@ use utoipa::{
 };
 
 use crate::{
-    annotated_picture::PictureOptions,
+    annotated_image::AnnotationOptions,
     api::parameters,
     pipeline::{Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec},
 };
@@ -28,11 +28,11 @@ impl IntoParams for DetectQuery {
 }
 
 /// The parameters of an annotated image in the query.
-pub(in crate::api) struct PictureQuery;
+pub(in crate::api) struct AnnotationQuery;
 
-impl IntoParams for PictureQuery {
+impl IntoParams for AnnotationQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        PictureOptions::TABLE.iter().map(in_query).collect()
+        AnnotationOptions::TABLE.iter().map(in_query).collect()
     }
 }
 

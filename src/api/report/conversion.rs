@@ -31,7 +31,7 @@ impl From<&DetectionReport> for Report {
                 height: report.image_height,
             },
             model: ReportModel::from(&report.model),
-            second_opinion: report.second_opinion.as_ref().map(ReportModel::from),
+            second_model: report.second_model.as_ref().map(ReportModel::from),
             profile: report.profile.name(),
             refinement: ReportRefinement {
                 name: refinement.refinement.name(),

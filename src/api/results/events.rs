@@ -15,7 +15,7 @@ use futures_util::stream::unfold;
 
 use super::{NO_CACHE, address::CameraAddress, feed::Feed};
 use crate::{
-    api::{ApiState, access::Reader, problem::Problem},
+    api::{ApiState, access::RequireRead, problem::Problem},
     results::Cameras,
 };
 
@@ -43,7 +43,7 @@ const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering")
 )]
 pub(in crate::api) async fn of_camera(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
@@ -67,7 +67,7 @@ pub(in crate::api) async fn of_camera(
 )]
 pub(in crate::api) async fn of_all(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     stream(state, Cameras::All, headers).await
@@ -86,7 +86,7 @@ async fn stream(
     let events = unfold(listener, async |(mut feed, state, headers)| {
         let event = feed.next().await?;
         // A stream must not outlive its key.
-        Reader::check(&state, &headers).ok()?;
+        RequireRead::check(&state, &headers).ok()?;
         Some((Ok::<_, Infallible>(event), (feed, state, headers)))
     });
     let headers = [(CONTENT_TYPE, "text/event-stream"), (ACCEL_BUFFERING, "no")];

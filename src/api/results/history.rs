@@ -16,7 +16,9 @@ use utoipa::ToSchema;
 
 use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
-    api::{ApiState, access::Reader, problem::Problem, report::Report, upload::parameters_named},
+    api::{
+        ApiState, access::RequireRead, problem::Problem, report::Report, upload::parameters_named,
+    },
     pipeline::{ParameterError, whole_number},
     results::{Cameras, ReportId, StoredReport},
 };
@@ -59,7 +61,7 @@ pub(in crate::api) struct PastReport {
 )]
 pub(in crate::api) async fn get_history(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     CameraAddress(camera): CameraAddress,
     uri: Uri,
 ) -> Result<impl IntoResponse, Problem> {

@@ -16,7 +16,7 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
-        access::Reader,
+        access::RequireRead,
         deadline::Deadline,
         entity_tags::{entity_tag, is_unmodified},
         problem::Problem,
@@ -56,7 +56,7 @@ const MAX_WAIT_SECONDS: u64 = 600;
 )]
 pub(in crate::api) async fn get_latest(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     deadline: Deadline,
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
@@ -73,7 +73,7 @@ pub(in crate::api) async fn get_latest(
         let limit = deadline.within(wait);
         let report = wait_for_newer(&state, &camera, &headers, limit).await?;
         // The key may have been removed during the wait.
-        Reader::check(&state, &headers)?;
+        RequireRead::check(&state, &headers)?;
         report
     };
     let report = report.ok_or_else(|| unknown(&camera))?;

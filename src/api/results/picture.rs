@@ -12,13 +12,13 @@ use bytes::Bytes;
 
 use super::{address::CameraAddress, unknown};
 use crate::{
-    annotated_picture::{KeptFrame, PictureOptions},
+    annotated_image::{AnnotationOptions, StoredFrame},
     api::{
         ApiState,
-        access::Reader,
+        access::RequireRead,
         deadline::Deadline,
         entity_tags::{entity_tag, is_unmodified},
-        openapi::{PictureQuery, RawBytes},
+        openapi::{AnnotationQuery, RawBytes},
         parameters::pairs,
         problem::{Problem, ProblemKind},
         upload::query_parameters,
@@ -39,7 +39,7 @@ const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
     get, path = "/results/{camera}/latest.jpg", tag = "results", operation_id = "get_latest_picture",
     params(
         ("camera" = String, Path, description = "The camera's name."),
-        PictureQuery,
+        AnnotationQuery,
         ("If-None-Match" = Option<String>, Header, nullable = false, pattern = r#"^(\*|"[!#-~]*")$"#,
             description = "The ETag of the known image."),
     ),
@@ -55,13 +55,13 @@ const PRIVATE: HeaderValue = HeaderValue::from_static("private, no-cache");
 )]
 pub(in crate::api) async fn get_picture(
     State(state): State<ApiState>,
-    _reader: Reader,
+    _reader: RequireRead,
     deadline: Deadline,
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
     uri: Uri,
 ) -> Result<Response, Problem> {
-    let options = PictureOptions::parse(pairs(&query_parameters(&uri)?))?;
+    let options = AnnotationOptions::parse(pairs(&query_parameters(&uri)?))?;
     let latest = state.results.latest(&camera).await?;
     let latest = latest.ok_or_else(|| unknown(&camera))?.id;
     // A client that has the latest image needs no other, so the image is not fetched from Redis.
@@ -71,7 +71,7 @@ pub(in crate::api) async fn get_picture(
     let kept = state.results.picture(&camera).await?;
     let kept = kept.ok_or_else(|| none_kept(&camera))?;
     let id = kept.id.to_string();
-    let frame = KeptFrame {
+    let frame = StoredFrame {
         jpeg: kept.picture.frame.clone(),
         sketch: kept.picture.sketch.clone(),
     };

@@ -10,7 +10,7 @@ use bytes::{Bytes, BytesMut};
 use tokio::time::timeout_at;
 
 use super::{
-    Pace,
+    MinimumUploadRate,
     budget::{Held, UploadBudget},
 };
 use crate::api::{
@@ -41,21 +41,25 @@ impl BodyReader<'_> {
         }
         let mut bytes = BytesMut::new();
         let mut share = self.budget.take(0)?;
-        let mut pace = Pace::begin(self.least_bytes_per_second);
-        while let Some(chunk) = self.next_in_time(&mut body, &pace).await? {
+        let mut upload_rate = MinimumUploadRate::begin(self.least_bytes_per_second);
+        while let Some(chunk) = self.next_in_time(&mut body, &upload_rate).await? {
             if bytes.len() + chunk.len() > self.max_bytes {
                 return Err(self.too_large());
             }
             share.merge(self.budget.take(chunk.len())?);
             bytes.extend_from_slice(&chunk);
-            pace.came(chunk.len());
+            upload_rate.came(chunk.len());
         }
         Ok(Held::new(bytes.freeze(), share))
     }
 
-    async fn next_in_time(&self, body: &mut Body, pace: &Pace) -> Result<Option<Bytes>, Problem> {
+    async fn next_in_time(
+        &self,
+        body: &mut Body,
+        upload_rate: &MinimumUploadRate,
+    ) -> Result<Option<Bytes>, Problem> {
         let deadline = self.deadline.at();
-        let late_at = pace.late_at(deadline);
+        let late_at = upload_rate.late_at(deadline);
         match timeout_at(late_at, next_chunk(body)).await {
             Ok(chunk) => chunk,
             Err(_) if late_at < deadline => {

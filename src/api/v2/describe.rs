@@ -9,7 +9,7 @@ use super::{
     Asked,
     metadata::{ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady},
 };
-use crate::api::{ApiState, access::Finder, health::require_ready, problem::Problem};
+use crate::api::{ApiState, access::RequireDetect, health::require_ready, problem::Problem};
 
 /// Get server metadata
 #[utoipa::path(
@@ -60,7 +60,7 @@ pub(in crate::api) async fn ready(
 )]
 pub(in crate::api) async fn model(
     State(state): State<ApiState>,
-    _finder: Finder,
+    _finder: RequireDetect,
     Path(name): Path<String>,
 ) -> Result<Json<ModelMetadata>, Problem> {
     Ok(Json(Asked::find(&state, &name, None)?.metadata()))
@@ -81,7 +81,7 @@ pub(in crate::api) async fn model(
 )]
 pub(in crate::api) async fn model_version(
     State(state): State<ApiState>,
-    _finder: Finder,
+    _finder: RequireDetect,
     Path((name, version)): Path<(String, String)>,
 ) -> Result<Json<ModelMetadata>, Problem> {
     Ok(Json(Asked::find(&state, &name, Some(&version))?.metadata()))
@@ -98,7 +98,7 @@ pub(in crate::api) async fn model_version(
 )]
 pub(in crate::api) async fn model_ready(
     State(state): State<ApiState>,
-    _finder: Finder,
+    _finder: RequireDetect,
     Path(name): Path<String>,
 ) -> Result<Json<ModelReady>, Problem> {
     Asked::find(&state, &name, None)?;
@@ -121,7 +121,7 @@ pub(in crate::api) async fn model_ready(
 )]
 pub(in crate::api) async fn model_version_ready(
     State(state): State<ApiState>,
-    _finder: Finder,
+    _finder: RequireDetect,
     Path((name, version)): Path<(String, String)>,
 ) -> Result<Json<ModelReady>, Problem> {
     Asked::find(&state, &name, Some(&version))?;

@@ -57,7 +57,7 @@ pub(super) async fn infer(
         model: Arc::clone(&model),
         pixels,
     };
-    let work = state.workers.look_and(job, move |found| {
+    let work = state.workers.infer_and(job, move |found| {
         let answerer = Answerer {
             model: model.name(),
             version: model.revision(),

@@ -15,7 +15,10 @@ use super::{
     request::InferRequest,
 };
 use crate::{
-    api::{ApiState, openapi::RawBytes, problem::Problem, request_id::RequestId, upload::Arrival},
+    api::{
+        ApiState, openapi::RawBytes, problem::Problem, request_id::RequestId,
+        upload::ReceivedRequest,
+    },
     telemetry::RequestTrace,
 };
 
@@ -49,7 +52,7 @@ pub(in crate::api) async fn infer(
     Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     Path(name): Path<String>,
-    arrival: Arrival,
+    arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
     let asked = Asked::find(&state, &name, None)?;
     answered(&state, &request_id, &trace, asked, arrival).await
@@ -82,7 +85,7 @@ pub(in crate::api) async fn infer_version(
     Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     Path((name, version)): Path<(String, String)>,
-    arrival: Arrival,
+    arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
     let asked = Asked::find(&state, &name, Some(&version))?;
     answered(&state, &request_id, &trace, asked, arrival).await
@@ -93,7 +96,7 @@ async fn answered(
     request_id: &RequestId,
     trace: &RequestTrace,
     asked: Asked,
-    arrival: Arrival,
+    arrival: ReceivedRequest,
 ) -> Result<InferAnswer, Problem> {
     trace.stage(
         "upload",

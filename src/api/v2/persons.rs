@@ -17,11 +17,11 @@ use crate::{
         ApiState,
         deadline::Deadline,
         detect::facts,
-        find::{Found, find},
         parameters::pairs,
         problem::Problem,
         report::ReportPerson,
         request_id::RequestId,
+        run_detection::{DetectionOutcome, run_detection},
     },
     open_inference::Datatype,
     pipeline::{DetectJob, DetectParameters, JsonType, ParameterError},
@@ -69,7 +69,7 @@ pub(super) async fn infer(
     }
     let parameters = parameters(&request.parameters)?;
     let job = DetectJob::sent(image, parameters, request_id.as_str(), received_at, arrived);
-    let write = move |found: Found<'_>| {
+    let write = move |found: DetectionOutcome<'_>| {
         let answerer = Answerer {
             model: FRAME_MODEL,
             version: FRAME_MODEL_VERSION,
@@ -79,7 +79,7 @@ pub(super) async fn infer(
         let outputs = outputs(&found.report.persons, report);
         InferAnswer::write(&answerer, &outputs, &request.wanted)
     };
-    let (report, mut answer) = find(state, trace, deadline, job, write).await?;
+    let (report, mut answer) = run_detection(state, trace, deadline, job, write).await?;
     answer.facts = facts(&report).into();
     Ok(answer)
 }

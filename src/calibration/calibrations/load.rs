@@ -86,7 +86,7 @@ impl LoadedFile {
 
     /// Returns true for a result that differs from `before`: a repeated read failure does not
     /// differ.
-    pub(super) fn is_news(&self, before: Option<&Self>) -> bool {
+    pub(super) fn is_changed(&self, before: Option<&Self>) -> bool {
         self.problems.is_empty()
             || before
                 .is_none_or(|before| before.problems != self.problems || before.named != self.named)

@@ -89,7 +89,7 @@ impl Calibrations {
 
     /// Counts and logs what a file changes.
     fn tell(&self, loaded: &LoadedFile, known: Option<&LoadedFile>) {
-        if !loaded.is_news(known) {
+        if !loaded.is_changed(known) {
             return;
         }
         let counter = if loaded.problems.is_empty() {

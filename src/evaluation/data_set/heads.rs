@@ -78,8 +78,8 @@ fn heads(row: &str) -> Result<Vec<[f64; 2]>, String> {
     if left.iter().any(|value| *value > 0.0) {
         return Err("it has an x without a y; give both for every head".to_owned());
     }
-    let is_somebody = |point: &&[f64; 2]| point.iter().all(|value| *value > 0.0);
-    Ok(points.iter().filter(is_somebody).copied().collect())
+    let is_person = |point: &&[f64; 2]| point.iter().all(|value| *value > 0.0);
+    Ok(points.iter().filter(is_person).copied().collect())
 }
 
 /// Parses a coordinate. Returns 0 if there is none.

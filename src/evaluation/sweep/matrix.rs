@@ -9,7 +9,7 @@ use crate::{
     imaging::{
         Frame, FrameError,
         annotate::{Drawing, Mark, annotate},
-        picture_grid::{GridCell, PictureGrid},
+        image_grid::{GridCell, ImageGrid},
         thumbnail,
     },
 };
@@ -62,7 +62,7 @@ pub fn matrix(
             .filter_map(|sigma| cell(score_threshold, *sigma));
         (format!("C_t {score_threshold}"), cells.collect())
     };
-    PictureGrid {
+    ImageGrid {
         title,
         columns: SIGMAS.map(|sigma| format!("σ {sigma}")).into(),
         rows: SCORE_THRESHOLDS.map(row).into(),

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::{Finds, four},
+    candidate_collector::{CandidateCollector, four},
     outputs::named,
     score::Activation,
     shape::{Axis, Batch},
@@ -60,7 +60,7 @@ impl Decoder for BoxesScoresHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let [boxes, scores] = self.select(outputs, batch)?;
         for (view, (boxes, scores)) in boxes.views().zip(scores.views()).enumerate() {

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use self::extent::Extent;
 use super::{
     Decoder,
-    finds::Finds,
+    candidate_collector::CandidateCollector,
     grid::Grid,
     outputs::named,
     score::Activation,
@@ -123,7 +123,7 @@ impl Decoder for CenternetHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let (heat, extent) = self.select(outputs, batch)?;
         let grid = Grid::of_map(heat, batch);

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::{Finds, corners_around, four},
+    candidate_collector::{CandidateCollector, corners_around, four},
     outputs::boxes_and_scores,
     score::ClassActivation,
     shape::{Axis, Batch},
@@ -68,7 +68,7 @@ impl Decoder for DetrHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let [boxes, scores] = self.select(outputs, batch)?;
         let person = usize::from(self.person_class);

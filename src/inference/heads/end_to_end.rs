@@ -7,7 +7,7 @@ use serde::Deserialize;
 use self::columns::Indices;
 use super::{
     Decoder,
-    finds::Finds,
+    candidate_collector::CandidateCollector,
     outputs::named_or_only,
     score::Activation,
     shape::{Axis, Batch},
@@ -91,7 +91,14 @@ impl EndToEndHead {
         Ok((rows, indices))
     }
 
-    fn offer(&self, row: &[f32], indices: &Indices, view: usize, batch: &Batch, finds: &mut Finds) {
+    fn offer(
+        &self,
+        row: &[f32],
+        indices: &Indices,
+        view: usize,
+        batch: &Batch,
+        finds: &mut CandidateCollector,
+    ) {
         let class = row[indices.class];
         if !class.is_finite() {
             return finds.count_non_finite();
@@ -132,7 +139,7 @@ impl Decoder for EndToEndHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let (rows, indices) = self.select(outputs, batch)?;
         let columns = rows.shape[rows.shape.len() - 1];

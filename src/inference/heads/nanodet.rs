@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::Finds,
+    candidate_collector::CandidateCollector,
     grid::{Grid, pyramid, pyramid_len},
     outputs::named_or_only,
     score::Activation,
@@ -126,7 +126,7 @@ impl Decoder for NanodetHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let candidates = self.select(outputs, batch)?;
         let columns = candidates.shape[2];

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::{Finds, corners_around, four},
+    candidate_collector::{CandidateCollector, corners_around, four},
     outputs::boxes_and_scores,
     score::ClassActivation,
     shape::{Axis, Batch, check_positive},
@@ -119,7 +119,7 @@ impl Decoder for SsdHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let anchors = self.pixel_anchors(batch)?;
         let [boxes, scores] = self.select(outputs, anchors.len(), batch)?;

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::{Finds, corners_around},
+    candidate_collector::{CandidateCollector, corners_around},
     grid::Grid,
     outputs::named_or_only,
     score::sigmoid,
@@ -62,7 +62,7 @@ impl Decoder for YoloV2Head {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let map = self.select(outputs, batch)?;
         let grid = Grid::of_map(map, batch);

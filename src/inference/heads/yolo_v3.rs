@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::{Finds, corners_around},
+    candidate_collector::{CandidateCollector, corners_around},
     grid::Grid,
     outputs::{named, names},
     score::sigmoid,
@@ -106,7 +106,7 @@ impl Decoder for YoloV3Head {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let person = 5 + usize::from(self.person_class);
         let floor = finds.floor;

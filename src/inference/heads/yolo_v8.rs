@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::{Finds, corners_around},
+    candidate_collector::{CandidateCollector, corners_around},
     grid::{default_strides, pyramid_len},
     outputs::named_or_only,
     score::Activation,
@@ -83,7 +83,7 @@ impl Decoder for YoloV8Head {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let candidates = self.select(outputs, batch)?;
         let (cells, per_channel, per_cell) = match self.layout {

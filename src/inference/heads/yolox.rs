@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Decoder,
-    finds::{Finds, corners_around, four},
+    candidate_collector::{CandidateCollector, corners_around, four},
     grid::{Grid, default_strides, pyramid, pyramid_len},
     outputs::named_or_only,
     score::Activation,
@@ -78,7 +78,7 @@ impl Decoder for YoloxHead {
         &self,
         outputs: &[TensorView<'_>],
         batch: &Batch,
-        finds: &mut Finds,
+        finds: &mut CandidateCollector,
     ) -> Result<(), String> {
         let candidates = self.select(outputs, batch)?;
         let person = 5 + usize::from(self.person_class);

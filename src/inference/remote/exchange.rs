@@ -239,8 +239,8 @@ mod tests {
                 &[0; 8][..],
                 "shorter than its outputs",
             ),
-            (output(size(4), json!(null)), &[0; 4], "needs 2 numbers"),
-            (output(json!({}), json!([1])), &[], "needs 2 numbers"),
+            (output(size(4), json!(null)), &[0; 4], "needs 2"),
+            (output(json!({}), json!([1])), &[], "needs 2"),
             (output(json!(null), json!(null)), &[], "no data"),
             (json!({ "error": "no" }), &[], "cannot be read"),
         ] {

@@ -115,7 +115,7 @@ impl RemoteServer {
     /// Probes the server's readiness, unless recent responses make that unnecessary. Returns true
     /// if requests are sent to it from now on. A periodic call, about every second, lets the server
     /// recover automatically.
-    pub fn look_after(&self) -> bool {
+    pub fn check_health(&self) -> bool {
         if self.is_available() && self.responded_recently() {
             return true;
         }

@@ -153,9 +153,9 @@ fn a_failing_server_gets_no_requests_until_it_is_ready() {
     detect(&mut detector, 1).unwrap_err();
     assert_eq!((fake.inferred().len(), server.counts().not_sent), (3, 1));
     fake.be_ready(false);
-    assert!(!server.look_after());
+    assert!(!server.check_health());
     fake.be_ready(true);
-    assert!(server.look_after());
+    assert!(server.check_health());
     detect(&mut detector, 1).unwrap();
 }
 
@@ -166,12 +166,15 @@ fn an_idle_server_is_probed_and_an_answering_one_is_not() {
     let server = server(&fake);
     let mut detector = load(&server, folder.path()).unwrap();
     fake.be_ready(false);
-    assert!(server.look_after() && server.look_after() && !server.look_after());
+    assert!(server.check_health() && server.check_health() && !server.check_health());
     fake.be_ready(true);
-    assert!(server.look_after());
+    assert!(server.check_health());
     detect(&mut detector, 1).unwrap();
     fake.be_ready(false);
-    assert!((0..5).all(|_| server.look_after()), "it has just responded");
+    assert!(
+        (0..5).all(|_| server.check_health()),
+        "it has just responded"
+    );
 }
 
 #[test]

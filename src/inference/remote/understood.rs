@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Metadata of a model on a server, checked against its manifest.
-pub(super) struct Understood {
+pub(super) struct RemoteModel {
     pub(super) manifest: ModelManifest,
     /// Name of the model on the server.
     pub(super) name_there: String,
@@ -52,7 +52,7 @@ struct TensorMetadata {
     shape: Vec<i64>,
 }
 
-impl Understood {
+impl RemoteModel {
     /// Fetches the metadata and checks it against the manifest.
     pub(super) fn ask(
         server: &RemoteServer,

@@ -117,7 +117,7 @@ impl Engine {
             .map_err(|error| internal(anyhow::Error::new(error)))?;
         warnings.push(Warning::new(
             WarningCode::LensAssumed,
-            "no calibration was named: an equidistant lens of 180° that looks straight down was \
+            "no calibration was named: an equidistant lens of 180° that passes straight down was \
              assumed, with the lens circle calibration.assumed_circle",
         ));
         if found.is_none() {

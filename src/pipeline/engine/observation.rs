@@ -8,8 +8,8 @@ use crate::{
     inference::Model,
     pipeline::{
         PipelineError, Profile, Stage, StageTimings, Timeline, ViewCounts,
-        look::Look,
-        network::{LookTask, Work},
+        network::{PassTask, Work},
+        pass::Pass,
     },
     warning::Warning,
 };
@@ -22,7 +22,7 @@ pub struct Observation {
     pub(super) camera: FrameCamera,
     pub(super) model: Arc<Model>,
     pub(super) profile: Profile,
-    pub(super) looks: Vec<Look>,
+    pub(super) passes: Vec<Pass>,
     pub(super) still_views: usize,
     pub(super) batch_count: usize,
     pub(super) non_finite: usize,
@@ -34,7 +34,7 @@ impl Observation {
     /// How many views were looked at, now or, where nothing has moved since, before.
     #[must_use]
     pub fn view_count(&self) -> usize {
-        self.looks.iter().map(|look| look.rig.view_count()).sum()
+        self.passes.iter().map(|look| look.rig.view_count()).sum()
     }
 
     /// What became of the views.
@@ -60,20 +60,20 @@ impl Observation {
     }
 
     /// Another model that looked as well, if there was anything to look at again.
-    pub(super) fn second_opinion(&self) -> Option<&Model> {
-        let mut models = self.looks.iter().map(|look| &*look.model);
+    pub(super) fn second_model(&self) -> Option<&Model> {
+        let mut models = self.passes.iter().map(|look| &*look.model);
         models.find(|model| model.name() != self.model.name())
     }
 
     /// Waits for rounds that were queued together, and takes in what came of them. Views are
     /// rendered and looked at side by side: the span from the first to the last is divided in the
     /// proportion of the work.
-    pub(super) fn take_in(&mut self, tasks: &[Arc<LookTask>]) -> Result<(), PipelineError> {
+    pub(super) fn take_in(&mut self, tasks: &[Arc<PassTask>]) -> Result<(), PipelineError> {
         let mut work: Option<Work> = None;
         for task in tasks {
             let looked = task.wait()?;
             work = Some(work.map_or(looked.work, |others| others.and(looked.work)));
-            self.looks.push(Look {
+            self.passes.push(Pass {
                 rig: Arc::clone(&task.rig),
                 model: Arc::clone(&task.model),
                 per_view: looked.per_view,

@@ -179,7 +179,7 @@ fn a_remembered_frame_is_refined_anew_without_a_look() {
         (again.batch_count, again.timings.inference.as_nanos()),
         (0, 0)
     );
-    assert_eq!(engine.recalled_frames(), 1);
+    assert_eq!(engine.inference_cache_hits(), 1);
     // As it would be found by another look.
     let parameters = [("calibration", "lobby"), ("refine", "nms")];
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);

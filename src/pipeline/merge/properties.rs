@@ -85,12 +85,12 @@ fn parameters() -> impl Strategy<Value = RefinementParameters> {
     )
 }
 
-fn look(rig: &Arc<CameraRig>, finds: &[(usize, ViewDetection)]) -> Look {
+fn look(rig: &Arc<CameraRig>, finds: &[(usize, ViewDetection)]) -> Pass {
     let mut per_view = vec![Vec::new(); rig.view_count()];
     for (view, detection) in finds {
         per_view[view % rig.view_count()].push(*detection);
     }
-    Look {
+    Pass {
         rig: Arc::clone(rig),
         model: Arc::clone(&MODEL),
         per_view,

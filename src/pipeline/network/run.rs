@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, prelude::*};
 
-use super::{Claim, LookTask, Work};
+use super::{Claim, PassTask, Work};
 use crate::{
     imaging::{NetworkInput, ViewBatch, ViewSignature},
     inference::{InferenceError, ViewDetection},
@@ -29,9 +29,9 @@ struct SeenView {
 
 /// A view on its way to the network.
 struct ViewJob<'a> {
-    task: &'a LookTask,
+    task: &'a PassTask,
     view: usize,
-    /// How it looks from afar, where the camera's views are remembered.
+    /// How it passes from afar, where the camera's views are remembered.
     signature: Option<ViewSignature>,
     /// What was found in it before, if nothing has moved since.
     still: Option<Vec<ViewDetection>>,
@@ -67,7 +67,7 @@ impl ViewJob<'_> {
     }
 }
 
-/// Renders the views and looks at those in which something has moved.
+/// Renders the views and passes at those in which something has moved.
 pub(super) fn look(
     claims: &[Claim],
     session: usize,

@@ -94,7 +94,7 @@ fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
 
 impl Bench {
     /// Queues a frame of one brightness.
-    fn look(&self, brightness: u8, ticket: Ticket) -> Arc<LookTask> {
+    fn look(&self, brightness: u8, ticket: Ticket) -> Arc<PassTask> {
         let frame = Frame::new(64, 64, vec![brightness; 64 * 64 * 3]).unwrap();
         let (rig, model) = (Arc::clone(&self.rig), Arc::clone(&self.model));
         self.network.look(rig, model, Arc::new(frame), ticket, None)

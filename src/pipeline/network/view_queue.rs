@@ -1,5 +1,5 @@
 //! The views that wait for the network: those of the first frame first, filled up with views of
-//! the next frames that the same model looks at.
+//! the next frames that the same model passes at.
 
 use std::{
     collections::BTreeMap,
@@ -7,7 +7,7 @@ use std::{
     time::Instant,
 };
 
-use super::{BatchOptions, Claim, LookTask};
+use super::{BatchOptions, Claim, PassTask};
 use crate::{
     inference::Model,
     pipeline::{
@@ -31,7 +31,7 @@ struct State {
 }
 
 struct Waiting {
-    task: Arc<LookTask>,
+    task: Arc<PassTask>,
     next_view: usize,
 }
 
@@ -55,7 +55,7 @@ impl ViewQueue {
     }
 
     /// Queues all views of a task.
-    pub(super) fn submit(&self, task: Arc<LookTask>) {
+    pub(super) fn submit(&self, task: Arc<PassTask>) {
         if task.rig.view_count() == 0 {
             return;
         }

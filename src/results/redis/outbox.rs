@@ -16,7 +16,7 @@ const MOST_BYTES: usize = 32 << 20;
 
 /// A report, possibly with its image.
 #[derive(Debug)]
-pub(super) struct Parcel {
+pub(super) struct PendingReport {
     pub(super) report: NewReport,
     pub(super) picture: Option<NewPicture>,
 }
@@ -30,7 +30,7 @@ pub(super) struct Outbox {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    parcels: VecDeque<Parcel>,
+    parcels: VecDeque<PendingReport>,
     bytes: usize,
     /// True while a report was taken and is not done.
     one_is_taken: bool,
@@ -40,7 +40,7 @@ struct Waiting {
 impl Outbox {
     /// Appends a report. Never waits.
     pub(super) fn push(&self, report: NewReport, picture: Option<NewPicture>) {
-        let parcel = Parcel { report, picture };
+        let parcel = PendingReport { report, picture };
         let mut waiting = self.waiting();
         waiting.drop_picture_of(&parcel.report.camera);
         waiting.bytes += parcel.bytes();
@@ -54,7 +54,7 @@ impl Outbox {
     }
 
     /// Waits for the first report and takes it. [`Outbox::done`] completes it.
-    pub(super) async fn first(&self) -> Parcel {
+    pub(super) async fn first(&self) -> PendingReport {
         loop {
             let changed = self.changed.notified();
             tokio::pin!(changed);
@@ -101,7 +101,7 @@ impl Outbox {
         self.waiting().dropped
     }
 
-    fn take(&self) -> Option<Parcel> {
+    fn take(&self) -> Option<PendingReport> {
         let mut waiting = self.waiting();
         let first = waiting.take_first()?;
         waiting.one_is_taken = true;
@@ -114,7 +114,7 @@ impl Outbox {
     }
 }
 
-impl Parcel {
+impl PendingReport {
     fn bytes(&self) -> usize {
         self.report.bytes() + self.picture.as_ref().map_or(0, NewPicture::bytes)
     }
@@ -130,7 +130,7 @@ impl Waiting {
         }
     }
 
-    fn take_first(&mut self) -> Option<Parcel> {
+    fn take_first(&mut self) -> Option<PendingReport> {
         let first = self.parcels.pop_front()?;
         self.bytes -= first.bytes();
         Some(first)

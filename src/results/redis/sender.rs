@@ -6,7 +6,7 @@ use std::sync::{Arc, atomic::Ordering};
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use uuid::Uuid;
 
-use super::{Shared, link::is_refusal, outbox::Parcel};
+use super::{Shared, link::is_refusal, outbox::PendingReport};
 
 /// The script that stores a report in Redis.
 const RECORD: &str = include_str!("record.lua");
@@ -44,7 +44,7 @@ struct Sender<'a> {
 
 impl Sender<'_> {
     /// Sends a report until Redis has answered. Fails only with a refusal.
-    async fn send(&self, parcel: &Parcel, number: u64) -> RedisResult<()> {
+    async fn send(&self, parcel: &PendingReport, number: u64) -> RedisResult<()> {
         loop {
             let line = self.shared.link.next_line().await;
             let outcome = self.record(line.connection.clone(), parcel, number).await;
@@ -61,7 +61,7 @@ impl Sender<'_> {
     async fn record(
         &self,
         mut connection: MultiplexedConnection,
-        Parcel { report, picture }: &Parcel,
+        PendingReport { report, picture }: &PendingReport,
         number: u64,
     ) -> RedisResult<()> {
         let (keys, limits) = (&self.shared.keys, &self.shared.limits);

@@ -122,7 +122,7 @@ async fn follow(
         let news = news.into_iter().flat_map(|news| news.keys);
         let mut news = entries(news.flat_map(|stream| stream.ids).collect());
         let newest = news.last().map(|entry| entry.id);
-        news.retain(|entry| shared.listeners.are_there_for(&entry.camera));
+        news.retain(|entry| shared.listeners.has_listener_for(&entry.camera));
         for report in reader.reports_at(news).await? {
             shared.listeners.tell(&report);
         }

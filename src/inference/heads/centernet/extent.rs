@@ -2,7 +2,9 @@
 
 use serde::Deserialize;
 
-use crate::inference::heads::{finds::corners_around, grid::Grid, tensor::TensorView};
+use crate::inference::heads::{
+    candidate_collector::corners_around, grid::Grid, tensor::TensorView,
+};
 
 /// Unit of sizes and sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]

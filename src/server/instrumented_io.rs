@@ -1,4 +1,4 @@
-//! Streams and response bodies that report their activity to the [`Pace`].
+//! Streams and response bodies that report their activity to the [`ConnectionTimeouts`].
 
 use std::{
     io::{self, IoSlice},
@@ -10,15 +10,15 @@ use std::{
 use hyper::body::{Body, Frame, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-use super::pace::Pace;
+use super::connection_timeouts::ConnectionTimeouts;
 
 /// The stream of a client.
-pub(super) struct WatchedStream<T> {
+pub(super) struct InstrumentedStream<T> {
     pub(super) stream: T,
-    pub(super) pace: Arc<Pace>,
+    pub(super) timeouts: Arc<ConnectionTimeouts>,
 }
 
-impl<T: AsyncRead + Unpin> AsyncRead for WatchedStream<T> {
+impl<T: AsyncRead + Unpin> AsyncRead for InstrumentedStream<T> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -27,20 +27,20 @@ impl<T: AsyncRead + Unpin> AsyncRead for WatchedStream<T> {
         let before = buffer.filled().len();
         let outcome = Pin::new(&mut self.stream).poll_read(context, buffer);
         if buffer.filled().len() > before {
-            self.pace.received();
+            self.timeouts.received();
         }
         outcome
     }
 }
 
-impl<T: AsyncWrite + Unpin> AsyncWrite for WatchedStream<T> {
+impl<T: AsyncWrite + Unpin> AsyncWrite for InstrumentedStream<T> {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write(context, bytes);
-        self.pace.sending(outcome.is_pending());
+        self.timeouts.sending(outcome.is_pending());
         outcome
     }
 
@@ -58,7 +58,7 @@ impl<T: AsyncWrite + Unpin> AsyncWrite for WatchedStream<T> {
         parts: &[IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write_vectored(context, parts);
-        self.pace.sending(outcome.is_pending());
+        self.timeouts.sending(outcome.is_pending());
         outcome
     }
 
@@ -68,12 +68,12 @@ impl<T: AsyncWrite + Unpin> AsyncWrite for WatchedStream<T> {
 }
 
 /// The body of a response. The request ends when this is dropped.
-pub(super) struct WatchedBody<B> {
+pub(super) struct InstrumentedBody<B> {
     pub(super) body: B,
-    pub(super) pace: Arc<Pace>,
+    pub(super) timeouts: Arc<ConnectionTimeouts>,
 }
 
-impl<B: Body + Unpin> Body for WatchedBody<B> {
+impl<B: Body + Unpin> Body for InstrumentedBody<B> {
     type Data = B::Data;
     type Error = B::Error;
 
@@ -93,8 +93,8 @@ impl<B: Body + Unpin> Body for WatchedBody<B> {
     }
 }
 
-impl<B> Drop for WatchedBody<B> {
+impl<B> Drop for InstrumentedBody<B> {
     fn drop(&mut self) {
-        self.pace.request_ends();
+        self.timeouts.request_ends();
     }
 }

@@ -17,8 +17,8 @@ use crate::{
     pipeline::Detected,
 };
 
-pub use kept::{KeptFrame, KeptFrameError};
-pub use options::{Layer, PictureOptions};
+pub use kept::{StoredFrame, StoredFrameError};
+pub use options::{AnnotationOptions, Layer};
 use sketch::Sketch;
 
 /// Default width of the image of a wider frame, pixels: more than a screen shows, and small enough
@@ -27,7 +27,7 @@ const DEFAULT_MAX_WIDTH: u32 = 2048;
 
 /// A file format of images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PictureFormat {
+pub enum ImageFormat {
     /// JPEG, in the quality of the options.
     Jpeg,
     /// PNG, lossless.
@@ -36,7 +36,7 @@ pub enum PictureFormat {
 
 /// The reason why there is no annotated image.
 #[derive(Debug, thiserror::Error)]
-pub enum PictureError {
+pub enum AnnotationError {
     /// The client no longer waits for it.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -50,12 +50,12 @@ pub enum PictureError {
 ///
 ///
 /// # Errors
-/// [`PictureError`] if the frame is larger than the format allows, or the job was withdrawn.
-pub fn annotated_picture(
+/// [`AnnotationError`] if the frame is larger than the format allows, or the job was withdrawn.
+pub fn annotated_image(
     detected: Detected,
-    format: PictureFormat,
-    options: &PictureOptions,
-) -> Result<Vec<u8>, PictureError> {
+    format: ImageFormat,
+    options: &AnnotationOptions,
+) -> Result<Vec<u8>, AnnotationError> {
     let sketch = Sketch::of(&detected, &options.layers);
     let is_cancelled = || detected.withdrawn.is_cancelled();
     drawn(detected.frame, &sketch, format, options, &is_cancelled)
@@ -65,10 +65,10 @@ pub fn annotated_picture(
 fn drawn(
     frame: Arc<Frame>,
     sketch: &Sketch,
-    format: PictureFormat,
-    options: &PictureOptions,
+    format: ImageFormat,
+    options: &AnnotationOptions,
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<u8>, PictureError> {
+) -> Result<Vec<u8>, AnnotationError> {
     let width = options.width.unwrap_or(DEFAULT_MAX_WIDTH);
     let mut picture = if frame.width() > width {
         narrowed(&frame, width)
@@ -78,8 +78,8 @@ fn drawn(
     let drawing = sketch.drawing(picture.width(), &options.layers);
     annotate_unless(&mut picture, &drawing, is_cancelled)?;
     let encoded = match format {
-        PictureFormat::Jpeg => encode_jpeg(&picture, options.quality),
-        PictureFormat::Png => encode_png(&picture),
+        ImageFormat::Jpeg => encode_jpeg(&picture, options.quality),
+        ImageFormat::Png => encode_png(&picture),
     };
     Ok(encoded?)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use strum::VariantArray;
 
-use super::{Layer, PictureError, PictureFormat, PictureOptions, drawn, sketch::Sketch};
+use super::{AnnotationError, AnnotationOptions, ImageFormat, Layer, drawn, sketch::Sketch};
 use crate::{
     imaging::{
         Frame,
@@ -30,7 +30,7 @@ const JPEG_START: [u8; 2] = [0xFF, 0xD8];
 
 /// A kept frame. Areas that the calibration masks are masked in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct KeptFrame {
+pub struct StoredFrame {
     /// The frame, at most 4 MiB.
     pub jpeg: Bytes,
     /// The drawings that can be added to it, JSON.
@@ -39,7 +39,7 @@ pub struct KeptFrame {
 
 /// The reason why a frame cannot be kept or drawn.
 #[derive(Debug, thiserror::Error)]
-pub enum KeptFrameError {
+pub enum StoredFrameError {
     /// The sketch cannot be serialised or parsed.
     #[error("the sketch of a kept frame is invalid: {0}")]
     Sketch(#[from] serde_json::Error),
@@ -51,20 +51,20 @@ pub enum KeptFrameError {
     Encode(#[from] EncodeError),
     /// The image cannot be drawn.
     #[error(transparent)]
-    Picture(#[from] PictureError),
+    Picture(#[from] AnnotationError),
     /// The frame is too large at every width.
     #[error("a frame takes more than {MAX_BYTES} bytes as a JPEG of {} pixels across", WIDTHS[2])]
     TooLarge,
 }
 
-impl KeptFrame {
+impl StoredFrame {
     /// Keeps a frame: its original JPEG, if that is small enough and nothing is masked, else a new
     /// one. A new one takes tens of milliseconds for a large frame: keep it off the async runtime.
     ///
     ///
     /// # Errors
-    /// [`KeptFrameError`] for a frame that cannot be kept.
-    pub fn of(detected: &Detected) -> Result<Self, KeptFrameError> {
+    /// [`StoredFrameError`] for a frame that cannot be kept.
+    pub fn of(detected: &Detected) -> Result<Self, StoredFrameError> {
         let sketch = Sketch::of(detected, Layer::VARIANTS).rounded();
         let sketch = serde_json::to_vec(&sketch)?.into();
         let jpeg = match &detected.encoded {
@@ -82,18 +82,18 @@ impl KeptFrame {
     ///
     ///
     /// # Errors
-    /// [`KeptFrameError`] for data that [`KeptFrame::of`] has not made.
+    /// [`StoredFrameError`] for data that [`StoredFrame::of`] has not made.
     pub fn annotated(
         &self,
-        options: &PictureOptions,
+        options: &AnnotationOptions,
         is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Vec<u8>, KeptFrameError> {
+    ) -> Result<Vec<u8>, StoredFrameError> {
         let sketch: Sketch = serde_json::from_slice(&self.sketch)?;
         let frame = decode(&self.jpeg, &DecodeLimits::default())?.frame;
         Ok(drawn(
             Arc::new(frame),
             &sketch,
-            PictureFormat::Jpeg,
+            ImageFormat::Jpeg,
             options,
             is_cancelled,
         )?)
@@ -105,7 +105,7 @@ fn is_kept_as_it_is(encoded: &[u8], frame: &Frame) -> bool {
 }
 
 /// Encodes a frame as JPEG, scaled down until it is small enough.
-fn jpeg_of(frame: &Frame) -> Result<Bytes, KeptFrameError> {
+fn jpeg_of(frame: &Frame) -> Result<Bytes, StoredFrameError> {
     for width in WIDTHS {
         let jpeg = if frame.width() > width {
             encode_jpeg(&narrowed(frame, width), QUALITY)?
@@ -116,5 +116,5 @@ fn jpeg_of(frame: &Frame) -> Result<Bytes, KeptFrameError> {
             return Ok(jpeg.into());
         }
     }
-    Err(KeptFrameError::TooLarge)
+    Err(StoredFrameError::TooLarge)
 }

@@ -66,7 +66,7 @@ pub enum Layer {
 
 /// The drawings and the size of an annotated image.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PictureOptions {
+pub struct AnnotationOptions {
     /// The layers, each once.
     pub layers: Vec<Layer>,
     /// Width in pixels, 2048 if none is given; a frame that is no wider stays as it is.
@@ -75,7 +75,7 @@ pub struct PictureOptions {
     pub quality: u8,
 }
 
-impl PictureOptions {
+impl AnnotationOptions {
     /// The specifications, in the order in which they are listed to users.
     pub const TABLE: &'static [ParameterSpec] = TABLE;
 
@@ -126,17 +126,17 @@ mod tests {
     fn every_layer_is_read_by_its_name_once() {
         let names = <Layer as VariantNames>::VARIANTS.join(",") + ",boxes";
         let pairs = [("draw", &*names), ("width", "640"), ("quality", "100")];
-        let options = PictureOptions::parse(pairs).unwrap();
+        let options = AnnotationOptions::parse(pairs).unwrap();
         assert_eq!(options.layers, <Layer as VariantArray>::VARIANTS);
         assert_eq!((options.width, options.quality), (Some(640), 100));
     }
 
     #[test]
     fn defaults_are_those_of_the_table() {
-        let default = PictureOptions::parse([]).unwrap();
+        let default = AnnotationOptions::parse([]).unwrap();
         assert_eq!(default.layers, [Layer::Oriented, Layer::Scores]);
         assert_eq!((default.width, default.quality), (None, 88));
-        let none = PictureOptions::parse([("draw", "none")]).unwrap();
+        let none = AnnotationOptions::parse([("draw", "none")]).unwrap();
         assert!(none.layers.is_empty());
     }
 
@@ -154,11 +154,11 @@ mod tests {
             ("quality", "1000"),
             ("quality", "high"),
         ] {
-            let error = PictureOptions::parse([(name, value)]).unwrap_err();
+            let error = AnnotationOptions::parse([(name, value)]).unwrap_err();
             assert_eq!(error.name, name, "{value:?}");
             assert_eq!(error.fault, ParameterFault::BadValue);
         }
-        let error = PictureOptions::parse([("draw", "hats")]).unwrap_err();
+        let error = AnnotationOptions::parse([("draw", "hats")]).unwrap_err();
         assert_eq!(
             error.to_string(),
             "draw: \"hats\" is not none or a comma-separated list of boxes, oriented, scores, zones, views, \

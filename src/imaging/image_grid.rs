@@ -11,7 +11,7 @@ const MARGIN_SHARE: f64 = 0.5;
 
 /// Images of one size with labels for rows and columns.
 #[derive(Debug, Clone)]
-pub struct PictureGrid {
+pub struct ImageGrid {
     /// Text line above the grid.
     pub title: String,
     /// Labels above the columns.
@@ -29,7 +29,7 @@ pub struct GridCell {
     pub caption: String,
 }
 
-impl PictureGrid {
+impl ImageGrid {
     /// Draws the grid as one image. Every cell has the size of the largest image.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(grid: &PictureGrid) -> Self {
+    fn of(grid: &ImageGrid) -> Self {
         let pictures = || grid.rows.iter().flat_map(|(_, cells)| cells);
         let widths = pictures().map(|cell| cell.picture.width());
         let heights = pictures().map(|cell| cell.picture.height());
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn every_image_is_complete_and_in_its_row_and_column() {
-        let grid = PictureGrid {
+        let grid = ImageGrid {
             title: "title".to_owned(),
             columns: vec!["a".to_owned(), "b".to_owned()],
             rows: vec![
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_grid_of_nothing_is_drawn() {
-        let grid = PictureGrid {
+        let grid = ImageGrid {
             title: String::new(),
             columns: Vec::new(),
             rows: Vec::new(),

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// A complete detection request. As an extractor, it also checks the scope `detect`.
-pub(in crate::api) struct Arrival {
+pub(in crate::api) struct ReceivedRequest {
     pub(in crate::api) parts: Parts,
     pub(in crate::api) body: Held<Bytes>,
     /// The deadline of the response.
@@ -30,7 +30,7 @@ pub(in crate::api) struct Arrival {
     pub(in crate::api) arrived: Instant,
 }
 
-impl FromRequest<ApiState> for Arrival {
+impl FromRequest<ApiState> for ReceivedRequest {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
@@ -40,7 +40,7 @@ impl FromRequest<ApiState> for Arrival {
     }
 }
 
-impl Arrival {
+impl ReceivedRequest {
     /// Reads the request, whose body uses memory of `budget`. The key is not checked here.
     pub(in crate::api) async fn receive(
         request: Request,

@@ -33,13 +33,13 @@ struct State {
 
 /// Tracks the phases of a connection and detects timeouts.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(super) struct ConnectionTimeouts {
     state: Mutex<State>,
     header_timeout: Duration,
     idle_timeout: Duration,
 }
 
-impl Pace {
+impl ConnectionTimeouts {
     /// Starts with a connection that has just been accepted.
     pub(super) fn new(limits: &ConnectionLimits) -> Self {
         let state = State {
@@ -132,8 +132,8 @@ mod tests {
 
     const IDLE: Duration = Duration::from_secs(4);
 
-    fn pace() -> Pace {
-        Pace::new(&ConnectionLimits {
+    fn pace() -> ConnectionTimeouts {
+        ConnectionTimeouts::new(&ConnectionLimits {
             max_connections: NonZeroUsize::MIN,
             header_timeout: Duration::from_secs(1),
             idle_timeout: IDLE,
@@ -142,39 +142,39 @@ mod tests {
         })
     }
 
-    async fn is_overdue(pace: &Pace) -> bool {
-        timeout(Duration::from_millis(1), pace.overdue())
+    async fn is_overdue(timeouts: &ConnectionTimeouts) -> bool {
+        timeout(Duration::from_millis(1), timeouts.overdue())
             .await
             .is_ok()
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_client_that_reads_slowly_but_steadily_may_finish() {
-        let pace = pace();
-        pace.request_begins();
-        pace.request_ends();
+        let timeouts = pace();
+        timeouts.request_begins();
+        timeouts.request_ends();
         for _ in 0..5 {
-            pace.sending(true);
+            timeouts.sending(true);
             advance(IDLE / 2).await;
-            pace.sending(false);
-            assert!(!is_overdue(&pace).await);
+            timeouts.sending(false);
+            assert!(!is_overdue(&timeouts).await);
         }
-        pace.sending(true);
+        timeouts.sending(true);
         advance(IDLE).await;
-        assert!(is_overdue(&pace).await);
+        assert!(is_overdue(&timeouts).await);
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_deadline_set_during_the_wait_is_kept() {
-        let pace = pace();
-        pace.request_begins();
-        pace.request_ends();
+        let timeouts = pace();
+        timeouts.request_begins();
+        timeouts.request_ends();
         let began = Instant::now();
         let head = async {
             tokio::time::sleep(IDLE / 3).await;
-            pace.received();
+            timeouts.received();
         };
-        tokio::join!(pace.overdue(), head);
+        tokio::join!(timeouts.overdue(), head);
         let since_received = began.elapsed().saturating_sub(IDLE / 3);
         assert_eq!(since_received.as_secs(), 1);
     }

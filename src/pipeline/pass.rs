@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// One round of looking. All rounds of a frame share its camera.
-pub(super) struct Look {
+pub(super) struct Pass {
     /// The views.
     pub(super) rig: Arc<CameraRig>,
     /// Who looked.
@@ -21,7 +21,7 @@ pub(super) struct Look {
 /// What was found in a view.
 #[derive(Clone, Copy)]
 pub(super) struct Find<'a> {
-    pub(super) look: &'a Look,
+    pub(super) look: &'a Pass,
     /// The view's index in its rig.
     pub(super) view: usize,
     /// A number for the view that no view of any round shares.
@@ -30,8 +30,8 @@ pub(super) struct Find<'a> {
 }
 
 /// Everything found in all rounds.
-pub(super) fn finds(looks: &[Look]) -> impl Iterator<Item = Find<'_>> {
-    let numbered = looks.iter().scan(0, |before, look| {
+pub(super) fn finds(passes: &[Pass]) -> impl Iterator<Item = Find<'_>> {
+    let numbered = passes.iter().scan(0, |before, look| {
         let first = *before;
         *before += look.per_view.len();
         Some((first, look))
@@ -50,7 +50,7 @@ pub(super) fn finds(looks: &[Look]) -> impl Iterator<Item = Find<'_>> {
 }
 
 /// In how many views of all rounds a person with this footprint is wholly visible.
-pub(super) fn views_holding(looks: &[Look], footprint: &Footprint) -> usize {
-    let holding = looks.iter().map(|look| look.rig.views_holding(footprint));
+pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint) -> usize {
+    let holding = passes.iter().map(|look| look.rig.views_holding(footprint));
     holding.sum()
 }

@@ -7,7 +7,7 @@ use bytes::Bytes;
 
 use super::{ApiState, deadline::Deadline, limit::Limit, problem::Problem, report::Report};
 use crate::{
-    annotated_picture::KeptFrame,
+    annotated_image::StoredFrame,
     metrics::Metrics,
     pipeline::{DetectJob, Detected, DetectionReport},
     results::{NewPicture, NewReport},
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// The input of a response writer.
-pub(super) struct Found<'a> {
+pub(super) struct DetectionOutcome<'a> {
     /// The frame and its detections.
     pub(super) detected: Detected,
     /// The report.
@@ -26,12 +26,12 @@ pub(super) struct Found<'a> {
 
 /// Detects the persons in a frame. `write` builds the response while the frame still holds its
 /// permit.
-pub(super) async fn find<T: Send + 'static>(
+pub(super) async fn run_detection<T: Send + 'static>(
     state: &ApiState,
     trace: &RequestTrace,
     deadline: Deadline,
     job: DetectJob,
-    write: impl FnOnce(Found<'_>) -> Result<T, Problem> + Send + 'static,
+    write: impl FnOnce(DetectionOutcome<'_>) -> Result<T, Problem> + Send + 'static,
 ) -> Result<(DetectionReport, T), Problem> {
     let limit = Limit::of(deadline, job.parameters.timeout);
     let timeline = job.ticket.timeline.clone();
@@ -65,12 +65,12 @@ pub(super) async fn find<T: Send + 'static>(
 /// Serialises the report for the result store and the response.
 fn written<T>(
     detected: Detected,
-    write: impl FnOnce(Found<'_>) -> Result<T, Problem>,
+    write: impl FnOnce(DetectionOutcome<'_>) -> Result<T, Problem>,
 ) -> Result<(Bytes, T), Problem> {
     let report = Report::from(&detected.report);
     let json = serde_json::to_vec(&report).map_err(Problem::internal)?;
     let json = Bytes::from(json);
-    let answer = write(Found {
+    let answer = write(DetectionOutcome {
         detected,
         report: &report,
         json: &json,
@@ -80,7 +80,7 @@ fn written<T>(
 
 /// Returns the image to store with the report. A failure here does not fail the request.
 fn picture(detected: &Detected) -> Option<NewPicture> {
-    match KeptFrame::of(detected) {
+    match StoredFrame::of(detected) {
         Ok(kept) => Some(NewPicture {
             frame: kept.jpeg,
             sketch: kept.sketch,

@@ -1,4 +1,4 @@
-//! The second pass: closer looks and upright crops of the frame that follow the plan's views.
+//! The second pass: closer passes and upright crops of the frame that follow the plan's views.
 
 use std::{sync::Arc, time::Instant};
 
@@ -7,7 +7,8 @@ use crate::{
     geometry::{crop_placement::place_crops, zoom::zoomed_views},
     inference::Model,
     pipeline::{
-        DetectJob, Stage, camera_rig::CameraRig, merge, network::LookTask, still_views::CameraViews,
+        DetectJob, Stage, camera_rig::CameraRig, merge, motion_cache::CameraViews,
+        network::PassTask,
     },
 };
 
@@ -16,9 +17,9 @@ type Planned = (CameraRig, Arc<Model>);
 
 impl Engine {
     /// Queues the second pass over whatever may be a person, where the profile has one.
-    pub(super) fn closer(&self, job: &DetectJob, observation: &Observation) -> Vec<Arc<LookTask>> {
+    pub(super) fn closer(&self, job: &DetectJob, observation: &Observation) -> Vec<Arc<PassTask>> {
         let profile = observation.profile;
-        if profile.most_zoomed_views() == 0 {
+        if profile.max_second_pass_views() == 0 {
             return Vec::new();
         }
         let timeline = &job.ticket.timeline;
@@ -58,14 +59,14 @@ impl Engine {
     /// request leaves the choice.
     fn zoomed(&self, job: &DetectJob, observation: &Observation) -> Vec<Planned> {
         let profile = observation.profile;
-        let Some(closer) = profile.closer_look() else {
+        let Some(closer) = profile.zoom_pass() else {
             return Vec::new();
         };
         let back_projection = profile.back_projection();
-        let outlines = merge::outlines(&observation.looks, back_projection, &closer.first_look);
+        let outlines = merge::outlines(&observation.passes, back_projection, &closer.first_look);
         let mut models = vec![Arc::clone(&observation.model)];
         if job.parameters.model.is_none() {
-            let second = self.options.default_models.second_opinion(profile);
+            let second = self.options.default_models.second_model(profile);
             models.extend(second.and_then(|name| self.models.get(name)));
         }
         let most_views = closer.most_views / models.len();
@@ -88,10 +89,10 @@ impl Engine {
         let profile = observation.profile;
         let pass = profile.crop_pass()?;
         let back_projection = profile.back_projection();
-        let targets = merge::crop_targets(&observation.looks, back_projection, &pass.candidates);
+        let targets = merge::crop_targets(&observation.passes, back_projection, &pass.candidates);
         let model = &observation.model;
         let side = model.input().width.min(model.input().height);
-        let crops = place_crops(&targets, pass.most_crops, pass.fill, side);
+        let crops = place_crops(&targets, pass.max_crops, pass.fill, side);
         let (width, height) = (observation.frame.width(), observation.frame.height());
         let rig = &observation.camera.rig;
         let rig = self

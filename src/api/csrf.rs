@@ -41,13 +41,13 @@ const MAX_SHOWN_CHARS: usize = 128;
 
 /// The origins that may make changes.
 #[derive(Clone)]
-pub(super) struct OwnPages {
+pub(super) struct AllowedOrigins {
     own_machine_only: bool,
     /// The origins in `access.cors_origins`.
     allowed: Arc<[String]>,
 }
 
-impl OwnPages {
+impl AllowedOrigins {
     /// Returns `None` if there are API keys.
     pub(super) fn of(options: &ApiOptions) -> Option<Self> {
         match options.access {
@@ -62,7 +62,7 @@ impl OwnPages {
 
 /// Refuses requests of other origins.
 pub(super) async fn refuse(
-    State(own_pages): State<OwnPages>,
+    State(own_pages): State<AllowedOrigins>,
     request: Request,
     next: Next,
 ) -> Response {
@@ -72,8 +72,8 @@ pub(super) async fn refuse(
     }
 }
 
-fn check(request: &Request, own_pages: &OwnPages) -> Result<(), Problem> {
-    let OwnPages {
+fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
+    let AllowedOrigins {
         own_machine_only,
         allowed,
     } = own_pages;

@@ -24,7 +24,7 @@ use tokio::{sync::oneshot, time::timeout_at};
 use super::{
     ApiState,
     deadline::Deadline,
-    upload::{Pace, next_chunk},
+    upload::{MinimumUploadRate, next_chunk},
 };
 
 /// Largest number of discarded bytes, as a multiple of the body limit.
@@ -56,25 +56,30 @@ pub(super) async fn discard(
         && let Ok(body) = returned.try_recv()
         && (body.begun || !asks_first)
     {
-        let pace = Pace::begin(state.options.min_upload_bytes_per_second);
+        let upload_rate = MinimumUploadRate::begin(state.options.min_upload_bytes_per_second);
         let most = state
             .options
             .max_body_bytes
             .saturating_mul(DISCARDED_LIMITS);
-        throw_away(body.body, most, pace, deadline).await;
+        throw_away(body.body, most, upload_rate, deadline).await;
     }
     response
 }
 
-async fn throw_away(mut body: Body, most: usize, mut pace: Pace, deadline: Deadline) {
+async fn throw_away(
+    mut body: Body,
+    most: usize,
+    mut upload_rate: MinimumUploadRate,
+    deadline: Deadline,
+) {
     let mut left = most;
     while !body.is_end_stream()
         && let Ok(Ok(Some(chunk))) =
-            timeout_at(pace.late_at(deadline.at()), next_chunk(&mut body)).await
+            timeout_at(upload_rate.late_at(deadline.at()), next_chunk(&mut body)).await
         && chunk.len() < left
     {
         left -= chunk.len();
-        pace.came(chunk.len());
+        upload_rate.came(chunk.len());
     }
 }
 

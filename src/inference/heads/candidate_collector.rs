@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Collects persons and counts the dropped candidates.
-pub(super) struct Finds {
+pub(super) struct CandidateCollector {
     /// Least score of a person.
     pub(super) floor: Floor,
     /// The whole view. `None` for inputs too large to have boxes.
@@ -19,7 +19,7 @@ pub(super) struct Finds {
     not_a_probability: Option<f32>,
 }
 
-impl Finds {
+impl CandidateCollector {
     pub(super) fn new(views: usize, input: &NetworkInput, floor: f64) -> Self {
         let [width, height] = [input.width, input.height].map(f64::from);
         Self {

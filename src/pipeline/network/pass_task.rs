@@ -10,11 +10,11 @@ use super::Work;
 use crate::{
     imaging::Frame,
     inference::{Model, ViewDetection},
-    pipeline::{PipelineError, Ticket, camera_rig::CameraRig, still_views::CameraViews},
+    pipeline::{PipelineError, Ticket, camera_rig::CameraRig, motion_cache::CameraViews},
 };
 
 /// One round of looking at a frame.
-pub(in crate::pipeline) struct LookTask {
+pub(in crate::pipeline) struct PassTask {
     pub(in crate::pipeline) rig: Arc<CameraRig>,
     pub(in crate::pipeline) model: Arc<Model>,
     pub(super) frame: Arc<Frame>,
@@ -30,7 +30,7 @@ pub(in crate::pipeline) struct LookTask {
 
 /// What came of a round.
 #[derive(Debug)]
-pub(in crate::pipeline) struct Looked {
+pub(in crate::pipeline) struct PassOutput {
     /// What was found in each view.
     pub(in crate::pipeline) per_view: Vec<Vec<ViewDetection>>,
     /// What it took.
@@ -45,7 +45,7 @@ struct Progress {
     failure: Option<PipelineError>,
 }
 
-impl LookTask {
+impl PassTask {
     pub(super) fn new(
         rig: Arc<CameraRig>,
         model: Arc<Model>,
@@ -74,7 +74,7 @@ impl LookTask {
     }
 
     /// Waits until every view was looked at. Blocks.
-    pub(in crate::pipeline) fn wait(&self) -> Result<Looked, PipelineError> {
+    pub(in crate::pipeline) fn wait(&self) -> Result<PassOutput, PipelineError> {
         let progress = self.lock();
         let mut progress = self
             .over
@@ -83,7 +83,7 @@ impl LookTask {
         if let Some(failure) = progress.failure.take() {
             return Err(failure);
         }
-        Ok(Looked {
+        Ok(PassOutput {
             per_view: std::mem::take(&mut progress.per_view),
             work: progress.work.unwrap_or_else(|| Work::none(self.queued)),
         })

@@ -9,10 +9,10 @@ use std::{
     },
 };
 
-use super::{camera_rig::CameraRig, look::Look};
+use super::{camera_rig::CameraRig, pass::Pass};
 use crate::inference::{Model, ViewDetection};
 
-/// Most memory that all remembered frames may hold: finds, and the tables of closer looks.
+/// Most memory that all remembered frames may hold: finds, and the tables of closer passes.
 const MAX_BYTES: usize = 32 << 20;
 
 /// Which frame was looked at, and by whom.
@@ -24,12 +24,12 @@ pub(super) struct FrameKey {
     pub(super) is_model_named: bool,
     /// The views of its camera.
     pub(super) rig: Arc<CameraRig>,
-    /// Who looks first.
+    /// Who passes first.
     pub(super) model: Arc<Model>,
 }
 
 /// The frames that were asked for last.
-pub(super) struct RememberedFrames {
+pub(super) struct InferenceCache {
     max_frames: usize,
     /// The least recently used first.
     frames: Mutex<VecDeque<Remembered>>,
@@ -41,7 +41,7 @@ struct Remembered {
     is_model_named: bool,
     // Weak: what nobody uses any more must keep neither tables nor weights in memory.
     rig: Weak<CameraRig>,
-    looks: Vec<RememberedLook>,
+    passes: Vec<RememberedLook>,
     bytes: usize,
 }
 
@@ -52,7 +52,7 @@ struct RememberedLook {
     per_view: Vec<Vec<ViewDetection>>,
 }
 
-impl RememberedFrames {
+impl InferenceCache {
     /// Remembers up to `max_frames`; 0 for none.
     pub(super) fn new(max_frames: usize) -> Self {
         Self {
@@ -72,19 +72,19 @@ impl RememberedFrames {
         &self,
         key: &FrameKey,
         serving: impl Fn(&Model) -> bool,
-    ) -> Option<Vec<Look>> {
+    ) -> Option<Vec<Pass>> {
         let mut frames = self.lock();
         let place = frames.iter().position(|frame| frame.is_of(key))?;
         let frame = frames.remove(place)?;
-        let looks = frame.looks(&key.rig, serving)?;
+        let passes = frame.passes(&key.rig, serving)?;
         frames.push_back(frame);
         self.recalled.fetch_add(1, Ordering::Relaxed);
-        Some(looks)
+        Some(passes)
     }
 
     /// Remembers what was found in a frame; others go where there is no room.
-    pub(super) fn remember(&self, key: FrameKey, looks: &[Look]) {
-        let frame = Remembered::new(key, looks);
+    pub(super) fn remember(&self, key: FrameKey, passes: &[Pass]) {
+        let frame = Remembered::new(key, passes);
         let mut frames = self.lock();
         frames.retain(|other| !other.is_like(&frame));
         frames.push_back(frame);
@@ -102,8 +102,8 @@ impl RememberedFrames {
 }
 
 impl Remembered {
-    fn new(key: FrameKey, looks: &[Look]) -> Self {
-        let looks: Vec<_> = looks
+    fn new(key: FrameKey, passes: &[Pass]) -> Self {
+        let passes: Vec<_> = passes
             .iter()
             .map(|look| RememberedLook {
                 closer: (!Arc::ptr_eq(&look.rig, &key.rig)).then(|| Arc::clone(&look.rig)),
@@ -112,16 +112,16 @@ impl Remembered {
             })
             .collect();
         Self {
-            bytes: key.digest.len() + looks.iter().map(RememberedLook::bytes).sum::<usize>(),
+            bytes: key.digest.len() + passes.iter().map(RememberedLook::bytes).sum::<usize>(),
             digest: key.digest,
             is_model_named: key.is_model_named,
             rig: Arc::downgrade(&key.rig),
-            looks,
+            passes,
         }
     }
 
     fn is_of(&self, key: &FrameKey) -> bool {
-        let first = self.looks.first();
+        let first = self.passes.first();
         self.digest == key.digest
             && self.is_model_named == key.is_model_named
             && std::ptr::eq(self.rig.as_ptr(), Arc::as_ptr(&key.rig))
@@ -129,22 +129,22 @@ impl Remembered {
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        let first = |frame: &Self| frame.looks.first().map(|look| look.model.as_ptr());
+        let first = |frame: &Self| frame.passes.first().map(|look| look.model.as_ptr());
         self.digest == other.digest
             && self.is_model_named == other.is_model_named
             && self.rig.ptr_eq(&other.rig)
             && first(self) == first(other)
     }
 
-    fn looks(&self, rig: &Arc<CameraRig>, serving: impl Fn(&Model) -> bool) -> Option<Vec<Look>> {
-        let looks = self.looks.iter().map(|look| {
-            Some(Look {
+    fn passes(&self, rig: &Arc<CameraRig>, serving: impl Fn(&Model) -> bool) -> Option<Vec<Pass>> {
+        let passes = self.passes.iter().map(|look| {
+            Some(Pass {
                 rig: Arc::clone(look.closer.as_ref().unwrap_or(rig)),
                 model: look.model.upgrade().filter(|model| serving(model))?,
                 per_view: look.per_view.clone(),
             })
         });
-        looks.collect()
+        passes.collect()
     }
 }
 

@@ -9,13 +9,13 @@ use tokio::time::Instant;
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The time to wait for the next bytes. Each byte extends it, up to [`PATIENCE`].
-pub(in crate::api) struct Pace {
+pub(in crate::api) struct MinimumUploadRate {
     /// Least rate; `None` for no limit.
     least_bytes_per_second: Option<NonZeroU64>,
     late_at: Instant,
 }
 
-impl Pace {
+impl MinimumUploadRate {
     pub(in crate::api) fn begin(least_bytes_per_second: Option<NonZeroU64>) -> Self {
         Self {
             least_bytes_per_second,

@@ -25,7 +25,7 @@ const MAX_AGE: Duration = Duration::from_secs(10);
 
 /// What each camera saw last.
 #[derive(Default)]
-pub(super) struct StillViews {
+pub(super) struct MotionCache {
     cameras: Mutex<HashMap<String, Remembered>>,
 }
 
@@ -56,7 +56,7 @@ struct SeenView {
     seen: Instant,
 }
 
-impl StillViews {
+impl MotionCache {
     /// What this camera saw through these views and this model; nothing yet when it is new or they
     /// are others than last time.
     pub(super) fn of(
