@@ -1,4 +1,4 @@
-"""Our rendering of views beside OpenCV's: remap (bilinear, fixed-point maps) and then blobFromImages.
+"""Compares the rendering of views with OpenCV's remap (bilinear, fixed-point maps) and blobFromImages.
 
 `against_opencv.py [ROUNDS]`, after `scripts/setup.py benches`. Both sides render the same 24 views of the same
 frame at the same positions, on one thread each, in turns, view by view; the ratio is the median over all turns of
@@ -17,7 +17,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 SIDES = (300, 416)
-# As `answer_rounds` in remap.rs scales its views.
+# The scaling of `answer_rounds` in remap.rs.
 SCALE = 1 / 57
 MEAN = (103.5, 116.3, 123.7)
 
@@ -65,7 +65,7 @@ def compare(folder: Path, side: int, rounds: int) -> dict:
         "ratio_of_least": round(float(our_time.min() / their_time.min()), 3),
         "ours_least_us": round(float(our_time.min()), 1),
         "opencv_least_us": round(float(their_time.min()), 1),
-        # OpenCV's weights are multiples of 1/32, and the frame is noise: a level or two are to be expected.
+        # OpenCV's weights are multiples of 1/32, and the frame is noise: expect one or two levels.
         "mean_difference_levels": round(float(np.abs(found - blob).mean() / SCALE), 2),
         "opencv": cv2.__version__,
     }

@@ -1,4 +1,4 @@
-"""Runs a network on ready tensors as fast as ONNX Runtime goes, and prints the views per second.
+"""Runs a network on ready tensors with bare ONNX Runtime, and prints the views per second.
 
 bare_onnx.py MODEL VIEWS.npy SESSIONS THREADS BATCH SECONDS: so many sessions at once, of so many threads each, and
 VIEWS.npy holds the views of a frame as bytes [views, 3, height, width].

@@ -1,8 +1,8 @@
-//! Refinements of 100,000 candidates, in milliseconds (median and least of many rounds):
-//! `cargo bench --bench refinement`.
+//! Benchmarks of refinements of 100,000 candidates, in milliseconds (median and minimum of many
+//! rounds): `cargo bench --bench refinement`.
 //!
-//! `raw-like` is what a floor of 0.01 lets through: a hundred persons whom many views report, and
-//! background whose scores are nearly all low. `random` and `strong` have no persons; of `random`,
+//! `raw-like` has the candidates of a score floor of 0.01: a hundred persons in many views, and
+//! background with mostly low scores. `random` and `strong` have no persons; of `random`,
 //! 7 % reach the score threshold, of `strong` 70 %.
 
 #[path = "support/times.rs"]
@@ -48,8 +48,8 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// A tenth of the candidates are a hundred persons' boxes, each a little off; the other nine
-/// tenths lie anywhere, with scores that thin out as they rise.
+/// A tenth of the candidates are boxes of a hundred persons with small deviations. The others have
+/// random positions, and high scores are rare.
 fn raw_like() -> Outcome<Vec<Candidate>> {
     let mut noise = Noise(7);
     let mut candidates = Vec::with_capacity(CANDIDATES);
@@ -72,7 +72,7 @@ fn raw_like() -> Outcome<Vec<Candidate>> {
     Ok(candidates)
 }
 
-/// Candidates anywhere, a share `strong` of which reaches the score threshold.
+/// Candidates at random positions; the fraction `strong` reaches the score threshold.
 fn random(strong: f64) -> Outcome<Vec<Candidate>> {
     let mut noise = Noise(7);
     let threshold = (SCORE_THRESHOLD - SCORE_FLOOR) / (1.0 - SCORE_FLOOR);
@@ -107,7 +107,7 @@ impl Noise {
         [x, y, width, height]
     }
 
-    /// A candidate there; the greater `exponent`, the rarer are high scores.
+    /// A candidate at this position; a greater `exponent` makes high scores rarer.
     fn candidate(&mut self, [x, y, width, height]: [f64; 4], exponent: f64) -> Outcome<Candidate> {
         #[expect(
             clippy::cast_possible_truncation,

@@ -1,10 +1,11 @@
-//! Remap tables: building those of a plan, and rendering a view, with vector instructions and
-//! without. `cargo bench --bench remap` prints milliseconds (median and least of many rounds), also of
-//! rendering as in the server, where the network has pushed the frame out of the caches.
+//! Benchmarks of remap tables: building those of a plan, and rendering a view, with and without
+//! vector instructions. `cargo bench --bench remap` prints milliseconds (median and minimum of many
+//! rounds), also of rendering as in the server, where the network has evicted the frame from the
+//! caches.
 //!
-//! `cargo bench --bench remap -- rounds FOLDER SIDE` is the half of `against_opencv.py` that is ours: it
-//! writes what both sides need into the folder, then renders the view whose index is on each line it
-//! reads and answers with the nanoseconds that took.
+//! `cargo bench --bench remap -- rounds FOLDER SIDE` is Lookdown's half of `against_opencv.py`. It
+//! writes the input of both halves into the folder. Then it reads indices of views, a line each,
+//! renders each view and prints the duration in nanoseconds.
 
 #[path = "support/times.rs"]
 mod times;
@@ -28,7 +29,7 @@ use self::times::{times, times_after};
 
 const FRAME_SIDE: u32 = 1680;
 const ROUNDS: usize = 240;
-/// Words of memory which a network may go through from view to view: more than the caches hold.
+/// Words of memory that a network reads between views: more than the caches hold.
 const NETWORK_WORDS: usize = 6 << 20;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -89,8 +90,8 @@ fn print_times() -> Outcome<()> {
     Ok(())
 }
 
-/// Writes the frame (`frame.rgb`) and the views' positions (`positions.f32`: x, y, pixel by pixel and
-/// view by view; −1000 where nothing is seen), then renders one view per line.
+/// Writes the frame (`frame.rgb`) and the positions of the views (`positions.f32`: x, y, pixel by
+/// pixel and view by view; −1000 outside the lens image), then renders one view per line.
 fn answer_rounds(folder: &Path, side: u32) -> Outcome<()> {
     let (frame, tables) = (frame()?, tables(side)?);
     let input = NetworkInput {
@@ -114,7 +115,7 @@ fn answer_rounds(folder: &Path, side: u32) -> Outcome<()> {
     }
     fs::write(folder.join("positions.f32"), positions)?;
     let mut batch = vec![0.0; tables.len() * input.view_len()];
-    // The memory that the network reads is the same from view to view, as it is theirs here.
+    // The output buffer is reused for every view, as in the server and in OpenCV's half.
     let mut slot = vec![0.0; input.view_len()];
     println!("{} {}", tables.len(), FRAME_SIDE);
     for line in stdin().lock().lines() {
@@ -154,7 +155,7 @@ fn tables(side: u32) -> Outcome<Vec<RemapTable>> {
     ))
 }
 
-/// Noise: nothing in it helps anybody's cache or branch predictor.
+/// Noise, which caches and branch predictors cannot exploit.
 fn frame() -> Outcome<Frame> {
     let bytes = 0..FRAME_SIDE * FRAME_SIDE * 3;
     let pixels = bytes.map(|index| index.wrapping_mul(2_654_435_761).to_le_bytes()[3]);

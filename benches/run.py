@@ -30,7 +30,7 @@ EFFORTS = {effort.name: effort for effort in (SHORT, MEDIUM, FULL)}
 def main(arguments: list[str]) -> int:
     """The exit status."""
     named = {part.__name__.rpartition(".")[2]: part for part in PARTS.values()}
-    # Servers that were started are stopped on the way out.
+    # Started servers are stopped at the exit.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     wanted, *parts = arguments or [""]
     unknown = [name for name in parts if name not in named]

@@ -1,6 +1,6 @@
 #!/bin/sh
-# root.sh FOLDER PACKAGE...: makes FOLDER a root file system with what programs need of these installed Debian
-# packages to run.
+# root.sh FOLDER PACKAGE...: makes FOLDER a root file system with the run-time files of these
+# installed Debian packages.
 set -eu
 root=$1
 shift
@@ -8,10 +8,10 @@ mkdir -p "$root/usr/lib" "$root/usr/lib64" "$root/etc/ssl/certs" "$root/var/lib/
     "$root/opt/lookdown/calibrations"
 ln -s usr/lib usr/lib64 "$root"
 for package in "$@"; do
-    # Libraries; not the many that convert between character sets.
+    # Copies libraries without the character set converters.
     dpkg-query --listfiles "$package" | grep -v /gconv/ | while read -r file; do
         case $file in
-            # These folders are links to those below /usr, which packages do not know.
+            # These folders are links to folders below /usr; package lists use the old paths.
             /lib/* | /lib64/*) file=/usr$file ;;
             /usr/lib/*) ;;
             *) continue ;;
@@ -19,7 +19,7 @@ for package in "$@"; do
         if [ -f "$file" ]; then cp --archive --parents "$file" "$root"; fi
     done
     install -D --mode=644 "/usr/share/doc/$package/copyright" "$root/usr/share/doc/$package/copyright"
-    # Scanners look for known faults of the packages that are named here.
+    # Vulnerability scanners read the package list here.
     dpkg-query --status "$package" > "$root/var/lib/dpkg/status.d/$package"
 done
 cp --dereference /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
@@ -28,5 +28,5 @@ chmod 1777 "$root/tmp"
 echo 'lookdown:x:65532:65532:Lookdown:/opt/lookdown:/nonexistent' > "$root/etc/passwd"
 echo 'lookdown:x:65532:' > "$root/etc/group"
 echo 'hosts: files dns' > "$root/etc/nsswitch.conf"
-# A volume that is mounted here is the program's to write to.
+# Makes volumes that are mounted here writable by the program.
 chown 65532:65532 "$root/opt/lookdown/calibrations"

@@ -10,8 +10,8 @@ NOTE = "The published yolov3-tiny.cfg has a wrong `mask`: make it 1,2,3 in its l
 
 
 def convert(options: argparse.Namespace) -> str:
-    """Converts, and says what was made."""
-    # Here, because only the private environment has what this needs.
+    """Converts, and prints the result."""
+    # Imported here, because only the private environment has the packages.
     from convert.darknet.detector import convert_detector
 
     name = options.name or options.folder.resolve().name

@@ -10,8 +10,8 @@ NOTE = "The network has to be one that takes pixels from 0 to 255, as those publ
 
 
 def convert(options: argparse.Namespace) -> str:
-    """Converts, and says what was made."""
-    # Here, because only the private environment has what this needs.
+    """Converts, and prints the result."""
+    # Imported here, because only the private environment has the packages.
     from convert.yolox import convert_detector
 
     name = options.name or options.folder.resolve().name

@@ -1,4 +1,4 @@
-"""Puts all that Lookdown needs to run into target/dist: `dist.py [BINARY]`, target/release/lookdown by default.
+"""Packs everything that Lookdown needs to run into target/dist: `dist.py [BINARY]`, target/release/lookdown by default.
 
 The folder target/dist/lookdown is what container images are made of; the tarball beside it is the same for people.
 The same binary and assets give the same bytes; files are as old as SOURCE_DATE_EPOCH says, from 1970 without it.
@@ -47,7 +47,7 @@ def main(arguments: list[str]) -> int:
 
 
 def files_of(root: Path, pins: Pins, cpu: str) -> Iterator[tuple[Path, str]]:
-    """The files that the set-up has placed and those of the repository, and what they are called in the folder."""
+    """The files of the set-up and of the repository, with their names in the folder."""
     for name in TEXTS:
         yield root / name, name
     for member in pins.runtime[cpu].members:
@@ -60,7 +60,7 @@ def files_of(root: Path, pins: Pins, cpu: str) -> Iterator[tuple[Path, str]]:
 
 
 def copy_files(folder: Path, binary: Path, files: Iterator[tuple[Path, str]]) -> None:
-    """Copies them with the permissions that everybody's files have."""
+    """Copies them with the permissions that all files need."""
     for source, name in [(binary, "lookdown"), *files]:
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -72,7 +72,7 @@ def copy_files(folder: Path, binary: Path, files: Iterator[tuple[Path, str]]) ->
 
 
 def describe_commands(folder: Path) -> None:
-    """Has the binary write its manual and what shells complete its commands with."""
+    """Lets the binary write its manual and shell completions."""
     binary = folder / "lookdown"
     subprocess.run([binary, "manual", folder / "man" / "man1"], check=True)
     completions = folder / "completions"
@@ -83,14 +83,14 @@ def describe_commands(folder: Path) -> None:
 
 
 def write_sums(folder: Path) -> None:
-    """Writes what `sha256sum --check SHA256SUMS` reads in the folder."""
+    """Writes SHA256SUMS for `sha256sum --check` in the folder."""
     files = sorted(file for file in folder.rglob("*") if file.is_file())
     lines = [f"{sha256_of(file)}  {file.relative_to(folder)}\n" for file in files]
     (folder / SUMS).write_text("".join(lines), encoding="utf-8")
 
 
 def pack(folder: Path, tarball: Path, modified: int) -> None:
-    """Packs the folder under the tarball's own name, without what would differ on another machine."""
+    """Packs the folder reproducibly, under the name of the tarball."""
 
     def anonymous(entry: tarfile.TarInfo) -> tarfile.TarInfo:
         entry.uid = entry.gid = 0
@@ -103,7 +103,7 @@ def pack(folder: Path, tarball: Path, modified: int) -> None:
         gzip.GzipFile("", "wb", mtime=modified, fileobj=file) as compressed,
         tarfile.open(fileobj=compressed, mode="w") as packed,
     ):
-        # Members of folders are added in the order of their names.
+        # Members are sorted by name.
         packed.add(folder, tarball.name.removesuffix(".tar.gz"), filter=anonymous)
 
 

@@ -14,16 +14,16 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 FUZZ = ROOT / "fuzz"
 IMPORTERS = re.findall(r'^    \("(\w+)", Format::', (FUZZ / "src/importer.rs").read_text(), re.MULTILINE)
-# Besides fuzz/seeds/TARGET.
+# Seeds in addition to fuzz/seeds/TARGET.
 SEEDS = {"picture": ["tests/fixtures/images"]} | {
     name: ["tests/fixtures/calibrations", "samples/calibrations"] for name in IMPORTERS
 }
 TARGETS = [*IMPORTERS, "picture", "request", "settings", "merge"]
 MAX_SECONDS = 1
 MAX_MEBIBYTES = 256
-# Longer inputs only take longer: a format's every field fits in this.
+# All fields of each format fit into this size; longer inputs only take more time.
 MAX_BYTES = 2048
-# Files of a corpus that are checked in, beside those that failed once.
+# The number of checked-in files of a corpus, without those that failed once.
 MAX_KEPT = 32
 FAILED = "failed-"
 
@@ -37,7 +37,7 @@ def main() -> int:
     for target in arguments.targets:
         if target not in TARGETS:
             parser.error(f"there is no target {target}: give some of {', '.join(TARGETS)}")
-    # What reads a stranger's bytes has no unsafe code, and without a sanitizer the stable compiler will do.
+    # Parsers of untrusted bytes have no unsafe code, so no sanitizer is needed and the stable compiler suffices.
     subprocess.run(["cargo", "fuzz", "build", "--sanitizer", "none"], cwd=FUZZ, check=True)
     print("| target | executions | of them read by the importer | seconds | per second | peak MiB | findings |")
     print("|---|---|---|---|---|---|---|", flush=True)
@@ -50,7 +50,7 @@ def main() -> int:
 
 
 def fuzz(target: str, runs: int) -> bool:
-    """Fuzzes a target and prints its row; whether nothing was found."""
+    """Fuzzes a target and prints its row; returns True if there were no findings."""
     found = FUZZ / "found" / target
     found.mkdir(parents=True, exist_ok=True)
     options = [f"-runs={runs}", f"-max_len={MAX_BYTES}", f"-timeout={MAX_SECONDS}", "-print_final_stats=1"]
@@ -59,7 +59,7 @@ def fuzz(target: str, runs: int) -> bool:
     output, healthy = run(target, [*options, found, *seeds(target)])
     seconds = time.monotonic() - began
     executions, peak = statistic("number_of_executed_units", output), statistic("peak_rss_mb", output)
-    # The fuzzer looks at its memory once a second, the kernel always.
+    # The fuzzer samples its memory once a second, the kernel records the peak.
     healthy = healthy and peak <= MAX_MEBIBYTES
     if not healthy:
         print(output[-4000:], file=sys.stderr)
@@ -70,7 +70,7 @@ def fuzz(target: str, runs: int) -> bool:
 
 
 def minimise(target: str) -> None:
-    """Keeps those of the finds in the corpus that together reach the most; what failed once stays there, too."""
+    """Keeps the inputs in the corpus that together reach the most code, and inputs that failed once."""
     corpus, chosen = FUZZ / "corpus" / target, FUZZ / "found" / f"{target}.chosen"
     corpus.mkdir(parents=True, exist_ok=True)
     chosen.mkdir()
@@ -78,7 +78,7 @@ def minimise(target: str) -> None:
     for old in corpus.iterdir():
         if not old.name.startswith(FAILED):
             old.unlink()
-    # They are written in the order of how much each adds.
+    # They are sorted by their additional coverage.
     best = sorted(chosen.iterdir(), key=lambda file: file.stat().st_mtime_ns)
     for file in best[:MAX_KEPT]:
         file.rename(corpus / file.name)
@@ -93,7 +93,7 @@ def seeds(target: str) -> list[Path]:
 
 
 def run(target: str, arguments: list) -> tuple[str, bool]:
-    """Runs the executable of a target; what it said, and whether it ended well."""
+    """Runs the executable of a target; returns its output and its success."""
     is_importer = target in IMPORTERS
     executable = "importer" if is_importer else target
     triple = subprocess.check_output(["rustc", "-vV"], text=True).split("host: ")[1].split()[0]

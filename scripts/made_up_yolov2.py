@@ -1,4 +1,4 @@
-"""Writes YOLOv2 (Pascal VOC, 416 x 416) with weights that nobody trained, for tests and timing of the real size."""
+"""Writes YOLOv2 (Pascal VOC, 416 x 416) with random weights, for tests and timing of the real size."""
 
 import argparse
 import sys
@@ -12,8 +12,8 @@ SEED = 2017
 
 
 def write(folder: Path) -> str:
-    """Writes yolov2.cfg and yolov2.weights, always the same ones, and says how large they are."""
-    # Here, because only the private environment has what these need.
+    """Writes yolov2.cfg and yolov2.weights, reproducibly, and prints their sizes."""
+    # Imported here, because only the private environment has the packages.
     from convert.darknet.network import read_network
     from convert.tests.made_up_darknet import VOC_ANCHORS, write_weights, yolov2_cfg
 

@@ -1,5 +1,5 @@
 #!/bin/sh
-# packages.sh PACKAGE...: installs the Debian packages that are missing. Anybody but root is told their names.
+# packages.sh PACKAGE...: installs the Debian packages that are missing. Prints their names if the user is not root.
 set -eu
 missing=
 for package in "$@"; do

@@ -1,4 +1,4 @@
-"""Writes what a running Lookdown is made of, as CycloneDX 1.6 (JSON): `sbom.py [FILE]`, standard output by default.
+"""Writes a CycloneDX 1.6 bill of materials of Lookdown as JSON: `sbom.py [FILE]`, standard output by default.
 
 The crates that the binary is built from, from `cargo metadata` and Cargo.lock; ONNX Runtime and the models, from
 pins.toml and the models' manifests. The same sources give the same bytes.
@@ -17,12 +17,12 @@ from assets.pins import Archive, Model, Pins, Quantised, read_pins
 
 ROOT = Path(__file__).resolve().parents[1]
 NOT_STATED = "NOASSERTION"
-# Only what it is derived from must never change: ours alone, and made up.
+# A namespace of our own; the identifiers that are derived from it must never change.
 NAMESPACE = uuid.UUID("6c1f4a52-3c0e-4b57-9f59-0f6b1f0f6d35")
 
 
 def main(arguments: list[str]) -> int:
-    """Writes the bill of materials of the machine's own kind of CPU."""
+    """Writes the bill of materials for the CPU family of this machine."""
     cpu = supported_cpu()
     text = json.dumps(bill_of_materials(ROOT, cpu, cargo_metadata(ROOT, cpu)), indent=2, ensure_ascii=False) + "\n"
     if arguments:
@@ -35,13 +35,13 @@ def main(arguments: list[str]) -> int:
 
 
 def cargo_metadata(root: Path, cpu: str) -> dict:
-    """What cargo knows of the crates and what they need on this kind of CPU."""
+    """The metadata of the crates and their dependencies for this CPU family, from cargo."""
     command = ["cargo", "metadata", "--locked", "--format-version=1", f"--filter-platform={cpu}-unknown-linux-gnu"]
     return json.loads(subprocess.run(command, cwd=root, check=True, capture_output=True).stdout)
 
 
 def bill_of_materials(root: Path, cpu: str, metadata: dict) -> dict:
-    """The document, without what would differ from one run to the next."""
+    """The document, reproducible between runs."""
     pins = read_pins(root / "scripts" / "pins.toml")
     needs = needed_crates(metadata)
     sums = checksums((root / "Cargo.lock").read_text(encoding="utf-8"))
@@ -68,7 +68,7 @@ def bill_of_materials(root: Path, cpu: str, metadata: dict) -> dict:
 
 
 def needed_crates(metadata: dict) -> dict[str, set[str]]:
-    """The crates that the binary is built from, its own among them, each with what it needs; none is for tests alone.
+    """The crates of the binary, its own included, with their dependencies, without dev-dependencies.
 
     Those of build scripts belong to it: the web page of the API comes from one.
     """
@@ -94,7 +94,7 @@ def checksums(lock: str) -> dict[tuple[str, str], str]:
 
 
 def reference(package: dict) -> str:
-    """What a crate is called in the document."""
+    """The reference of a crate in the document."""
     return purl("cargo", package["name"], package["version"])
 
 
@@ -110,7 +110,7 @@ def crate(package: dict, sums: dict[tuple[str, str], str]) -> dict:
 
 
 def onnx_runtime(pins: Pins, cpu: str) -> dict:
-    """The component for the library that runs the networks."""
+    """The component of ONNX Runtime."""
     package = archive("pypi", pins.runtime[cpu].archive)
     return package | {"bom-ref": package["purl"], "licenses": licences("MIT")}
 
@@ -130,7 +130,7 @@ def model(root: Path, pinned: Model | Quantised) -> dict:
 
 
 def archive(registry: str, package: Archive) -> dict:
-    """The component for a package as a registry serves it, without a name in the document."""
+    """The component of a registry package, without a reference in the document."""
     return {
         "type": "library",
         "name": package.package,
@@ -141,12 +141,12 @@ def archive(registry: str, package: Archive) -> dict:
 
 
 def identity(kind: str, name_here: str, name: str, version: str) -> dict:
-    """What every component of the document says."""
+    """The common fields of every component."""
     return {"type": kind, "bom-ref": name_here, "name": name, "version": version}
 
 
 def purl(registry: str, name: str, version: str) -> str:
-    """What a package is called everywhere."""
+    """The package URL (purl)."""
     return f"pkg:{registry}/{quote(name)}@{quote(version)}"
 
 
@@ -156,7 +156,7 @@ def hashes(sha256: str) -> list[dict]:
 
 
 def licences(expression: str) -> list[dict]:
-    """An SPDX expression, or that nobody has said."""
+    """An SPDX expression, or the statement that none is given."""
     if expression == NOT_STATED:
         return [{"license": {"name": "not stated"}}]
     return [{"expression": expression}]

@@ -1,9 +1,9 @@
-"""How many replicas so many cameras need, by simulation: `scaling.py FIGURES.json CORES [PROFILE...]` prints Markdown.
+"""Simulates the number of replicas for cameras: `scaling.py FIGURES.json CORES [PROFILE...]` prints Markdown.
 
-FIGURES.json holds what was measured of one replica (docs/scaling.json). A replica of CORES cores is taken for a queue
-that works on one frame after the other with all of them, which is what Lookdown does with the views of a frame, so a
-frame takes its CPU time divided by the cores. Cameras send at their own phase, a little irregularly; whoever stands before the
-replicas sends each frame to one of them at random, in turns, or to the one that is done first.
+FIGURES.json has the measurements of one replica (docs/scaling.json). A replica of CORES cores is modelled as a queue
+that processes one frame after the other with all cores, as Lookdown does with the views of a frame. So a frame takes
+its CPU time divided by the cores. Cameras send at their own phase, with a small jitter. The load balancer sends each
+frame to a random replica, in turns, or to the replica that finishes first.
 """
 
 import heapq
@@ -18,18 +18,18 @@ from pathlib import Path
 CAMERAS = (10, 100, 1000, 10_000)
 FRAMES_PER_SECOND = 1.0
 JITTER_SECONDS = 0.05
-"""Most that a frame comes before or after its time."""
+"""The maximum jitter of a frame."""
 SECONDS, WARM_UP_SECONDS = 60.0, 20.0
 TARGET_SECONDS = 1.0
-"""99 of 100 frames are answered within it."""
+"""The limit of the 99th percentile of the latency."""
 MOST_BUSY = 0.8
-"""Share of the cores that is planned with: the rest carries on when a replica is away."""
+"""The maximum planned load of the cores; the rest is for the failure of a replica."""
 SEED = 7
 
 
 
 def arrivals(cameras: int, chance: random.Random) -> list[float]:
-    """When frames come, ordered, seconds."""
+    """The sorted arrival times of frames, seconds."""
     period = 1.0 / FRAMES_PER_SECOND
     phases = [chance.uniform(0.0, period) for _ in range(cameras)]
     times = [
@@ -41,7 +41,7 @@ def arrivals(cameras: int, chance: random.Random) -> list[float]:
 
 
 def latencies(times: Iterable[float], service: float, replicas: int, balancer: str, chance: random.Random) -> list[float]:
-    """Seconds from a frame's arrival to its answer, frames of the warm-up left out."""
+    """The latencies of frames in seconds, without the warm-up."""
     seen = []
     for at, done in _answers(times, service, replicas, balancer, chance):
         if at >= WARM_UP_SECONDS:
@@ -71,12 +71,12 @@ BALANCERS = ("random", "in turns", "first done")
 
 
 def needed(cameras: int, service: float, balancer: str) -> int:
-    """The fewest replicas that keep to the target, each of which takes so many seconds for a frame."""
+    """The minimum number of replicas that meets the target, with `seconds` of work per frame."""
     if service > TARGET_SECONDS:
         raise ValueError(f"a frame alone takes {service:.2f} s, more than {TARGET_SECONDS:.2f} s: give more cores")
     times = arrivals(cameras, random.Random(SEED))
     replicas = max(1, math.ceil(cameras * FRAMES_PER_SECOND * service / MOST_BUSY))
-    # In steps of one in a hundred: among thousands nobody counts single ones.
+    # In steps of 1 %: single replicas do not matter among thousands.
     while True:
         slowest = percentile(latencies(times, service, replicas, balancer, random.Random(SEED)), 0.99)
         if slowest <= TARGET_SECONDS:
@@ -85,12 +85,12 @@ def needed(cameras: int, service: float, balancer: str) -> int:
 
 
 def percentile(values: list[float], share: float) -> float:
-    """The value that so large a share of the values does not exceed."""
+    """The quantile of values."""
     return sorted(values)[math.ceil(share * len(values)) - 1]
 
 
 def table(figures: dict, cores: int, profile: str) -> str:
-    """One row for each number of cameras."""
+    """A table with a row for each number of cameras."""
     core_seconds = figures["profiles"][profile]["core_ms_per_frame"] / 1000
     views, redis = figures["profiles"][profile]["views"], figures["redis"]
     lines = [
@@ -101,7 +101,7 @@ def table(figures: dict, cores: int, profile: str) -> str:
     for cameras in CAMERAS:
         frames = cameras * FRAMES_PER_SECOND
         counts = [needed(cameras, core_seconds / cores, balancer) for balancer in BALANCERS]
-        # Every replica hears of every report.
+        # Every replica receives every report.
         redis_ms = redis["core_ms_per_report"] + redis["core_ms_per_delivery"] * counts[-1]
         cells = [
             f"{cameras:,}",

@@ -1,4 +1,4 @@
-"""Fetches what Lookdown needs beside its source: `setup.py [toolchain] [runtime] [model]`, all of them by default.
+"""Downloads the dependencies of Lookdown: `setup.py [toolchain] [runtime] [model]`, all of them by default.
 
 `setup.py model NAME...` fetches and converts other models than the default ones, `setup.py models` all of them.
 Nothing is installed outside the repository, and a second run only checks sums. The work is in `assets/`; this
@@ -11,7 +11,7 @@ OLDEST_PYTHON = (3, 11)
 
 
 def refusal_of(version):
-    """Why this Python cannot run the set-up, or None."""
+    """The reason why this Python cannot run the set-up, or None."""
     if tuple(version[:2]) >= OLDEST_PYTHON:
         return None
     return (

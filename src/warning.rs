@@ -1,5 +1,5 @@
 //! Warnings of reports and calibrations: a stable code for programs and a sentence for people. A
-//! new code is one entry of the table here; its row in docs/operations.md follows from it.
+//! new code is one entry of the table here; its row in docs/http.md follows from it.
 
 use std::fmt;
 

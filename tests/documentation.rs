@@ -17,12 +17,12 @@ struct Section {
 /// Every generated part.
 const SECTIONS: [Section; 2] = [
     Section {
-        file: "docs/operations.md",
+        file: "docs/http.md",
         name: "problems",
         content: problem_table,
     },
     Section {
-        file: "docs/operations.md",
+        file: "docs/http.md",
         name: "warnings",
         content: warning_table,
     },

@@ -1,17 +1,17 @@
-/** The section Calibrate: a circle over the frame, or a file of any format; its views straightened; saved. */
+/** The section Calibrate: edits a circle over the frame or imports a file, previews its views, and saves it. */
 
 import { drawCircle } from "./circle_handles.js";
 import { afterPause, element, find } from "./dom.js";
 import { assumedCircle, calibrationOf, circleOf } from "./lens.js";
 import { isServing, loadCalibrations } from "./parameters.js";
-import { shown, tell, withProgress } from "./progress.js";
+import { shown, showFailure, withProgress } from "./progress.js";
 import { ask, askJson } from "./server.js";
 import { shared, whenChanged } from "./shared.js";
 import { viewCanvas } from "./straighten.js";
 import { GRID_CELLS } from "./views.js";
 
 const FIELDS = ["cx", "cy", "radius", "fieldOfView"];
-/** A circle that is being moved is looked through once it rests. */
+/** The pause after the last change before the preview is updated. */
 const REST_MILLIS = 120;
 const PREVIEW_PIXELS = 320;
 
@@ -24,7 +24,7 @@ let trying = null;
 const form = () => find("#calibration-form");
 const field = (name) => form().elements[name];
 
-/** The circle of the frame: what the server found, or all there is. */
+/** The circle of the frame: the detected one, or the largest that fits. */
 function begin() {
   const { frame, report } = shared;
   find("#calibrate-empty").hidden = Boolean(frame);
@@ -37,7 +37,7 @@ function begin() {
   }
   const { width, height } = frame;
   if (!circle) setCircle(assumedCircle(report ?? { image: { width, height } }));
-  if (isVisible) lookShown();
+  if (isVisible) previewShown();
 }
 
 function setCircle(next) {
@@ -58,7 +58,7 @@ function drawn() {
   if (imported) drawing.replaceChildren();
   else drawCircle(drawing, circle, (moved) => edited({ ...circle, ...moved }));
   for (const name of FIELDS) find(`output[for=calibrate-${name}]`).textContent = Number(field(name).value).toFixed(1);
-  find("#import-name").textContent = imported ? `${imported.name} is saved as it is.` : "";
+  find("#import-name").textContent = imported ? `${imported.name} is saved unchanged.` : "";
   find("#circle-fields").disabled = Boolean(imported);
   find("#import-fields").hidden = !imported;
   const id = field("id").value;
@@ -67,13 +67,13 @@ function drawn() {
 
 function edited(next) {
   setCircle(next);
-  lookSoon();
+  previewSoon();
 }
 
 const content = () => imported?.content ?? JSON.stringify(calibrationOf({ id: id(), ...circle }), null, 2);
 const id = () => field("id").value || "camera";
 
-/** How to read an imported file: which of its cameras, and the size of frames where its format does not tell it. */
+/** The query for an imported file: the camera, and the frame size if the format has none. */
 function reading() {
   const query = new URLSearchParams();
   if (imported && field("camera").value) query.set("camera", field("camera").value);
@@ -81,7 +81,7 @@ function reading() {
   return query;
 }
 
-async function look() {
+async function preview() {
   const { frame } = shared;
   if (!frame || !circle) return;
   trying?.abort();
@@ -101,15 +101,15 @@ async function look() {
   find("#previews").replaceChildren(...views);
 }
 
-/** Repeats a request that lacked the size of frames with that of the current frame. */
+/** Repeats a request that lacks the frame size with the size of the current frame. */
 const sizeOr = (again) => (problem) => {
   if (!imported || imported.needsSize || problem.parameter !== "size") throw problem;
   imported.needsSize = true;
   return again();
 };
 
-const lookShown = shown(look);
-const lookSoon = afterPause(REST_MILLIS, lookShown);
+const previewShown = shown(preview);
+const previewSoon = afterPause(REST_MILLIS, previewShown);
 
 async function save() {
   const name = id();
@@ -120,24 +120,24 @@ async function save() {
   const answer = await withProgress(find("#save-progress"), "Saving", () => ask(path, options));
   const { warnings = [] } = await answer.json();
   await loadCalibrations();
-  find("#saved").textContent = [`${name} is saved and serves.`, ...warnings.map(({ message }) => message)].join(" ");
+  find("#saved").textContent = [`${name} is saved and in use.`, ...warnings.map(({ message }) => message)].join(" ");
   find("#calibration").value = name;
   find("#parameters").dispatchEvent(new Event("input"));
   drawn();
 }
 
-/** A file from the disk; what it means is for the server to say. */
+/** Imports a file from the disk; the server parses it. */
 async function importFile(file) {
   const text = await file.text();
   imported = { name: file.name, content: text, needsSize: false };
-  // A file of ours has a name.
+  // A native file has an ID.
   const own = /"id"\s*:\s*"([a-z0-9][a-z0-9_-]{0,63})"/.exec(text);
   if (own) field("id").value = own[1];
   drawn();
-  await look();
+  await preview();
 }
 
-/** Goes on from a calibration that serves. */
+/** Loads a calibration of the server. */
 async function open(name) {
   const file = await askJson(`calibrations/${name}`);
   const known = circleOf(file);
@@ -145,7 +145,7 @@ async function open(name) {
   imported = known ? null : { name, content: JSON.stringify(file), needsSize: false };
   if (known) setCircle(known);
   drawn();
-  await look();
+  await preview();
 }
 
 export function visible(is) {
@@ -165,7 +165,7 @@ export function start() {
       const values = Object.fromEntries(FIELDS.map((name) => [name, Number(field(name).value)]));
       circle = { ...circle, ...values, model: field("model").value, cameraHeight: Number(field("cameraHeight").value) || null };
     }
-    if (event.target.closest("#circle-fields, #import-fields")) lookSoon();
+    if (event.target.closest("#circle-fields, #import-fields")) previewSoon();
     if (circle) drawn();
   });
   form().addEventListener("submit", (event) => {
@@ -179,9 +179,9 @@ export function start() {
   });
   find("#drop-import").addEventListener("click", () => {
     imported = null;
-    tell(find("#previews-progress"), "");
+    showFailure(find("#previews-progress"), "");
     drawn();
-    lookShown();
+    previewShown();
   });
   find("#open-calibration").addEventListener("change", (event) => {
     const name = event.target.value;

@@ -1,8 +1,8 @@
-/** The circle over the frame and its two handles. Whatever they do, the fields beside do, too. */
+/** The circle over the frame and its two handles, which have the same function as the form fields. */
 
 import { shape } from "./dom.js";
 
-/** Draws the circle into `drawing`; `moved` hears of `{cx, cy}` or `{radius}` while a handle is dragged. */
+/** Draws the circle into `drawing`; calls `moved` with `{cx, cy}` or `{radius}` while a handle is dragged. */
 export function drawCircle(drawing, { width, height, cx, cy, radius }, moved) {
   drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
   const unit = Math.max(width, height) / 480;
@@ -11,7 +11,7 @@ export function drawCircle(drawing, { width, height, cx, cy, radius }, moved) {
     node.addEventListener("pointerdown", (event) => drag(drawing, event, act));
     return node;
   };
-  // On the diagonal, where the frame still holds it when the circle fills the frame.
+  // On the diagonal, which is inside the frame even if the circle fills it.
   const side = radius * Math.SQRT1_2;
   drawing.replaceChildren(
     shape("circle", { class: "casing", cx, cy, r: radius, "stroke-width": 4.5 * unit }),

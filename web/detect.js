@@ -1,4 +1,4 @@
-/** The section Detect: a frame in, its persons over it; every change of a parameter looks again. */
+/** The section Detect: shows a frame with its persons; every change of a parameter runs detection again. */
 
 import { afterPause, element, find } from "./dom.js";
 import { clearFindings, showFindings } from "./findings.js";
@@ -8,7 +8,7 @@ import { shown, withProgress } from "./progress.js";
 import { askJson } from "./server.js";
 import { change, shared, whenChanged } from "./shared.js";
 
-/** A slider that is being moved asks once it rests. */
+/** The pause after the last change of a slider before the request. */
 const REST_MILLIS = 150;
 
 let running = null;
@@ -20,7 +20,7 @@ async function run() {
   const now = (running = new AbortController());
   const path = `detect?${parameters.query()}`;
   const options = { method: "POST", body: frame.blob, signal: now.signal };
-  const report = await withProgress(find("#stage"), "Looking for people", () => askJson(path, options));
+  const report = await withProgress(find("#stage"), "Detecting persons", () => askJson(path, options));
   if (shared.frame === frame && running === now) change("report", report);
 }
 
@@ -51,7 +51,7 @@ function showReport() {
   showFindings(report);
 }
 
-/** Hands the report out as a file. */
+/** Downloads the report as a file. */
 function save() {
   const blob = new Blob([JSON.stringify(shared.report, null, 1)], { type: "application/json" });
   const url = URL.createObjectURL(blob);
@@ -62,7 +62,7 @@ function save() {
 export function start() {
   parameters.start(afterPause(REST_MILLIS, runShown));
   find("#report-link").addEventListener("click", save);
-  // Marks keep their size on the screen, whatever that of the picture is.
+  // Marks keep their size on the screen for all image sizes.
   new ResizeObserver(() => shared.report && drawMarks(find("#marks"), shared.report)).observe(find("#marks"));
   whenChanged(["frame"], showFrame);
   whenChanged(["report"], showReport);

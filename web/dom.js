@@ -1,15 +1,15 @@
-/** Elements: found, made, filled. */
+/** Helpers that find, create and fill elements. */
 
 const SVG = "http://www.w3.org/2000/svg";
 
 export const find = (selector, within = document) => within.querySelector(selector);
 
-/** An element with attributes, listeners (`onclick` and the like) and children. */
+/** Creates an element with attributes, listeners (`onclick` and the like) and children. */
 export function element(name, attributes = {}, ...children) {
   return furnished(document.createElement(name), attributes, children);
 }
 
-/** The same for shapes of a drawing. */
+/** A shape of an SVG drawing. */
 export function shape(name, attributes = {}, ...children) {
   return furnished(document.createElementNS(SVG, name), attributes, children);
 }
@@ -23,7 +23,7 @@ function furnished(node, attributes, children) {
   return node;
 }
 
-/** Calls `act` once the calls have stopped for so long. */
+/** Returns a function that calls `act` after a pause without further calls. */
 export function afterPause(millis, act) {
   let timer;
   return () => {

@@ -1,4 +1,4 @@
-/** What was found: the list of persons, where the time went, what the sender should know. */
+/** The results: the list of persons, the time per stage, warnings. */
 
 import { element, find, plural } from "./dom.js";
 import { change, shared } from "./shared.js";
@@ -13,19 +13,19 @@ const STAGE_WORDS = {
   refine: "Merge",
 };
 
-/** A duration, with as many digits as mean something. */
+/** Formats a duration with its significant digits. */
 export const millis = (value) => (value < 9.95 ? value.toFixed(1) : String(Math.round(value)));
 
 export function showFindings(report) {
   const { persons, views, timings_ms: timings } = report;
-  const looked = views.inferred + views.unchanged;
+  const used = views.inferred + views.unchanged;
   find("#count").textContent = persons.length;
   find("#count-word").textContent = persons.length === 1 ? "person" : "persons";
   find("#summary").textContent =
-    `${plural(looked, "view")}${views.inferred ? "" : " remembered"}, ${millis(timings.total)} ms, ${report.model.name}, ${report.refinement.name}`;
+    `${plural(used, "view")}${views.inferred ? "" : " cached"}, ${millis(timings.total)} ms, ${report.model.name}, ${report.refinement.name}`;
   find("#announcement").textContent = `${plural(persons.length, "person")} found in ${millis(timings.total)} milliseconds.`;
   find("#persons").replaceChildren(...persons.map(row));
-  find("#nobody").hidden = persons.length > 0;
+  find("#no-persons").hidden = persons.length > 0;
   showTimings(timings);
   find("#warnings").replaceChildren(...report.warnings.map(({ message }) => element("li", {}, message)));
 }
@@ -68,11 +68,11 @@ function showTimings(timings) {
   find("#timings").replaceChildren(...facts);
 }
 
-/** Takes everything away. */
+/** Clears all results. */
 export function clearFindings() {
   find("#count").textContent = "–";
   find("#count-word").textContent = "persons";
   find("#summary").textContent = shared.frame ? shared.frame.name : "No frame yet";
   for (const id of ["#persons", "#timing-bar", "#timings", "#warnings"]) find(id).replaceChildren();
-  find("#nobody").hidden = true;
+  find("#no-persons").hidden = true;
 }

@@ -1,4 +1,4 @@
-/** The section Floor: persons from above, where the camera's height is known. */
+/** The section Floor: persons from above, if the camera height is known. */
 
 import { element, find, plural, shape } from "./dom.js";
 import { points, roundStep } from "./geometry.js";
@@ -7,9 +7,9 @@ import { askJson } from "./server.js";
 import { change, shared, whenChanged } from "./shared.js";
 import { pointOut } from "./marks.js";
 
-/** Half the side of the drawing, in its own units. */
+/** Half the side of the drawing, in drawing units. */
 const HALF = 240;
-/** The map reaches at least so far, metres. */
+/** The minimum extent of the map, metres. */
 const LEAST_REACH = 3;
 
 let isVisible = false;
@@ -31,7 +31,7 @@ async function show() {
 
 function reason(report) {
   if (!report) return "Pick a frame in Detect first: its persons are shown here from above.";
-  if (!report.persons.length) return "There is nobody in this frame.";
+  if (!report.persons.length) return "This frame has no persons.";
   return "The height of this camera above the floor is not known. Save a calibration with the height in Calibrate, and choose it in Detect.";
 }
 
@@ -60,7 +60,7 @@ function draw(report, file) {
     shape("path", { d: "M-7 0L0 -7L7 0L0 7Z", class: "camera" }, shape("title", {}, "The camera")),
     ...report.persons.flatMap((person, index) => (person.floor ? [dot(person.floor, index, scale)] : [])),
   );
-  find("#floor-facts").textContent = `The camera is the diamond in the middle, ${file.mount.height_m} m above the floor; right and down are those of the frame.`;
+  find("#floor-facts").textContent = `The diamond in the middle is the camera, ${file.mount.height_m} m above the floor. Right and down are the directions in the frame.`;
   find("#places").replaceChildren(...report.persons.map(row));
 }
 

@@ -1,22 +1,22 @@
 /** The frame: from a file, the clipboard, a drop or a sample. */
 
 import { element, find } from "./dom.js";
-import { tell } from "./progress.js";
+import { showFailure } from "./progress.js";
 import { change, shared } from "./shared.js";
 
-/** Pixels of the longer side that views are straightened from. */
+/** The longer side of the image for straightened views, pixels. */
 const MAX_SIDE = 1600;
 
-/** Reads a picture and makes it the frame. */
+/** Reads an image and makes it the frame. */
 export async function show(blob, name) {
   let picture;
   try {
     picture = await createImageBitmap(blob);
   } catch {
-    tell(find("#stage"), `${name} is no picture that this browser can read: use a JPEG, PNG or WebP file.`);
+    showFailure(find("#stage"), `${name} is not an image that this browser can read: use a JPEG, PNG or WebP file.`);
     return;
   }
-  tell(find("#stage"), "");
+  showFailure(find("#stage"), "");
   const scale = Math.min(1, MAX_SIDE / Math.max(picture.width, picture.height));
   const [width, height] = [picture.width, picture.height].map((side) => Math.round(side * scale));
   const canvas = new OffscreenCanvas(width, height);
@@ -46,7 +46,7 @@ export function start() {
   });
   document.addEventListener("paste", (event) => {
     const file = pictureIn(event.clipboardData?.files);
-    if (file) show(file, "the pasted picture");
+    if (file) show(file, "the pasted image");
   });
   document.addEventListener("dragover", (event) => {
     event.preventDefault();
@@ -59,7 +59,7 @@ export function start() {
     event.preventDefault();
     const file = pictureIn(event.dataTransfer.files);
     if (file) show(file, file.name);
-    else if (event.dataTransfer.files.length) tell(find("#stage"), "What was dropped is no picture.");
+    else if (event.dataTransfer.files.length) showFailure(find("#stage"), "The dropped item is not an image.");
   });
   const samples = ["office", "canteen", "lounge"].map((name) => sample(name));
   find("#samples").append(...samples);

@@ -1,4 +1,4 @@
-/** Places in the frame, corner-origin pixels. */
+/** Geometry in the frame, in corner-origin pixels. */
 
 /** The corners of an oriented box, clockwise from its top left: its height axis is `angle_deg` clockwise from image up. */
 export function corners({ cx, cy, width, height, angle_deg: degrees }) {
@@ -9,7 +9,7 @@ export function corners({ cx, cy, width, height, angle_deg: degrees }) {
   return across.map((x, corner) => [cx + x * cos - along[corner] * sin, cy + x * sin + along[corner] * cos]);
 }
 
-/** Whether a place lies in an outline: it crosses it an odd number of times on the way out. */
+/** Returns true if a point lies in an outline (even-odd rule). */
 export function holds(outline, [x, y]) {
   let inside = false;
   outline.forEach(([x1, y1], index) => {
@@ -19,7 +19,7 @@ export function holds(outline, [x, y]) {
   return inside;
 }
 
-/** As the attribute `points` of a drawing. */
+/** Formats points for the attribute `points` of a polygon. */
 export const points = (places) => places.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ");
 
 /** The centre of a person's box. */

@@ -1,4 +1,4 @@
-/** The dialog for the key: asked for by the server, or opened by hand. */
+/** The dialog for the API key, opened on a 401 response or by its button. */
 
 import { find } from "./dom.js";
 import { key } from "./server.js";

@@ -1,6 +1,6 @@
-/** Ideal lenses: a circle and a field of view make a calibration file, and the other way round. */
+/** Ideal lenses: converts a circle and a field of view to a calibration file and back. */
 
-/** Radius over focal length for an angle from the axis. */
+/** The radius divided by the focal length for an angle from the axis. */
 const CURVES = {
   equidistant: (theta) => theta,
   equisolid: (theta) => 2 * Math.sin(theta / 2),
@@ -21,13 +21,13 @@ export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldO
   return {
     id,
     image: { width, height },
-    // Lens functions speak of pixel centres.
+    // Lens functions use pixel centres.
     lens: { model, focal: radius / CURVES[model](maxTheta), cx: cx - 0.5, cy: cy - 0.5, max_theta: maxTheta },
     mount,
   };
 }
 
-/** What `calibrationOf` would have made this file of; null for what it cannot make. */
+/** The circle from which `calibrationOf` makes this file; null if there is none. */
 export function circleOf({ lens, mount, image, zones, masks }) {
   const curve = CURVES[lens.model];
   const focal = lens.focal ?? (lens.fx === lens.fy ? lens.fx : null);

@@ -1,52 +1,52 @@
-/** The section Live: a card for each camera, told by events. */
+/** The section Live: a card for each camera, updated by events. */
 
 import { element, find } from "./dom.js";
 import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
-import { shown, tell, withProgress } from "./progress.js";
+import { shown, showFailure, withProgress } from "./progress.js";
 import { ask, askJson, events } from "./server.js";
 
-/** Cameras that are shown at most, those that were heard of last. */
+/** The maximum number of cards; cameras with the latest reports come first. */
 const MAX_CARDS = 60;
-/** Reports that a plot goes back. */
+/** The number of reports in a plot. */
 const MAX_HISTORY = 100;
-/** From the end of a stream to the next try. */
+/** The pause between the end of a stream and the next attempt. */
 const PAUSE_MILLIS = 2000;
 
 const cards = new Map();
 let listening = null;
 let lastId = "";
 
-/** Listens until it is told to stop; whoever comes back hears what was missed. */
+/** Reads events until `signal` aborts. After a reconnection the server sends the missed events. */
 async function listen(signal) {
   const wall = find("#wall-progress");
-  const cameras = await withProgress(wall, "Looking for cameras", () => askJson("results", { signal }));
+  const cameras = await withProgress(wall, "Loading cameras", () => askJson("results", { signal }));
   cameras.sort((one, other) => one.age_seconds - other.age_seconds);
   const known = cameras.slice(0, MAX_CARDS);
-  await withProgress(wall, "Reading what was seen before", () => Promise.all(known.map((row) => remember(row, signal))));
+  await withProgress(wall, "Loading the history", () => Promise.all(known.map((row) => loadHistory(row, signal))));
   find("#wall-empty").hidden = cards.size > 0;
   while (!signal.aborted) {
     try {
       const headers = lastId ? { "Last-Event-ID": lastId } : {};
       for await (const { id, data } of events("events", { headers, signal })) {
-        tell(wall, "");
-        take(id, JSON.parse(data));
+        showFailure(wall, "");
+        addReport(id, JSON.parse(data));
       }
     } catch (error) {
       if (signal.aborted) return;
-      tell(wall, `${error.message} Trying again.`);
+      showFailure(wall, `${error.message} Trying again.`);
     }
     await new Promise((resolve) => setTimeout(resolve, PAUSE_MILLIS));
   }
 }
 
-async function remember({ camera }, signal) {
+async function loadHistory({ camera }, signal) {
   const rows = await askJson(`results/${encodeURIComponent(camera)}/history?limit=${MAX_HISTORY}`, { signal });
-  for (const { id, report } of rows) take(id, report);
+  for (const { id, report } of rows) addReport(id, report);
 }
 
-/** Takes in a report; one that is known changes nothing. */
-function take(id, report) {
+/** Adds a report to its card; ignores known reports. */
+function addReport(id, report) {
   const card = cards.get(report.camera) ?? added(report.camera);
   if (Number(id) <= Number(card.id)) return;
   if (Number(id) > Number(lastId)) lastId = id;
@@ -55,7 +55,7 @@ function take(id, report) {
   card.history.splice(0, card.history.length - MAX_HISTORY);
   card.report = report;
   if (card.drawn) return;
-  // Many reports at once are drawn once.
+  // Draws once for many simultaneous reports.
   card.drawn = requestAnimationFrame(() => draw(card));
 }
 
@@ -92,7 +92,7 @@ function draw(card) {
   showPicture(card);
 }
 
-/** Puts the picture of the latest report in the place of the sketch, where the server keeps pictures of this camera. */
+/** Replaces the sketch by the image of the latest report, if the server stores images of this camera. */
 async function showPicture(card) {
   if (!card.hasPicture || card.isAsking) return;
   card.isAsking = true;

@@ -1,4 +1,4 @@
-/** Starts the page: one section at a time, named by the address. */
+/** Starts the page and shows the section in the address. */
 
 import { find } from "./dom.js";
 import * as calibrate from "./calibrate.js";

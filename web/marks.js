@@ -4,10 +4,10 @@ import { plural, shape } from "./dom.js";
 import { centre, corners, points } from "./geometry.js";
 import { change, shared } from "./shared.js";
 
-/** The side of a picture whose size on the screen is not known, CSS pixels. */
+/** The default side of an image with an unknown size on the screen, CSS pixels. */
 const USUAL_SIDE = 480;
 
-/** Fills a drawing that lies over the frame of `report`; its persons can be pointed at. */
+/** Draws the persons of `report` over its frame, with pointer events. */
 export function drawMarks(drawing, report) {
   const { width, height } = report.image;
   const scale = Math.min(drawing.clientWidth / width, drawing.clientHeight / height) || USUAL_SIDE / Math.max(width, height);
@@ -15,7 +15,7 @@ export function drawMarks(drawing, report) {
   drawing.replaceChildren(...report.persons.map((person, index) => mark(person, index, 1 / scale)));
 }
 
-/** A mark with lines of `pixel` times so many pixels of the frame. */
+/** A mark with line widths in multiples of `pixel`, frame pixels. */
 function mark(person, index, pixel) {
   const outline = points(corners(person.oriented_box));
   const [x, y] = centre(person);
@@ -29,11 +29,11 @@ function mark(person, index, pixel) {
   );
 }
 
-/** The persons in the circle of the lens, as small as a thumb. */
+/** A thumbnail of the persons in the lens circle. */
 export function sketch(report) {
   const { width, height } = report.image;
   const side = Math.min(width, height);
-  const label = `Where ${plural(report.persons.length, "person")} was seen in the frame`;
+  const label = `Positions of ${plural(report.persons.length, "person")} in the frame`;
   const box = ({ oriented_box: box }) => shape("polygon", { points: points(corners(box)), "stroke-width": side / 75 });
   return shape(
     "svg",
@@ -44,7 +44,7 @@ export function sketch(report) {
   );
 }
 
-/** Points out the person that is pointed at. */
+/** Highlights the person under the pointer. */
 export function pointOut(drawing) {
   for (const node of drawing.querySelectorAll("[data-person]")) {
     node.classList.toggle("chosen", Number(node.dataset.person) === shared.person);

@@ -1,17 +1,17 @@
-/** The parameters of the section Detect, as the server takes them. */
+/** The parameters of the section Detect, as in the API. */
 
 import { element, find } from "./dom.js";
 import { askJson } from "./server.js";
 import { change, shared } from "./shared.js";
 
 const SLIDERS = ["score_threshold", "iou_threshold", "sigma"];
-/** What refines where nothing is chosen. */
+/** The default refinements of profiles; `fusion` for all others. */
 const OWN_REFINEMENT = { paper: "soft_nms_gaussian", direct: "nms" };
 
 const form = () => find("#parameters");
 
-/** As a query. Reports of the page are kept under a name of its own, not among those of a camera; and as whoever
- * moves a slider asks for the same frame again, what the network found in it is to be remembered. */
+/** The query of a request. Reports of the page have their own camera name, and inference is cached, because sliders
+ * send the same frame again. */
 export function query() {
   const given = [...new FormData(form())].filter(([, value]) => value !== "");
   return new URLSearchParams([...given, ["camera", "web-page"], ["remember", "true"]]);
@@ -19,11 +19,11 @@ export function query() {
 
 export const profile = () => new FormData(form()).get("profile");
 
-/** Shows the values, and which of them matter. */
+/** Shows the values, and disables those without effect. */
 function show() {
   for (const name of SLIDERS) find(`output[for=${name}]`).textContent = Number(find(`#${name}`).value).toFixed(2);
   const refinement = find("#refine").value || OWN_REFINEMENT[profile()] || "fusion";
-  find("#refine-own").textContent = `The profile's own (${OWN_REFINEMENT[profile()] ?? "fusion"})`;
+  find("#refine-own").textContent = `Default of the profile (${OWN_REFINEMENT[profile()] ?? "fusion"})`;
   find("#sigma").disabled = refinement !== "soft_nms_gaussian";
 }
 

@@ -1,4 +1,4 @@
-/** Persons over time, as steps: a count holds until the next report. */
+/** Persons over time as a step plot: a count is valid until the next report. */
 
 import { plural, shape } from "./dom.js";
 import { roundStep } from "./geometry.js";
@@ -7,7 +7,7 @@ const [WIDTH, HEIGHT, LEFT, BOTTOM, TOP] = [320, 110, 24, 20, 8];
 
 const clock = (time) => new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
 
-/** A drawing of `history`: `{time, persons}`, milliseconds since 1970, oldest first, at least one; until `now`. */
+/** Draws `history` until `now`: at least one `{time, persons}`, milliseconds since 1970, oldest first. */
 export function stepPlot(history, now) {
   const first = history[0].time;
   // The clocks of the server and of this machine may differ.

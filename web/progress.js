@@ -1,11 +1,11 @@
-/** Shows what takes long, and what went wrong. */
+/** Shows progress bars and failures. */
 
 import { element, find } from "./dom.js";
 
-/** Work that takes longer is shown. */
+/** The delay before a progress bar is shown. */
 const PATIENCE_MILLIS = 300;
 
-/** How much is under way in a host: what was replaced ends after what replaces it has begun. */
+/** The number of running operations per host: a replaced one may end after its replacement has begun. */
 const underWay = new WeakMap();
 
 function count(host, change) {
@@ -15,7 +15,7 @@ function count(host, change) {
   else host.removeAttribute("aria-busy");
 }
 
-/** Does `work` and shows a bar in `host` for as long as it takes; failures are told there, too. */
+/** Runs `work`, with a progress bar in `host`; shows failures there, too. */
 export async function withProgress(host, label, work) {
   const began = performance.now();
   const seconds = element("span", { class: "seconds", "aria-hidden": "true" });
@@ -38,10 +38,10 @@ export async function withProgress(host, label, work) {
   count(host, 1);
   try {
     const done = await work();
-    tell(host, "");
+    showFailure(host, "");
     return done;
   } catch (error) {
-    if (error.name !== "AbortError") tell(host, error.message);
+    if (error.name !== "AbortError") showFailure(host, error.message);
     throw error;
   } finally {
     clearTimeout(waiting);
@@ -51,13 +51,13 @@ export async function withProgress(host, label, work) {
   }
 }
 
-/** Shows a failure in `host`, or takes the last one away. */
-export function tell(host, text) {
+/** Shows a failure in `host`, or removes it if `text` is empty. */
+export function showFailure(host, text) {
   find(":scope > .failure", host)?.remove();
   if (text) host.append(element("p", { class: "failure", role: "alert" }, text));
 }
 
-/** For event handlers: what went wrong has been shown. */
+/** Wraps an event handler: ignores failures that are already shown. */
 export function shown(work) {
   return (...given) => {
     work(...given).catch((error) => {

@@ -1,4 +1,4 @@
-/** Talks to the server: relative addresses, the key if there is one, problems as errors. */
+/** Requests to the server, with relative addresses, the API key, and problems as errors. */
 
 const KEY = "lookdown-key";
 
@@ -7,7 +7,7 @@ export const key = {
   set: (value) => (value ? sessionStorage.setItem(KEY, value) : sessionStorage.removeItem(KEY)),
 };
 
-/** A problem document of the server (RFC 9457); `parameter` is the one at fault, if there is one. */
+/** A problem document of the server (RFC 9457); `parameter` is the invalid parameter, if any. */
 export class Problem extends Error {
   constructor(status, text, parameter) {
     super(text);
@@ -16,7 +16,7 @@ export class Problem extends Error {
   }
 }
 
-/** The answer, if it is a success; otherwise throws what is wrong. */
+/** Returns a successful response; throws a `Problem` otherwise. */
 export async function ask(path, options = {}) {
   const headers = new Headers(options.headers);
   if (key.get()) headers.set("X-API-Key", key.get());
@@ -25,17 +25,17 @@ export async function ask(path, options = {}) {
     answer = await fetch(path, { ...options, headers });
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Problem(0, "The server does not answer.");
+    throw new Problem(0, "The server does not respond.");
   }
   if (answer.ok) return answer;
-  const told = await answer.json().catch(() => ({}));
+  const problem = await answer.json().catch(() => ({}));
   if (answer.status === 401) document.dispatchEvent(new Event("key-wanted"));
-  throw new Problem(answer.status, told.detail ?? `The server answered ${answer.status}.`, told.parameter);
+  throw new Problem(answer.status, problem.detail ?? `The server returned ${answer.status}.`, problem.parameter);
 }
 
 export const askJson = async (path, options) => (await ask(path, options)).json();
 
-/** Server-sent events of a path, `{id, data}` each. `EventSource` could not send the key. */
+/** Server-sent events of a path, `{id, data}` each. `EventSource` cannot send the key. */
 export async function* events(path, options = {}) {
   const answer = await ask(path, { ...options, headers: { Accept: "text/event-stream", ...options.headers } });
   const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -52,7 +52,7 @@ export async function* events(path, options = {}) {
   }
 }
 
-/** One event from its lines. */
+/** Parses one event. */
 export function parseEvent(block) {
   const event = { id: "", data: "" };
   for (const line of block.split(/\r?\n/)) {

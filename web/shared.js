@@ -1,13 +1,13 @@
-/** What the sections share; whoever wants to know hears of changes. */
+/** The shared state of the sections, with change events. */
 
 export const shared = {
   /** The frame: `{blob, name, url, width, height, pixels}`. */
   frame: null,
-  /** Its report, as the server answered it. */
+  /** Its report, as returned by the server. */
   report: null,
-  /** The index of the person that is pointed out, or null. */
+  /** The index of the highlighted person, or null. */
   person: null,
-  /** The calibrations that serve. */
+  /** The calibrations in use. */
   calibrations: [],
 };
 

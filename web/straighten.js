@@ -1,6 +1,6 @@
-/** Straightens a frame: the server says where the nodes of a grid over a view lie in the frame, whatever the lens. */
+/** Straightens a frame with a grid: the server returns the positions of its nodes in the frame for any lens. */
 
-/** What lies beyond the lens image and outside the frame: black. */
+/** The colour outside the lens image and the frame: black. */
 const BEYOND = [0, 0, 0, 255];
 
 /**
@@ -27,13 +27,13 @@ export function straighten(pixels, frameWidth, grid, cells, target) {
   }
 }
 
-/** The cell that a share of a side lies in, and the share of the cell. */
+/** The cell that contains a fraction of a side, and the fraction within the cell. */
 function cellAt(share, cells) {
   const cell = Math.min(Math.floor(share * cells), cells - 1);
   return [cell, share * cells - cell];
 }
 
-/** The nodes beyond the lens image go on as straight as those before them, so that the image ends where it ends. */
+/** Extrapolates nodes beyond the lens image linearly, so that the drawing covers the lens image up to its border. */
 export function continued(grid, cells) {
   const side = cells + 1;
   const places = [...grid];
@@ -59,7 +59,7 @@ export function continued(grid, cells) {
   return places.map((place) => place ?? [NaN, NaN]);
 }
 
-/** Copies what is at a place (pixel centres), between four pixels. */
+/** Copies the bilinear sample at a position (pixel centres). */
 function sample({ data, width, height }, x, y, target, at) {
   const inside = x >= -0.5 && y >= -0.5 && x <= width - 0.5 && y <= height - 0.5;
   if (!inside) {
@@ -79,7 +79,7 @@ function sample({ data, width, height }, x, y, target, at) {
   target[at + 3] = 255;
 }
 
-/** A canvas with the view, `side` pixels along its longer side. */
+/** Returns a canvas with the view, `side` pixels along its longer side. */
 export function viewCanvas(view, cells, frame, frameWidth, side) {
   const [width, height] = view.size.map((own) => Math.round((own / Math.max(...view.size)) * side));
   const canvas = document.createElement("canvas");

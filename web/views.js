@@ -1,4 +1,4 @@
-/** The section Views: what the network saw, and who was in sight of whom. */
+/** The section Views: the views of a frame and the persons in each. */
 
 import { element, find, percent, plural, shape } from "./dom.js";
 import { centre, holds, points } from "./geometry.js";
@@ -10,7 +10,7 @@ import { change, shared, whenChanged } from "./shared.js";
 import { viewCanvas } from "./straighten.js";
 
 export const GRID_CELLS = 16;
-/** Pixels of a straightened view's longer side. */
+/** The longer side of a straightened view, pixels. */
 const TILE_PIXELS = 224;
 
 let isVisible = false;
@@ -18,7 +18,7 @@ let shownReport = null;
 let plan = null;
 let chosen = null;
 
-/** The plan that a frame was looked at with. */
+/** Requests the view plan of a report. */
 async function planOf(report) {
   const query = `profile=${report.profile}&grid=${GRID_CELLS}`;
   if (!report.calibration.assumed) {
@@ -34,9 +34,9 @@ async function show() {
   find("#views-content").hidden = !report;
   if (!isVisible || !report || report === shownReport) return;
   const sheet = find("#sheet");
-  const told = await withProgress(find("#views-progress"), "Straightening the views", () => planOf(report));
+  const loaded = await withProgress(find("#views-progress"), "Straightening the views", () => planOf(report));
   if (report !== shared.report) return;
-  [shownReport, plan, chosen] = [report, told, null];
+  [shownReport, plan, chosen] = [report, loaded, null];
   const picture = find("#views-picture");
   picture.src = frame.url;
   picture.width = frame.width;
@@ -46,8 +46,8 @@ async function show() {
   find("#people").replaceChildren(...report.persons.map(chip));
   const facts = `${plural(plan.views.length, "view")} of the profile ${plan.profile} see `;
   find("#views-facts").textContent = plan.views.length
-    ? `${facts}${percent(plan.coverage)} of the lens image, a place of it ${plan.overlap.toFixed(1)} times on average.`
-    : "The profile direct looks at the frame itself: there are no views.";
+    ? `${facts}${percent(plan.coverage)} of the lens image, and each point of it in ${plan.overlap.toFixed(1)} views on average.`
+    : "The profile direct uses the whole frame: there are no views.";
   sheet.classList.toggle("small", plan.views.length > 48);
   sheet.replaceChildren(...plan.views.map((view, index) => tile(view, index, frame, report)));
   pointOutAll();
@@ -70,14 +70,14 @@ function chip(person, index) {
 
 const small = (person) => element("i", {}, `${person + 1} `);
 
-/** A person's box centre in pixels of the frames that the plan was made for. */
+/** The centre of a person's box in pixels of the frame size of the plan. */
 const placeOf = (person, report) => centre(person).map((value) => (value * plan.image[0]) / report.image.width);
 
 function tile(view, index, frame, report) {
-  const inSight = report.persons.flatMap((person, who) => (holds(view.outline, placeOf(person, report)) ? [who] : []));
+  const inSight = report.persons.flatMap((person, at) => (holds(view.outline, placeOf(person, report)) ? [at] : []));
   const canvas = viewCanvas(view, GRID_CELLS, frame, plan.image[0], TILE_PIXELS);
   canvas.setAttribute("aria-hidden", "true");
-  const where = `, ${Math.round(view.off_axis_deg)}° off axis, ${inSight.length ? "sees" : "nobody in sight"} `;
+  const where = `, ${Math.round(view.off_axis_deg)}° off axis, ${inSight.length ? "with" : "without persons"} `;
   const choose = () => {
     chosen = chosen === index ? null : index;
     pointOutAll();

@@ -1,1 +1,1 @@
-"""What all parts of the benchmarks share."""
+"""Code that all parts of the benchmarks share."""

@@ -1,11 +1,11 @@
-"""The boxes of two answers, matched."""
+"""Matches the boxes of two responses."""
 
 SAME_IOU = 0.5
-"""Boxes that overlap so far are of the same person."""
+"""The minimum IoU of boxes of the same person."""
 
 
 def boxes(answer: dict) -> list[list[float]]:
-    """The boxes in an answer."""
+    """Reads the boxes of a response."""
     sides = ("x_min", "y_min", "x_max", "y_max")
     return [[person["box"][side] for side in sides] for person in answer["persons"]]
 
@@ -24,7 +24,7 @@ def matched(mine: list[list[float]], other: list[list[float]]) -> list[float]:
 
 
 def iou(a: list[float], b: list[float]) -> float:
-    """Of two boxes."""
+    """The IoU of two boxes."""
     width = min(a[2], b[2]) - max(a[0], b[0])
     height = min(a[3], b[3]) - max(a[1], b[1])
     shared = max(width, 0.0) * max(height, 0.0)

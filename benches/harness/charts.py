@@ -1,4 +1,4 @@
-"""Charts beside the tables."""
+"""Charts of the results."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ plt.switch_backend("Agg")
 
 
 def bars(name: str, title: str, unit: str, values: dict[str, float]) -> str:
-    """Horizontal bars, one a name; the Markdown that shows them."""
+    """Draws a horizontal bar per name; returns the Markdown of the image."""
     figure, axes = plt.subplots(figsize=(7, 0.6 + 0.4 * len(values)))
     shown = axes.barh(list(values), list(values.values()), color="#3b6ea5")
     axes.bar_label(shown, fmt=" %.3g")
@@ -27,7 +27,7 @@ def lines(
     series: dict[str, Sequence[tuple[float, float]]],
     logarithmic: bool = False,
 ) -> str:
-    """Points joined by lines, a colour a series; the Markdown that shows them."""
+    """Draws a line per series; returns the Markdown of the image."""
     figure, axes = plt.subplots(figsize=(7, 3.6))
     for label, points in series.items():
         axes.plot(*zip(*points, strict=True), marker="o", label=label)
@@ -45,7 +45,7 @@ def lines(
 def _save(figure, name: str, title: str) -> str:
     CHARTS.mkdir(parents=True, exist_ok=True)
     figure.axes[0].set_title(title)
-    # Without the library's version in it, the same figures make the same file.
+    # Without the version of the library, the same figures give the same file.
     figure.savefig(CHARTS / f"{name}.png", dpi=110, bbox_inches="tight", metadata={"Software": None})
     plt.close(figure)
     return f"![{title}](charts/{name}.png)\n"

@@ -1,38 +1,38 @@
-"""How long everything is measured."""
+"""The duration of measurements."""
 
 from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How long everything is measured."""
+    """The duration of measurements."""
 
     name: str
     profiles: tuple[str, ...]
     seconds: float
-    """Of a window, at least."""
+    """The minimum duration of a window."""
     rounds: int
-    """Of windows that alternate."""
+    """The number of alternating windows."""
     tune_seconds: float
-    """Of a window in the search for the best settings."""
+    """The duration of a window in the search for the best settings."""
     clients: tuple[int, ...]
-    """Clients of the closed loops."""
+    """The numbers of clients of closed loops."""
     loads: tuple[int, ...]
-    """Rates of the open loops, percent of the capacity."""
+    """The rates of open loops, percent of the capacity."""
     peer_clients: int
-    """Clients when servers are compared."""
+    """The number of clients for comparisons of servers."""
     many_clients: tuple[int, ...]
-    """Growth with clients."""
+    """The numbers of clients for growth."""
     sides: tuple[int, ...]
-    """Growth with the frame, pixels."""
+    """The frame sides for growth, pixels."""
     cameras: tuple[int, ...]
-    """Growth with cameras."""
+    """The numbers of cameras for growth."""
     frames: int
-    """Frames one after the other, where single frames are timed."""
+    """The number of consecutive frames for timings of single frames."""
     starts: int
-    """Starts of the server."""
+    """The number of server starts."""
     memory_minutes: float
-    """Of steady load while memory is watched."""
+    """The duration of steady load for the measurement of memory."""
 
 
 FULL = Effort(

@@ -1,4 +1,4 @@
-"""What many measurements of one thing say together."""
+"""Statistics over repeated measurements."""
 
 import math
 from collections.abc import Sequence
@@ -16,28 +16,28 @@ class Spread:
     count: int
 
     def as_json(self) -> dict:
-        """For a raw file."""
+        """The values for a raw file."""
         return asdict(self)
 
 
 def spread(values: Sequence[float]) -> Spread:
-    """Of at least one value."""
+    """Computes the spread of at least one value."""
     return Spread(median(values), min(values), max(values), len(values))
 
 
 def ratios(ours: Sequence[float], theirs: Sequence[float]) -> Spread:
-    """Ours by theirs, round by round: what disturbs a whole round leaves its ratio alone."""
+    """The ratios of both servers per round: a disturbance of a whole round does not change its ratio."""
     return spread([our / their for our, their in zip(ours, theirs, strict=True)])
 
 
 def growth(values: Sequence[float]) -> float:
-    """How much greater the last quarter is than the second one, medians; the first one is the warm-up."""
+    """The median of the last quarter minus that of the second; the first is the warm-up."""
     quarter = max(len(values) // 4, 1)
     return median(values[-quarter:]) - median(values[quarter : 2 * quarter] or values[:1])
 
 
 def round_to(value: float, digits: int = 3) -> str:
-    """With so many significant digits, and no more decimals than they need."""
+    """Formats a number with `digits` significant digits and no further decimals."""
     if not math.isfinite(value):
         return "–"
     if value == 0:

@@ -1,4 +1,4 @@
-"""HAProxy that answers each poll from its settings, on one thread: what the cheapest answer costs."""
+"""HAProxy with fixed responses to polls, on one thread: a lower bound of the cost of a response."""
 
 import contextlib
 import shutil
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .processes import BenchError, Server, free_ports, running
 
-# Its rules cannot answer 304. These are fewer headers than ours, and a body that is not there either.
+# Its rules cannot return 304. This response has fewer headers than Lookdown's, and no body either.
 PLAN = """
 global
     nbthread 1
@@ -25,7 +25,7 @@ frontend polls
 
 @contextlib.contextmanager
 def haproxy() -> Iterator[Server]:
-    """One that answers."""
+    """Starts HAProxy and waits until it responds."""
     if shutil.which("haproxy") is None:
         raise BenchError("haproxy is missing: apt-get install haproxy")
     (port,) = free_ports(1)

@@ -9,7 +9,7 @@ from .places import LOAD
 from .processes import BenchError, Server
 
 OPEN_LOOP_CLIENTS = 256
-"""Most requests at a time in an open loop."""
+"""The maximum number of simultaneous requests in an open loop."""
 
 
 def load(
@@ -35,13 +35,13 @@ def load(
     after, wall = server.usage(), time.monotonic() - began
     if answer.returncode != 0:
         raise BenchError(f"the load generator failed: {answer.stderr.strip()}")
-    told = json.loads(answer.stdout)
+    result = json.loads(answer.stdout)
     cpu = after.cpu_seconds - before.cpu_seconds
-    return told | {
+    return result | {
         "clients": clients,
         "rate": rate,
         "cores": cpu / wall,
-        "cpu_seconds_per_frame": cpu / max(told["succeeded_in_all"], 1),
+        "cpu_seconds_per_frame": cpu / max(result["succeeded_in_all"], 1),
         "resident_mib": after.resident_bytes / 2**20,
     }
 
@@ -59,10 +59,10 @@ def steady(
     """A closed loop whose warm-up and window are long enough for every client, if a frame takes `frame_seconds`."""
     turn = clients * frame_seconds
     warm_up, seconds = max(1.0, 1.2 * turn), max(seconds, 2.0 * turn)
-    told = load(server, paths, body, clients=clients, warm_up=warm_up, seconds=seconds, content_type=content_type)
-    if not told["succeeded"]["count"]:
-        raise BenchError(f"{paths[0]}: nothing was answered with success in {seconds:.0f} s: {told}")
-    return told
+    result = load(server, paths, body, clients=clients, warm_up=warm_up, seconds=seconds, content_type=content_type)
+    if not result["succeeded"]["count"]:
+        raise BenchError(f"{paths[0]}: no successful response in {seconds:.0f} s: {result}")
+    return result
 
 
 def start_load(

@@ -1,4 +1,4 @@
-"""Our own server."""
+"""The Lookdown server."""
 
 import contextlib
 import json
@@ -10,14 +10,14 @@ from .places import LOOKDOWN, SAMPLES
 from .processes import Server, free_ports, running
 
 MODEL = "nanodet_g_416"
-"""Of the profiles `fast` and `balanced`."""
+"""The model of the profiles `fast` and `balanced`."""
 
 ROOMY = {
     "LIMITS__MAX_FRAMES_IN_FLIGHT": "512",
     "LIMITS__MAX_UPLOAD_BYTES": "2147483648",
     "SERVER__REQUEST_TIMEOUT_MILLIS": "600000",
 }
-"""Settings under which no client of a closed loop is ever refused: it would only ask again."""
+"""Settings under which no request of a closed loop is refused: the client would only retry."""
 
 
 @contextlib.contextmanager
@@ -29,7 +29,7 @@ def lookdown(settings: dict[str, str] | None = None, calibrations: Path = SAMPLE
     environment = {f"LOOKDOWN__{name}": value for name, value in wanted.items()}
     environment["MALLOC_MMAP_THRESHOLD_"] = "131072"
     with running("lookdown", [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
-        # Ready is said when the default profile's model is loaded; other profiles' may still be loading.
+        # The server is ready when the model of the default profile is loaded; others may still be loading.
         camera = next(calibrations.glob("*.json")).stem
         server.wait_for(f"/calibrations/{camera}/views?profile=paper")
         yield server
@@ -46,5 +46,5 @@ def report(server: Server, path: str, frame: Path) -> dict:
 
 
 def view_plan(server: Server, profile: str) -> dict:
-    """How a frame of the office is looked at."""
+    """The view plan of a frame of the office."""
     return json.loads(server.get(f"/calibrations/{calibration().stem}/views?profile={profile}"))

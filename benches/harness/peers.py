@@ -1,4 +1,4 @@
-"""The servers that we compare with, each in its own Python environment."""
+"""The peer servers, each in its own Python environment."""
 
 import contextlib
 import itertools
@@ -16,29 +16,29 @@ from .processes import Server, free_ports, running
 
 @dataclass(frozen=True)
 class Setting:
-    """How a peer uses the cores."""
+    """The use of cores by a peer."""
 
     processes: int
     frames: int
-    """Worked on at once by a process."""
+    """The number of frames that a process handles at once."""
     threads: int
-    """Of one run of the network."""
+    """The number of threads of one run of the network."""
     batch: int
-    """Views in a run."""
+    """The number of views per run."""
 
     def text(self) -> str:
-        """For a table."""
+        """Formats the settings for a table."""
         return (
             f"processes: {self.processes}, frames at once: {self.frames}, threads: {self.threads}, batch: {self.batch}"
         )
 
     def environment(self) -> dict[str, str]:
-        """As the peers read it."""
+        """The environment variables of a peer."""
         return {name.upper(): str(value) for name, value in asdict(self).items()} | {"MODEL": str(model(MODEL))}
 
 
 def settings(parallel: bool) -> list[Setting]:
-    """Those among which the best is looked for; `parallel` if the peer can work on frames at once in one process."""
+    """The settings to search; `parallel` if the peer handles several frames in one process."""
     cores = len(os.sched_getaffinity(0))
     shares = [(1, 1, cores), (cores, 1, 1)]
     if parallel:
@@ -59,12 +59,12 @@ def plain_python(setting: Setting, plan: Path, refine: str) -> Iterator[Server]:
 
 @contextlib.contextmanager
 def v2_server(setting: Setting) -> Iterator[Server]:
-    """MLServer with the model and nothing around it."""
+    """MLServer with the model only."""
     http, grpc, metrics = free_ports(3)
     folder = WORK / "detector"
     folder.mkdir(parents=True, exist_ok=True)
     wanted = {"host": "127.0.0.1", "http_port": http, "grpc_port": grpc, "metrics_port": metrics, "debug": False}
-    # One process: the model runs in the server's own; several: in workers beside it.
+    # One process: the model runs in the server process. Several: it runs in workers.
     wanted["parallel_workers"] = 0 if setting.processes == 1 else setting.processes
     (folder / "settings.json").write_text(json.dumps(wanted), encoding="utf-8")
     described = {"name": "detector", "implementation": "model.Detector"}

@@ -1,4 +1,4 @@
-"""The frames and calibrations that servers are loaded with: made of our own samples, the same ones every time."""
+"""Generates the frames and calibrations for load tests from the samples, reproducibly."""
 
 import json
 from pathlib import Path
@@ -9,9 +9,9 @@ import numpy as np
 from .places import SAMPLES, WORK
 
 SIDE = 1680
-"""Of the frames of a common camera, pixels."""
+"""The side of a common camera's frames, pixels."""
 NOISE = 2.0
-"""Standard deviation of what makes up for the detail that enlarging cannot give, grey levels."""
+"""The standard deviation of the noise that replaces the detail missing after enlarging, grey levels."""
 QUALITY = 90
 
 
@@ -32,12 +32,12 @@ def frame(side: int = SIDE, sample: str = "office") -> Path:
 
 
 def calibration(sample: str = "office") -> Path:
-    """The calibration of a sample; it holds for every size of its frames."""
+    """The calibration of a sample, for all frame sizes."""
     return SAMPLES / "calibrations" / f"{sample}.json"
 
 
 def cameras(folder: Path, count: int) -> list[str]:
-    """Fills a folder with the calibrations of so many cameras of the office; their IDs."""
+    """Writes calibrations of `count` office cameras into a folder; returns their IDs."""
     written = json.loads(calibration().read_text(encoding="utf-8"))
     ids = [f"camera-{number:04}" for number in range(count)]
     for camera in ids:

@@ -1,4 +1,4 @@
-"""Where things are."""
+"""The folders of the benchmarks."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ SAMPLES = ROOT / "samples"
 PYTHONS = ROOT / ".setup" / "benches"
 """The Python environments that `scripts/setup.py benches` makes."""
 WORK = PYTHONS / "work"
-"""What the benchmarks make for themselves: frames, plans, logs."""
+"""Generated files: frames, plans, logs."""
 
 LOOKDOWN = ROOT / "target" / "release" / "lookdown"
 LOAD = ROOT / "target" / "release" / "examples" / "load"

@@ -20,12 +20,12 @@ STOP_SECONDS = 20.0
 
 
 class BenchError(Exception):
-    """Something that keeps a benchmark from going on."""
+    """An error that stops a benchmark."""
 
 
 @dataclass(frozen=True)
 class Server:
-    """A server that answers."""
+    """A running server."""
 
     address: str
     process: subprocess.Popen
@@ -33,20 +33,20 @@ class Server:
 
     @property
     def pid(self) -> int:
-        """Of its first process."""
+        """The ID of the first process."""
         return self.process.pid
 
     def usage(self) -> Usage:
-        """What it and its workers have used."""
+        """The resource usage of the server and its workers."""
         return usage_of(self.pid)
 
     def get(self, path: str) -> bytes:
-        """The body at a path."""
+        """Returns the body at a path."""
         with urllib.request.urlopen(f"http://{self.address}{path}", timeout=60) as answer:
             return answer.read()
 
     def wait_for(self, path: str, seconds: float = 60.0) -> None:
-        """Until a path is answered with success."""
+        """Waits until a path returns success."""
         deadline = time.monotonic() + seconds
         while True:
             try:
@@ -58,7 +58,7 @@ class Server:
             time.sleep(0.05)
 
     def post(self, path: str, body: bytes, content_type: str = "image/jpeg") -> bytes:
-        """The answer to a body."""
+        """Returns the response to a body."""
         headers = {"Content-Type": content_type}
         request = urllib.request.Request(f"http://{self.address}{path}", body, headers)
         try:
@@ -69,7 +69,7 @@ class Server:
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports that nobody listens on."""
+    """Returns unused ports."""
     with contextlib.ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
         for opened in sockets:
@@ -87,7 +87,7 @@ def running(
     folder: Path = ROOT,
     host: str = "127.0.0.1",
 ) -> Iterator[Server]:
-    """A server that listens on `port` of `host`, from when it answers `ready` with 200 on."""
+    """Starts a server on `port` of `host` and waits until `ready` returns 200."""
     WORK.mkdir(parents=True, exist_ok=True)
     log = WORK / f"{name}.log"
     started = time.monotonic()
@@ -126,7 +126,7 @@ def _last_words(log: Path) -> list[str]:
 
 
 def _stop(process: subprocess.Popen) -> None:
-    """Ends the server with all it has started: its session is its own."""
+    """Ends the server and its child processes, which share its session."""
     for signal_number in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal_number)

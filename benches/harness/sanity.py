@@ -1,4 +1,4 @@
-"""Whether a peer does the same work: it must find the same persons."""
+"""Checks that a peer detects the same persons as Lookdown."""
 
 import json
 
@@ -9,7 +9,7 @@ from .processes import Server
 
 
 def agreement(ours: Server, theirs: Server) -> list[dict]:
-    """Our boxes on the frame and theirs, with one plan and model, for two of our ways to merge boxes."""
+    """Compares the boxes of both servers with one plan and model, for two refinements of Lookdown."""
     other = boxes(json.loads(theirs.post("/detect", frame().read_bytes())))
     rows = []
     for refine in ("fusion", "nms"):

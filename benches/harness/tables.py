@@ -8,7 +8,7 @@ ABSENT = "–"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table whose first column is words and whose other columns are figures."""
+    """Formats a table with words in the first column and figures in the others."""
     lines = [_line(head), "|---|" + "---:|" * (len(head) - 1)]
     for row in rows:
         if len(row) != len(head):

@@ -1,4 +1,4 @@
-"""What a process and its descendants have used, from /proc."""
+"""The resource usage of a process and its descendants, from /proc."""
 
 import os
 from dataclasses import dataclass

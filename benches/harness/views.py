@@ -1,4 +1,4 @@
-"""What the networks of other servers see of our frame: the same views, rendered with OpenCV."""
+"""The views of the frame for the networks of other servers, rendered with OpenCV."""
 
 import base64
 import json

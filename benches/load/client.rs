@@ -1,4 +1,4 @@
-//! A client with one connection, which it keeps as long as the server does.
+//! A client with one keep-alive connection.
 
 use std::{cell::RefCell, rc::Rc, time::Duration};
 
@@ -17,31 +17,31 @@ use tokio::{
 
 use crate::{pace::Pace, tally::Tally};
 
-/// What is asked of whom.
+/// The request and its server.
 pub struct Target {
     /// Address and port.
     pub address: String,
-    /// Path and query, taken in turns.
+    /// Paths and queries, used in turns.
     pub paths: Vec<String>,
-    /// The body's type.
+    /// The media type of the body.
     pub content_type: String,
     /// The body.
     pub body: Bytes,
-    /// How long an answer is waited for.
+    /// The timeout of a response.
     pub timeout: Duration,
 }
 
-/// What became of a request.
+/// The outcome of a request.
 pub enum Outcome {
-    /// The whole answer, of so many bytes, has come.
+    /// The complete response, with its number of bytes.
     Answered(StatusCode, usize),
-    /// No connection, or one that broke.
+    /// No connection, or a broken one.
     Broken,
-    /// The client gave up.
+    /// The response timed out.
     TimedOut,
 }
 
-/// Sends one request after the other.
+/// Sends requests one after the other.
 pub struct Client {
     target: Rc<Target>,
     connection: Option<SendRequest<Full<Bytes>>>,
@@ -49,7 +49,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// Begins with the path whose turn it is for the client of this index.
+    /// Starts with the path for the client of this index.
     pub fn new(target: Rc<Target>, index: usize) -> Self {
         Self {
             target,
@@ -58,7 +58,7 @@ impl Client {
         }
     }
 
-    /// Sends requests when they are due, to the end.
+    /// Sends requests at their due times, until the end.
     pub async fn run(mut self, pace: Rc<RefCell<Pace>>, tally: Rc<RefCell<Tally>>) {
         let taken = || pace.borrow_mut().take();
         while let Some(due) = taken() {
@@ -71,7 +71,7 @@ impl Client {
             };
             if !matches!(outcome, Outcome::Answered(..)) {
                 self.connection = None;
-                // A server that is not there must not make a busy loop.
+                // Avoids a busy loop while the server is down.
                 tokio::time::sleep(Duration::from_millis(1)).await;
             }
             tally.borrow_mut().note(due, &outcome, target.body.len());
@@ -105,7 +105,7 @@ impl Client {
         let stream = TcpStream::connect(&self.target.address).await?;
         stream.set_nodelay(true)?;
         let (sender, connection) = handshake(TokioIo::new(stream)).await?;
-        // Its error also reaches whoever waits for an answer on it.
+        // The caller that waits for the response receives the error, too.
         tokio::spawn(connection);
         Ok(sender)
     }

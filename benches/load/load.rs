@@ -1,12 +1,12 @@
-//! Loads an HTTP server with one request over and over, and tells how it answered as JSON on standard
-//! output.
+//! Loads an HTTP server with repetitions of one request, and prints statistics of the responses as
+//! JSON on standard output.
 //!
-//! Closed loop: every client sends its next request as soon as the last one is answered. Open loop
-//! (`--rate`): requests are due at times that do not depend on the answers, and every latency counts
-//! from when its request was due, so that a server which stalls cannot hide it.
+//! Closed loop: every client sends its next request as soon as it has the response. Open loop
+//! (`--rate`): requests are due at times that do not depend on the responses. Latencies count from
+//! the due time, so that a stalled server shows (no coordinated omission).
 //!
-//! Runs on one thread, so that it takes little from a server on the same machine. Memory does not
-//! grow with the number of requests.
+//! Runs on one thread, to leave the CPU to a server on the same machine. Memory does not grow with
+//! the number of requests.
 
 mod client;
 mod pace;
@@ -28,36 +28,36 @@ use self::{
     tally::Tally,
 };
 
-/// Loads an HTTP server and tells how it answered.
+/// Loads an HTTP server and prints statistics of the responses.
 #[derive(Parser)]
 struct Arguments {
     /// Address and port of the server.
     address: String,
-    /// What to POST to; several are taken in turns.
+    /// Path and query of the POST; several are used in turns.
     #[arg(long, required = true)]
     path: Vec<String>,
     /// The file to send as the body.
     #[arg(long)]
     body: PathBuf,
-    /// The body's type.
+    /// The media type of the body.
     #[arg(long, default_value = "image/jpeg")]
     content_type: String,
-    /// Clients with a connection each. In an open loop, the most requests at a time.
+    /// Clients with a connection each. Open loop: the maximum of simultaneous requests.
     #[arg(long, default_value_t = 1)]
     clients: usize,
     /// Open loop: requests per second.
     #[arg(long)]
     rate: Option<f64>,
-    /// Open loop: how the requests are spread.
+    /// Open loop: the distribution of the requests.
     #[arg(long, value_enum, default_value_t = Arrivals::Poisson)]
     arrivals: Arrivals,
-    /// Seconds of load before anything is counted.
+    /// Seconds of load before the measurement.
     #[arg(long, default_value_t = 1.0)]
     warm_up_seconds: f64,
-    /// Seconds that are counted.
+    /// Seconds of the measurement.
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
-    /// After so many seconds a client gives up on an answer.
+    /// Timeout of a response in seconds.
     #[arg(long, default_value_t = 600.0)]
     timeout_seconds: f64,
 }
@@ -95,7 +95,7 @@ async fn main() -> anyhow::Result<()> {
         let client = Client::new(Rc::clone(&target), index);
         local.spawn_local(client.run(Rc::clone(&pace), Rc::clone(&tally)));
     }
-    // A closed loop counts what ends in time; the requests of an open loop are all waited for.
+    // A closed loop counts the requests that end in time; an open loop waits for all of them.
     let last = arguments.rate.map_or(end, |_| end + timeout);
     let _ = timeout_at(last, local).await;
     println!("{}", tally.borrow().summary());

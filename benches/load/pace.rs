@@ -1,20 +1,20 @@
-//! When requests are due.
+//! The due times of requests.
 
 use std::time::Duration;
 
 use clap::ValueEnum;
 use tokio::time::Instant;
 
-/// How the requests of an open loop are spread.
+/// The distribution of the requests of an open loop.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Arrivals {
-    /// As if from many who know nothing of each other.
+    /// A Poisson process, as of many independent clients.
     Poisson,
-    /// Evenly.
+    /// Regular intervals.
     Constant,
 }
 
-/// Says when the next request is due, for all clients together.
+/// The due times of the requests of all clients together.
 pub struct Pace {
     schedule: Option<Schedule>,
     end: Instant,
@@ -50,7 +50,7 @@ impl Pace {
         }
     }
 
-    /// When the next request is due, which is then taken; `None` when there is none left.
+    /// Takes the due time of the next request; `None` after the last one.
     pub fn take(&mut self) -> Option<Instant> {
         let due = match &mut self.schedule {
             None => Instant::now(),
@@ -74,7 +74,7 @@ impl Schedule {
         Duration::from_secs_f64(gaps / self.rate)
     }
 
-    /// From 0 to below 1, the same ones in every run: the generator `SplitMix64` (Steele et al., "Fast
+    /// A number from 0 to below 1, reproducible: the generator `SplitMix64` (Steele et al., "Fast
     /// splittable pseudorandom number generators", OOPSLA 2014).
     fn uniform(&mut self) -> f64 {
         self.random = self.random.wrapping_add(0x9E37_79B9_7F4A_7C15);

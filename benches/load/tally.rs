@@ -1,4 +1,4 @@
-//! What became of the requests, in bounded memory.
+//! Statistics of the requests, in bounded memory.
 
 use std::{collections::BTreeMap, ops::Range, time::Duration};
 
@@ -7,12 +7,12 @@ use tokio::time::Instant;
 
 use crate::client::Outcome;
 
-/// Latencies are told apart to this share of themselves.
+/// The relative resolution of latencies.
 const RESOLUTION: f64 = 0.005;
-/// The shortest latency told from shorter ones, seconds.
+/// The shortest latency with a class of its own, seconds.
 const SHORTEST: f64 = 1e-4;
 
-/// Counts what became of the requests of a time.
+/// Counts the outcomes of the requests of a time span.
 pub struct Tally {
     counted: Range<Instant>,
     open: bool,
@@ -45,7 +45,7 @@ impl Tally {
         }
     }
 
-    /// Takes the outcome of a request with a body of `sent` bytes that has just ended.
+    /// Records the outcome of a request with a body of `sent` bytes that has just ended.
     pub fn note(&mut self, due: Instant, outcome: &Outcome, sent: usize) {
         let now = Instant::now();
         let succeeded = matches!(outcome, Outcome::Answered(status, _) if status.is_success());
@@ -70,7 +70,7 @@ impl Tally {
         }
     }
 
-    /// All of it as JSON.
+    /// Returns all statistics as JSON.
     pub fn summary(&self) -> Value {
         let seconds = (self.counted.end - self.counted.start).as_secs_f64();
         #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52")]
@@ -112,7 +112,7 @@ impl Latencies {
         self.longest = self.longest.max(latency);
     }
 
-    /// The latency that this share of requests did not exceed, milliseconds.
+    /// The latency that this fraction of the requests did not exceed, milliseconds.
     fn quantile(&self, share: f64) -> f64 {
         let longest = self.longest.as_secs_f64();
         let mut seen = 0;
@@ -177,9 +177,9 @@ mod tests {
         tally.note(now, &Outcome::Answered(StatusCode::OK, 5), 3);
         tally.note(now, &Outcome::Answered(StatusCode::TOO_MANY_REQUESTS, 5), 3);
         tally.note(early, &Outcome::Answered(StatusCode::OK, 5), 3);
-        let told = tally.summary();
-        assert_eq!(told["statuses"], json!({ "200": 1, "429": 1 }));
-        assert_eq!(told["refused"]["count"], 1);
-        assert_eq!(told["succeeded_in_all"], 2);
+        let summary = tally.summary();
+        assert_eq!(summary["statuses"], json!({ "200": 1, "429": 1 }));
+        assert_eq!(summary["refused"]["count"], 1);
+        assert_eq!(summary["succeeded_in_all"], 2);
     }
 }

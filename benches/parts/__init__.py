@@ -1,1 +1,1 @@
-"""The parts of the benchmarks: each measures, tells (Markdown) and draws (charts)."""
+"""The parts of the benchmarks: each has `measure`, `tell` (Markdown) and `draw` (charts)."""

@@ -1,4 +1,4 @@
-"""Whether a camera's frames fare worse on a server that knows and has used many others, and what those take."""
+"""The latency and memory of a camera on a server that has used many other cameras."""
 
 import tempfile
 from pathlib import Path
@@ -14,7 +14,7 @@ PROFILE = "fast"
 
 
 def measure(effort: Effort) -> dict:
-    """Servers in turns: one with a single camera, and one with so many."""
+    """Alternates two servers: one with a single camera, and one with many."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (only,) = cameras(folder, 1)
@@ -25,7 +25,7 @@ def measure(effort: Effort) -> dict:
 
 
 def beside(effort: Effort, alone, only: str, count: int) -> dict:
-    """Medians of a window each: the camera alone, the same among `count` that were all used, and those in turns."""
+    """Medians of windows: the camera alone, the camera among `count` used ones, and all of those in turns."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         ids = cameras(folder, count)
@@ -34,7 +34,7 @@ def beside(effort: Effort, alone, only: str, count: int) -> dict:
             for camera in ids:
                 report(crowded, detect(PROFILE, camera), frame())
             used = crowded.usage().resident_bytes
-            told = {"alone": [], "among": [], "turns": []}
+            result = {"alone": [], "among": [], "turns": []}
             for _ in range(effort.rounds):
                 for key, server, asked in (
                     ("alone", alone, [only]),
@@ -43,8 +43,8 @@ def beside(effort: Effort, alone, only: str, count: int) -> dict:
                 ):
                     paths = [detect(PROFILE, camera) for camera in asked]
                     late = load(server, paths, frame(), seconds=effort.seconds / 4)["succeeded"]
-                    told[key].append(late["p50_ms"])
-    return {"count": count, "mib": (used - empty) / 2**20, **told}
+                    result[key].append(late["p50_ms"])
+    return {"count": count, "mib": (used - empty) / 2**20, **result}
 
 
 def tell(raw: dict) -> str:
@@ -68,5 +68,5 @@ def tell(raw: dict) -> str:
 
 
 def draw(_raw: dict) -> str:
-    """A table says it."""
+    """No chart: the table shows everything."""
     return ""

@@ -1,4 +1,4 @@
-"""What dashboards cost: many that poll a camera each second with its ETag, and many that listen."""
+"""The cost of dashboards: many clients that poll a camera each second with its ETag, and many event streams."""
 
 import asyncio
 import time
@@ -19,27 +19,27 @@ PATH = "/results/office/latest"
 EVENTS = "/results/office/events"
 SETTINGS = {"SERVER__MAX_CONNECTIONS": "2000", "RESULTS__MAX_LISTENERS": "1500", "SHUTDOWN__GRACE_MILLIS": "0"}
 REPORTS = 40
-"""While somebody listens; memory is looked at after the first quarter and at the end."""
+"""The duration with event streams; memory is measured after the first quarter and at the end."""
 
 
 @dataclass
 class Heard:
-    """What all listeners together have heard."""
+    """The events that all clients together have received."""
 
     reports: int = 0
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def wait_for(self, reports: int) -> None:
-        """Until they have heard so many."""
+        """Waits until the clients have received `count` events."""
         while self.reports < reports:
             self.changed.clear()
             await self.changed.wait()
 
 
 def measure(effort: Effort) -> dict:
-    """The cost of pollers without new reports, as most polls are, in turns with a server that only answers; then
-    listeners and new reports."""
-    # A kernel counts processor time by the hundredth of a second, and all of this takes a fifth of one.
+    """The cost of polls without new reports, alternating with a server of fixed responses; then
+    event streams and new reports."""
+    # The kernel counts CPU time in hundredths of a second, and the measurement takes a fifth of one.
     seconds = max(2 * effort.seconds, 10.0)
     ours, least = [], []
     with lookdown(SETTINGS) as server, haproxy() as other:
@@ -64,8 +64,8 @@ def server_tag(server: Server) -> str:
 
 
 async def poll(server: Server, tag: str, seconds: float) -> dict:
-    """What was answered to the pollers, and the share of a core that it took. A dashboard keeps its connection, so
-    the time begins when each has one and has been answered once."""
+    """The responses to the pollers, and the share of a core that they took. A dashboard keeps its connection, so
+    the measurement begins when each client has a connection and its first response."""
     request = f"GET {PATH} HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: {tag}\r\n\r\n".encode()
     statuses: dict[str, int] = {}
     dashboards = [await connect(server.address) for _ in range(POLLERS)]
@@ -93,7 +93,7 @@ async def poll(server: Server, tag: str, seconds: float) -> dict:
 
 
 async def listen(server: Server) -> dict:
-    """Memory with everybody listening, and whether each hears of each report."""
+    """Memory with all event streams open; checks that each receives each report."""
     heard, idle = Heard(), server.usage().resident_bytes
 
     async def one() -> None:
@@ -107,7 +107,7 @@ async def listen(server: Server) -> dict:
             writer.close()
 
     listeners = [asyncio.create_task(one()) for _ in range(LISTENERS)]
-    # Each begins with the latest report.
+    # Each stream begins with the latest report.
     await heard.wait_for(LISTENERS)
     connected = server.usage().resident_bytes
     resident = []
@@ -140,9 +140,9 @@ def tell(raw: dict) -> str:
     rows = [
         (f"{POLLERS} pollers, one poll a second each with its ETag: answers", answers),
         ("**share of a core**, %", spread_cell(spread(raw["percent"]).as_json())),
-        ("HAProxy's for as many answers that are in its settings, in turns, %", spread_cell(spread(raw["least_percent"]).as_json())),
+        ("HAProxy's for as many fixed responses, alternating, %", spread_cell(spread(raw["least_percent"]).as_json())),
         ("ours ÷ HAProxy's", spread_cell(ratios(raw["percent"], raw["least_percent"]).as_json())),
-        (f"{LISTENERS} listeners (server-sent events): reports heard of {LISTENERS * (REPORTS + 1)}", listening["heard"]),
+        (f"{LISTENERS} event streams: reports received of {LISTENERS * (REPORTS + 1)}", listening["heard"]),
         ("memory for each, KiB", listening["kib_each"]),
         ("memory with all of them, MiB", listening["mib"]),
         (f"… and after {REPORTS - REPORTS // 4} more reports, MiB", listening["mib_more"]),
@@ -151,5 +151,5 @@ def tell(raw: dict) -> str:
 
 
 def draw(_raw: dict) -> str:
-    """A table says it."""
+    """No chart: the table shows everything."""
     return ""

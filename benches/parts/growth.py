@@ -1,4 +1,4 @@
-"""How cost grows with views, the frame and clients."""
+"""The growth of the cost with views, frame size and clients."""
 
 from harness.charts import lines
 from harness.effort import Effort
@@ -14,7 +14,7 @@ CLIENT_PROFILE = "fast"
 
 
 def measure(effort: Effort) -> dict:
-    """One thing grows at a time; one model throughout."""
+    """Varies one parameter at a time, with one model."""
     with lookdown(ROOMY) as server:
         views = [with_views(effort, server, profile) for profile in PLANS]
         sides = [with_side(effort, server, side) for side in effort.sides]
@@ -32,7 +32,7 @@ def measure(effort: Effort) -> dict:
 
 
 def with_views(effort: Effort, server, profile: str) -> dict:
-    """A frame's stages under a plan."""
+    """The stages of a frame with a plan."""
     count = max(len(view_plan(server, profile)["views"]), 1)
     stages = stages_of(server, detect(profile, model=MODEL), effort.frames)
     return {"profile": profile, "views": count, "stages": stages}
@@ -65,7 +65,7 @@ def tell(raw: dict) -> str:
             f"With clients (closed loop, `{CLIENT_PROFILE}`):\n",
             table(
                 ("clients", "frames/s", "p50, ms", "p99, ms", "cores used", "memory, MiB"),
-                [clients_row(told) for told in raw["clients"]],
+                [clients_row(result) for result in raw["clients"]],
             ),
         ]
     )
@@ -82,11 +82,11 @@ def sides_row(row: dict) -> tuple:
     return row["side"], row["kilobytes"], *(row["stages"][name] for name in ("decode", "remap", "inference", "total"))
 
 
-def clients_row(told: dict) -> tuple:
+def clients_row(result: dict) -> tuple:
     """One number of clients."""
-    late = told["succeeded"]
+    late = result["succeeded"]
     times = (late.get("p50_ms"), late.get("p99_ms"))
-    return told["clients"], told["succeeded_per_second"], *times, told["cores"], round(told["resident_mib"])
+    return result["clients"], result["succeeded_per_second"], *times, result["cores"], round(result["resident_mib"])
 
 
 def draw(raw: dict) -> str:

@@ -1,4 +1,4 @@
-"""From start to ready, and memory under steady load."""
+"""The time from start to ready, and memory under steady load."""
 
 import subprocess
 import tempfile
@@ -20,12 +20,12 @@ SAMPLES = 60
 
 
 def measure(effort: Effort) -> dict:
-    """Starts with many calibrations, then a long steady load."""
+    """Measures starts with many calibrations, then a long steady load."""
     return {"starts": starts(effort), "memory": memory(effort)}
 
 
 def starts(effort: Effort) -> list[dict]:
-    """Seconds to ready and of the first frame of a camera, which makes its tables."""
+    """Seconds to ready and of the first frame of a camera, which builds its remap tables."""
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -39,7 +39,7 @@ def starts(effort: Effort) -> list[dict]:
 
 
 def memory(effort: Effort) -> dict:
-    """Resident memory at even times under an open loop."""
+    """Resident memory at regular intervals under an open loop."""
     paths, samples = [detect(PROFILE)], []
     seconds = effort.memory_minutes * 60
     with lookdown() as server:

@@ -1,4 +1,4 @@
-"""The limit: the same views through bare ONNX Runtime on ready tensors, in turns with the server."""
+"""The limit: the same views through bare ONNX Runtime on ready tensors, alternating with the server."""
 
 import os
 import subprocess
@@ -21,12 +21,12 @@ BATCHES = (1, 4, 8, 24)
 
 
 def measure(effort: Effort) -> dict:
-    """Looks for the best bare settings, then alternates."""
+    """Searches for the best bare settings, then alternates."""
     path = detect(PROFILE, model=MODEL)
     with lookdown(ROOMY) as server:
         plan = view_plan(server, PROFILE)
         views, count = view_file(plan, INPUT_SIDE), len(plan["views"])
-        report(server, path, frame())  # makes the camera's tables
+        report(server, path, frame())  # builds the remap tables of the camera
         tried = {
             f"{sessions} × {threads} threads, batch {batch}": (sessions, threads, batch)
             for sessions, threads in shares()
@@ -37,13 +37,13 @@ def measure(effort: Effort) -> dict:
         ours, theirs = [], []
         for _ in range(effort.rounds):
             theirs.append(bare(views, *tried[best], effort.seconds) / count)
-            told = load(server, [path], frame(), clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
-            ours.append(told["succeeded_per_second"])
+            result = load(server, [path], frame(), clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
+            ours.append(result["succeeded_per_second"])
     return {"views": count, "tuning": tuning, "best": best, "ours": ours, "bare": theirs}
 
 
 def shares() -> list[tuple[int, int]]:
-    """Ways to share the cores: sessions and threads of each."""
+    """The divisions of the cores: sessions and threads of each."""
     cores = len(os.sched_getaffinity(0))
     ways = [(1, cores), (cores, 1)] + ([(2, cores // 2)] if cores > 3 else [])
     return list(dict.fromkeys(ways))
@@ -69,7 +69,7 @@ def tell(raw: dict) -> str:
     return (
         f"`{PROFILE}`, {MODEL}, {raw['views']} views per frame, {CLIENTS} clients, {len(raw['ours'])} rounds:\n\n"
         + table(("", "median (range)"), rows)
-        + "\nBare settings tried (sessions × threads, views in a run):\n\n"
+        + "\nTested settings of bare ONNX Runtime (sessions × threads, views in a run):\n\n"
         + table(("setting", "frames/s"), tuning)
     )
 

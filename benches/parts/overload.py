@@ -1,4 +1,4 @@
-"""Far more frames than the server can work on: what it still does, and how fast it refuses the rest."""
+"""Overload far beyond the capacity: the goodput, and the latency of refusals."""
 
 from harness.effort import Effort
 from harness.figures import spread
@@ -13,10 +13,10 @@ TIMES = 10
 
 
 def measure(effort: Effort) -> dict:
-    """Capacity and overload in turns, default settings."""
+    """Alternates capacity and overload with default settings."""
     paths, picture, rounds = [detect(PROFILE)], frame(), []
     with lookdown() as server:
-        report(server, paths[0], picture)  # makes the camera's tables
+        report(server, paths[0], picture)  # builds the remap tables of the camera
         for _ in range(effort.rounds):
             calm = load(server, paths, picture, clients=CLIENTS, warm_up=2.0, seconds=effort.seconds)
             rate = TIMES * calm["succeeded_per_second"]
@@ -45,11 +45,11 @@ def cell(values: list[float]) -> str:
     return spread_cell(spread(values).as_json())
 
 
-def unanswered(told: dict) -> int:
-    """Requests without an answer."""
-    return told["broken"] + told["timed_out"]
+def unanswered(result: dict) -> int:
+    """Requests without a response."""
+    return result["broken"] + result["timed_out"]
 
 
 def draw(_raw: dict) -> str:
-    """Nothing that the table does not show."""
+    """No chart: the table shows everything."""
     return ""

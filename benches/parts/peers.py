@@ -1,4 +1,4 @@
-"""Other servers in the same run, in turns with ours.
+"""Other servers in the same run, alternating with Lookdown.
 
 (a) plain Python as one writes it, with the paper's plan and with ours; (b) the views of our plan posted to a V2
 server, which decodes, renders and merges nothing.
@@ -28,13 +28,13 @@ NAMES = {
     "v2": "MLServer (V2), ready views of `balanced`",
 }
 SLOW_CLIENTS = 4
-"""Clients of the paper's plan in plain Python: enough to keep all cores busy for many seconds a frame."""
-# What is compared with what.
+"""Clients of the paper's plan in plain Python, enough to keep all cores busy at many seconds per frame."""
+# The comparisons.
 PAIRS = ((OURS[0], NAMES["plain"]), (OURS[1], NAMES["paper"]), (OURS[0], NAMES["v2"]))
 
 
 def measure(effort: Effort) -> dict:
-    """Tunes each peer, then loads all of them in turns."""
+    """Tunes each peer, then measures all of them alternately."""
     with ExitStack() as stack:
         ours = stack.enter_context(lookdown(ROOMY))
         plan, paper_plan = view_plan(ours, "balanced"), view_plan(ours, "paper")
@@ -68,17 +68,17 @@ def measure(effort: Effort) -> dict:
 
 
 def plain_body() -> dict:
-    """What a plain Python server is asked."""
+    """The request to a plain Python server."""
     return {"paths": ["/detect"], "body": frame(), "content_type": "image/jpeg"}
 
 
 def v2_body(request: Path) -> dict:
-    """What a V2 server is asked."""
+    """The request to a V2 server."""
     return {"paths": ["/v2/models/detector/infer"], "body": request, "content_type": "application/json"}
 
 
 def window(server: Server, what: dict, clients: int, seconds: float) -> dict:
-    """A closed loop in which each client is answered at least twice."""
+    """A closed loop with at least two responses per client."""
     began = time.monotonic()
     server.post(what["paths"][0], what["body"].read_bytes(), what["content_type"])
     alone = time.monotonic() - began
@@ -90,8 +90,8 @@ def tune(effort: Effort, start, what: dict, parallel: bool) -> list[dict]:
     rows = []
     for setting in peers.settings(parallel)[:: 1 if effort.name == "full" else 3]:
         with start(setting) as server:
-            told = load(server, clients=4, warm_up=2.0, seconds=2.0 * effort.tune_seconds, **what)
-        rows.append({"setting": vars(setting), "frames_per_second": told["succeeded_per_second"]})
+            result = load(server, clients=4, warm_up=2.0, seconds=2.0 * effort.tune_seconds, **what)
+        rows.append({"setting": vars(setting), "frames_per_second": result["succeeded_per_second"]})
     return rows
 
 
@@ -104,17 +104,17 @@ def tell(raw: dict) -> str:
     """The comparison as Markdown."""
     rows = []
     for name, rounds in raw["rounds"].items():
-        p99 = spread([told["succeeded"].get("p99_ms", float("nan")) for told in rounds])
-        per_second = spread([told["succeeded_per_second"] for told in rounds])
-        cpu = spread([told["cpu_seconds_per_frame"] for told in rounds])
+        p99 = spread([result["succeeded"].get("p99_ms", float("nan")) for result in rounds])
+        per_second = spread([result["succeeded_per_second"] for result in rounds])
+        cpu = spread([result["cpu_seconds_per_frame"] for result in rounds])
         clients = raw["clients"][name]
         rows.append((name, clients, per_second.median, p99.median, cpu.median, rounds[-1]["resident_mib"]))
     compared = []
     for ours, theirs in PAIRS:
         mine, other = raw["rounds"][ours], raw["rounds"][theirs]
-        faster = ratios(*[[told["succeeded_per_second"] for told in rounds] for rounds in (mine, other)])
-        later = ratios(*[[told["succeeded"]["p99_ms"] for told in rounds] for rounds in (mine, other)])
-        # Waiting times compare only in queues of one length.
+        faster = ratios(*[[result["succeeded_per_second"] for result in rounds] for rounds in (mine, other)])
+        later = ratios(*[[result["succeeded"]["p99_ms"] for result in rounds] for rounds in (mine, other)])
+        # Queueing times are comparable only for queues of the same length.
         same_queue = raw["clients"][ours] == raw["clients"][theirs]
         late = spread_cell(later.as_json()) if same_queue else "–"
         compared.append((f"{ours} ÷ {theirs}", spread_cell(faster.as_json()), late))
@@ -122,21 +122,21 @@ def tell(raw: dict) -> str:
     head = ("server", "clients", "frames/s", "p99, ms", "CPU s per frame", "memory, MiB")
     return (
         f"{table(head, rows)}\n{table(('ratio, median (range)', 'frames/s', 'p99'), compared)}\n"
-        f"The best of the settings that were tried:\n\n{settings}\n\n{told_agreement(raw['agreement'])}"
+        f"The best of the tested settings:\n\n{settings}\n\n{told_agreement(raw['agreement'])}"
     )
 
 
 def told_agreement(rows: list[dict]) -> str:
-    """How far the plain server finds the same persons."""
+    """The agreement of the plain server's persons with Lookdown's."""
     head = ("our refinement", "boxes we find", "boxes it finds with NMS", "the same ones", "mean IoU of those")
     found = [(row["refine"], row["ours"], row["theirs"], row["same"], row["mean_iou"]) for row in rows]
-    return f"Whether it does the same work, plan and model being the same:\n\n{table(head, found)}"
+    return f"Agreement of the results, with the same plan and model:\n\n{table(head, found)}"
 
 
 def draw(raw: dict) -> str:
     """The comparison as a chart."""
     values = {
-        name.replace("`", ""): spread([told["succeeded_per_second"] for told in rounds]).median
+        name.replace("`", ""): spread([result["succeeded_per_second"] for result in rounds]).median
         for name, rounds in raw["rounds"].items()
     }
     return bars("peers", f"1680 × 1680 JPEG, {MODEL}", "frames per second", values)

@@ -1,4 +1,4 @@
-"""Rendering of views beside OpenCV's, what `against_opencv.py` says."""
+"""Rendering of views compared with OpenCV, by `against_opencv.py`."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ from harness.tables import table
 
 
 def measure(effort: Effort) -> list[dict]:
-    """Both sides in turns, a row per size of view."""
+    """Measures both sides alternately, a row per view size."""
     command = [sys.executable, str(BENCHES / "against_opencv.py"), str(12 * effort.rounds)]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     if answer.returncode != 0:

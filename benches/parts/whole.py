@@ -1,4 +1,4 @@
-"""The whole service: closed and open loops per profile, and where a frame's time goes."""
+"""The whole service: closed and open loops per profile, and the time per stage."""
 
 from statistics import median
 
@@ -14,34 +14,34 @@ STAGES = ("decode", "calibrate", "queue", "remap", "inference", "refine", "total
 
 
 def measure(effort: Effort) -> dict:
-    """A server of its own for each profile and kind of loop."""
+    """Starts a server for each profile and kind of loop."""
     return {profile: of_profile(effort, profile) for profile in effort.profiles}
 
 
 def of_profile(effort: Effort, profile: str) -> dict:
-    """Stages, closed loops, then open loops at shares of what the closed ones reached."""
+    """Measures stages, closed loops, then open loops at fractions of the closed loops' throughput."""
     paths, picture = [detect(profile)], frame()
     with lookdown(ROOMY) as server:
         stages = stages_of(server, paths[0], effort.frames)
         seconds = stages["total"] / 1000
         closed = []
         for clients in effort.clients:
-            told = steady(server, paths, picture, clients=clients, seconds=effort.seconds, frame_seconds=seconds)
-            closed.append(told)
-    capacity = max(told["succeeded_per_second"] for told in closed)
+            result = steady(server, paths, picture, clients=clients, seconds=effort.seconds, frame_seconds=seconds)
+            closed.append(result)
+    capacity = max(result["succeeded_per_second"] for result in closed)
     opened = []
     with lookdown() as server:
-        report(server, paths[0], picture)  # makes the camera's tables
+        report(server, paths[0], picture)  # builds the remap tables of the camera
         for percent in effort.loads:
             rate = capacity * percent / 100
             enough = max(effort.seconds, 12 / capacity)
-            told = load(server, paths, picture, rate=rate, seconds=enough, warm_up=max(1.0, 4 / capacity))
-            opened.append(told | {"percent": percent})
+            result = load(server, paths, picture, rate=rate, seconds=enough, warm_up=max(1.0, 4 / capacity))
+            opened.append(result | {"percent": percent})
     return {"capacity": capacity, "stages": stages, "closed": closed, "open": opened}
 
 
 def stages_of(server: Server, path: str, frames: int) -> dict[str, float]:
-    """Median milliseconds of each stage, frames one after the other, the tables already made."""
+    """Median milliseconds of each stage for consecutive frames with existing remap tables."""
     report(server, path, frame())
     timings = [report(server, path, frame())["timings_ms"] for _ in range(frames)]
     return {stage: median(timing[stage] for timing in timings) for stage in STAGES}
@@ -50,23 +50,23 @@ def stages_of(server: Server, path: str, frames: int) -> dict[str, float]:
 def tell(raw: dict) -> str:
     """The tables as Markdown."""
     open_loop = (
-        "Open loop: frames come at random times (Poisson), whatever the server does, up to 256 at a time; "
-        "latencies count from when a frame was due. Default settings: at most 16 frames in flight.\n"
+        "Open loop: frames are due at random times (Poisson), independent of the server, up to 256 at a time; "
+        "latencies count from the due time. Default settings: at most 16 frames in flight.\n"
     )
     return "\n".join(
         [
-            "Where a frame's time goes, ms, one client (median):\n",
+            "Time per stage of a frame, ms, one client (median):\n",
             table(("profile", *STAGES, "not the network"), [stage_row(name, part) for name, part in raw.items()]),
-            "Closed loop: each client asks again as soon as it is answered.\n",
+            "Closed loop: each client sends its next request after the response.\n",
             table(
                 ("profile", "clients", "frames/s", "p50, ms", "p95", "p99", "cores used", "memory, MiB"),
-                [closed_row(name, told) for name, part in raw.items() for told in part["closed"]],
+                [closed_row(name, result) for name, part in raw.items() for result in part["closed"]],
             ),
             open_loop,
             table(
                 ("profile", "load, % of capacity", "frames/s", "p50, ms", "p95", "p99")
                 + ("refused", "p99 of refusals, ms", "broken or late", "cores used"),
-                [open_row(name, told) for name, part in raw.items() for told in part["open"]],
+                [open_row(name, result) for name, part in raw.items() for result in part["open"]],
             ),
         ]
     )
@@ -79,28 +79,29 @@ def stage_row(profile: str, part: dict) -> tuple:
     return profile, *(stages[stage] for stage in STAGES), f"{rest:.1%}"
 
 
-def closed_row(profile: str, told: dict) -> tuple:
+def closed_row(profile: str, result: dict) -> tuple:
     """One closed loop."""
-    late = told["succeeded"]
+    late = result["succeeded"]
     times = (late.get(name) for name in ("p50_ms", "p95_ms", "p99_ms"))
-    return profile, told["clients"], told["succeeded_per_second"], *times, told["cores"], round(told["resident_mib"])
+    usage = result["cores"], round(result["resident_mib"])
+    return profile, result["clients"], result["succeeded_per_second"], *times, *usage
 
 
-def open_row(profile: str, told: dict) -> tuple:
+def open_row(profile: str, result: dict) -> tuple:
     """One open loop."""
-    late, refused = told["succeeded"], told["refused"]
+    late, refused = result["succeeded"], result["refused"]
     times = (late.get(name) for name in ("p50_ms", "p95_ms", "p99_ms"))
-    unanswered = told["broken"] + told["timed_out"]
+    unanswered = result["broken"] + result["timed_out"]
     return (
-        *(profile, told["percent"], told["succeeded_per_second"], *times),
-        *(refused["count"], refused.get("p99_ms"), unanswered, told["cores"]),
+        *(profile, result["percent"], result["succeeded_per_second"], *times),
+        *(refused["count"], refused.get("p99_ms"), unanswered, result["cores"]),
     )
 
 
 def draw(raw: dict) -> str:
     """Latency with clients as a chart."""
     series = {
-        profile: [(told["clients"], told["succeeded"].get("p50_ms", float("nan"))) for told in part["closed"]]
+        profile: [(result["clients"], result["succeeded"].get("p50_ms", float("nan"))) for result in part["closed"]]
         for profile, part in raw.items()
     }
     labels = ("clients (closed loop)", "median latency, ms")

@@ -1,13 +1,13 @@
-//! How long work takes that is done again and again.
+//! The duration of repeated work.
 
 use std::time::{Duration, Instant};
 
-/// Median and least time of so many rounds (at least one), in milliseconds.
+/// The median and the minimum of a number of rounds (at least one), in milliseconds.
 pub(crate) fn times(rounds: usize, work: impl FnMut()) -> String {
     times_after(rounds, || {}, work)
 }
 
-/// The same with something before each round that does not count.
+/// The same with an untimed preparation before each round.
 pub(crate) fn times_after(
     rounds: usize,
     mut before: impl FnMut(),

@@ -11,7 +11,7 @@ class Figures(unittest.TestCase):
         self.assertEqual((found.median, found.least, found.greatest, found.count), (2.5, 1.0, 9.0, 4))
 
     def test_ratios_are_taken_round_by_round(self):
-        # A machine that was half as fast in the second round changes no ratio.
+        # A machine at half speed in the second round changes no ratio.
         self.assertEqual(ratios([10.0, 5.0], [20.0, 10.0]), spread([0.5, 0.5]))
 
     def test_rounds_without_a_partner_are_refused(self):

@@ -1,4 +1,4 @@
-"""What processes have used."""
+"""The resource usage of processes."""
 
 import os
 import unittest

@@ -1,8 +1,7 @@
-//! Fuzzes [`lookdown_fuzz::importer`], the importer that the environment names in `IMPORTER`.
+//! Fuzzes [`lookdown_fuzz::importer`] with the importer in the environment variable `IMPORTER`.
 //!
-//! Most changes to a text leave no calibration file, so half of them are made to one of its
-//! numbers. What another importer reads is not kept, and each time that this one has read is
-//! counted.
+//! Most mutations of a text leave no calibration file, so half of them change one of its numbers.
+//! Files for other importers are not kept, and files for this one are counted.
 #![no_main]
 
 use std::sync::{
@@ -14,9 +13,9 @@ use libfuzzer_sys::{Corpus, fuzz_mutator, fuzz_target, fuzzer_mutate};
 use lookdown::calibration::formats::Format;
 use lookdown_fuzz::importer::{IMPORTERS, read};
 
-/// How often the count is told.
-const TOLD_EVERY: u64 = 1_000;
-/// What numbers in files should never be, and sometimes are.
+/// The interval of prints of the count.
+const PRINT_EVERY: u64 = 1_000;
+/// Extreme and invalid numbers.
 const NUMBERS: [&str; 24] = [
     "0",
     "-0.0",
@@ -56,7 +55,7 @@ fuzz_target!(|content: &[u8]| -> Corpus {
         return Corpus::Reject;
     }
     let times = READ.fetch_add(1, Ordering::Relaxed) + 1;
-    if times.is_multiple_of(TOLD_EVERY) {
+    if times.is_multiple_of(PRINT_EVERY) {
         eprintln!("read {times}");
     }
     Corpus::Keep
@@ -76,7 +75,7 @@ fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
     }
 });
 
-/// The text with one of its numbers made another.
+/// Returns the text with one of its numbers replaced.
 fn with_other_number(text: &[u8], seed: u32) -> Option<Vec<u8>> {
     let is_part = |byte: u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'e' | b'-' | b'+');
     let begins: Vec<usize> = (0..text.len())
@@ -95,7 +94,7 @@ fn with_other_number(text: &[u8], seed: u32) -> Option<Vec<u8>> {
             let value: f64 = std::str::from_utf8(number).ok()?.parse().ok()?;
             let factor = f64::from(random.next()) / f64::from(u32::MAX);
             match kind {
-                // A little, or a lot.
+                // Slightly, or by orders of magnitude.
                 1 => format!("{}", value * (0.5 + factor)),
                 _ => format!("{:e}", value * (factor - 0.5) * 20.0),
             }

@@ -1,4 +1,4 @@
-//! Calibration files, one importer at a time, and all that the server does with their cameras.
+//! Fuzzes calibration files, one importer at a time, with all uses of their cameras in the server.
 
 use lookdown::{
     calibration::{
@@ -11,7 +11,7 @@ use lookdown::{
 };
 use strum::VariantArray;
 
-/// The importers, under the names of their folders of seeds and finds.
+/// The importers, with the names of their folders of seeds and corpora.
 pub const IMPORTERS: [(&str, Format); 15] = [
     ("native", Format::Native),
     ("kalibr", Format::Kalibr),
@@ -30,10 +30,10 @@ pub const IMPORTERS: [(&str, Format); 15] = [
     ("camera_intrinsic_model", Format::CameraIntrinsicModel),
 ];
 
-/// Places of a frame where its lens is tried, as shares of its sides.
+/// Positions in a frame where its lens is tested, as fractions of its sides.
 const PLACES: [f64; 5] = [0.0, 0.3, 0.5, 0.9, 1.0];
 
-/// Reads `content` and uses its cameras; tells whether it was the importer of `format` that read it.
+/// Reads `content` and uses its cameras; returns true if the importer of `format` read it.
 pub fn read(format: Format, content: &[u8]) -> bool {
     let file = match CalibrationFile::parse(content) {
         Ok(file) => file,
@@ -47,10 +47,10 @@ pub fn read(format: Format, content: &[u8]) -> bool {
     }
     let checked = file.calibrations("fuzzed", content);
     assert_eq!(checked.len(), file.cameras.len());
-    for (told, (_, checked)) in file.cameras.iter().zip(&checked) {
-        match (&told.camera, checked) {
+    for (parsed, (_, checked)) in file.cameras.iter().zip(&checked) {
+        match (&parsed.camera, checked) {
             (Ok(camera), Ok(calibration)) => {
-                look_through(calibration);
+                check_lens(calibration);
                 write(camera, calibration, content.len());
             }
             (Err(refusal), _) | (_, Err(refusal)) => check(refusal),
@@ -59,7 +59,7 @@ pub fn read(format: Format, content: &[u8]) -> bool {
     true
 }
 
-/// A refusal says something, however much there is in the file that could be quoted.
+/// Checks that a refusal has a message of limited length.
 fn check(refusal: &FormatError) {
     assert!((1..8_192).contains(&refusal.to_string().len()));
 }
@@ -85,7 +85,7 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
     let [(_, checked)] = &again.calibrations("fuzzed", content.as_bytes())[..] else {
         panic!("one camera became several in {content}");
     };
-    // Others have no place for the end of the lens image, without which it may be refused.
+    // Other formats cannot store the border of the lens image, without which it may be refused.
     if target == Target::Native
         && let Err(error) = checked
     {
@@ -93,11 +93,11 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
     }
 }
 
-/// Rays and pixels are finite wherever the lens has any.
-fn look_through(calibration: &Calibration) {
+/// Checks that rays and pixels are finite wherever the lens is defined.
+fn check_lens(calibration: &Calibration) {
     let (width, height) = calibration.image_size();
     assert!(calibration.warnings().len() < 10);
-    // Half the size, as smaller frames of the same camera are.
+    // Half the size, for smaller frames of the same camera.
     let halved = calibration.for_frame(width.div_ceil(2), height.div_ceil(2));
     let halved = halved.ok().map(|geometry| {
         for mask in &geometry.areas.masks {

@@ -1,7 +1,7 @@
-//! What is done with fuzzed bytes: the same functions for the fuzzers of `fuzz_targets/`, which
-//! make up the bytes, and for `tests/fuzz_corpus.rs`, which replays what they have found.
+//! The functions under fuzzing, for the fuzzers of `fuzz_targets/`, which generate bytes, and for
+//! `tests/fuzz_corpus.rs`, which replays their corpora.
 //!
-//! Each panics when something is wrong, and tells whether its bytes got as far as what it is for.
+//! Each function panics on an error, and returns true if its bytes reached the code under test.
 
 pub mod importer;
 pub mod merge;

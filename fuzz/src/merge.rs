@@ -1,13 +1,13 @@
-//! Candidates of any shape, merged every way: what comes out is finite, in range and in order.
+//! Fuzzes all refinements with arbitrary candidates: results are finite, in range and sorted.
 
 use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
 use strum::VariantArray;
 
-/// A number is two bytes, in eighths; this one says that the eight bytes after it are a float of
-/// any kind.
+/// The marker of an arbitrary float in the next eight bytes. Other numbers are two bytes, in
+/// eighths.
 const ANY_FLOAT: i16 = i16::MIN;
 
-/// Merges the candidates that `bytes` spell; tells whether there are any.
+/// Merges the candidates that `bytes` encode; returns true if there are any.
 pub fn read(bytes: &[u8]) -> bool {
     let mut numbers = Numbers(bytes);
     let parameters = RefinementParameters {
@@ -60,7 +60,7 @@ fn check(candidates: &[Candidate], parameters: &RefinementParameters) {
                 .map(|&index| candidates[index].bbox)
         };
         assert!(members().next().is_some());
-        // Means of coordinates, so within those of the members but for rounding.
+        // Means of coordinates lie within those of the members, except for rounding.
         for (axis, value) in detection.bbox.corners().into_iter().enumerate() {
             let of_members = || members().map(|bbox| bbox.corners()[axis]);
             let least = of_members().fold(f64::INFINITY, f64::min);
@@ -74,7 +74,7 @@ fn check(candidates: &[Candidate], parameters: &RefinementParameters) {
     }
 }
 
-/// Numbers spelt in bytes; zeros after the last.
+/// Numbers encoded in bytes; zeros after the last.
 struct Numbers<'a>(&'a [u8]);
 
 impl Numbers<'_> {

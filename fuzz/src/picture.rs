@@ -1,8 +1,8 @@
-//! Pictures: decoding within limits.
+//! Fuzzes the decoding of images within limits.
 
 use lookdown::imaging::decode::{DecodeLimits, decode};
 
-/// Small, so that a second holds thousands of pictures; what is checked against them is the same.
+/// Small limits, to decode thousands of images per second with the same checks.
 const LIMITS: DecodeLimits = DecodeLimits {
     max_width: 1024,
     max_height: 1024,
@@ -10,7 +10,7 @@ const LIMITS: DecodeLimits = DecodeLimits {
     max_alloc_bytes: 1024 * 1024,
 };
 
-/// Decodes `bytes`; tells whether they are of a format that is read.
+/// Decodes `bytes`; returns true if their format is supported.
 pub fn read(bytes: &[u8]) -> bool {
     match decode(bytes, &LIMITS) {
         Ok(decoded) => {

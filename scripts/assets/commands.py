@@ -1,4 +1,4 @@
-"""Runs another program: quietly, with progress by what it has written, and with its last words if it fails."""
+"""Runs another program with progress by its written bytes, and prints its last output if it fails."""
 
 import os
 import subprocess

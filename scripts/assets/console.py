@@ -1,8 +1,8 @@
-"""What the set-up says, and how it stops."""
+"""Messages and errors of the set-up."""
 
 
 class SetupError(Exception):
-    """Something that keeps the set-up from going on; the message says what, and what to do about it."""
+    """An error that stops the set-up; the message has the reason and the remedy."""
 
 
 def say(step: str, text: str) -> None:
@@ -11,5 +11,5 @@ def say(step: str, text: str) -> None:
 
 
 def megabytes(size: int) -> str:
-    """A number of bytes for people."""
+    """Formats a number of bytes."""
     return f"{size / 1e6:.1f} MB"

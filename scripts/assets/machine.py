@@ -1,4 +1,4 @@
-"""Which machines the set-up supports: Linux with glibc, on x86-64 or arm64."""
+"""The supported machines: Linux with glibc, on x86-64 or arm64."""
 
 import os
 import platform
@@ -11,7 +11,7 @@ OLDEST_GLIBC = (2, 28)
 
 
 def supported_cpu() -> str:
-    """`x86_64` or `aarch64`, or a refusal that says what this machine is."""
+    """`x86_64` or `aarch64`; raises an error with the kind of this machine otherwise."""
     cpu = CPU_NAMES.get(platform.machine().lower())
     if sys.platform != "linux" or cpu is None or sys.maxsize < 2**32:
         bits = 64 if sys.maxsize >= 2**32 else 32

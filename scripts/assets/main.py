@@ -1,4 +1,4 @@
-"""The set-up from start to end, and every way in which it stops."""
+"""The set-up with all its steps and errors."""
 
 import errno
 import signal
@@ -91,7 +91,7 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
 
 
 def chosen_models(models: tuple[Model | Quantised, ...], arguments: list[str]) -> list[Model | Quantised]:
-    """Those that the arguments ask for, in the order of the pins."""
+    """The models of the arguments, in the order of the pins."""
     if EVERY_MODEL in arguments:
         return list(models)
     named = [model for model in models if model.name in arguments]
@@ -103,7 +103,7 @@ def chosen_models(models: tuple[Model | Quantised, ...], arguments: list[str]) -
 def _explain(error: OSError) -> str:
     place = error.filename or ROOT
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"There is no space left for {place}; free some and run the set-up again, it goes on where it stopped."
+        return f"There is no space left for {place}; free some and run the set-up again; it continues where it stopped."
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         return f"{place} cannot be written by this user; use a clone in a folder of your own, or make this one yours."
     return f"{error.strerror or error}: {place}"

@@ -1,4 +1,4 @@
-"""npm: the one that is installed, or the one inside a Python package."""
+"""npm: the installed one, or the one of a Python package."""
 
 import os
 import shutil
@@ -12,8 +12,8 @@ from .private_python import PrivatePython
 
 def pack_command(places: Places, archive: Archive, node: tuple[Requirement, ...], step: str) -> list[str]:
     """The command that writes the package's tarball into the current folder."""
-    # These undo what a user may have set for npm in general. The cache goes away with the current folder, and
-    # without a network npm gives up after twenty seconds, not after seventy.
+    # These override the user's general npm settings. The cache is removed with the current folder, and
+    # without a network npm fails after 20 seconds instead of 70.
     switches = [
         *("--loglevel=error", "--ignore-scripts", "--dry-run=false", "--json=false", "--pack-destination=."),
         *("--cache=npm-cache", "--logs-max=0", "--fetch-retry-maxtimeout=10000"),
@@ -40,5 +40,5 @@ def _npm(places: Places, node: tuple[Requirement, ...], step: str) -> list[str]:
 
 
 def _works(npm: str) -> bool:
-    """npm is a script and useless without the Node.js that it names."""
+    """Checks that npm, a script, has a working Node.js."""
     return subprocess.run([npm, "--version"], capture_output=True, check=False).returncode == 0

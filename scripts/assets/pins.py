@@ -13,7 +13,7 @@ REGISTRIES = ("npm", "pypi")
 
 @dataclass(frozen=True)
 class Member:
-    """A file in an archive; `to` is where it goes in the repository, if it is a result itself."""
+    """A file in an archive; `to` is its path in the repository if it is a result itself."""
 
     path: str
     sha256: str
@@ -22,7 +22,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Archive:
-    """A package as its registry serves it."""
+    """A package of a registry."""
 
     package: str
     version: str
@@ -33,7 +33,7 @@ class Archive:
 
 @dataclass(frozen=True)
 class Runtime:
-    """ONNX Runtime for one kind of CPU; platform and Python version choose the wheel."""
+    """ONNX Runtime for one CPU family; platform and Python version select the wheel."""
 
     archive: Archive
     members: tuple[Member, ...]
@@ -43,9 +43,9 @@ class Runtime:
 
 @dataclass(frozen=True)
 class Model:
-    """A model, how it is converted, and the sum of the ONNX file it gives.
+    """A model, its converter, and the sum of the resulting ONNX file.
 
-    `converter` is a module and what it is told after the names of its source and its result. `registry` is where
+    `converter` is a module and its arguments after the names of its source and its result. `registry` is where
     the archive comes from. `default` models belong to every set-up. `caution` is what a user should know before
     using the weights, if anything.
     """
@@ -62,7 +62,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Quantised:
-    """The INT8 form of a model, made from the model's ONNX file, and the sum of the ONNX file it gives.
+    """The INT8 version of a model, made from its ONNX file, and the sum of the result.
 
     `default` forms belong to every set-up.
     """

@@ -1,4 +1,4 @@
-"""Where the set-up keeps things; every path is inside the repository."""
+"""The folders of the set-up, all inside the repository."""
 
 import contextlib
 import fcntl
@@ -40,7 +40,7 @@ class Places:
 
     @contextlib.contextmanager
     def temporary(self) -> Iterator[Path]:
-        """A folder for unfinished work, on the same file system as the results, gone afterwards."""
+        """A temporary folder for unfinished work, on the same file system as the results."""
         parent = self.own / "unfinished"
         parent.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(dir=parent))
@@ -51,7 +51,7 @@ class Places:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Lets one set-up at a time work here, and clears away what a killed one left unfinished."""
+        """Locks the set-up, and removes unfinished work of a killed one."""
         self.own.mkdir(parents=True, exist_ok=True)
         with open(self.own / "lock", "w") as lock:
             try:
@@ -64,13 +64,13 @@ class Places:
 
 
 def put_in_place(finished: Path, destination: Path) -> None:
-    """Moves a finished file to its name in one step, so that no reader ever sees half of it."""
+    """Renames a finished file in one step, so that no reader sees an incomplete one."""
     destination.parent.mkdir(parents=True, exist_ok=True)
     os.replace(finished, destination)
 
 
 def require_space(folder: Path, needed: int) -> None:
-    """Refuses to begin what cannot fit."""
+    """Raises an error if the free space is too small."""
     free = shutil.disk_usage(folder).free
     if free < needed:
         raise SetupError(

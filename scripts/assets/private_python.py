@@ -1,4 +1,4 @@
-"""Python environments of the set-up's own, so that nothing of the user's is touched."""
+"""Private Python environments, which leave those of the user unchanged."""
 
 import importlib.util
 import os
@@ -11,7 +11,7 @@ from .console import SetupError, say
 from .pins import Requirement
 from .places import Places
 
-# What a user may say about how registries are reached. Every other PIP_ setting is about the user's own
+# The user's settings for access to registries. Every other PIP_ setting is for the user's own
 # environments (PIP_TARGET, PIP_NO_BINARY, PIP_REQUIRE_VIRTUALENV ...) and must not reach this one.
 REGISTRY_SETTINGS = {
     *("PIP_INDEX_URL", "PIP_EXTRA_INDEX_URL", "PIP_NO_INDEX", "PIP_FIND_LINKS", "PIP_TRUSTED_HOST", "PIP_CERT"),
@@ -25,7 +25,7 @@ NO_PIP = (
 
 
 class PrivatePython:
-    """The environment in `.setup/venv` or another folder, made when it is first asked for."""
+    """The environment in `.setup/venv` or another folder, created at the first use."""
 
     def __init__(self, places: Places, step: str, folder: Path | None = None):
         self.places = places
@@ -34,14 +34,14 @@ class PrivatePython:
         self.python = self.folder / "bin" / "python"
 
     def pip(self, *arguments: str) -> list[str]:
-        """The command that runs pip for this environment; makes the environment if need be."""
+        """The command that runs pip for this environment; creates the environment if needed."""
         self._make()
         if has_module("ensurepip"):
             return [str(self.python), "-m", "pip", *arguments]
         return [sys.executable, "-m", "pip", "--python", str(self.python), *arguments]
 
     def install(self, label: str, requirements: tuple[Requirement, ...]) -> None:
-        """Installs exactly these packages, by their sums; nothing is done if they are there already."""
+        """Installs exactly these packages, by their sums, unless they are installed already."""
         names = ", ".join(dict.fromkeys(pin.package for pin in requirements))
         self._install(label, requirements_text(requirements), names, "--require-hashes")
 
@@ -91,12 +91,12 @@ class PrivatePython:
                 environment=pip_environment(),
                 failure=f"{NO_PIP} It said:",
             )
-        # Written last: an environment without it was not finished and is made anew.
+        # Written last: an environment without it is incomplete and is created again.
         record.write_text(identity, encoding="utf-8")
 
 
 def has_module(name: str) -> bool:
-    """Whether this Python has the module; Debian leaves out some of the standard library."""
+    """Returns True if this Python has the module; Debian omits parts of the standard library."""
     return importlib.util.find_spec(name) is not None
 
 
@@ -111,12 +111,12 @@ def requirements_text(requirements: tuple[Requirement, ...]) -> str:
 
 
 def pip_environment() -> dict[str, str]:
-    """The user's environment without what would lead pip or the private Python elsewhere."""
+    """The user's environment without variables that redirect pip or the private Python."""
     environment = {
         name: value
         for name, value in os.environ.items()
         if name in REGISTRY_SETTINGS or not name.startswith(("PIP_", "PYTHON", "VIRTUAL_ENV"))
     }
-    # These win over the user's configuration file as well.
+    # These override the user's configuration file, too.
     quiet = {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_INPUT": "1", "PIP_ROOT_USER_ACTION": "ignore"}
     return environment | quiet | {"PIP_REQUIRE_VIRTUALENV": "0", "PIP_USER": "0", "PYTHONNOUSERSITE": "1"}

@@ -56,7 +56,7 @@ def install_model(places: Places, model: Model, pins: Pins) -> None:
 
 
 def install_quantised(places: Places, model: Quantised, pins: Pins) -> None:
-    """Puts the INT8 form of a model into its folder under `models/`, and before that the model itself."""
+    """Puts the INT8 version of a model into its folder under `models/`, after the model itself."""
     step = "model"
     onnx_file = places.root / "models" / model.name / "model.onnx"
     if not is_whole(onnx_file, model.onnx_sha256):
@@ -71,7 +71,7 @@ def install_quantised(places: Places, model: Quantised, pins: Pins) -> None:
 
 
 def install_benches(places: Places) -> None:
-    """Makes a Python environment for the benchmarks and one for each server they compare with."""
+    """Creates a Python environment for the benchmarks and one for each peer server."""
     step = "benches"
     benches = places.root / "benches"
     for file in sorted([benches / "requirements.txt", *benches.glob("peers/*/requirements.txt")]):
@@ -107,7 +107,7 @@ def _place_results(places: Places, members: tuple[Member, ...], files: list[Path
 
 
 def _require_loadable(library: Path) -> None:
-    """Loads the library the way the server will, in a process of its own."""
+    """Loads the library as the server does, in a separate process."""
     command = [sys.executable, "-c", LOAD_LIBRARY, str(library)]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     if answer.returncode != 0:

@@ -13,18 +13,18 @@ def sha256_of(file: Path) -> str:
 
 
 def is_whole(file: Path, sha256: str) -> bool:
-    """Whether the file is there with this very content."""
+    """Returns True if the file exists with this content."""
     return file.is_file() and sha256_of(file) == sha256
 
 
-FETCHED_REMEDY = "Run the set-up again; if this stays, ask whoever runs your package mirror or proxy."
+FETCHED_REMEDY = "Run the set-up again; if it fails again, ask the operator of your package mirror or proxy."
 
 
 def require_sum(file: Path, sha256: str, origin: str, remedy: str = FETCHED_REMEDY) -> None:
-    """Refuses a file with another content than the pinned one; `origin` says where it came from."""
+    """Refuses a file with a sum other than the pinned one; `origin` is its source."""
     found = sha256_of(file)
     if found != sha256:
         raise SetupError(
             f"{file.name} from {origin} is not the file that Lookdown pins: its sha256 is {found}, pinned is {sha256}. "
-            f"It was thrown away. {remedy}"
+            f"It was deleted. {remedy}"
         )

@@ -1,4 +1,4 @@
-"""Checks for the programs that build Lookdown, before anything is fetched."""
+"""Checks for the programs that build Lookdown, before any download."""
 
 import os
 import re
@@ -13,7 +13,7 @@ VERSION = re.compile(r"rustc (\d+)\.(\d+)")
 
 
 def check_toolchain(root: Path) -> None:
-    """Cargo, a Rust that is new enough, and the C compiler, which compiles a crate's C and links."""
+    """Checks for cargo, a recent Rust, and the C compiler, which compiles C code of crates and links."""
     wanted = tomllib.loads((root / "Cargo.toml").read_text(encoding="utf-8"))["package"]["rust-version"]
     advice = f"install Rust {wanted} or newer, with rustup or from your distribution, and run the set-up again"
     for program in ("cargo", "rustc"):

@@ -1,5 +1,5 @@
-"""How a conversion stops."""
+"""The error of a conversion."""
 
 
 class ConversionError(Exception):
-    """The source is not what the converter was written for; the message says what was found and what is needed."""
+    """An unsupported source; the message has the actual and the required content."""

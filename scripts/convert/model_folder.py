@@ -1,4 +1,4 @@
-"""Writes a model folder for Lookdown: `model.onnx` and the `model.toml` that says what it is."""
+"""Writes a model folder for Lookdown: `model.onnx` and its manifest `model.toml`."""
 
 import json
 import os
@@ -7,12 +7,12 @@ from pathlib import Path
 
 from .errors import ConversionError
 
-# Data sets that are told by how many classes they have, COCO and Pascal VOC, and their class of persons.
+# The data sets COCO and Pascal VOC, identified by their number of classes, and their person class.
 PERSON_BY_CLASSES = {80: 0, 20: 14}
 
 
 def person_class(classes: int, class_names: Path | None) -> int:
-    """Which of the classes the person is, by a list of their names or, without one, by their number."""
+    """The index of the person class, from a list of names or else from the number of classes."""
     if class_names is None:
         if classes not in PERSON_BY_CLASSES:
             raise ConversionError(f"Which of {classes} classes is the person? Give a list of names: --class-names FILE")

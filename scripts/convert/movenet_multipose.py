@@ -1,4 +1,4 @@
-"""MoveNet MultiPose Lightning, cut down to where and how large persons are: `MODEL_JSON ONNX`.
+"""MoveNet MultiPose Lightning, reduced to positions and sizes of persons: `MODEL_JSON ONNX`.
 
 The published graph follows at most six persons and finds their joints. Its heat map of persons' centres and its
 maps of box offsets and sizes make a detector of their own, without that limit.

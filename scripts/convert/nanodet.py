@@ -31,7 +31,7 @@ RESIZE_FACTORS = {
     "PartitionedCall/resize_2/ResizeBilinear": 0.5,
     "PartitionedCall/resize_3/ResizeBilinear": 0.5,
 }
-# Of the pictures NanoDet was trained on: red, green, blue. The network itself wants blue first.
+# The statistics of NanoDet's training images: red, green, blue. The network expects blue first.
 MEAN = (123.675, 116.28, 103.53)
 DEVIATION = (58.395, 57.12, 57.375)
 DESCRIPTION = (
@@ -76,7 +76,7 @@ def _keep_person_class(graph: TfGraph) -> None:
 
 
 def _take_red_first(graph: TfGraph) -> None:
-    """Turns the first convolution's input channels round, so that the picture may come as red, green, blue."""
+    """Reverses the input channels of the first convolution, so that the input is red, green, blue."""
     name = graph.node(FIRST_CONVOLUTION).inputs[1]
     graph.constants[name] = graph.constant(name)[:, :, ::-1, :]
 

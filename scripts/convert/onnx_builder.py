@@ -18,7 +18,7 @@ IR_VERSION = 8
 
 
 class OnnxBuilder:
-    """An ONNX graph under construction; tensors go by name."""
+    """An ONNX graph under construction; tensors are identified by name."""
 
     def __init__(self):
         self.nodes = []
@@ -49,7 +49,7 @@ class OnnxBuilder:
         return pieces
 
     def top(self, tensor: str, count: int) -> tuple[str, str]:
-        """The `count` largest values along axis 1, in falling order, and their indices."""
+        """The `count` largest values along axis 1, in descending order, and their indices."""
         name = self._new_name("TopK")
         values, indices = f"{name}/values", f"{name}/indices"
         wanted = self.constant(numpy.array([count], numpy.int64))
@@ -57,7 +57,7 @@ class OnnxBuilder:
         return values, indices
 
     def reshape(self, tensor: str, shape: list[int]) -> str:
-        """Reshapes; 0 keeps a dimension, -1 takes what is left."""
+        """Reshapes; 0 keeps a dimension, -1 is inferred."""
         return self.node("Reshape", [tensor, self.constant(numpy.array(shape, numpy.int64))])
 
     def save_detector(self, path: Path, *, boxes: str, scores: str, size: int, anchors: int, description: str) -> None:

@@ -10,7 +10,7 @@ class Peaks:
     """The strongest local maxima of a heat map `[N, 1, height, width]`."""
 
     def __init__(self, builder: OnnxBuilder, heat_map: str, width: int, count: int):
-        """`width` is the heat map's; `count` peaks are taken, fewer real ones being followed by scores of 0."""
+        """`width` is the heat map's; `count` peaks are returned, padded with scores of 0."""
         self._builder = builder
         self._width = width
         neighbourhood = builder.node("MaxPool", [heat_map], kernel_shape=[3, 3], strides=[1, 1], pads=[1, 1, 1, 1])
@@ -19,7 +19,7 @@ class Peaks:
         self.scores, self._cells = builder.top(peaks, count)
 
     def values(self, maps: str, channels: int) -> str:
-        """What maps `[N, channels, height, width]` say at the peaks: `[N, count, channels]`."""
+        """The values of maps `[N, channels, height, width]` at the peaks: `[N, count, channels]`."""
         builder = self._builder
         per_cell = builder.node("Transpose", [builder.reshape(maps, [0, channels, -1])], perm=[0, 2, 1])
         every_channel = builder.constant(numpy.array([1, 1, channels], numpy.int64))

@@ -1,4 +1,4 @@
-"""Makes the INT8 form of a converted model, from checked-in activation ranges: `FP32_ONNX ONNX RANGES_JSON`.
+"""Makes the INT8 version of a converted model, from checked-in activation ranges: `FP32_ONNX ONNX RANGES_JSON`.
 
 Integers stand between pairs of QuantizeLinear and DequantizeLinear, which ONNX Runtime turns into integer kernels.
 Nothing is measured here, so that the same files give the same bytes everywhere; `quantisation.calibrate` made the
@@ -41,7 +41,7 @@ class Quantiser:
         self._written: list[NodeProto] = []
 
     def quantise(self) -> None:
-        """Puts a rounding behind every tensor that is to be rounded, and integers in place of weights."""
+        """Adds QuantizeLinear and DequantizeLinear to every quantised tensor, and replaces weights by integers."""
         for node in self.graph.nodes:
             if node.name in self._int8_nodes and node.op_type == "Conv":
                 self._use_integer_weights(node)

@@ -14,7 +14,7 @@ ANCHORS_NODE = "Postprocessor/ExpandDims"
 
 
 def keep_one_class(graph: TfGraph, class_index: int, feature_maps: int) -> None:
-    """Drops every other class from the class predictors, which makes them some ninety times smaller.
+    """Drops every other class from the class predictors, which makes them about ninety times smaller.
 
     A predictor has one channel per anchor shape and class, the classes of an anchor next to each other.
     """

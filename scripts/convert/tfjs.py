@@ -48,7 +48,7 @@ def _weights(entries: list[dict], shards: bytes) -> dict[str, numpy.ndarray]:
 
 
 def _attribute(value: dict):
-    """The plain Python value of a node attribute; kinds that no operation asks for stay as they are."""
+    """The plain Python value of a node attribute; unused kinds stay unchanged."""
     match value:
         case {"s": list(codes)}:
             return bytes(codes).decode()

@@ -25,7 +25,7 @@ STORAGES = {
 
 
 def read_checkpoint(file: Path) -> dict:
-    """The object that was saved, tensors as numpy arrays."""
+    """The saved object, with tensors as numpy arrays."""
     try:
         with zipfile.ZipFile(file) as archive:
             pickled = next((name for name in archive.namelist() if name.endswith("/data.pkl")), None)
@@ -40,7 +40,7 @@ def read_checkpoint(file: Path) -> dict:
 
 
 class _Husk:
-    """Stands for an object of a class that is of no interest."""
+    """A placeholder for objects of other classes."""
 
     def __init__(self, *_arguments, **_named):
         pass

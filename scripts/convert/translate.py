@@ -10,7 +10,7 @@ from .errors import ConversionError
 from .onnx_builder import OnnxBuilder
 from .tf_graph import TfGraph, TfNode
 
-# Where a TensorFlow axis of N, height, width, channels lies in N, channels, height, width.
+# The index of a TensorFlow axis (N, height, width, channels) in N, channels, height, width.
 AXES_CHANNELS_FIRST = (0, 2, 3, 1)
 TO_CHANNELS_LAST = [0, 2, 3, 1]
 TO_CHANNELS_FIRST = [0, 3, 1, 2]
@@ -28,7 +28,7 @@ class Translator:
         channels_first_feeds: frozenset[str] = frozenset(),
         resize_factors: dict[str, float] | None = None,
     ):
-        """`feeds` says where to stop: TensorFlow node name to the ONNX tensor that takes its place.
+        """`feeds` maps names of TensorFlow nodes to the ONNX tensors that replace them.
 
         `channels_first_feeds` are those whose TensorFlow node is itself N, channels, height, width, as in graphs
         that were exported from elsewhere. `resize_factors` says by how much each bilinear resize multiplies height
@@ -163,7 +163,7 @@ class Translator:
         was_channels_first = node.inputs[0] in self._channels_first
         order = self.graph.constant(node.inputs[1]).tolist()
         if order != (TO_CHANNELS_LAST if was_channels_first else TO_CHANNELS_FIRST):
-            raise ConversionError(f"node '{name}' transposes by {order}, which is no change of the channels' place")
+            raise ConversionError(f"node '{name}' transposes by {order}, which is not a move of the channels")
         if not was_channels_first:
             self._channels_first.add(name)
         return image
@@ -198,7 +198,7 @@ class Translator:
         return self.builder.constant(self.graph.constant(name).reshape(1, -1, 1, 1), f"{user}/per_channel")
 
     def _axis(self, name: str, axis: int) -> int:
-        """Where an axis of a TensorFlow feature map lies in the ONNX tensor."""
+        """The index of an axis of a TensorFlow feature map in the ONNX tensor."""
         return axis if name in self._channels_first else AXES_CHANNELS_FIRST[axis]
 
 
@@ -214,7 +214,7 @@ def _padding(name: str, node: TfNode) -> dict:
 
 
 def _fused(name: str, node: TfNode) -> tuple[bool, str | None]:
-    """Whether a convolution adds a bias, and the activation it applies."""
+    """The bias and the activation of a fused convolution."""
     match node.attributes.get("fused_ops", []):
         case []:
             return False, None

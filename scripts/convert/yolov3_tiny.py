@@ -12,7 +12,7 @@ from .darknet.network import read_network
 from .darknet.weights import read_weights
 from .onnx_builder import OnnxBuilder
 
-# The published file says 0, 1, 2 for the finer map, with which no box fits; the weights were trained with these.
+# The published file has 0, 1, 2 for the finer map, which fits no box; the weights were trained with these.
 MASKS = ([3, 4, 5], [1, 2, 3])
 DESCRIPTION = (
     "YOLOv3-tiny (COCO), person class only. images: RGB 0..255, N x 3 x 416 x 416. "

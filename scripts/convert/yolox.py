@@ -21,7 +21,7 @@ PYRAMID = "backbone"
 
 
 def convert_detector(checkpoint: Path, folder: Path, size: int, name: str, class_names: Path | None) -> str:
-    """Writes the model folder for pictures of `size` x `size` pixels and says in a line what was made."""
+    """Writes the model folder for pictures of `size` x `size` pixels and returns a line that describes it."""
     if size <= 0 or size % STRIDES[-1]:
         raise ConversionError(f"The size is {size} pixels; YOLOX needs a multiple of {STRIDES[-1]}.")
     saved = read_checkpoint(checkpoint)
@@ -52,7 +52,7 @@ def convert_detector(checkpoint: Path, folder: Path, size: int, name: str, class
 
 
 class Yolox:
-    """Adds the parts of a YOLOX to a graph; layers go by the names of their weights."""
+    """Adds the parts of a YOLOX to a graph; layers are named after their weights."""
 
     def __init__(self, builder: OnnxBuilder, weights: dict[str, numpy.ndarray]):
         self.builder = builder
@@ -71,7 +71,7 @@ class Yolox:
         return [*maps[1:], self._partial(tensor, f"{TRUNK}.dark5.2", shortcut=False)]
 
     def pyramid(self, maps: list[str]) -> list[str]:
-        """The path aggregation network: every map learns of the coarser and the finer ones."""
+        """The path aggregation network, which combines coarser and finer maps."""
         fine, middle, coarse = maps
         coarse = self._block(coarse, f"{PYRAMID}.lateral_conv0")
         middle = self._partial(self._joined(self._doubled(coarse), middle), f"{PYRAMID}.C3_p4", shortcut=False)
@@ -111,7 +111,7 @@ class Yolox:
         return self.builder.node("Conv", [tensor, kernel, bias], kernel_shape=[1, 1])
 
     def _block(self, tensor: str, name: str, stride: int = 1) -> str:
-        """A convolution, or the two that a separable one consists of."""
+        """A convolution, or the two of a separable one."""
         if f"{name}.dconv.conv.weight" in self.weights:
             return self._unit(self._unit(tensor, f"{name}.dconv", stride, separable=True), f"{name}.pconv")
         return self._unit(tensor, name, stride)
@@ -146,7 +146,7 @@ class Yolox:
         return self.builder.node("Mul", [convolved, self.builder.node("Sigmoid", [convolved])])
 
     def _partial(self, tensor: str, name: str, *, shortcut: bool) -> str:
-        """A cross stage partial layer: half of the channels pass through bottlenecks, half pass by."""
+        """A cross stage partial layer: half of the channels pass through bottlenecks."""
         through, beside = self._block(tensor, f"{name}.conv1"), self._block(tensor, f"{name}.conv2")
         index = 0
         while f"{name}.m.{index}.conv1.conv.weight" in self.weights:
@@ -166,7 +166,7 @@ class Yolox:
         return self._block(self._joined(narrowed, *pooled), f"{name}.conv2")
 
     def _quarters(self, images: str) -> str:
-        """Every second pixel of every second row, from the four places to begin, one after the other."""
+        """Every second pixel of every second row, for the four offsets in order."""
 
         def quarter(row: int, column: int) -> str:
             begins, ends, axes, steps = ([row, column], [2**31, 2**31], [2, 3], [2, 2])

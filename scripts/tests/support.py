@@ -1,4 +1,4 @@
-"""What several tests share: a repository of its own for each test, and small archives to put in it."""
+"""Shared code of the tests: a repository for each test, and small archives."""
 
 import contextlib
 import dataclasses
@@ -15,7 +15,7 @@ from assets.places import Places
 
 
 class InEmptyRepository(unittest.TestCase):
-    """Gives each test `self.places` in an empty folder whose path contains a space, and swallows what is printed."""
+    """Gives each test `self.places` in an empty folder whose path contains a space, and captures the output."""
 
     def setUp(self):
         folder = self.enterContext(tempfile.TemporaryDirectory(prefix="look down "))
@@ -42,7 +42,7 @@ def archive_of(content: bytes, file: str = "thing-1.0.tgz") -> Archive:
 
 
 def model_of(archive: Archive, members: tuple[Member, ...], onnx: bytes, **changes) -> Model:
-    """The pin of a model that comes out of an archive and becomes these bytes."""
+    """The pin of a model from an archive that is converted to these bytes."""
     model = Model("net", archive, "npm", members, ("convert.net",), sha256(onnx), default=True, caution=None)
     return dataclasses.replace(model, **changes)
 

@@ -1,4 +1,4 @@
-"""Unpacking: only whole archives with the pinned members give files."""
+"""Unpacking: only complete archives with the pinned members produce files."""
 
 from assets.archives import extract
 from assets.console import SetupError
@@ -28,7 +28,7 @@ class Archives(InEmptyRepository):
             with self.assertRaisesRegex(SetupError, f"{name} has no file .*two.txt"):
                 extract(archive, (member("two.txt", b"2"),), self.places.root)
 
-    def test_a_corrupted_archive_is_refused_with_its_path_and_the_remedy(self):
+    def test_corrupt_archive_is_refused_with_path_and_remedy(self):
         for name, pack in (("a.whl", wheel), ("a.tgz", npm_package)):
             whole = pack({"one.txt": bytes(range(256)) * 400})
             for damaged in (whole[: len(whole) // 2], b"not an archive", b""):

@@ -1,4 +1,4 @@
-"""Converters called by hand: where they run, and how they stop."""
+"""Converters on the command line: their Python environment and their errors."""
 
 import contextlib
 import io
@@ -24,11 +24,11 @@ class Conversion(InEmptyRepository):
         with mock.patch.object(sys, "prefix", str(self.places.python)):
             return conversion.main("convert_net.py", convert)
 
-    def test_in_the_private_python_it_converts_and_says_what_was_made(self):
+    def test_private_python_converts_and_prints_the_result(self):
         self.assertEqual(self.in_private_python(lambda: "model.onnx: 3 weights"), 0)
         self.assertEqual(self.printed.getvalue(), "model.onnx: 3 weights\n")
 
-    def test_in_another_python_it_goes_on_in_the_private_one_with_the_same_arguments(self):
+    def test_other_python_runs_the_private_one_with_same_arguments(self):
         installed = []
         self.enterContext(mock.patch.object(conversion, "read_pins", mock.Mock()))
         self.enterContext(mock.patch.object(PrivatePython, "install", lambda *arguments: installed.append(arguments)))
@@ -40,7 +40,7 @@ class Conversion(InEmptyRepository):
         self.assertEqual(run.call_args.args[0], [python, "/scripts/convert_net.py", "net.cfg", "out folder"])
         self.assertEqual(len(installed), 1)
 
-    def test_what_keeps_it_from_converting_is_said_without_a_traceback(self):
+    def test_conversion_error_is_printed_without_traceback(self):
         causes = (
             (ConversionError("The file is short."), "The conversion stopped. The file is short.\n"),
             (FileNotFoundError(2, "No such file", "a.cfg"), "The conversion stopped. No such file: a.cfg\n"),

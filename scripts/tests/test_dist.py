@@ -1,4 +1,4 @@
-"""What is handed out is complete, can be checked, and is the same wherever it was packed."""
+"""The tarball is complete, verifiable and reproducible."""
 
 import hashlib
 import subprocess
@@ -23,7 +23,7 @@ class Dist(unittest.TestCase):
         self.binary = self.here / "built"
         self.binary.write_text(PROGRAM, encoding="utf-8")
 
-    def test_the_library_the_default_models_and_their_licences_belong_to_it(self):
+    def test_tarball_has_library_default_models_and_licences(self):
         pins = read_pins(ROOT / "scripts" / "pins.toml")
         names = [name for _, name in files_of(ROOT, pins, supported_cpu())]
         for name in ("LICENSE", "NOTICE", "runtime/libonnxruntime.so", "runtime/ThirdPartyNotices.txt"):

@@ -1,4 +1,4 @@
-"""Fetching: only whole archives are kept, whatever happened before."""
+"""Downloads: only complete archives are kept."""
 
 import os
 import sys
@@ -43,7 +43,7 @@ class Downloads(InEmptyRepository):
             self.fetch(self.writing(CONTENT[:-1] + b"!"))
         self.assertFalse((self.places.downloads / PIN.file).exists())
 
-    def test_a_client_that_is_killed_on_the_way_leaves_nothing_behind(self):
+    def test_killed_client_leaves_no_files(self):
         script = f"import os; open({PIN.file!r}, 'wb').write(b'half'); os.kill(os.getpid(), 9)"
         with self.assertRaisesRegex(SetupError, "npm could not fetch thing 1.0"):
             self.fetch(script)

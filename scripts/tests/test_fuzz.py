@@ -1,4 +1,4 @@
-"""The fuzzers' script knows every importer, and their seeds are there."""
+"""The script of the fuzzers has every importer, and their seeds exist."""
 
 import re
 import unittest

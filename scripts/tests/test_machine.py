@@ -1,4 +1,4 @@
-"""Unsupported machines are told what is supported and what they are."""
+"""Unsupported machines are refused with the supported ones and their own kind."""
 
 import unittest
 from unittest import mock
@@ -8,7 +8,7 @@ from assets.machine import supported_cpu
 
 
 def machine(system="linux", cpu="x86_64", libc="glibc 2.36", largest=2**63 - 1):
-    """Pretends to be another machine; `libc=None` is a C library that does not know glibc's question."""
+    """Pretends to be another machine; `libc=None` is a C library without glibc's version query."""
     answer = {"side_effect": ValueError("unrecognized name")} if libc is None else {"return_value": libc}
     patches = mock.patch.multiple("sys", platform=system, maxsize=largest)
     patched_cpu = mock.patch("platform.machine", return_value=cpu)
@@ -42,7 +42,7 @@ class Machine(unittest.TestCase):
         with self.assertRaisesRegex(SetupError, "needs a Linux with the GNU C library"):
             self.on(libc=None)
 
-    def test_a_glibc_older_than_onnx_runtime_wants_is_refused_with_its_version(self):
+    def test_old_glibc_is_refused_with_its_version(self):
         self.assertEqual(self.on(libc="glibc 2.28"), "x86_64")
         with self.assertRaisesRegex(SetupError, "needs glibc 2.28 or newer and this system has 2.27"):
             self.on(libc="glibc 2.27")

@@ -1,4 +1,4 @@
-"""Which npm is used: the installed one if it works, else the one that a Python package brings."""
+"""The choice of npm: the installed one if it works, else that of a Python package."""
 
 from pathlib import Path
 from unittest import mock
@@ -24,7 +24,7 @@ class Npm(InEmptyRepository):
         return file
 
     def node_package(self, brings_node: bool):
-        """Stands for the installation of the Python package; the folders are those of the real one."""
+        """Replaces the installation of the Python package, with the same folders."""
 
         def install(python, label, requirements):
             self.assertEqual((label, requirements), ("node", NODE))

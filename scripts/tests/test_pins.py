@@ -15,7 +15,7 @@ SHIPPED = SCRIPTS / "pins.toml"
 
 
 class ShippedPins(InEmptyRepository):
-    def test_both_processors_get_the_library_and_its_licences_from_the_same_version(self):
+    def test_both_cpu_types_get_the_same_library_version(self):
         for cpu, runtime in read_pins(SHIPPED).runtime.items():
             self.assertIn(cpu, runtime.platform)
             self.assertIn(cpu, runtime.archive.file)
@@ -23,7 +23,7 @@ class ShippedPins(InEmptyRepository):
             results = {member.to for member in runtime.members}
             self.assertEqual(results, {"runtime/libonnxruntime.so", "runtime/LICENSE", "runtime/ThirdPartyNotices.txt"})
 
-    def test_every_model_has_a_converter_and_its_results_stay_in_its_folder(self):
+    def test_every_model_has_a_converter_and_its_own_folder(self):
         for model in read_pins(SHIPPED).models:
             self.assertTrue((SCRIPTS / f"{model.converter[0].replace('.', '/')}.py").is_file())
             for member in model.members:
@@ -37,7 +37,7 @@ class ShippedPins(InEmptyRepository):
             manifest = tomllib.loads(text)
             self.assertEqual((manifest["name"], manifest["onnx"]), (model.name, "model.onnx"))
 
-    def test_every_int8_form_has_the_ranges_of_the_very_model_it_is_made_from(self):
+    def test_every_int8_model_has_the_ranges_of_its_source(self):
         for model in read_pins(SHIPPED).quantised:
             text = (SCRIPTS.parent / "models" / model.name / "activation_ranges.json").read_text(encoding="utf-8")
             self.assertEqual(json.loads(text)["model_sha256"], model.source.onnx_sha256)

@@ -1,4 +1,4 @@
-"""The private Python environment: how it is made, what reaches its pip, what happens without pip."""
+"""The private Python environment: creation, settings of pip, missing pip."""
 
 import sys
 from unittest import mock
@@ -58,7 +58,7 @@ class Making(InEmptyRepository):
             with self.assertRaisesRegex(SetupError, "apt-get install python3-venv"):
                 PrivatePython(self.places, "model").pip("list")
 
-    def test_a_requirements_file_is_installed_once_into_a_folder_of_its_own(self):
+    def test_requirements_file_is_installed_once_in_its_folder(self):
         commands = self.with_modules("venv", "ensurepip")
         file = self.write("benches/peers/other/requirements.txt", b"a==1\n")
         python = PrivatePython(self.places, "benches", self.places.python)
@@ -69,7 +69,7 @@ class Making(InEmptyRepository):
 
 
 class Environment(InEmptyRepository):
-    def test_registry_settings_reach_pip_and_settings_of_the_users_own_environments_do_not(self):
+    def test_only_registry_settings_of_the_user_reach_pip(self):
         kept = {"PIP_INDEX_URL": "index", "PIP_FIND_LINKS": "links", "PIP_CERT": "cert", "PIP_CONFIG_FILE": "file"}
         dropped = {"PIP_TARGET": "t", "PIP_NO_BINARY": "onnx", "PYTHONPATH": "p", "PYTHONHOME": "h", "VIRTUAL_ENV": "v"}
         self.enterContext(mock.patch.dict("os.environ", kept | dropped | {"PIP_REQUIRE_VIRTUALENV": "1"}))

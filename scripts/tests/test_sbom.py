@@ -1,4 +1,4 @@
-"""The bill of materials is complete, consistent, and says where each part is from."""
+"""The bill of materials is complete, consistent, and has the source of each component."""
 
 import json
 import tomllib
@@ -38,13 +38,13 @@ class ShippedBill(unittest.TestCase):
         self.assertLessEqual({entry["ref"] for entry in entries}, known)
         self.assertEqual({needed for entry in entries for needed in entry["dependsOn"]}, {*self.components})
 
-    def test_every_part_has_its_sum_and_every_package_its_name_of_the_registry(self):
+    def test_every_component_has_a_sum_and_a_purl(self):
         for reference, part in self.components.items():
             self.assertRegex(part["hashes"][0]["content"], r"^[0-9a-f]{64}$")
             if part["type"] == "library":
                 self.assertEqual(part["purl"], reference)
 
-    def test_what_the_binary_is_built_from_is_there_and_what_only_tests_need_is_not(self):
+    def test_sbom_has_build_but_no_test_dependencies(self):
         names = {part["name"] for part in self.bill["components"]}
         self.assertLessEqual({"axum", "ort", "rustls", "ring", "utoipa-swagger-ui-vendored"}, names)
         self.assertEqual({"proptest", "insta", "rcgen", "tempfile"} & names, set())
@@ -66,7 +66,7 @@ class ShippedBill(unittest.TestCase):
 
 
 class Parts(unittest.TestCase):
-    def test_a_crate_that_only_tests_need_is_left_out_with_all_that_it_needs(self):
+    def test_dev_dependencies_are_omitted_recursively(self):
         def need(name, kind):
             return {"pkg": name, "dep_kinds": [{"kind": kind}]}
 
@@ -80,7 +80,7 @@ class Parts(unittest.TestCase):
         needs = needed_crates({"resolve": {"root": "own", "nodes": nodes}})
         self.assertEqual(needs, {"own": {"used", "build"}, "used": set(), "build": {"used"}})
 
-    def test_a_licence_that_nobody_stated_is_no_spdx_expression(self):
+    def test_unstated_licence_is_no_spdx_expression(self):
         self.assertEqual(licences("MIT OR Apache-2.0"), [{"expression": "MIT OR Apache-2.0"}])
         self.assertEqual(licences("NOASSERTION"), [{"license": {"name": "not stated"}}])
 

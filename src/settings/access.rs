@@ -15,7 +15,7 @@ settings! {
     #[derive(Debug, Clone, PartialEq)]
     pub struct AccessSettings in "access" {
         /// The file of API keys, one line each as `lookdown key new` prints it
-        /// (docs/operations.md). With keys, every request except health checks, metrics and the API
+        /// (docs/deployment.md). With keys, every request except health checks, metrics and the API
         /// page needs one. Without keys, only clients on the same machine should reach the server.
         /// Leave it out for none: an empty value is refused.
         keys_file: Option<PathBuf> = None => given_path("/etc/lookdown/keys.toml");

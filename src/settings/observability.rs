@@ -26,7 +26,7 @@ settings! {
     #[derive(Debug, Clone, PartialEq)]
     pub struct TraceSettings in "telemetry" {
         /// The collector of traces with OTLP over HTTP, such as `http://127.0.0.1:4318`, without
-        /// `/v1/traces` (docs/operations.md). Empty: no traces. Its credentials come from the
+        /// `/v1/traces` (docs/observability.md). Empty: no traces. Its credentials come from the
         /// variable `OTEL_EXPORTER_OTLP_HEADERS`.
         otlp_endpoint: Option<Url> = None => optional(endpoint());
         /// The share of the requests that is traced, where the caller's `traceparent` does not

@@ -1,4 +1,4 @@
-//! The table of metrics in docs/operations.md lists exactly the metrics that the server exports.
+//! The table of metrics in docs/observability.md lists exactly the metrics that the server exports.
 
 use std::collections::BTreeSet;
 
@@ -44,7 +44,7 @@ async fn the_documentation_lists_exactly_the_exported_metrics() {
         .await;
     let metrics = service.get("/metrics").await.text();
     let shown = rows(&metrics);
-    let document = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations.md");
+    let document = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/observability.md");
     let document = std::fs::read_to_string(document).unwrap();
     let (_, section) = document.split_once("\n## Metrics\n").unwrap();
     let section = section.split("\n## ").next().unwrap();

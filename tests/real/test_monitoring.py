@@ -46,10 +46,10 @@ class Monitoring(unittest.TestCase):
         self.assertEqual([rule["alert"] for rule in self.rules if f"alertname: {rule['alert']}\n" not in tested], [])
 
     def test_every_alert_has_a_runbook(self):
-        operations = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
-        anchors = {line.strip("# ").lower() for line in operations.splitlines() if line.startswith("### Lookdown")}
+        page = (ROOT / "docs" / "observability.md").read_text(encoding="utf-8")
+        anchors = {line.strip("# ").lower() for line in page.splitlines() if line.startswith("### Lookdown")}
         runbooks = {rule["annotations"]["runbook"] for rule in self.rules}
-        self.assertEqual(runbooks, {f"docs/operations.md#{anchor}" for anchor in anchors})
+        self.assertEqual(runbooks, {f"docs/observability.md#{anchor}" for anchor in anchors})
 
     def test_prometheus_accepts_the_dashboard(self):
         self.assertTrue(self.panels)

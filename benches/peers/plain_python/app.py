@@ -1,4 +1,4 @@
-"""A person detector for fisheye frames as one writes it in Python: FastAPI, OpenCV and ONNX Runtime.
+"""A typical person detector for fisheye frames in Python: FastAPI, OpenCV and ONNX Runtime.
 
 Serves `POST /detect` (the frame as the body). Settings: MODEL, PLAN and CALIBRATION (files), REFINE (`nms` or
 `soft_nms`), THREADS (of one run of the network), BATCH (views in a run), FRAMES (worked on at once).

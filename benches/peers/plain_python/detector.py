@@ -1,4 +1,4 @@
-"""The detector: frame, views, network, boxes back in the frame, one box per person."""
+"""The detector: frame, views, network, boxes mapped to the frame, suppression."""
 
 import threading
 
@@ -9,7 +9,7 @@ from suppression import nms, soft_nms
 from views import Lens, View
 
 SCORE = 0.3
-"""Of a person in the answer, at least. No box below it can become one, nor change one."""
+"""The minimum score of a person. Boxes below it cannot become or change a person."""
 
 
 class Detector:

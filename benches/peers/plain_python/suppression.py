@@ -4,7 +4,7 @@ import numpy as np
 
 
 def iou(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Of one box with many."""
+    """The IoU of one box with many."""
     low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
     shared = np.prod(np.clip(high - low, 0, None), axis=1)
     area = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
@@ -12,7 +12,7 @@ def iou(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
 
 
 def nms(boxes: np.ndarray, scores: np.ndarray, threshold: float = 0.5) -> list[tuple[np.ndarray, float]]:
-    """The best boxes none of which overlap another one by `threshold`."""
+    """Selects the best boxes that do not overlap each other by `threshold`."""
     return _pick(boxes, scores, lambda overlap: (overlap < threshold).astype(float))
 
 

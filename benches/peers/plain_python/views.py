@@ -37,7 +37,7 @@ class View:
         columns, rows = np.meshgrid(np.arange(size), np.arange(size))
         pixels, seen = lens.project(self.rays(columns, rows))
         pixels[~seen] = -1e4  # outside of the frame: black
-        # Fixed-point maps are what OpenCV remaps fastest with.
+        # OpenCV's remap is fastest with fixed-point maps.
         self.maps = cv2.convertMaps(pixels[..., 0].astype(np.float32), pixels[..., 1].astype(np.float32), cv2.CV_16SC2)
 
     def rays(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -46,11 +46,11 @@ class View:
         return rays @ self.rotation.T
 
     def render(self, frame: np.ndarray) -> np.ndarray:
-        """What the view sees of a frame `[height, width, 3]`."""
+        """Renders the view of a frame `[height, width, 3]`."""
         return cv2.remap(frame, *self.maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
     def boxes_in_frame(self, boxes: np.ndarray) -> np.ndarray:
-        """Axis-parallel hulls in the frame of the four corners of boxes `[n, 4]`; those mostly unseen are left out."""
+        """Axis-parallel hulls in the frame of the four corners of boxes `[n, 4]`; mostly invisible ones are omitted."""
         x = boxes[:, [0, 2, 2, 0]] - 0.5
         y = boxes[:, [1, 1, 3, 3]] - 0.5
         pixels, seen = self.lens.project(self.rays(x, y))

@@ -1,4 +1,4 @@
-"""An ONNX model for MLServer that takes pictures as bytes and answers with the boxes worth an answer.
+"""An ONNX model for MLServer that takes images as bytes and returns the boxes above a threshold.
 
 The server's REST protocol has JSON only, so the pictures come in base64: one tensor of bytes `[n, 3, size, size]`.
 Settings: MODEL (file), THREADS (of one run of the network), BATCH (pictures in a run).
@@ -16,7 +16,7 @@ SCORE = 0.3
 
 
 class Detector(MLModel):
-    """Boxes of persons in pictures."""
+    """Detects boxes of persons in images."""
 
     async def load(self) -> bool:
         options = onnxruntime.SessionOptions()

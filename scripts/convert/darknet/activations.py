@@ -7,7 +7,7 @@ LEAKY_SLOPE = 0.1
 
 
 def activation_of(section: Section, default: str) -> str:
-    """The name of the activation that a section asks for."""
+    """The name of the activation of a section."""
     name = section.options.get("activation", default)
     if name not in ("linear", "leaky", "relu", "logistic", "mish"):
         raise section.refusal(f"has activation={name}, which has no translation")

@@ -16,17 +16,17 @@ class Section:
     options: dict[str, str] = field(default_factory=dict)
 
     def refusal(self, reason: str) -> ConversionError:
-        """An error that says which section is meant."""
+        """An error that names the section."""
         return ConversionError(f"{self.place}: [{self.kind}] {reason}")
 
     def allow_only(self, *names: str) -> None:
-        """Refuses options that would change what the layer computes in a way that has no translation."""
+        """Refuses options that change the result of the layer and have no translation."""
         for name in self.options:
             if name not in names:
                 raise self.refusal(f"has the option '{name}', which has no translation")
 
     def whole(self, name: str, default: int | None = None, least: int = 0) -> int:
-        """A whole number that is at least `least`; without a default it has to be there."""
+        """A whole number that is at least `least`; without a default it is required."""
         value = self.options.get(name, default)
         if value is None:
             raise self.refusal(f"lacks the option '{name}'")
@@ -68,7 +68,7 @@ class Section:
 def read_cfg(file: Path) -> list[Section]:
     """The sections in order.
 
-    Spaces mean nothing, `#` and `;` begin comments, and of an option that is given twice the first counts.
+    Spaces are ignored, `#` and `;` begin comments, and the first of repeated options counts.
     """
     sections = []
     for number, text in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):

@@ -10,7 +10,7 @@ from .cfg import Section
 from .layer import Layer, Shape, steps
 
 # Added to the variance before its root is taken. Darknet adds this to the root itself, or 1e-5 to the variance on a
-# GPU; for trained networks, whose variances are not that small, the answers differ by less than a thousandth.
+# GPU; for trained networks with larger variances, the outputs differ by less than 0.1 %.
 VARIANCE_FLOOR = numpy.float32(1e-6)
 
 

@@ -1,4 +1,4 @@
-"""A darknet detector as a model folder for Lookdown; the network's raw maps come out, not boxes."""
+"""A darknet detector as a model folder for Lookdown; the outputs are the raw maps, not boxes."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from .weights import read_weights
 
 
 def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_names: Path | None) -> str:
-    """Writes the model folder and says in a line what was made."""
+    """Writes the model folder and returns a line that describes it."""
     network = read_network(cfg)
     picture, classes = network.picture, network.heads[0].classes
     person = person_class(classes, class_names)
@@ -38,7 +38,7 @@ def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_na
 
 
 def _tables(network: Network, person: int) -> list[str]:
-    """How pixels go in, and how what comes out becomes boxes."""
+    """The manifest lines of input and output."""
     anchors = network.heads[0].anchors
     lines = ["", "[input]", f"scale = {[1 / 255] * 3}", "", "[output]"]
     if isinstance(network.heads[0], Region):

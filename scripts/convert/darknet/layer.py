@@ -1,4 +1,4 @@
-"""What every layer of a darknet network tells: which layers it reads, its shape, its weights, its ONNX nodes."""
+"""The interface of all layers of a darknet network: inputs, shape, weights, ONNX nodes."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -22,7 +22,7 @@ class Shape:
 
 
 class Layer:
-    """A layer: `sources` are the layers it reads, -1 the picture; `parameters` is how many weights it has."""
+    """A layer: `sources` are the layers it reads, -1 the image; `parameters` is the number of its weights."""
 
     kind: ClassVar[str]
     sources: tuple[int, ...]
@@ -30,7 +30,7 @@ class Layer:
     parameters = 0
 
     def __init__(self, section: Section, index: int, shapes: dict[int, Shape]):
-        """`index` is the layer's own; `shapes` are those of the layers before it, and of the picture."""
+        """`index` is the layer's own; `shapes` are those of the previous layers, and of the image."""
         raise NotImplementedError
 
     def add_to(self, builder: OnnxBuilder, inputs: list[str], weights: numpy.ndarray) -> str:
@@ -39,7 +39,7 @@ class Layer:
 
 
 def steps(section: Section, extent: int, size: int, stride: int) -> int:
-    """How many places a window takes along an extent in pixels, padding included."""
+    """The number of window positions along an extent in pixels, padding included."""
     if extent < size:
         raise section.refusal(f"has a window of {size} pixels where {extent} are left; is the input too small?")
     return (extent - size) // stride + 1

@@ -12,7 +12,7 @@ from .layer import Layer, Shape, steps
 
 
 class MaxPool(Layer):
-    """The largest of each window. The missing rows and columns lie more at the lower right, as in TensorFlow."""
+    """Max pooling. Odd padding is at the lower right, as in TensorFlow."""
 
     kind = "maxpool"
 
@@ -39,7 +39,7 @@ class MaxPool(Layer):
 
 
 class Route(Layer):
-    """Earlier layers, one channel after the other."""
+    """The concatenation of earlier layers along the channels."""
 
     kind = "route"
 
@@ -58,7 +58,7 @@ class Route(Layer):
 
 
 class Shortcut(Layer):
-    """The sum of the layer before and an earlier one."""
+    """The sum of the previous layer and an earlier one."""
 
     kind = "shortcut"
 
@@ -78,7 +78,7 @@ class Shortcut(Layer):
 
 
 class Upsample(Layer):
-    """Every pixel repeated."""
+    """Upsampling by repetition of pixels."""
 
     kind = "upsample"
 
@@ -96,7 +96,7 @@ class Upsample(Layer):
 
 
 class Reorg(Layer):
-    """Fewer pixels and more channels, in darknet's own order.
+    """Space to depth, in darknet's own order.
 
     Darknet reads the memory of a map of C channels, H x W, as one of C / s^2 channels, s H x s W, and sorts the
     pixels of every s x s block of that into channels of their own. What comes out lies in memory as C channels,
@@ -119,7 +119,7 @@ class Reorg(Layer):
         channels, stride = self.source.channels // self.stride**2, self.stride
         blocks = [0, channels, self.source.height, stride, self.source.width, stride]
         parted = builder.reshape(inputs[0], blocks)
-        # N, channel, row, row in block, column, column in block -> both places in the block come first.
+        # N, channel, row, row in block, column, column in block -> both positions in the block come first.
         sorted_out = builder.node("Transpose", [parted], perm=[0, 3, 5, 1, 2, 4])
         return builder.reshape(sorted_out, [0, self.shape.channels, self.shape.height, self.shape.width])
 

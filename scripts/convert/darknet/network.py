@@ -26,12 +26,12 @@ class Network:
 
     @property
     def parameters(self) -> int:
-        """How many weights the network has."""
+        """The number of weights of the network."""
         return sum(layer.parameters for layer in self.layers)
 
     @property
     def heads(self) -> list[Head]:
-        """The layers that give boxes."""
+        """The layers that produce boxes."""
         return [layer for layer in self.layers if isinstance(layer, Head)]
 
     def add_to(self, builder: OnnxBuilder, picture: str, weights: numpy.ndarray) -> list[str]:

@@ -7,16 +7,16 @@ import numpy
 from ..errors import ConversionError
 
 VERSION_BYTES = 12  # major, minor and revision, 32 bits each
-# Then the number of pictures seen in training: 32 bits before version 0.2, 64 bits since.
+# Then the number of training images: 32 bits before version 0.2, 64 bits since.
 HEADER_BYTES_BEFORE_0_2 = VERSION_BYTES + 4
 HEADER_BYTES = VERSION_BYTES + 8
 NUMBER_BYTES = 4
-# Darknet marks files with kernels the other way round by version numbers from here on.
+# Darknet marks files with transposed kernels by version numbers from here on.
 ODD_VERSION = 1000
 
 
 def read_weights(file: Path, parameters: int) -> numpy.ndarray:
-    """All the numbers of the file, which has to hold exactly so many."""
+    """All numbers of the file; their number must match."""
     found = file.stat().st_size
     if found < HEADER_BYTES:
         raise ConversionError(f"{file.name} has {found} bytes, fewer than the header of a darknet .weights file.")

@@ -1,4 +1,4 @@
-"""Measures a model's activation ranges on views of our samples: `FP32_ONNX SAMPLES_FOLDER RANGES_JSON`.
+"""Measures the activation ranges of a model on views of the samples: `FP32_ONNX SAMPLES_FOLDER RANGES_JSON`.
 
 Run by hand when a model changes, and never by the set-up, which uses the checked-in ranges. Needs `onnxruntime` and
 `pillow` beside the converters' packages.
@@ -26,7 +26,7 @@ DIGITS = 6
 
 
 def measure(fp32_file: Path, samples: Path) -> ActivationRanges:
-    """The range of each tensor that will be rounded, without the outermost values; groups of moved tensors share one."""
+    """The range of each quantised tensor without the outermost values; groups of moved tensors share one."""
     graph = OnnxGraph(fp32_file)
     fold(graph)
     tensors = int8_tensors(graph)

@@ -1,4 +1,4 @@
-"""Takes into each convolution what only scales, shifts or pads: integers then stand at fewer, better known places."""
+"""Folds scaling, shifting and padding into convolutions, so that fewer tensors need quantisation."""
 
 import numpy
 from onnx import NodeProto
@@ -10,7 +10,7 @@ LOWEST = numpy.finfo(numpy.float32).min
 
 
 def fold(graph: OnnxGraph) -> None:
-    """Leaves the same function with fewer nodes; every convolution has a bias afterwards."""
+    """Folds nodes without a change of the function; every convolution has a bias afterwards."""
     for node in list(graph.nodes):
         if node.op_type == "MaxPool":
             _take_pads(graph, node, LOWEST)
@@ -31,14 +31,14 @@ def _state_bias(graph: OnnxGraph, convolution: NodeProto) -> None:
 
 
 def _set_parameters(graph: OnnxGraph, convolution: NodeProto, weights: numpy.ndarray, bias: numpy.ndarray) -> None:
-    """Names of their own keep apart convolutions that shared a constant."""
+    """Gives convolutions that share a constant copies of their own."""
     names = [f"{convolution.name}/{kind}" for kind in ("folded_weights", "folded_bias")]
     graph.constants |= dict(zip(names, (weights, bias), strict=True))
     convolution.input[:] = [convolution.input[0], *names]
 
 
 def _take_pads(graph: OnnxGraph, node: NodeProto, value: float) -> None:
-    """Takes in a padding of rows and columns with `value` before a node, which itself pads with that."""
+    """Folds a padding of rows and columns with `value` into the next node, which pads with the same value."""
     pad = graph.producer(node.input[0])
     if pad is None or pad.op_type != "Pad" or len(graph.users(node.input[0])) > 1:
         return
@@ -55,7 +55,7 @@ def _take_pads(graph: OnnxGraph, node: NodeProto, value: float) -> None:
 
 
 def _take_follower(graph: OnnxGraph, convolution: NodeProto) -> bool:
-    """Takes in the one node that reads the result, if it scales and shifts channels; whether it did."""
+    """Folds the only node that reads the result, if it scales and shifts channels; returns True if it did."""
     users = graph.users(convolution.output[0])
     if len(users) != 1:
         return False
@@ -79,7 +79,7 @@ def _take_follower(graph: OnnxGraph, convolution: NodeProto) -> bool:
 
 
 def _scale_and_shift(graph: OnnxGraph, node: NodeProto, channels: int) -> tuple[numpy.ndarray, numpy.ndarray] | None:
-    """What a node multiplies each channel with and then adds to it, if that is all it does."""
+    """The factor and the offset per channel of a node, if it does nothing else."""
     constants = [graph.constants[name].astype(numpy.float64) for name in node.input if name in graph.constants]
     if node.op_type == "BatchNormalization":
         factor, offset, mean, variance = constants

@@ -1,4 +1,4 @@
-"""An ONNX graph that was read from a file, in a form that is easy to change."""
+"""An editable ONNX graph from a file."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ class OnnxGraph:
         self.constants = {tensor.name: numpy_helper.to_array(tensor) for tensor in self._model.graph.initializer}
 
     def producer(self, tensor: str) -> NodeProto | None:
-        """The node that makes a tensor; constants and the graph's input have none."""
+        """The node that produces a tensor; constants and the input of the graph have none."""
         return next((node for node in self.nodes if tensor in node.output), None)
 
     def users(self, tensor: str) -> list[NodeProto]:
@@ -46,7 +46,7 @@ def attribute(node: NodeProto, name: str, default):
 
 
 def set_attribute(node: NodeProto, name: str, value) -> None:
-    """States an attribute of a node, in place of what it stated before."""
+    """Sets an attribute of a node."""
     kept = [entry for entry in node.attribute if entry.name != name]
     del node.attribute[:]
     node.attribute.extend([*kept, helper.make_attribute(name, value)])

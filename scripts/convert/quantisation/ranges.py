@@ -1,4 +1,4 @@
-"""Activation ranges: between which values each tensor of a network was found to lie, as a checked-in file."""
+"""Activation ranges: the measured minimum and maximum of each tensor of a network, as a checked-in file."""
 
 import hashlib
 import json
@@ -14,14 +14,14 @@ LARGEST = 255
 
 @dataclass(frozen=True)
 class ActivationRanges:
-    """The ranges of the tensors that are rounded, measured on the FP32 model with this sum."""
+    """The ranges of the quantised tensors, measured on the FP32 model with this sum."""
 
     model_sha256: str
     ranges: dict[str, tuple[float, float]]
 
     @classmethod
     def read(cls, file: Path) -> "ActivationRanges":
-        """Reads what `write` wrote."""
+        """Reads the file of `write`."""
         document = json.loads(file.read_text(encoding="utf-8"))
         return cls(document["model_sha256"], {name: tuple(ends) for name, ends in document["ranges"].items()})
 
@@ -32,12 +32,12 @@ class ActivationRanges:
         file.write_text(text, encoding="utf-8")
 
     def require_model(self, file: Path) -> None:
-        """Refuses a model that the ranges do not belong to."""
+        """Refuses a model with another sum."""
         if sha256_of(file) != self.model_sha256:
             raise ConversionError(f"the activation ranges were measured on another model than {file}; measure anew")
 
     def scale_and_zero_point(self, tensor: str) -> tuple[numpy.float32, numpy.uint8]:
-        """How a tensor is rounded to 0..255; 0 itself, with which pictures are padded, stays exact."""
+        """The quantisation of a tensor to 0..255; 0, the value of padding, stays exact."""
         if tensor not in self.ranges:
             raise ConversionError(f"the range of '{tensor}' was not measured; measure the ranges anew")
         low, high = self.ranges[tensor]

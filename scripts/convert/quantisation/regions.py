@@ -1,10 +1,10 @@
-"""Which part of a network runs in INT8."""
+"""Selects the part of a network that runs in INT8."""
 
 from onnx import NodeProto
 
 from .graph import OnnxGraph
 
-# What ONNX Runtime runs on integers, or folds into what it runs so, between other such operations.
+# Operations that ONNX Runtime runs on integers, or fuses into such operations.
 INT8_OPERATIONS = {"Conv", "Clip", "LeakyRelu", "Add", "Concat", "Resize", "MaxPool"}
 # Those of them that only move values, or choose among them.
 MOVING_OPERATIONS = {"Concat", "Resize", "MaxPool"}
@@ -25,7 +25,7 @@ def int8_nodes(graph: OnnxGraph) -> list[NodeProto]:
 
 
 def int8_tensors(graph: OnnxGraph) -> list[str]:
-    """The tensors that are rounded to integers: what those nodes read and what they make, in order.
+    """The tensors that are quantised: inputs and outputs of those nodes, in order.
 
     A convolution that only a Clip reads is not rounded itself: rounding the Clip's result does both at once.
     """

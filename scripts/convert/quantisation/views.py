@@ -27,7 +27,7 @@ def sample_views(samples: Path, size: int):
 
 
 def _rays(elevation: float, azimuth: float, field_of_view: float, size: int) -> numpy.ndarray:
-    """The directions in which a view's pixels look, in the frame of a camera that looks straight down."""
+    """The ray directions of the pixels of a view, for a camera that looks straight down."""
     tilt = numpy.array(
         [[1, 0, 0], [0, numpy.cos(elevation), -numpy.sin(elevation)], [0, numpy.sin(elevation), numpy.cos(elevation)]]
     )
@@ -40,7 +40,7 @@ def _rays(elevation: float, azimuth: float, field_of_view: float, size: int) -> 
 
 
 def _project(lens: dict, rays: numpy.ndarray) -> tuple[numpy.ndarray, numpy.ndarray]:
-    """Where an equidistant lens shows rays: columns and rows of pixel centres; NaN beyond its image."""
+    """The projection of rays by an equidistant lens: columns and rows of pixel centres; NaN outside its image."""
     across = numpy.hypot(rays[..., 0], rays[..., 1])
     theta = numpy.arctan2(across, rays[..., 2])
     radius_by_across = numpy.where(theta <= lens["max_theta"], lens["focal"] * theta / across, numpy.nan)

@@ -8,7 +8,7 @@ LARGEST = 127
 LARGEST_PAIR = 127
 # Biases are integers of 32 bits; one bit of room stays for the sum.
 LARGEST_BIAS = 2**30
-# For channels of which nothing is left.
+# The scale of channels without weights.
 SMALLEST_SCALE = 1e-12
 
 
@@ -34,7 +34,7 @@ def quantise_weights(
 
 
 def _largest_pair(weights: numpy.ndarray) -> numpy.ndarray:
-    """Per output channel, the largest magnitude that two weights of one sign have together, of neighbouring inputs.
+    """Per output channel, the largest sum of magnitudes of two neighbouring weights of the same sign.
 
     x86 CPUs without VNNI multiply and add such pairs in 16 bits and cut off what does not fit. Depthwise convolutions
     have no neighbouring inputs.

@@ -43,7 +43,7 @@ def region(anchors: list[float], classes: int) -> str:
 
 def yolov2_cfg(size: int, anchors: list[float], classes: int, thinner: int = 1) -> str:
     """YOLOv2 for pictures of `size` pixels; `thinner` divides the filters of every layer but the last."""
-    # Darknet-19: where the filters double, a max pooling goes before; 1 x 1 convolutions halve them in between.
+    # Darknet-19: a max pooling precedes each doubling of the filters; 1 x 1 convolutions halve them in between.
     parts = [section("net", width=size, height=size, channels=3)]
     for filters, repeats in ((32, 0), (64, 0), (128, 1), (256, 1), (512, 2), (1024, 2)):
         if filters > 32:
@@ -85,7 +85,7 @@ def yolov3_tiny_cfg(size: int, classes: int, thinner: int = 1) -> str:
 
 
 def write_weights(file: Path, network: Network, seed: int, version: tuple[int, int] = (0, 2)) -> None:
-    """Random weights that keep the spread of the values from layer to layer (He et al., 2015, eq. 10)."""
+    """Random weights that keep the variance of the values from layer to layer (He et al., 2015, eq. 10)."""
     random = numpy.random.default_rng(seed)
     seen = struct.pack("<q" if version >= (0, 2) else "<i", 64)
     with open(file, "wb") as stream:

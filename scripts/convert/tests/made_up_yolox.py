@@ -1,4 +1,4 @@
-"""YOLOX networks of any width and depth with weights that nobody trained, and checkpoints as PyTorch writes them."""
+"""YOLOX networks of any width and depth with random weights, and checkpoints in PyTorch's format."""
 
 import collections
 import io
@@ -79,14 +79,14 @@ class YoloxWeights:
 
 
 class _Storage:
-    """What the numbers of a tensor are written as."""
+    """The encoding of the numbers of a tensor."""
 
     def __init__(self, values: numpy.ndarray):
         self.values = values
 
 
 def write_checkpoint(file: Path, content) -> None:
-    """Writes what `torch.save` would write for these dicts, lists and arrays, the arrays as tensors."""
+    """Writes the file of `torch.save` for these dicts, lists and arrays, with arrays as tensors."""
     torch, utilities = types.ModuleType("torch"), types.ModuleType("torch._utils")
     torch.FloatStorage = type("FloatStorage", (), {"__module__": "torch"})
     rebuild = types.FunctionType((lambda: None).__code__, {}, "_rebuild_tensor_v2")

@@ -1,4 +1,4 @@
-"""Networks' layers once more, one pixel after the other in float64, to hold the converters' graphs against.
+"""Reference implementations of layers, pixel by pixel in float64, to check the graphs of the converters.
 
 It shares no code with the converters and follows what darknet and YOLOX compute, not what ONNX offers.
 """
@@ -19,7 +19,7 @@ def parse(cfg: str) -> list[tuple[str, dict[str, str]]]:
 
 
 def run(cfg: str, numbers: numpy.ndarray, picture: numpy.ndarray) -> list[numpy.ndarray]:
-    """What the heads get, each `[channels, height, width]`, for a picture `[3, height, width]`."""
+    """The inputs of the heads, each `[channels, height, width]`, for an image `[3, height, width]`."""
     maps, heads, numbers = [], [], numbers.astype(numpy.float64)
     last = picture.astype(numpy.float64)
     for kind, options in parse(cfg)[1:]:
@@ -48,7 +48,7 @@ def run(cfg: str, numbers: numpy.ndarray, picture: numpy.ndarray) -> list[numpy.
 
 
 def convolved(image, options, whole, numbers):
-    """A convolution, and the numbers it left."""
+    """A convolution, and the remaining weights."""
     filters, size, stride = whole["filters"], whole["size"], whole["stride"]
     groups = whole.get("groups", 1)
     channels = image.shape[0] // groups
@@ -65,7 +65,7 @@ def convolved(image, options, whole, numbers):
 
 
 def correlated(image, kernel, stride, padding, groups=1):
-    """The sum of kernel times window at every place."""
+    """The sum of kernel times window at every position."""
     filters, channels, size, _ = kernel.shape
     padded = numpy.pad(image, ((0, 0), (padding, padding), (padding, padding)))
     height, width = ((extent + 2 * padding - size) // stride + 1 for extent in image.shape[1:])
@@ -97,7 +97,7 @@ def activated(values, activation):
 
 
 def pooled(image, size, stride, padding):
-    """The largest value of each window; places outside the image do not count."""
+    """The largest value of each window; positions outside the image do not count."""
     channels, height, width = image.shape
     rows, columns = ((extent + padding - size) // stride + 1 for extent in (height, width))
     result = numpy.full((channels, rows, columns), -numpy.inf)
@@ -110,7 +110,7 @@ def pooled(image, size, stride, padding):
 
 
 def reordered(image, stride):
-    """Place by place through the memory: the map is read as one with fewer channels and larger sides."""
+    """Reads the memory in order: the map is read as one with fewer channels and larger sides."""
     channels, height, width = image.shape
     memory, result = image.ravel(), numpy.empty(image.size)
     coarse = channels // stride**2

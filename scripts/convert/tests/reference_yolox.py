@@ -1,4 +1,4 @@
-"""YOLOX once more, in float64 and without the converter's code, as the paper and its published weights have it."""
+"""A reference implementation of YOLOX in float64, from the paper and its published weights."""
 
 import numpy
 
@@ -6,7 +6,7 @@ from .reference import correlated
 
 
 def run(weights: dict[str, numpy.ndarray], picture: numpy.ndarray) -> tuple[numpy.ndarray, numpy.ndarray]:
-    """Corners `[cells, 4]` and chances `[cells, classes]` for a picture `[3, size, size]` of red, green and blue."""
+    """Corners `[cells, 4]` and probabilities `[cells, classes]` for an RGB image `[3, size, size]`."""
     image = picture[::-1].astype(numpy.float64)
     quarters = [image[:, row::2, column::2] for row, column in ((0, 0), (1, 0), (0, 1), (1, 1))]
     image = unit(weights, "backbone.backbone.stem.conv", numpy.concatenate(quarters))
@@ -35,7 +35,7 @@ def run(weights: dict[str, numpy.ndarray], picture: numpy.ndarray) -> tuple[nump
 
 
 def level(weights, index, image, stride):
-    """Corners and chances of the cells of one map, row by row."""
+    """Corners and probabilities of the cells of one map, row by row."""
     image = block(weights, f"head.stems.{index}", image)
     features = {}
     for branch in ("cls", "reg"):
@@ -76,7 +76,7 @@ def unit(weights, name, image, stride=1, groups=1):
 
 
 def partial(weights, name, image, add):
-    """Half of the channels through bottlenecks, half past them."""
+    """A cross stage partial layer: half of the channels pass through bottlenecks."""
     through, past = block(weights, f"{name}.conv1", image), block(weights, f"{name}.conv2", image)
     index = 0
     while any(key.startswith(f"{name}.m.{index}.") for key in weights):
@@ -87,7 +87,7 @@ def partial(weights, name, image, add):
 
 
 def highest(image, size):
-    """The largest value around every place."""
+    """The largest value around every position."""
     around = size // 2
     result = numpy.empty_like(image)
     for row in range(image.shape[1]):

@@ -1,4 +1,4 @@
-"""What the converters' tests share: a folder with a darknet network, and what its graph answers."""
+"""Shared code of the converter tests: a folder with a darknet network, and the outputs of its graph."""
 
 import tempfile
 import unittest
@@ -17,7 +17,7 @@ WEIGHTS_SEED, PICTURE_SEED = 1, 2
 
 
 class MaxPool(OpRun):
-    """MaxPool as ONNX states it. The evaluator's own takes unequal `pads` for those of other sides."""
+    """MaxPool as ONNX states it. The evaluator's own implementation swaps unequal `pads`."""
 
     def _run(self, images, *, kernel_shape, pads, strides, **_unused):
         top, left, bottom, right = pads
@@ -42,11 +42,11 @@ class WithDarknetFiles(unittest.TestCase):
         write_weights(self.weights, read_network(self.cfg), WEIGHTS_SEED, version)
 
     def convert(self, class_names: Path | None = None) -> str:
-        """Converts the network that was written."""
+        """Converts the written network."""
         return convert_detector(self.cfg, self.weights, self.model, "made_up", class_names)
 
     def require_same_answers(self, cfg: str, class_names: Path | None = None) -> None:
-        """Writes and converts the network, and compares its answers to two pictures with the reference's."""
+        """Writes and converts the network, and compares its outputs for two images with the reference."""
         self.model = Path(tempfile.mkdtemp(dir=self.folder))
         self.write(cfg)
         self.convert(class_names)

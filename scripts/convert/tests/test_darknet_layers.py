@@ -1,4 +1,4 @@
-"""Each kind of layer alone gives what the reference gives."""
+"""Each kind of layer equals the reference."""
 
 from ..errors import ConversionError
 from .made_up_darknet import convolution, section
@@ -10,7 +10,7 @@ def net(width=6, height=8) -> str:
 
 
 def head(channels: int) -> str:
-    """A head with one anchor, which passes on as many channels as it gets."""
+    """A head with one anchor, which returns its input channels."""
     return section("region", anchors="1,1", num=1, classes=channels - 5, coords=4, softmax=1)
 
 
@@ -26,7 +26,7 @@ class Layers(WithDarknetFiles):
     def test_a_convolution_with_biases_alone(self):
         self.require_same(convolution(7, 3, batch_normalize=0), 7)
 
-    def test_a_convolution_with_a_stride_padding_of_its_own_and_groups(self):
+    def test_convolution_with_stride_padding_and_groups(self):
         self.require_same(convolution(6, 3, stride=2, pad=0, padding=2, groups=3), 6)
 
     def test_every_activation(self):
@@ -37,13 +37,13 @@ class Layers(WithDarknetFiles):
     def test_a_max_pooling_halves_odd_sides_upwards(self):
         self.require_same(convolution(6, 1) + section("maxpool", size=2, stride=2), 6, width=7, height=5)
 
-    def test_a_max_pooling_of_stride_1_keeps_the_size_and_looks_right_and_down(self):
+    def test_max_pooling_of_stride_1_pads_right_and_below(self):
         self.require_same(convolution(6, 1) + section("maxpool", size=2, stride=1), 6)
 
-    def test_a_max_pooling_of_odd_size_and_stride_1_looks_to_all_sides(self):
+    def test_odd_max_pooling_of_stride_1_pads_all_sides(self):
         self.require_same(convolution(6, 1) + section("maxpool", size=5, stride=1), 6)
 
-    def test_a_route_joins_layers_counted_from_the_start_and_backwards(self):
+    def test_route_joins_layers_by_absolute_and_relative_index(self):
         layers = convolution(4, 1) + convolution(5, 1) + convolution(3, 1) + section("route", layers="-2,0")
         self.require_same(layers, 9)
 
@@ -79,7 +79,7 @@ class Refusals(WithDarknetFiles):
     def test_a_route_forwards_is_refused(self):
         self.refused(net() + section("route", layers=3) + head(6), "refers to layer 3; it is layer 0 itself")
 
-    def test_a_head_that_gets_other_channels_than_it_needs_is_refused(self):
+    def test_head_with_wrong_channel_count_is_refused(self):
         self.refused(net() + convolution(7, 1) + head(6), "gets 7 channels; 1 anchors and 1 classes need 6")
 
     def test_a_network_without_a_head_is_refused(self):

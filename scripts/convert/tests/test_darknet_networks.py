@@ -1,4 +1,4 @@
-"""Whole networks of the published architectures: what they answer, what their manifests say, what is refused."""
+"""Whole networks of the published architectures: outputs, manifests, refusals."""
 
 import tomllib
 
@@ -17,7 +17,7 @@ class Answers(WithDarknetFiles):
     def test_yolov2_tiny_answers_as_the_reference_does(self):
         self.require_same_answers(yolov2_tiny_cfg(96, COCO_ANCHORS, 80, thinner=THINNER))
 
-    def test_yolov3_tiny_answers_as_the_reference_does_in_both_scales(self):
+    def test_yolov3_tiny_equals_the_reference_in_both_scales(self):
         self.require_same_answers(yolov3_tiny_cfg(64, 80, THINNER))
 
 
@@ -26,7 +26,7 @@ class Sizes(WithDarknetFiles):
         self.cfg.write_text(cfg, encoding="utf-8")
         return read_network(self.cfg).parameters
 
-    def test_the_networks_have_as_many_weights_as_the_published_files(self):
+    def test_weight_counts_equal_those_of_the_published_files(self):
         self.assertEqual(self.parameters(yolov2_cfg(416, COCO_ANCHORS, 80)), 50_983_561)
         self.assertEqual(self.parameters(yolov2_tiny_cfg(416, VOC_ANCHORS, 20)), 15_867_885)
         self.assertEqual(self.parameters(yolov3_tiny_cfg(416, 80)), 8_858_734)
@@ -47,7 +47,7 @@ class Manifests(WithDarknetFiles):
         self.assertEqual(manifest["input"], {"scale": [1 / 255] * 3})
         self.assertEqual((manifest["name"], manifest["onnx"]), ("made_up", "model.onnx"))
 
-    def test_the_manifest_of_yolov3_tells_which_map_has_which_anchors(self):
+    def test_yolov3_manifest_assigns_anchors_to_maps(self):
         output = self.manifest(yolov3_tiny_cfg(32, 80, THINNER))["output"]
         self.assertEqual((output["head"], output["person_class"]), ("yolo_v3", 0))
         self.assertEqual(output["masks"], [[3, 4, 5], [1, 2, 3]])
@@ -57,7 +57,7 @@ class Manifests(WithDarknetFiles):
         cfg = yolov2_tiny_cfg(32, VOC_ANCHORS, 3, thinner=THINNER)
         self.assertEqual(self.manifest(cfg, "cat\nperson\ndog\n")["output"]["person_class"], 1)
 
-    def test_without_a_list_of_names_an_unknown_number_of_classes_is_refused(self):
+    def test_unknown_class_count_without_names_is_refused(self):
         with self.assertRaisesRegex(ConversionError, "Which of 3 classes is the person.*--class-names FILE"):
             self.manifest(yolov2_tiny_cfg(32, VOC_ANCHORS, 3, thinner=THINNER))
 

@@ -1,4 +1,4 @@
-"""Peaks of a heat map: the strongest local maxima, and what other maps say there."""
+"""Peaks of a heat map: the strongest local maxima, and the values of other maps there."""
 
 import tempfile
 import unittest
@@ -16,7 +16,7 @@ SIZE, COUNT, CHANNELS = 6, 3, 2
 
 class FoundPeaks(unittest.TestCase):
     def peaks_of(self, heat: numpy.ndarray, maps: numpy.ndarray):
-        """Scores, values, columns and rows; both maps are channels of one picture."""
+        """Scores, values, columns and rows; both maps are channels of one image."""
         builder = OnnxBuilder()
         heat_map, other_maps = builder.split("images", [1, CHANNELS], axis=1)
         peaks = Peaks(builder, heat_map, SIZE, COUNT)
@@ -32,7 +32,7 @@ class FoundPeaks(unittest.TestCase):
         pictures = numpy.concatenate([heat[:, None], maps], axis=1).astype(numpy.float32)
         return ReferenceEvaluator(str(file), new_ops=[MaxPool]).run(list(outputs), {"images": pictures})
 
-    def test_neighbours_of_a_peak_do_not_count_and_every_picture_has_its_own(self):
+    def test_peaks_suppress_neighbours_per_image(self):
         heat = numpy.zeros((2, SIZE, SIZE))
         heat[0, 2, 4], heat[0, 2, 5], heat[0, 5, 0] = 0.9, 0.8, 0.3
         heat[1, 4, 4], heat[1, 0, 5], heat[1, 3, 1] = 0.5, 0.7, 0.6

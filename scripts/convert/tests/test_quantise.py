@@ -1,4 +1,4 @@
-"""INT8 models: what is folded, how weights are rounded, which nodes stay, and that the answers hardly change."""
+"""INT8 models: folding, rounding of weights, unchanged nodes, and the accuracy of outputs."""
 
 import tempfile
 import unittest
@@ -23,7 +23,7 @@ RANDOM_SEED = 3
 
 
 class MadeUpNetwork:
-    """A network with what the converters write around convolutions: six of them, the last one decoded."""
+    """A network with the nodes that converters write around convolutions: six of them, the last one decoded."""
 
     def __init__(self):
         self.builder = OnnxBuilder()
@@ -89,7 +89,7 @@ class WithNetwork(unittest.TestCase):
 
     def answer(self, file: Path, tensors: list[str] | None = None) -> list[numpy.ndarray]:
         model = onnx.load(file)
-        # The evaluator knows DequantizeLinear from this version on; it means the same.
+        # The evaluator supports DequantizeLinear from this version on, with the same meaning.
         model.opset_import[0].version = 19
         model.graph.output.extend(onnx.ValueInfoProto(name=tensor) for tensor in tensors or [])
         return ReferenceEvaluator(model, new_ops=[MaxPool]).run(tensors, {"images": self.pictures})
@@ -101,7 +101,7 @@ class WithNetwork(unittest.TestCase):
 
 
 class Folding(WithNetwork):
-    def test_scales_shifts_and_pads_go_into_the_convolutions_and_the_answers_stay(self):
+    def test_folding_keeps_the_outputs(self):
         left = [node.op_type for node in onnx.load(self.folded).graph.node]
         self.assertEqual(left.count("Conv"), 6)
         self.assertEqual(left.count("Add"), 1)
@@ -141,7 +141,7 @@ class Weights(unittest.TestCase):
         self.assertLessEqual(numpy.abs((integers * steps - self.weights) / steps).max(), 0.5001)
         numpy.testing.assert_allclose(bias * scales * 0.02, self.bias, atol=1e-3)
 
-    def test_two_neighbours_times_the_largest_activation_fit_into_16_bits(self):
+    def test_weight_pairs_do_not_saturate_16_bits(self):
         self.weights[0, :2] = 1.0
         self.weights[1, 4:6] = -1.0
         integers, _, _ = quantise_weights(self.weights, self.bias, 0.02)
@@ -164,7 +164,7 @@ class Quantising(WithNetwork):
         super().setUp()
         self.write_ranges(sha256_of(self.fp32))
 
-    def test_the_answers_hardly_change_and_the_same_files_give_the_same_bytes(self):
+    def test_quantisation_is_accurate_and_reproducible(self):
         quantise(self.fp32, self.int8, self.ranges)
         written = self.int8.read_bytes()
         [expected], [found] = self.answer(self.fp32), self.answer(self.int8)
@@ -173,7 +173,7 @@ class Quantising(WithNetwork):
         quantise(self.fp32, self.int8, self.ranges)
         self.assertEqual(self.int8.read_bytes(), written)
 
-    def test_the_first_three_and_the_last_convolution_keep_their_numbers(self):
+    def test_first_three_and_last_convolutions_stay_float(self):
         quantise(self.fp32, self.int8, self.ranges)
         graph = OnnxGraph(self.int8)
         convolutions = [node for node in graph.nodes if node.op_type == "Conv"]

@@ -43,7 +43,7 @@ class Reading(unittest.TestCase):
         with self.assertRaisesRegex(ConversionError, "only float16, float32 and int32"):
             self.read(weights)
 
-    def test_shards_that_hold_more_than_the_manifest_says_are_refused(self):
+    def test_shards_larger_than_the_manifest_are_refused(self):
         with self.assertRaisesRegex(ConversionError, "describes 24 bytes of weights, the shards hold 28"):
             self.read(shard=SHARD + b"more")
 

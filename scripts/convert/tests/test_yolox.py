@@ -1,4 +1,4 @@
-"""YOLOX: the graph answers as the reference does, and files that are no such checkpoints are refused."""
+"""YOLOX: the graph equals the reference, and other files are refused."""
 
 import tempfile
 import tomllib

@@ -1,5 +1,5 @@
 //! The table of problem kinds. A new kind is one entry here and nothing else: its OpenAPI
-//! description, its documentation page, its metric label and its row in docs/operations.md follow
+//! description, its documentation page, its metric label and its row in docs/http.md follow
 //! from the entry.
 
 use axum::http::StatusCode;

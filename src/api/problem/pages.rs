@@ -1,5 +1,5 @@
 //! The documentation of problems: the pages that `type` of a problem document refers to, and the
-//! table in docs/operations.md.
+//! table in docs/http.md.
 
 use std::fmt::Write;
 

@@ -53,7 +53,7 @@ pageTest("a saved lens with a height is used at once and shows the floor", "", a
   await page.getByLabel("Height, metres").fill("2.9");
   await page.getByLabel("Name", { exact: true }).fill("lobby");
   await page.getByRole("button", { name: "Save", exact: true }).click();
-  await page.getByText("lobby is saved and serves.").waitFor();
+  await page.getByText("lobby is saved and in use.").waitFor();
   const { lens, mount } = await stored("lobby");
   assert.equal(mount.height_m, 2.9);
   assert.equal(lens.model, "equidistant");
@@ -67,7 +67,7 @@ pageTest("a saved lens with a height is used at once and shows the floor", "", a
   await go(page, "Calibrate");
   await page.getByLabel("Height, metres").fill("3.1");
   await page.getByRole("button", { name: "Replace lobby" }).click();
-  await page.getByText("lobby is saved and serves.").waitFor();
+  await page.getByText("lobby is saved and in use.").waitFor();
   assert.equal((await stored("lobby")).mount.height_m, 3.1);
 });
 
@@ -75,12 +75,12 @@ pageTest("a file of another program is previewed and saved unchanged", "", async
   await start(page);
   const before = await pixels(page);
   await straightenedAfter(page, () => page.locator("#import-file").setInputFiles(`${FIXTURES}/adapter_ds.yml`));
-  await page.getByText("adapter_ds.yml is saved as it is.").waitFor();
+  await page.getByText("adapter_ds.yml is saved unchanged.").waitFor();
   assert.notEqual(await pixels(page), before);
   await assertAccessible(page);
   await page.getByLabel("Name", { exact: true }).fill("imported");
   await page.getByRole("button", { name: "Save", exact: true }).click();
-  await page.getByText("imported is saved and serves.").waitFor();
+  await page.getByText("imported is saved and in use.").waitFor();
   assert.equal((await stored("imported")).lens.model, "double_sphere");
   await straightenedAfter(page, () => page.getByRole("button", { name: "Back to the circle" }).click());
   assert.equal(await pixels(page), before);

@@ -63,9 +63,9 @@ pageTest("a frame is dropped, pasted or opened", "", async (page) => {
 
 pageTest("other files are refused with a message, and the next frame is accepted", "", async (page) => {
   await hand(page, "drop", "notes.txt", "text/plain", Buffer.from("hello"));
-  await page.getByRole("alert").getByText("What was dropped is no picture.").waitFor();
+  await page.getByRole("alert").getByText("The dropped item is not an image.").waitFor();
   await hand(page, "drop", "broken.jpg", "image/jpeg", Buffer.from("hello"));
-  await page.getByRole("alert").getByText("broken.jpg is no picture that this browser can read").waitFor();
+  await page.getByRole("alert").getByText("broken.jpg is not an image that this browser can read").waitFor();
   await detectSample(page, "office");
   assert.equal(await page.getByRole("alert").count(), 0);
 });
@@ -78,11 +78,11 @@ pageTest("every parameter runs a new detection at once", "", async (page) => {
   // The network has processed this frame before.
   const seen = first.views.inferred;
   assert.deepEqual([strict.views.inferred, strict.views.unchanged, strict.timings_ms.inference], [0, seen, 0]);
-  await page.getByText(`${seen} views remembered`).waitFor();
+  await page.getByText(`${seen} views cached`).waitFor();
   await page.locator("#persons li").nth(all - 1).waitFor({ state: "detached" });
   assert.equal(await count(page), strict.persons.length);
   assert.ok(strict.persons.length < all);
-  const overlapping = await reportAfter(page, () => slide(page, "Overlap of one person", 0.2));
+  const overlapping = await reportAfter(page, () => slide(page, "IoU threshold", 0.2));
   assert.equal(overlapping.refinement.iou_threshold, 0.2);
   assert.ok(await page.getByRole("slider", { name: "Softness" }).isDisabled());
   const soft = await reportAfter(page, () => page.locator("#refine").selectOption("soft_nms_gaussian"));
@@ -118,7 +118,7 @@ pageTest("progress is shown and removed at the end", "", async (page) => {
     await route.continue();
   });
   await page.getByRole("button", { name: "office", exact: true }).click();
-  await page.getByRole("progressbar", { name: "Looking for people" }).waitFor();
+  await page.getByRole("progressbar", { name: "Detecting persons" }).waitFor();
   release();
   await page.locator("#persons li").first().waitFor();
   assert.equal(await page.getByRole("progressbar").count(), 0);

@@ -7,7 +7,7 @@ const go = (page, name) => page.getByRole("navigation").getByRole("link", { name
 
 pageTest("an address selects its section, and a section without a frame shows a hint", "#views", async (page) => {
   await page.getByRole("heading", { name: "Views", level: 1 }).waitFor();
-  await page.getByText("Pick a frame in Detect first: what the network saw").waitFor();
+  await page.getByText("Pick a frame in Detect first: its views are shown here").waitFor();
   assert.equal(await page.title(), "Views – Lookdown");
   await go(page, "Floor");
   await page.getByText("its persons are shown here from above").waitFor();
@@ -110,7 +110,7 @@ pageTest(
   async (page) => {
     const dialog = page.getByRole("dialog", { name: "Key" });
     await dialog.waitFor();
-    await dialog.getByText("This server wants a key").waitFor();
+    await dialog.getByText("This server requires a valid API key").waitFor();
     await assertAccessible(page);
     await dialog.getByLabel("API key").fill(process.env.LOOKDOWN_KEY);
     await page.keyboard.press("Enter");
