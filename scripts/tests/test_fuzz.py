@@ -9,9 +9,10 @@ from fuzz import IMPORTERS, ROOT, TARGETS, seeds, statistic
 class Fuzz(unittest.TestCase):
     def test_every_format_has_its_importer_fuzzed(self):
         source = (ROOT / "src/calibration/formats/recognise.rs").read_text()
-        formats = re.search(r"pub enum Format \{(.*?)\}", source, re.DOTALL)[1].split()
+        variants = re.search(r"pub enum Format \{(.*?)\n\}", source, re.DOTALL)[1]
+        formats = re.findall(r"^ +(\w+),$", variants, re.MULTILINE)
         fuzzed = re.findall(r"Format::(\w+)\),$", (ROOT / "fuzz/src/importer.rs").read_text(), re.MULTILINE)
-        self.assertEqual(sorted(name.rstrip(",") for name in formats), sorted(fuzzed))
+        self.assertEqual(sorted(formats), sorted(fuzzed))
         self.assertEqual(len(IMPORTERS), len(fuzzed))
 
     def test_every_target_has_seeds(self):

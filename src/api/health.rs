@@ -2,11 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use axum::{Json, extract::State, http::header::CONTENT_TYPE, response::IntoResponse};
+use axum::{
+    Json,
+    extract::State,
+    http::{HeaderMap, header::CONTENT_TYPE},
+    response::IntoResponse,
+};
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-use super::{ApiState, problem::Problem};
+use super::{ApiState, access::RequireRead, problem::Problem};
 use crate::{
     calibration::{CalibrationId, CalibrationsHealth},
     pipeline::PipelineError,
@@ -100,15 +105,18 @@ struct ResultsHealth {
 
 /// The state of the calibrations.
 #[derive(serde::Serialize, ToSchema)]
-#[schema(example = json!({ "serving": 12, "problems": [
+#[schema(example = json!({ "serving": 12, "problem_count": 1, "problems": [
     { "file": "lobby.json", "problem": "image: 4×4 pixels; each side must be 16 to 65536" }
 ] }))]
 struct CalibrationHealth {
     /// Number of calibrations in use.
     serving: usize,
-    /// Files whose newest version cannot be used; at most 100.
+    /// Number of files whose newest version cannot be used.
+    problem_count: usize,
+    /// These files, at most 100; empty for clients that may not read calibrations.
     problems: Vec<FileProblem>,
-    /// The reason why the calibration store cannot be read, if it cannot.
+    /// The reason why the calibration store cannot be read, if it cannot. Without details for clients
+    /// that may not read calibrations.
     #[serde(skip_serializing_if = "Option::is_none")]
     store_problem: Option<String>,
 }
@@ -122,17 +130,28 @@ struct FileProblem {
     problem: String,
 }
 
-impl From<CalibrationsHealth> for CalibrationHealth {
-    fn from(health: CalibrationsHealth) -> Self {
-        let problems = health.problems.into_iter().take(MAX_PROBLEMS);
+impl CalibrationHealth {
+    /// Describes the calibrations, with names and reasons if `has_details`.
+    fn new(health: CalibrationsHealth, has_details: bool) -> Self {
+        let problem_count = health.problems.len();
+        let shown = if has_details { MAX_PROBLEMS } else { 0 };
+        let problems = health.problems.into_iter().take(shown);
         Self {
             serving: health.serving,
+            problem_count,
             problems: problems
                 .map(|(file, problem)| FileProblem { file, problem })
                 .collect(),
-            store_problem: health.store_problem,
+            store_problem: described(health.store_problem, has_details),
         }
     }
+}
+
+/// Returns the problem of a store, without its details unless `has_details`.
+fn described(problem: Option<String>, has_details: bool) -> Option<String> {
+    let hidden =
+        || "the store is unavailable; a key with the scope read shows the reason".to_owned();
+    problem.map(|problem| if has_details { problem } else { hidden() })
 }
 
 /// Check liveness
@@ -157,13 +176,17 @@ pub(super) async fn livez() -> Json<Health> {
         (status = OK, description = "The server accepts frames.", body = Ready),
     )
 )]
-pub(super) async fn readyz(State(state): State<ApiState>) -> Result<Json<Ready>, Problem> {
+pub(super) async fn readyz(
+    State(state): State<ApiState>,
+    headers: HeaderMap,
+) -> Result<Json<Ready>, Problem> {
     require_ready(&state)?;
+    let has_details = RequireRead::check(&state, &headers).is_ok();
     Ok(Json(Ready {
         status: "ready",
-        calibrations: CalibrationHealth::from(state.calibrations.health()),
+        calibrations: CalibrationHealth::new(state.calibrations.health(), has_details),
         results: ResultsHealth {
-            store_problem: state.results.health().problem,
+            store_problem: described(state.results.health().problem, has_details),
         },
     }))
 }

@@ -6,7 +6,7 @@ use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 use rumqttc::Publish;
 use tokio::{
     sync::broadcast::{self, error::RecvError},
-    time::{Instant, sleep},
+    time::{Instant, sleep, sleep_until},
 };
 use uuid::Uuid;
 
@@ -31,6 +31,9 @@ const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_mins(1);
 /// A connection that has lasted this long resets the pause.
 const STEADY: Duration = Duration::from_secs(10);
+
+/// Shortest time between two messages of the whole state. Any client of the broker can ask for it.
+const BIRTH_PAUSE: Duration = Duration::from_secs(10);
 
 /// The broker to publish to, and the settings of the messages.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,11 +181,23 @@ impl Publisher {
         let topics = [self.topics.status()].into_iter().chain(birth);
         session.subscribe(topics).await?;
         session.publish(cameras.all()).await?;
+        let mut next_state: Option<Instant> = None;
+        let mut not_before = Instant::now();
         loop {
             tokio::select! {
-                said = session.next() => {
-                    let messages = self.answer(&said?, cameras);
-                    session.publish(messages).await?;
+                message = session.next() => {
+                    let message = message?;
+                    if self.is_birth(&message) {
+                        next_state.get_or_insert(not_before);
+                    } else if message.topic == self.topics.status() && message.payload == OFFLINE {
+                        // Another client says otherwise, such as the will of a replica that has ended.
+                        session.publish([self.status(ONLINE)]).await?;
+                    }
+                }
+                () = sleep_until(next_state.unwrap_or(not_before)), if next_state.is_some() => {
+                    next_state = None;
+                    not_before = Instant::now() + BIRTH_PAUSE;
+                    session.publish(cameras.all()).await?;
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {
@@ -204,22 +219,10 @@ impl Publisher {
         }
     }
 
-    /// The messages that answer an incoming one: the whole state when Home Assistant has started,
-    /// and the status "online" when another client says otherwise, such as the will of a replica
-    /// that has ended.
-    fn answer(&self, said: &Publish, cameras: &Cameras) -> Vec<Message> {
-        let is_of = |topic: &str, payload: &str| said.topic == topic && said.payload == payload;
-        if is_of(&self.topics.status(), OFFLINE) {
-            return vec![self.status(ONLINE)];
-        }
-        if self
-            .topics
-            .birth()
-            .is_some_and(|birth| is_of(&birth, ONLINE))
-        {
-            return cameras.all();
-        }
-        Vec::new()
+    /// Returns whether Home Assistant says that it has started: it needs the whole state then.
+    fn is_birth(&self, message: &Publish) -> bool {
+        let birth = self.topics.birth();
+        birth.is_some_and(|topic| message.topic == topic && message.payload == ONLINE)
     }
 }
 

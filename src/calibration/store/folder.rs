@@ -6,9 +6,10 @@ use std::{
     io::{self, ErrorKind, Read, Write},
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicU64, Ordering},
     time::{Duration, SystemTime},
 };
+
+use uuid::Uuid;
 
 use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
 
@@ -23,7 +24,6 @@ pub struct FolderStore {
     path: PathBuf,
     /// The folder is made by the first write; until then it is empty.
     may_be_missing: bool,
-    writes: AtomicU64,
 }
 
 impl FolderStore {
@@ -33,7 +33,6 @@ impl FolderStore {
         Self {
             path: path.to_owned(),
             may_be_missing: false,
-            writes: AtomicU64::new(0),
         }
     }
 
@@ -62,9 +61,8 @@ impl FolderStore {
             fs::create_dir_all(&self.path)?;
         }
         self.remove_abandoned()?;
-        let count = self.writes.fetch_add(1, Ordering::Relaxed);
-        let process = std::process::id();
-        let unfinished = format!(".{name}.{process}-{count}.{UNFINISHED}");
+        // Random: containers on one volume have the same process IDs.
+        let unfinished = format!(".{name}.{}.{UNFINISHED}", Uuid::new_v4().simple());
         let unfinished = self.path.join(unfinished);
         let written = File::create(&unfinished).and_then(|mut file| {
             file.write_all(content)?;

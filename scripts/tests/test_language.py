@@ -1,0 +1,32 @@
+"""The language rules: the tree keeps them, and the checker finds what breaks them."""
+
+import unittest
+
+import language
+
+
+class Language(unittest.TestCase):
+    def test_the_tree_keeps_the_rules(self):
+        self.assertEqual([*language.findings([])], [])
+
+    def test_first_words_of_doc_comments_are_checked(self):
+        lines = ["/// Whether it is so.", "fn a() {}", "/// Returns it.", "/// How it wraps is free.", "//! What."]
+        found = [*language.findings_in_rust("a.rs", lines)]
+        self.assertEqual([line.split(":")[1] for line in found], ["1"])
+
+    def test_persons_for_things_are_found(self):
+        found = [*language.findings_in_text("a.md", ["nobody waits", "the client waits", "Whoever asks"])]
+        self.assertEqual([line.split(":")[1] for line in found], ["1", "3"])
+
+    def test_long_test_names_are_found(self):
+        long = "a" * 61
+        rust = ["#[tokio::test]", f"async fn {long}() {{", f"fn {long}() {{"]
+        self.assertEqual(len([*language.findings_in_rust("a.rs", rust)]), 1)
+        self.assertEqual(len([*language.findings_in_python("a.py", [f"def test_{long}(self):"])]), 1)
+
+    def test_summaries_are_short_imperatives(self):
+        def document(summary):
+            return '{"paths": {"/a": {"get": {"summary": "%s"}}}}' % summary
+
+        for summary, count in [("List calibrations", 0), ("Is it ready?", 1), ("", 1), ("One two three four five six seven", 1)]:
+            self.assertEqual(len([*language.findings_in_openapi("o", document(summary))]), count, summary)
