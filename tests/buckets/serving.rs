@@ -108,7 +108,7 @@ fn the_last_calibrations_are_used_during_an_outage() {
     service.wait_for("/metrics", |answer| {
         answer.contains("lookdown_calibration_store_up 1")
     });
-    let log = service.log_with("can be looked at again");
+    let log = service.log_with("can be read again");
     let told = log
         .lines()
         .filter_map(|line| line.split_once("the known ones go on: "));

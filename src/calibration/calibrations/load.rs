@@ -17,7 +17,7 @@ pub(super) struct LoadedFile {
     pub(super) cameras: BTreeMap<CalibrationId, Arc<CalibrationEntry>>,
     /// True when the last version that could be read holds several cameras.
     pub(super) holds_several: bool,
-    /// Why this version, or cameras of it, cannot be used, a sentence each.
+    /// Reasons why this version, or cameras of it, cannot be used, one sentence each.
     pub(super) problems: Vec<String>,
 }
 
