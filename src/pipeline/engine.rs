@@ -1,5 +1,5 @@
-//! The engine: converts the bytes of a frame to its report. The calling thread decodes the frame and
-//! merges detections; the network threads render views and run inference.
+//! The engine: converts the bytes of a frame to its report. The calling thread decodes the frame
+//! and merges detections; the network threads render views and run inference.
 
 mod camera;
 mod given_views;

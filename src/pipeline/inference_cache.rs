@@ -1,5 +1,5 @@
-//! The inference cache: detections of recent frames, so that a request for the same frame with other
-//! refinement parameters needs no inference. Only frames whose request opts in are cached.
+//! The inference cache: detections of recent frames, so that a request for the same frame with
+//! other refinement parameters needs no inference. Only frames whose request opts in are cached.
 
 use std::{
     collections::VecDeque,

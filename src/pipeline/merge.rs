@@ -33,11 +33,11 @@ const CROP_VOTE: f64 = 0.7;
 
 /// Converts between merged scores and reported scores.
 ///
-/// In fusion the vote of a supporting view is its score × its IoU with the fused box. The merged score
-/// of a clearly visible person is therefore lower than the score of each view. The reported score
-/// corrects this on average: with this power the default threshold of 0.3 lies where F1 is best.
-/// (Without it, F1 was best at merged scores of 0.24 to 0.30, on photographs and in rendered rooms.)
-/// The order of persons does not change.
+/// In fusion the vote of a supporting view is its score × its IoU with the fused box. The merged
+/// score of a clearly visible person is therefore lower than the score of each view. The reported
+/// score corrects this on average: with this power the default threshold of 0.3 lies where F1 is
+/// best. (Without it, F1 was best at merged scores of 0.24 to 0.30, on photographs and in rendered
+/// rooms.) The order of persons does not change.
 #[derive(Debug, Clone, Copy)]
 struct ScoreScale {
     power: f64,
@@ -125,8 +125,8 @@ pub(super) fn persons(
         .collect()
 }
 
-/// Returns the outlines (unit rays) of possible persons, highest score first. Each is the outline of
-/// the person's best box.
+/// Returns the outlines (unit rays) of possible persons, highest score first. Each is the outline
+/// of the person's best box.
 pub(super) fn outlines(
     passes: &[Pass],
     back_projection: BackProjection,
@@ -219,8 +219,8 @@ fn touches_border(bbox: &BBox<ViewPixels>, input: &NetworkInput) -> bool {
         || bbox.y_max() > height - margin
 }
 
-/// Builds a person from the members of a merged box. Returns `None` for a box outside the frame: lens
-/// images may be larger than frames.
+/// Builds a person from the members of a merged box. Returns `None` for a box outside the frame:
+/// lens images may be larger than frames.
 fn person(
     bbox: BBox<FramePixels>,
     score: f64,

@@ -1,7 +1,7 @@
 //! The motion cache: detections of views without motion, so that unchanged views need no inference.
 //!
-//! A view is compared with its state at the last inference, not with the previous frame, so that slow
-//! changes add up. After [`MAX_AGE`] inference always runs again.
+//! A view is compared with its state at the last inference, not with the previous frame, so that
+//! slow changes add up. After [`MAX_AGE`] inference always runs again.
 
 use std::{
     collections::HashMap,
@@ -55,8 +55,8 @@ struct CachedView {
 }
 
 impl MotionCache {
-    /// Returns the cached views of a camera. They are empty if the camera is new or if its rig or its
-    /// model has changed.
+    /// Returns the cached views of a camera. They are empty if the camera is new or if its rig or
+    /// its model has changed.
     pub(super) fn of(
         &self,
         camera: &str,

@@ -21,8 +21,8 @@ fn calibration(areas: &str) -> Arc<Calibration> {
     Arc::new(checked.unwrap())
 }
 
-/// Runs detection on a frame with a disc of 20 pixels at `center`. The frame is `scale` times as large
-/// as the calibration's image; the disc is in pixels of the calibration's image.
+/// Runs detection on a frame with a disc of 20 pixels at `center`. The frame is `scale` times as
+/// large as the calibration's image; the disc is in pixels of the calibration's image.
 fn detected(engine: &Engine, areas: &str, profile: &str, scale: u32, center: [f64; 2]) -> Detected {
     let factor = f64::from(scale);
     let image = frame_with_disc(600 * scale, center.map(|at| at * factor), 20.0 * factor);
@@ -31,8 +31,8 @@ fn detected(engine: &Engine, areas: &str, profile: &str, scale: u32, center: [f6
     engine.detect(&job).unwrap()
 }
 
-/// Zones around a person to the right of the image centre, where feet point left. The disc's box and
-/// the person extend from about 400 to 440, with the foot at 400.
+/// Zones around a person to the right of the image centre, where feet point left. The disc's box
+/// and the person extend from about 400 to 440, with the foot at 400.
 const ZONES: &str = r#", "zones": [
     {"name": "foot", "frame_px": [[380, 280], [410, 280], [410, 320], [380, 320]]},
     {"name": "box-centre", "frame_px": [[411, 280], [450, 280], [450, 320], [411, 320]]},

@@ -21,8 +21,8 @@ use crate::{
     warning::{Warning, WarningCode},
 };
 
-/// The rounding step of lens circles, as a share of the radius. Rounding maps the jittering circles of
-/// one camera to one rig; a quarter of a percent does not move boxes visibly.
+/// The rounding step of lens circles, as a share of the radius. Rounding maps the jittering circles
+/// of one camera to one rig; a quarter of a percent does not move boxes visibly.
 const CIRCLE_STEP_SHARE: f64 = 1.0 / 400.0;
 
 /// Returns the rig key of the assumed camera with the rounded circle.

@@ -10,8 +10,8 @@ use crate::{
 };
 
 impl Engine {
-    /// Detects persons in views without further processing, in batches of the usual size. Blocks: it
-    /// waits for a session, as the network threads do.
+    /// Detects persons in views without further processing, in batches of the usual size. Blocks:
+    /// it waits for a session, as the network threads do.
     ///
     /// # Errors
     /// Returns a [`PipelineError`], which distinguishes client and server faults.

@@ -65,8 +65,9 @@ impl Observation {
         models.find(|model| model.name() != self.model.name())
     }
 
-    /// Waits for passes that were queued together, and adds their detections. Rendering and inference
-    /// overlap, so the total span is divided between these stages in proportion to their work.
+    /// Waits for passes that were queued together, and adds their detections. Rendering and
+    /// inference overlap, so the total span is divided between these stages in proportion to their
+    /// work.
     pub(super) fn wait_for(&mut self, tasks: &[Arc<PassTask>]) -> Result<(), PipelineError> {
         let mut work: Option<Work> = None;
         for task in tasks {

@@ -59,8 +59,8 @@ impl Engine {
         self.motion_cache.of_crops(camera, rig, model)
     }
 
-    /// Plans zoom views for the model of the first pass. If the request names no model and the profile
-    /// has a second model, each of the two models gets half of the views.
+    /// Plans zoom views for the model of the first pass. If the request names no model and the
+    /// profile has a second model, each of the two models gets half of the views.
     fn zoomed(&self, job: &DetectJob, observation: &Observation) -> Vec<Planned> {
         let profile = observation.profile;
         let Some(pass) = profile.zoom_pass() else {

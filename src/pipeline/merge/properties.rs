@@ -18,8 +18,8 @@ const HEIGHT: u32 = 240;
 /// Side length of a view in pixels, equal to the input of [`BlobDetector`].
 const SIDE: f64 = 96.0;
 
-/// Cameras in every profile, with a lens image within the frame or larger, that point down, obliquely
-/// or along the floor.
+/// Cameras in every profile, with a lens image within the frame or larger, that point down,
+/// obliquely or along the floor.
 static CAMERAS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(|| {
     let mut rigs = Vec::new();
     for (radius, up) in [
