@@ -97,9 +97,9 @@ impl LoadedFile {
         let file = &self.named.file.name;
         for problem in &self.problems {
             let serving = if self.cameras.is_empty() {
-                "nothing serves in its place"
+                "no calibration is loaded from it"
             } else {
-                "what was known of it goes on"
+                "calibrations loaded from it stay in use"
             };
             tracing::error!(file, "calibration not used, {serving}: {problem}");
         }
