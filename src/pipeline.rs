@@ -1,4 +1,4 @@
-//! From the bytes of a frame to a report of the persons in it.
+//! The detection pipeline: turns an encoded frame into a report of the persons in it.
 
 mod camera_rig;
 mod default_models;

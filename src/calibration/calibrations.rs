@@ -5,8 +5,8 @@ mod change;
 mod content;
 mod error;
 mod load;
-mod look;
 mod named_file;
+mod scan;
 mod snapshot;
 
 use std::sync::{

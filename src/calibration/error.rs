@@ -31,7 +31,7 @@ pub enum CalibrationError {
         /// The field, its value and what would be right.
         problem: String,
     },
-    /// The store cannot be looked at.
+    /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
 }

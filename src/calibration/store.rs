@@ -16,7 +16,7 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
     /// The files there are now, in any order; other things may be among them.
     ///
     /// # Errors
-    /// [`StoreError`] when the place cannot be looked at, or has more than [`MAX_FILES`].
+    /// [`StoreError`] when the store cannot be read, or has more than [`MAX_FILES`].
     fn list(&self) -> Result<Vec<StoredFile>, StoreError>;
 
     /// The contents of files, each cut after `at_most` bytes, in the order of `names`: several at
@@ -42,7 +42,7 @@ pub trait CalibrationStore: fmt::Debug + Send + Sync {
     fn delete(&self, name: &str) -> Result<(), StoreError>;
 }
 
-/// Most files looked at in one place.
+/// The maximum number of files in a store.
 pub const MAX_FILES: usize = 50_000;
 /// Most files read at once: bounds the memory and the connections that reading takes.
 pub const READ_AT_ONCE: usize = 16;
@@ -95,7 +95,7 @@ pub enum StoreError {
         problem: String,
     },
     /// Another writer has changed the file meanwhile.
-    #[error("{place}/{name} was changed by somebody else meanwhile")]
+    #[error("{place}/{name} was changed by another writer meanwhile")]
     Changed {
         /// The store.
         place: String,

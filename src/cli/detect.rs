@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(code)
 }
 
-/// What `--format`, `--out` and `--oriented` ask for.
+/// Returns the label output requested by `--format`, `--out` and `--oriented`.
 fn labels(arguments: &Arguments, pictures: &[Picture]) -> anyhow::Result<Option<Labels>> {
     let (Some(format), Some(folder)) = (arguments.format, &arguments.out) else {
         return Ok(None);

@@ -25,7 +25,7 @@ const MIN_EXTENT: f64 = 1.0;
 pub struct CropTarget {
     /// Its box `[x_min, y_min, x_max, y_max]`, corner-origin frame pixels.
     pub bbox: [f64; 4],
-    /// How likely it is a person, above 0.
+    /// The score as a person, above 0.
     pub score: f64,
     /// The direction in which it stands, frame pixels, unit length.
     pub up: Vector2<f64>,
@@ -113,13 +113,13 @@ fn best_hull(first: &CropTarget, neighbours: &[&CropTarget], reach: f64) -> Hull
     best.1
 }
 
-/// Whether a target has about the size and the direction for which the crop was made.
+/// Returns true when a target has about the size and the direction for which the crop was made.
 fn suits(crop: &FrameCrop, target: &CropTarget, fill: f64) -> bool {
     let filled = crop.scale * target.extent() / f64::from(crop.width);
     SERVED_FILL.contains(&(filled / fill)) && crop.turn.up().dot(&target.up) >= SERVED_COSINE
 }
 
-/// Whether a target lies wholly in the crop.
+/// Returns true when a target lies wholly in the crop.
 fn shows(crop: &FrameCrop, target: &CropTarget) -> bool {
     let reach = WITHIN * f64::from(crop.width) / crop.scale / 2.0 + 1e-6;
     let offsets = [0, 1, 2, 3].map(|side| target.bbox[side] - crop.center[side % 2]);

@@ -1,4 +1,4 @@
-//! Frame crops: upright cut-outs of the fisheye frame itself, turned by a multiple of 90° and scaled.
+//! Frame crops: upright cut-outs of the fisheye frame, turned by a multiple of 90° and scaled.
 //!
 //! A quarter turn maps axis-parallel boxes to axis-parallel boxes. The footprint of a box that was
 //! found in a crop is therefore exact; `docs/geometry.md` compares it with that of a virtual view.
@@ -111,7 +111,7 @@ impl FrameCrop {
         self.frame_box([0.0, 0.0, f64::from(self.width), f64::from(self.height)])
     }
 
-    /// Whether a position in the frame lies in the crop.
+    /// Returns true when a position in the frame lies in the crop.
     #[must_use]
     pub fn holds(&self, position: &Pixel) -> bool {
         let Pixel { coords } = self.crop_from_frame(position);

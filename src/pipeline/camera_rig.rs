@@ -1,5 +1,6 @@
-//! Camera rigs: a camera's geometry with the views of a plan or the crops of a frame and their remap
-//! tables, immutable; those of a plan are shared by every frame of that camera.
+//! Camera rigs: a camera's geometry together with its views or crops and their remap tables.
+//!
+//! A rig is immutable. All frames of a camera share the rig of a view plan.
 
 use std::sync::Arc;
 
@@ -22,20 +23,20 @@ pub(super) struct CameraRig {
     views_masked: usize,
 }
 
-/// How the frame reaches the network.
+/// The network's views of a frame.
 #[derive(Debug)]
 enum Views {
-    /// Through virtual views.
+    /// Virtual perspective views.
     Virtual(Vec<(VirtualView, RemapTable)>),
-    /// In upright crops of it.
+    /// Upright crops of the frame.
     Crops(Vec<(FrameCrop, RemapTable)>),
-    /// As it is.
+    /// The whole frame, letterboxed.
     Direct(Letterbox),
 }
 
 impl CameraRig {
-    /// Tabulates the views of `plan` (without one, the frame is seen as it is). Views that see
-    /// nothing of the lens image, or nothing beside its masks, are left out.
+    /// Builds the remap tables of the views of `plan`. Without a plan, the only view is the whole
+    /// frame. Views that show no unmasked part of the lens image are left out.
     pub(super) fn new(
         geometry: CameraGeometry,
         frame_width: u32,
@@ -59,7 +60,7 @@ impl CameraRig {
         Self::of_views(geometry, masked, views, frame_width, frame_height)
     }
 
-    /// The same camera with other views.
+    /// Returns a rig of the same camera with other views.
     pub(super) fn with_views(
         &self,
         views: Vec<VirtualView>,
@@ -70,7 +71,7 @@ impl CameraRig {
         Self::of_views(geometry, masked, views, frame_width, frame_height)
     }
 
-    /// The same camera with crops of the frame instead of views.
+    /// Returns a rig of the same camera with crops of the frame instead of views.
     pub(super) fn with_crops(
         &self,
         crops: &[FrameCrop],
@@ -98,7 +99,7 @@ impl CameraRig {
         }
     }
 
-    /// Views with their tables, without those that see nothing.
+    /// Builds a rig from `views`, without those that show no unmasked part of the lens image.
     fn of_views(
         geometry: CameraGeometry,
         masked: Arc<MaskedPixels>,
@@ -125,27 +126,27 @@ impl CameraRig {
         }
     }
 
-    /// Blanks what the camera's masks hide; nothing else may see the frame before.
+    /// Blanks the masked areas of the frame. Must run before any other use of the frame.
     pub(super) fn blank(&self, frame: &mut Frame) {
         self.masked.blank(frame);
     }
 
-    /// Whether the camera has no masks that hide anything.
-    pub(super) fn hides_nothing(&self) -> bool {
+    /// Returns true if no pixel of the frame is masked.
+    pub(super) fn has_no_masks(&self) -> bool {
         self.masked.is_empty()
     }
 
-    /// Lens and mount.
+    /// Returns the lens, the mount and the areas of the camera.
     pub(super) fn geometry(&self) -> &CameraGeometry {
         &self.geometry
     }
 
-    /// The whole frame.
+    /// Returns the box of the whole frame.
     pub(super) fn frame(&self) -> &BBox<FramePixels> {
         &self.frame
     }
 
-    /// How many views the network has to see.
+    /// Returns the number of views that the network processes.
     pub(super) fn view_count(&self) -> usize {
         match &self.views {
             Views::Virtual(views) => views.len(),
@@ -154,17 +155,17 @@ impl CameraRig {
         }
     }
 
-    /// How many of the planned views see nothing of the lens image.
+    /// Returns the number of planned views that lie outside the lens image.
     pub(super) fn views_outside(&self) -> usize {
         self.views_outside
     }
 
-    /// How many of the planned views see nothing of it beside what is masked.
+    /// Returns the number of planned views whose part of the lens image is wholly masked.
     pub(super) fn views_masked(&self) -> usize {
         self.views_masked
     }
 
-    /// The borders of the views, corner-origin frame pixels.
+    /// Returns the outlines of the views in corner-origin frame pixels.
     pub(super) fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         match &self.views {
             Views::Virtual(views) => {
@@ -177,7 +178,7 @@ impl CameraRig {
         }
     }
 
-    /// Memory held by the tables and masks, bytes; what several of them share counts once.
+    /// Returns the memory of the tables and masks in bytes. Shared memory counts once.
     pub(super) fn bytes(&self) -> usize {
         let tables = match &self.views {
             Views::Virtual(views) => RemapTable::bytes(views.iter().map(|(_, table)| table)),
@@ -203,7 +204,7 @@ impl CameraRig {
         }
     }
 
-    /// What a box found in a view covers in the frame; `None` beyond the lens image.
+    /// Returns the footprint in the frame of a box of a view; `None` outside the lens image.
     pub(super) fn footprint(
         &self,
         view: usize,
@@ -227,7 +228,7 @@ impl CameraRig {
         }
     }
 
-    /// The crops; none of a rig of virtual views.
+    /// Returns the crops; empty for a rig without crops.
     pub(super) fn crops(&self) -> impl Iterator<Item = &FrameCrop> {
         let crops = match &self.views {
             Views::Crops(crops) => crops.as_slice(),
@@ -236,12 +237,12 @@ impl CameraRig {
         crops.iter().map(|(crop, _)| crop)
     }
 
-    /// Whether boxes of the views are exact in the frame, as those of crops are.
+    /// Returns true if boxes of the views are exact in the frame, as the boxes of crops are.
     pub(super) fn is_exact(&self) -> bool {
         matches!(self.views, Views::Crops(_))
     }
 
-    /// How many views show the whole footprint; the frame itself shows everything.
+    /// Returns the number of views that show the whole footprint. The whole frame always does.
     pub(super) fn views_holding(&self, footprint: &Footprint) -> usize {
         match &self.views {
             Views::Virtual(views) => {

@@ -1,67 +1,67 @@
-//! Which model answers requests that name none.
+//! The default models: one for each profile and device, for requests that name no model.
 
 use strum::VariantArray;
 
 use super::Profile;
 use crate::inference::Device;
 
-/// The models of a profile, the preferred one first: the one table of them. Those that were not
-/// fetched are passed over; [`STAND_IN`] comes after all.
+/// Returns the models of a profile, in order of preference. This is the only table of them. Models
+/// that were not fetched are skipped; [`FALLBACK`] is the last choice.
 fn preferred(profile: Profile, device: Device) -> &'static [&'static str] {
     match (profile, device) {
         (Profile::Paper | Profile::Direct, Device::Cpu) => &[SSDLITE_INT8],
-        (Profile::Paper | Profile::Direct, _) => &[STAND_IN],
+        (Profile::Paper | Profile::Direct, _) => &[FALLBACK],
         (Profile::Fast, Device::Cpu) => &[NANODET_INT8, NANODET],
         (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[NANODET],
     }
 }
 
-/// Whose model takes half of a profile's closer passes.
-fn second_opinion_of(profile: Profile) -> Option<Profile> {
+/// Returns the profile whose model processes half of the zoom views of `profile`.
+fn second_model_profile(profile: Profile) -> Option<Profile> {
     (profile == Profile::Quality).then_some(Profile::Paper)
 }
 
 const NANODET: &str = "nanodet_g_416";
 
-/// ONNX Runtime has integer kernels for it on processors alone.
+/// ONNX Runtime has integer kernels for this model on CPUs only.
 const NANODET_INT8: &str = "nanodet_g_416_int8";
 
-/// ONNX Runtime has integer kernels for it on processors alone.
+/// ONNX Runtime has integer kernels for this model on CPUs only.
 const SSDLITE_INT8: &str = "ssdlite_mobilenet_v2_int8";
 
-/// Stands in for models that were not fetched: the smallest set-up has this one.
-const STAND_IN: &str = "ssdlite_mobilenet_v2";
+/// The fallback for models that were not fetched: every installation includes it.
+const FALLBACK: &str = "ssdlite_mobilenet_v2";
 
-/// Which model answers requests of a profile that name none.
+/// The default models of the profiles.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DefaultModels {
-    /// One for all profiles.
+    /// One model for all profiles.
     One(String),
-    /// Each profile's own, or another one that every set-up has.
+    /// One model for each profile, or the fallback that every installation includes.
     PerProfile {
-        /// What networks run on.
+        /// The device that runs the models.
         device: Device,
-        /// The profiles' models that are missing.
+        /// The preferred models that were not fetched.
         missing: Vec<&'static str>,
     },
 }
 
 impl DefaultModels {
-    /// Each profile's own model for this device, as far as `is_fetched` says that it is there.
+    /// Selects the model of each profile for this device from those that `is_fetched` accepts.
     #[must_use]
     pub fn per_profile(device: Device, is_fetched: impl Fn(&str) -> bool) -> Self {
         let mut missing: Vec<_> = Profile::VARIANTS
             .iter()
             .flat_map(|&profile| preferred(profile, device))
             .copied()
-            .filter(|name| *name != STAND_IN && !is_fetched(name))
+            .filter(|name| *name != FALLBACK && !is_fetched(name))
             .collect();
         missing.sort_unstable();
         missing.dedup();
         Self::PerProfile { device, missing }
     }
 
-    /// The model of a profile.
+    /// Returns the model of a profile.
     #[must_use]
     pub fn of(&self, profile: Profile) -> &str {
         match self {
@@ -69,20 +69,20 @@ impl DefaultModels {
             Self::PerProfile { device, missing } => {
                 let mut models = preferred(profile, *device).iter();
                 let fetched = models.find(|name| !missing.contains(name));
-                fetched.copied().unwrap_or(STAND_IN)
+                fetched.copied().unwrap_or(FALLBACK)
             }
         }
     }
 
-    /// The model that gives a second opinion in a profile's closer passes, if that profile has one
-    /// and it is another than its own.
+    /// Returns the second model of a profile's zoom views, if the profile has one and it differs
+    /// from the profile's own model.
     #[must_use]
     pub fn second_opinion(&self, profile: Profile) -> Option<&str> {
-        let name = self.of(second_opinion_of(profile)?);
+        let name = self.of(second_model_profile(profile)?);
         (name != self.of(profile)).then_some(name)
     }
 
-    /// All of them, each once; that of the default profile comes first.
+    /// Returns each model once. The model of the default profile comes first.
     #[must_use]
     pub fn names(&self) -> Vec<&str> {
         let mut names = vec![self.of(Profile::default())];
@@ -101,19 +101,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_model_that_was_not_fetched_has_a_stand_in() {
+    fn a_model_that_was_not_fetched_has_a_fallback() {
         let all = DefaultModels::per_profile(Device::Cpu, |_| true);
         assert_eq!(all.names(), [NANODET, SSDLITE_INT8, NANODET_INT8]);
         let without = DefaultModels::per_profile(Device::Cpu, |name| name != NANODET_INT8);
         assert_eq!(without.of(Profile::Fast), NANODET);
         let few = DefaultModels::per_profile(Device::Cpu, |_| false);
-        assert_eq!(few.names(), [STAND_IN]);
+        assert_eq!(few.names(), [FALLBACK]);
     }
 
     #[test]
-    fn only_a_processor_gets_the_int8_form() {
+    fn int8_models_are_selected_on_cpus_only() {
         let gpu = DefaultModels::per_profile(Device::Cuda(0), |_| true);
-        assert_eq!(gpu.of(Profile::Paper), STAND_IN);
+        assert_eq!(gpu.of(Profile::Paper), FALLBACK);
         let cpu = DefaultModels::per_profile(Device::Cpu, |_| true);
         assert_eq!(cpu.of(Profile::Paper), SSDLITE_INT8);
         assert_eq!(
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_opinion_is_another_model_s() {
+    fn second_model_differs_from_the_profile_s_own_model() {
         let all = DefaultModels::per_profile(Device::Cpu, |_| true);
         assert_eq!(all.second_opinion(Profile::Quality), Some(SSDLITE_INT8));
         assert_eq!(all.second_opinion(Profile::Balanced), None);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn one_model_can_answer_for_all_profiles() {
+    fn one_model_can_serve_all_profiles() {
         let one = DefaultModels::One("mine".to_owned());
         assert!(
             Profile::VARIANTS

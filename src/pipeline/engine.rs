@@ -1,5 +1,5 @@
-//! The engine: everything between a frame's bytes and its report. The calling thread decodes and
-//! merges; the threads of the network render and infer.
+//! The engine: converts the bytes of a frame to its report. The calling thread decodes the frame
+//! and merges detections; the network threads render views and run inference.
 
 mod camera;
 mod given_views;
@@ -41,29 +41,29 @@ use crate::{
 /// The smallest frame side that can hold a lens image, pixels.
 const MIN_FRAME_SIDE: u32 = 32;
 
-/// How the engine works.
+/// The options of the engine.
 #[derive(Debug, Clone)]
 pub struct EngineOptions {
-    /// What a picture may cost before it is decoded.
+    /// Limits that are checked before a frame is decoded.
     pub decode_limits: DecodeLimits,
-    /// Which model answers requests that name none.
+    /// The models for requests that name none.
     pub default_models: DefaultModels,
-    /// How views become batches.
+    /// Options for batches of views.
     pub batches: BatchOptions,
-    /// Threads of the network: as many as models have sessions.
+    /// Number of network threads, equal to the number of sessions of each model.
     pub sessions: NonZeroUsize,
-    /// Threads that build tables, and render batches of several views.
+    /// Number of threads that build remap tables and render batches of several views.
     pub remap_threads: NonZeroUsize,
-    /// How the paper's field of view is read.
+    /// The interpretation of the paper's field of view.
     pub paper_field_of_view: FieldOfViewReading,
-    /// Most memory that remap tables may hold, bytes.
+    /// Maximum memory of cached remap tables, bytes.
     pub rig_cache_bytes: usize,
-    /// Most frames of which is remembered what was found in them, for requests that want it.
+    /// Maximum number of frames in the inference cache, which requests opt in to.
     pub inference_cache_frames: usize,
 }
 
 impl EngineOptions {
-    /// Small options for tests: `model` for all profiles, one session, little memory.
+    /// Returns options for tests: `model` for all profiles, one session, small caches.
     #[must_use]
     pub fn for_testing(model: &str) -> Self {
         Self {
@@ -89,18 +89,18 @@ pub struct Engine {
     remappers: Arc<ThreadPool>,
     calibrations: Option<Arc<Calibrations>>,
     rigs: RigCache,
-    still_views: MotionCache,
-    /// Takes turns for views that do not come through the network's queue.
+    motion_cache: MotionCache,
+    /// Round-robin counter for views that bypass the network's queue.
     next_session: AtomicUsize,
-    remembered: InferenceCache,
+    inference_cache: InferenceCache,
     options: EngineOptions,
 }
 
 impl Engine {
-    /// An engine that passes with `models`; without `calibrations` every lens is assumed.
+    /// Creates an engine that runs `models`. Without `calibrations` every lens is assumed.
     ///
     /// # Errors
-    /// When the operating system gives no threads.
+    /// Fails if the operating system cannot start the threads.
     pub fn new(
         models: Arc<ModelRegistry>,
         calibrations: Option<Arc<Calibrations>>,
@@ -118,23 +118,23 @@ impl Engine {
             remappers,
             calibrations,
             rigs: RigCache::new(options.rig_cache_bytes),
-            still_views: MotionCache::default(),
+            motion_cache: MotionCache::default(),
             next_session: AtomicUsize::new(0),
-            remembered: InferenceCache::new(options.inference_cache_frames),
+            inference_cache: InferenceCache::new(options.inference_cache_frames),
             options,
         })
     }
 
-    /// Which model answers requests that name none.
+    /// Returns the default models.
     #[must_use]
     pub fn default_models(&self) -> &DefaultModels {
         &self.options.default_models
     }
 
-    /// Finds the persons in a frame. Blocks; keep it off the async runtime.
+    /// Detects the persons in a frame. Blocks: do not call it on an async runtime thread.
     ///
     /// # Errors
-    /// [`PipelineError`], by who is at fault.
+    /// Returns a [`PipelineError`], which distinguishes client and server faults.
     pub fn detect(&self, job: &DetectJob) -> Result<Detected, PipelineError> {
         let observation = self.observe(job)?;
         let timeline = &job.ticket.timeline;
@@ -174,24 +174,24 @@ impl Engine {
         let mut rigs: Vec<_> = observation
             .passes
             .into_iter()
-            .map(|look| look.rig)
+            .map(|pass| pass.rig)
             .collect();
-        // Two models may have looked through the same views.
+        // Two passes with different models may share a rig.
         rigs.dedup_by(|one, other| Arc::ptr_eq(one, other));
-        let hides_nothing = observation.camera.rig.hides_nothing();
+        let has_no_masks = observation.camera.rig.has_no_masks();
         Ok(Detected {
             withdrawn: job.ticket.withdrawn.clone(),
             report,
             frame: observation.frame,
-            encoded: hides_nothing.then(|| job.image.clone()),
+            encoded: has_no_masks.then(|| job.image.clone()),
             rigs,
         })
     }
 
-    /// Everything up to and including the network.
+    /// Runs all stages up to and including inference.
     ///
     /// # Errors
-    /// [`PipelineError`], by who is at fault.
+    /// Returns a [`PipelineError`], which distinguishes client and server faults.
     pub fn observe(&self, job: &DetectJob) -> Result<Observation, PipelineError> {
         let timeline = &job.ticket.timeline;
         timeline.enter(Stage::Queue, job.arrived);
@@ -221,7 +221,7 @@ impl Engine {
         let mut observation = Observation {
             profile: job.parameters.profile,
             passes: Vec::with_capacity(3),
-            still_views: 0,
+            unchanged_views: 0,
             batch_count: 0,
             non_finite: 0,
             timeline: timeline.clone(),
@@ -230,12 +230,12 @@ impl Engine {
             model,
             warnings,
         };
-        let recalled = key
+        let cached = key
             .as_ref()
-            .and_then(|key| self.remembered.recall(key, |model| self.serves(model)));
-        if let Some(passes) = recalled {
+            .and_then(|key| self.inference_cache.lookup(key, |model| self.serves(model)));
+        if let Some(passes) = cached {
             observation.passes = passes;
-            observation.still_views = observation.view_count();
+            observation.unchanged_views = observation.view_count();
             timeline.leave(Instant::now());
             return Ok(observation);
         }
@@ -245,18 +245,18 @@ impl Engine {
             Arc::clone(&observation.model),
             Arc::clone(&observation.frame),
             job.ticket.clone(),
-            self.seen_before(job, &observation),
+            self.cached_views(job, &observation),
         );
-        observation.take_in(&[first])?;
-        let closer = self.closer(job, &observation);
-        observation.take_in(&closer)?;
+        observation.wait_for(&[first])?;
+        let second = self.second_pass(job, &observation);
+        observation.wait_for(&second)?;
         if let Some(key) = key {
-            self.remembered.remember(key, &observation.passes);
+            self.inference_cache.store(key, &observation.passes);
         }
         Ok(observation)
     }
 
-    /// The persons in an observed frame.
+    /// Merges the detections of an observed frame into persons.
     #[must_use]
     pub fn persons(
         &self,
@@ -267,36 +267,36 @@ impl Engine {
         merge::persons(&observation.passes, back_projection, refinement)
     }
 
-    /// What the frame's camera saw before, if the request wants to rely on it.
-    fn seen_before(&self, job: &DetectJob, seen: &Observation) -> Option<Arc<CameraViews>> {
+    /// Returns the camera's views in the motion cache, if the request enables motion detection.
+    fn cached_views(&self, job: &DetectJob, seen: &Observation) -> Option<Arc<CameraViews>> {
         let parameters = &job.parameters;
         let camera = parameters.camera_name().filter(|_| parameters.motion)?;
-        Some(self.still_views.of(camera, &seen.camera.rig, &seen.model))
+        Some(self.motion_cache.of(camera, &seen.camera.rig, &seen.model))
     }
 
     pub(super) fn options(&self) -> &EngineOptions {
         &self.options
     }
 
-    /// How many frames were not looked at again, as what was found in them was remembered.
+    /// Returns the number of frames served from the inference cache since the start.
     #[must_use]
     pub fn inference_cache_hits(&self) -> u64 {
-        self.remembered.recalled()
+        self.inference_cache.hits()
     }
 
-    /// Whether a model is still the one of its name.
+    /// Returns true if the registry still has this instance of the model under its name.
     fn serves(&self, model: &Model) -> bool {
         let now = self.models.get(model.name());
         now.is_some_and(|now| std::ptr::eq(Arc::as_ptr(&now), model))
     }
 
-    /// The model that answers requests which name none.
+    /// Returns the model for requests that name none.
     pub(super) fn default_model(&self, profile: Profile) -> Result<Arc<Model>, PipelineError> {
         let name = self.options.default_models.of(profile);
         self.models.get(name).ok_or(PipelineError::ModelStarting)
     }
 
-    /// The model that a request named, or the one for its profile.
+    /// Returns the model that the request names, or the default model of its profile.
     fn model(&self, parameters: &DetectParameters) -> Result<Arc<Model>, PipelineError> {
         let Some(name) = &parameters.model else {
             return self.default_model(parameters.profile);

@@ -1,51 +1,51 @@
-//! Why a frame got no report, by who is at fault.
+//! Errors of the pipeline, with client faults and server faults as separate variants.
 
 use std::time::Duration;
 
 use super::ParameterError;
 use crate::{imaging::decode::DecodeError, inference::InferenceError};
 
-/// A frame that got no report.
+/// The reason why a frame has no report.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
-    /// The caller's parameter cannot be used.
+    /// A parameter of the request is invalid.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// The caller's picture cannot be used.
+    /// The image of the request is invalid.
     #[error(transparent)]
     Image(#[from] DecodeError),
-    /// The caller named a calibration that does not exist.
+    /// The request names a calibration that does not exist.
     #[error(
         "calibration: there is no calibration {id:?}: name one that is in the calibration folder, or leave it out"
     )]
     UnknownCalibration {
-        /// The ID asked for.
+        /// The requested ID.
         id: String,
     },
-    /// The caller named a calibration whose file gives none.
+    /// The request names a calibration whose file is invalid or ambiguous.
     #[error("calibration: {id:?} cannot be used: {problem}")]
     UnusableCalibration {
-        /// The ID asked for.
+        /// The requested ID.
         id: String,
-        /// What is wrong with the file, or which of its cameras to name.
+        /// The fault in the file, or the cameras that the request may name.
         problem: String,
     },
-    /// The caller asked for a model that is not loaded.
+    /// The request names a model that is not loaded.
     #[error("model: {name:?} is not loaded; use one of {loaded}, or leave it out")]
     UnknownModel {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The models there are.
+        /// The names of the loaded models.
         loaded: String,
     },
-    /// The model that answers is still being loaded.
+    /// The model of the request is still being loaded.
     #[error("the server is loading its models: try again in a second")]
     ModelStarting,
-    /// The caller's frame does not belong to the calibration it named.
+    /// The frame and the named calibration differ in aspect ratio.
     #[error(
         "image: the frame is {frame_width}×{frame_height} pixels, but calibration {id:?} was made \
-         for {calibration_width}×{calibration_height}, which is another aspect: send an uncropped \
-         frame or name another calibration"
+         for {calibration_width}×{calibration_height}, which is a different aspect ratio: send an \
+         uncropped frame or name another calibration"
     )]
     AspectMismatch {
         /// The calibration's ID.
@@ -54,9 +54,9 @@ pub enum PipelineError {
         frame_width: u32,
         /// Frame height, pixels.
         frame_height: u32,
-        /// Width the calibration was made for, pixels.
+        /// Image width of the calibration, pixels.
         calibration_width: u32,
-        /// Height the calibration was made for, pixels.
+        /// Image height of the calibration, pixels.
         calibration_height: u32,
     },
     /// The frame is too small to hold a lens image.
@@ -66,39 +66,38 @@ pub enum PipelineError {
         width: u32,
         /// Frame height, pixels.
         height: u32,
-        /// The smallest side accepted, pixels.
+        /// The minimum side length, pixels.
         minimum: u32,
     },
-    /// More frames are waiting than the queue holds.
-    #[error("all {capacity} places in the queue are taken: send fewer frames at a time, or retry")]
+    /// The queue is full.
+    #[error("the queue is full ({capacity} frames): send fewer frames at a time, or retry")]
     Overloaded {
-        /// How many frames may wait or be worked on.
+        /// The maximum number of frames that wait or are processed.
         capacity: usize,
-        /// When those that are there now will have been served, if frames are served as fast as
-        /// they have been.
+        /// The estimated time to serve the present frames, at the recent service rate.
         retry_after: Duration,
     },
-    /// The server that networks run on has no place for more.
-    #[error("the inference server has no place for more: send fewer frames at a time, or retry")]
+    /// The inference server is overloaded.
+    #[error("the inference server is overloaded: send fewer frames at a time, or retry")]
     InferenceBusy {
-        /// When it may have one.
+        /// The delay after which a retry may succeed.
         retry_after: Duration,
     },
-    /// The server that networks run on cannot be reached, or fails.
+    /// The inference server is unreachable or fails.
     #[error("the inference server does not answer: try again in a few seconds")]
     InferenceUnavailable,
-    /// Nobody waits for the report any more, so the frame was not looked at.
-    #[error("the request was withdrawn before its frame had a report")]
+    /// The client cancelled the request, so its frame was not processed.
+    #[error("the request was cancelled before its report was ready")]
     Withdrawn,
-    /// The server is about to stop.
+    /// The server is shutting down.
     #[error("the server is shutting down: send the frame to another one")]
     ShuttingDown,
-    /// Our fault: logged with its cause, shown without it.
+    /// A fault in the server. The log contains the cause, the response does not.
     #[error("the frame could not be processed because of a fault in the server")]
     Internal(#[source] anyhow::Error),
 }
 
-/// What a network's failure means for a frame.
+/// Converts an inference error to a pipeline error.
 pub(super) fn of_inference(error: &InferenceError) -> PipelineError {
     match error {
         InferenceError::RemoteBusy { retry_after } => PipelineError::InferenceBusy {
@@ -111,7 +110,7 @@ pub(super) fn of_inference(error: &InferenceError) -> PipelineError {
     }
 }
 
-/// Our own fault, with its cause.
+/// Wraps the cause of a fault in the server.
 pub(super) fn internal(cause: anyhow::Error) -> PipelineError {
     PipelineError::Internal(cause)
 }

@@ -1,4 +1,4 @@
-//! The frames that wait for a worker, in their turn.
+//! The queue of frames that wait for a worker.
 
 use std::{
     collections::BTreeMap,
@@ -10,7 +10,7 @@ use super::{
     ticket::{Turn, Turns},
 };
 
-/// A queue by priority, then by arrival. Its length is bounded by whoever fills it.
+/// A queue ordered by priority, then by arrival. The caller of `push` bounds its length.
 pub(super) struct FrameQueue<T> {
     state: Mutex<State<T>>,
     changed: Condvar,
@@ -34,7 +34,7 @@ impl<T> FrameQueue<T> {
         }
     }
 
-    /// Queues an entry; gives it back when the queue is closed.
+    /// Queues an entry. Returns it as an error if the queue is closed.
     pub(super) fn push(&self, priority: Priority, entry: T) -> Result<(), T> {
         let mut state = self.lock();
         if state.closed {
@@ -47,7 +47,7 @@ impl<T> FrameQueue<T> {
         Ok(())
     }
 
-    /// Waits for the next entry; `None` when the queue is closed and empty. Blocks.
+    /// Waits for the next entry; `None` if the queue is closed and empty. Blocks.
     pub(super) fn pop(&self) -> Option<T> {
         let mut state = self
             .changed
@@ -58,14 +58,14 @@ impl<T> FrameQueue<T> {
         state.waiting.pop_first().map(|(_, entry)| entry)
     }
 
-    /// Takes in no more; what is waiting is still handed out.
+    /// Closes the queue for new entries. Waiting entries can still be popped.
     pub(super) fn close(&self) {
         self.lock().closed = true;
         self.changed.notify_all();
     }
 
     fn lock(&self) -> MutexGuard<'_, State<T>> {
-        // No change can panic half-way.
+        // No change can panic part-way, so a poisoned state is still consistent.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_closed_queue_gives_back_what_comes_late() {
+    fn a_closed_queue_returns_new_entries() {
         let queue = FrameQueue::new();
         queue.close();
         assert_eq!(queue.push(Priority::default(), 7), Err(7));

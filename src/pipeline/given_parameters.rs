@@ -4,15 +4,15 @@ use std::str::FromStr;
 
 use super::{ParameterDefault, ParameterError, ParameterSpec};
 
-/// The values that a request gives for the parameters of a table, each at most once.
+/// The parameter values of a request, at most one for each parameter of a table.
 #[derive(Debug)]
 pub struct GivenParameters<'a>(Vec<(&'static str, &'a str)>);
 
 impl<'a> GivenParameters<'a> {
-    /// Takes `(name, value)` pairs.
+    /// Reads `(name, value)` pairs.
     ///
     /// # Errors
-    /// [`ParameterError`] for a repeated name and for one that is not in the table.
+    /// Returns a [`ParameterError`] for a repeated name or a name that is not in the table.
     pub fn read(
         table: &'static [ParameterSpec],
         pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
@@ -33,7 +33,7 @@ impl<'a> GivenParameters<'a> {
         Ok(Self(given))
     }
 
-    /// Returns the text that the request gives for a parameter.
+    /// Returns the text of a parameter in the request.
     #[must_use]
     pub fn text(&self, spec: &ParameterSpec) -> Option<&'a str> {
         let mut given = self.0.iter();
@@ -42,10 +42,10 @@ impl<'a> GivenParameters<'a> {
             .map(|(_, value)| *value)
     }
 
-    /// Parses the value of a parameter, or the default of the table; `None` if there is neither.
+    /// Parses the value of a parameter, or its default in the table; `None` without either.
     ///
     /// # Errors
-    /// [`ParameterError`] for a value that the parameter does not take.
+    /// Returns a [`ParameterError`] for an invalid value.
     pub fn optional<T: FromStr>(&self, spec: &ParameterSpec) -> Result<Option<T>, ParameterError> {
         let default = match spec.default {
             ParameterDefault::Value(value) => Some(value),
@@ -58,9 +58,9 @@ impl<'a> GivenParameters<'a> {
     /// Parses the value of a parameter whose default is in the table.
     ///
     /// # Errors
-    /// [`ParameterError`] for a value that the parameter does not take.
+    /// Returns a [`ParameterError`] for an invalid value.
     pub fn value<T: FromStr>(&self, spec: &ParameterSpec) -> Result<T, ParameterError> {
-        let missing = || ParameterError::bad_value(spec.name, "it is needed: give it".to_owned());
+        let missing = || ParameterError::bad_value(spec.name, "a value is required".to_owned());
         self.optional(spec)?.ok_or_else(missing)
     }
 }

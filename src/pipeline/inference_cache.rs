@@ -1,5 +1,5 @@
-//! What the network found in frames that somebody is still thinking about: asked for again with another
-//! refinement, they need not be looked at again. Only frames whose request says so are remembered.
+//! The inference cache: detections of recent frames, so that a request for the same frame with
+//! other refinement parameters needs no inference. Only frames whose request opts in are cached.
 
 use std::{
     collections::VecDeque,
@@ -12,79 +12,79 @@ use std::{
 use super::{camera_rig::CameraRig, pass::Pass};
 use crate::inference::{Model, ViewDetection};
 
-/// Most memory that all remembered frames may hold: finds, and the tables of closer passes.
+/// Maximum memory of all cached frames: detections and the remap tables of second passes.
 const MAX_BYTES: usize = 32 << 20;
 
-/// Which frame was looked at, and by whom.
+/// The key of a frame: its content, its views and its model.
 #[derive(Clone)]
 pub(super) struct FrameKey {
     /// The SHA-256 of the encoded frame.
     pub(super) digest: String,
-    /// Whether the request named the model: only then a second opinion is not asked for.
+    /// True if the request named the model, which excludes a second model.
     pub(super) is_model_named: bool,
     /// The views of its camera.
     pub(super) rig: Arc<CameraRig>,
-    /// Who passes first.
+    /// The model of the first pass.
     pub(super) model: Arc<Model>,
 }
 
-/// The frames that were asked for last.
+/// The most recently requested frames with their detections.
 pub(super) struct InferenceCache {
     max_frames: usize,
     /// The least recently used first.
-    frames: Mutex<VecDeque<Remembered>>,
-    recalled: AtomicU64,
+    frames: Mutex<VecDeque<CachedFrame>>,
+    hits: AtomicU64,
 }
 
-struct Remembered {
+struct CachedFrame {
     digest: String,
     is_model_named: bool,
-    // Weak: what nobody uses any more must keep neither tables nor weights in memory.
+    // Weak: an unused entry must not keep tables or weights in memory.
     rig: Weak<CameraRig>,
-    passes: Vec<RememberedLook>,
+    passes: Vec<CachedPass>,
     bytes: usize,
 }
 
-struct RememberedLook {
-    /// The views of a closer look, which nobody else holds; `None` for those of the camera.
-    closer: Option<Arc<CameraRig>>,
+struct CachedPass {
+    /// The views of a second pass, owned by this entry alone; `None` for the camera's views.
+    own_rig: Option<Arc<CameraRig>>,
     model: Weak<Model>,
     per_view: Vec<Vec<ViewDetection>>,
 }
 
 impl InferenceCache {
-    /// Remembers up to `max_frames`; 0 for none.
+    /// Creates a cache of up to `max_frames` frames; 0 disables it.
     pub(super) fn new(max_frames: usize) -> Self {
         Self {
             max_frames,
             frames: Mutex::default(),
-            recalled: AtomicU64::new(0),
+            hits: AtomicU64::new(0),
         }
     }
 
-    /// How many frames were recalled since the start.
-    pub(super) fn recalled(&self) -> u64 {
-        self.recalled.load(Ordering::Relaxed)
+    /// Returns the number of cache hits since the start.
+    pub(super) fn hits(&self) -> u64 {
+        self.hits.load(Ordering::Relaxed)
     }
 
-    /// What was found in a frame, if it is remembered and all who looked are still `serving`.
-    pub(super) fn recall(
+    /// Returns the passes of a cached frame, if all models of these passes are still `serving`.
+    pub(super) fn lookup(
         &self,
         key: &FrameKey,
         serving: impl Fn(&Model) -> bool,
     ) -> Option<Vec<Pass>> {
         let mut frames = self.lock();
-        let place = frames.iter().position(|frame| frame.is_of(key))?;
-        let frame = frames.remove(place)?;
+        let index = frames.iter().position(|frame| frame.is_of(key))?;
+        let frame = frames.remove(index)?;
         let passes = frame.passes(&key.rig, serving)?;
         frames.push_back(frame);
-        self.recalled.fetch_add(1, Ordering::Relaxed);
+        self.hits.fetch_add(1, Ordering::Relaxed);
         Some(passes)
     }
 
-    /// Remembers what was found in a frame; others go where there is no room.
-    pub(super) fn remember(&self, key: FrameKey, passes: &[Pass]) {
-        let frame = Remembered::new(key, passes);
+    /// Stores the passes of a frame and evicts the least recently used frames above the limits.
+    pub(super) fn store(&self, key: FrameKey, passes: &[Pass]) {
+        let frame = CachedFrame::new(key, passes);
         let mut frames = self.lock();
         frames.retain(|other| !other.is_like(&frame));
         frames.push_back(frame);
@@ -95,24 +95,24 @@ impl InferenceCache {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, VecDeque<Remembered>> {
-        // Whatever was interrupted, each frame in the list is whole.
+    fn lock(&self) -> MutexGuard<'_, VecDeque<CachedFrame>> {
+        // No change leaves a partial frame, so a poisoned list is still consistent.
         self.frames.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Remembered {
+impl CachedFrame {
     fn new(key: FrameKey, passes: &[Pass]) -> Self {
         let passes: Vec<_> = passes
             .iter()
-            .map(|look| RememberedLook {
-                closer: (!Arc::ptr_eq(&look.rig, &key.rig)).then(|| Arc::clone(&look.rig)),
-                model: Arc::downgrade(&look.model),
-                per_view: look.per_view.clone(),
+            .map(|pass| CachedPass {
+                own_rig: (!Arc::ptr_eq(&pass.rig, &key.rig)).then(|| Arc::clone(&pass.rig)),
+                model: Arc::downgrade(&pass.model),
+                per_view: pass.per_view.clone(),
             })
             .collect();
         Self {
-            bytes: key.digest.len() + passes.iter().map(RememberedLook::bytes).sum::<usize>(),
+            bytes: key.digest.len() + passes.iter().map(CachedPass::bytes).sum::<usize>(),
             digest: key.digest,
             is_model_named: key.is_model_named,
             rig: Arc::downgrade(&key.rig),
@@ -125,11 +125,11 @@ impl Remembered {
         self.digest == key.digest
             && self.is_model_named == key.is_model_named
             && std::ptr::eq(self.rig.as_ptr(), Arc::as_ptr(&key.rig))
-            && first.is_some_and(|look| std::ptr::eq(look.model.as_ptr(), Arc::as_ptr(&key.model)))
+            && first.is_some_and(|pass| std::ptr::eq(pass.model.as_ptr(), Arc::as_ptr(&key.model)))
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        let first = |frame: &Self| frame.passes.first().map(|look| look.model.as_ptr());
+        let first = |frame: &Self| frame.passes.first().map(|pass| pass.model.as_ptr());
         self.digest == other.digest
             && self.is_model_named == other.is_model_named
             && self.rig.ptr_eq(&other.rig)
@@ -137,23 +137,23 @@ impl Remembered {
     }
 
     fn passes(&self, rig: &Arc<CameraRig>, serving: impl Fn(&Model) -> bool) -> Option<Vec<Pass>> {
-        let passes = self.passes.iter().map(|look| {
+        let passes = self.passes.iter().map(|pass| {
             Some(Pass {
-                rig: Arc::clone(look.closer.as_ref().unwrap_or(rig)),
-                model: look.model.upgrade().filter(|model| serving(model))?,
-                per_view: look.per_view.clone(),
+                rig: Arc::clone(pass.own_rig.as_ref().unwrap_or(rig)),
+                model: pass.model.upgrade().filter(|model| serving(model))?,
+                per_view: pass.per_view.clone(),
             })
         });
         passes.collect()
     }
 }
 
-impl RememberedLook {
+impl CachedPass {
     fn bytes(&self) -> usize {
-        let finds: usize = self.per_view.iter().map(Vec::len).sum();
-        let tables = self.closer.as_ref().map_or(0, |rig| rig.bytes());
+        let detections: usize = self.per_view.iter().map(Vec::len).sum();
+        let tables = self.own_rig.as_ref().map_or(0, |rig| rig.bytes());
         tables
-            + finds * size_of::<ViewDetection>()
+            + detections * size_of::<ViewDetection>()
             + self.per_view.len() * size_of::<Vec<ViewDetection>>()
     }
 }

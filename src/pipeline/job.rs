@@ -1,4 +1,4 @@
-//! One frame to be looked at, and what came of it.
+//! Detection jobs and their results.
 
 use std::{sync::Arc, time::Instant};
 
@@ -14,27 +14,27 @@ use crate::{
     inference::Model,
 };
 
-/// One frame to be looked at.
+/// One frame to process.
 #[derive(Debug, Clone)]
 pub struct DetectJob {
-    /// Identifies the request in logs and answers.
+    /// Identifies the request in logs and responses.
     pub request_id: String,
-    /// When the request arrived, by the calendar.
+    /// The wall-clock time at which the request arrived.
     pub received_at: Timestamp,
-    /// When the whole request was in memory: stages are timed from here.
+    /// The time at which the whole request was in memory: the start of all stage timings.
     pub arrived: Instant,
     /// The encoded frame.
     pub image: Bytes,
-    /// Its turn, and whether anybody still waits for it.
+    /// The priority of the job and its cancellation state.
     pub ticket: Ticket,
-    /// The checked parameters.
+    /// The validated parameters.
     pub parameters: DetectParameters,
-    /// A calibration at hand, used instead of looking up `parameters.calibration`.
+    /// A calibration that replaces the lookup of `parameters.calibration`.
     pub calibration: Option<Arc<Calibration>>,
 }
 
 impl DetectJob {
-    /// A frame that a client has sent, in the turn that its parameters say.
+    /// Creates the job for a frame of a client, with the priority in its parameters.
     #[must_use]
     pub fn sent(
         image: Bytes,
@@ -55,46 +55,46 @@ impl DetectJob {
     }
 }
 
-/// Views that somebody else has made, to be looked at as they are.
+/// Views rendered by a client, for inference without changes.
 pub struct ViewsJob {
-    /// When the whole request was in memory.
+    /// The time at which the whole request was in memory.
     pub arrived: Instant,
-    /// Its turn, and whether anybody still waits for it.
+    /// The priority of the job and its cancellation state.
     pub ticket: Ticket,
-    /// Who passes.
+    /// The model that runs.
     pub model: Arc<Model>,
     /// `[views, 3, height, width]` at the size of the model's input: planes of red, green and blue,
-    /// 0 to 255. What their owner holds besides goes with them, when the work on them has ended.
+    /// 0 to 255. The owner of the pixels, with any other resources, is dropped with the job.
     pub pixels: Box<dyn AsRef<[f32]> + Send>,
 }
 
-/// A report together with the frame it is about.
+/// A report together with its frame.
 #[derive(Debug, Clone)]
 pub struct Detected {
-    /// The persons and how they were found.
+    /// The persons with the settings and timings of their detection.
     pub report: DetectionReport,
     /// The decoded frame, EXIF orientation applied.
     pub frame: Arc<Frame>,
-    /// What it was decoded from; `None` where masks hide some of that.
+    /// The encoded frame; `None` if masks hide a part of it.
     pub encoded: Option<Bytes>,
-    /// Cancelled as soon as no client waits for the answer: drawing stops then.
+    /// Cancelled when the client is gone. Drawing then stops.
     pub withdrawn: CancellationToken,
     pub(super) rigs: Vec<Arc<CameraRig>>,
 }
 
 impl Detected {
-    /// Where the views looked that the frame was seen through: their borders, corner-origin frame
-    /// pixels, closer passes after the plan's views; none when the detector saw the frame as it is.
+    /// Returns the outlines of the views in corner-origin frame pixels: the plan's views, then the
+    /// views of the second pass. Empty if the detector processed the whole frame.
     #[must_use]
     pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let rigs = self.rigs.iter();
         rigs.flat_map(|rig| rig.view_outlines()).collect()
     }
 
-    /// The zones of the frame's calibration, as the frame shows them.
+    /// Returns the outlines of the calibration's zones in the frame.
     #[must_use]
     pub fn zone_outlines(&self) -> Vec<ZoneOutline> {
-        // All rigs are of one camera.
+        // All rigs belong to one camera.
         let camera = self.rigs.first().map(|rig| rig.geometry());
         let outlines = camera.into_iter().flat_map(|camera| {
             let outline = |zone| ZoneOutline::of(zone, &camera.lens, &camera.mount);

@@ -1,9 +1,9 @@
-//! From boxes in views to persons in the frame.
+//! Merges boxes of views into persons of the frame.
 
 use super::{
     Person,
     camera_rig::CameraRig,
-    pass::{Find, Pass, finds, views_holding},
+    pass::{Pass, PassDetection, detections, views_holding},
     plausibility::score_weight,
 };
 use crate::{
@@ -20,22 +20,24 @@ use crate::{
     imaging::NetworkInput,
 };
 
-/// A box this close to its view's border (share of the view's width) is probably cut off.
+/// Distance to the view's border, as a share of the view's width, below which a box is considered
+/// cut off.
 const BORDER_SHARE: f64 = 0.0125;
-/// How much less the coordinates of a cut-off box count when boxes are averaged.
+/// The weight of the coordinates of a cut-off box when boxes are averaged.
 const BORDER_WEIGHT: f64 = 0.1;
-/// How much less the coordinates of a box of a virtual view count than the exact ones of a crop.
+/// The weight of the coordinates of a virtual view's box, relative to the exact box of a crop.
 const VIRTUAL_VIEW_WEIGHT: f64 = 0.1;
-/// The factor for scores from crops, in which people lean by up to 45° and more: whether there is a
-/// person is better seen in upright views, and where the person ends in crops.
+/// The factor for scores from crops, in which persons lean by up to 45° and more. Upright views
+/// give better scores, and crops give better extents.
 const CROP_VOTE: f64 = 0.7;
 
-/// From the score of a merge to the one that is reported.
+/// Converts between merged scores and reported scores.
 ///
-/// In fusion a witness's word is its score × its IoU with the fused box, so that a person whom all
-/// see well scores less than each of them said. The reported score takes that back in the mean: with
-/// this power the default threshold of 0.3 lies where F1 is best (it was best at 0.24 to 0.30 of the
-/// merge's own scores, on photographs and in rendered rooms). The order of persons stays.
+/// In fusion the vote of a supporting view is its score × its IoU with the fused box. The merged
+/// score of a clearly visible person is therefore lower than the score of each view. The reported
+/// score corrects this on average: with this power the default threshold of 0.3 lies where F1 is
+/// best. (Without it, F1 was best at merged scores of 0.24 to 0.30, on photographs and in rendered
+/// rooms.) The order of persons does not change.
 #[derive(Debug, Clone, Copy)]
 struct ScoreScale {
     power: f64,
@@ -45,7 +47,7 @@ impl ScoreScale {
     fn of(refinement: Refinement) -> Self {
         let power = match refinement {
             Refinement::Fusion => 0.87,
-            // What is picked keeps what the detector said of it.
+            // Suppression keeps the detector's scores.
             Refinement::Nms | Refinement::SoftNmsLinear | Refinement::SoftNmsGaussian => 1.0,
         };
         Self { power }
@@ -65,14 +67,14 @@ struct Mapped {
     candidate: Candidate,
     footprint: Footprint,
     cut_off: bool,
-    /// Whether it is from a crop of the frame.
+    /// True for a box from a crop of the frame.
     is_exact: bool,
 }
 
 impl Mapped {
-    /// The candidate with its score weighed by how plausible a person it makes, and the views that
-    /// should have seen that person counted.
-    fn weighed(&self, passes: &[Pass], rig: &CameraRig) -> Candidate {
+    /// Returns the candidate with its score weighted by its plausibility as a person, and with the
+    /// number of views that hold the whole person.
+    fn weighted(&self, passes: &[Pass], rig: &CameraRig) -> Candidate {
         let mount = &rig.geometry().mount;
         let height_ratio = self
             .footprint
@@ -123,7 +125,8 @@ pub(super) fn persons(
         .collect()
 }
 
-/// The outlines (unit rays) of what may be persons, the likeliest first: each that of its best box.
+/// Returns the outlines (unit rays) of possible persons, highest score first. Each is the outline
+/// of the person's best box.
 pub(super) fn outlines(
     passes: &[Pass],
     back_projection: BackProjection,
@@ -139,7 +142,7 @@ pub(super) fn outlines(
         .collect()
 }
 
-/// The boxes of what may be persons, the likeliest first, for crops to be placed around them.
+/// Returns the boxes of possible persons, highest score first, as targets for crops.
 pub(super) fn crop_targets(
     passes: &[Pass],
     back_projection: BackProjection,
@@ -169,15 +172,15 @@ fn merged(
     parameters: &RefinementParameters,
 ) -> (Vec<Mapped>, Vec<MergedDetection>) {
     let is_fusion = parameters.refinement == Refinement::Fusion;
-    // Suppression only lowers scores; in fusion, what lies below the threshold is a witness.
+    // Suppression only lowers scores. In fusion, boxes below the threshold still vote.
     let matters = |score: f64| is_fusion || score >= parameters.score_threshold;
-    let mapped: Vec<Mapped> = finds(passes)
+    let mapped: Vec<Mapped> = detections(passes)
         .filter(|find| matters(find.detection.score))
         .filter_map(|find| map(&find, back_projection))
         .collect();
-    // Suppression compares what the detector said; fusion weighs it.
+    // Suppression compares the detector's scores; fusion weights them.
     let candidates: Vec<Candidate> = if is_fusion {
-        mapped.iter().map(|one| one.weighed(passes, rig)).collect()
+        mapped.iter().map(|one| one.weighted(passes, rig)).collect()
     } else {
         mapped.iter().map(|one| one.candidate).collect()
     };
@@ -185,7 +188,7 @@ fn merged(
     (mapped, merged)
 }
 
-fn map(find: &Find<'_>, back_projection: BackProjection) -> Option<Mapped> {
+fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapped> {
     let Pass { rig, model, .. } = find.look;
     let found = find.detection;
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
@@ -216,7 +219,8 @@ fn touches_border(bbox: &BBox<ViewPixels>, input: &NetworkInput) -> bool {
         || bbox.y_max() > height - margin
 }
 
-/// `None` for one of whom the frame shows nothing: lens images may be larger than frames.
+/// Builds a person from the members of a merged box. Returns `None` for a box outside the frame:
+/// lens images may be larger than frames.
 fn person(
     bbox: BBox<FramePixels>,
     score: f64,
@@ -228,7 +232,7 @@ fn person(
     let bbox = bbox.clipped_to(rig.frame())?;
     let center = nalgebra::Point2::from(bbox.center());
     let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
-    // Upright views give the proportions, crops the extent.
+    // Upright views determine the proportions, crops the extent.
     let has_exact = members.iter().any(|member| member.is_exact);
     let has_upright = members.iter().any(|member| !member.is_exact);
     let proportioned = members
@@ -236,7 +240,7 @@ fn person(
         .filter(|member| !(has_upright && member.is_exact));
     let outlines = proportioned.map(|member| {
         let weight = member.candidate.score.powi(3) * member.candidate.coordinate_weight;
-        // A score of 0 is allowed; its outline still has to count for something.
+        // A score of 0 is valid, but the outline needs a weight above 0.
         (weight.max(f64::MIN_POSITIVE), member.footprint.outline())
     });
     let averaged = OrientedBox::averaging(up, outlines)?;

@@ -1,9 +1,7 @@
-//! Views in which nothing moves: what was found in them is kept, so that a frame need not be looked
-//! at again where it has not changed.
+//! The motion cache: detections of views without motion, so that unchanged views need no inference.
 //!
-//! A view is compared with how it looked when the network last saw it, not with the frame before:
-//! changes too slow to notice add up. Whatever happens, a view is looked at again after
-//! [`MAX_AGE`].
+//! A view is compared with its state at the last inference, not with the previous frame, so that
+//! slow changes add up. After [`MAX_AGE`] inference always runs again.
 
 use std::{
     collections::HashMap,
@@ -18,18 +16,18 @@ use crate::{
     inference::{Model, ViewDetection},
 };
 
-/// Cameras remembered at most; the least recently seen go first.
+/// Maximum number of cached cameras. The least recently used camera is evicted first.
 const MAX_CAMERAS: usize = 256;
-/// After this a view is looked at again, moved or not.
+/// Maximum age of cached detections, with or without motion.
 const MAX_AGE: Duration = Duration::from_secs(10);
 
-/// What each camera saw last.
+/// The latest detections of each camera.
 #[derive(Default)]
 pub(super) struct MotionCache {
-    cameras: Mutex<HashMap<String, Remembered>>,
+    cameras: Mutex<HashMap<String, CachedCamera>>,
 }
 
-struct Remembered {
+struct CachedCamera {
     views: Arc<CameraViews>,
     /// The crops of the last second pass.
     crops: Option<CameraCrops>,
@@ -41,24 +39,24 @@ struct CameraCrops {
     views: Arc<CameraViews>,
 }
 
-/// What one camera saw last, by the views of one rig and through one model.
+/// The latest detections of one camera, for the views of one rig and one model.
 pub(super) struct CameraViews {
-    // Weak: a camera that is silent must keep neither tables nor weights in memory.
+    // Weak: an inactive camera must not keep tables or weights in memory.
     rig: Weak<CameraRig>,
     model: Weak<Model>,
-    views: Mutex<Vec<Option<SeenView>>>,
+    views: Mutex<Vec<Option<CachedView>>>,
 }
 
 #[derive(Clone)]
-struct SeenView {
+struct CachedView {
     signature: ViewSignature,
     found: Vec<ViewDetection>,
-    seen: Instant,
+    inferred_at: Instant,
 }
 
 impl MotionCache {
-    /// What this camera saw through these views and this model; nothing yet when it is new or they
-    /// are others than last time.
+    /// Returns the cached views of a camera. They are empty if the camera is new or if its rig or
+    /// its model has changed.
     pub(super) fn of(
         &self,
         camera: &str,
@@ -84,7 +82,7 @@ impl MotionCache {
             model: Arc::downgrade(model),
             views: Mutex::new((0..rig.view_count()).map(|_| None).collect()),
         });
-        let entry = Remembered {
+        let entry = CachedCamera {
             views: Arc::clone(&views),
             crops: None,
             last_used: now,
@@ -93,8 +91,8 @@ impl MotionCache {
         views
     }
 
-    /// What this camera saw in crops that the last second pass had as well; `None` for a camera
-    /// that is not remembered.
+    /// Returns the cached crops of a camera, filled where the last second pass had the same crop.
+    /// `None` if the camera is not in the cache.
     pub(super) fn of_crops(
         &self,
         camera: &str,
@@ -106,7 +104,7 @@ impl MotionCache {
         let before = known.crops.take();
         let before = before.filter(|before| before.views.are_of_model(model));
         let crops: Vec<FrameCrop> = rig.crops().copied().collect();
-        let seen = crops.iter().map(|crop| {
+        let cached = crops.iter().map(|crop| {
             let before = before.as_ref()?;
             let same = before.crops.iter().position(|other| other == crop)?;
             before.views.lock()[same].clone()
@@ -114,7 +112,7 @@ impl MotionCache {
         let views = Arc::new(CameraViews {
             rig: Arc::downgrade(rig),
             model: Arc::downgrade(model),
-            views: Mutex::new(seen.collect()),
+            views: Mutex::new(cached.collect()),
         });
         known.crops = Some(CameraCrops {
             crops,
@@ -133,34 +131,35 @@ impl CameraViews {
         std::ptr::eq(self.model.as_ptr(), Arc::as_ptr(model))
     }
 
-    /// What was found in the view, if nothing has moved in it since.
+    /// Returns the cached detections of a view, if nothing has moved in it since.
     pub(super) fn still(
         &self,
         view: usize,
         signature: &ViewSignature,
     ) -> Option<Vec<ViewDetection>> {
         let views = self.lock();
-        let seen = views[view].as_ref()?;
-        let is_still = seen.seen.elapsed() < MAX_AGE && !seen.signature.differs_from(signature);
-        is_still.then(|| seen.found.clone())
+        let cached = views[view].as_ref()?;
+        let is_fresh = cached.inferred_at.elapsed() < MAX_AGE;
+        let is_still = is_fresh && !cached.signature.differs_from(signature);
+        is_still.then(|| cached.found.clone())
     }
 
-    /// Keeps what was found in a view.
+    /// Stores the detections of a view.
     pub(super) fn remember(
         &self,
         view: usize,
         signature: ViewSignature,
         found: Vec<ViewDetection>,
     ) {
-        self.lock()[view] = Some(SeenView {
+        self.lock()[view] = Some(CachedView {
             signature,
             found,
-            seen: Instant::now(),
+            inferred_at: Instant::now(),
         });
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<Option<SeenView>>> {
-        // Every change is a single assignment.
+    fn lock(&self) -> MutexGuard<'_, Vec<Option<CachedView>>> {
+        // Every change is one assignment, so a poisoned state is still consistent.
         self.views.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,9 +1,9 @@
-//! The network's threads: each takes the views that are next, of whichever frames, renders them
-//! and runs its session of their model on them.
+//! The inference threads. Each thread takes the next views of any frame, renders them and runs its
+//! session of their model on them.
 //!
-//! A thread renders what it is about to look at itself: the pixels are still in its cache when the
-//! network reads them, and no core waits for another. Only batches of several views are rendered
-//! by the pool, side by side.
+//! A thread renders a single view itself: the pixels are still in its CPU cache when the network
+//! reads them, and no core waits for another. Only batches of several views are rendered in
+//! parallel by the thread pool.
 
 mod pass_task;
 mod run;
@@ -35,30 +35,30 @@ use crate::{
 pub(super) use pass_task::PassTask;
 pub(super) use work::Work;
 
-/// Views of one round of looking that a thread has taken on.
+/// Views of one pass that a thread has claimed.
 struct Claim {
     task: Arc<PassTask>,
     views: std::ops::Range<usize>,
 }
 
-/// How views become batches.
+/// Batching options for views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BatchOptions {
-    /// Most views in one run of the network.
+    /// The maximum number of views in one run of the network.
     pub max_views: NonZeroUsize,
-    /// How long the first view of a batch may wait for others to fill it.
+    /// The maximum time that the first view of a batch waits for more views.
     pub max_delay: Duration,
 }
 
-/// The network's threads and the queue that they serve. Dropping it ends them after the views
-/// that are waiting.
+/// The inference threads and their queue. Dropping it ends the threads after the queued views are
+/// processed.
 pub(super) struct Network {
     queue: Arc<ViewQueue>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Network {
-    /// Starts a thread for each session that models have.
+    /// Starts one thread per session of the models.
     pub(super) fn start(
         sessions: NonZeroUsize,
         options: BatchOptions,
@@ -78,8 +78,8 @@ impl Network {
         Ok(network)
     }
 
-    /// Queues the views of a rig; [`PassTask::wait`] gives what was found in them. Views that
-    /// `seen_before` says nothing has moved in are not looked at.
+    /// Queues the views of a rig. [`PassTask::wait`] returns their detections. Views without motion
+    /// according to `seen_before` skip the network.
     pub(super) fn look(
         &self,
         rig: Arc<CameraRig>,
@@ -98,21 +98,21 @@ impl Drop for Network {
     fn drop(&mut self) {
         self.queue.close();
         for thread in self.threads.drain(..) {
-            // A thread that panicked has told the frames it was working on.
+            // A thread that panicked has already failed the tasks of its batch.
             let _ = thread.join();
         }
     }
 }
 
-/// What a thread does until the queue is closed.
+/// Processes batches on an inference thread until the queue is closed.
 fn serve(queue: &ViewQueue, session: usize, remappers: &ThreadPool) {
     let mut batch = ViewBatch::default();
     while let Some(claims) = queue.next_batch() {
-        // As with all that cannot be divided: it belongs to the frame whose view was next.
+        // Log lines of a shared batch are attributed to the frame of the first claim.
         let _in_request = claims[0].task.request.enter();
-        let look = || run::look(&claims, session, remappers, &mut batch);
-        match catch_unwind(AssertUnwindSafe(look)) {
-            Ok(Ok(run)) => run.hand_out(&claims),
+        let run = || run::execute(&claims, session, remappers, &mut batch);
+        match catch_unwind(AssertUnwindSafe(run)) {
+            Ok(Ok(run)) => run.dispatch(&claims),
             Ok(Err(error)) => fail(&claims, || of_inference(&error)),
             Err(_) => fail(&claims, || {
                 internal(anyhow::anyhow!("the network's thread panicked on a batch"))

@@ -1,4 +1,4 @@
-//! Errors about parameters, in the same words wherever parameters are read.
+//! Errors about parameters, with the same wording in every interface.
 
 use std::{fmt::Display, ops::RangeInclusive, str::FromStr};
 
@@ -10,7 +10,7 @@ use crate::quoted::{Quoted, shortened};
 pub struct ParameterError {
     /// The parameter's name.
     pub name: String,
-    /// One sentence: the value, and what would be right.
+    /// The value and the rule that it breaks, in one sentence.
     pub problem: String,
     /// The kind of error.
     pub fault: ParameterFault,
@@ -19,35 +19,35 @@ pub struct ParameterError {
 /// The ways in which a parameter can be wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterFault {
-    /// There is no such parameter.
+    /// Unknown parameter.
     UnknownName,
-    /// It was given more than once.
+    /// Parameter given more than once.
     Repeated,
-    /// Its value is out of range or no value of its kind.
+    /// Value out of range or of the wrong type.
     BadValue,
 }
 
 impl ParameterError {
-    /// There is none of this name; `problem` lists those that there are.
+    /// Creates the error for an unknown name. `problem` lists the known names.
     #[must_use]
     pub fn unknown(name: &str, problem: String) -> Self {
         Self::new(name, problem, ParameterFault::UnknownName)
     }
 
-    /// It was given more than once.
+    /// Creates the error for a parameter given more than once.
     #[must_use]
     pub fn repeated(name: &str) -> Self {
         let problem = "it is given twice: give it once".to_owned();
         Self::new(name, problem, ParameterFault::Repeated)
     }
 
-    /// Its value cannot be used, for the reason given.
+    /// Creates the error for a bad value with its reason.
     #[must_use]
     pub fn bad_value(name: &str, problem: String) -> Self {
         Self::new(name, problem, ParameterFault::BadValue)
     }
 
-    /// Its value breaks `rule`, which completes "… is not".
+    /// Creates the error for a value that breaks `rule`, which completes "… is not".
     #[must_use]
     pub fn is_not(name: &str, value: &str, rule: &str) -> Self {
         Self::bad_value(name, format!("{} is not {rule}", Quoted(value)))

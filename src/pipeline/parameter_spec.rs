@@ -1,5 +1,5 @@
-//! The specification of a request parameter: one row from which the parser, the OpenAPI document, the Open
-//! Inference Protocol, the command line and `docs/parameters.md` are derived.
+//! The specification of a request parameter: one row from which the parser, the OpenAPI document,
+//! the Open Inference Protocol, the command line and `docs/parameters.md` are derived.
 
 use std::str::FromStr;
 
@@ -10,9 +10,9 @@ use super::ParameterError;
 pub struct ParameterSpec {
     /// The name in requests; the flag is the same in kebab-case.
     pub name: &'static str,
-    /// The values that it takes.
+    /// The accepted values.
     pub kind: ParameterKind,
-    /// The value of requests without it.
+    /// The value when a request omits the parameter.
     pub default: ParameterDefault,
     /// The meaning, in sentences with Markdown code spans. The first one is the summary.
     pub help: &'static str,
@@ -29,10 +29,10 @@ pub enum ParameterKind {
     Text,
     /// A name of 1 to `max_chars` characters without control characters.
     Name {
-        /// Most characters.
+        /// The maximum number of characters.
         max_chars: usize,
     },
-    /// A text that the type it is parsed into checks.
+    /// A text checked by the type into which it is parsed.
     Pattern {
         /// A regular expression that the text matches.
         regex: &'static str,
@@ -41,11 +41,11 @@ pub enum ParameterKind {
     },
     /// One of these names.
     Choice(&'static [&'static str]),
-    /// Some of these names, separated by commas, or a word for none of them.
+    /// A comma-separated list of these names, or a keyword for none of them.
     Choices {
         /// The names.
         names: &'static [&'static str],
-        /// The word for none of them.
+        /// The keyword for none of them.
         none: &'static str,
     },
     /// `true` or `false`.
@@ -110,7 +110,7 @@ impl ParameterSpec {
     /// Parses a value of the parameter.
     ///
     /// # Errors
-    /// [`ParameterError`] with the values that there are.
+    /// [`ParameterError`] with the accepted values.
     pub fn parse<T: FromStr>(&self, value: &str) -> Result<T, ParameterError> {
         let parsed = self.kind.accepts(value).then(|| value.parse().ok());
         let refused = || ParameterError::is_not(self.name, value, &self.kind.rule());
@@ -181,7 +181,7 @@ impl ParameterKind {
 }
 
 impl JsonType {
-    /// Names the type as a rule has it: "… is needed".
+    /// Returns the name of the type so that the text completes "… is needed".
     #[must_use]
     pub fn described(self) -> &'static str {
         match self {
@@ -192,7 +192,7 @@ impl JsonType {
     }
 }
 
-/// Declares the rows of a table: a constant each, and the table of all of them.
+/// Declares the rows of a table: a constant for each row, and the table of all rows.
 macro_rules! parameter_table {
     ($(#[$about:meta])* $visibility:vis const $table:ident; $($name:ident = $spec:expr;)+) => {
         $(const $name: $crate::pipeline::ParameterSpec = $spec;)+

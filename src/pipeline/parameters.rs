@@ -1,5 +1,6 @@
-//! The parameters of a detection: the table of their specifications, and the checked values of a request.
-//! A new parameter is a row of the table, a field of [`DetectParameters`] and a line of its parser.
+//! The parameters of a detection: the table of their specifications, and the checked values of a
+//! request. A new parameter needs a row in the table, a field of [`DetectParameters`] and a line in
+//! its parser.
 
 use std::time::Duration;
 
@@ -15,7 +16,8 @@ use crate::{
     detection::{Refinement, RefinementParameters},
 };
 
-/// Requests over every protocol; `lookdown detect` has its own `--calibration FILE|ID` for the first row.
+/// The interfaces of every protocol. `lookdown detect` has its own `--calibration FILE|ID` for the
+/// first row.
 const REQUESTS: &[Interface] = &[Interface::Http, Interface::FrameModel];
 const EVERY_DETECTION: &[Interface] = &[
     Interface::Http,
@@ -91,7 +93,7 @@ parameter_table! {
         example: None,
         interfaces: EVERY_DETECTION,
     };
-    // The paper does not state its best value.
+    // The paper does not state the value that it used.
     SIGMA = ParameterSpec {
         name: "sigma",
         kind: ParameterKind::Positive,
@@ -159,13 +161,13 @@ parameter_table! {
 /// The checked parameters of one detection request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectParameters {
-    /// The calibration; without one the lens circle is found in the frame.
+    /// The calibration. Without one, the lens circle is detected in the frame.
     pub calibration: Option<CalibrationId>,
-    /// The name under which results are kept.
+    /// The camera name under which results are stored.
     pub camera: Option<String>,
     /// The profile.
     pub profile: Profile,
-    /// The model that must answer; any by default.
+    /// The required model; any model by default.
     pub model: Option<String>,
     /// The merge of overlapping boxes into persons.
     pub refinement: RefinementParameters,
@@ -234,7 +236,7 @@ impl DetectParameters {
 /// Parses a value of the parameter `profile`.
 ///
 /// # Errors
-/// [`ParameterError`] when there is no such profile.
+/// [`ParameterError`] for an unknown profile.
 pub fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
     PROFILE.parse(value)
 }

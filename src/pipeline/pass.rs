@@ -1,4 +1,4 @@
-//! One round of looking at a frame: the views of a rig, and what the network found in each.
+//! One pass over a frame: the views of a rig and the detections in each of them.
 
 use std::sync::Arc;
 
@@ -8,39 +8,39 @@ use crate::{
     inference::{Model, ViewDetection},
 };
 
-/// One round of looking. All rounds of a frame share its camera.
+/// One pass over a frame. All passes over a frame share its camera.
 pub(super) struct Pass {
     /// The views.
     pub(super) rig: Arc<CameraRig>,
-    /// Who looked.
+    /// The model that processed the views.
     pub(super) model: Arc<Model>,
-    /// What was found in each of them.
+    /// The detections in each view.
     pub(super) per_view: Vec<Vec<ViewDetection>>,
 }
 
-/// What was found in a view.
+/// A detection in one view of a pass.
 #[derive(Clone, Copy)]
-pub(super) struct Find<'a> {
+pub(super) struct PassDetection<'a> {
     pub(super) look: &'a Pass,
-    /// The view's index in its rig.
+    /// The index of the view in its rig.
     pub(super) view: usize,
-    /// A number for the view that no view of any round shares.
+    /// The number of the view, unique over all passes.
     pub(super) number: usize,
     pub(super) detection: &'a ViewDetection,
 }
 
-/// Everything found in all rounds.
-pub(super) fn finds(passes: &[Pass]) -> impl Iterator<Item = Find<'_>> {
-    let numbered = passes.iter().scan(0, |before, look| {
+/// Returns the detections of all passes.
+pub(super) fn detections(passes: &[Pass]) -> impl Iterator<Item = PassDetection<'_>> {
+    let numbered = passes.iter().scan(0, |before, pass| {
         let first = *before;
-        *before += look.per_view.len();
-        Some((first, look))
+        *before += pass.per_view.len();
+        Some((first, pass))
     });
-    numbered.flat_map(|(first, look)| {
-        let views = look.per_view.iter().enumerate();
+    numbered.flat_map(|(first, pass)| {
+        let views = pass.per_view.iter().enumerate();
         views.flat_map(move |(view, found)| {
-            found.iter().map(move |detection| Find {
-                look,
+            found.iter().map(move |detection| PassDetection {
+                look: pass,
                 view,
                 number: first + view,
                 detection,
@@ -49,8 +49,9 @@ pub(super) fn finds(passes: &[Pass]) -> impl Iterator<Item = Find<'_>> {
     })
 }
 
-/// In how many views of all rounds a person with this footprint is wholly visible.
+/// Returns the number of views over all passes in which a person with this footprint is wholly
+/// visible.
 pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint) -> usize {
-    let holding = passes.iter().map(|look| look.rig.views_holding(footprint));
+    let holding = passes.iter().map(|pass| pass.rig.views_holding(footprint));
     holding.sum()
 }

@@ -11,50 +11,51 @@ use crate::{
     imaging::MaskedPixels,
 };
 
-/// Steps along each side of a view between the rays that decide whether it sees the lens image.
+/// Steps along each side of a view between the rays that test whether it covers the lens image.
 const SIGHT_STEPS: u32 = 64;
 /// Points of an outline along each side of a view.
 const POINTS_PER_SIDE: u32 = 16;
 
-/// How frames of a camera are looked at.
+/// The view plan of a camera and its cost.
 #[derive(Debug, Clone)]
 pub struct PlannedViews {
     /// The profile.
     pub profile: Profile,
-    /// Name of the model that the views are made for.
+    /// Name of the model for which the views are planned.
     pub model: String,
-    /// Width of the frames that outlines are in, pixels.
+    /// Frame width that the outlines refer to, pixels.
     pub image_width: u32,
-    /// Height of the frames that outlines are in, pixels.
+    /// Frame height that the outlines refer to, pixels.
     pub image_height: u32,
-    /// The views that see some of the lens image beside its masks, in plan order; none for [`Profile::Direct`].
+    /// The views that cover some unmasked part of the lens image, in plan order. Empty for
+    /// [`Profile::Direct`].
     pub views: Vec<PlannedView>,
     /// Share of the lens image that lies in at least one view, 0 to 1.
     pub seen_share: f64,
-    /// In how many views a place of the lens image lies on average.
+    /// The mean number of views that cover a position in the lens image.
     pub mean_views: f64,
-    /// How many pictures the network sees of every frame.
+    /// The number of network inputs of the first pass over every frame.
     pub pictures: usize,
-    /// Most pictures it sees besides, of places that the views made interesting.
+    /// The maximum number of additional network inputs of the second passes.
     pub zoomed_pictures_at_most: usize,
-    /// How many times the network is run for the views.
+    /// The number of runs of the network in the first pass.
     pub batches: usize,
-    /// Pixels of the pictures of every frame.
+    /// The number of pixels of the network inputs of the first pass.
     pub pixels: u64,
 }
 
-/// A view and where it passes in the frame.
+/// A view and its outline in the frame.
 #[derive(Debug, Clone)]
 pub struct PlannedView {
     /// The view.
     pub view: VirtualView,
-    /// Its border, clockwise from the top left corner of the view, corner-origin frame pixels.
+    /// The border, clockwise from the top left corner of the view, corner-origin frame pixels.
     pub outline: Vec<Pixel>,
 }
 
 impl PlannedView {
-    /// Where the nodes of a grid of `cells` × `cells` over the whole view lie in the frame, row by row from the top
-    /// left corner of the view, corner-origin frame pixels; `None` beyond the lens image.
+    /// Returns the nodes of a grid of `cells` × `cells` over the view, row by row from its top left
+    /// corner, in corner-origin frame pixels. Nodes beyond the lens image are `None`.
     #[must_use]
     pub fn grid(&self, lens: &Lens, cells: u32) -> Vec<Option<Pixel>> {
         let place =
@@ -71,8 +72,8 @@ impl PlannedView {
 }
 
 impl Engine {
-    /// The views through which frames of `calibration` are looked at, at the frame size that it
-    /// was made for. Blocks for some ten milliseconds.
+    /// Plans the views for frames of `calibration` at the frame size of the calibration. Blocks for
+    /// some ten milliseconds.
     ///
     /// # Errors
     /// [`PipelineError::ModelStarting`] while the profile's model is not loaded.
@@ -119,7 +120,7 @@ impl Engine {
     }
 }
 
-/// Whether some of the lens image is in the view that is not masked.
+/// Returns true when the view covers some unmasked part of the lens image.
 fn sees(view: &VirtualView, lens: &Lens, masked: &MaskedPixels) -> bool {
     let place =
         |index: u32, side: u32| f64::from(index) / f64::from(SIGHT_STEPS) * f64::from(side) - 0.5;
@@ -132,8 +133,8 @@ fn sees(view: &VirtualView, lens: &Lens, masked: &MaskedPixels) -> bool {
     })
 }
 
-/// The border of a view, clockwise from its top left corner, corner-origin frame pixels; what lies
-/// beyond the lens image is pulled to its rim.
+/// Returns the border of a view, clockwise from its top left corner, corner-origin frame pixels.
+/// Points beyond the lens image are moved to its rim.
 pub(super) fn view_outline(view: &VirtualView, lens: &Lens) -> Vec<Pixel> {
     let rays = view.border_rays(POINTS_PER_SIDE);
     rays.filter_map(|ray| lens.project_to_rim(&ray))
@@ -141,7 +142,7 @@ pub(super) fn view_outline(view: &VirtualView, lens: &Lens) -> Vec<Pixel> {
         .collect()
 }
 
-/// The border of a crop, clockwise from its top left corner, corner-origin frame pixels.
+/// Returns the border of a crop, clockwise from its top left corner, corner-origin frame pixels.
 pub(super) fn crop_outline(crop: &FrameCrop) -> Vec<Pixel> {
     let (width, height) = (f64::from(crop.width), f64::from(crop.height));
     let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];

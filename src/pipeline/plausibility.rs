@@ -1,40 +1,41 @@
-//! How much a box's score is worth, given where it lies in its view and how large a person it
-//! would make.
+//! The score weight of a box: a factor from its position in its view and from the implied size of
+//! the person.
 
 use crate::geometry::{Mount, height_ratio::HeightRatio};
 
-/// What is left of the score of a box cut off by its view's border: its other views know better.
-const CUT_OFF_WORTH: f64 = 0.7;
-/// How much of a score an impossible height, or an impossible width, takes away.
-const IMPOSSIBLE_DOUBT: f64 = 0.7;
+/// The factor for a box cut off by the border of its view. Other views show the person whole.
+const CUT_OFF_WEIGHT: f64 = 0.7;
+/// The share of the score that an impossible height or an impossible width removes.
+const IMPOSSIBLE_PENALTY: f64 = 0.7;
 /// Heights in camera heights: impossible below the first, fully plausible from the second to the
 /// third, impossible from the fourth. Sitting and half hidden people are included.
 const HEIGHT: [f64; 4] = [0.1, 0.35, 0.85, 1.05];
-/// Widths in camera heights, likewise.
+/// Widths in camera heights, with the same meaning of the four values.
 const WIDTH: [f64; 4] = [0.03, 0.12, 0.7, 1.1];
-/// Angles from straight down at which heights begin to tell, and tell fully, radians.
-const HEIGHTS_TELL: [f64; 2] = [0.15, 0.45];
+/// Angles from straight down, radians. Heights have no influence up to the first and full influence
+/// from the second.
+const HEIGHT_ANGLES: [f64; 2] = [0.15, 0.45];
 
-/// The factor, above 0 and at most 1, for the score of a box.
+/// Returns the factor for the score of a box, above 0 and at most 1.
 pub(super) fn score_weight(cut_off: bool, height_ratio: Option<HeightRatio>, mount: &Mount) -> f64 {
-    let whole = if cut_off { CUT_OFF_WORTH } else { 1.0 };
-    // Only a camera that passes down is above everybody's head.
+    let whole = if cut_off { CUT_OFF_WEIGHT } else { 1.0 };
+    // Only a camera that faces down is above the heads of all persons.
     match height_ratio {
         Some(height_ratio) if mount.is_near_nadir() => {
-            let telling = rise(height_ratio.off_nadir, HEIGHTS_TELL);
-            let height = 1.0 - telling * (1.0 - trapezium(height_ratio.height, HEIGHT));
+            let influence = rise(height_ratio.off_nadir, HEIGHT_ANGLES);
+            let height = 1.0 - influence * (1.0 - trapezium(height_ratio.height, HEIGHT));
             let width = trapezium(height_ratio.width, WIDTH);
-            whole * doubted(height) * doubted(width)
+            whole * penalized(height) * penalized(width)
         }
         _ => whole,
     }
 }
 
-fn doubted(plausibility: f64) -> f64 {
-    1.0 - IMPOSSIBLE_DOUBT * (1.0 - plausibility)
+fn penalized(plausibility: f64) -> f64 {
+    1.0 - IMPOSSIBLE_PENALTY * (1.0 - plausibility)
 }
 
-/// 0 up to the first, 1 from the second on, straight between.
+/// Returns 0 up to `from`, 1 from `to` on, and a linear ramp between.
 fn rise(value: f64, [from, to]: [f64; 2]) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
@@ -58,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn people_keep_their_score_and_the_impossible_loses_most_of_it() {
+    fn implausible_sizes_lower_the_score_and_plausible_keep_it() {
         let mount = Mount::default();
         assert_eq!(
             score_weight(false, Some(height_ratio(0.6, 0.2, 1.0)), &mount),
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_tell_nothing_below_the_camera_or_for_a_camera_on_a_wall() {
+    fn height_is_ignored_at_the_nadir_and_for_wall_cameras() {
         assert_eq!(
             score_weight(false, Some(height_ratio(0.0, 0.2, 0.1)), &Mount::default()),
             1.0

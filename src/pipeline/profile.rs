@@ -7,7 +7,7 @@ use crate::{
     geometry::{BackProjection, FieldOfViewReading, ViewPlan},
 };
 
-/// What a frame is looked at with.
+/// A profile: the views, models and refinement used for a frame.
 #[derive(
     Debug,
     Clone,
@@ -31,11 +31,12 @@ pub enum Profile {
     Paper,
     /// Five wide views and up to 5 upright crops of the frame; on a CPU by a model in INT8.
     Fast,
-    /// 18 views, wide around the nadir and narrow at the rim, and up to 6 upright crops of the frame.
+    /// 18 views, wide around the nadir and narrow at the rim, and up to 6 upright crops of the
+    /// frame.
     #[default]
     Balanced,
-    /// 24 views, up to 40 closer passes, half of them by a second model, and up to 16 upright crops
-    /// of the frame.
+    /// 24 views, up to 40 zoom views, half of them by a second model, and up to 16 upright crops of
+    /// the frame.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -48,8 +49,8 @@ impl Profile {
         self.into()
     }
 
-    /// The view plan; `None` for [`Profile::Direct`]. `paper_reading` says how the paper's field
-    /// of view is read.
+    /// Returns the view plan; `None` for [`Profile::Direct`]. `paper_reading` is the interpretation
+    /// of the paper's field of view.
     #[must_use]
     pub fn view_plan(self, paper_reading: FieldOfViewReading) -> Option<ViewPlan> {
         match self {
@@ -61,16 +62,16 @@ impl Profile {
         }
     }
 
-    /// The closer look that follows the plan's views, if any.
+    /// Returns the zoom pass that follows the views of the plan, if any.
     pub(super) fn zoom_pass(self) -> Option<ZoomPass> {
         (self == Self::Quality).then_some(ZoomPass {
             most_views: 40,
             fill: 1.0 / 3.0,
-            first_look: FIRST_PASS_CANDIDATES,
+            candidates: FIRST_PASS_CANDIDATES,
         })
     }
 
-    /// The upright crops of the frame that follow the plan's views, if any.
+    /// Returns the pass through upright crops that follows the views of the plan, if any.
     pub(super) fn crop_pass(self) -> Option<CropPass> {
         let max_crops = match self {
             Self::Fast => 5,
@@ -85,13 +86,13 @@ impl Profile {
         })
     }
 
-    /// Most runs of the network that follow the plan's views.
+    /// Returns the maximum number of network inputs of the passes after the views of the plan.
     pub(super) fn max_second_pass_views(self) -> usize {
-        let closer = self.zoom_pass().map_or(0, |closer| closer.most_views);
-        closer + self.crop_pass().map_or(0, |crops| crops.max_crops)
+        let zoom_views = self.zoom_pass().map_or(0, |zoom| zoom.most_views);
+        zoom_views + self.crop_pass().map_or(0, |crops| crops.max_crops)
     }
 
-    /// How boxes are taken back to the frame.
+    /// Returns the method that projects boxes back to the frame.
     #[must_use]
     pub fn back_projection(self) -> BackProjection {
         match self {
@@ -100,7 +101,7 @@ impl Profile {
         }
     }
 
-    /// The refinement used when a request names none.
+    /// Returns the refinement for requests without one.
     #[must_use]
     pub fn default_refinement(self) -> Refinement {
         match self {
@@ -111,7 +112,7 @@ impl Profile {
     }
 }
 
-/// How the boxes of the first pass become places for a second one.
+/// The refinement that turns boxes of the first pass into candidates for a second pass.
 const FIRST_PASS_CANDIDATES: RefinementParameters = RefinementParameters {
     refinement: Refinement::Fusion,
     iou_threshold: 0.5,
@@ -122,21 +123,21 @@ const FIRST_PASS_CANDIDATES: RefinementParameters = RefinementParameters {
 
 /// A second pass through upright crops of the frame around possible persons.
 pub(super) struct CropPass {
-    /// Most crops.
+    /// The maximum number of crops.
     pub(super) max_crops: usize,
     /// The share of a crop's side that the larger side of a person's box fills.
     pub(super) fill: f64,
-    /// How the boxes of the first pass become places of crops.
+    /// The refinement that turns boxes of the first pass into crop positions.
     pub(super) candidates: RefinementParameters,
 }
 
-/// A closer look at whatever may be a person after the first one.
+/// A second pass through zoom views of possible persons.
 pub(super) struct ZoomPass {
-    /// Most views it may take.
+    /// The maximum number of zoom views.
     pub(super) most_views: usize,
-    /// The share of a view's shorter side that a person fills in it. More confirms mistakes: seen
-    /// from close by, a half person or a poster passes like a whole one.
+    /// The share of a view's shorter side that a person fills. A larger share confirms false
+    /// detections: at a high zoom, half a person or a poster resembles a whole person.
     pub(super) fill: f64,
-    /// How the first look's boxes become what is looked at.
-    pub(super) first_look: RefinementParameters,
+    /// The refinement that turns boxes of the first pass into zoom views.
+    pub(super) candidates: RefinementParameters,
 }

@@ -1,4 +1,4 @@
-//! What came of a frame: the persons found and how they were found.
+//! The report on a frame: the persons found, and the models, views and times behind them.
 
 use std::time::Duration;
 
@@ -19,13 +19,13 @@ use crate::{
 /// The persons in one frame.
 #[derive(Debug, Clone)]
 pub struct DetectionReport {
-    /// Identifies the request in logs and answers.
+    /// The ID of the request in logs and responses.
     pub request_id: String,
-    /// Which camera the frame came from; the calibration's ID unless the request named one.
+    /// The camera of the frame: the name in the request, otherwise the ID of the calibration.
     pub camera: String,
-    /// When the request arrived.
+    /// The arrival time of the request.
     pub received_at: Timestamp,
-    /// When the frame was taken, when the request said so.
+    /// The capture time of the frame, when the request gave it.
     pub captured_at: Option<Timestamp>,
     /// The calibration used.
     pub calibration: CalibrationUsed,
@@ -35,7 +35,7 @@ pub struct DetectionReport {
     pub image_height: u32,
     /// The detector used.
     pub model: ModelUsed,
-    /// The detector that took some of the closer passes, where the profile asks a second one.
+    /// The second detector for some of the zoom views, when the profile uses one.
     pub second_opinion: Option<ModelUsed>,
     /// The profile used.
     pub profile: Profile,
@@ -43,55 +43,55 @@ pub struct DetectionReport {
     pub refinement: RefinementParameters,
     /// Persons, highest score first.
     pub persons: Vec<Person>,
-    /// How many of them are in each zone of the calibration, in its order.
+    /// The number of persons in each zone, in the order of the calibration.
     pub zones: Vec<ZoneCount>,
-    /// What became of the views.
+    /// The numbers of views by outcome.
     pub views: ViewCounts,
-    /// In how many batches it saw them.
+    /// The number of inference batches.
     pub batch_count: usize,
-    /// Candidates of the network dropped because a number of theirs was not finite.
+    /// Candidates of the network dropped because one of their numbers was not finite.
     pub non_finite: usize,
-    /// Where the time went.
+    /// The time spent in each stage.
     pub timings: StageTimings,
     /// Circumstances that the caller should consider.
     pub warnings: Vec<Warning>,
 }
 
-/// What became of the views of one frame.
+/// The numbers of views of one frame by outcome.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ViewCounts {
-    /// The network saw these.
+    /// Views processed by the network.
     pub inferred: usize,
-    /// Nothing had moved in these: what was found in them before stands.
+    /// Views without motion, whose detections come from the motion cache.
     pub unchanged: usize,
-    /// These lie outside the lens image, where nothing can be seen.
+    /// Views outside the lens image.
     pub outside: usize,
-    /// These see nothing but what the camera's masks hide.
+    /// Views wholly hidden by the masks of the camera.
     pub masked: usize,
 }
 
-/// Which calibration a report is based on.
+/// The calibration on which a report is based.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationUsed {
     /// The calibration's ID; `assumed` when none was named.
     pub id: String,
-    /// Changes whenever the calibration's content does.
+    /// The revision, which changes with the content of the calibration.
     pub revision: String,
     /// The lens circle from which the lens was assumed; `None` with a calibration.
     pub assumed_circle: Option<LensCircle>,
 }
 
-/// How many persons are in a zone.
+/// The number of persons in a zone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ZoneCount {
     /// The zone's name.
     pub name: String,
-    /// Who is in it; one person may be in several.
+    /// The number of persons in the zone. One person may be in several zones.
     pub persons: usize,
 }
 
 impl ZoneCount {
-    /// Counts who is in each zone.
+    /// Counts the persons in each zone.
     pub(super) fn of(zones: &[Zone], persons: &[Person]) -> Vec<Self> {
         let count = |zone: &Zone| Self {
             name: zone.name.clone(),
@@ -104,12 +104,12 @@ impl ZoneCount {
     }
 }
 
-/// Which detector a report is based on.
+/// The detector on which a report is based.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ModelUsed {
     /// The model's name.
     pub name: String,
-    /// Changes whenever the model's weights do.
+    /// The revision, which changes with the weights of the model.
     pub revision: String,
 }
 
@@ -133,17 +133,17 @@ pub struct Person {
     pub oriented_box: OrientedBox,
     /// The direction of the box centre; `None` when it lies outside the lens image.
     pub bearing: Option<Bearing>,
-    /// Where the person stands, when the camera's height is known.
+    /// The floor position of the person, when the height of the camera is known.
     pub floor: Option<FloorPosition>,
-    /// How many views agreed.
+    /// The number of supporting views.
     pub views: usize,
     /// The names of the zones that the person's foot is in; `None` when the calibration has none.
     pub zones: Option<Vec<String>>,
 }
 
 impl Person {
-    /// The names of those `zones` that hold a foot seen at `foot`, which is `floor`; `None` when
-    /// there are no zones.
+    /// Returns the names of the `zones` that contain the foot at pixel `foot` and floor position
+    /// `floor`; `None` when there are no zones.
     pub(super) fn zones_of(
         zones: &[Zone],
         foot: Pixel,
@@ -155,18 +155,18 @@ impl Person {
     }
 }
 
-/// Disjoint wall-clock spans of one frame; together they make `total` but for scheduling gaps.
+/// Disjoint wall-clock spans of one frame. Their sum is `total` minus scheduling gaps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct StageTimings {
-    /// Bytes to pixels.
+    /// Decoding of the image.
     pub decode: Duration,
-    /// Finding the camera: calibration, lens circle, tables when they are new.
+    /// Camera setup: calibration, lens circle, and remap tables when they are not cached.
     pub calibrate: Duration,
     /// Waiting for a worker and for the network.
     pub queue: Duration,
-    /// Frame to network input.
+    /// Remapping of the frame to network inputs.
     pub remap: Duration,
-    /// The network.
+    /// Inference.
     pub inference: Duration,
     /// Back-projection and merge.
     pub refine: Duration,
@@ -175,7 +175,7 @@ pub struct StageTimings {
 }
 
 impl StageTimings {
-    /// The time in which the frame was worked on: all stages but the queue.
+    /// Returns the processing time: all stages except the queue.
     #[must_use]
     pub fn worked(&self) -> Duration {
         self.decode + self.calibrate + self.remap + self.inference + self.refine

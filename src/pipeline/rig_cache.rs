@@ -1,4 +1,4 @@
-//! Rigs in memory: built once, shared, bounded by bytes, least recently used out first.
+//! The cache of rigs: built once, shared, bounded in bytes, with least-recently-used eviction.
 
 use std::{
     collections::HashMap,
@@ -7,7 +7,7 @@ use std::{
 
 use super::{Profile, camera_rig::CameraRig};
 
-/// What a rig was built for.
+/// The cache key of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct RigKey {
     pub(super) camera: RigCamera,
@@ -16,7 +16,7 @@ pub(super) struct RigKey {
     pub(super) input_size: (u32, u32),
 }
 
-/// Which lens a rig was built for.
+/// The lens for which a rig was built.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum RigCamera {
     /// A calibration at a revision.
@@ -36,7 +36,7 @@ pub(super) struct RigCache {
 struct Entries {
     by_key: HashMap<RigKey, Entry>,
     clock: u64,
-    /// Of the rigs that are built.
+    /// The size of all built rigs.
     bytes: usize,
     builds: u64,
     evictions: u64,
@@ -44,14 +44,14 @@ struct Entries {
 
 #[derive(Debug, Default)]
 struct Entry {
-    /// Filled by whoever asks first; others with the same key wait for that one build.
+    /// Filled by the first caller. Other callers with the same key wait for that build.
     rig: Arc<OnceLock<Arc<CameraRig>>>,
     last_used: u64,
-    /// Of the rig, once it is built and counted.
+    /// The size of the rig, once it is built and counted.
     bytes: Option<usize>,
 }
 
-/// How full a cache of camera rigs is, and what it has done so far.
+/// The usage and the counters of a cache of camera rigs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RigCacheUse {
     /// Rigs in memory.
@@ -72,7 +72,7 @@ impl RigCache {
         }
     }
 
-    /// The rig for `key`, built by `build` unless it is there.
+    /// Returns the rig for `key`, built by `build` unless it is cached.
     pub(super) fn get_or_build(
         &self,
         key: &RigKey,
@@ -99,7 +99,7 @@ impl RigCache {
         rig
     }
 
-    /// How full the cache is, and what it has done so far.
+    /// Returns the usage and the counters of the cache.
     pub(super) fn usage(&self) -> RigCacheUse {
         let entries = self.lock();
         let built = entries
@@ -115,14 +115,14 @@ impl RigCache {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Entries> {
-        // Every change to the entries is a single step, so a panic cannot leave them half changed.
+        // Every update of the entries is a single step, so a panic cannot leave them inconsistent.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Entries {
-    /// Counts the rig that was just built for `key`. Only counted ones are evicted, so its entry
-    /// is there.
+    /// Counts the rig that was just built for `key`. Only counted rigs are evicted, so its entry
+    /// exists.
     fn count(&mut self, key: &RigKey, bytes: usize) {
         self.builds += 1;
         if let Some(entry) = self.by_key.get_mut(key) {
@@ -131,7 +131,7 @@ impl Entries {
         }
     }
 
-    /// Drops the least recently used rigs until the rest fits; `newest` stays in any case.
+    /// Evicts the least recently used rigs until the rest fits. `newest` is never evicted.
     fn evict_beyond(&mut self, budget_bytes: usize, newest: &RigKey) {
         while self.bytes > budget_bytes {
             let oldest = self

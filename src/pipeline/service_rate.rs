@@ -1,26 +1,26 @@
-//! How fast frames are served: when a client that was refused should come again.
+//! The rate at which frames are served, from which `Retry-After` of a refused request is estimated.
 
 use std::time::{Duration, Instant};
 
-/// The newest interval counts this much, all before it the rest: ten frames back hardly count.
+/// The weight of the newest interval in the moving average. Intervals ten frames back hardly count.
 const NEWEST_WEIGHT: f64 = 0.2;
 
 /// Measures the time between the ends of two frames while there is work.
 #[derive(Debug, Default)]
 pub(super) struct ServiceRate {
-    /// Since when there has been work without an end of a frame.
+    /// The start of the current interval: the end of the last frame, or the arrival of work.
     waiting_since: Option<Instant>,
     /// Mean seconds per frame.
     seconds_per_frame: Option<f64>,
 }
 
 impl ServiceRate {
-    /// A frame came in.
+    /// Records that a frame arrived.
     pub(super) fn began(&mut self, now: Instant) {
         self.waiting_since.get_or_insert(now);
     }
 
-    /// A frame was served; `pending` others are there.
+    /// Records that a frame was served, with `pending` other frames left.
     pub(super) fn ended(&mut self, now: Instant, pending: usize) {
         let since = self.waiting_since.take().unwrap_or(now);
         let seconds = now.saturating_duration_since(since).as_secs_f64();
@@ -31,14 +31,14 @@ impl ServiceRate {
         }
     }
 
-    /// A frame was given up; `pending` others are there.
+    /// Records that a frame was withdrawn, with `pending` other frames left.
     pub(super) fn given_up(&mut self, pending: usize) {
         if pending == 0 {
             self.waiting_since = None;
         }
     }
 
-    /// How long `frames` will take; zero as long as nothing was served.
+    /// Estimates the time to serve `frames`. Returns zero before the first frame is served.
     pub(super) fn time_for(&self, frames: usize) -> Duration {
         let count = u32::try_from(frames).unwrap_or(u32::MAX);
         let seconds = self.seconds_per_frame.unwrap_or(0.0) * f64::from(count);
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_was_given_up_starts_no_clock() {
+    fn a_withdrawn_frame_starts_no_interval() {
         let (mut rate, start) = (ServiceRate::default(), Instant::now());
         rate.began(start);
         rate.given_up(0);
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_served_side_by_side_count_by_their_ends() {
+    fn frames_served_in_parallel_count_by_their_ends() {
         let (mut rate, start) = (ServiceRate::default(), Instant::now());
         for _ in 0..4 {
             rate.began(start);

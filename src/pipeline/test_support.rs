@@ -1,4 +1,4 @@
-//! A small real detector for tests: it finds bright blobs instead of persons, so that geometry,
+//! A small detector for tests. It detects bright blobs instead of persons, so that geometry,
 //! merging and scheduling can be tested without weights.
 
 use std::{
@@ -18,7 +18,7 @@ use crate::{
     inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},
 };
 
-/// Finds the bounding box of everything brighter than this in a view.
+/// Returns the bounding box of all pixels in a view that are brighter than this.
 const BRIGHT: f32 = 200.0;
 
 pub(super) struct BlobDetector {
@@ -77,7 +77,7 @@ impl BlobDetector {
                 ]
             });
         let found = hull.and_then(|sides| BBox::new(sides).ok());
-        // A blob cut off by the border is less sure, as with a real detector.
+        // A blob cut off by the border gets a lower score, as from a real detector.
         let whole = |bbox: &BBox<ViewPixels>| {
             let sides = bbox.corners();
             let right = f64::from(self.input.width);

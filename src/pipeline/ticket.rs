@@ -1,11 +1,10 @@
-//! What a frame brings to every queue: its turn, whether anybody still waits for it, and when it was
-//! where.
+//! The ticket of a frame in every queue: its priority, its cancellation token and its timeline.
 
 use tokio_util::sync::CancellationToken;
 
 use super::Timeline;
 
-/// The priority of a frame in every queue. Frames of one priority are served in the order of their arrival.
+/// The priority of a frame in every queue. Frames of one priority are served in order of arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Priority {
     /// Served first.
@@ -18,7 +17,7 @@ pub enum Priority {
 }
 
 impl Priority {
-    /// Returns the priority of a level as requests give it: 1 to 3 are high, 4 to 6 normal, 7 to 9 low.
+    /// Returns the priority of a level in a request: 1 to 3 are high, 4 to 6 normal, 7 to 9 low.
     #[must_use]
     pub fn of_level(level: u32) -> Self {
         match level {
@@ -32,16 +31,16 @@ impl Priority {
 /// Travels with a frame through every queue.
 #[derive(Debug, Clone, Default)]
 pub struct Ticket {
-    /// Its priority.
+    /// The priority of the frame.
     pub priority: Priority,
-    /// Cancelled as soon as nobody waits for the report: what has not begun never will.
+    /// The token that is cancelled when the client disconnects. Work that has not begun is skipped.
     pub withdrawn: CancellationToken,
-    /// When it was in which stage.
+    /// The times at which the frame entered and left each stage.
     pub timeline: Timeline,
 }
 
 impl Ticket {
-    /// A ticket for somebody who waits.
+    /// Creates a ticket that is not withdrawn.
     #[must_use]
     pub fn of(priority: Priority) -> Self {
         Self {
@@ -51,14 +50,14 @@ impl Ticket {
     }
 }
 
-/// A place in a queue: by priority, then by arrival.
+/// A position in a queue, ordered by priority, then by arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Turn {
     priority: Priority,
     arrival: u64,
 }
 
-/// Hands out turns.
+/// Assigns positions in a queue.
 #[derive(Debug, Default)]
 pub(super) struct Turns {
     arrivals: u64,

@@ -1,5 +1,5 @@
-//! When a frame was in which stage: entered by whoever works on it, read by whoever waits for it,
-//! also when it comes to nothing.
+//! The stages of a frame with their times. Workers record them, and the request handler reads them,
+//! also after a failure.
 
 use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -10,19 +10,19 @@ use strum::IntoStaticStr;
 
 use super::StageTimings;
 
-/// A stage of a frame's way to its report.
+/// A stage in the processing of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Stage {
-    /// Bytes to pixels.
+    /// Decoding of the image.
     Decode,
-    /// Finding the camera: calibration, lens circle, tables when they are new.
+    /// Camera setup: calibration, lens circle, and remap tables when they are not cached.
     Calibrate,
     /// Waiting for a worker and for the network.
     Queue,
-    /// Frame to network input.
+    /// Remapping of the frame to network inputs.
     Remap,
-    /// The network.
+    /// Inference.
     Inference,
     /// Back-projection and merge.
     Refine,
@@ -36,18 +36,18 @@ impl Stage {
     }
 }
 
-/// A stretch of time in one stage. A frame that is looked at twice is in some stages twice.
+/// A time span in one stage. A frame with a second pass is in some stages twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StageSpan {
     /// The stage.
     pub stage: Stage,
-    /// When it began.
+    /// The start of the span.
     pub began: Instant,
-    /// When it ended.
+    /// The end of the span.
     pub ended: Instant,
 }
 
-/// The stages of one frame, one after another. Clones share it.
+/// The sequence of stages of one frame. Clones share the same timeline.
 #[derive(Debug, Clone, Default)]
 pub struct Timeline(Arc<Mutex<Stages>>);
 
@@ -58,7 +58,8 @@ struct Stages {
 }
 
 impl Stages {
-    /// This moment, or the latest that is known, if that is later: several threads look at the clock.
+    /// Returns the later of `at` and the last recorded time: clock readings of different threads
+    /// may be out of order.
     fn not_before_the_last(&self, at: Instant) -> Instant {
         let began = self.now.map(|(_, began)| began);
         let last = began.or(self.over.last().map(|span| span.ended));
@@ -78,7 +79,7 @@ impl Stages {
 }
 
 impl Timeline {
-    /// The stages so far; the one the frame is in ends at `until`.
+    /// Returns the stages so far. The current stage ends at `until`.
     #[must_use]
     pub fn spans(&self, until: Instant) -> Vec<StageSpan> {
         let stages = self.lock();
@@ -90,7 +91,7 @@ impl Timeline {
         stages.over.iter().copied().chain(now).collect()
     }
 
-    /// How long the frame was in each stage that is over.
+    /// Returns the total time in each completed stage.
     pub(super) fn timings(&self) -> StageTimings {
         let mut timings = StageTimings::default();
         for span in &self.lock().over {
@@ -99,7 +100,7 @@ impl Timeline {
         timings
     }
 
-    /// The frame enters a stage, and leaves the one it is in.
+    /// Records that the frame leaves its current stage and enters `stage`.
     pub(super) fn enter(&self, stage: Stage, at: Instant) {
         let mut stages = self.lock();
         if stages.now.is_none_or(|(now, _)| now != stage) {
@@ -109,13 +110,13 @@ impl Timeline {
         }
     }
 
-    /// The frame leaves the stage it is in.
+    /// Records that the frame leaves its current stage.
     pub(super) fn leave(&self, at: Instant) {
         self.lock().leave(at);
     }
 
     fn lock(&self) -> MutexGuard<'_, Stages> {
-        // No change can panic half-way.
+        // No update can panic half-way.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -138,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_is_in_one_stage_at_a_time_and_stages_that_return_add_up() {
+    fn stages_do_not_overlap_and_repeated_stages_add_up() {
         let timeline = Timeline::default();
         let start = Instant::now();
         let after = |millis| start + Duration::from_millis(millis);
@@ -167,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn stages_stay_apart_when_threads_disagree_about_the_time() {
+    fn stages_stay_disjoint_with_out_of_order_clock_readings() {
         let timeline = Timeline::default();
         let (now, later) = (Instant::now(), Instant::now() + Duration::from_secs(1));
         timeline.enter(Stage::Queue, later);

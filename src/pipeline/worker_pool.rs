@@ -20,13 +20,13 @@ use super::{
 };
 use crate::inference::HeadOutput;
 
-/// Does all the work on a frame, with the way back to whoever waits for it.
+/// The whole work on a frame, including the channel that returns the result to the caller.
 type Work = Box<dyn FnOnce(&Engine) -> Done + Send>;
 
-/// What came of a frame.
+/// The outcome of a frame.
 struct Done {
     withdrawn: bool,
-    /// Hands it to whoever waits for it, which takes no time.
+    /// Delivers the outcome to the caller without blocking.
     deliver: Box<dyn FnOnce() + Send>,
 }
 
@@ -34,10 +34,9 @@ struct Done {
 struct Entry {
     ticket: Ticket,
     work: Work,
-    /// Whose log lines are those of the work.
+    /// The tracing span to which the log lines of the work belong.
     request: tracing::Span,
-    /// Travels with the work: a place is free again when the work has ended, not when its client
-    /// has left.
+    /// The permit, held until the work has ended, even when its client has disconnected.
     place: OwnedSemaphorePermit,
 }
 
@@ -57,10 +56,10 @@ struct Shared {
 }
 
 impl WorkerPool {
-    /// Starts `workers` threads; `capacity` frames may wait or be worked on.
+    /// Starts `workers` threads. At most `capacity` frames may be queued or in progress.
     ///
     /// # Errors
-    /// When the operating system gives no thread.
+    /// An I/O error when the operating system cannot start a thread.
     pub fn start(
         engine: &Arc<Engine>,
         workers: NonZeroUsize,
@@ -86,28 +85,28 @@ impl WorkerPool {
         })
     }
 
-    /// The engine that works.
+    /// Returns the engine that processes the frames.
     #[must_use]
     pub fn engine(&self) -> &Engine {
         &self.shared.engine
     }
 
-    /// Queues a frame and waits for its report. Dropping the future withdraws the frame: whatever
-    /// of it no thread has begun is never done.
+    /// Queues a frame and waits for its report. Dropping the future withdraws the frame: work that
+    /// has not begun is skipped.
     ///
     /// # Errors
     /// [`PipelineError::Overloaded`] at once when the queue is full,
-    /// [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise what the engine
-    /// says.
+    /// [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise the error of the
+    /// engine.
     pub async fn detect(&self, job: DetectJob) -> Result<Detected, PipelineError> {
         self.detect_and(job, |detected| detected).await
     }
 
-    /// The same, and `finish` is done with what was detected on the thread that worked on the frame,
-    /// before its place is free: what takes time, such as drawing, is bounded like the rest.
+    /// Detects like [`WorkerPool::detect`], then calls `finish` with the result on the worker
+    /// thread, before the permit is released. Slow work such as drawing is thus bounded as well.
     ///
     /// # Errors
-    /// As [`WorkerPool::detect`].
+    /// The same as [`WorkerPool::detect`].
     pub async fn detect_and<T: Send + 'static>(
         &self,
         job: DetectJob,
@@ -119,11 +118,11 @@ impl WorkerPool {
         self.queue(ticket, work).await
     }
 
-    /// Queues views that somebody has made, and waits for what is found in them; otherwise as
+    /// Queues views rendered by the client and waits for their detections. Otherwise the same as
     /// [`WorkerPool::detect_and`].
     ///
     /// # Errors
-    /// As [`WorkerPool::detect`].
+    /// The same as [`WorkerPool::detect`].
     pub async fn infer_and<T: Send + 'static>(
         &self,
         job: ViewsJob,
@@ -135,12 +134,12 @@ impl WorkerPool {
         self.queue(ticket, work).await
     }
 
-    /// Does other work that takes its time, such as drawing, in a place among the frames and in the middle of
-    /// their priorities: it is bounded as they are. Dropping the future withdraws what has not begun, and
-    /// cancels the token that the work is given, so that long work can stop.
+    /// Runs other slow work, such as drawing, at normal priority. It takes a permit like a frame,
+    /// so its amount is bounded. Dropping the future withdraws work that has not begun, and cancels
+    /// the token passed to the work so that long work can stop.
     ///
     /// # Errors
-    /// As [`WorkerPool::detect`].
+    /// The same as [`WorkerPool::detect`].
     pub async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce(&CancellationToken) -> T + Send + 'static,
@@ -172,7 +171,7 @@ impl WorkerPool {
                 let outcome = outcome.unwrap_or_else(|_| Err(panicked()));
                 Done {
                     withdrawn: matches!(outcome, Err(PipelineError::Withdrawn)),
-                    // The client may have left meanwhile.
+                    // The client may have disconnected.
                     deliver: Box::new(|| drop(answer.send(outcome))),
                 }
             }),
@@ -181,11 +180,12 @@ impl WorkerPool {
         };
         let queued = self.shared.queue.push(priority, entry);
         queued.map_err(|_| PipelineError::ShuttingDown)?;
-        // Nothing is delivered of what was withdrawn, for which nobody waits.
+        // The sender of a withdrawn frame is dropped without an answer.
         waiting.await.unwrap_or(Err(PipelineError::Withdrawn))
     }
 
-    /// Why a frame would be refused now, if it would: known before its bytes are read.
+    /// Checks whether the queue has a free permit, so that a request can be refused before its body
+    /// is read.
     ///
     /// # Errors
     /// [`PipelineError::Overloaded`] when the queue is full.
@@ -196,24 +196,24 @@ impl WorkerPool {
         Ok(())
     }
 
-    /// How many frames wait or are worked on.
+    /// Returns the number of frames queued or in progress.
     #[must_use]
     pub fn pending(&self) -> usize {
         self.shared.pending()
     }
 
-    /// How many frames were given up since the start because nobody waited for them any more.
+    /// Returns the number of frames withdrawn since the start because their client disconnected.
     #[must_use]
     pub fn withdrawn(&self) -> u64 {
         self.shared.withdrawn.load(Ordering::Relaxed)
     }
 
-    /// Takes no more frames, finishes those in the queue and ends the threads. Blocks.
+    /// Refuses new frames, finishes the queued frames and ends the threads. Blocks.
     pub fn shut_down(&self) {
         self.shared.queue.close();
         let mut threads = self.threads.lock().unwrap_or_else(PoisonError::into_inner);
         for thread in threads.drain(..) {
-            // A worker that panicked outside a job has nothing left to tell.
+            // A panic of a worker outside a job needs no further report.
             let _ = thread.join();
         }
     }
@@ -227,7 +227,7 @@ impl WorkerPool {
 }
 
 impl Shared {
-    /// What a worker does until the queue is closed and empty.
+    /// Processes frames on a worker thread until the queue is closed and empty.
     fn work(&self) {
         while let Some(entry) = self.queue.pop() {
             let Entry {
@@ -244,7 +244,7 @@ impl Shared {
                 continue;
             }
             let done = work(&self.engine);
-            // Whoever sends the next frame on this answer must find the place free.
+            // A client that sends the next frame after this answer must find the permit free.
             drop(place);
             self.rate().ended(Instant::now(), self.pending());
             if done.withdrawn {
@@ -259,7 +259,7 @@ impl Shared {
     }
 
     fn rate(&self) -> MutexGuard<'_, ServiceRate> {
-        // Numbers only: nothing can be left half changed.
+        // The rate holds plain numbers only, so a panic cannot leave it inconsistent.
         self.rate.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -108,11 +108,11 @@ fn the_last_calibrations_are_used_during_an_outage() {
     service.wait_for("/metrics", |answer| {
         answer.contains("lookdown_calibration_store_up 1")
     });
-    let log = service.log_with("can be looked at again");
-    let told = log
+    let log = service.log_with("can be read again");
+    let reported = log
         .lines()
-        .filter_map(|line| line.split_once("the known ones go on: "));
-    let mut problems: Vec<_> = told.map(|(_, problem)| problem).collect();
+        .filter_map(|line| line.split_once("the loaded ones stay in use: "));
+    let mut problems: Vec<_> = reported.map(|(_, problem)| problem).collect();
     let count = problems.len();
     problems.sort_unstable();
     problems.dedup();

@@ -8,16 +8,16 @@ use super::{
 };
 use crate::calibration::{CalibrationId, Replaces, StoredFile};
 
-/// When a calibration may be changed.
+/// The precondition of a change to a calibration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum WriteCondition {
-    /// Whatever there is.
+    /// No precondition.
     Always,
-    /// When there is none yet.
+    /// The calibration must not exist.
     IfAbsent,
-    /// When there is one.
+    /// The calibration must exist.
     IfPresent,
-    /// When there is one at one of these revisions.
+    /// The calibration must exist at one of these revisions.
     IfRevision(Vec<String>),
 }
 

@@ -2,7 +2,7 @@
 
 use crate::calibration::{CalibrationId, FormatError, StoreError};
 
-/// A calibration that was not changed, or that could not be looked at afterwards. Every message is
+/// A calibration that was not changed, or that could not be read back afterwards. Every message is
 /// one sentence with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
@@ -54,7 +54,7 @@ pub enum ChangeError {
         /// The IDs of the cameras.
         ids: Vec<String>,
     },
-    /// The change was made, but could not be looked at.
+    /// The change was made, but could not be read back.
     #[error("the calibration was changed, but {0}")]
     Unseen(StoreError),
     /// The store did not do it.
@@ -66,7 +66,7 @@ impl From<StoreError> for ChangeError {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::Changed { .. } => Self::Outdated {
-                now: "being changed by somebody else".to_owned(),
+                now: "being changed by another writer".to_owned(),
             },
             error => Self::Store(error),
         }

@@ -17,7 +17,7 @@ pub(super) struct LoadedFile {
     pub(super) cameras: BTreeMap<CalibrationId, Arc<CalibrationEntry>>,
     /// True when the last version that could be read holds several cameras.
     pub(super) holds_several: bool,
-    /// Why this version, or cameras of it, cannot be used, a sentence each.
+    /// Reasons why this version, or cameras of it, cannot be used, one sentence each.
     pub(super) problems: Vec<String>,
 }
 
@@ -97,9 +97,9 @@ impl LoadedFile {
         let file = &self.named.file.name;
         for problem in &self.problems {
             let serving = if self.cameras.is_empty() {
-                "nothing serves in its place"
+                "no calibration is loaded from it"
             } else {
-                "what was known of it goes on"
+                "calibrations loaded from it stay in use"
             };
             tracing::error!(file, "calibration not used, {serving}: {problem}");
         }

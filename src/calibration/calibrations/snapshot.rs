@@ -15,7 +15,7 @@ pub(super) struct Snapshot {
     pub(super) files: BTreeMap<CalibrationId, Arc<LoadedFile>>,
     by_id: HashMap<CalibrationId, Arc<CalibrationEntry>>,
     revision: String,
-    /// Why the store could not be looked at, if it could not.
+    /// The reason why the store could not be read, if it could not.
     pub(super) store_problem: Option<String>,
 }
 
@@ -28,7 +28,7 @@ pub struct CalibrationRow {
     pub file: String,
     /// The calibration that serves; `None` when no version could be used so far.
     pub entry: Option<Arc<CalibrationEntry>>,
-    /// Why the newest version of its file, or a camera of it, is not used.
+    /// The reason why the newest version of its file, or a camera of it, is not used.
     pub problem: Option<String>,
 }
 
@@ -41,7 +41,7 @@ pub struct CalibrationsHealth {
     pub revision: String,
     /// Files whose newest version cannot be used, by name, and why.
     pub problems: Vec<(String, String)>,
-    /// Why the store could not be looked at, if it could not.
+    /// The reason why the store could not be read, if it could not.
     pub store_problem: Option<String>,
     /// Files read and used since the start.
     pub loads_succeeded: u64,
@@ -72,7 +72,7 @@ impl Snapshot {
         }
     }
 
-    /// The same while the store cannot be looked at.
+    /// Returns the same snapshot with the reason why the store cannot be read.
     pub(super) fn with_store_problem(&self, problem: String) -> Self {
         Self {
             files: self.files.clone(),

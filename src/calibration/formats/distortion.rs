@@ -49,7 +49,7 @@ impl Distortion {
     }
 }
 
-/// Why radial and tangential distortion of a pinhole camera is not read.
+/// Returns the error text for the radial and tangential distortion of a pinhole camera.
 pub(super) fn not_a_fisheye(model: &str) -> String {
     format!(
         "it is {model}, which describes ordinary lenses below 180° and not a fisheye, whatever the \

@@ -1,4 +1,4 @@
-//! Why the content of a calibration file cannot be used.
+//! Errors in the content of a calibration file.
 
 /// The content of a calibration file that cannot be used. Every message is one sentence with the
 /// remedy.

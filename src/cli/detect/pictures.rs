@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_gives_its_pictures_in_the_order_of_their_names_and_nothing_else() {
+    fn a_folder_lists_its_images_only_in_order_of_name() {
         let folder = folder_with(&[
             "b.JPG",
             "a/2.webp",

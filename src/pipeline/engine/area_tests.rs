@@ -1,4 +1,4 @@
-//! What zones and masks do to a frame's report.
+//! Tests of zones and masks in the report of a frame.
 
 use super::*;
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     pipeline::test_support::{BlobDetector, engine, frame_with_disc, job},
 };
 
-/// A camera for frames of 600 × 600 pixels, 3 m above the floor, with these areas.
+/// Returns a camera for frames of 600 × 600 pixels, 3 m above the floor, with these areas.
 fn calibration(areas: &str) -> Arc<Calibration> {
     let content = format!(
         r#"{{ "id": "lobby", "image": {{"width": 600, "height": 600}},
@@ -21,8 +21,8 @@ fn calibration(areas: &str) -> Arc<Calibration> {
     Arc::new(checked.unwrap())
 }
 
-/// What is detected in a frame `scale` times as large with a disc of 20 pixels at `center`, in pixels
-/// of frames of the calibration's size.
+/// Runs detection on a frame with a disc of 20 pixels at `center`. The frame is `scale` times as
+/// large as the calibration's image; the disc is in pixels of the calibration's image.
 fn detected(engine: &Engine, areas: &str, profile: &str, scale: u32, center: [f64; 2]) -> Detected {
     let factor = f64::from(scale);
     let image = frame_with_disc(600 * scale, center.map(|at| at * factor), 20.0 * factor);
@@ -31,8 +31,8 @@ fn detected(engine: &Engine, areas: &str, profile: &str, scale: u32, center: [f6
     engine.detect(&job).unwrap()
 }
 
-/// To the right of the image's middle people have their feet on their left: the disc's box reaches
-/// from about 400 to 440, and so does the person, with the foot at 400.
+/// Zones around a person to the right of the image centre, where feet point left. The disc's box
+/// and the person extend from about 400 to 440, with the foot at 400.
 const ZONES: &str = r#", "zones": [
     {"name": "foot", "frame_px": [[380, 280], [410, 280], [410, 320], [380, 320]]},
     {"name": "box-centre", "frame_px": [[411, 280], [450, 280], [450, 320], [411, 320]]},
@@ -40,7 +40,7 @@ const ZONES: &str = r#", "zones": [
     {"name": "floor-at-centre", "floor_m": [[2.0, -0.5], [2.5, -0.5], [2.5, 0.5], [2.0, 0.5]]}]"#;
 
 #[test]
-fn a_person_is_in_the_zones_of_the_foot_and_not_in_those_of_the_box_centre() {
+fn a_person_is_in_the_zones_of_its_foot_only() {
     let engine = engine(BlobDetector::default(), None);
     for scale in [1, 2] {
         let report = detected(&engine, ZONES, "balanced", scale, [420.0, 300.0]).report;
@@ -72,18 +72,18 @@ fn a_person_is_in_the_zones_of_the_foot_and_not_in_those_of_the_box_centre() {
 }
 
 #[test]
-fn without_zones_nothing_is_said_of_any() {
+fn a_report_without_zones_has_no_zone_fields() {
     let engine = engine(BlobDetector::default(), None);
     let report = detected(&engine, "", "fast", 1, [420.0, 300.0]).report;
     assert_eq!((report.zones.len(), &report.persons[0].zones), (0, &None));
 }
 
-/// Everything to the right of the middle, and some beyond the frame.
+/// A mask over the right half of the frame and beyond its border.
 const RIGHT_HALF: &str =
     r#", "masks": [{"frame_px": [[300, -10], [700, -10], [700, 610], [300, 610]]}]"#;
 
 #[test]
-fn nobody_is_found_under_a_mask_and_others_are_in_every_profile() {
+fn masks_hide_persons_under_them_only_in_every_profile() {
     let engine = engine(BlobDetector::default(), None);
     for profile in ["paper", "fast", "balanced", "quality", "direct"] {
         let persons = |center| {
@@ -96,7 +96,7 @@ fn nobody_is_found_under_a_mask_and_others_are_in_every_profile() {
 }
 
 #[test]
-fn what_is_masked_is_black_in_the_frame_that_is_shown_at_every_size() {
+fn masked_pixels_are_black_in_frames_of_every_size() {
     let engine = engine(BlobDetector::default(), None);
     for scale in [1, 2] {
         let frame = detected(&engine, RIGHT_HALF, "fast", scale, [420.0, 300.0]).frame;
@@ -107,7 +107,7 @@ fn what_is_masked_is_black_in_the_frame_that_is_shown_at_every_size() {
 }
 
 #[test]
-fn views_wholly_under_masks_are_not_looked_at_and_are_counted() {
+fn wholly_masked_views_skip_inference_and_are_counted() {
     let engine = engine(BlobDetector::default(), None);
     let views = |areas| {
         let report = detected(&engine, areas, "balanced", 1, [180.0, 300.0]).report;
@@ -121,7 +121,7 @@ fn views_wholly_under_masks_are_not_looked_at_and_are_counted() {
     let everything = r#", "masks": [{"frame_px": [[0, 0], [600, 0], [600, 600], [0, 600]]}]"#;
     let (none, batches) = views(everything);
     assert_eq!((none.inferred, none.masked, batches), (0, 18, 0));
-    // The plan tells the same.
+    // The planned views have the same count.
     let planned = engine.planned_views(&calibration(RIGHT_HALF), Profile::Balanced);
     assert_eq!(planned.unwrap().pictures, half.inferred - 1);
 }

@@ -1,4 +1,4 @@
-//! Which camera a frame came from: a named calibration, or a lens assumed from its circle.
+//! Selects the camera of a frame: a named calibration, or a lens assumed from the lens circle.
 
 use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
@@ -21,17 +21,17 @@ use crate::{
     warning::{Warning, WarningCode},
 };
 
-/// Circles are rounded to this share of the radius, so that the jitter of one camera's frames
-/// finds one rig: a quarter of a percent moves no box by a visible amount.
+/// The rounding step of lens circles, as a share of the radius. Rounding maps the jittering circles
+/// of one camera to one rig; a quarter of a percent does not move boxes visibly.
 const CIRCLE_STEP_SHARE: f64 = 1.0 / 400.0;
 
-/// The camera with about that circle.
+/// Returns the rig key of the assumed camera with the rounded circle.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "steps within a bounded frame"
 )]
 fn rounded(circle: &LensCircle) -> RigCamera {
-    // The radius in steps that grow with it, and the centre in those that belong to it.
+    // The step of the radius grows with the radius; the centre uses the same step.
     let radius = (circle.radius.max(1.0).ln() / CIRCLE_STEP_SHARE).round();
     let step = ((radius * CIRCLE_STEP_SHARE).exp() * CIRCLE_STEP_SHARE).max(0.5);
     RigCamera::Assumed {
@@ -41,14 +41,14 @@ fn rounded(circle: &LensCircle) -> RigCamera {
     }
 }
 
-/// The camera of a frame.
+/// The rig of a frame's camera, with the calibration that the report names.
 pub(super) struct FrameCamera {
     pub(super) used: CalibrationUsed,
     pub(super) rig: Arc<CameraRig>,
 }
 
 impl Engine {
-    /// How full the memory for remap tables is, and how often they were built and dropped.
+    /// Returns the use of the rig cache: memory, builds and evictions.
     #[must_use]
     pub fn rig_cache_use(&self) -> RigCacheUse {
         self.rigs.usage()
@@ -117,7 +117,7 @@ impl Engine {
             .map_err(|error| internal(anyhow::Error::new(error)))?;
         warnings.push(Warning::new(
             WarningCode::LensAssumed,
-            "no calibration was named: an equidistant lens of 180° that passes straight down was \
+            "no calibration was named: an equidistant lens of 180° that points straight down was \
              assumed, with the lens circle calibration.assumed_circle",
         ));
         if found.is_none() {
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn circles_that_differ_are_cameras_of_their_own_also_in_proportion() {
+    fn different_circles_are_different_cameras() {
         let camera = rounded(&circle(840.0, 840.0, 830.0));
         assert_ne!(rounded(&circle(800.0, 800.0, 790.476)), camera);
         assert_ne!(rounded(&circle(846.0, 840.0, 830.0)), camera);
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jitter_of_a_cameras_circle_leaves_it_the_same_camera() {
+    fn a_jittering_circle_is_one_camera() {
         let camera = rounded(&circle(840.0, 840.0, 830.0));
         assert_eq!(rounded(&circle(840.2, 839.8, 830.2)), camera);
     }

@@ -1,4 +1,4 @@
-//! Views that somebody else has made: nothing but the network.
+//! Inference on views that the client has rendered.
 
 use std::{sync::atomic::Ordering, time::Instant};
 
@@ -10,11 +10,11 @@ use crate::{
 };
 
 impl Engine {
-    /// Finds persons in views as they are, in batches as large as those of frames. Blocks: it waits
-    /// for the turn of a session, as the threads of the network do.
+    /// Detects persons in views without further processing, in batches of the usual size. Blocks:
+    /// it waits for a session, as the network threads do.
     ///
     /// # Errors
-    /// [`PipelineError`], by who is at fault.
+    /// Returns a [`PipelineError`], which distinguishes client and server faults.
     pub fn look(&self, job: &ViewsJob) -> Result<HeadOutput, PipelineError> {
         let input = job.model.input();
         let views = job.model.batch_of(self.options.batches.max_views).get();

@@ -1,4 +1,4 @@
-//! What is known of a frame after the network has seen it.
+//! The result of inference on a frame.
 
 use std::sync::Arc;
 
@@ -14,8 +14,8 @@ use crate::{
     warning::Warning,
 };
 
-/// A frame after the network has seen it: all that refinement needs, so that other refinements
-/// of the same frame cost no inference.
+/// A frame with its detections: the complete input of refinement, so that other refinements of the
+/// same frame need no inference.
 pub struct Observation {
     /// The decoded frame, EXIF orientation applied.
     pub frame: Arc<Frame>,
@@ -23,7 +23,7 @@ pub struct Observation {
     pub(super) model: Arc<Model>,
     pub(super) profile: Profile,
     pub(super) passes: Vec<Pass>,
-    pub(super) still_views: usize,
+    pub(super) unchanged_views: usize,
     pub(super) batch_count: usize,
     pub(super) non_finite: usize,
     pub(super) timeline: Timeline,
@@ -31,57 +31,57 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// How many views were looked at, now or, where nothing has moved since, before.
+    /// Returns the number of views with detections, from this frame's inference or from a cache.
     #[must_use]
     pub fn view_count(&self) -> usize {
-        self.passes.iter().map(|look| look.rig.view_count()).sum()
+        self.passes.iter().map(|pass| pass.rig.view_count()).sum()
     }
 
-    /// What became of the views.
+    /// Returns the counts of inferred, unchanged, outside and masked views.
     pub(super) fn view_counts(&self) -> ViewCounts {
         ViewCounts {
-            inferred: self.view_count() - self.still_views,
-            unchanged: self.still_views,
+            inferred: self.view_count() - self.unchanged_views,
+            unchanged: self.unchanged_views,
             outside: self.camera.rig.views_outside(),
             masked: self.camera.rig.views_masked(),
         }
     }
 
-    /// Where the time went so far: `refine` and `total` are still to come.
+    /// Returns the stage timings so far, without `refine` and `total`.
     #[must_use]
     pub fn timings(&self) -> StageTimings {
         self.timeline.timings()
     }
 
-    /// The model that looked.
+    /// Returns the model of the first pass.
     #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Another model that looked as well, if there was anything to look at again.
+    /// Returns the second model, if the second pass used one.
     pub(super) fn second_opinion(&self) -> Option<&Model> {
-        let mut models = self.passes.iter().map(|look| &*look.model);
+        let mut models = self.passes.iter().map(|pass| &*pass.model);
         models.find(|model| model.name() != self.model.name())
     }
 
-    /// Waits for rounds that were queued together, and takes in what came of them. Views are
-    /// rendered and looked at side by side: the span from the first to the last is divided in the
-    /// proportion of the work.
-    pub(super) fn take_in(&mut self, tasks: &[Arc<PassTask>]) -> Result<(), PipelineError> {
+    /// Waits for passes that were queued together, and adds their detections. Rendering and
+    /// inference overlap, so the total span is divided between these stages in proportion to their
+    /// work.
+    pub(super) fn wait_for(&mut self, tasks: &[Arc<PassTask>]) -> Result<(), PipelineError> {
         let mut work: Option<Work> = None;
         for task in tasks {
-            let looked = task.wait()?;
-            work = Some(work.map_or(looked.work, |others| others.and(looked.work)));
+            let output = task.wait()?;
+            work = Some(work.map_or(output.work, |others| others.and(output.work)));
             self.passes.push(Pass {
                 rig: Arc::clone(&task.rig),
                 model: Arc::clone(&task.model),
-                per_view: looked.per_view,
+                per_view: output.per_view,
             });
         }
         let Some(work) = work else { return Ok(()) };
         self.batch_count += work.runs;
-        self.still_views += work.still_views;
+        self.unchanged_views += work.still_views;
         self.non_finite += work.non_finite;
         let span = work.ended.saturating_duration_since(work.began);
         let remap = span.mul_f64(work.remap_share());

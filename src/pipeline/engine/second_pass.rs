@@ -1,4 +1,4 @@
-//! The second pass: closer passes and upright crops of the frame that follow the plan's views.
+//! The second pass: zoom views and upright crops around the candidates of the first pass.
 
 use std::{sync::Arc, time::Instant};
 
@@ -12,12 +12,16 @@ use crate::{
     },
 };
 
-/// Views and the model that sees them.
+/// Views and the model that processes them.
 type Planned = (CameraRig, Arc<Model>);
 
 impl Engine {
-    /// Queues the second pass over whatever may be a person, where the profile has one.
-    pub(super) fn closer(&self, job: &DetectJob, observation: &Observation) -> Vec<Arc<PassTask>> {
+    /// Queues the second pass over possible persons, if the profile has one.
+    pub(super) fn second_pass(
+        &self,
+        job: &DetectJob,
+        observation: &Observation,
+    ) -> Vec<Arc<PassTask>> {
         let profile = observation.profile;
         if profile.max_second_pass_views() == 0 {
             return Vec::new();
@@ -28,10 +32,10 @@ impl Engine {
         planned.extend(self.crops(observation));
         let tasks = planned.into_iter().map(|(rig, model)| {
             let rig = Arc::new(rig);
-            let seen_before = self.crops_seen_before(job, &rig, &model);
+            let cached_views = self.cached_crops(job, &rig, &model);
             let frame = Arc::clone(&observation.frame);
             let ticket = job.ticket.clone();
-            self.network.look(rig, model, frame, ticket, seen_before)
+            self.network.look(rig, model, frame, ticket, cached_views)
         });
         let tasks: Vec<_> = tasks.collect();
         if tasks.is_empty() {
@@ -42,8 +46,8 @@ impl Engine {
         tasks
     }
 
-    /// What the camera saw before in the same crops, if the request wants to rely on it.
-    fn crops_seen_before(
+    /// Returns the camera's crops in the motion cache, if the request enables motion detection.
+    fn cached_crops(
         &self,
         job: &DetectJob,
         rig: &Arc<CameraRig>,
@@ -52,31 +56,31 @@ impl Engine {
         let parameters = &job.parameters;
         let camera = parameters.camera_name().filter(|_| parameters.motion)?;
         let _first = rig.crops().next()?;
-        self.still_views.of_crops(camera, rig, model)
+        self.motion_cache.of_crops(camera, rig, model)
     }
 
-    /// Zoomed views: for the model of the first pass, or half for it and half for another, if the
-    /// request leaves the choice.
+    /// Plans zoom views for the model of the first pass. If the request names no model and the
+    /// profile has a second model, each of the two models gets half of the views.
     fn zoomed(&self, job: &DetectJob, observation: &Observation) -> Vec<Planned> {
         let profile = observation.profile;
-        let Some(closer) = profile.zoom_pass() else {
+        let Some(pass) = profile.zoom_pass() else {
             return Vec::new();
         };
         let back_projection = profile.back_projection();
-        let outlines = merge::outlines(&observation.passes, back_projection, &closer.first_look);
+        let outlines = merge::outlines(&observation.passes, back_projection, &pass.candidates);
         let mut models = vec![Arc::clone(&observation.model)];
         if job.parameters.model.is_none() {
             let second = self.options.default_models.second_opinion(profile);
             models.extend(second.and_then(|name| self.models.get(name)));
         }
-        let most_views = closer.most_views / models.len();
+        let most_views = pass.most_views / models.len();
         let rig = &observation.camera.rig;
         let (width, height) = (observation.frame.width(), observation.frame.height());
         job.ticket.timeline.enter(Stage::Remap, Instant::now());
         let rigs = models.into_iter().filter_map(|model| {
             let size = [model.input().width, model.input().height];
             let mount = &rig.geometry().mount;
-            let views = zoomed_views(&outlines, most_views, closer.fill, mount, size);
+            let views = zoomed_views(&outlines, most_views, pass.fill, mount, size);
             let tabulate = || rig.with_views(views, width, height);
             let rig = self.remappers.install(tabulate);
             (rig.view_count() > 0).then_some((rig, model))
@@ -84,7 +88,7 @@ impl Engine {
         rigs.collect()
     }
 
-    /// Upright crops of the frame, for the model of the first pass.
+    /// Plans upright crops of the frame for the model of the first pass.
     fn crops(&self, observation: &Observation) -> Option<Planned> {
         let profile = observation.profile;
         let pass = profile.crop_pass()?;

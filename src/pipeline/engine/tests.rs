@@ -16,7 +16,7 @@ fn engine_with_lobby() -> (Engine, tempfile::TempDir) {
 }
 
 #[test]
-fn a_blob_is_found_where_it_is_in_every_profile() {
+fn a_blob_is_found_at_its_position_in_every_profile() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     for profile in ["paper", "fast", "balanced", "quality", "direct"] {
@@ -53,7 +53,7 @@ fn a_blob_is_found_where_it_is_in_every_profile() {
 }
 
 #[test]
-fn a_report_says_what_it_is_based_on() {
+fn a_report_names_its_camera_calibration_and_model() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     let named = engine
@@ -117,7 +117,7 @@ fn crops_make_boxes_exact_and_oriented_boxes_agree() {
 }
 
 #[test]
-fn an_empty_room_is_not_looked_at_more_closely() {
+fn an_empty_room_has_no_crops_in_the_second_pass() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 0.0);
     let views = |profile| {
@@ -133,7 +133,7 @@ fn an_empty_room_is_not_looked_at_more_closely() {
 }
 
 #[test]
-fn where_nothing_has_moved_the_network_need_not_look_again() {
+fn views_without_motion_skip_inference() {
     let (engine, _folder) = engine_with_lobby();
     let report = |disc: [f64; 2], more: &[(&str, &str)]| {
         let named = [("calibration", "lobby"), ("motion", "true")];
@@ -154,7 +154,7 @@ fn where_nothing_has_moved_the_network_need_not_look_again() {
     assert!((x - 420.0).abs() < 6.0 && (y - 330.0).abs() < 6.0);
     assert_eq!(moved.persons.len(), 1);
 
-    // Another camera, or another profile's views, have been seen by nobody.
+    // Another camera and the views of another profile are not in the motion cache.
     let other = report([420.0, 330.0], &[("camera", "north")]);
     assert_eq!(other.views.unchanged, 0);
     let other = report([420.0, 330.0], &[("profile", "fast")]);
@@ -162,7 +162,7 @@ fn where_nothing_has_moved_the_network_need_not_look_again() {
 }
 
 #[test]
-fn a_remembered_frame_is_refined_anew_without_a_look() {
+fn a_cached_frame_is_refined_without_inference() {
     let (engine, _folder) = engine_with_lobby();
     let report = |disc: [f64; 2], more: &[(&str, &str)]| {
         let named = [("calibration", "lobby"), ("remember", "true")];
@@ -180,7 +180,7 @@ fn a_remembered_frame_is_refined_anew_without_a_look() {
         (0, 0)
     );
     assert_eq!(engine.inference_cache_hits(), 1);
-    // As it would be found by another look.
+    // Inference without the cache gives the same result.
     let parameters = [("calibration", "lobby"), ("refine", "nms")];
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     let anew = engine.detect(&job(image, &parameters)).unwrap().report;
@@ -188,16 +188,16 @@ fn a_remembered_frame_is_refined_anew_without_a_look() {
     assert_eq!(anew.persons[0].bbox, again.persons[0].bbox);
     assert_eq!(anew.persons[0].score, again.persons[0].score);
 
-    // Another frame, other views or another model that was asked for are another matter.
+    // Another frame and a named model are different cache keys.
     assert_eq!(unchanged([420.0, 330.0], &[]), 0);
     assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 0);
-    // Two are remembered: the first had to make room.
+    // The cache holds two frames: the first one was evicted.
     assert_eq!(unchanged([420.0, 300.0], &[]), 0);
     assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 19);
 }
 
 #[test]
-fn the_threshold_is_one_of_reported_scores() {
+fn the_threshold_applies_to_reported_scores() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     let scores = |threshold: f64| {
@@ -213,7 +213,7 @@ fn the_threshold_is_one_of_reported_scores() {
 }
 
 #[test]
-fn an_assumed_lens_finds_what_the_true_calibration_finds() {
+fn an_assumed_lens_and_the_true_calibration_agree() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [300.0, 180.0], 25.0);
     let named = engine
@@ -225,7 +225,7 @@ fn an_assumed_lens_finds_what_the_true_calibration_finds() {
 }
 
 #[test]
-fn a_frame_scaled_from_the_calibration_s_size_is_fine_and_another_aspect_is_not() {
+fn a_scaled_frame_is_accepted_and_another_aspect_is_refused() {
     let (engine, _folder) = engine_with_lobby();
     let larger = frame_with_disc(900, [630.0, 450.0], 30.0);
     let report = engine
@@ -242,12 +242,12 @@ fn a_frame_scaled_from_the_calibration_s_size_is_fine_and_another_aspect_is_not(
     assert_eq!(
         error.to_string(),
         "image: the frame is 800×600 pixels, but calibration \"lobby\" was made for 600×600, \
-         which is another aspect: send an uncropped frame or name another calibration"
+         which is a different aspect ratio: send an uncropped frame or name another calibration"
     );
 }
 
 #[test]
-fn what_does_not_exist_is_refused_by_name() {
+fn unknown_names_and_tiny_frames_are_refused() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(64, [30.0, 30.0], 5.0);
     let refusal = |parameters: &[(&str, &str)]| {
@@ -273,7 +273,7 @@ fn what_does_not_exist_is_refused_by_name() {
 }
 
 #[test]
-fn a_network_that_fails_is_our_fault_and_the_next_frame_is_served() {
+fn a_failed_inference_is_internal_and_the_next_frame_works() {
     let mut failures = vec![InferenceError::Run("out of memory".to_owned())];
     let detector = BlobDetector {
         before: Box::new(move || failures.pop().map_or(Ok(()), Err)),
@@ -285,7 +285,7 @@ fn a_network_that_fails_is_our_fault_and_the_next_frame_is_served() {
     assert!(matches!(error, PipelineError::Internal(_)));
     assert!(
         !error.to_string().contains("memory"),
-        "a caller must not see our causes: {error}"
+        "the response must not contain the cause: {error}"
     );
     assert_eq!(
         engine
@@ -316,7 +316,7 @@ fn stages_are_disjoint_and_within_the_total() {
 }
 
 #[test]
-fn other_refinements_of_an_observed_frame_need_no_network() {
+fn other_refinements_of_an_observation_need_no_inference() {
     let (engine, _folder) = engine_with_lobby();
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);
     let job = job(image, &[("calibration", "lobby")]);
@@ -336,6 +336,6 @@ fn other_refinements_of_an_observed_frame_need_no_network() {
     assert!(fused[0].views > 1, "several views see the blob");
     assert!(
         soft.iter().all(|person| person.views == 1),
-        "soft-NMS picks, it does not average"
+        "soft-NMS selects boxes and does not average them"
     );
 }

@@ -1,4 +1,4 @@
-//! What must hold for whatever a network finds, through any kind of camera.
+//! Property tests of the merge, for arbitrary detections and several kinds of cameras.
 
 use std::sync::{Arc, LazyLock};
 
@@ -15,12 +15,12 @@ use crate::{
 
 const WIDTH: u32 = 320;
 const HEIGHT: u32 = 240;
-/// Pixels of a view, each side: those of [`BlobDetector`].
+/// Side length of a view in pixels, equal to the input of [`BlobDetector`].
 const SIDE: f64 = 96.0;
 
-/// Cameras whose lens image lies in the frame or is larger, that look down, askance or along the
-/// floor, in every profile.
-static LOOKS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(|| {
+/// Cameras in every profile, with a lens image within the frame or larger, that point down,
+/// obliquely or along the floor.
+static CAMERAS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(|| {
     let mut rigs = Vec::new();
     for (radius, up) in [
         (118.0, [0.0, 0.0, -1.0]),
@@ -45,8 +45,8 @@ static LOOKS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(||
 static MODEL: LazyLock<Arc<Model>> =
     LazyLock::new(|| Arc::new(Model::new(Box::new(BlobDetector::default()))));
 
-/// A find in whichever view the number chooses.
-fn find() -> impl Strategy<Value = (usize, BBox<ViewPixels>)> {
+/// Generates a box and a number that selects its view.
+fn view_box() -> impl Strategy<Value = (usize, BBox<ViewPixels>)> {
     let side = || prop_oneof![4 => 0.0..=SIDE, 1 => Just(0.0), 1 => Just(SIDE)];
     (any::<usize>(), side(), side(), side(), side()).prop_map(|(view, x, y, to_x, to_y)| {
         let sides = [x.min(to_x), y.min(to_y), x.max(to_x), y.max(to_y)];
@@ -54,21 +54,22 @@ fn find() -> impl Strategy<Value = (usize, BBox<ViewPixels>)> {
     })
 }
 
-/// Finds of different scores, each with its view's number, in two orders. No doubt makes two scores equal: they are
-/// the square roots of 1, 2, 3 …, of whose ratios none is a product of the tenths that doubts are.
-fn finds_in_two_orders() -> impl Strategy<Value = [Vec<(usize, ViewDetection)>; 2]> {
-    let scored = prop::collection::vec(find(), 1..40).prop_map(|finds| {
+/// Generates detections with distinct scores and view numbers, in two orders. Score weights make no
+/// two scores equal: the scores are proportional to the square roots of 1, 2, 3 …, and no ratio of
+/// these is a product of the weights, which are tenths.
+fn detections_in_two_orders() -> impl Strategy<Value = [Vec<(usize, ViewDetection)>; 2]> {
+    let scored = prop::collection::vec(view_box(), 1..40).prop_map(|detections| {
         let mut squared = 0.0_f64;
-        let scored = finds.into_iter().map(|(view, bbox)| {
+        let scored = detections.into_iter().map(|(view, bbox)| {
             squared += 1.0 / 64.0;
             let score = squared.sqrt();
             (view, ViewDetection { bbox, score })
         });
         scored.collect::<Vec<_>>()
     });
-    scored.prop_flat_map(|finds| {
-        let shuffled = Just(finds.clone()).prop_shuffle();
-        (Just(finds), shuffled).prop_map(|(one, other)| [one, other])
+    scored.prop_flat_map(|detections| {
+        let shuffled = Just(detections.clone()).prop_shuffle();
+        (Just(detections), shuffled).prop_map(|(one, other)| [one, other])
     })
 }
 
@@ -85,9 +86,9 @@ fn parameters() -> impl Strategy<Value = RefinementParameters> {
     )
 }
 
-fn look(rig: &Arc<CameraRig>, finds: &[(usize, ViewDetection)]) -> Pass {
+fn pass(rig: &Arc<CameraRig>, detections: &[(usize, ViewDetection)]) -> Pass {
     let mut per_view = vec![Vec::new(); rig.view_count()];
-    for (view, detection) in finds {
+    for (view, detection) in detections {
         per_view[view % rig.view_count()].push(*detection);
     }
     Pass {
@@ -99,13 +100,13 @@ fn look(rig: &Arc<CameraRig>, finds: &[(usize, ViewDetection)]) -> Pass {
 
 proptest! {
     #[test]
-    fn persons_lie_in_the_frame_and_every_number_of_theirs_is_finite(
-        [finds, _] in finds_in_two_orders(),
-        camera in prop::sample::select((0..LOOKS.len()).collect::<Vec<_>>()),
+    fn persons_lie_in_the_frame_and_have_finite_numbers(
+        [detections, _] in detections_in_two_orders(),
+        camera in prop::sample::select((0..CAMERAS.len()).collect::<Vec<_>>()),
         parameters in parameters(),
     ) {
-        let (rig, back_projection) = &LOOKS[camera];
-        for person in persons(&[look(rig, &finds)], *back_projection, &parameters) {
+        let (rig, back_projection) = &CAMERAS[camera];
+        for person in persons(&[pass(rig, &detections)], *back_projection, &parameters) {
             let [x_min, y_min, x_max, y_max] = person.bbox.corners();
             prop_assert!(0.0 <= x_min && x_min < x_max && x_max <= f64::from(WIDTH), "{person:?}");
             prop_assert!(0.0 <= y_min && y_min < y_max && y_max <= f64::from(HEIGHT), "{person:?}");
@@ -127,14 +128,14 @@ proptest! {
     }
 
     #[test]
-    fn the_order_in_which_views_tell_what_they_found_does_not_matter(
-        [finds, shuffled] in finds_in_two_orders(),
-        camera in prop::sample::select((0..LOOKS.len()).collect::<Vec<_>>()),
+    fn the_order_of_detections_does_not_change_the_persons(
+        [detections, shuffled] in detections_in_two_orders(),
+        camera in prop::sample::select((0..CAMERAS.len()).collect::<Vec<_>>()),
         parameters in parameters(),
     ) {
-        let (rig, back_projection) = &LOOKS[camera];
-        let [one, other] = [finds, shuffled]
-            .map(|finds| persons(&[look(rig, &finds)], *back_projection, &parameters));
+        let (rig, back_projection) = &CAMERAS[camera];
+        let [one, other] = [detections, shuffled]
+            .map(|detections| persons(&[pass(rig, &detections)], *back_projection, &parameters));
         prop_assert_eq!(one.len(), other.len());
         for (one, other) in one.iter().zip(&other) {
             let pairs = one.bbox.corners().into_iter().zip(other.bbox.corners());

@@ -1,4 +1,4 @@
-//! One round of looking at a frame, while its views are in the network.
+//! One pass over a frame while its views are queued for inference or being processed.
 
 use std::{
     ops::Range,
@@ -13,27 +13,27 @@ use crate::{
     pipeline::{PipelineError, Ticket, camera_rig::CameraRig, motion_cache::CameraViews},
 };
 
-/// One round of looking at a frame.
+/// One pass over a frame: the views of a rig and the model that processes them.
 pub(in crate::pipeline) struct PassTask {
     pub(in crate::pipeline) rig: Arc<CameraRig>,
     pub(in crate::pipeline) model: Arc<Model>,
     pub(super) frame: Arc<Frame>,
     pub(super) ticket: Ticket,
-    /// What the camera saw before, if that may stand in for views in which nothing has moved.
+    /// The motion cache of the camera, when cached detections may replace inference on still views.
     pub(super) seen_before: Option<Arc<CameraViews>>,
-    /// Whose log lines are those of the work.
+    /// The tracing span to which the log lines of the work belong.
     pub(super) request: tracing::Span,
     pub(super) queued: Instant,
     progress: Mutex<Progress>,
     over: Condvar,
 }
 
-/// What came of a round.
+/// The result of a pass.
 #[derive(Debug)]
 pub(in crate::pipeline) struct PassOutput {
-    /// What was found in each view.
+    /// The detections in each view.
     pub(in crate::pipeline) per_view: Vec<Vec<ViewDetection>>,
-    /// What it took.
+    /// The work that the pass took.
     pub(in crate::pipeline) work: Work,
 }
 
@@ -73,7 +73,7 @@ impl PassTask {
         }
     }
 
-    /// Waits until every view was looked at. Blocks.
+    /// Waits until every view is processed or the pass fails. Blocks.
     pub(in crate::pipeline) fn wait(&self) -> Result<PassOutput, PipelineError> {
         let progress = self.lock();
         let mut progress = self
@@ -89,12 +89,13 @@ impl PassTask {
         })
     }
 
-    /// Whether nobody needs its other views: it failed, or its client has left.
+    /// Returns true when the remaining views are not needed: the pass failed, or its client has
+    /// disconnected.
     pub(super) fn is_pointless(&self) -> bool {
         self.ticket.withdrawn.is_cancelled() || self.lock().failed
     }
 
-    /// Ends the round; views that are in the network come to nothing.
+    /// Ends the pass with an error. Detections in views still being processed are discarded.
     pub(super) fn fail(&self, error: PipelineError) {
         let mut progress = self.lock();
         if !progress.failed {
@@ -105,7 +106,7 @@ impl PassTask {
         self.over.notify_all();
     }
 
-    /// Takes in what was found in some views.
+    /// Accepts the detections in some views.
     pub(super) fn finish(
         &self,
         views: Range<usize>,
@@ -126,7 +127,7 @@ impl PassTask {
     }
 
     fn lock(&self) -> MutexGuard<'_, Progress> {
-        // Views are counted by the queue, so no change can panic half-way.
+        // The queue counts the views, so no update can panic half-way.
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

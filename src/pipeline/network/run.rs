@@ -1,4 +1,5 @@
-//! One batch: rendered, looked at where something has moved, and handed out.
+//! The execution of one batch: rendering, inference for views with motion, and dispatch of the
+//! detections.
 
 use std::time::Instant;
 
@@ -10,12 +11,12 @@ use crate::{
     inference::{InferenceError, ViewDetection},
 };
 
-/// What came of a batch.
+/// The result of a batch.
 pub(super) struct Run {
-    /// In the order of the claims.
+    /// The views in the order of the claims.
     views: Vec<SeenView>,
     non_finite: usize,
-    /// Whether the network ran at all.
+    /// True when the network ran, that is, when at least one view had motion.
     ran: bool,
     began: Instant,
     rendered: Instant,
@@ -27,13 +28,13 @@ struct SeenView {
     is_still: bool,
 }
 
-/// A view on its way to the network.
+/// A view of a batch before inference.
 struct ViewJob<'a> {
     task: &'a PassTask,
     view: usize,
-    /// How it passes from afar, where the camera's views are remembered.
+    /// The signature for motion detection, when the camera uses the motion cache.
     signature: Option<ViewSignature>,
-    /// What was found in it before, if nothing has moved since.
+    /// The cached detections, when nothing has moved since.
     still: Option<Vec<ViewDetection>>,
 }
 
@@ -48,7 +49,7 @@ impl ViewJob<'_> {
         }
     }
 
-    /// The view as it was seen: now, unless it is still.
+    /// Returns the cached detections of a still view, otherwise those of `now`, which are cached.
     fn seen(self, mut now: impl FnMut() -> Vec<ViewDetection>) -> SeenView {
         if let Some(found) = self.still {
             return SeenView {
@@ -67,8 +68,8 @@ impl ViewJob<'_> {
     }
 }
 
-/// Renders the views and passes at those in which something has moved.
-pub(super) fn look(
+/// Renders the views and runs the network on those with motion.
+pub(super) fn execute(
     claims: &[Claim],
     session: usize,
     remappers: &ThreadPool,
@@ -123,9 +124,9 @@ impl Claim {
 }
 
 impl Run {
-    /// Gives each frame what was found in its views, and its share of the time. What cannot be
-    /// divided belongs to the frame whose view was next.
-    pub(super) fn hand_out(self, claims: &[Claim]) {
+    /// Dispatches the detections and a share of the time to each frame. The counts of runs and
+    /// non-finite candidates cannot be divided and go to the frame of the first claim.
+    pub(super) fn dispatch(self, claims: &[Claim]) {
         let total = self.views.len();
         let mut views = self.views.into_iter();
         let mut undivided = (usize::from(self.ran), self.non_finite);

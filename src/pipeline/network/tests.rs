@@ -9,7 +9,7 @@ use crate::{
     pipeline::Priority,
 };
 
-/// Tells how many views each run has, and of which brightness the first is, and waits to be let go.
+/// Reports the view count of each run and the brightness of its first view, then waits for release.
 struct Gated {
     input: NetworkInput,
     begun: SyncSender<(usize, f32)>,
@@ -50,7 +50,7 @@ struct Bench {
     go: SyncSender<()>,
 }
 
-/// A network of `sessions` threads; frames have four views.
+/// A network of `sessions` threads with four views per frame.
 fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
     let input = NetworkInput::plain(8, 8);
     let (begun, begins) = sync_channel(64);
@@ -93,14 +93,14 @@ fn bench(sessions: usize, max_views: usize, max_delay: Duration) -> Bench {
 }
 
 impl Bench {
-    /// Queues a frame of one brightness.
-    fn look(&self, brightness: u8, ticket: Ticket) -> Arc<PassTask> {
+    /// Queues a frame of uniform brightness.
+    fn submit(&self, brightness: u8, ticket: Ticket) -> Arc<PassTask> {
         let frame = Frame::new(64, 64, vec![brightness; 64 * 64 * 3]).unwrap();
         let (rig, model) = (Arc::clone(&self.rig), Arc::clone(&self.model));
         self.network.look(rig, model, Arc::new(frame), ticket, None)
     }
 
-    /// The next run: how many views it has, and how bright the first one is.
+    /// Returns the next run: its view count and the brightness of its first view.
     fn next_run(&self) -> (usize, f32) {
         self.begins.recv_timeout(Duration::from_mins(1)).unwrap()
     }
@@ -116,29 +116,29 @@ impl Bench {
 fn a_batch_is_filled_with_views_of_the_next_frame() {
     let bench = bench(1, 6, Duration::ZERO);
     // Occupies the thread while the others queue.
-    let before = bench.look(1, Ticket::default());
+    let before = bench.submit(1, Ticket::default());
     assert_eq!(bench.next_run(), (4, 1.0));
     let (first, second) = (
-        bench.look(10, Ticket::default()),
-        bench.look(20, Ticket::default()),
+        bench.submit(10, Ticket::default()),
+        bench.submit(20, Ticket::default()),
     );
     bench.let_go(3);
     assert_eq!(bench.next_run(), (6, 10.0));
     assert_eq!(bench.next_run(), (2, 20.0));
     before.wait().unwrap();
-    let looked = [first.wait().unwrap(), second.wait().unwrap()];
-    assert!(looked.iter().all(|looked| looked.per_view.len() == 4));
+    let outputs = [first.wait().unwrap(), second.wait().unwrap()];
+    assert!(outputs.iter().all(|output| output.per_view.len() == 4));
     // The shared run counts once.
-    assert_eq!(looked.map(|looked| looked.work.runs), [1, 1]);
+    assert_eq!(outputs.map(|output| output.work.runs), [1, 1]);
 }
 
 #[test]
 fn an_urgent_frame_overtakes_one_that_has_not_begun() {
     let bench = bench(1, 4, Duration::ZERO);
-    let before = bench.look(1, Ticket::default());
+    let before = bench.submit(1, Ticket::default());
     bench.next_run();
-    let usual = bench.look(10, Ticket::default());
-    let urgent = bench.look(20, Ticket::of(Priority::High));
+    let usual = bench.submit(10, Ticket::default());
+    let urgent = bench.submit(20, Ticket::of(Priority::High));
     bench.let_go(3);
     assert_eq!(bench.next_run(), (4, 20.0));
     assert_eq!(bench.next_run(), (4, 10.0));
@@ -148,13 +148,13 @@ fn an_urgent_frame_overtakes_one_that_has_not_begun() {
 }
 
 #[test]
-fn views_that_nobody_waits_for_never_reach_the_network() {
+fn views_of_a_withdrawn_frame_never_reach_the_network() {
     let bench = bench(1, 1, Duration::ZERO);
     let ticket = Ticket::default();
-    let left = bench.look(10, ticket.clone());
+    let left = bench.submit(10, ticket.clone());
     assert_eq!(bench.next_run(), (1, 10.0));
     ticket.withdrawn.cancel();
-    let next = bench.look(20, Ticket::default());
+    let next = bench.submit(20, Ticket::default());
     bench.let_go(5);
     assert_eq!(bench.next_run(), (1, 20.0));
     assert!(matches!(left.wait(), Err(PipelineError::Withdrawn)));
@@ -162,10 +162,10 @@ fn views_that_nobody_waits_for_never_reach_the_network() {
 }
 
 #[test]
-fn sessions_look_at_views_of_one_frame_side_by_side() {
+fn sessions_process_views_of_one_frame_in_parallel() {
     let bench = bench(2, 1, Duration::ZERO);
-    let task = bench.look(10, Ticket::default());
-    // Both have begun before either is let go.
+    let task = bench.submit(10, Ticket::default());
+    // Both runs begin before either is released.
     bench.next_run();
     bench.next_run();
     bench.let_go(4);
@@ -173,10 +173,10 @@ fn sessions_look_at_views_of_one_frame_side_by_side() {
 }
 
 #[test]
-fn a_batch_waits_for_more_views_if_it_may() {
+fn a_batch_waits_for_more_views_within_the_delay() {
     let bench = bench(1, 8, Duration::from_mins(1));
-    let first = bench.look(10, Ticket::default());
-    let second = bench.look(20, Ticket::default());
+    let first = bench.submit(10, Ticket::default());
+    let second = bench.submit(20, Ticket::default());
     bench.let_go(1);
     assert_eq!(bench.next_run(), (8, 10.0));
     first.wait().unwrap();
@@ -184,9 +184,9 @@ fn a_batch_waits_for_more_views_if_it_may() {
 }
 
 #[test]
-fn a_batch_that_does_not_fill_up_goes_when_its_time_has_come() {
+fn a_partial_batch_runs_after_the_maximum_delay() {
     let bench = bench(1, 8, Duration::from_millis(20));
-    let task = bench.look(10, Ticket::default());
+    let task = bench.submit(10, Ticket::default());
     bench.let_go(1);
     assert_eq!(bench.next_run(), (4, 10.0));
     assert!(

@@ -1,5 +1,5 @@
-//! The views that wait for the network: those of the first frame first, filled up with views of
-//! the next frames that the same model passes at.
+//! The queue of views for inference. A batch holds views of the first frame and is filled up with
+//! views of the next frames for the same model.
 
 use std::{
     collections::BTreeMap,
@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-/// The views that wait for the network. It is bounded by the number of frames that are worked on.
+/// The queue of views for inference, bounded by the number of frames in progress.
 pub(super) struct ViewQueue {
     options: BatchOptions,
     state: Mutex<State>,
@@ -67,14 +67,14 @@ impl ViewQueue {
         self.changed.notify_all();
     }
 
-    /// Takes in no more; what is waiting is still handed out.
+    /// Closes the queue for new tasks. Views already queued are still dispatched.
     pub(super) fn close(&self) {
         self.lock().closed = true;
         self.changed.notify_all();
     }
 
-    /// The views of one run, all for one model, in their turn; waits for them. `None` when the
-    /// queue is closed and empty.
+    /// Waits for the views of the next run, in queue order and all for one model. Returns `None`
+    /// when the queue is closed and empty.
     pub(super) fn next_batch(&self) -> Option<Vec<Claim>> {
         let mut state = self.lock();
         loop {
@@ -105,13 +105,13 @@ impl ViewQueue {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // No change can panic half-way.
+        // No update can panic half-way.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl State {
-    /// Forgets the views that nobody needs any more.
+    /// Drops the views of failed tasks and of tasks whose client has disconnected.
     fn drop_pointless(&mut self) {
         self.waiting.retain(|_, waiting| {
             let pointless = waiting.task.is_pointless();
@@ -122,7 +122,7 @@ impl State {
         });
     }
 
-    /// How many views wait for a model.
+    /// Returns the number of views queued for a model.
     fn views_for(&self, model: &Arc<Model>) -> usize {
         let alike = self
             .waiting
@@ -131,7 +131,7 @@ impl State {
         alike.map(Waiting::views_left).sum()
     }
 
-    /// Takes the next views for a model.
+    /// Claims the next views for a model, at most `most`.
     fn claim(&mut self, model: &Arc<Model>, most: usize) -> Vec<Claim> {
         let mut room = most;
         let mut claims = Vec::new();

@@ -1,28 +1,28 @@
-//! What the network did for a frame, and when.
+//! Work counters and times of inference for one frame.
 
 use std::time::{Duration, Instant};
 
-/// What the network did for a frame, and when.
+/// Work counters and times of inference for one frame.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::pipeline) struct Work {
-    /// When the first of them was begun.
+    /// The start of the first view.
     pub(in crate::pipeline) began: Instant,
-    /// When the last of them was done.
+    /// The end of the last view.
     pub(in crate::pipeline) ended: Instant,
-    /// Time spent on rendering, by all threads.
+    /// Rendering time, summed over all threads.
     pub(in crate::pipeline) remap: Duration,
-    /// Time spent in the network, by all threads.
+    /// Inference time, summed over all threads.
     pub(in crate::pipeline) inference: Duration,
-    /// Runs of the network. A run that several frames share belongs to the one that was next.
+    /// Runs of the network. A run shared by several frames counts for the first of them only.
     pub(in crate::pipeline) runs: usize,
-    /// Views that were not looked at, as nothing had moved in them.
+    /// Views that skipped the network because nothing had moved in them.
     pub(in crate::pipeline) still_views: usize,
-    /// Candidates dropped because a number of theirs was not finite.
+    /// Candidates dropped because one of their numbers was not finite.
     pub(in crate::pipeline) non_finite: usize,
 }
 
 impl Work {
-    /// No work at all, as for a rig without views.
+    /// Returns no work, as for a rig without views.
     pub(super) fn none(queued: Instant) -> Self {
         Self {
             began: queued,
@@ -35,7 +35,7 @@ impl Work {
         }
     }
 
-    /// Both together.
+    /// Returns the sum of both.
     pub(in crate::pipeline) fn and(self, other: Self) -> Self {
         Self {
             began: self.began.min(other.began),
@@ -48,7 +48,7 @@ impl Work {
         }
     }
 
-    /// Which share of the work was rendering, 0 to 1.
+    /// Returns the share of the time spent on rendering, 0 to 1.
     pub(in crate::pipeline) fn remap_share(&self) -> f64 {
         let (remap, all) = (self.remap, self.remap + self.inference);
         if all.is_zero() {

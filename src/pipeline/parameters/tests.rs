@@ -21,7 +21,7 @@ fn defaults_are_those_of_the_contract() {
 }
 
 #[test]
-fn every_parameter_is_taken_over() {
+fn every_parameter_is_parsed() {
     let parameters = parse(&[
         ("calibration", "lobby"),
         ("camera", "Lobby, north"),
@@ -155,14 +155,14 @@ fn unknown_and_repeated_names_are_refused() {
 }
 
 #[test]
-fn endless_names_and_values_are_not_repeated_in_full() {
+fn long_names_and_values_are_truncated_in_errors() {
     let endless = "x".repeat(100_000);
     assert!(parse(&[(&endless, "1")]).unwrap_err().to_string().len() < 400);
     assert!(parse(&[("sigma", &endless)]).unwrap_err().to_string().len() < 400);
 }
 
 #[test]
-fn defaults_of_the_table_are_values_that_are_accepted() {
+fn defaults_of_the_table_are_accepted_values() {
     for spec in DetectParameters::TABLE {
         if let ParameterDefault::Value(default) = spec.default {
             let accepted: Result<String, _> = spec.parse(default);

@@ -43,18 +43,18 @@ fn rig() -> CameraRig {
 fn a_rig_is_built_once_and_shared() {
     let cache = RigCache::new(usize::MAX);
     let first = cache.get_or_build(&key(1), rig);
-    let second = cache.get_or_build(&key(1), || unreachable!("it is there already"));
+    let second = cache.get_or_build(&key(1), || unreachable!("the rig is cached"));
     assert!(Arc::ptr_eq(&first, &second));
 }
 
 #[test]
-fn the_least_recently_used_rig_leaves_when_the_budget_is_spent() {
+fn the_least_recently_used_rig_is_evicted_beyond_the_budget() {
     let cache = RigCache::new(2 * rig().bytes());
     cache.get_or_build(&key(1), rig);
     cache.get_or_build(&key(2), rig);
-    cache.get_or_build(&key(1), || unreachable!("it is there already"));
+    cache.get_or_build(&key(1), || unreachable!("the rig is cached"));
     cache.get_or_build(&key(3), rig);
-    cache.get_or_build(&key(1), || unreachable!("it was used after the second"));
+    cache.get_or_build(&key(1), || unreachable!("recently used rigs stay"));
     let mut rebuilt = false;
     cache.get_or_build(&key(2), || {
         rebuilt = true;
@@ -67,12 +67,12 @@ fn the_least_recently_used_rig_leaves_when_the_budget_is_spent() {
 fn a_rig_larger_than_the_budget_still_serves_its_frame() {
     let cache = RigCache::new(1);
     assert!(cache.get_or_build(&key(1), rig).bytes() > 1);
-    let kept = cache.get_or_build(&key(1), || unreachable!("the newest stays"));
+    let kept = cache.get_or_build(&key(1), || unreachable!("the newest rig is not evicted"));
     assert_eq!(kept.view_count(), 18);
 }
 
 #[test]
-fn it_tells_what_it_holds_and_what_it_did() {
+fn usage_reports_contents_builds_and_evictions() {
     let bytes = rig().bytes();
     let cache = RigCache::new(2 * bytes);
     let [empty, full] = [0, 2].map(|rigs| RigCacheUse {
@@ -103,7 +103,7 @@ fn a_thousand_cameras_used_once_each_fit_the_default_budget() {
     }
     let usage = cache.usage();
     assert_eq!((usage.rigs, usage.builds, usage.evictions), (1000, 1000, 0));
-    // And so they would with views as large as those of the default model.
+    // The same holds for views as large as those of the default model.
     let plan = ViewPlan::balanced();
     let input = NetworkInput::plain(416, 416);
     let full_size = CameraRig::new(geometry(), 64, 64, Some(&plan), &input);

@@ -6,7 +6,7 @@ use std::{
 use super::*;
 use crate::pipeline::test_support::{BlobDetector, engine, frame_with_disc, job};
 
-/// A detector that reports each batch it begins and waits to be let go on.
+/// A detector that reports the start of each batch and then waits for release.
 fn gated_pool(capacity: usize) -> (Arc<WorkerPool>, Receiver<()>, SyncSender<()>) {
     let (begun, begins) = sync_channel(64);
     let (go, gate) = sync_channel(64);
@@ -36,7 +36,7 @@ fn spawn(pool: &Arc<WorkerPool>) -> tokio::task::JoinHandle<Result<Detected, Pip
     tokio::spawn(async move { pool.detect(direct_job()).await })
 }
 
-/// Lets the queue settle until `count` frames are pending.
+/// Waits until `count` frames are pending.
 async fn until_pending(pool: &WorkerPool, count: usize) {
     while pool.pending() != count {
         tokio::task::yield_now().await;
@@ -44,7 +44,7 @@ async fn until_pending(pool: &WorkerPool, count: usize) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_full_queue_refuses_at_once_and_serves_again_when_it_has_drained() {
+async fn a_full_queue_refuses_frames_until_it_has_drained() {
     let (pool, begins, go) = gated_pool(2);
     let (first, second) = (spawn(&pool), spawn(&pool));
     until_pending(&pool, 2).await;
@@ -65,7 +65,7 @@ async fn a_full_queue_refuses_at_once_and_serves_again_when_it_has_drained() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn other_work_waits_for_its_turn_in_a_place_among_the_frames() {
+async fn other_work_takes_a_permit_and_waits_for_its_turn() {
     let (pool, begins, go) = gated_pool(2);
     let first = spawn(&pool);
     begins.recv().unwrap();
@@ -84,7 +84,7 @@ async fn other_work_waits_for_its_turn_in_a_place_among_the_frames() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_frame_whose_client_has_left_is_not_worked_on() {
+async fn a_frame_of_a_disconnected_client_is_not_processed() {
     let (pool, begins, go) = gated_pool(4);
     let first = spawn(&pool);
     begins.recv().unwrap();
@@ -102,7 +102,7 @@ async fn a_frame_whose_client_has_left_is_not_worked_on() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn shutting_down_finishes_what_was_taken_and_takes_no_more() {
+async fn shutdown_finishes_queued_frames_and_refuses_new_ones() {
     let (pool, begins, go) = gated_pool(4);
     let (first, second) = (spawn(&pool), spawn(&pool));
     until_pending(&pool, 2).await;
@@ -119,12 +119,12 @@ async fn shutting_down_finishes_what_was_taken_and_takes_no_more() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_panic_on_one_frame_costs_one_answer_and_no_worker() {
+async fn a_panic_on_one_frame_fails_that_frame_only() {
     let mut frames = 0;
     let detector = BlobDetector {
         before: Box::new(move || {
             frames += 1;
-            assert_ne!(frames, 1, "the first frame goes wrong on purpose");
+            assert_ne!(frames, 1, "the first frame fails on purpose");
             Ok(())
         }),
         ..BlobDetector::default()
@@ -138,7 +138,7 @@ async fn a_panic_on_one_frame_costs_one_answer_and_no_worker() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_done_with_a_report_holds_its_place_and_runs_on_the_worker() {
+async fn finish_runs_on_the_worker_and_holds_the_permit() {
     let engine = Arc::new(engine(BlobDetector::default(), None));
     let pool = WorkerPool::start(&engine, NonZeroUsize::MIN, NonZeroUsize::MIN).unwrap();
     let pool = Arc::new(pool);
@@ -151,7 +151,7 @@ async fn what_is_done_with_a_report_holds_its_place_and_runs_on_the_worker() {
     assert_eq!((persons, pending), (1, 1));
     assert_eq!(thread.as_deref(), Some("frame-worker-0"));
     until_pending(&pool, 0).await;
-    let failed = pool.detect_and(direct_job(), |_| panic!("drawing goes wrong on purpose"));
+    let failed = pool.detect_and(direct_job(), |_| panic!("drawing fails on purpose"));
     assert!(matches!(
         failed.await.unwrap_err(),
         PipelineError::Internal(_)

@@ -119,7 +119,7 @@ async fn views_need_permits_and_bodies_have_limits() {
         refused
     });
     assert_eq!(waiting.status, 200);
-    assert_refused(&refused, 429, "overloaded", "places in the queue");
+    assert_refused(&refused, 429, "overloaded", "the queue is full");
     let answer = service.post(FRAMES, &" ".repeat(100_001)).await;
     assert_refused(&answer, 413, "body-too-large", "100000");
     service.gate.panic_once();

@@ -46,7 +46,7 @@ fn causes(error: &Error) -> Vec<&(dyn std::error::Error + 'static)> {
     causes
 }
 
-/// Why no answer came, if none came.
+/// Returns the reason why the bucket did not answer, if it did not.
 fn transport(error: &Error) -> Option<String> {
     let causes = causes(error);
     let failed = causes

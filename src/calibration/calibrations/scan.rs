@@ -17,8 +17,8 @@ use crate::calibration::{CalibrationFile, CalibrationId, READ_AT_ONCE, StoreErro
 type Files = BTreeMap<CalibrationId, Arc<LoadedFile>>;
 
 impl Calibrations {
-    /// Looks at the store and reads the files that have changed. Failures are logged, reported by
-    /// [`Calibrations::health`], and leaves the calibrations it concerns as they are. Blocks.
+    /// Lists the store and reads the files that have changed. Failures are logged, reported by
+    /// [`Calibrations::health`], and leave the affected calibrations unchanged. Blocks.
     pub fn refresh(&self) {
         let changing = self.lock();
         if let Err(error) = self.look(&changing) {
@@ -26,7 +26,7 @@ impl Calibrations {
             let now = self.now();
             if now.store_problem.as_ref() != Some(&problem) {
                 tracing::error!(
-                    "calibrations cannot be looked at, the known ones go on: {problem}"
+                    "calibrations cannot be read, the loaded ones stay in use: {problem}"
                 );
                 self.replace(now.with_store_problem(problem));
             }
@@ -56,7 +56,7 @@ impl Calibrations {
             tracing::info!(calibration = %gone, "its file is gone");
         }
         if before.store_problem.is_some() {
-            tracing::info!("calibrations can be looked at again");
+            tracing::info!("calibrations can be read again");
         }
         self.replace(Snapshot::of(files));
         Ok(())
