@@ -191,12 +191,12 @@ async fn invalid_frames_and_fields_have_the_statuses_of_deepstack() {
         (
             &[("image", &good), ("min_confidence", b"1.5")],
             "invalid-parameter",
-            "min_confidence: 1.5",
+            "min_confidence: \"1.5\"",
         ),
         (
             &[("image", &good), ("min_confidence", b"-1")],
             "invalid-parameter",
-            "min_confidence: -1",
+            "min_confidence: \"-1\"",
         ),
         (
             &[("image", &good), ("min_confidence", b"NaN")],

@@ -138,7 +138,7 @@ async fn a_frame_of_a_disconnected_client_is_not_processed() {
     ask_and_leave(&service, request.body(Body::from(frame())).unwrap()).await;
     assert_eq!(
         service.gate.runs(),
-        2,
+        4,
         "the frame of the client that left cost a run"
     );
     assert_eq!(metric(&service, "lookdown_withdrawn_frames_total").await, 1);
