@@ -58,10 +58,13 @@ enum Command {
     /// Measure which sessions, threads and batches are fastest on this machine
     Tune(tune::Arguments),
     /// Print the OpenAPI document
+    #[command(hide = true)]
     Openapi,
     /// Print shell completions
+    #[command(hide = true)]
     Completions(shell::CompletionArguments),
     /// Write the manual pages
+    #[command(hide = true)]
     Manual(shell::ManualArguments),
 }
 

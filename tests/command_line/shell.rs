@@ -32,6 +32,16 @@ fn each_command_has_a_manual_page() {
 }
 
 #[test]
+fn help_lists_commands_of_users_only() {
+    let output = lookdown(&["--help"], &[]);
+    let help = String::from_utf8(output.stdout).unwrap();
+    assert!(help.contains("\n  serve "), "{help}");
+    for command in ["openapi", "completions", "manual"] {
+        assert!(!help.contains(&format!("\n  {command} ")), "{help}");
+    }
+}
+
+#[test]
 fn the_version_is_that_of_the_crate() {
     let output = lookdown(&["--version"], &[]);
     let said = String::from_utf8(output.stdout).unwrap();
