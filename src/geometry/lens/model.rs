@@ -1,5 +1,5 @@
 //! The pieces that every lens model is made of: [`Model`], and the macros that declare the
-//! parameters of one model ([`lens_parameters`]) and the list of all models ([`lens_models`]).
+//! parameters of one model (`lens_parameters`) and the list of all models (`lens_models`).
 
 use super::{ImagePlane, LensError, check::positive, curve::Curve, distortion::RadialTangential};
 
