@@ -90,7 +90,7 @@ pageTest("a camera of a file with several is selected by name", "", async (page)
   await start(page);
   await page.locator("#import-file").setInputFiles(`${FIXTURES}/kalibr_camchain.yaml`);
   await page.getByRole("alert").getByText("cam0, cam1").waitFor();
-  const answer = await straightenedAfter(page, () => page.getByLabel("Camera of the file").fill("cam1"));
+  const answer = await straightenedAfter(page, () => page.getByLabel("Camera, if the file has several").fill("cam1"));
   assert.equal(answer.status(), 200);
   assert.equal(await page.getByRole("alert").count(), 0);
 }, { expected: /status of 422/ });

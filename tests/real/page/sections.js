@@ -30,7 +30,7 @@ for (const [lens, what] of [["", "a lens that was assumed"], ["office", "a calib
     await page.getByRole("button", { name: "2", exact: true }).click();
     await page.locator(".tile.dim").first().waitFor();
     const seeing = await page.locator(".tile:not(.dim)").count();
-    assert.ok(seeing >= 4 && seeing <= 12, `${seeing}`);
+    assert.ok(seeing >= 2 && seeing <= 12, `${seeing}`);
     assert.equal(await page.locator("#outlines .sees").count(), seeing);
     await tiles.nth(2).click();
     await page.locator("#outlines polygon.chosen").waitFor();
@@ -83,7 +83,7 @@ pageTest("a new camera appears in Live, and its card is updated", "#live", async
   await card.getByText(String(first.persons.length), { exact: true }).first().waitFor();
   assert.equal(await card.locator(".sketch polygon").count(), first.persons.length);
   const plot = card.getByRole("img", { name: "Persons over time" });
-  const second = await post("hall 1", "canteen");
+  const second = await post("hall 1", "canteen", "profile=fast&max_detections=2");
   assert.notEqual(second.persons.length, first.persons.length);
   await card.locator(".big b").getByText(String(second.persons.length), { exact: true }).waitFor();
   const most = Math.max(first.persons.length, second.persons.length);
