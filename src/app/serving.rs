@@ -171,13 +171,14 @@ impl App {
                 break;
             }
             self.load(name, shutdown).await?;
-            if self.readiness.phase() == Phase::WarmingUp {
-                self.readiness.warmed_up();
-                let port = address.port();
-                tracing::info!(
-                    "ready: try curl -F img=@samples/office.jpg {scheme}://localhost:{port}/detect"
-                );
-            }
+        }
+        // Each profile needs its model: a server with some of them would refuse the others' frames.
+        if self.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {
+            self.readiness.warmed_up();
+            let port = address.port();
+            tracing::info!(
+                "ready: try curl -F img=@samples/office.jpg {scheme}://localhost:{port}/detect"
+            );
         }
         Ok(())
     }
