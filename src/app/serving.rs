@@ -159,7 +159,7 @@ impl App {
         }
     }
 
-    /// Loads the models until a stop is requested. The server is ready when the first is loaded.
+    /// Loads the models until a stop is requested. The server is ready when all are loaded.
     async fn load_models(
         &self,
         scheme: &str,
