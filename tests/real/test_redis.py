@@ -108,19 +108,19 @@ class Shared(unittest.TestCase):
 
     def test_reports_and_ids_are_identical_on_every_server(self) -> None:
         """Latest, history, list and 304."""
-        sent = [detect(server, "hall").body for server in (self.one, self.other, self.one)]
-        one, other = (self.latest(server, "hall", sent[-1]) for server in (self.one, self.other))
+        sent = [detect(server, "atrium").body for server in (self.one, self.other, self.one)]
+        one, other = (self.latest(server, "atrium", sent[-1]) for server in (self.one, self.other))
         self.assertEqual(one.headers["etag"], other.headers["etag"])
-        again = get(self.other, "/results/hall/latest", If_None_Match=one.headers["etag"])
+        again = get(self.other, "/results/atrium/latest", If_None_Match=one.headers["etag"])
         self.assertEqual(again.status, 304)
-        pages = [get(server, "/results/hall/history").body for server in (self.one, self.other)]
+        pages = [get(server, "/results/atrium/history").body for server in (self.one, self.other)]
         self.assertEqual(pages[0], pages[1])
         kept = [row["report"] for row in json.loads(pages[0])]
         self.assertEqual(kept, [json.loads(report) for report in sent])
         ids = [int(row["id"]) for row in json.loads(pages[0])]
         self.assertEqual(sorted(set(ids)), ids)
         self.assertLess(abs(ids[-1] / 1e6 - time.time()), 60.0)
-        since = [get(server, f"/results/hall/history?since={ids[0]}&limit=1").json() for server in (self.one, self.other)]
+        since = [get(server, f"/results/atrium/history?since={ids[0]}&limit=1").json() for server in (self.one, self.other)]
         self.assertEqual(since[0], since[1])
         self.assertEqual([int(row["id"]) for row in since[0]], ids[1:2])
         rows = [
