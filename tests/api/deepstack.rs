@@ -288,7 +288,7 @@ async fn the_key_is_in_the_form_or_in_a_header_but_not_in_both() {
     let service = guarded("detect");
     let image = frame();
     let image: (&str, &[u8]) = ("image", &image);
-    let log = Log::begin();
+    let log = Log::start();
     let in_form = ("api_key", KEY.as_bytes());
     assert_eq!(post(&service, LOBBY, &[image, in_form]).await.status, 200);
     assert_eq!(

@@ -15,7 +15,6 @@ mod extremes;
 mod kept_pictures;
 mod load;
 mod log;
-mod logs;
 mod metrics_table;
 mod operation;
 mod picture;
