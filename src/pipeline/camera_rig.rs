@@ -34,6 +34,35 @@ enum Views {
     Direct(Letterbox),
 }
 
+/// The views that show an unmasked part of the lens image, and the number of the others.
+struct Visible<V> {
+    views: Vec<(V, RemapTable)>,
+    /// Views outside the lens image.
+    outside: usize,
+    /// Views whose part of the lens image is wholly masked.
+    masked: usize,
+}
+
+impl<V> Visible<V> {
+    fn of(planned: impl Iterator<Item = (V, RemapTable)>, masked: &MaskedPixels) -> Self {
+        let mut visible = Self {
+            views: Vec::new(),
+            outside: 0,
+            masked: 0,
+        };
+        for (view, table) in planned {
+            if !table.sees_anything() {
+                visible.outside += 1;
+            } else if !masked.is_empty() && !table.sees_beside(masked) {
+                visible.masked += 1;
+            } else {
+                visible.views.push((view, table));
+            }
+        }
+        visible
+    }
+}
+
 impl CameraRig {
     /// Builds the remap tables of the views of `plan`. Without a plan, the only view is the whole
     /// frame. Views that show no unmasked part of the lens image are left out.
@@ -78,24 +107,17 @@ impl CameraRig {
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
-        let tabulated = crops.iter().map(|crop| {
-            let table = RemapTable::of_crop(crop, frame_width, frame_height);
-            (*crop, table)
-        });
-        let shows_something = |(_, table): &(_, RemapTable)| {
-            if self.masked.is_empty() {
-                table.sees_anything()
-            } else {
-                table.sees_beside(&self.masked)
-            }
-        };
+        let tables = crops
+            .iter()
+            .map(|crop| RemapTable::of_crop(crop, frame_width, frame_height));
+        let visible = Visible::of(crops.iter().copied().zip(tables), &self.masked);
         Self {
             geometry: self.geometry.clone(),
             frame: BBox::of_frame(frame_width, frame_height),
             masked: Arc::clone(&self.masked),
-            views: Views::Crops(tabulated.filter(shows_something).collect()),
-            views_outside: 0,
-            views_masked: 0,
+            views_outside: visible.outside,
+            views_masked: visible.masked,
+            views: Views::Crops(visible.views),
         }
     }
 
@@ -107,22 +129,15 @@ impl CameraRig {
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
-        let planned = views.len();
         let tables = RemapTable::of_views(&views, &geometry.lens, frame_width, frame_height);
-        let tabulated = views.into_iter().zip(tables);
-        let within = tabulated.filter(|(_, table)| table.sees_anything());
-        let mut views: Vec<_> = within.collect();
-        let views_outside = planned - views.len();
-        if !masked.is_empty() {
-            views.retain(|(_, table)| table.sees_beside(&masked));
-        }
+        let visible = Visible::of(views.into_iter().zip(tables), &masked);
         Self {
             geometry,
             frame: BBox::of_frame(frame_width, frame_height),
             masked,
-            views_outside,
-            views_masked: planned - views_outside - views.len(),
-            views: Views::Virtual(views),
+            views_outside: visible.outside,
+            views_masked: visible.masked,
+            views: Views::Virtual(visible.views),
         }
     }
 

@@ -125,44 +125,47 @@ pub(super) fn persons(
         .collect()
 }
 
-/// Returns the outlines (unit rays) of possible persons, highest score first. Each is the outline
-/// of the person's best box.
-pub(super) fn outlines(
-    passes: &[Pass],
-    back_projection: BackProjection,
-    parameters: &RefinementParameters,
-) -> Vec<Vec<Ray>> {
-    let Some(Pass { rig, .. }) = passes.first() else {
-        return Vec::new();
-    };
-    let (mapped, merged) = merged(passes, rig, back_projection, parameters);
-    let best = merged.iter().filter_map(|merged| merged.members.first());
-    let unit = |rays: &[Ray]| rays.iter().map(Ray::normalize).collect();
-    best.map(|&member| unit(mapped[member].footprint.rays()))
-        .collect()
+/// The refinement that turns boxes of the first pass into targets of the second.
+const TARGET_REFINEMENT: RefinementParameters = RefinementParameters {
+    refinement: Refinement::Fusion,
+    iou_threshold: 0.5,
+    sigma: 0.3,
+    score_threshold: 0.03,
+    max_detections: 500,
+};
+
+/// Possible persons of the first pass, highest score first.
+pub(super) struct SecondPassTargets {
+    /// The outline (unit rays) of each person's best box.
+    pub(super) outlines: Vec<Vec<Ray>>,
+    /// The fused boxes within the frame.
+    pub(super) crop_targets: Vec<CropTarget>,
 }
 
-/// Returns the boxes of possible persons, highest score first, as targets for crops.
-pub(super) fn crop_targets(
+/// Merges the boxes of the first pass into targets of the second.
+pub(super) fn second_pass_targets(
     passes: &[Pass],
+    rig: &CameraRig,
     back_projection: BackProjection,
-    parameters: &RefinementParameters,
-) -> Vec<CropTarget> {
-    let Some(Pass { rig, .. }) = passes.first() else {
-        return Vec::new();
-    };
-    let (_, merged) = merged(passes, rig, back_projection, parameters);
-    let within = merged.iter().filter_map(|merged| {
+) -> SecondPassTargets {
+    let (mapped, merged) = merged(passes, rig, back_projection, &TARGET_REFINEMENT);
+    let best = merged.iter().filter_map(|merged| merged.members.first());
+    let unit = |rays: &[Ray]| rays.iter().map(Ray::normalize).collect();
+    let outlines = best.map(|&member| unit(mapped[member].footprint.rays()));
+    let geometry = rig.geometry();
+    let crop_targets = merged.iter().filter_map(|merged| {
         let bbox = merged.bbox.clipped_to(rig.frame())?;
         let center = nalgebra::Point2::from(bbox.center());
-        let geometry = rig.geometry();
         Some(CropTarget {
             bbox: bbox.corners(),
             score: merged.score,
             up: vertical_in_frame(center, &geometry.lens, &geometry.mount),
         })
     });
-    within.collect()
+    SecondPassTargets {
+        outlines: outlines.collect(),
+        crop_targets: crop_targets.collect(),
+    }
 }
 
 fn merged(
@@ -189,7 +192,7 @@ fn merged(
 }
 
 fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapped> {
-    let Pass { rig, model, .. } = find.look;
+    let Pass { rig, model, .. } = find.pass;
     let found = find.detection;
     let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
     let is_exact = rig.is_exact();

@@ -3,7 +3,7 @@
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 use crate::{
-    detection::{Refinement, RefinementParameters},
+    detection::Refinement,
     geometry::{BackProjection, FieldOfViewReading, ViewPlan},
 };
 
@@ -67,7 +67,6 @@ impl Profile {
         (self == Self::Quality).then_some(ZoomPass {
             most_views: 40,
             fill: 1.0 / 3.0,
-            candidates: FIRST_PASS_CANDIDATES,
         })
     }
 
@@ -82,7 +81,6 @@ impl Profile {
         Some(CropPass {
             max_crops,
             fill: 0.3,
-            candidates: FIRST_PASS_CANDIDATES,
         })
     }
 
@@ -112,23 +110,12 @@ impl Profile {
     }
 }
 
-/// The refinement that turns boxes of the first pass into candidates for a second pass.
-const FIRST_PASS_CANDIDATES: RefinementParameters = RefinementParameters {
-    refinement: Refinement::Fusion,
-    iou_threshold: 0.5,
-    sigma: 0.3,
-    score_threshold: 0.03,
-    max_detections: 500,
-};
-
 /// A second pass through upright crops of the frame around possible persons.
 pub(super) struct CropPass {
     /// The maximum number of crops.
     pub(super) max_crops: usize,
     /// The share of a crop's side that the larger side of a person's box fills.
     pub(super) fill: f64,
-    /// The refinement that turns boxes of the first pass into crop positions.
-    pub(super) candidates: RefinementParameters,
 }
 
 /// A second pass through zoom views of possible persons.
@@ -138,6 +125,4 @@ pub(super) struct ZoomPass {
     /// The share of a view's shorter side that a person fills. A larger share confirms false
     /// detections: at a high zoom, half a person or a poster resembles a whole person.
     pub(super) fill: f64,
-    /// The refinement that turns boxes of the first pass into zoom views.
-    pub(super) candidates: RefinementParameters,
 }

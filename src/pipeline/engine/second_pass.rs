@@ -4,7 +4,11 @@ use std::{sync::Arc, time::Instant};
 
 use super::{Engine, Observation};
 use crate::{
-    geometry::{crop_placement::place_crops, zoom::zoomed_views},
+    geometry::{
+        Ray,
+        crop_placement::{CropTarget, place_crops},
+        zoom::zoomed_views,
+    },
     inference::Model,
     pipeline::{
         DetectJob, Stage, camera_rig::CameraRig, merge, motion_cache::CameraViews,
@@ -28,14 +32,21 @@ impl Engine {
         }
         let timeline = &job.ticket.timeline;
         timeline.enter(Stage::Refine, Instant::now());
-        let mut planned = self.zoomed(job, observation);
-        planned.extend(self.crops(observation));
+        let targets = merge::second_pass_targets(
+            &observation.passes,
+            &observation.camera.rig,
+            profile.back_projection(),
+        );
+        timeline.enter(Stage::Remap, Instant::now());
+        let mut planned = self.zoomed(job, observation, &targets.outlines);
+        planned.extend(self.crops(observation, &targets.crop_targets));
         let tasks = planned.into_iter().map(|(rig, model)| {
             let rig = Arc::new(rig);
             let cached_views = self.cached_crops(job, &rig, &model);
             let frame = Arc::clone(&observation.frame);
             let ticket = job.ticket.clone();
-            self.network.look(rig, model, frame, ticket, cached_views)
+            self.network
+                .queue_pass(rig, model, frame, ticket, cached_views)
         });
         let tasks: Vec<_> = tasks.collect();
         if tasks.is_empty() {
@@ -61,13 +72,16 @@ impl Engine {
 
     /// Plans zoom views for the model of the first pass. If the request names no model and the
     /// profile has a second model, each of the two models gets half of the views.
-    fn zoomed(&self, job: &DetectJob, observation: &Observation) -> Vec<Planned> {
+    fn zoomed(
+        &self,
+        job: &DetectJob,
+        observation: &Observation,
+        outlines: &[Vec<Ray>],
+    ) -> Vec<Planned> {
         let profile = observation.profile;
         let Some(pass) = profile.zoom_pass() else {
             return Vec::new();
         };
-        let back_projection = profile.back_projection();
-        let outlines = merge::outlines(&observation.passes, back_projection, &pass.candidates);
         let mut models = vec![Arc::clone(&observation.model)];
         if job.parameters.model.is_none() {
             let second = self.options.default_models.second_opinion(profile);
@@ -76,11 +90,10 @@ impl Engine {
         let most_views = pass.most_views / models.len();
         let rig = &observation.camera.rig;
         let (width, height) = (observation.frame.width(), observation.frame.height());
-        job.ticket.timeline.enter(Stage::Remap, Instant::now());
         let rigs = models.into_iter().filter_map(|model| {
             let size = [model.input().width, model.input().height];
             let mount = &rig.geometry().mount;
-            let views = zoomed_views(&outlines, most_views, pass.fill, mount, size);
+            let views = zoomed_views(outlines, most_views, pass.fill, mount, size);
             let tabulate = || rig.with_views(views, width, height);
             let rig = self.remappers.install(tabulate);
             (rig.view_count() > 0).then_some((rig, model))
@@ -89,14 +102,11 @@ impl Engine {
     }
 
     /// Plans upright crops of the frame for the model of the first pass.
-    fn crops(&self, observation: &Observation) -> Option<Planned> {
-        let profile = observation.profile;
-        let pass = profile.crop_pass()?;
-        let back_projection = profile.back_projection();
-        let targets = merge::crop_targets(&observation.passes, back_projection, &pass.candidates);
+    fn crops(&self, observation: &Observation, targets: &[CropTarget]) -> Option<Planned> {
+        let pass = observation.profile.crop_pass()?;
         let model = &observation.model;
         let side = model.input().width.min(model.input().height);
-        let crops = place_crops(&targets, pass.max_crops, pass.fill, side);
+        let crops = place_crops(targets, pass.max_crops, pass.fill, side);
         let (width, height) = (observation.frame.width(), observation.frame.height());
         let rig = &observation.camera.rig;
         let rig = self
