@@ -21,10 +21,6 @@ pub use kept::{StoredFrame, StoredFrameError};
 pub use options::{AnnotationOptions, Layer};
 use sketch::Sketch;
 
-/// Default width of the image of a wider frame, pixels: more than a screen shows, and small enough
-/// that drawing costs no more than decoding.
-const DEFAULT_MAX_WIDTH: u32 = 2048;
-
 /// A file format of images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageFormat {
@@ -69,9 +65,8 @@ fn drawn(
     options: &AnnotationOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<u8>, AnnotationError> {
-    let width = options.width.unwrap_or(DEFAULT_MAX_WIDTH);
-    let mut picture = if frame.width() > width {
-        narrowed(&frame, width)
+    let mut picture = if frame.width() > options.width {
+        narrowed(&frame, options.width)
     } else {
         Arc::unwrap_or_clone(frame)
     };

@@ -27,10 +27,11 @@ parameter_table! {
         example: None,
         interfaces: INTERFACES,
     };
+    // More than a screen shows, and small enough that drawing costs no more than decoding.
     WIDTH = ParameterSpec {
         name: "width",
         kind: ParameterKind::Whole { min: 64, max: 8192 },
-        default: ParameterDefault::Described("the width of the frame, 2048 at most"),
+        default: ParameterDefault::Value("2048"),
         help: "Maximum width of an annotated image, pixels. A narrower frame is not enlarged.",
         example: Some("640"),
         interfaces: INTERFACES,
@@ -69,8 +70,8 @@ pub enum Layer {
 pub struct AnnotationOptions {
     /// The layers, each once.
     pub layers: Vec<Layer>,
-    /// Width in pixels, 2048 if none is given; a frame that is no wider stays as it is.
-    pub width: Option<u32>,
+    /// Maximum width in pixels. A narrower frame is not enlarged.
+    pub width: u32,
     /// Quality of a JPEG, 1 to 100.
     pub quality: u8,
 }
@@ -90,7 +91,7 @@ impl AnnotationOptions {
         let Layers(layers) = given.value(&DRAW)?;
         Ok(Self {
             layers,
-            width: given.optional(&WIDTH)?,
+            width: given.value(&WIDTH)?,
             quality: given.value(&QUALITY)?,
         })
     }
@@ -128,14 +129,14 @@ mod tests {
         let pairs = [("draw", &*names), ("width", "640"), ("quality", "100")];
         let options = AnnotationOptions::parse(pairs).unwrap();
         assert_eq!(options.layers, <Layer as VariantArray>::VARIANTS);
-        assert_eq!((options.width, options.quality), (Some(640), 100));
+        assert_eq!((options.width, options.quality), (640, 100));
     }
 
     #[test]
     fn defaults_are_those_of_the_table() {
         let default = AnnotationOptions::parse([]).unwrap();
         assert_eq!(default.layers, [Layer::Oriented, Layer::Scores]);
-        assert_eq!((default.width, default.quality), (None, 88));
+        assert_eq!((default.width, default.quality), (2048, 88));
         let none = AnnotationOptions::parse([("draw", "none")]).unwrap();
         assert!(none.layers.is_empty());
     }
