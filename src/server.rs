@@ -16,7 +16,6 @@ use hyper::{
 use tokio::{
     net::{TcpListener, TcpStream},
     task::JoinSet,
-    time::timeout,
 };
 use tower::{BoxError, Service};
 
@@ -27,9 +26,9 @@ use self::{
 };
 use crate::{metrics::Metrics, shutdown::Shutdown, tls::Tls};
 
-/// Longest time for the handshake and the head on a connection beyond the limit. A probe needs
-/// milliseconds.
-const HEADER_TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_millis(500);
+/// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe
+/// needs milliseconds.
+const TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_millis(500);
 
 /// The limits of connections.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,15 +92,14 @@ pub async fn serve<S, B>(
     let mut connections = JoinSet::new();
     let serve_on = |stream: TcpStream, permit: ConnectionPermit| {
         let is_regular = permit.is_regular();
-        let (service, header_timeout) = if is_regular {
-            (services.regular.clone(), limits.header_timeout)
+        let (service, max_duration) = if is_regular {
+            (services.regular.clone(), Duration::MAX)
         } else {
-            let timeout = limits.header_timeout.min(HEADER_TIMEOUT_BEYOND_LIMIT);
-            (services.beyond_limit.clone(), timeout)
+            (services.beyond_limit.clone(), TIMEOUT_BEYOND_LIMIT)
         };
         let rules = Rules {
             limits: ConnectionLimits {
-                header_timeout,
+                header_timeout: limits.header_timeout.min(max_duration),
                 ..limits.clone()
             },
             one_request_only: !is_regular,
@@ -114,14 +112,7 @@ pub async fn serve<S, B>(
                 match tls {
                     None => connection::serve(stream, service, rules).await,
                     Some(tls) => {
-                        let handshake = tls.accept(stream);
-                        let stream = if is_regular {
-                            handshake.await
-                        } else {
-                            let within = HEADER_TIMEOUT_BEYOND_LIMIT;
-                            timeout(within, handshake).await.ok().flatten()
-                        };
-                        if let Some(stream) = stream {
+                        if let Some(stream) = tls.accept(stream, max_duration).await {
                             connection::serve(stream, service, rules).await;
                         }
                     }

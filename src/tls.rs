@@ -12,6 +12,7 @@ mod validity;
 use std::{
     num::NonZeroU64,
     sync::{Arc, Mutex, PoisonError, RwLock},
+    time::Duration,
 };
 
 use jiff::Timestamp;
@@ -84,11 +85,16 @@ impl Tls {
     }
 
     /// Performs the TLS handshake of a connection. Returns `None` if it fails, is refused, or takes
-    /// too long.
-    pub async fn accept(&self, connection: TcpStream) -> Option<TlsStream<TcpStream>> {
+    /// longer than the handshake timeout or `max_duration`.
+    pub async fn accept(
+        &self,
+        connection: TcpStream,
+        max_duration: Duration,
+    ) -> Option<TlsStream<TcpStream>> {
+        let max_duration = max_duration.min(self.options.handshake_timeout);
         let config = Arc::clone(&self.serving().config);
         let handshake = shake_hands(connection, config);
-        let (result, encrypted) = match timeout(self.options.handshake_timeout, handshake).await {
+        let (result, encrypted) = match timeout(max_duration, handshake).await {
             Ok(Ok(encrypted)) => ("success", Some(encrypted)),
             Ok(Err(error)) => {
                 tracing::debug!("a TLS handshake failed: {error}");
