@@ -9,7 +9,7 @@ impl App {
     /// and calibrations, and lines on the clients that have access. Blocks.
     ///
     /// # Errors
-    /// When a model cannot be loaded.
+    /// Returns an error if a model cannot be loaded.
     pub fn check(&self) -> anyhow::Result<String> {
         for name in &self.to_load {
             self.models.load(name)?;

@@ -49,7 +49,7 @@ impl Calibrations {
             succeeded: AtomicU64::new(0),
             failed: AtomicU64::new(0),
         };
-        calibrations.look(&calibrations.lock())?;
+        calibrations.scan(&calibrations.lock())?;
         Ok(calibrations)
     }
 

@@ -117,7 +117,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let mut output = Output::new(arguments);
     if arguments.from_detections.is_empty() {
-        look(arguments, &mut output)?;
+        detect_groups(arguments, &mut output)?;
     } else {
         let data_set = arguments.truth.open(&arguments.settings_file)?;
         for path in saved_rows(&arguments.from_detections)? {
@@ -129,7 +129,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 /// Runs every profile on the data set.
-fn look(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
+fn detect_groups(arguments: &Arguments, output: &mut Output) -> anyhow::Result<()> {
     let groups = variants::groups(arguments)?;
     let settings = arguments.settings_file.load()?;
     let data_set = arguments.truth.open(&arguments.settings_file)?;

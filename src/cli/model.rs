@@ -85,7 +85,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         writeln!(out, "sample       none: give one with --sample").context(UNWRITABLE)?;
         return Ok(ExitCode::SUCCESS);
     };
-    let detected = look(&settings, &sample, profile)?;
+    let detected = detect(&settings, &sample, profile)?;
     let persons = &detected.report.persons;
     let views = detected.report.views.inferred;
     writeln!(
@@ -142,7 +142,7 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
 }
 
 /// Detects persons in the sample with the model of the settings.
-fn look(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
+fn detect(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
     let parameters = DetectParameters::parse([("profile", profile)])?;
     let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
     let image = std::fs::read(sample)

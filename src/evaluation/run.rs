@@ -62,14 +62,14 @@ pub fn detect(
         return Ok(Vec::new());
     };
     let seen = in_order(&data_set.images, at_once, |image| {
-        let seen = look(engine, image, first, variants);
+        let seen = evaluate_image(engine, image, first, variants);
         done();
         seen
     })?;
     Ok(rows(seen, variants))
 }
 
-fn look(
+fn evaluate_image(
     engine: &Engine,
     image: &DataSetImage,
     first: &DetectParameters,

@@ -240,7 +240,7 @@ impl Engine {
             return Ok(observation);
         }
         timeline.enter(Stage::Queue, Instant::now());
-        let first = self.network.look(
+        let first = self.network.queue_pass(
             Arc::clone(&observation.camera.rig),
             Arc::clone(&observation.model),
             Arc::clone(&observation.frame),

@@ -132,7 +132,7 @@ impl CameraViews {
     }
 
     /// Returns the cached detections of a view, if nothing has moved in it since.
-    pub(super) fn still(
+    pub(super) fn lookup(
         &self,
         view: usize,
         signature: &ViewSignature,
@@ -145,12 +145,7 @@ impl CameraViews {
     }
 
     /// Stores the detections of a view.
-    pub(super) fn remember(
-        &self,
-        view: usize,
-        signature: ViewSignature,
-        found: Vec<ViewDetection>,
-    ) {
+    pub(super) fn store(&self, view: usize, signature: ViewSignature, found: Vec<ViewDetection>) {
         self.lock()[view] = Some(CachedView {
             signature,
             found,

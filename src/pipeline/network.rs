@@ -80,7 +80,7 @@ impl Network {
 
     /// Queues the views of a rig. [`PassTask::wait`] returns their detections. Views without motion
     /// according to `seen_before` skip the network.
-    pub(super) fn look(
+    pub(super) fn queue_pass(
         &self,
         rig: Arc<CameraRig>,
         model: Arc<Model>,

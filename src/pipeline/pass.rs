@@ -21,7 +21,7 @@ pub(super) struct Pass {
 /// A detection in one view of a pass.
 #[derive(Clone, Copy)]
 pub(super) struct PassDetection<'a> {
-    pub(super) look: &'a Pass,
+    pub(super) pass: &'a Pass,
     /// The index of the view in its rig.
     pub(super) view: usize,
     /// The number of the view, unique over all passes.
@@ -40,7 +40,7 @@ pub(super) fn detections(passes: &[Pass]) -> impl Iterator<Item = PassDetection<
         let views = pass.per_view.iter().enumerate();
         views.flat_map(move |(view, found)| {
             found.iter().map(move |detection| PassDetection {
-                look: pass,
+                pass,
                 view,
                 number: first + view,
                 detection,

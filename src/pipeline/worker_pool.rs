@@ -130,7 +130,7 @@ impl WorkerPool {
     ) -> Result<T, PipelineError> {
         let ticket = job.ticket.clone();
         ticket.timeline.enter(Stage::Queue, job.arrived);
-        let work = move |engine: &Engine| engine.look(&job).map(finish);
+        let work = move |engine: &Engine| engine.infer_views(&job).map(finish);
         self.queue(ticket, work).await
     }
 

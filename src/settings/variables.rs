@@ -23,8 +23,8 @@ pub(crate) fn variable_of(key: &str) -> String {
 /// The key that a variable sets; `None` for a variable that is no setting.
 ///
 /// # Errors
-/// When there is no such key, or when the name has a single underscore after `LOOKDOWN` and two
-/// underscores later: then it was meant for a setting.
+/// Returns an error if there is no such key, or if the name has a single underscore after
+/// `LOOKDOWN` and two underscores later: such a name was meant for a setting.
 pub(super) fn key_of(name: &str, entries: &[Entry]) -> Result<Option<String>, SettingsError> {
     let upper = name.to_uppercase();
     let key = |rest: &str| rest.to_lowercase().replace(SEPARATOR, ".");

@@ -68,7 +68,7 @@ fn yaml_and_toml_have_them_too_and_a_written_file_keeps_them() {
         lost.contains(&"opencv has no masks: those of the calibration (1) are left out".to_owned())
             && lost
                 .iter()
-                .any(|told| told.starts_with("opencv has no zones")),
+                .any(|warning| warning.starts_with("opencv has no zones")),
         "{lost:?}"
     );
 }

@@ -64,7 +64,7 @@ impl Calibrations {
         let (entry, written) = import(id, &name, content, reading)?;
         let changing = self.lock();
         // What others have stored since the last look counts, too.
-        self.look(&changing)?;
+        self.scan(&changing)?;
         let before = self.now();
         let replaced = before.entry(id);
         condition.check(replaced.map(Arc::as_ref))?;
@@ -79,7 +79,7 @@ impl Calibrations {
         others
             .filter(|other| *other != name)
             .try_for_each(|hidden| self.store.delete(hidden))
-            .and_then(|()| self.look(&changing))
+            .and_then(|()| self.scan(&changing))
             .map_err(ChangeError::Unseen)?;
         Ok(Put {
             entry: Arc::new(entry),
@@ -100,7 +100,7 @@ impl Calibrations {
             return Err(ChangeError::NotWritable);
         }
         let changing = self.lock();
-        self.look(&changing)?;
+        self.scan(&changing)?;
         let before = self.now();
         let entry = before.entry(id);
         let file = before.files.get(id);
@@ -122,7 +122,7 @@ impl Calibrations {
         for name in file.names().rev() {
             self.store.delete(name)?;
         }
-        self.look(&changing).map_err(ChangeError::Unseen)
+        self.scan(&changing).map_err(ChangeError::Unseen)
     }
 }
 

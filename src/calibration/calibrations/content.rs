@@ -42,13 +42,13 @@ pub(super) fn cameras(
     let checked = file.calibrations(stem.as_str(), content);
     let is_alone = checked.len() == 1;
     let cameras = file.cameras.into_iter().zip(checked);
-    let cameras = cameras.map(|(told, (id, checked))| {
+    let cameras = cameras.map(|(described, (id, checked))| {
         let entry = if is_alone && id != stem.as_str() {
             let problem =
                 format!("it is {id:?}, but the file's name says \"{stem}\": make them equal");
             Err(FormatError::invalid("id", problem))
         } else {
-            checked.and_then(|calibration| entry(calibration, told, name))
+            checked.and_then(|calibration| entry(calibration, described, name))
         };
         (id, entry)
     });
@@ -57,21 +57,21 @@ pub(super) fn cameras(
 
 fn entry(
     calibration: Calibration,
-    told: FileCamera,
+    described: FileCamera,
     name: &str,
 ) -> Result<CalibrationEntry, FormatError> {
-    let told = told.camera?;
+    let described = described.camera?;
     let (width, height) = calibration.image_size();
     Ok(CalibrationEntry {
         native: NativeCalibration {
             id: calibration.id().to_string(),
             image: NativeImage { width, height },
-            lens: told.lens,
-            mount: told.mount,
-            zones: told.zones,
-            masks: told.masks,
+            lens: described.lens,
+            mount: described.mount,
+            zones: described.zones,
+            masks: described.masks,
         },
-        notes: told.notes,
+        notes: described.notes,
         calibration: Arc::new(calibration),
         file: name.to_owned(),
     })
@@ -130,8 +130,8 @@ pub(super) fn import(
             names: names.iter().map(|name| shown(name)).collect(),
         });
     };
-    let told = file.cameras.swap_remove(chosen);
-    file.cameras = vec![told];
+    let described = file.cameras.swap_remove(chosen);
+    file.cameras = vec![described];
     let (found, checked) = file.calibrations(id.as_str(), content).swap_remove(0);
     if found != id.as_str() {
         let problem = format!("it is {found:?}, but the address says \"{id}\": make them equal");

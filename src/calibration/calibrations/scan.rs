@@ -21,7 +21,7 @@ impl Calibrations {
     /// [`Calibrations::health`], and leave the affected calibrations unchanged. Blocks.
     pub fn refresh(&self) {
         let changing = self.lock();
-        if let Err(error) = self.look(&changing) {
+        if let Err(error) = self.scan(&changing) {
             let problem = error.to_string();
             let now = self.now();
             if now.store_problem.as_ref() != Some(&problem) {
@@ -34,7 +34,7 @@ impl Calibrations {
     }
 
     /// Lists the store and reads what has changed.
-    pub(super) fn look(&self, _changing: &MutexGuard<'_, ()>) -> Result<(), StoreError> {
+    pub(super) fn scan(&self, _changing: &MutexGuard<'_, ()>) -> Result<(), StoreError> {
         let before = self.now();
         let listed = by_id(self.store.list()?);
         let gone = before.files.keys().filter(|id| !listed.contains_key(id));

@@ -143,7 +143,7 @@ fn a_store_that_fails_leaves_everything_serving() {
 }
 
 #[test]
-fn a_file_that_cannot_be_read_is_tried_again_and_told_once() {
+fn an_unreadable_file_is_retried_and_reported_once() {
     /// Lists a file that it does not have.
     #[derive(Debug)]
     struct Liar;

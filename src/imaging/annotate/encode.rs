@@ -33,7 +33,7 @@ pub fn encode_jpeg(frame: &Frame, quality: u8) -> Result<Vec<u8>, EncodeError> {
 /// Encodes the frame as PNG, without loss.
 ///
 /// # Errors
-/// When the encoder fails. No frame is known to cause this.
+/// Returns an error if the encoder fails. No frame is known to cause this.
 pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     encode(frame, "PNG", PngEncoder::new(&mut bytes))?;

@@ -15,7 +15,7 @@ impl Engine {
     ///
     /// # Errors
     /// Returns a [`PipelineError`], which distinguishes client and server faults.
-    pub fn look(&self, job: &ViewsJob) -> Result<HeadOutput, PipelineError> {
+    pub fn infer_views(&self, job: &ViewsJob) -> Result<HeadOutput, PipelineError> {
         let input = job.model.input();
         let views = job.model.batch_of(self.options.batches.max_views).get();
         let session = self.next_session.fetch_add(1, Ordering::Relaxed);

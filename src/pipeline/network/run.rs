@@ -44,7 +44,7 @@ impl ViewJob<'_> {
         task.rig.render_view(view, &task.frame, input, slot);
         if let Some(seen_before) = &task.seen_before {
             let signature = ViewSignature::of(slot, input);
-            self.still = seen_before.still(view, &signature);
+            self.still = seen_before.lookup(view, &signature);
             self.signature = Some(signature);
         }
     }
@@ -59,7 +59,7 @@ impl ViewJob<'_> {
         }
         let found = now();
         if let (Some(seen_before), Some(signature)) = (&self.task.seen_before, self.signature) {
-            seen_before.remember(self.view, signature, found.clone());
+            seen_before.store(self.view, signature, found.clone());
         }
         SeenView {
             found,

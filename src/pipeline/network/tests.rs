@@ -97,7 +97,8 @@ impl Bench {
     fn submit(&self, brightness: u8, ticket: Ticket) -> Arc<PassTask> {
         let frame = Frame::new(64, 64, vec![brightness; 64 * 64 * 3]).unwrap();
         let (rig, model) = (Arc::clone(&self.rig), Arc::clone(&self.model));
-        self.network.look(rig, model, Arc::new(frame), ticket, None)
+        self.network
+            .queue_pass(rig, model, Arc::new(frame), ticket, None)
     }
 
     /// Returns the next run: its view count and the brightness of its first view.

@@ -31,18 +31,18 @@ impl<T: ObjectStore + PaginatedListStore> Objects for T {}
 /// A provider's client, as its variables say.
 macro_rules! client {
     ($builder:ty, $client_key:path, $prefix:literal, $url:expr, $variables:expr) => {{
-        let told = <$builder>::new().with_url($url.as_str());
-        let told = $variables
+        let builder = <$builder>::new().with_url($url.as_str());
+        let builder = $variables
             .filter(|(name, _)| name.starts_with($prefix))
-            .fold(told, |told, (name, value)| {
+            .fold(builder, |builder, (name, value)| {
                 match name.to_ascii_lowercase().parse() {
-                    Ok(key) => told.with_config(key, value),
+                    Ok(key) => builder.with_config(key, value),
                     // Meant for other programs.
-                    Err(_) => told,
+                    Err(_) => builder,
                 }
             });
-        let bounded = BOUNDS.iter().fold(told, |told, (key, value)| {
-            told.with_config($client_key(*key), *value)
+        let bounded = BOUNDS.iter().fold(builder, |builder, (key, value)| {
+            builder.with_config($client_key(*key), *value)
         });
         let client = bounded.with_retry(retries()).build();
         client.map(|client| Arc::new(client) as Arc<dyn Objects>)

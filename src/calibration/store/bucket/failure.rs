@@ -72,14 +72,14 @@ fn answer(error: &Error) -> String {
         words.len() <= MAX_WORDS
             && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == ' ')
     };
-    let told: Vec<_> = [status, code]
+    let known: Vec<_> = [status, code]
         .into_iter()
         .flatten()
         .filter(is_plain)
         .collect();
-    if told.is_empty() {
+    if known.is_empty() {
         String::new()
     } else {
-        format!(" ({})", told.join(", "))
+        format!(" ({})", known.join(", "))
     }
 }

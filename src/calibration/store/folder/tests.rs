@@ -50,7 +50,7 @@ fn later_write_removes_only_abandoned_temporary_files() {
 }
 
 #[test]
-fn a_write_replaces_only_what_it_was_told_to() {
+fn a_write_replaces_only_the_expected_content() {
     let folder = tempfile::tempdir().unwrap();
     let store = FolderStore::new(folder.path());
     store
