@@ -114,7 +114,7 @@ async fn an_invalid_image_is_no_error_in_the_log() {
     let answer = service.send(request("POST", path, "no-image", body)).await;
     assert_eq!(answer.status, 415);
     let lines = log.of("no-image");
-    assert_eq!(levels(&lines), ["INFO"], "{lines:#?}");
+    assert_eq!(levels(&lines), ["DEBUG"], "{lines:#?}");
     assert!(!log.text().contains("no picture"));
 }
 
