@@ -71,7 +71,7 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
         if CONVERTERS in arguments:
             PrivatePython(places, CONVERTERS).install("converter", pins.converter)
         if S3_SERVER in arguments:
-            listed = places.root / "tests" / "buckets" / "requirements.txt"
+            listed = places.root / "tests" / "files" / "buckets" / "requirements.txt"
             PrivatePython(places, S3_SERVER).install_file(listed, "--require-hashes")
         if AUDITOR in arguments:
             PrivatePython(places, AUDITOR).install(AUDITOR, pins.auditor)

@@ -2,9 +2,12 @@
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod calibration;
+mod evaluate;
 mod evaluation;
 mod health;
 mod keys;
+mod samples;
+mod serve;
 mod shell;
 
 use std::process::{Command, Output};

@@ -1,4 +1,4 @@
-//! Tests of the mask of a rotated box. Known answers are in `tests/evaluation_vectors.rs`.
+//! Tests of the mask of a rotated box. Known answers are in `tests/known_answers/evaluation.rs`.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,4 +1,4 @@
-//! Tests of the assignment to strata. Known answers are in `tests/evaluation_vectors.rs`.
+//! Tests of the assignment to strata. Known answers are in `tests/known_answers/evaluation.rs`.
 
 use std::path::PathBuf;
 

@@ -1,0 +1,304 @@
+//! `lookdown serve` as a process: the errors at its start, and its shutdown.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Lines, Read, Write},
+    net::{TcpListener, TcpStream},
+    path::Path,
+    process::{Child, ChildStderr, Command, Output, Stdio},
+};
+
+const LOOKDOWN: &str = env!("CARGO_BIN_EXE_lookdown");
+const FREE_ADDRESS: (&str, &str) = ("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:0");
+const NO_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "0");
+const LONG_GRACE: (&str, &str) = ("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "600000");
+
+fn run(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
+    Command::new(LOOKDOWN)
+        .args(arguments)
+        // The log may hold more about the same error, for example of a model that cannot be loaded.
+        .envs([FREE_ADDRESS, ("LOOKDOWN__LOG__FILTER", "off")])
+        .envs(environment.iter().copied())
+        .output()
+        .unwrap()
+}
+
+/// The error sentence of the start. There must be no other output.
+#[track_caller]
+fn refusal(output: &Output) -> String {
+    let message = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(output.stdout.is_empty(), "{output:?}");
+    assert_eq!(message.lines().count(), 1, "{message}");
+    message
+}
+
+#[test]
+fn every_invalid_setting_ends_the_start_with_a_sentence() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let taken = taken.local_addr().unwrap().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let text = path("notes.txt");
+    fs::write(&text, "nothing of use").unwrap();
+    let other_sum = path("other_sum");
+    fs::create_dir(&other_sum).unwrap();
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models/pairs.onnx");
+    fs::copy(fixture, Path::new(&other_sum).join("model.onnx")).unwrap();
+    let manifest = format!(
+        "name = \"other_sum\"\nonnx = \"model.onnx\"\nsha256 = \"{}\"\n",
+        "0".repeat(64)
+    );
+    fs::write(Path::new(&other_sum).join("model.toml"), manifest).unwrap();
+
+    let cases: [(&str, &str, &[&str]); 17] = [
+        ("SERVER__LISTN", "127.0.0.1:1", &["server", "`listn`"]),
+        (
+            "SERVER__LISTEN",
+            "localhost",
+            &["server.listen", "127.0.0.1:8080"],
+        ),
+        (
+            "SERVER__LISTEN",
+            &taken,
+            &["server.listen", &taken, "in use"],
+        ),
+        (
+            "SERVER__LISTEN",
+            "192.0.2.1:80",
+            &["server.listen", "192.0.2.1:80"],
+        ),
+        (
+            "SERVER__METRICS_LISTEN",
+            &taken,
+            &["server.metrics_listen", &taken, "in use"],
+        ),
+        (
+            "SERVER__MAX_CONNECTIONS",
+            "0",
+            &["server.max_connections", "from 1"],
+        ),
+        (
+            "CALIBRATIONS__PATH",
+            "/nowhere",
+            &["calibrations.path", "/nowhere"],
+        ),
+        ("CALIBRATIONS__PATH", &text, &["calibrations.path", &text]),
+        (
+            "ACCESS__KEYS_FILE",
+            "/nowhere",
+            &["access.keys_file", "/nowhere"],
+        ),
+        ("ACCESS__KEYS_FILE", &text, &["access.keys_file", &text]),
+        (
+            "INFERENCE__LIBRARY_PATH",
+            "/nowhere.so",
+            &["inference.library_path", "make setup"],
+        ),
+        (
+            "INFERENCE__LIBRARY_PATH",
+            &text,
+            &["inference.library_path", &text],
+        ),
+        ("MODEL__PATH", "/nowhere", &["model.path", "/nowhere"]),
+        ("MODEL__PATH", &text, &[&text]),
+        (
+            "MODEL__PATH",
+            &other_sum,
+            &["other_sum", "SHA-256", "fetch it again"],
+        ),
+        (
+            "MODEL__REPOSITORY",
+            "/nowhere",
+            &["model.repository", "make setup"],
+        ),
+        ("MODEL__ALSO_LOAD", "no_such_model", &["no_such_model"]),
+    ];
+    for (variable, value, parts) in cases {
+        let variable = format!("LOOKDOWN__{variable}");
+        for arguments in [&["serve"][..], &["serve", "--check"]] {
+            let message = refusal(&run(arguments, &[(&variable, value)]));
+            for part in parts {
+                assert!(
+                    message.contains(part),
+                    "{variable}: {message:?} lacks {part:?}"
+                );
+            }
+        }
+    }
+    let message = refusal(&run(&["serve", "--config", "/nowhere.toml"], &[]));
+    assert!(
+        message.contains("/nowhere.toml") && message.contains("--config"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_check_reports_models_and_access_and_serves_no_client() {
+    let address = TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let listen = address.to_string();
+    let check = |variables: &[(&str, &str)]| {
+        let mut variables = variables.to_vec();
+        variables.push(("LOOKDOWN__SERVER__LISTEN", &listen));
+        let output = run(&["serve", "--check"], &variables);
+        assert!(output.status.success(), "{output:?}");
+        assert!(output.stderr.is_empty(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let open = check(&[]);
+    assert!(
+        open.starts_with(&format!("ready to serve on {listen}: ")),
+        "{open}"
+    );
+    assert!(open.contains("ssdlite_mobilenet_v2"), "{open}");
+    assert!(open.contains("access: open, without API keys"), "{open}");
+    let keys = format!("gate:detect+read:{:064}", 7);
+    let keyed = check(&[("LOOKDOWN__ACCESS__KEYS", &keys)]);
+    assert!(
+        keyed.contains(&format!("access: {listen} needs an API key; 1 known")),
+        "{keyed}"
+    );
+    assert!(keyed.contains("\n  gate: detect, read\n"), "{keyed}");
+}
+
+/// A running server.
+struct Server {
+    process: Child,
+    log: Lines<BufReader<ChildStderr>>,
+    port: String,
+}
+
+impl Server {
+    /// Starts a server by a shell after `preparation`, and waits until it is ready.
+    fn start(preparation: &str, environment: &[(&str, &str)]) -> Self {
+        let mut process = Command::new("sh")
+            .args(["-c", &format!("{preparation}\nexec {LOOKDOWN} serve")])
+            .envs([FREE_ADDRESS])
+            .envs(environment.iter().copied())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let log = BufReader::new(process.stderr.take().unwrap()).lines();
+        let mut server = Self {
+            process,
+            log,
+            port: String::new(),
+        };
+        let line = server.says("listening on http");
+        let (_, rest) = line.split_once("://127.0.0.1:").unwrap();
+        rest.split_once(',').unwrap().0.clone_into(&mut server.port);
+        server.says("ready: try curl");
+        server
+    }
+
+    /// The next log line that contains this text.
+    fn says(&mut self, part: &str) -> String {
+        let mut lines = self.log.by_ref().map(Result::unwrap);
+        let line = lines.find(|line| line.contains(part));
+        line.unwrap_or_else(|| panic!("the log does not say {part:?}"))
+    }
+
+    fn connect(&self) -> TcpStream {
+        TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap()
+    }
+
+    fn signal(&self, name: &str) {
+        let kill = format!("kill -{name} {}", self.process.id());
+        let sent = Command::new("sh").args(["-c", &kill]).status();
+        assert!(sent.unwrap().success());
+    }
+
+    /// Waits for a successful exit, and returns the rest of the log.
+    fn has_ended(mut self) -> Vec<String> {
+        let rest = self.log.by_ref().map(Result::unwrap).collect();
+        assert!(self.process.wait().unwrap().success());
+        rest
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        // It still runs only if a test has failed.
+        let _ = self.process.kill();
+    }
+}
+
+#[test]
+fn sigterm_shuts_down_gracefully() {
+    let mut server = Server::start("", &[NO_GRACE]);
+    server.signal("TERM");
+    server.says("stopping");
+    let rest = server.has_ended();
+    assert!(rest.last().unwrap().contains("stopped"), "{rest:?}");
+}
+
+#[test]
+fn sigint_shuts_down_without_a_grace_period() {
+    let server = Server::start("", &[LONG_GRACE]);
+    server.signal("INT");
+    server.has_ended();
+}
+
+#[test]
+fn a_second_signal_ends_the_server_at_once() {
+    let mut server = Server::start("", &[LONG_GRACE]);
+    server.signal("TERM");
+    server.says("stopping");
+    // A model is still being loaded, which must not crash the process.
+    server.signal("TERM");
+    // The process ends before the grace period is over.
+    server.has_ended();
+}
+
+#[test]
+fn lack_of_file_descriptors_is_logged_once_and_recovered_from() {
+    // With a single model, a ready server opens no more files.
+    let model = ("LOOKDOWN__MODEL__PATH", "models/ssdlite_mobilenet_v2");
+    let mut server = Server::start("ulimit -n 64", &[NO_GRACE, model]);
+    let held: Vec<_> = (0..100).map(|_| server.connect()).collect();
+    let complaint = "connections cannot be accepted";
+    server.says(complaint);
+    drop(held);
+    let mut connection = server.connect();
+    connection
+        .write_all(b"GET /livez HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n\r\n")
+        .unwrap();
+    let mut answer = String::new();
+    connection.read_to_string(&mut answer).unwrap();
+    assert!(answer.contains("200 OK"), "{answer}");
+    server.signal("TERM");
+    let rest = server.has_ended();
+    assert!(
+        !rest.iter().any(|line| line.contains(complaint)),
+        "{rest:?}"
+    );
+}
+
+#[test]
+fn health_check_over_tls_accepts_any_certificate_name() {
+    let pair = rcgen::generate_simple_self_signed(["lookdown.example".to_owned()]).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let written = |name: &str, content: String| {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let certificate = written("server.pem", pair.cert.pem());
+    let private_key = written("server.key", pair.signing_key.serialize_pem());
+    let tls = [
+        ("LOOKDOWN__SERVER__TLS__CERTIFICATE", &*certificate),
+        ("LOOKDOWN__SERVER__TLS__PRIVATE_KEY", &*private_key),
+    ];
+    let server = Server::start("", &[NO_GRACE, tls[0], tls[1]]);
+    let address = format!("127.0.0.1:{}", server.port);
+    let output = run(
+        &["health"],
+        &[("LOOKDOWN__SERVER__LISTEN", &address), tls[0], tls[1]],
+    );
+    assert!(output.status.success(), "{output:?}");
+    server.signal("TERM");
+    server.has_ended();
+}

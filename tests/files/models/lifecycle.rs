@@ -1,0 +1,250 @@
+//! Loading, reloading and unloading of models, and the state after failures.
+
+use std::{
+    fs,
+    num::NonZeroUsize,
+    sync::{
+        Arc, Barrier,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+};
+
+use lookdown::inference::{
+    InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
+};
+use tempfile::TempDir;
+
+use crate::models::folder::{fixture, model_of_two_sessions, write};
+
+const OTHER_ORDER: &str = "[input]\nchannel_order = \"bgr\"";
+
+/// Options for the models in a folder. `a` must stay loaded.
+fn options_of(folder: &TempDir) -> RepositoryOptions {
+    RepositoryOptions {
+        folder: ModelFolder {
+            path: folder.path().to_owned(),
+            elsewhere: None,
+        },
+        warm_up_views: NonZeroUsize::new(3).unwrap(),
+        kept: vec!["a".to_owned()],
+    }
+}
+
+struct Models {
+    repository: ModelRepository,
+    folder: TempDir,
+}
+
+impl Models {
+    /// A repository with the models `a` and `b`. `a` must stay loaded.
+    fn new() -> Self {
+        let folder = TempDir::new().unwrap();
+        for name in ["a", "b"] {
+            write(&folder.path().join(name), name, "", &fixture("any_batch"));
+        }
+        Self {
+            repository: ModelRepository::new(options_of(&folder), Box::new(model_of_two_sessions)),
+            folder,
+        }
+    }
+
+    fn write(&self, name: &str, more: &str, onnx: &str) {
+        write(&self.folder.path().join(name), name, more, &fixture(onnx));
+    }
+
+    fn revision(&self, name: &str) -> Option<String> {
+        let model = self.repository.registry().get(name);
+        model.map(|model| model.revision().to_owned())
+    }
+
+    fn row(&self, name: &str) -> RepositoryRow {
+        let rows = self.repository.rows();
+        rows.into_iter().find(|row| row.name == name).unwrap()
+    }
+
+    fn counts(&self) -> (u64, u64) {
+        let counts = self.repository.load_counts();
+        (counts.succeeded, counts.failed)
+    }
+}
+
+#[test]
+fn models_are_loaded_listed_and_unloaded_by_name() {
+    let models = Models::new();
+    let states = || {
+        let rows = models.repository.rows();
+        let states = rows
+            .iter()
+            .map(|row| (row.name.clone(), row.revision.is_some()));
+        states.collect::<Vec<_>>()
+    };
+    let state = |name: &str, loaded| (name.to_owned(), loaded);
+    assert_eq!(states(), [state("a", false), state("b", false)]);
+    models.repository.load("a").unwrap();
+    models.repository.load("b").unwrap();
+    assert_eq!(states(), [state("a", true), state("b", true)]);
+    models.repository.unload("b").unwrap();
+    assert_eq!(states(), [state("a", true), state("b", false)]);
+    let again = models.repository.unload("b").unwrap_err();
+    assert!(
+        matches!(again, RepositoryError::NotLoaded { .. }),
+        "{again}"
+    );
+    let kept = models.repository.unload("a").unwrap_err();
+    assert!(matches!(kept, RepositoryError::Kept { .. }), "{kept}");
+    assert_eq!(models.counts(), (2, 0));
+}
+
+#[test]
+fn only_what_is_in_the_folder_can_be_loaded() {
+    let models = Models::new();
+    let long = "x".repeat(1000);
+    for name in ["c", "", ".", "..", "../a", "a/../b", "/etc", &long] {
+        let error = models.repository.load(name).err().unwrap();
+        assert!(matches!(error, RepositoryError::Unknown { .. }), "{error}");
+        assert!(error.to_string().ends_with("there are a, b") && error.to_string().len() < 200);
+    }
+    write(
+        &models.folder.path().join("c"),
+        "a",
+        "",
+        &fixture("any_batch"),
+    );
+    let error = models.repository.load("c").err().unwrap().to_string();
+    assert!(error.contains("has the name \"a\""), "{error}");
+}
+
+#[test]
+fn a_model_with_changed_files_is_replaced_once_they_are_stable() {
+    let models = Models::new();
+    models.repository.load("a").unwrap();
+    let before = models.revision("a");
+    models.repository.reload_changed();
+    assert_eq!(models.counts(), (1, 0));
+
+    models.write("a", OTHER_ORDER, "any_batch");
+    models.repository.reload_changed();
+    assert_eq!(models.revision("a"), before, "the files may still change");
+    models.repository.reload_changed();
+    let after = models.revision("a");
+    assert_ne!(after, before);
+    models.repository.reload_changed();
+    models.repository.reload_changed();
+    assert_eq!((models.revision("a"), models.counts()), (after, (2, 0)));
+}
+
+#[test]
+fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
+    for (onnx, reason) in [
+        ("external_in_a_branch", "tensors in other files"),
+        ("huge_tensor", "a tensor of more than"),
+        ("four_planes", "32-bit floats"),
+        ("other_names", "\"dets\""),
+        ("balloon", "the network failed"),
+    ] {
+        let models = Models::new();
+        models.repository.load("a").unwrap();
+        let before = models.revision("a");
+        models.write("a", "", onnx);
+        let error = models.repository.load("a").err().unwrap().to_string();
+        assert!(error.contains(reason), "{error}");
+        assert_eq!(models.revision("a"), before);
+        assert_eq!(models.row("a").reason, Some(error));
+        // A refused model is not loaded again until its files change.
+        models.repository.reload_changed();
+        models.repository.reload_changed();
+        assert_eq!(models.counts(), (1, 1));
+
+        models.write("a", OTHER_ORDER, "any_batch");
+        models.repository.reload_changed();
+        models.repository.reload_changed();
+        assert_ne!(models.revision("a"), before);
+        assert_eq!(models.row("a").reason, None);
+    }
+}
+
+#[test]
+fn a_model_with_deleted_files_stays_loaded() {
+    let models = Models::new();
+    models.repository.load("a").unwrap();
+    fs::remove_dir_all(models.folder.path().join("a")).unwrap();
+    models.repository.reload_changed();
+    models.repository.reload_changed();
+    assert!(models.revision("a").is_some());
+    assert_eq!(models.counts(), (1, 0));
+}
+
+#[test]
+fn an_invalid_manifest_is_reported_once_and_changes_nothing() {
+    let models = Models::new();
+    models.repository.load("a").unwrap();
+    fs::write(models.folder.path().join("a/model.toml"), "name = ").unwrap();
+    for _ in 0..4 {
+        models.repository.reload_changed();
+    }
+    assert_eq!(models.counts(), (1, 1));
+    assert!(models.row("a").reason.unwrap().contains("line 1"));
+}
+
+#[test]
+fn nothing_is_unloaded_while_a_model_is_being_loaded() {
+    let Models { folder, .. } = Models::new();
+    let steps = Arc::new(Barrier::new(2));
+    let steps_of_load = Arc::clone(&steps);
+    let repository = ModelRepository::new(
+        options_of(&folder),
+        Box::new(move |path| {
+            steps_of_load.wait();
+            steps_of_load.wait();
+            model_of_two_sessions(path)
+        }),
+    );
+    thread::scope(|scope| {
+        let loading = scope.spawn(|| repository.load("b"));
+        steps.wait();
+        let refused = repository.unload("b").unwrap_err();
+        assert!(matches!(refused, RepositoryError::Busy), "{refused}");
+        steps.wait();
+        loading.join().unwrap().unwrap();
+    });
+    repository.unload("b").unwrap();
+}
+
+#[test]
+fn changed_files_are_retried_after_a_server_outage() {
+    let models = Models::new();
+    let folder = &models.folder;
+    let is_unavailable = Arc::new(AtomicBool::new(false));
+    let unavailable = Arc::clone(&is_unavailable);
+    let repository = ModelRepository::new(
+        options_of(folder),
+        Box::new(move |path| {
+            if unavailable.load(Ordering::Relaxed) {
+                let (url, detail) = ("http://elsewhere".to_owned(), "silence".to_owned());
+                return Err(InferenceError::Remote { url, detail });
+            }
+            model_of_two_sessions(path)
+        }),
+    );
+    let before = repository.load("a").unwrap().revision().to_owned();
+    models.write("a", OTHER_ORDER, "any_batch");
+    is_unavailable.store(true, Ordering::Relaxed);
+    repository.reload_changed();
+    repository.reload_changed();
+    assert_eq!(repository.load_counts().failed, 1);
+    is_unavailable.store(false, Ordering::Relaxed);
+    repository.reload_changed();
+    repository.reload_changed();
+    let now = repository.registry().get("a").unwrap();
+    assert_ne!(now.revision(), before);
+}
+
+#[test]
+fn a_missing_model_file_error_names_the_command_to_fetch_it() {
+    let models = Models::new();
+    fs::remove_file(models.folder.path().join("b/model.onnx")).unwrap();
+    assert!(models.row("b").reason.unwrap().contains("make models"));
+    let error = models.repository.load("b").err().unwrap().to_string();
+    assert!(error.contains("make models"), "{error}");
+}

@@ -1,0 +1,82 @@
+//! The models of `make setup` on the samples.
+
+use std::{fs, sync::Arc, time::Instant};
+
+use jiff::Timestamp;
+use lookdown::{
+    app::engine_for,
+    calibration::Calibration,
+    detection::{BBox, FramePixels},
+    inference::is_fetched,
+    pipeline::{DetectJob, DetectParameters, DetectionReport, Ticket},
+    settings,
+};
+use serde_json::Value;
+
+use crate::models::folder::of_repository;
+
+/// Runs a model on the office sample with a low score threshold.
+fn detect(model: &str) -> DetectionReport {
+    let settings = settings::load(None, []).unwrap();
+    let parameters =
+        DetectParameters::parse([("model", model), ("score_threshold", "0.05")]).unwrap();
+    let engine = engine_for(&settings, std::slice::from_ref(&parameters)).unwrap();
+    let calibration = of_repository("samples/calibrations/office.json");
+    let image = fs::read(of_repository("samples/office.jpg")).unwrap();
+    let job = DetectJob {
+        request_id: "test".to_owned(),
+        received_at: Timestamp::UNIX_EPOCH,
+        arrived: Instant::now(),
+        ticket: Ticket::default(),
+        image: image.into(),
+        parameters,
+        calibration: Some(Arc::new(Calibration::read(&calibration).unwrap())),
+    };
+    engine.detect(&job).unwrap().report
+}
+
+/// Boxes of the persons in the office.
+fn annotated() -> Vec<BBox<FramePixels>> {
+    let file = fs::read_to_string(of_repository("samples/annotations.json")).unwrap();
+    let file: Value = serde_json::from_str(&file).unwrap();
+    let images = file["images"].as_array().unwrap();
+    let is_office = |image: &&Value| image["file_name"] == "office.jpg";
+    let office = &images.iter().find(is_office).unwrap()["id"];
+    let annotations = file["annotations"].as_array().unwrap().iter();
+    let boxes = annotations.filter(|annotation| annotation["image_id"] == *office);
+    let boxes = boxes.map(|annotation| {
+        let [x, y, width, height] = [0, 1, 2, 3].map(|i| annotation["bbox"][i].as_f64().unwrap());
+        BBox::new([x, y, x + width, y + height]).unwrap()
+    });
+    boxes.collect()
+}
+
+#[test]
+fn every_fetched_model_finds_the_persons_of_a_sample() {
+    let folders = fs::read_dir(of_repository("models")).unwrap();
+    let folders = folders.map(|entry| entry.unwrap().path());
+    let fetched: Vec<_> = folders.filter(|folder| is_fetched(folder)).collect();
+    assert!(
+        fetched.len() >= 2,
+        "`make setup` installs two models: {fetched:?}"
+    );
+    let annotated = annotated();
+    for folder in fetched {
+        let name = folder.file_name().unwrap().to_str().unwrap();
+        let report = detect(name);
+        assert_eq!(report.model.name, name);
+        let is_found = |truth: &&BBox<FramePixels>| {
+            report
+                .persons
+                .iter()
+                .any(|person| person.bbox.iou(truth) > 0.4)
+        };
+        let found = annotated.iter().filter(is_found).count();
+        // The smallest model misses some persons.
+        assert!(
+            2 * found >= annotated.len(),
+            "{name} finds {found} of {}",
+            annotated.len()
+        );
+    }
+}

@@ -1,0 +1,145 @@
+//! Replacement of a model under load.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    num::NonZeroUsize,
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
+
+use axum::{
+    Router,
+    body::Body,
+    http::{Request, StatusCode},
+};
+use http_body_util::BodyExt;
+use lookdown::{
+    api::{self, ApiOptions, ApiState, Readiness},
+    calibration::{Calibrations, FolderStore},
+    inference::{ModelFolder, ModelRepository, RepositoryOptions},
+    metrics::Metrics,
+    pipeline::{Engine, EngineOptions, WorkerPool},
+    results::{MemoryResults, ResultLimits},
+};
+use serde_json::Value;
+use tempfile::TempDir;
+use tower::ServiceExt;
+
+use crate::models::folder::{model_of_two_sessions, of_repository, write};
+
+const CLIENTS: usize = 3;
+const SWAPS: usize = 6;
+
+/// A service whose only model is called `person`.
+fn service(folder: &Path) -> Router {
+    let two = NonZeroUsize::new(2).unwrap();
+    let models = ModelRepository::new(
+        RepositoryOptions {
+            folder: ModelFolder {
+                path: folder.to_owned(),
+                elsewhere: None,
+            },
+            warm_up_views: two,
+            kept: vec!["person".to_owned()],
+        },
+        Box::new(model_of_two_sessions),
+    );
+    models.load("person").unwrap();
+    let engine = EngineOptions {
+        sessions: two,
+        remap_threads: two,
+        ..EngineOptions::for_testing("person")
+    };
+    let engine = Engine::new(Arc::clone(models.registry()), None, engine).unwrap();
+    let workers = WorkerPool::start(&Arc::new(engine), two, NonZeroUsize::new(16).unwrap());
+    let readiness = Readiness::default();
+    readiness.warmed_up();
+    let options = ApiOptions {
+        max_body_bytes: 1 << 24,
+        max_upload_bytes: 1 << 27,
+        request_timeout: Duration::from_mins(2),
+        ..ApiOptions::for_testing()
+    };
+    let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
+    let calibrations = Calibrations::open(Box::new(store), false).unwrap();
+    let metrics = Arc::new(Metrics::new().unwrap());
+    let workers = Arc::new(workers.unwrap());
+    api::router(ApiState::new(
+        workers,
+        Arc::new(models),
+        Arc::new(calibrations),
+        Arc::new(MemoryResults::new(ResultLimits::default())),
+        metrics,
+        readiness,
+        options,
+    ))
+}
+
+async fn post(router: &Router, path: &str, body: Vec<u8>) -> (StatusCode, Value) {
+    let request = Request::post(path).header("host", "localhost");
+    let request = request.body(Body::from(body)).unwrap();
+    let response = router.clone().oneshot(request).await.unwrap();
+    let status = response.status();
+    let body = response.into_body().collect().await.unwrap().to_bytes();
+    (status, serde_json::from_slice(&body).unwrap())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_model_is_swapped_under_load_without_a_failed_request() {
+    let folder = TempDir::new().unwrap();
+    let person = folder.path().join("person");
+    let weights = ["ssdlite_mobilenet_v2", "nanodet_g_416"]
+        .map(|name| of_repository(&format!("models/{name}/model.onnx")));
+    write(&person, "person", "", &weights[0]);
+    let router = service(folder.path());
+    let frame = fs::read(of_repository("samples/office.jpg")).unwrap();
+
+    let done = Arc::new(AtomicBool::new(false));
+    let clients = (0..CLIENTS).map(|_| {
+        let (router, frame, done) = (router.clone(), frame.clone(), Arc::clone(&done));
+        tokio::spawn(async move {
+            let mut seen = Vec::new();
+            while !done.load(Ordering::Relaxed) {
+                let (status, report) = post(&router, "/detect?profile=fast", frame.clone()).await;
+                assert_eq!(status, StatusCode::OK, "{report}");
+                assert_eq!(report["model"]["name"], "person");
+                assert_ne!(report["persons"], Value::Array(Vec::new()));
+                seen.push(report["model"]["revision"].as_str().unwrap().to_owned());
+            }
+            seen
+        })
+    });
+    let clients: Vec<_> = clients.collect();
+
+    let mut revisions = BTreeSet::new();
+    for swap in 1..=SWAPS {
+        write(&person, "person", "", &weights[swap % 2]);
+        let path = "/v2/repository/models/person/load";
+        let (status, loaded) = post(&router, path, Vec::new()).await;
+        assert_eq!(
+            (status, &loaded["state"]),
+            (StatusCode::OK, &"READY".into()),
+            "{loaded}"
+        );
+        let revision = loaded["version"].as_str().unwrap().to_owned();
+        // A frame that starts now uses the new model.
+        let (_, report) = post(&router, "/detect?profile=fast", frame.clone()).await;
+        assert_eq!(report["model"]["revision"], revision.as_str());
+        revisions.insert(revision);
+    }
+    done.store(true, Ordering::Relaxed);
+    assert_eq!(revisions.len(), 2);
+    let mut seen = BTreeSet::new();
+    for client in clients {
+        seen.extend(client.await.unwrap());
+    }
+    assert_eq!(
+        seen, revisions,
+        "a report names an unknown revision, or no reports were received"
+    );
+}

@@ -1,0 +1,142 @@
+//! Files with the parameters of a camera in `fixtures/vectors` project to its known answers.
+
+use lookdown::{calibration::CalibrationFile, geometry::Pixel};
+use serde_json::Value;
+
+use crate::calibration_formats::{camera, fixture, json, lens, ray};
+
+/// File, index of the camera in it, format, known answers.
+const FILES: [(&str, usize, &str, &str); 33] = [
+    ("opencv_fisheye.yml", 0, "OpenCV FileStorage", "kb_tumvi512"),
+    (
+        "opencv_fisheye_4x_header.yml",
+        0,
+        "OpenCV FileStorage",
+        "kb_tumvi512",
+    ),
+    ("opencv_fisheye.xml", 0, "OpenCV FileStorage", "kb_tumvi512"),
+    (
+        "opencv_fisheye.json",
+        0,
+        "OpenCV FileStorage",
+        "kb_tumvi512",
+    ),
+    (
+        "opencv_other_names.yml",
+        0,
+        "OpenCV FileStorage",
+        "kb_tumvi512",
+    ),
+    (
+        "opencv_nameless_model.yml",
+        0,
+        "OpenCV FileStorage",
+        "kb_tumvi512",
+    ),
+    (
+        "opencv_plain_lists.json",
+        0,
+        "OpenCV FileStorage",
+        "kb_tumvi512",
+    ),
+    ("opencv_omnidir.yml", 0, "OpenCV FileStorage", "mei_xi_gt1"),
+    ("opencv_omnidir.xml", 0, "OpenCV FileStorage", "mei_xi_gt1"),
+    ("opencv_omnidir.json", 0, "OpenCV FileStorage", "mei_xi_gt1"),
+    (
+        "ros_camera_info_equidistant.yaml",
+        0,
+        "ROS camera_info",
+        "kb_tumvi512",
+    ),
+    ("ros_message.yaml", 0, "ROS camera_info", "kb_tumvi512"),
+    ("kalibr_camchain.yaml", 0, "Kalibr camchain", "kb_tumvi512"),
+    ("kalibr_camchain.yaml", 1, "Kalibr camchain", "mei_kalibr"),
+    ("kalibr_camchain.yaml", 2, "Kalibr camchain", "ds_euroc"),
+    ("kalibr_camchain.yaml", 3, "Kalibr camchain", "eucm_a"),
+    (
+        "kalibr_with_directive.yaml",
+        0,
+        "Kalibr camchain",
+        "kb_tumvi512",
+    ),
+    ("camodocal_mei.yaml", 0, "camodocal", "mei_kalibr"),
+    (
+        "camodocal_kannala_brandt.yaml",
+        0,
+        "camodocal",
+        "kb_tumvi512",
+    ),
+    ("basalt.json", 0, "Basalt", "ds_basalt"),
+    ("basalt.json", 1, "Basalt", "eucm_a"),
+    ("basalt.json", 2, "Basalt", "ucm_a"),
+    ("basalt.json", 3, "Basalt", "kb_tumvi512"),
+    (
+        "ocamcalib_calib_results.txt",
+        0,
+        "OCamCalib",
+        "ocamcalib_1600",
+    ),
+    ("py_ocamcalib.json", 0, "py-OCamCalib", "ocamcalib_1600"),
+    ("multicol.yaml", 0, "MultiCol-SLAM", "ocamcalib_1600"),
+    (
+        "adapter_ocam.yml",
+        0,
+        "fisheye-calib-adapter",
+        "ocamcalib_1600",
+    ),
+    ("adapter_ds.yml", 0, "fisheye-calib-adapter", "ds_basalt"),
+    ("adapter_kb4.yml", 0, "fisheye-calib-adapter", "kb_tumvi512"),
+    (
+        "intrinsic_model_eucm.json",
+        0,
+        "camera-intrinsic-model",
+        "eucm_a",
+    ),
+    (
+        "intrinsic_model_kb4.json",
+        0,
+        "camera-intrinsic-model",
+        "kb_tumvi512",
+    ),
+    ("woodscape.json", 0, "WoodScape", "woodscape_fv"),
+    ("nvidia_ftheta.json", 0, "NVIDIA f-theta", "ftheta_backward"),
+];
+
+#[test]
+fn every_file_is_recognised_and_projects_as_its_camera() {
+    for (file, index, format, vector) in FILES {
+        let content = fixture(&format!("calibrations/{file}"));
+        let found = CalibrationFile::parse(&content).unwrap();
+        assert_eq!(found.format.name(), format, "{file}");
+        let camera = camera(&content, index);
+        let answers = json(&format!("vectors/{vector}.json"));
+        if let Some(image) = camera.image {
+            let size = &answers["image_size"];
+            assert_eq!(size[0], image.width, "{file}");
+            assert_eq!(size[1], image.height, "{file}");
+        }
+        let lens = lens(&camera);
+        let points = answers["project"].as_array().unwrap();
+        let valid: Vec<_> = points.iter().filter(|point| is_valid(point)).collect();
+        assert!(valid.len() > 20, "{vector} has few answers");
+        for point in valid {
+            let expected = Pixel::new(
+                point["uv"][0].as_f64().unwrap(),
+                point["uv"][1].as_f64().unwrap(),
+            );
+            let Some(pixel) = lens.project(&ray(&point["xyz"])) else {
+                panic!("{file}, camera {index}: refuses {}", point["xyz"]);
+            };
+            // Near its limit a lens reaches pixels far beyond any frame, where precision is lost.
+            let tolerance = f64::max(1e-6, 1e-9 * expected.coords.norm());
+            assert!(
+                (pixel - expected).norm() <= tolerance,
+                "{file}, camera {index}: {pixel} instead of {expected}"
+            );
+        }
+    }
+}
+
+fn is_valid(point: &Value) -> bool {
+    point["valid"] == true
+}

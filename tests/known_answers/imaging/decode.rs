@@ -1,0 +1,314 @@
+//! Decoding of every accepted format, upright and in RGB, and refusal of everything else.
+
+use lookdown::imaging::decode::{DecodeError, DecodeLimits, DecodedFrame, ExceededLimit, decode};
+use proptest::prelude::*;
+
+fn fixture(name: &str) -> Vec<u8> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/images/");
+    std::fs::read(format!("{folder}{name}")).unwrap()
+}
+
+fn decoded(name: &str) -> DecodedFrame {
+    decode(&fixture(name), &DecodeLimits::default())
+        .unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn refused(bytes: &[u8]) -> DecodeError {
+    decode(bytes, &DecodeLimits::default()).unwrap_err()
+}
+
+const IMAGES: [&str; 21] = [
+    "alpha.png",
+    "alpha.webp",
+    "alpha_lossy.webp",
+    "animated.webp",
+    "cmyk.jpg",
+    "grey.jpg",
+    "grey.png",
+    "grey_16_bit.png",
+    "lossless.webp",
+    "lossy.webp",
+    "one_bit.png",
+    "orientation_1.jpg",
+    "orientation_6.jpg",
+    "orientation_6.png",
+    "orientation_6.webp",
+    "palette.png",
+    "palette_alpha.png",
+    "progressive.jpg",
+    "rgb.png",
+    "rgb_16_bit.png",
+    "thumbnail.jpg",
+];
+
+/// Centres of the quarters of the image in every fixture.
+const QUARTERS: [((u32, u32), [u8; 3]); 4] = [
+    ((40, 8), [0, 255, 0]),
+    ((8, 8), [255, 0, 0]),
+    ((8, 24), [0, 0, 255]),
+    ((40, 24), [255, 255, 255]),
+];
+
+fn assert_close(name: &str, actual: [u8; 3], expected: [u8; 3], tolerance: u8) {
+    let near = actual
+        .iter()
+        .zip(expected)
+        .all(|(a, e)| a.abs_diff(e) <= tolerance);
+    assert!(near, "{name}: {actual:?} is not about {expected:?}");
+}
+
+fn assert_shows_the_quarters(name: &str, image: &DecodedFrame, tolerance: u8) {
+    let frame = &image.frame;
+    assert_eq!((frame.width(), frame.height()), (64, 32), "{name}");
+    for ((x, y), colour) in QUARTERS {
+        assert_close(name, frame.pixel(x, y), colour, tolerance);
+    }
+}
+
+#[test]
+fn every_colour_format_decodes_to_the_same_image() {
+    for name in [
+        "rgb.png",
+        "rgb_16_bit.png",
+        "palette.png",
+        "lossless.webp",
+        "animated.webp",
+    ] {
+        assert_shows_the_quarters(name, &decoded(name), 0);
+    }
+    for name in ["thumbnail.jpg", "progressive.jpg", "cmyk.jpg", "lossy.webp"] {
+        assert_shows_the_quarters(name, &decoded(name), 4);
+    }
+}
+
+#[test]
+fn all_eight_exif_orientations_are_turned_upright() {
+    for orientation in 1..=8 {
+        let name = format!("orientation_{orientation}.jpg");
+        let image = decoded(&name);
+        assert_shows_the_quarters(&name, &image, 4);
+        assert_eq!(image.orientation_applied, orientation != 1, "{name}");
+    }
+}
+
+#[test]
+fn png_and_webp_orientations_are_honoured_too() {
+    for name in ["orientation_6.png", "orientation_6.webp"] {
+        let image = decoded(name);
+        assert_shows_the_quarters(name, &image, 0);
+        assert!(image.orientation_applied, "{name}");
+    }
+}
+
+#[test]
+fn grey_images_become_rgb_and_sixteen_bits_become_eight() {
+    for (name, tolerance) in [("grey.png", 0), ("grey.jpg", 4), ("grey_16_bit.png", 1)] {
+        let image = decoded(name);
+        for x in [0, 20, 63] {
+            let level = u8::try_from(x * 4).unwrap();
+            assert_close(name, image.frame.pixel(x, 9), [level; 3], tolerance);
+        }
+    }
+    let image = decoded("one_bit.png");
+    assert_eq!(image.frame.pixel(31, 0), [0; 3]);
+    assert_eq!(image.frame.pixel(32, 0), [255; 3]);
+}
+
+#[test]
+fn transparent_pixels_are_blended_over_black() {
+    for (name, tolerance) in [
+        ("alpha.png", 0),
+        ("alpha.webp", 0),
+        ("alpha_lossy.webp", 12),
+    ] {
+        let image = decoded(name);
+        assert_close(name, image.frame.pixel(4, 4), [0, 0, 0], tolerance);
+        assert_close(name, image.frame.pixel(24, 4), [128, 0, 0], tolerance);
+        assert_close(name, image.frame.pixel(60, 4), [0, 255, 0], tolerance);
+    }
+    let image = decoded("palette_alpha.png");
+    assert_eq!(image.frame.pixel(4, 4), [0; 3]);
+    assert_eq!(image.frame.pixel(60, 4), [0, 255, 0]);
+}
+
+#[test]
+fn zero_bytes_are_reported_as_empty() {
+    assert_eq!(refused(b""), DecodeError::Empty);
+}
+
+#[test]
+fn fifty_bytes_that_claim_ten_thousand_megapixels_are_too_large() {
+    let bytes = fixture("huge.png");
+    assert_eq!(bytes.len(), 50);
+    assert_eq!(
+        refused(&bytes).to_string(),
+        "the image is 100000×100000 pixels; at most 8192×8192 is accepted: \
+         send a smaller image or raise limits.max_image_side"
+    );
+}
+
+#[test]
+fn each_limit_holds_on_its_own_for_every_container() {
+    let open = DecodeLimits::default();
+    let cases = [
+        (
+            DecodeLimits {
+                max_width: 63,
+                ..open
+            },
+            ExceededLimit::Side {
+                max_width: 63,
+                max_height: open.max_height,
+            },
+        ),
+        (
+            DecodeLimits {
+                max_height: 31,
+                ..open
+            },
+            ExceededLimit::Side {
+                max_width: open.max_width,
+                max_height: 31,
+            },
+        ),
+        (
+            DecodeLimits {
+                max_pixels: 2047,
+                ..open
+            },
+            ExceededLimit::Pixels { max_pixels: 2047 },
+        ),
+        (
+            DecodeLimits {
+                max_alloc_bytes: 10_000,
+                ..open
+            },
+            ExceededLimit::Memory { max_bytes: 10_000 },
+        ),
+    ];
+    for name in ["rgb.png", "progressive.jpg", "lossy.webp", "alpha.webp"] {
+        for (limits, limit) in cases {
+            let expected = DecodeError::TooLarge {
+                width: 64,
+                height: 32,
+                limit,
+            };
+            assert_eq!(decode(&fixture(name), &limits), Err(expected), "{name}");
+        }
+    }
+}
+
+#[test]
+fn an_image_exactly_at_its_limits_is_accepted() {
+    let limits = DecodeLimits {
+        max_width: 64,
+        max_height: 32,
+        max_pixels: 2048,
+        max_alloc_bytes: 12_288,
+    };
+    assert!(decode(&fixture("rgb.png"), &limits).is_ok());
+}
+
+#[test]
+fn the_format_is_detected_from_content_and_others_are_named() {
+    let found = |bytes: &[u8]| match refused(bytes) {
+        DecodeError::UnsupportedFormat { found } => found,
+        other => panic!("{other}"),
+    };
+    assert_eq!(found(&fixture("picture.gif")), "in the format Gif");
+    assert_eq!(found(&fixture("picture.bmp")), "in the format Bmp");
+    assert_eq!(
+        found(b"\0\0\0\x18ftypheic\0\0\0\0mif1"),
+        "in the format HEIF"
+    );
+    assert_eq!(
+        found(b"{\"img\": \"frame.jpg\"}"),
+        "not in a known image format"
+    );
+    assert_eq!(
+        refused(b"<html>").to_string(),
+        "the image is not in a known image format: send a JPEG, PNG or WebP image"
+    );
+}
+
+#[test]
+fn a_truncated_file_is_an_error_and_never_grey_rows() {
+    for name in IMAGES {
+        let bytes = fixture(name);
+        for length in 0..bytes.len() {
+            let error = refused(&bytes[..length]);
+            assert!(
+                !matches!(error, DecodeError::TooLarge { .. }),
+                "{name} cut to {length}: {error}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_truncated_image_has_a_clear_error() {
+    let bytes = fixture("thumbnail.jpg");
+    assert_eq!(
+        refused(&bytes[..bytes.len() - 40]).to_string(),
+        "the JPEG image is damaged or cut off (the file ends early): send the whole file again"
+    );
+}
+
+#[test]
+fn bytes_after_the_end_of_an_image_are_ignored() {
+    for name in IMAGES {
+        let mut bytes = fixture(name);
+        bytes.extend_from_slice(b"\0\0\0\0 trailing \xFF");
+        assert!(decode(&bytes, &DecodeLimits::default()).is_ok(), "{name}");
+    }
+}
+
+#[test]
+fn a_webp_frame_larger_than_its_canvas_is_refused() {
+    let mut bytes = fixture("alpha_lossy.webp");
+    let frame = bytes.windows(4).position(|name| name == b"VP8 ").unwrap();
+    bytes[frame + 14..frame + 18].copy_from_slice(&[0xFF, 0x3F, 0xFF, 0x3F]);
+    assert!(
+        refused(&bytes)
+            .to_string()
+            .contains("a frame is larger than the image")
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    /// A panic in a decoder would terminate its worker thread.
+    #[test]
+    fn damaged_images_never_panic(
+        image in 0..IMAGES.len(),
+        flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12),
+        keep in any::<prop::sample::Index>(),
+        cut in any::<bool>(),
+    ) {
+        let mut bytes = fixture(IMAGES[image]);
+        for (at, value) in flips {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if cut {
+            bytes.truncate(keep.index(bytes.len()));
+        }
+        let limits = DecodeLimits { max_pixels: 1 << 20, ..DecodeLimits::default() };
+        if let Ok(image) = decode(&bytes, &limits) {
+            let size = u64::from(image.frame.width()) * u64::from(image.frame.height());
+            prop_assert!(size <= limits.max_pixels);
+        }
+    }
+
+    #[test]
+    fn noise_behind_an_image_signature_never_panics(
+        signature in prop::sample::select(vec![
+            &b"\xFF\xD8\xFF"[..], b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"RIFF\x40\0\0\0WEBPVP8 ", b"RIFF\x40\0\0\0WEBPVP8X", b"",
+        ]),
+        noise in prop::collection::vec(any::<u8>(), 0..200),
+    ) {
+        let bytes = [signature, &noise[..]].concat();
+        let _ = decode(&bytes, &DecodeLimits { max_pixels: 1 << 20, ..DecodeLimits::default() });
+    }
+}

@@ -1,0 +1,59 @@
+//! Replays the seeds of the fuzzers and the inputs that they kept. `docs/reliability.md` describes
+//! how the fuzzers are run.
+
+#[path = "../../fuzz/src/lib.rs"]
+mod targets;
+
+use std::{fs, path::Path};
+
+use targets::{importer, merge, picture, request, settings};
+
+/// Passes every file below `folder` to `read`. Returns the number of files that were accepted as
+/// valid.
+fn replay(folder: &str, read: impl Fn(&[u8]) -> bool) -> usize {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let Ok(entries) = fs::read_dir(&folder) else {
+        return 0;
+    };
+    let files = entries.map(|entry| entry.unwrap().path());
+    files.filter(|file| read(&fs::read(file).unwrap())).count()
+}
+
+/// Replays the seeds and the corpus of one target, and the files of `folders`.
+fn replay_all(name: &str, folders: &[&str], read: impl Fn(&[u8]) -> bool) {
+    let own = [format!("fuzz/seeds/{name}"), format!("fuzz/corpus/{name}")];
+    let folders = own
+        .iter()
+        .map(String::as_str)
+        .chain(folders.iter().copied());
+    let taken: usize = folders.map(|folder| replay(folder, &read)).sum();
+    assert!(taken > 0, "{name}: no input reached the fuzzed code");
+}
+
+#[test]
+fn every_importer_survives_its_corpus() {
+    for (name, format) in importer::IMPORTERS {
+        let fixtures = ["tests/fixtures/calibrations", "samples/calibrations"];
+        replay_all(name, &fixtures, |content| importer::read(format, content));
+    }
+}
+
+#[test]
+fn decoding_survives_its_corpus() {
+    replay_all("picture", &["tests/fixtures/images"], picture::read);
+}
+
+#[test]
+fn the_service_survives_its_corpus() {
+    replay_all("request", &[], request::read);
+}
+
+#[test]
+fn settings_survive_their_corpus() {
+    replay_all("settings", &[], settings::read);
+}
+
+#[test]
+fn merging_survives_its_corpus() {
+    replay_all("merge", &[], merge::read);
+}

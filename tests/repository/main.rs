@@ -1,0 +1,7 @@
+//! The repository: its documentation, layers, OpenAPI document and fuzzing corpus.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
+
+mod documentation;
+mod fuzz_corpus;
+mod layering;
+mod openapi;
