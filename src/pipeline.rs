@@ -20,6 +20,7 @@ mod plausibility;
 mod profile;
 mod report;
 mod rig_cache;
+mod score_calibration;
 mod service_rate;
 #[cfg(test)]
 mod test_support;

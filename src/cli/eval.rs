@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// C_t without `--score-threshold`: low, as average precision considers all scores.
-const DEFAULT_SCORE_THRESHOLD: &str = "0.01";
+const DEFAULT_SCORE_THRESHOLD: &str = "0.001";
 
 /// Arguments of `lookdown eval`.
 #[derive(Debug, Args)]

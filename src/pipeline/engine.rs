@@ -263,8 +263,7 @@ impl Engine {
         observation: &Observation,
         refinement: &RefinementParameters,
     ) -> Vec<Person> {
-        let back_projection = observation.profile.back_projection();
-        merge::persons(&observation.passes, back_projection, refinement)
+        merge::persons(&observation.passes, observation.profile, refinement)
     }
 
     /// Returns the camera's views in the motion cache, if the request enables motion detection.

@@ -1,10 +1,11 @@
 //! Merges boxes of views into persons of the frame.
 
 use super::{
-    Person,
+    Person, Profile,
     camera_rig::CameraRig,
     pass::{Pass, PassDetection, detections, views_holding},
     plausibility::score_weight,
+    score_calibration::ScoreCalibration,
 };
 use crate::{
     detection::{
@@ -30,37 +31,6 @@ const VIRTUAL_VIEW_WEIGHT: f64 = 0.1;
 /// The factor for scores from crops, in which persons lean by up to 45° and more. Upright views
 /// give better scores, and crops give better extents.
 const CROP_VOTE: f64 = 0.7;
-
-/// Converts between merged scores and reported scores.
-///
-/// In fusion the vote of a supporting view is its score × its IoU with the fused box. The merged
-/// score of a clearly visible person is therefore lower than the score of each view. The reported
-/// score corrects this on average: with this power the default threshold of 0.3 lies where F1 is
-/// best. (Without it, F1 was best at merged scores of 0.24 to 0.30, on photographs and in rendered
-/// rooms.) The order of persons does not change.
-#[derive(Debug, Clone, Copy)]
-struct ScoreScale {
-    power: f64,
-}
-
-impl ScoreScale {
-    fn of(refinement: Refinement) -> Self {
-        let power = match refinement {
-            Refinement::Fusion => 0.87,
-            // Suppression keeps the detector's scores.
-            Refinement::Nms | Refinement::SoftNmsLinear | Refinement::SoftNmsGaussian => 1.0,
-        };
-        Self { power }
-    }
-
-    fn reported(self, merged: f64) -> f64 {
-        merged.powf(self.power)
-    }
-
-    fn merged(self, reported: f64) -> f64 {
-        reported.powf(self.power.recip())
-    }
-}
 
 /// A box of a view, with its footprint in the frame.
 struct Mapped {
@@ -100,18 +70,18 @@ impl Mapped {
 /// Maps the boxes of every view to the frame and merges them into persons.
 pub(super) fn persons(
     passes: &[Pass],
-    back_projection: BackProjection,
+    profile: Profile,
     parameters: &RefinementParameters,
 ) -> Vec<Person> {
     let Some(Pass { rig, .. }) = passes.first() else {
         return Vec::new();
     };
-    let scale = ScoreScale::of(parameters.refinement);
+    let calibration = ScoreCalibration::of(profile, parameters.refinement);
     let parameters = RefinementParameters {
-        score_threshold: scale.merged(parameters.score_threshold),
+        score_threshold: calibration.merged(parameters.score_threshold),
         ..*parameters
     };
-    let (mapped, merged) = merged(passes, rig, back_projection, &parameters);
+    let (mapped, merged) = merged(passes, rig, profile.back_projection(), &parameters);
     merged
         .into_iter()
         .filter_map(|merged| {
@@ -120,7 +90,12 @@ pub(super) fn persons(
                 .iter()
                 .map(|&member| &mapped[member])
                 .collect();
-            person(merged.bbox, scale.reported(merged.score), &members, rig)
+            person(
+                merged.bbox,
+                calibration.reported(merged.score),
+                &members,
+                rig,
+            )
         })
         .collect()
 }

@@ -99,6 +99,15 @@ impl Profile {
         }
     }
 
+    /// Returns the score at which a person merged by fusion is as likely as not. The more views
+    /// see a person, the more of them must agree.
+    pub(super) fn even_odds_score(self) -> f64 {
+        match self {
+            Self::Quality => 0.31,
+            Self::Paper | Self::Fast | Self::Balanced | Self::Direct => 0.22,
+        }
+    }
+
     /// Returns the refinement for requests without one.
     #[must_use]
     pub fn default_refinement(self) -> Refinement {

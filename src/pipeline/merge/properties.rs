@@ -20,7 +20,7 @@ const SIDE: f64 = 96.0;
 
 /// Cameras in every profile, with a lens image within the frame or larger, that point down,
 /// obliquely or along the floor.
-static CAMERAS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(|| {
+static CAMERAS: LazyLock<Vec<(Arc<CameraRig>, Profile)>> = LazyLock::new(|| {
     let mut rigs = Vec::new();
     for (radius, up) in [
         (118.0, [0.0, 0.0, -1.0]),
@@ -37,7 +37,7 @@ static CAMERAS: LazyLock<Vec<(Arc<CameraRig>, BackProjection)>> = LazyLock::new(
             let plan = profile.view_plan(FieldOfViewReading::default());
             let input = BlobDetector::default().input;
             let rig = CameraRig::new(geometry, WIDTH, HEIGHT, plan.as_ref(), &input);
-            rigs.push((Arc::new(rig), profile.back_projection()));
+            rigs.push((Arc::new(rig), profile));
         }
     }
     rigs
@@ -105,8 +105,8 @@ proptest! {
         camera in prop::sample::select((0..CAMERAS.len()).collect::<Vec<_>>()),
         parameters in parameters(),
     ) {
-        let (rig, back_projection) = &CAMERAS[camera];
-        for person in persons(&[pass(rig, &detections)], *back_projection, &parameters) {
+        let (rig, profile) = &CAMERAS[camera];
+        for person in persons(&[pass(rig, &detections)], *profile, &parameters) {
             let [x_min, y_min, x_max, y_max] = person.bbox.corners();
             prop_assert!(0.0 <= x_min && x_min < x_max && x_max <= f64::from(WIDTH), "{person:?}");
             prop_assert!(0.0 <= y_min && y_min < y_max && y_max <= f64::from(HEIGHT), "{person:?}");
@@ -133,9 +133,9 @@ proptest! {
         camera in prop::sample::select((0..CAMERAS.len()).collect::<Vec<_>>()),
         parameters in parameters(),
     ) {
-        let (rig, back_projection) = &CAMERAS[camera];
+        let (rig, profile) = &CAMERAS[camera];
         let [one, other] = [detections, shuffled]
-            .map(|detections| persons(&[pass(rig, &detections)], *back_projection, &parameters));
+            .map(|detections| persons(&[pass(rig, &detections)], *profile, &parameters));
         prop_assert_eq!(one.len(), other.len());
         for (one, other) in one.iter().zip(&other) {
             let pairs = one.bbox.corners().into_iter().zip(other.bbox.corners());
