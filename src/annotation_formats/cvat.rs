@@ -1,80 +1,159 @@
 //! CVAT for images 1.1: one XML document. An oriented box is written unrotated, with its clockwise
 //! `rotation` about its centre in degrees, from 0 to below 360.
 
-use super::{AnnotatedImage, BoxKind, LABEL, pixels, share, xml::Xml};
+use serde::Serialize;
+
+use super::{
+    AnnotatedImage, BoxKind, LABEL, pixels, share,
+    xml::{self, Text},
+};
 use crate::geometry::OrientedBox;
 
+#[derive(Serialize)]
+struct Annotations {
+    version: &'static str,
+    meta: Meta,
+    image: Vec<Image>,
+}
+
+/// The label, which makes the classes of the file explicit.
+#[derive(Serialize)]
+struct Meta {
+    job: Job,
+}
+
+#[derive(Serialize)]
+struct Job {
+    labels: Labels,
+}
+
+#[derive(Serialize)]
+struct Labels {
+    label: Label,
+}
+
+#[derive(Serialize)]
+struct Label {
+    name: &'static str,
+    attributes: Attributes,
+}
+
+#[derive(Serialize)]
+struct Attributes {
+    attribute: AttributeType,
+}
+
+#[derive(Serialize)]
+struct AttributeType {
+    name: &'static str,
+    mutable: &'static str,
+    input_type: &'static str,
+    default_value: &'static str,
+    values: &'static str,
+}
+
+#[derive(Serialize)]
+struct Image {
+    #[serde(rename = "@id")]
+    id: usize,
+    #[serde(rename = "@name")]
+    name: Text,
+    #[serde(rename = "@width")]
+    width: u32,
+    #[serde(rename = "@height")]
+    height: u32,
+    #[serde(rename = "box")]
+    shapes: Vec<Shape>,
+}
+
+#[derive(Serialize)]
+struct Shape {
+    #[serde(rename = "@label")]
+    label: &'static str,
+    #[serde(rename = "@source")]
+    source: &'static str,
+    #[serde(rename = "@occluded")]
+    occluded: u8,
+    #[serde(rename = "@xtl")]
+    left: String,
+    #[serde(rename = "@ytl")]
+    top: String,
+    #[serde(rename = "@xbr")]
+    right: String,
+    #[serde(rename = "@ybr")]
+    bottom: String,
+    #[serde(rename = "@z_order")]
+    z_order: u8,
+    #[serde(rename = "@rotation", skip_serializing_if = "Option::is_none")]
+    rotation: Option<String>,
+    attribute: Attribute,
+}
+
+#[derive(Serialize)]
+struct Attribute {
+    #[serde(rename = "@name")]
+    name: &'static str,
+    #[serde(rename = "$text")]
+    value: f64,
+}
+
 pub(super) fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
-    let mut xml = Xml::document();
-    xml.open("annotations", &[]);
-    xml.text("version", "1.1");
-    label(&mut xml);
-    for (id, image) in images.iter().enumerate() {
-        xml.open(
-            "image",
-            &[
-                ("id", &id.to_string()),
-                ("name", &image.file_name),
-                ("width", &image.width.to_string()),
-                ("height", &image.height.to_string()),
-            ],
-        );
-        for (corners, person) in image.boxes() {
+    let images = images.iter().enumerate().map(|(id, image)| {
+        let shapes = image.boxes().map(|(corners, person)| {
             let (corners, rotation) = match boxes {
                 BoxKind::AxisParallel => (corners, None),
                 BoxKind::Oriented => unturned(&person.oriented_box),
             };
-            shape(&mut xml, corners, rotation, person.score);
+            shape(corners, rotation, person.score)
+        });
+        Image {
+            id,
+            name: image.file_name.as_str().into(),
+            width: image.width,
+            height: image.height,
+            shapes: shapes.collect(),
         }
-        xml.close("image");
-    }
-    xml.close("annotations");
-    xml.finish()
+    });
+    let attribute = AttributeType {
+        name: "score",
+        mutable: "False",
+        input_type: "text",
+        default_value: "",
+        values: "",
+    };
+    let label = Label {
+        name: LABEL,
+        attributes: Attributes { attribute },
+    };
+    let annotations = Annotations {
+        version: "1.1",
+        meta: Meta {
+            job: Job {
+                labels: Labels { label },
+            },
+        },
+        image: images.collect(),
+    };
+    xml::document("annotations", &annotations)
 }
 
-/// The label, which makes the classes of the file explicit.
-fn label(xml: &mut Xml) {
-    for name in ["meta", "job", "labels", "label"] {
-        xml.open(name, &[]);
-    }
-    xml.text("name", LABEL);
-    xml.open("attributes", &[]);
-    xml.open("attribute", &[]);
-    for (name, value) in [
-        ("name", "score"),
-        ("mutable", "False"),
-        ("input_type", "text"),
-        ("default_value", ""),
-        ("values", ""),
-    ] {
-        xml.text(name, value);
-    }
-    for name in ["attribute", "attributes", "label", "labels", "job", "meta"] {
-        xml.close(name);
-    }
-}
-
-fn shape(xml: &mut Xml, corners: [f64; 4], rotation: Option<f64>, score: f64) {
+fn shape(corners: [f64; 4], rotation: Option<f64>, score: f64) -> Shape {
     let [left, top, right, bottom] = corners.map(|side| format!("{side:.2}"));
-    let rotation = rotation.map(|degrees| format!("{degrees:.2}"));
-    let mut attributes = vec![
-        ("label", LABEL),
-        ("source", "auto"),
-        ("occluded", "0"),
-        ("xtl", &left),
-        ("ytl", &top),
-        ("xbr", &right),
-        ("ybr", &bottom),
-        ("z_order", "0"),
-    ];
-    attributes.extend(
-        rotation
-            .as_ref()
-            .map(|degrees| ("rotation", degrees.as_str())),
-    );
-    xml.open("box", &attributes);
-    xml.element("attribute", &[("name", "score")], &share(score).to_string());
-    xml.close("box");
+    Shape {
+        label: LABEL,
+        source: "auto",
+        occluded: 0,
+        left,
+        top,
+        right,
+        bottom,
+        z_order: 0,
+        rotation: rotation.map(|degrees| format!("{degrees:.2}")),
+        attribute: Attribute {
+            name: "score",
+            value: share(score),
+        },
+    }
 }
 
 /// The corners of the unrotated box, and its rotation in degrees.

@@ -1,7 +1,48 @@
 //! Pascal VOC: an XML file per image, in `Annotations/`. Boxes are corner-origin pixels with two
 //! decimals, as current annotation tools write and read them.
 
-use super::{AnnotatedImage, LABEL, stem, xml::Xml};
+use serde::Serialize;
+
+use super::{
+    AnnotatedImage, LABEL, stem,
+    xml::{self, Text},
+};
+
+/// The number of channels of every image.
+const DEPTH: u8 = 3;
+
+#[derive(Serialize)]
+struct Annotation {
+    folder: Text,
+    filename: Text,
+    size: Size,
+    segmented: u8,
+    object: Vec<Object>,
+}
+
+#[derive(Serialize)]
+struct Size {
+    width: u32,
+    height: u32,
+    depth: u8,
+}
+
+#[derive(Serialize)]
+struct Object {
+    name: &'static str,
+    pose: &'static str,
+    truncated: u8,
+    difficult: u8,
+    bndbox: Bndbox,
+}
+
+#[derive(Serialize)]
+struct Bndbox {
+    xmin: String,
+    ymin: String,
+    xmax: String,
+    ymax: String,
+}
 
 /// The path of an image's file.
 pub(super) fn path(image_file_name: &str) -> String {
@@ -9,33 +50,35 @@ pub(super) fn path(image_file_name: &str) -> String {
 }
 
 pub(super) fn document(image: &AnnotatedImage) -> String {
-    let (folder, name) = match image.file_name.rsplit_once('/') {
-        Some((folder, name)) => (folder, name),
-        None => ("", image.file_name.as_str()),
-    };
-    let mut xml = Xml::document();
-    xml.open("annotation", &[]);
-    xml.text("folder", folder);
-    xml.text("filename", name);
-    xml.open("size", &[]);
-    xml.text("width", &image.width.to_string());
-    xml.text("height", &image.height.to_string());
-    xml.text("depth", "3");
-    xml.close("size");
-    xml.text("segmented", "0");
-    for (corners, _) in image.boxes() {
-        xml.open("object", &[]);
-        xml.text("name", LABEL);
-        xml.text("pose", "Unspecified");
-        xml.text("truncated", "0");
-        xml.text("difficult", "0");
-        xml.open("bndbox", &[]);
-        for (side, value) in ["xmin", "ymin", "xmax", "ymax"].into_iter().zip(corners) {
-            xml.text(side, &format!("{value:.2}"));
+    let (folder, name) = image
+        .file_name
+        .rsplit_once('/')
+        .unwrap_or(("", &image.file_name));
+    let objects = image.boxes().map(|(corners, _)| {
+        let [xmin, ymin, xmax, ymax] = corners.map(|side| format!("{side:.2}"));
+        Object {
+            name: LABEL,
+            pose: "Unspecified",
+            truncated: 0,
+            difficult: 0,
+            bndbox: Bndbox {
+                xmin,
+                ymin,
+                xmax,
+                ymax,
+            },
         }
-        xml.close("bndbox");
-        xml.close("object");
-    }
-    xml.close("annotation");
-    xml.finish()
+    });
+    let annotation = Annotation {
+        folder: folder.into(),
+        filename: name.into(),
+        size: Size {
+            width: image.width,
+            height: image.height,
+            depth: DEPTH,
+        },
+        segmented: 0,
+        object: objects.collect(),
+    };
+    xml::document("annotation", &annotation)
 }

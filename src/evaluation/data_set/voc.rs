@@ -7,7 +7,8 @@
 
 use std::path::{Path, PathBuf};
 
-use roxmltree::{Document, Node};
+use quick_xml::{Reader, events::Event};
+use serde::Deserialize;
 
 use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
 use crate::{
@@ -17,6 +18,43 @@ use crate::{
 
 /// The file of a crowded image has some 100 kB.
 const MAX_BYTES: u64 = 16 * 1024 * 1024;
+
+/// The root element of an annotation file.
+const ROOT: &str = "annotation";
+
+/// The part of an annotation file that is read. Numbers are texts, so that errors can name them.
+#[derive(Deserialize)]
+struct Annotation {
+    size: Option<Size>,
+    #[serde(rename = "object", default)]
+    objects: Vec<Object>,
+}
+
+#[derive(Deserialize)]
+struct Size {
+    #[serde(default)]
+    width: String,
+    #[serde(default)]
+    height: String,
+}
+
+#[derive(Deserialize)]
+struct Object {
+    #[serde(default)]
+    name: String,
+    #[serde(default)]
+    difficult: String,
+    bndbox: Option<Bndbox>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Bndbox {
+    xmin: String,
+    ymin: String,
+    xmax: String,
+    ymax: String,
+}
 
 /// Reads one file per image. Its path below `root` is the ID of the image.
 pub(super) fn read_files(
@@ -32,25 +70,22 @@ pub(super) fn read_files(
             problem,
         };
         let text = read_text(path, MAX_BYTES)?;
-        let document =
-            Document::parse(&text).map_err(|error| wrong(format!("not XML: {error}")))?;
-        let annotation = document.root_element();
-        is_anything_annotated |= objects(annotation).next().is_some();
+        check_root(&text).map_err(wrong)?;
+        let annotation: Annotation = quick_xml::de::from_str(&text)
+            .map_err(|error| wrong(format!("not a VOC annotation: {error}")))?;
+        is_anything_annotated |= !annotation.objects.is_empty();
         let id = path.strip_prefix(root).unwrap_or(path).with_extension("");
         let id = ImageId::Text(id.to_string_lossy().into_owned());
         images.push(read(path, id, annotation, pictures).map_err(wrong)?);
     }
-    let is_somebody_there = images
+    let has_persons = images
         .iter()
         .any(|image: &DataSetImage| !image.truth.persons.is_empty());
     match files.first() {
-        Some(first) if is_anything_annotated && !is_somebody_there => {
-            Err(DataSetError::Annotations {
-                path: first.clone(),
-                problem: "no object in any file is named person; give the persons that name"
-                    .to_owned(),
-            })
-        }
+        Some(first) if is_anything_annotated && !has_persons => Err(DataSetError::Annotations {
+            path: first.clone(),
+            problem: "no object in any file is named person; give the persons that name".to_owned(),
+        }),
         _ => Ok(DataSet {
             images,
             scoring: Scoring::AxisParallel,
@@ -58,67 +93,80 @@ pub(super) fn read_files(
     }
 }
 
+/// Refuses a document that is not XML, or that has another root element.
+fn check_root(text: &str) -> Result<(), String> {
+    let mut reader = Reader::from_str(text);
+    loop {
+        let event = reader
+            .read_event()
+            .map_err(|error| format!("not a VOC annotation: {error}"))?;
+        match event {
+            Event::Start(start) | Event::Empty(start) => {
+                let root = String::from_utf8_lossy(start.name().into_inner()).into_owned();
+                return if root == ROOT {
+                    Ok(())
+                } else {
+                    Err(format!(
+                        "not a VOC annotation: its root is <{root}> instead of <{ROOT}>"
+                    ))
+                };
+            }
+            Event::Eof => return Err("not a VOC annotation: it has no element".to_owned()),
+            _ => {}
+        }
+    }
+}
+
 fn read(
     path: &Path,
     id: ImageId,
-    annotation: Node<'_, '_>,
+    annotation: Annotation,
     pictures: &PictureIndex,
 ) -> Result<DataSetImage, String> {
-    if annotation.tag_name().name() != "annotation" {
-        return Err(format!(
-            "not a VOC annotation: its root is <{}> instead of <annotation>",
-            annotation.tag_name().name()
-        ));
-    }
     let picture = pictures.named_like(path)?;
     let mut image = DataSetImage::empty(id, picture);
-    image.size = match child(annotation, "size") {
-        Some(size) => Some([number(size, "width")?, number(size, "height")?]),
+    image.size = match &annotation.size {
+        Some(Size { width, height }) => Some([
+            number("size: width", width)?,
+            number("size: height", height)?,
+        ]),
         None => None,
     };
-    for object in objects(annotation).filter(is_person) {
-        let bndbox = child(object, "bndbox").ok_or("an object has no bndbox; add one")?;
+    for object in annotation
+        .objects
+        .iter()
+        .filter(|object| object.is_person())
+    {
+        let bndbox = object
+            .bndbox
+            .as_ref()
+            .ok_or("an object has no bndbox; add one")?;
         let corners = [
-            number(bndbox, "xmin")?,
-            number(bndbox, "ymin")?,
-            number(bndbox, "xmax")?,
-            number(bndbox, "ymax")?,
+            number("bndbox: xmin", &bndbox.xmin)?,
+            number("bndbox: ymin", &bndbox.ymin)?,
+            number("bndbox: xmax", &bndbox.xmax)?,
+            number("bndbox: ymax", &bndbox.ymax)?,
         ];
         let bbox = BBox::new(corners).map_err(|error| format!("bndbox: {error}"))?;
-        let is_difficult = child(object, "difficult").is_some_and(|node| text_of(node) == "1");
         image.add(AnnotatedPerson {
-            counts: !is_difficult,
+            counts: object.difficult.trim() != "1",
             ..AnnotatedPerson::from(Outline::AxisParallel(bbox))
         });
     }
     Ok(image)
 }
 
-fn objects<'a, 'input>(root: Node<'a, 'input>) -> impl Iterator<Item = Node<'a, 'input>> {
-    root.children().filter(|node| node.has_tag_name("object"))
+impl Object {
+    /// VOC has one class of persons, named `person`.
+    fn is_person(&self) -> bool {
+        self.name.trim().eq_ignore_ascii_case("person")
+    }
 }
 
-/// VOC has one class of persons, named `person`.
-fn is_person(object: &Node<'_, '_>) -> bool {
-    child(*object, "name").is_some_and(|name| text_of(name).eq_ignore_ascii_case("person"))
-}
-
-fn child<'a, 'input>(parent: Node<'a, 'input>, name: &str) -> Option<Node<'a, 'input>> {
-    parent.children().find(|node| node.has_tag_name(name))
-}
-
-fn text_of<'a>(node: Node<'a, '_>) -> &'a str {
-    node.text().unwrap_or_default().trim()
-}
-
-fn number<T: std::str::FromStr>(parent: Node<'_, '_>, name: &str) -> Result<T, String> {
-    let text = child(parent, name).map(text_of).unwrap_or_default();
-    text.parse().map_err(|_| {
-        format!(
-            "{}: {name} is {text:?}; give a number of pixels",
-            parent.tag_name().name()
-        )
-    })
+fn number<T: std::str::FromStr>(name: &str, text: &str) -> Result<T, String> {
+    let text = text.trim();
+    text.parse()
+        .map_err(|_| format!("{name} is {text:?}; give a number of pixels"))
 }
 
 #[cfg(test)]

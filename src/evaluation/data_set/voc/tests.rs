@@ -59,7 +59,7 @@ fn boxes_for_piropo_are_matched_to_images_by_time() {
 #[test]
 fn errors_name_the_file_and_the_problem() {
     for (from, to, expected) in [
-        ("</annotation>", "", "not XML: "),
+        ("</annotation>", "", "not a VOC annotation: "),
         ("annotation>", "svg>", "its root is <svg>"),
         ("<xmin>626.25</xmin>", "", "bndbox: xmin is \"\""),
         ("626.25", "left", "bndbox: xmin is \"left\""),
@@ -86,8 +86,8 @@ fn entity_bombs_and_deep_nesting_are_refused() {
     let bomb =
         r#"<!DOCTYPE a [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><annotation>&b;</annotation>"#;
     let error = refusal(&folder(&[("a.xml", bomb), ("a.jpg", "")]));
-    assert!(error.contains("not XML: "), "{error}");
+    assert!(error.contains("not a VOC annotation: "), "{error}");
     let deep = "<annotation>".repeat(1_000_000);
     let error = refusal(&folder(&[("a.xml", &deep), ("a.jpg", "")]));
-    assert!(error.contains("not XML: "), "{error}");
+    assert!(error.contains("not a VOC annotation: "), "{error}");
 }
