@@ -104,7 +104,7 @@ impl Profile {
     pub(super) fn even_odds_score(self) -> f64 {
         match self {
             Self::Quality => 0.31,
-            Self::Paper | Self::Fast | Self::Balanced | Self::Direct => 0.22,
+            Self::Paper | Self::Fast | Self::Balanced | Self::Direct => 0.25,
         }
     }
 
