@@ -80,7 +80,7 @@ parameter_table! {
         name: "score_threshold",
         kind: ParameterKind::Fraction,
         default: ParameterDefault::Value("0.3"),
-        help: "Minimum score of a person (`C_t`). Persons with a lower score are left out.",
+        help: "Minimum score of a person (`C_t`), with fusion a probability. Persons with a lower score are left out.",
         example: None,
         interfaces: EVERY_DETECTION,
     };
