@@ -157,6 +157,12 @@ pub struct App {
 }
 
 impl App {
+    /// Returns the metrics of the server.
+    #[must_use]
+    pub fn metrics(&self) -> &Metrics {
+        &self.metrics
+    }
+
     /// Starts the workers. No model is loaded yet: [`App::serve`] does that. Needs a tokio runtime.
     ///
     ///

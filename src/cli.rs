@@ -94,7 +94,7 @@ impl SettingsFile {
 #[must_use]
 pub fn run(commit: Option<&str>) -> ExitCode {
     let outcome = match parse(commit).command {
-        Command::Serve(arguments) => serve::run(&arguments),
+        Command::Serve(arguments) => serve::run(&arguments, commit),
         Command::Health(arguments) => health::run(&arguments),
         Command::Detect(arguments) => detect::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),

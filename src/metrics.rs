@@ -3,7 +3,7 @@
 //! which administrators name, are optional and limited to a thousand.
 
 mod kind;
-mod process;
+mod zone_persons;
 
 use std::{
     collections::BTreeSet,
@@ -12,13 +12,11 @@ use std::{
 
 use prometheus::{
     Encoder, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Registry, TextEncoder,
+    process_collector::ProcessCollector,
 };
 
 use kind::Kind;
-use process::Process;
-
-/// Most zones that are published.
-const MAX_ZONE_ROWS: usize = 1000;
+use zone_persons::ZonePersons;
 
 /// Declares the struct, and registers each field as `lookdown_` followed by its name.
 macro_rules! metrics {
@@ -74,8 +72,8 @@ metrics! {
     non_finite: IntCounter = "non_finite_candidates_total" [];
     /// Persons reported.
     persons: IntCounter = "persons_total" [];
-    /// Persons in a zone (`calibration/zone`), latest frame; only with `calibrations.zone_metrics`.
-    zone_persons: IntGaugeVec = "zone_persons" ["zone"];
+    /// Persons in a zone of a calibration, latest frame; only with `calibrations.zone_metrics`.
+    zone_persons: ZonePersons = "zone_persons" ["calibration", "zone"];
     /// Requests answered with a problem, by its kind.
     failures: IntCounterVec = "request_failures_total" ["reason"];
     /// Frames that wait for a worker or are being processed.
@@ -144,8 +142,8 @@ metrics! {
     tls_certificate_loads: IntCounterVec = "tls_certificate_loads_total" ["result"];
     /// Finished TLS handshakes, by result.
     tls_handshakes: IntCounterVec = "tls_handshakes_total" ["result"];
-    /// Always 1; the label is the version of the server.
-    build_info: IntGaugeVec = "build_info" ["version"];
+    /// Always 1; the labels are the version of the server, and the commit if it is known.
+    build_info: IntGaugeVec = "build_info" ["version", "commit"];
 }
 
 /// The rows of info metrics, which are removed when they are no longer true. The lock is held while
@@ -155,22 +153,25 @@ struct Shown {
     /// Model name and revision.
     models: BTreeSet<(String, String)>,
     calibrations: String,
-    /// Calibration and zone.
-    zones: BTreeSet<(String, String)>,
 }
 
 impl Metrics {
     /// Creates metrics that are all zero.
     ///
-    ///
     /// # Errors
     /// If Prometheus does not accept a name or a label.
     pub fn new() -> Result<Self, prometheus::Error> {
         let metrics = Self::registered()?;
-        let version = [env!("CARGO_PKG_VERSION")];
-        metrics.build_info.with_label_values(&version).set(1);
-        metrics.process.register(Box::new(Process::new()?))?;
+        metrics
+            .process
+            .register(Box::new(ProcessCollector::for_self()))?;
         Ok(metrics)
+    }
+
+    /// Shows the version of the server, and the commit from which it was built, if known.
+    pub fn show_build(&self, commit: Option<&str>) {
+        let labels = [env!("CARGO_PKG_VERSION"), commit.unwrap_or_default()];
+        self.build_info.with_label_values(&labels).set(1);
     }
 
     /// Sets the number of frames that wait or are processed, and the number dropped since the
@@ -243,30 +244,14 @@ impl Metrics {
         calibration: &str,
         zones: impl IntoIterator<Item = (&'a str, usize)>,
     ) {
-        let mut shown = self.one_scrape();
         for (zone, persons) in zones {
-            let row = (calibration.to_owned(), zone.to_owned());
-            if shown.zones.len() < MAX_ZONE_ROWS || shown.zones.contains(&row) {
-                let label = zone_label(calibration, zone);
-                let gauge = self.zone_persons.with_label_values(&[label]);
-                gauge.set(count(persons));
-                shown.zones.insert(row);
-            }
+            self.zone_persons.set(calibration, zone, persons);
         }
     }
 
-    /// Removes the zones that are not `there`, by calibration and name.
-    pub fn retain_zones(&self, there: impl Fn(&str, &str) -> bool) {
-        let mut shown = self.one_scrape();
-        shown.zones.retain(|(calibration, zone)| {
-            let stays = there(calibration, zone);
-            if !stays {
-                // The row exists, so it can be removed.
-                let label = zone_label(calibration, zone);
-                let _ = self.zone_persons.remove_label_values(&[label]);
-            }
-            stays
-        });
+    /// Removes the zones for which `is_kept` is false, by calibration and name.
+    pub fn retain_zones(&self, is_kept: impl Fn(&str, &str) -> bool) {
+        self.zone_persons.retain(is_kept);
     }
 
     /// Sets the number and the bytes of rigs in memory, and the numbers built and evicted since the
@@ -313,7 +298,6 @@ impl Metrics {
 
     /// Returns all metrics in the Prometheus text format.
     ///
-    ///
     /// # Errors
     /// If a metric cannot be written.
     pub fn render(&self) -> Result<String, prometheus::Error> {
@@ -328,12 +312,6 @@ impl Metrics {
         // The next scrape corrects the rows.
         self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// One label for both names: the registry identifies rows by a hash of their concatenated labels,
-/// in which `a` and `bc` equal `ab` and `c`. Neither name may contain a slash.
-fn zone_label(calibration: &str, zone: &str) -> String {
-    format!("{calibration}/{zone}")
 }
 
 /// Raises counters to these counts.

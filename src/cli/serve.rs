@@ -36,7 +36,7 @@ pub(super) struct Arguments {
 }
 
 /// Runs the server until a stop is requested, or checks that it could run.
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result<ExitCode> {
     let settings = arguments.settings_file.load()?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(runtime_threads())
@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let outcome = if arguments.check {
         runtime.block_on(check(settings))
     } else {
-        runtime.block_on(serve(settings))
+        runtime.block_on(serve(settings, commit))
     };
     // Remaining tasks were aborted. But ONNX Runtime crashes the process if it ends while a model
     // is being loaded.
@@ -60,10 +60,11 @@ fn runtime_threads() -> usize {
     (cores / 2).clamp(1, MAX_RUNTIME_THREADS)
 }
 
-async fn serve(settings: Settings) -> anyhow::Result<()> {
+async fn serve(settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
     let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
     let sockets = Sockets::bind(&settings.server).await?;
     let app = start(settings).await?;
+    app.metrics().show_build(commit);
     let (tracer, at_once) = (app.tracer(), shutdown.clone());
     let outcome = app.serve(sockets, shutdown).await;
     let last_spans = spawn_blocking(move || tracer.shut_down());

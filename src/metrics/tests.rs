@@ -83,8 +83,8 @@ fn at_most_a_thousand_zones_are_shown_until_they_are_removed() {
     metrics.show_zones("lobby", [("door", 2), ("till", 0)]);
     metrics.show_zones("lobby", [("door", 1), ("till", 3)]);
     let (door, till) = (
-        "lookdown_zone_persons{zone=\"lobby/door\"} 1",
-        "lookdown_zone_persons{zone=\"lobby/till\"} 3",
+        "lookdown_zone_persons{calibration=\"lobby\",zone=\"door\"} 1",
+        "lookdown_zone_persons{calibration=\"lobby\",zone=\"till\"} 3",
     );
     assert_eq!(shown(), [door, till]);
     metrics.retain_zones(|_, zone| zone != "door");
@@ -96,7 +96,7 @@ fn at_most_a_thousand_zones_are_shown_until_they_are_removed() {
             names.iter().map(|name| (name.as_str(), 1)),
         );
     }
-    assert_eq!(shown().len(), MAX_ZONE_ROWS);
+    assert_eq!(shown().len(), zone_persons::MAX_ROWS);
 }
 
 #[test]

@@ -97,7 +97,7 @@ async fn zone_metrics_are_optional_and_follow_the_zones() {
         let row = |zone: &Value| {
             let name = zone["name"].as_str().unwrap();
             format!(
-                "lookdown_zone_persons{{zone=\"lobby/{name}\"}} {}",
+                "lookdown_zone_persons{{calibration=\"lobby\",zone=\"{name}\"}} {}",
                 zone["persons"]
             )
         };

@@ -76,7 +76,7 @@ pub(super) fn read_files(
         is_anything_annotated |= !annotation.objects.is_empty();
         let id = path.strip_prefix(root).unwrap_or(path).with_extension("");
         let id = ImageId::Text(id.to_string_lossy().into_owned());
-        images.push(read(path, id, annotation, pictures).map_err(wrong)?);
+        images.push(read(path, id, &annotation, pictures).map_err(wrong)?);
     }
     let has_persons = images
         .iter()
@@ -120,7 +120,7 @@ fn check_root(text: &str) -> Result<(), String> {
 fn read(
     path: &Path,
     id: ImageId,
-    annotation: Annotation,
+    annotation: &Annotation,
     pictures: &PictureIndex,
 ) -> Result<DataSetImage, String> {
     let picture = pictures.named_like(path)?;
