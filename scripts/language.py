@@ -28,9 +28,7 @@ SUFFIXES = {".rs", ".py", ".js", ".mjs", ".md", ".html"}
 
 def tracked_files(paths):
     """The tracked files below the paths, relative to the repository."""
-    listed = subprocess.run(
-        ["git", "ls-files", "--", *paths], cwd=ROOT, check=True, capture_output=True, text=True
-    )
+    listed = subprocess.run(["git", "ls-files", "--", *paths], cwd=ROOT, check=True, capture_output=True, text=True)
     return [name for name in listed.stdout.splitlines() if name not in EXEMPT]
 
 

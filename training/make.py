@@ -13,9 +13,7 @@ FIRST_SEED = 1_000_000
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "what", choices=("textures", "portraits", "persons", "rooms", "frames", "sheets", "statistics")
-    )
+    parser.add_argument("what", choices=("textures", "portraits", "persons", "rooms", "frames", "sheets", "statistics"))
     parser.add_argument("--work", type=Path, default=Path(__file__).parent / "work")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--count", type=int, default=20)
@@ -26,9 +24,7 @@ def parse():
     parser.add_argument("--resolution", type=int, help="pixels: diameter of a room's panorama to 90 degrees")
     options = parser.parse_args()
     if options.first_seed < FIRST_SEED:
-        parser.error(
-            f"--first-seed {options.first_seed} belongs to evaluation sets; use {FIRST_SEED} or more"
-        )
+        parser.error(f"--first-seed {options.first_seed} belongs to evaluation sets; use {FIRST_SEED} or more")
     return options
 
 
@@ -36,9 +32,7 @@ def main():
     options = parse()
     os.nice(max(0, options.nice - os.nice(0)))
     work = options.work.resolve()
-    more = {
-        k: v for k, v in (("samples", options.samples), ("resolution", options.resolution)) if v is not None
-    }
+    more = {k: v for k, v in (("samples", options.samples), ("resolution", options.resolution)) if v is not None}
     if options.what == "textures":
         from generator.textures import write_all
 

@@ -54,9 +54,7 @@ class Network(nn.Module):
                 self.register_buffer(key, torch.tensor(constants[inputs[1]].copy()))
                 self.steps.append((kind, inputs[:1], out, key))
             elif kind == "Conv":
-                self.steps.append(
-                    ("Conv", inputs[:1], out, (parameter("kernel", inputs[1]), attributes["strides"][0]))
-                )
+                self.steps.append(("Conv", inputs[:1], out, (parameter("kernel", inputs[1]), attributes["strides"][0])))
             elif kind == "Add" and inputs[1] in constants:
                 self.steps.append(("Bias", inputs[:1], out, parameter("bias", inputs[1])))
             elif kind == "Pad":
@@ -72,9 +70,7 @@ class Network(nn.Module):
             elif kind in ("Add", "Concat", "LeakyRelu"):
                 self.steps.append((kind, inputs, out, attributes.get("alpha")))
             else:
-                raise ValueError(
-                    f"{path}: operation {kind} is not one of NanoDet-g's; give the model nanodet_g_416"
-                )
+                raise ValueError(f"{path}: operation {kind} is not one of NanoDet-g's; give the model nanodet_g_416")
         self.steps = _fused(self.steps)
         self.last_use = {name: k for k, step in enumerate(self.steps) for name in step[1]}
 
@@ -89,9 +85,7 @@ class Network(nn.Module):
                 r = a * getattr(self, p)
             elif kind == "ConvBias":
                 kernel, bias, stride, padding = p
-                r = F.conv2d(
-                    a, self.weights[kernel], self.weights[bias].reshape(-1), stride=stride, padding=padding
-                )
+                r = F.conv2d(a, self.weights[kernel], self.weights[bias].reshape(-1), stride=stride, padding=padding)
             elif kind == "LeakyRelu":
                 r = F.leaky_relu(a, p)
             elif kind == "Pad":

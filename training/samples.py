@@ -13,7 +13,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
 from generator.geometry import circle_radius
 
 UPRIGHT_LIMIT = 62.0
@@ -35,9 +34,7 @@ def turned(width, height, boxes, angles, quarter):
 
 def cut(image, boxes, ignore, x, y, scale, size):
     """The square sample at (x, y) with `scale` sample pixels an image pixel. Boxes are clipped; scraps are ignored."""
-    matrix = np.array(
-        [[scale, 0, -x * scale + 0.5 * scale - 0.5], [0, scale, -y * scale + 0.5 * scale - 0.5]]
-    )
+    matrix = np.array([[scale, 0, -x * scale + 0.5 * scale - 0.5], [0, scale, -y * scale + 0.5 * scale - 0.5]])
     source = cv2.GaussianBlur(image, (0, 0), 0.45 / scale) if scale < 0.75 else image
     sample = cv2.warpAffine(source, matrix, (size, size), flags=cv2.INTER_LINEAR, borderValue=(0, 0, 0))
     moved = (boxes - (x, y, x, y)) * scale
@@ -73,9 +70,7 @@ class Frames:
         about = self.images[k]
         image = cv2.cvtColor(cv2.imread(str(self.folder / about["file_name"])), cv2.COLOR_BGR2RGB)
         found = self.annotations[about["id"]]
-        boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in (a["bbox"] for a in found)], float).reshape(
-            -1, 4
-        )
+        boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in (a["bbox"] for a in found)], float).reshape(-1, 4)
         lens = json.loads((self.folder / about["calibration"]).read_text())["lens"]
         radius = circle_radius(lens)
         angles = np.array([a["upright_deg"] if a["nadir_deg"] > BELOW_CAMERA else np.nan for a in found])
@@ -127,8 +122,7 @@ class Pack:
         self.files = [np.load(p, allow_pickle=False) for p in sorted(Path(folder).glob("*.npz"))]
         self.where = [(f, k) for f in self.files for k in range(len(f["start"]) - 1)]
         self.cache = {
-            id(f): {name: f[name] for name in ("bytes", "start", "boxes", "ignore", "first")}
-            for f in self.files
+            id(f): {name: f[name] for name in ("bytes", "start", "boxes", "ignore", "first")} for f in self.files
         }
 
     def sample(self, rng, size, tile_share=None):

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
 from losses import sample_losses
 from network import Network, averaged, boxes_of, export
+
 from samples import Frames, Pack
 
 
@@ -32,9 +32,7 @@ def options_of():
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--size", type=int, default=416)
     parser.add_argument("--rate", type=float, default=4e-4, help="largest learning rate")
-    parser.add_argument(
-        "--frozen", type=int, default=4, help="convolutions at the input that keep their weights"
-    )
+    parser.add_argument("--frozen", type=int, default=4, help="convolutions at the input that keep their weights")
     parser.add_argument(
         "--tiles", type=float, default=0.5, help="share of whole quarter-turn tiles; the rest are crops"
     )
@@ -85,9 +83,7 @@ def step_loss(network, batch, device):
             torch.as_tensor(boxes[n], dtype=torch.float32, device=device),
             torch.as_tensor(ignore[n], device=device).bool(),
         )
-        loss, w = sample_losses(
-            logits[n], sides[n], found[n], points, strides, all_boxes[~flags], all_boxes[flags]
-        )
+        loss, w = sample_losses(logits[n], sides[n], found[n], points, strides, all_boxes[~flags], all_boxes[flags])
         parts, weight = parts + loss, weight + w
     parts = parts / max(weight, 2.0)
     return parts[0] + 2 * parts[1] + 0.25 * parts[2], parts.detach()

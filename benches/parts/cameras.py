@@ -49,21 +49,18 @@ def beside(effort: Effort, alone, only: str, count: int) -> dict:
 
 def tell(raw: dict) -> str:
     """The table as Markdown."""
-    return (
-        f"One client, `{PROFILE}`, medians; memory from before the first frame:\n\n"
-        + table(
-            ("cameras", "memory, MiB", "one alone, ms", "one among them ÷ alone", "all in turns ÷ one alone"),
-            [
-                (
-                    row["count"],
-                    round_to(row["mib"]),
-                    round_to(spread(row["alone"]).median),
-                    spread_cell(ratios(row["among"], row["alone"]).as_json()),
-                    spread_cell(ratios(row["turns"], row["alone"]).as_json()),
-                )
-                for row in raw["cameras"]
-            ],
-        )
+    return f"One client, `{PROFILE}`, medians; memory from before the first frame:\n\n" + table(
+        ("cameras", "memory, MiB", "one alone, ms", "one among them ÷ alone", "all in turns ÷ one alone"),
+        [
+            (
+                row["count"],
+                round_to(row["mib"]),
+                round_to(spread(row["alone"]).median),
+                spread_cell(ratios(row["among"], row["alone"]).as_json()),
+                spread_cell(ratios(row["turns"], row["alone"]).as_json()),
+            )
+            for row in raw["cameras"]
+        ],
     )
 
 

@@ -22,8 +22,8 @@ S3_SERVER = "s3-server"
 RELIABILITY = "reliability"
 REAL_PARTS = "real-parts"
 BENCHES = "benches"
-AUDITOR = "auditor"
-MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, RELIABILITY, REAL_PARTS, BENCHES, AUDITOR)
+CHECKERS = "checkers"
+MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, RELIABILITY, REAL_PARTS, BENCHES, CHECKERS)
 
 
 def main(arguments: list[str]) -> int:
@@ -33,7 +33,7 @@ def main(arguments: list[str]) -> int:
     what the converters import, for their tests; `s3-server` a server that the tests of buckets talk to;
     `reliability` what the proofs of reliability run; `real-parts` the parts from PyPI that `make test-real` runs
     Lookdown with, each in an environment of its own; `benches` what the benchmarks and the servers they compare with
-    import; `auditor` cargo-deny.
+    import; `checkers` what checks the code: cargo-deny, cargo-shear, ruff and typos.
     """
     signal.signal(signal.SIGTERM, _stop)
     try:
@@ -73,8 +73,8 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
         if S3_SERVER in arguments:
             listed = places.root / "tests" / "files" / "buckets" / "requirements.txt"
             PrivatePython(places, S3_SERVER).install_file(listed, "--require-hashes")
-        if AUDITOR in arguments:
-            PrivatePython(places, AUDITOR).install(AUDITOR, pins.auditor)
+        if CHECKERS in arguments:
+            PrivatePython(places, CHECKERS).install("checker", pins.checker)
         if RELIABILITY in arguments:
             listed = places.root / "tests" / "reliability" / "requirements.txt"
             PrivatePython(places, RELIABILITY, places.own / "reliability").install_file(listed, "--require-hashes")

@@ -93,7 +93,7 @@ class Pins:
     converter: tuple[Requirement, ...]
     node: tuple[Requirement, ...]
     builder: tuple[Requirement, ...]
-    auditor: tuple[Requirement, ...]
+    checker: tuple[Requirement, ...]
 
 
 def read_pins(file: Path) -> Pins:
@@ -114,7 +114,7 @@ def read_pins(file: Path) -> Pins:
             converter=tuple(_requirement(table) for table in document["converter"]),
             node=tuple(_requirement(table) for table in document["node"]),
             builder=tuple(_requirement(table) for table in document["builder"]),
-            auditor=tuple(_requirement(table) for table in document["auditor"]),
+            checker=tuple(_requirement(table) for table in document["checker"]),
         )
     except KeyError as missing:
         raise SetupError(f"{file}: the key {missing} is missing.") from None

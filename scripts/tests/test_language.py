@@ -26,7 +26,12 @@ class Language(unittest.TestCase):
 
     def test_summaries_are_short_imperatives(self):
         def document(summary):
-            return '{"paths": {"/a": {"get": {"summary": "%s"}}}}' % summary
+            return f'{{"paths": {{"/a": {{"get": {{"summary": "{summary}"}}}}}}}}'
 
-        for summary, count in [("List calibrations", 0), ("Is it ready?", 1), ("", 1), ("One two three four five six seven", 1)]:
+        for summary, count in [
+            ("List calibrations", 0),
+            ("Is it ready?", 1),
+            ("", 1),
+            ("One two three four five six seven", 1),
+        ]:
             self.assertEqual(len([*language.findings_in_openapi("o", document(summary))]), count, summary)

@@ -57,7 +57,7 @@ class ShippedPins(InEmptyRepository):
         archives = {model.archive for model in pins.models}
         sums = [archive.sha256 for archive in archives] + [model.onnx_sha256 for model in pins.models + pins.quantised]
         sums += [runtime.archive.sha256 for runtime in pins.runtime.values()]
-        sums += [value for pin in pins.converter + pins.node + pins.builder + pins.auditor for value in pin.sha256]
+        sums += [value for pin in pins.converter + pins.node + pins.builder + pins.checker for value in pin.sha256]
         self.assertEqual(len(sums), len(set(sums)))
 
     def test_no_address_of_a_registry_is_written_down(self):

@@ -27,7 +27,7 @@ def main(client: str, port: str, image: str, model: str, key: str, confidence: s
     detect = {"python": with_python, "sdk": with_sdk}[client]
     try:
         answer = {"predictions": detect(port, Path(image), model, key, float(confidence))}
-    except Exception as error:  # noqa: BLE001: the test checks any exception of a client
+    except Exception as error:  # The test checks any exception of a client.
         answer = {"raised": f"{type(error).__name__}: {error}"}
     print(json.dumps(answer))
 

@@ -40,7 +40,9 @@ class ContainerImage(unittest.TestCase):
         programs = {file.name for file in files if not file.name.startswith(("lib", "ld-"))}
         self.assertEqual(programs, {"lookdown"})
         writable = [file for file in self.image.root.rglob("*") if self.is_writable_by_the_user(file)]
-        self.assertEqual({str(file.relative_to(self.image.root)) for file in writable}, {"tmp", "opt/lookdown/calibrations"})
+        self.assertEqual(
+            {str(file.relative_to(self.image.root)) for file in writable}, {"tmp", "opt/lookdown/calibrations"}
+        )
 
     def test_third_party_software_has_its_licences(self):
         for name in ("libc6", "libgcc-s1", "libstdc++6", "ca-certificates"):

@@ -97,7 +97,19 @@ class Monitoring(unittest.TestCase):
         """The metrics of a server that has answered a frame over TLS."""
         key, certificate = self.folder / "key.pem", self.folder / "certificate.pem"
         made = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
-        run([*made, "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", certificate])
+        run(
+            [
+                *made,
+                "-subj",
+                "/CN=localhost",
+                "-addext",
+                "subjectAltName=DNS:localhost",
+                "-keyout",
+                key,
+                "-out",
+                certificate,
+            ]
+        )
         port, metrics_port = free_ports(2)
         settings = {
             "SERVER__LISTEN": f"127.0.0.1:{port}",

@@ -10,10 +10,11 @@ import unittest
 from pathlib import Path
 
 from harness.places import ROOT, SAMPLES
-from metrics import metric
 from mosquitto import PASSWORD, PASSWORD_IN_URL, broker
 from support.lookdown import TINY, lookdown
 from waiting import wait_until
+
+from metrics import metric
 
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
@@ -80,7 +81,7 @@ class Mqtt(unittest.TestCase):
     def test_a_starting_home_assistant_gets_all_messages_again(self):
         with self.lookdown() as server:
             server.post(DETECT, OFFICE)
-            wait_until(lambda: CONFIGS < set(self.broker.retained()), "discovery is published")
+            wait_until(lambda: set(self.broker.retained()) > CONFIGS, "discovery is published")
             for topic in (*CONFIGS, PERSONS):
                 self.broker.client("pub", "-r", "-n", "-t", topic)
             self.assertFalse(CONFIGS & set(self.broker.retained()))

@@ -43,7 +43,9 @@ class Page(unittest.TestCase):
             shutil.copytree(SAMPLES / "calibrations", calibrations)
             keys = Path(folder) / "keys.toml"
             digest = hashlib.sha256(KEY.encode()).hexdigest()
-            keys.write_text(f'page = {{ scopes = ["detect", "read", "admin"], sha256 = "{digest}" }}\n', encoding="utf-8")
+            keys.write_text(
+                f'page = {{ scopes = ["detect", "read", "admin"], sha256 = "{digest}" }}\n', encoding="utf-8"
+            )
             with lookdown({"RESULTS__PICTURES": PICTURED}, calibrations=calibrations) as server:
                 with lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed:
                     self.run_node(

@@ -17,11 +17,12 @@ from pathlib import Path
 from harness.places import LOOKDOWN, ROOT
 from harness.places import WORK as LOGS
 from harness.processes import Server, free_ports, running
-from metrics import metric
 from redis_server import RedisServer
 from support.exchange import Answer, ask
 from support.places import OFFICE, SAMPLES, TINY_MODEL
 from waiting import PATIENCE_SECONDS, wait_until
+
+from metrics import metric
 
 PICTURE = OFFICE.read_bytes()
 RECORD = (ROOT / "src" / "results" / "redis" / "record.lua").read_text(encoding="utf-8")
@@ -43,7 +44,10 @@ def replica(name: str, url: str, **settings: str) -> Iterator[Server]:
     }
     environment = {f"LOOKDOWN__{key}": value for key, value in wanted.items()}
     with running(name, [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
-        wait_until(lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "unreachable" in name, "Redis is connected")
+        wait_until(
+            lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "unreachable" in name,
+            "Redis is connected",
+        )
         yield server
 
 
@@ -69,7 +73,9 @@ class Stream:
     def __init__(self, server: Server, path: str, **headers: str) -> None:
         """Listens from now on."""
         self._connection = http.client.HTTPConnection(server.address, timeout=PATIENCE_SECONDS)
-        self._connection.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+        self._connection.request(
+            "GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()}
+        )
         self._answer = self._connection.getresponse()
         assert self._answer.status == 200, self._answer.read()
 
@@ -120,14 +126,22 @@ class Shared(unittest.TestCase):
         ids = [int(row["id"]) for row in json.loads(pages[0])]
         self.assertEqual(sorted(set(ids)), ids)
         self.assertLess(abs(ids[-1] / 1e6 - time.time()), 60.0)
-        since = [get(server, f"/results/atrium/history?since={ids[0]}&limit=1").json() for server in (self.one, self.other)]
+        since = [
+            get(server, f"/results/atrium/history?since={ids[0]}&limit=1").json() for server in (self.one, self.other)
+        ]
         self.assertEqual(since[0], since[1])
         self.assertEqual([int(row["id"]) for row in since[0]], ids[1:2])
         rows = [
-            [{key: row[key] for key in ("camera", "id", "received_at", "persons")} for row in get(server, "/results").json()]
+            [
+                {key: row[key] for key in ("camera", "id", "received_at", "persons")}
+                for row in get(server, "/results").json()
+            ]
             for server in (self.one, self.other)
         ]
         self.assertEqual(rows[0], rows[1])
+
+    def append_latest(self, answers: list[Answer], path: str, tag: str) -> None:
+        answers.append(get(self.other, path, If_None_Match=tag))
 
     def test_long_polls_are_answered_by_reports_of_other_servers(self) -> None:
         """Long polls, also for the first report of a camera."""
@@ -138,7 +152,7 @@ class Shared(unittest.TestCase):
                 tag = self.latest(self.other, "stairs", first.body).headers["etag"]
             answers: list[Answer] = []
             path = "/results/stairs/latest?wait=10"
-            waiting = threading.Thread(target=lambda: answers.append(get(self.other, path, If_None_Match=tag)))
+            waiting = threading.Thread(target=self.append_latest, args=(answers, path, tag))
             waiting.start()
             wait_until(lambda: metric(self.other, "results_listeners") >= 1.0, "a client listens")
             began = time.monotonic()
@@ -280,7 +294,13 @@ class Secrets(unittest.TestCase):
                 ready = get(server, "/readyz").body
             wrong = redis.url.replace("right", "wrong")
             with replica("redis-unreachable-wrong", wrong) as server:
-                wait_until(lambda: "WRONGPASS" in log_of("redis-unreachable-wrong") or "assword" in log_of("redis-unreachable-wrong"), "the wrong password is logged")
+                wait_until(
+                    lambda: (
+                        "WRONGPASS" in log_of("redis-unreachable-wrong")
+                        or "assword" in log_of("redis-unreachable-wrong")
+                    ),
+                    "the wrong password is logged",
+                )
                 ready += get(server, "/readyz").body
                 redis.ask("CONFIG", "SET", "requirepass", "s3cret-wrong")
                 redis.password = "s3cret-wrong"
@@ -321,29 +341,29 @@ class Bounds(unittest.TestCase):
 
     def test_an_image_is_drawn_by_any_server(self) -> None:
         """Equal on every server, with its ETag. None for cameras that are not named."""
-        with RedisServer() as redis:
-            with (
-                replica("redis-camera", redis.url, RESULTS__PICTURES="hall") as one,
-                replica("redis-viewer", redis.url) as other,
-            ):
-                for camera in ("hall", "hall", "stairs"):
-                    detect(one, camera)
-                path = "/results/hall/latest.jpg?draw=boxes,scores,views,timestamp&width=640"
-                wait_until(lambda: metric(one, "results_waiting") == 0.0, "all is stored")
-                pictures = [get(server, path) for server in (one, other)]
-                self.assertEqual([picture.status for picture in pictures], [200, 200])
-                self.assertTrue(pictures[0].body.startswith(b"\xff\xd8\xff"))
-                self.assertEqual(pictures[0].body, pictures[1].body)
-                latest = get(other, "/results/hall/latest").headers["etag"]
-                self.assertEqual([picture.headers["etag"] for picture in pictures], [latest, latest])
-                self.assertEqual(get(other, path, If_None_Match=latest).status, 304)
-                problem = get(other, "/results/stairs/latest.jpg").json()
-                self.assertEqual(problem["type"], "/problems/picture-not-kept")
-                self.assertIn(redis.ask("TTL", "lookdown:picture:hall"), range(80_000, 86_401))
-                self.assertLess(redis.ask("MEMORY", "USAGE", "lookdown:picture:hall"), 4 << 20)
-                # A report from a server that keeps no images removes the previous one.
-                detect(other, "hall")
-                wait_until(lambda: get(one, path).status == 404, "the picture is gone")
+        with (
+            RedisServer() as redis,
+            replica("redis-camera", redis.url, RESULTS__PICTURES="hall") as one,
+            replica("redis-viewer", redis.url) as other,
+        ):
+            for camera in ("hall", "hall", "stairs"):
+                detect(one, camera)
+            path = "/results/hall/latest.jpg?draw=boxes,scores,views,timestamp&width=640"
+            wait_until(lambda: metric(one, "results_waiting") == 0.0, "all is stored")
+            pictures = [get(server, path) for server in (one, other)]
+            self.assertEqual([picture.status for picture in pictures], [200, 200])
+            self.assertTrue(pictures[0].body.startswith(b"\xff\xd8\xff"))
+            self.assertEqual(pictures[0].body, pictures[1].body)
+            latest = get(other, "/results/hall/latest").headers["etag"]
+            self.assertEqual([picture.headers["etag"] for picture in pictures], [latest, latest])
+            self.assertEqual(get(other, path, If_None_Match=latest).status, 304)
+            problem = get(other, "/results/stairs/latest.jpg").json()
+            self.assertEqual(problem["type"], "/problems/picture-not-kept")
+            self.assertIn(redis.ask("TTL", "lookdown:picture:hall"), range(80_000, 86_401))
+            self.assertLess(redis.ask("MEMORY", "USAGE", "lookdown:picture:hall"), 4 << 20)
+            # A report from a server that keeps no images removes the previous one.
+            detect(other, "hall")
+            wait_until(lambda: get(one, path).status == 404, "the picture is gone")
 
     def test_limits_of_the_settings_hold(self) -> None:
         """Cameras, history and reports."""
@@ -374,11 +394,15 @@ class Bounds(unittest.TestCase):
                     # A sender without an answer sends the report again.
                     redis.ask_all([record(report, limits)] * chance.choice((1, 1, 2)))
                     kept = room_for(kept, report, limits)
-                    pictured = [camera for camera in pictured if camera != report[0]] + [report[0]] * has_picture(number)
+                    pictured = [camera for camera in pictured if camera != report[0]] + [report[0]] * has_picture(
+                        number
+                    )
                     pictured = [camera for camera in pictured if any(one[0] == camera for one in kept)][-MOST_PICTURES:]
                     entries = redis.ask("XRANGE", "t:reports", "-", "+")
                     self.assertEqual([tuple(entry[1][1::2]) for entry in entries], [_fields(one) for one in kept])
-                    ids = {int(one[1][1]): entry[0] for entry, one in zip(entries, _contents(redis, entries), strict=True)}
+                    ids = {
+                        int(one[1][1]): entry[0] for entry, one in zip(entries, _contents(redis, entries), strict=True)
+                    }
                     self.assertEqual(list(ids), [one[1] for one in kept])
                 latest = {camera: ids[number] for camera, number, _ in kept}
                 by_age = sorted(latest, key=lambda camera: latest[camera])
@@ -404,7 +428,9 @@ def record(report: tuple[str, int, int], limits: list[int]) -> tuple:
     return ("EVAL", RECORD, len(keys), *keys, "t:camera:", "t:picture:", *told, *limits, MOST_PICTURES, 3600)
 
 
-def room_for(kept: list[tuple[str, int, int]], report: tuple[str, int, int], limits: list[int]) -> list[tuple[str, int, int]]:
+def room_for(
+    kept: list[tuple[str, int, int]], report: tuple[str, int, int], limits: list[int]
+) -> list[tuple[str, int, int]]:
     """The stored reports, in order, after this report."""
     most_cameras, most_of_camera, most_reports, most_bytes = limits
     kept = [*kept, report]

@@ -50,8 +50,9 @@ def put_everywhere(servers: dict[str, Server], content: bytes) -> str:
     status, tag, told = send(servers["r1"], "PUT", "/calibrations/office", content)
     assert status in (200, 201), told
     for name, server in servers.items():
-        path = "/calibrations/office"
-        wait_until(lambda server=server: send(server, "GET", path)[1] == tag, f"{name} has the calibration")
+        wait_until(
+            lambda server=server: send(server, "GET", "/calibrations/office")[1] == tag, f"{name} has the calibration"
+        )
     return tag
 
 

@@ -17,9 +17,10 @@ from pathlib import Path
 
 from harness.places import ROOT, SAMPLES, model
 from harness.processes import Server, free_ports, running
-from metrics import metric
 from support.lookdown import lookdown
 from waiting import wait_until
+
+from metrics import metric
 
 HERE = Path(__file__).resolve().parent
 MLSERVER = ROOT / ".setup" / "real" / "v2_backend" / "bin" / "mlserver"

@@ -6,8 +6,8 @@ import math
 import os
 
 os.environ["OPENCV_IO_ENABLE_OPENEXR"] = "1"
-import bpy
 import bmesh  # Exists only once bpy is imported.
+import bpy
 import cv2
 import numpy as np
 from mathutils import Matrix
@@ -196,14 +196,10 @@ class Builder:
                     profile=0.5,
                 )
 
-        mesh = self._mesh(
-            made, ("box", sx, sy, sz, bevel), build, (lambda _: True) if bevel >= 0.03 else None
-        )
+        mesh = self._mesh(made, ("box", sx, sy, sz, bevel), build, (lambda _: True) if bevel >= 0.03 else None)
         return self._place(mesh, x, y, z, rx, ry, rz)
 
-    def cylinder(
-        self, radius, height, x, y, z, made, top=None, segments=16, rx=0.0, ry=0.0, scale=(1, 1), capped=True
-    ):
+    def cylinder(self, radius, height, x, y, z, made, top=None, segments=16, rx=0.0, ry=0.0, scale=(1, 1), capped=True):
         def build(b):
             bmesh.ops.create_cone(
                 b,
@@ -231,9 +227,7 @@ class Builder:
             bmesh.ops.delete(b, geom=[v for v in b.verts if v.co.z < lower * radius], context="VERTS")
             bmesh.ops.scale(b, vec=scale, verts=b.verts)
 
-        return self._place(
-            self._mesh(made, ("sphere", radius, scale, lower), build, lambda _: True), x, y, z, rx
-        )
+        return self._place(self._mesh(made, ("sphere", radius, scale, lower), build, lambda _: True), x, y, z, rx)
 
     def plane(self, sx, sy, x, y, z, made, rx=0.0, ry=0.0, rz=0.0):
         mesh = bpy.data.meshes.new("plane")

@@ -8,7 +8,7 @@ import gzip
 import json
 import os
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -100,13 +100,11 @@ def _material_textures(folder, material):
             words = line.split()
             if len(words) > 1 and words[0] in ("diffuseTexture", "normalmapTexture"):
                 path = Path(os.path.normpath((folder / material).parent / words[1]))
-                found[words[0]] = (
-                    str(path) if path.exists() else None
-                )  # Textures of unsettled licence are absent.
+                found[words[0]] = str(path) if path.exists() else None  # Textures of unsettled licence are absent.
     return found.get("diffuseTexture"), found.get("normalmapTexture")
 
 
-@lru_cache(maxsize=None)
+@cache
 def load_garment(path):
     scales, rows, hidden, mode, obj, material = {}, [], set(), "", None, None
     with open(path, errors="ignore") as lines:
@@ -203,7 +201,7 @@ class Body:
             self._add_bone(parent)
         self.names.append(name)
 
-    @lru_cache(maxsize=None)
+    @cache
     def target(self, name):
         path, indices, moves = self.folder / f"targets/{name}.target.gz", [], []
         if path.exists():
@@ -266,9 +264,7 @@ class Body:
                 child = heads[self.index[f"{NEXT_JOINT[bone]}.{side}"]] - heads[i]
                 turn = rotation_between(turn @ child, value) @ turn
             rotations[i] = turn
-            posed[i] = (
-                heads[i] if parent < 0 else rotations[parent] @ (heads[i] - heads[parent]) + posed[parent]
-            )
+            posed[i] = heads[i] if parent < 0 else rotations[parent] @ (heads[i] - heads[parent]) + posed[parent]
         return np.array(rotations), posed
 
     def build(self, who, pose) -> Person:

@@ -25,9 +25,7 @@ def wrap_upright(angle):
 
 def _outline(mask):
     """The centres of all outline pixels of a mask (n × 2)."""
-    outlines, _ = cv2.findContours(
-        np.ascontiguousarray(mask, np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
-    )
+    outlines, _ = cv2.findContours(np.ascontiguousarray(mask, np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return np.concatenate(outlines)[:, 0].astype(np.float32) + 0.5
 
 

@@ -71,9 +71,7 @@ def _window(calibration, placement, crop, factor):
     theta, phi = np.hypot(px, py) / v["focal"], np.arctan2(px, -py) + placement.azimuth
     rays = np.stack([np.sin(theta) * np.sin(phi), np.sin(theta) * np.cos(phi), -np.cos(theta)], 1)
     camera = rays @ calibration.rotation.T
-    if (
-        np.arctan2(np.hypot(camera[:, 0], camera[:, 1]), camera[:, 2]) > calibration.lens["max_theta"] + 0.9
-    ).all():
+    if (np.arctan2(np.hypot(camera[:, 0], camera[:, 1]), camera[:, 2]) > calibration.lens["max_theta"] + 0.9).all():
         return None
     pixels, _ = calibration.project(rays * 10 + (0, 0, calibration.height_m))
     low, high = np.floor(pixels.min(0)) - 2, np.ceil(pixels.max(0)) + 3
@@ -82,9 +80,7 @@ def _window(calibration, placement, crop, factor):
         low, high = np.minimum(low, nadir), np.maximum(high, nadir)
     x0, y0 = (max(0, int(v)) for v in low)
     x1, y1 = min(calibration.width, int(high[0])), min(calibration.height, int(high[1]))
-    return (
-        None if x0 >= x1 or y0 >= y1 else (slice(y0 * factor, y1 * factor), slice(x0 * factor, x1 * factor))
-    )
+    return None if x0 >= x1 or y0 >= y1 else (slice(y0 * factor, y1 * factor), slice(x0 * factor, x1 * factor))
 
 
 def _sample_crop(crop, placement, theta, phi, frame_focal):

@@ -106,10 +106,7 @@ class Figure:
         b = Builder(matrix=self.matrix, index=index)
         tone = {name: material(tuple(colours["extra"][i]), 0.8) for i, name in enumerate(EXTRAS)}
         for i, name in enumerate(EXTRAS):
-            if (
-                name in ("skirt", "long_coat", "scarf", "backpack")
-                and (fabric := colours["extra_fabric"]) is not None
-            ):
+            if name in ("skirt", "long_coat", "scarf", "backpack") and (fabric := colours["extra_fabric"]) is not None:
                 tone[name] = material(
                     texture=f"{palette.textures}/fabric{fabric}.png",
                     rough=0.9,
@@ -176,9 +173,7 @@ class Figure:
                 hips = (j["upperleg01.L"] + j["upperleg01.R"]) / 2
                 low = hips[2] * (0.5 if colours["extra"][1][0] > 0.2 else 0.2)
                 stride = float(np.hypot(*(j["foot.L"] - j["foot.R"])[:2]))
-                low = (
-                    max(low, 0.42 * hips[2]) if stride > 0.45 * k else low
-                )  # Long skirts do not allow long steps.
+                low = max(low, 0.42 * hips[2]) if stride > 0.45 * k else low  # Long skirts do not allow long steps.
                 feet = max(0.16, 0.12 + 0.42 * stride * (1 - low / hips[2]))
                 high = hips[2] + 0.12 * k
                 b.cylinder(

@@ -35,9 +35,7 @@ def random_camera(rng, room):
         tilt = abs(float(rng.normal() * math.radians(3)))
     if all_round and rng.random() < 0.7:
         tilt = math.radians(float(rng.uniform(5, 62)))
-    rotation = camera_rotation(
-        float(rng.uniform(0, 2 * math.pi)), tilt, float(rng.normal() * 0.02) if tilt else 0.0
-    )
+    rotation = camera_rotation(float(rng.uniform(0, 2 * math.pi)), tilt, float(rng.normal() * 0.02) if tilt else 0.0)
     cx, cy = ((s - 1) / 2 + float(rng.normal() * 0.004 * diameter) for s in (width, height))
     return Calibration(width, height, lens, cx, cy, rotation, room["camera_height"])
 
@@ -138,9 +136,7 @@ def write_annotations(folder):
         for a in record["annotations"]:
             annotations.append(dict(a, id=len(annotations) + 1, image_id=record["image"]["id"]))
         others += [dict(d, image_id=record["image"]["id"]) for d in record["distractors"]]
-    content = dict(
-        images=images, annotations=annotations, distractors=others, categories=[dict(id=1, name="person")]
-    )
+    content = dict(images=images, annotations=annotations, distractors=others, categories=[dict(id=1, name="person")])
     (folder / "annotations.json").write_text(json.dumps(content))
     return len(images), len(annotations)
 
@@ -155,11 +151,10 @@ def make_frames(work, first_seed, count, split="train"):
         raise SystemExit(
             f"{work} has {len(rooms)} rooms and {len(files)} person files of the split {split}; render both first"
         )
-    todo = [
-        s for s in range(first_seed, first_seed + count) if not (folder / "records" / f"{s}.json").exists()
-    ]
+    todo = [s for s in range(first_seed, first_seed + count) if not (folder / "records" / f"{s}.json").exists()]
     progress = Progress(f"frames {split}", len(todo), work / "log" / f"frames-{split}.log")
     for seed in todo:
         make_frame(seed, rooms, files, folder, split)
         progress.step()
-    print("%d frames, %d persons" % write_annotations(folder))
+    frame_count, person_count = write_annotations(folder)
+    print(f"{frame_count} frames, {person_count} persons")

@@ -13,9 +13,7 @@ class Palette:
 
     def __init__(self, rng, textures, split="train"):
         r, self.rng, self.textures = rng, rng, str(textures)
-        self.wood = [
-            material(texture=f"{textures}/wood{i}.png", rough=0.45, scale=1.2) for i in r.permutation(6)[:3]
-        ]
+        self.wood = [material(texture=f"{textures}/wood{i}.png", rough=0.45, scale=1.2) for i in r.permutation(6)[:3]]
         self.metal = material((0.55, 0.55, 0.57), 0.35, metal=0.8)
         self.black, self.white = material((0.03, 0.03, 0.035), 0.5), material((0.75, 0.75, 0.74), 0.4)
         self.cloth = material(self.colour(0.02, 0.5), 0.9)
@@ -34,9 +32,7 @@ class Palette:
 
     def fabric(self, split="train"):
         low, high = (0, 24) if split == "train" else (24, 32)
-        return self.texture(
-            f"fabric{self.rng.integers(low, high)}", rough=0.9, scale=0.6, tint=self.colour(0.1, 1.2)
-        )
+        return self.texture(f"fabric{self.rng.integers(low, high)}", rough=0.9, scale=0.6, tint=self.colour(0.1, 1.2))
 
 
 def chair(b, p, seat_height=0.45, style=None, jacket=False):
@@ -49,9 +45,7 @@ def chair(b, p, seat_height=0.45, style=None, jacket=False):
             b.cylinder(0.03, seat_height - 0.1, 0, 0, seat_height / 2, p.metal)
             for k in range(5):
                 a = k * 1.2566
-                b.box(
-                    0.3, 0.04, 0.03, 0.15 * math.cos(a), 0.15 * math.sin(a), 0.06, p.black, bevel=0.005, rz=a
-                )
+                b.box(0.3, 0.04, 0.03, 0.15 * math.cos(a), 0.15 * math.sin(a), 0.06, p.black, bevel=0.005, rz=a)
         else:
             for x in (-0.2, 0.2):
                 for y in (-0.2, 0.2):
@@ -128,9 +122,7 @@ def things_on(b, p, width, depth, height, count):
             b.cylinder(0.035, 0.09, x, y, height + 0.045, material(p.colour(), 0.4), top=0.04)
         elif kind == 2:
             b.box(0.33, 0.23, 0.015, x, y, height + 0.008, p.metal, bevel=0, rz=a)
-            b.child(x, y, math.degrees(a)).box(
-                0.33, 0.01, 0.22, 0, 0.12, height + 0.11, p.black, bevel=0, rx=-0.25
-            )
+            b.child(x, y, math.degrees(a)).box(0.33, 0.01, 0.22, 0, 0.12, height + 0.11, p.black, bevel=0, rx=-0.25)
         elif kind == 3:
             b.box(0.17, 0.24, 0.025, x, y, height + 0.012, material(p.colour(), 0.6), bevel=0, rz=a)
         elif kind == 4:
@@ -186,9 +178,7 @@ def shelf(b, p, width=None, height=None, y=0.18):
 
 def plant(b, p):
     r = p.rng
-    b.cylinder(
-        0.13, 0.3, 0, 0, 0.15, p.white if r.random() < 0.5 else material((0.4, 0.2, 0.12), 0.8), top=0.18
-    )
+    b.cylinder(0.13, 0.3, 0, 0, 0.15, p.white if r.random() < 0.5 else material((0.4, 0.2, 0.12), 0.8), top=0.18)
     tall, vertices, faces = float(r.uniform(0.4, 1.3)), [], []
     for _ in range(int(r.integers(30, 70))):
         a, share, long, wide = (
@@ -201,11 +191,7 @@ def plant(b, p):
         d = np.array([math.cos(a) * math.cos(rise), math.sin(a) * math.cos(rise), math.sin(rise)])
         n = np.array([-math.sin(a), math.cos(a), 0])
         for u, w in ((0.05, 0.1), (0.35, 1), (0.7, 0.8), (1, 0.02)):
-            centre = (
-                np.array([0, 0, 0.3 + tall * share * 0.6])
-                + d * long * u
-                - np.array([0, 0, 0.375 * long * u * u])
-            )
+            centre = np.array([0, 0, 0.3 + tall * share * 0.6]) + d * long * u - np.array([0, 0, 0.375 * long * u * u])
             vertices += [tuple(centre + n * wide * w), tuple(centre - n * wide * w)]
         faces += [(base + 2 * k, base + 2 * k + 1, base + 2 * k + 3, base + 2 * k + 2) for k in range(3)]
     mesh = bpy.data.meshes.new("plant")

@@ -24,9 +24,7 @@ def radius_of(lens, theta):
         return 2 * f * np.tan(theta / 2)
     if model == "kannala_brandt":
         return f * theta * (1 + sum(k * theta ** (2 * i + 2) for i, k in enumerate(lens["k"])))
-    raise ValueError(
-        f"lens model {model!r} is unknown; use equidistant, equisolid, stereographic or kannala_brandt"
-    )
+    raise ValueError(f"lens model {model!r} is unknown; use equidistant, equisolid, stereographic or kannala_brandt")
 
 
 def theta_of(lens, radius):
@@ -43,9 +41,7 @@ def make_lens(rng, circle_radius):
     if model == "kannala_brandt":
         lens["k"] = [
             float(x)
-            for x in np.array(
-                [rng.uniform(-0.03, 0.03), rng.uniform(-0.008, 0.004), rng.uniform(-0.001, 0.002), 0.0]
-            )
+            for x in np.array([rng.uniform(-0.03, 0.03), rng.uniform(-0.008, 0.004), rng.uniform(-0.001, 0.002), 0.0])
         ]
     lens["focal"] = float(circle_radius / radius_of(lens, max_theta))
     return lens
@@ -85,9 +81,7 @@ class Calibration:
         rays = (np.atleast_2d(points) - np.array([0, 0, self.height_m])) @ self.rotation.T
         rho = np.hypot(rays[:, 0], rays[:, 1])
         theta = np.arctan2(rho, rays[:, 2])
-        scale = radius_of(self.lens, np.minimum(theta, self.lens["max_theta"] + 0.05)) / np.maximum(
-            rho, 1e-12
-        )
+        scale = radius_of(self.lens, np.minimum(theta, self.lens["max_theta"] + 0.05)) / np.maximum(rho, 1e-12)
         return np.stack([self.cx + scale * rays[:, 0], self.cy + scale * rays[:, 1]], 1), theta
 
     def rays(self, x, y):

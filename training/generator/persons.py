@@ -89,9 +89,7 @@ def light_rig(rng, kind, camera):
 
 def whole_area(points, triangles):
     """Pixels that a body covers when nothing stands before it: what the visible share is counted from."""
-    fine = (
-        4 if np.ptp(points, axis=0).max() < 120 else 2
-    )  # Filled triangles include the pixels that they touch.
+    fine = 4 if np.ptp(points, axis=0).max() < 120 else 2  # Filled triangles include the pixels that they touch.
     low = np.floor(points.min(0)) - 1
     size = (np.ceil(points.max(0) - low).astype(int) + 2) * fine
     mask, corners = np.zeros(size[::-1], np.uint8), np.rint((points - low) * fine * 16).astype(np.int32)

@@ -23,9 +23,7 @@ class Maker:
     def person(self, kind, x=0.0, y=0.0, degrees=0.0, arms=None, seat_height=None, child=None):
         child = self.rng.random() < 0.14 if child is None else child
         who = random_person(self.rng, self.assets, self.split, child)
-        figure = add_figure(
-            self.body, self.rng, who, kind, len(self.figures) + 1, x, y, degrees, arms, seat_height
-        )
+        figure = add_figure(self.body, self.rng, who, kind, len(self.figures) + 1, x, y, degrees, arms, seat_height)
         self.figures.append(figure)
         return figure
 
@@ -123,9 +121,7 @@ def with_trolley(m):
 
 def behind_counter(m):
     f.counter(Builder(0, -0.62, 0), m.palette, float(m.rng.uniform(1.0, 2.0)))
-    m.person(
-        "standing", 0, 0, float(m.rng.normal() * 20), str(m.rng.choice(["carry", "none", "table", "point"]))
-    )
+    m.person("standing", 0, 0, float(m.rng.normal() * 20), str(m.rng.choice(["carry", "none", "table", "point"])))
 
 
 MAKERS = {
@@ -151,8 +147,4 @@ def make_piece(m):
 
 def reach(figures):
     """How far the piece reaches from its centre on the floor, in metres."""
-    return (
-        max(float(abs(figure.world_vertices()[:, :2]).max()) for figure in figures) + 0.1
-        if figures
-        else math.nan
-    )
+    return max(float(abs(figure.world_vertices()[:, :2]).max()) for figure in figures) + 0.1 if figures else math.nan

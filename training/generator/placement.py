@@ -72,9 +72,7 @@ def place(rng, room, files, wanted, prefer_light=None, tries=400):
     if prefer_light is not None:
         chosen = [(f, k) for f, k in fits if f.views[k]["light"] == prefer_light]
         fits = chosen * 4 + fits if len(chosen) > 3 else fits
-    angles = np.array(
-        [math.degrees(math.atan2(f.views[k]["distance"], f.views[k]["camera_height"])) for f, k in fits]
-    )
+    angles = np.array([math.degrees(math.atan2(f.views[k]["distance"], f.views[k]["camera_height"])) for f, k in fits])
     placed, taken, used, persons = [], [], {}, 0
     for _ in range(tries if fits else 0):
         if persons >= wanted:

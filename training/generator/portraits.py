@@ -59,9 +59,7 @@ def render_portraits(work, first_seed, count, threads=1):
             bl.ambient(0.6, (1, 1, 1))
             _camera(scene, rng, rng.random() < 0.5)
             rgba, _, _ = bl.render(scene, 12, scratch)
-            ground = np.linspace(0, 1, 384)[:, None, None] * rng.uniform(0.02, 0.8, 3) + rng.uniform(
-                0.02, 0.5, 3
-            )
+            ground = np.linspace(0, 1, 384)[:, None, None] * rng.uniform(0.02, 0.8, 3) + rng.uniform(0.02, 0.5, 3)
             picture = display(rgba[..., :3] + ground * (1 - rgba[..., 3:]), 1.0)
             if rng.random() < 0.5:
                 y = int(rng.choice([20, 330]))

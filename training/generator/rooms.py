@@ -52,9 +52,7 @@ class Room:
 
     def portrait(self):
         names = [
-            n
-            for k in range(200)
-            if (self.work / "textures" / f"{(n := portrait_name(self.split, k))}.png").exists()
+            n for k in range(200) if (self.work / "textures" / f"{(n := portrait_name(self.split, k))}.png").exists()
         ]
         return str(self.rng.choice(names)) if names else "poster0"
 
@@ -92,9 +90,7 @@ class Room:
                 rx=math.pi / 2,
             )
             wall.box(long, 0.015, 0.09, 0, 0.008, 0.045, p.white, bevel=0)
-        top = self.grid.plane(
-            self.width, self.depth, 0, 0, self.ceiling, bl.material(p.colour(0.3, 0.8), 0.95)
-        )
+        top = self.grid.plane(self.width, self.depth, 0, 0, self.ceiling, bl.material(p.colour(0.3, 0.8), 0.95))
         top.visible_diffuse = top.visible_glossy = top.visible_shadow = False
         for _ in range(int(r.integers(0, 5)) if self.width > 12 else 0):
             x, y = float(r.uniform(-0.45, 0.45) * self.width), float(r.uniform(-0.45, 0.45) * self.depth)
@@ -199,9 +195,7 @@ class Room:
             )
             name = self.portrait() if person else self._numbered("poster", 16)
             made = (
-                p.white
-                if kind == "board"
-                else p.texture(name, uv=True, rough=0.5, emit=float(r.choice([0, 0, 0.6])))
+                p.white if kind == "board" else p.texture(name, uv=True, rough=0.5, emit=float(r.choice([0, 0, 0.6])))
             )
             z = float(r.uniform(h / 2 + 0.3, max(h / 2 + 0.4, 1.7)))
             b.box(w + 0.06, 0.025, h + 0.06, 0, 0.012, z, p.black, bevel=0)
@@ -235,9 +229,7 @@ class Room:
         """A roll-up with a picture of a person."""
         w, h = f.flip_board(b, self.palette)
         made = self.palette.texture(self.portrait(), uv=True, rough=0.5)
-        b.child(0, 0, index=PICTURE_OF_PERSON).plane(
-            w - 0.04, h - 0.1, 0, -0.02, h / 2 + 0.1, made, rx=math.pi / 2
-        )
+        b.child(0, 0, index=PICTURE_OF_PERSON).plane(w - 0.04, h - 0.1, 0, -0.02, h / 2 + 0.1, made, rx=math.pi / 2)
         self.occupy(b, 0.5, 0.3)
 
     def mannequin(self, b):

@@ -54,9 +54,7 @@ class FloorShadow:
         for lx, ly, lz, strength in sorted(lights, key=lambda light: -light[3])[:3]:
             low = points[points[:, 2] < 0.95 * lz]
             t = (lz / (lz - low[:, 2]))[:, None]
-            self._darken(
-                self._cover(np.array([lx, ly]) + (low[:, :2] - (lx, ly)) * t, 0.1), 0.85 * strength / total
-            )
+            self._darken(self._cover(np.array([lx, ly]) + (low[:, :2] - (lx, ly)) * t, 0.1), 0.85 * strength / total)
         self._darken(self._cover(points[points[:, 2] < 0.35], 0.08), 0.35)
         self._darken(self._cover(points, 0.25), 0.5 * math.pi * room["ambient"] / total)
 

@@ -16,7 +16,9 @@ def print_statistics(folder):
     }
     counted = [a for a in data["annotations"] if not a["ignore"]]
     a_frame = [sum(a["image_id"] == image["id"] for a in counted) for image in data["images"]]
-    spread = lambda values: "10 %% %.3g, median %.3g, 90 %% %.3g" % tuple(np.percentile(values, (10, 50, 90)))
+    spread = lambda values: "10 % {:.3g}, median {:.3g}, 90 % {:.3g}".format(
+        *tuple(np.percentile(values, (10, 50, 90)))
+    )
     print(
         f"{len(data['images'])} frames, {len(counted)} persons, {len(data['annotations']) - len(counted)} ignored, {len(data['distractors'])} distractors"
     )

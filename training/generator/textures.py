@@ -10,10 +10,7 @@ def noise(n, scale, rng, octaves=4):
     out = np.zeros((n, n), np.float32)
     for octave in range(octaves):
         k = min(max(2, int(scale * 2**octave)), n)
-        out += (
-            cv2.resize(rng.normal(size=(k, k)).astype(np.float32), (n, n), interpolation=cv2.INTER_CUBIC)
-            / 2**octave
-        )
+        out += cv2.resize(rng.normal(size=(k, k)).astype(np.float32), (n, n), interpolation=cv2.INTER_CUBIC) / 2**octave
     return out / out.std()
 
 
@@ -40,9 +37,7 @@ def planks(rng, colour, rows):
 
 
 def tiles(rng, colour, count):
-    image = (
-        np.ones((SIZE, SIZE, 3), np.float32) * np.array(colour) * (1 + 0.03 * noise(SIZE, 6, rng)[..., None])
-    )
+    image = np.ones((SIZE, SIZE, 3), np.float32) * np.array(colour) * (1 + 0.03 * noise(SIZE, 6, rng)[..., None])
     edges = [int(i * SIZE / count) for i in range(count + 1)]
     grout = np.array(colour) * rng.uniform(0.5, 0.9)
     for i in range(count):
@@ -61,11 +56,7 @@ def checker(rng, one, two, count=8):
 
 
 def carpet(rng, colour):
-    image = (
-        np.ones((SIZE, SIZE, 3), np.float32)
-        * np.array(colour)
-        * (1 + 0.16 * rng.normal(size=(SIZE, SIZE, 1)))
-    )
+    image = np.ones((SIZE, SIZE, 3), np.float32) * np.array(colour) * (1 + 0.16 * rng.normal(size=(SIZE, SIZE, 1)))
     return image * (1 + 0.06 * noise(SIZE, 5, rng)[..., None])
 
 
@@ -127,9 +118,7 @@ def fabric(rng, number, n=512):
         share = ((x % period < period // 2) * 0.5 + (y % period < period // 2) * 0.5)[..., None]
         image = image * (1 - share) + other * share
     elif kind == 4:
-        image[((x % period - period / 2) ** 2 + (y % period - period / 2) ** 2) < (period * 0.25) ** 2] = (
-            other
-        )
+        image[((x % period - period / 2) ** 2 + (y % period - period / 2) ** 2) < (period * 0.25) ** 2] = other
     elif kind == 5:
         blots = noise(n, 10, rng)
         image[blots > 0.4] = other
@@ -208,9 +197,7 @@ def write_all(folder, seed=5):
         save(f"rug{i}", rug(rng, i % 3))
     for i in range(16):
         save(f"poster{i}", abstract_poster(rng))
-    for i, background in enumerate(
-        [(0.92, 0.93, 0.95), (0.12, 0.14, 0.18), (0.3, 0.45, 0.65), (0.85, 0.6, 0.3)]
-    ):
+    for i, background in enumerate([(0.92, 0.93, 0.95), (0.12, 0.14, 0.18), (0.3, 0.45, 0.65), (0.85, 0.6, 0.3)]):
         save(f"screen{i}", screen(rng, background))
     for i in range(32):
         save(f"fabric{i}", fabric(rng, i))

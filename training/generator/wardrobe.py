@@ -138,10 +138,7 @@ def random_colours(rng, who, split="train"):
         top=top,
         bottom=bottom,
         extra=[
-            [
-                float(x)
-                for x in np.exp(rng.uniform(-4, -0.7)) * (1 + rng.uniform(0.1, 0.8) * rng.uniform(-1, 1, 3))
-            ]
+            [float(x) for x in np.exp(rng.uniform(-4, -0.7)) * (1 + rng.uniform(0.1, 0.8) * rng.uniform(-1, 1, 3))]
             for _ in EXTRAS
         ],
         extra_fabric=int(rng.choice(list(FABRICS[split]))) if rng.random() < 0.4 else None,

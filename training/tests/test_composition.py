@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
-
 from generator.boxes import axis_box, box_along, oriented_box
 from generator.compose import compose
 from generator.geometry import (
@@ -74,12 +73,8 @@ def block(distance=4.0, depth=3.0, width=21, height=41):
         index=np.ones((height, width), np.uint8),
         view=view,
     )
-    about = dict(
-        persons=[dict(index=1, kind="standing", x=0.0, y=0.0, child=False)], reach=0.5, seed=1, piece="block"
-    )
-    return SimpleNamespace(
-        views=[view], about=about, crop=lambda k: crop, cloud=lambda: np.zeros((4, 3), np.float32)
-    )
+    about = dict(persons=[dict(index=1, kind="standing", x=0.0, y=0.0, child=False)], reach=0.5, seed=1, piece="block")
+    return SimpleNamespace(views=[view], about=about, crop=lambda k: crop, cloud=lambda: np.zeros((4, 3), np.float32))
 
 
 class Lenses(unittest.TestCase):
@@ -146,9 +141,7 @@ class Occlusion(unittest.TestCase):
     def test_nearer_piece_hides_the_farther_one(self):
         near, far = block(distance=3.8, depth=3.0), block(distance=4.2, depth=5.0)
         both = compose(calibration(), empty_room(), [Placement(near, 0, 0, 1.0), Placement(far, 0, 0, 1.0)])
-        self.assertEqual(
-            both.ids[160 - round(FOCAL * math.atan2(3.8, HEIGHT)), 160], 2
-        )  # Numbered from far to near.
+        self.assertEqual(both.ids[160 - round(FOCAL * math.atan2(3.8, HEIGHT)), 160], 2)  # Numbered from far to near.
         far_visible = np.count_nonzero(both.ids == 1)
         self.assertLess(far_visible, 0.3 * both.persons[0]["in_crop"])
 

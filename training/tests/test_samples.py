@@ -3,8 +3,8 @@
 import unittest
 
 import numpy as np
-
 from generator.boxes import axis_box
+
 from samples import cut, turned
 
 
