@@ -1,38 +1,18 @@
 //! The HTTP API: the table of routes and the layers around them. No other module uses HTTP. Every
 //! failure is returned as a problem document.
 
-mod accept;
 mod access;
 mod answer;
-mod calibrations;
-mod connection_limit;
-mod cors;
-mod csrf;
-mod deadline;
-mod deepstack;
-mod detect;
-mod drain_body;
-mod entity_tags;
-mod envelope;
-mod header_limits;
-mod health;
-mod host;
-mod incoming_trace;
+mod http;
 mod limit;
 mod openapi;
-mod page_headers;
 mod parameters;
-mod problem;
-mod rate_limit;
+mod protocols;
 mod report;
-mod repository;
-mod request_id;
-mod results;
+mod routes;
 mod run_detection;
 mod state;
 mod upload;
-mod v2;
-mod web_page;
 
 use axum::{
     Router,
@@ -43,16 +23,27 @@ use tower_http::catch_panic::CatchPanicLayer;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use csrf::AllowedOrigins;
-use envelope::Surroundings;
-use rate_limit::RateLimiter;
+use self::{
+    http::{
+        connection_limit, cors,
+        csrf::{self, AllowedOrigins},
+        drain_body,
+        envelope::{self, Surroundings},
+        header_limits, host, page_headers, problem,
+        rate_limit::{self, RateLimiter},
+    },
+    protocols::{
+        deepstack,
+        open_inference::{self, repository},
+    },
+    routes::{calibrations, detect, health, results, web_page},
+};
 
+pub use self::http::{problem::pages::problem_table, rate_limit::RequestRate};
 pub use access::Access;
-pub use health::{Phase, Readiness};
 pub use openapi::document as openapi_document;
-pub use problem::pages::problem_table;
-pub use rate_limit::RequestRate;
 pub use report::Report;
+pub use routes::health::{Phase, Readiness};
 pub use state::{ApiOptions, ApiState};
 
 /// All routes with their entries in the OpenAPI document.
@@ -84,12 +75,12 @@ fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(results::history::get_history))
         .routes(routes!(results::events::of_camera))
         .routes(routes!(results::events::of_all))
-        .routes(routes!(v2::describe::model))
-        .routes(routes!(v2::describe::model_version))
-        .routes(routes!(v2::describe::model_ready))
-        .routes(routes!(v2::describe::model_version_ready))
-        .routes(routes!(v2::infer::infer))
-        .routes(routes!(v2::infer::infer_version))
+        .routes(routes!(open_inference::describe::model))
+        .routes(routes!(open_inference::describe::model_version))
+        .routes(routes!(open_inference::describe::model_ready))
+        .routes(routes!(open_inference::describe::model_version_ready))
+        .routes(routes!(open_inference::infer::infer))
+        .routes(routes!(open_inference::infer::infer_version))
         .routes(routes!(repository::index))
         .routes(routes!(repository::load))
         .routes(routes!(repository::unload))
@@ -108,15 +99,15 @@ fn description() -> OpenApiRouter<ApiState> {
         .routes(routes!(openapi::openapi_json))
         .routes(routes!(problem::pages::list_problems))
         .routes(routes!(problem::pages::get_problem))
-        .routes(routes!(v2::describe::server))
+        .routes(routes!(open_inference::describe::server))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(health::livez))
         .routes(routes!(health::readyz))
-        .routes(routes!(v2::describe::live))
-        .routes(routes!(v2::describe::ready))
+        .routes(routes!(open_inference::describe::live))
+        .routes(routes!(open_inference::describe::ready))
 }
 
 fn metrics() -> OpenApiRouter<ApiState> {

@@ -8,11 +8,13 @@ use axum::{
     http::{HeaderMap, HeaderName, HeaderValue, header::AUTHORIZATION, request::Parts},
 };
 
-use super::{
-    ApiState,
-    problem::{Problem, ProblemKind},
+use crate::{
+    access::{AccessKeys, Holder, Scope},
+    api::{
+        ApiState,
+        http::problem::{Problem, ProblemKind},
+    },
 };
-use crate::access::{AccessKeys, Holder, Scope};
 
 /// The header that holds a key alone.
 pub(super) const API_KEY: HeaderName = HeaderName::from_static("x-api-key");

@@ -8,13 +8,13 @@ use bytes::Bytes;
 
 use self::format::AnswerFormat;
 pub(super) use self::format::TABLE;
-use super::{
-    parameters::{self, pairs},
-    problem::{Problem, ProblemKind},
-};
 use crate::{
     annotated_image::{AnnotationError, AnnotationOptions, annotated_image},
     annotation_formats::{AnnotatedImage, BoxKind},
+    api::{
+        http::problem::{Problem, ProblemKind},
+        parameters::{self, pairs},
+    },
     pipeline::{Detected, PipelineError},
 };
 

@@ -10,7 +10,7 @@ use utoipa::{OpenApi, openapi};
 
 use security::Keys;
 
-use super::problem::ProblemBody;
+use crate::api::http::problem::ProblemBody;
 pub(super) use parameters::{AnnotationQuery, DetectForm, DetectQuery, RawBytes, fields};
 
 #[derive(OpenApi)]

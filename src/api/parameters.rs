@@ -3,9 +3,9 @@
 #[cfg(test)]
 mod reference;
 
-use super::answer;
 use crate::{
     annotated_image::AnnotationOptions,
+    api::answer,
     pipeline::{DetectParameters, ParameterSpec},
 };
 

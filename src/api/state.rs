@@ -2,13 +2,12 @@
 
 use std::{num::NonZeroU64, ops::Deref, sync::Arc, time::Duration};
 
-use super::{
-    Access, Readiness, RequestRate,
-    deadline::Deadline,
-    problem::ProblemKind,
-    upload::{BodyReader, UploadBudget},
-};
 use crate::{
+    api::{
+        Access, Readiness, RequestRate,
+        http::{deadline::Deadline, problem::ProblemKind},
+        upload::{BodyReader, UploadBudget},
+    },
     calibration::Calibrations,
     inference::ModelRepository,
     metrics::Metrics,

@@ -29,14 +29,16 @@ use names::{is_parameter, unknown_parameter};
 
 pub(super) use form::FieldUse;
 
-use super::{
-    ApiState,
-    deadline::Deadline,
-    problem::{Problem, ProblemKind},
-    request_id::RequestId,
-};
 use crate::{
     access::Scope,
+    api::{
+        ApiState,
+        http::{
+            deadline::Deadline,
+            problem::{Problem, ProblemKind},
+            request_id::RequestId,
+        },
+    },
     pipeline::{DetectJob, DetectParameters, ParameterError},
 };
 

@@ -13,7 +13,7 @@ use super::{
     MinimumUploadRate,
     budget::{Held, UploadBudget},
 };
-use crate::api::{
+use crate::api::http::{
     deadline::Deadline,
     problem::{Problem, ProblemKind},
 };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::api::problem::{Problem, ProblemKind};
+use crate::api::http::problem::{Problem, ProblemKind};
 
 /// The memory of all bodies and of the tensors unpacked from them, in bytes. Clones share it.
 #[derive(Clone)]

@@ -11,7 +11,7 @@ use axum::{
 use bytes::Bytes;
 
 use super::names::unknown_parameter;
-use crate::api::problem::{Problem, ProblemKind};
+use crate::api::http::problem::{Problem, ProblemKind};
 
 /// Largest number of fields of a form: every parameter and the frame, with room for repeated
 /// fields, which have a better error message.

@@ -2,7 +2,7 @@
 
 use super::form::FieldUse;
 use crate::{
-    api::{parameters, problem::Problem},
+    api::{http::problem::Problem, parameters},
     pipeline::ParameterError,
 };
 

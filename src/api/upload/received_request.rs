@@ -15,7 +15,10 @@ use super::{
 };
 use crate::{
     access::Scope,
-    api::{ApiState, Phase, deadline::Deadline, problem::Problem},
+    api::{
+        ApiState, Phase,
+        http::{deadline::Deadline, problem::Problem},
+    },
 };
 
 /// A complete detection request. As an extractor, it also checks the scope `detect`.

@@ -1,0 +1,42 @@
+//! Limits of request heads. The HTTP parser refuses much larger heads before this layer, with a
+//! status and without a problem document.
+
+use axum::{
+    extract::{Request, State},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+
+use super::problem::{Problem, ProblemKind};
+use crate::api::ApiState;
+
+/// Bytes of a header line besides name and value: `: ` and the line end.
+const SEPARATORS: usize = 4;
+
+/// Refuses a request with too many headers or too large a head.
+pub(in crate::api) async fn within_bounds(
+    State(state): State<ApiState>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let options = &state.options;
+    let too_large = if request.headers().len() > options.max_headers {
+        Some(("headers", options.max_headers))
+    } else if bytes_of_head(&request) > options.max_header_bytes {
+        Some(("bytes of path and headers", options.max_header_bytes))
+    } else {
+        None
+    };
+    if let Some((what, most)) = too_large {
+        let detail = format!("the request has more than {most} {what}: send fewer");
+        return Problem::new(ProblemKind::HeadersTooLarge, detail).into_response();
+    }
+    next.run(request).await
+}
+
+fn bytes_of_head(request: &Request) -> usize {
+    let query = request.uri().query().map_or(0, str::len);
+    let headers = request.headers().iter();
+    let headers = headers.map(|(name, value)| name.as_str().len() + value.len() + SEPARATORS);
+    request.uri().path().len() + query + headers.sum::<usize>()
+}
