@@ -1,21 +1,24 @@
 //! The HTTP API: the table of routes and the layers around them. No other module uses HTTP. Every
 //! failure is returned as a problem document.
 
-mod access;
 mod answer;
 mod http;
 mod limit;
 mod openapi;
 mod parameters;
 mod protocols;
+mod readiness;
 mod report;
+mod report_headers;
+mod require_scope;
 mod routes;
 mod run_detection;
 mod state;
 mod upload;
 
 use axum::{
-    Router,
+    Extension, Router,
+    http::HeaderName,
     middleware::{from_fn, from_fn_with_state, map_response},
 };
 use tower::{ServiceBuilder, util::option_layer};
@@ -27,24 +30,34 @@ use self::{
     http::{
         connection_limit, cors,
         csrf::{self, AllowedOrigins},
-        drain_body,
+        drain_body::{self, BodyLimits},
         envelope::{self, Surroundings},
-        header_limits, host, page_headers, problem,
+        header_limits::{self, HeaderLimits},
+        host, page_headers,
         rate_limit::{self, RateLimiter},
     },
     protocols::{
         deepstack,
         open_inference::{self, repository},
     },
-    routes::{calibrations, detect, health, results, web_page},
+    report_headers::{INFERENCE_TIME, PERSON_COUNT, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
+    routes::{
+        calibrations, detect, health,
+        openapi::{self as document, DocumentSource},
+        problems,
+        results::{self, events::LAST_EVENT_ID},
+        web_page,
+    },
 };
+use crate::open_inference::HEAD_LENGTH;
 
-pub use self::http::{problem::pages::problem_table, rate_limit::RequestRate};
-pub use access::Access;
-pub use openapi::document as openapi_document;
-pub use report::Report;
-pub use routes::health::{Phase, Readiness};
-pub use state::{ApiOptions, ApiState};
+pub use self::{
+    http::{access::Access, rate_limit::RequestRate},
+    readiness::{Phase, Readiness},
+    report::Report,
+    routes::problems::problem_table,
+    state::{ApiOptions, ApiState},
+};
 
 /// All routes with their entries in the OpenAPI document.
 fn routes() -> OpenApiRouter<ApiState> {
@@ -53,6 +66,12 @@ fn routes() -> OpenApiRouter<ApiState> {
         .merge(description())
         .merge(probes())
         .merge(metrics())
+}
+
+/// Returns the OpenAPI document of all routes.
+#[must_use]
+pub fn openapi_document() -> utoipa::openapi::OpenApi {
+    openapi::complete(routes().into_openapi())
 }
 
 /// The routes of the native API.
@@ -96,9 +115,9 @@ fn deepstack_routes() -> OpenApiRouter<ApiState> {
 
 fn description() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
-        .routes(routes!(openapi::openapi_json))
-        .routes(routes!(problem::pages::list_problems))
-        .routes(routes!(problem::pages::get_problem))
+        .routes(routes!(document::openapi_json))
+        .routes(routes!(problems::list_problems))
+        .routes(routes!(problems::get_problem))
         .routes(routes!(open_inference::describe::server))
 }
 
@@ -117,8 +136,13 @@ fn metrics() -> OpenApiRouter<ApiState> {
 /// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
     let options = &state.options;
-    let own_pages = AllowedOrigins::of(options).map(|own| from_fn_with_state(own, csrf::refuse));
-    let limiter = RateLimiter::of(options).map(|all| from_fn_with_state(all, rate_limit::apply));
+    let access = &options.access;
+    let own_pages = AllowedOrigins::of(access, &options.cors_origins);
+    let own_pages = own_pages.map(|own| from_fn_with_state(own, csrf::refuse));
+    let limiter = options
+        .request_rate
+        .map(|rate| RateLimiter::new(rate, access));
+    let limiter = limiter.map(|all| from_fn_with_state(all, rate_limit::apply));
     let guards = ServiceBuilder::new()
         .layer(option_layer(own_pages))
         .layer(option_layer(limiter));
@@ -126,21 +150,21 @@ pub fn router(state: ApiState) -> Router {
     let deepstack = Router::from(deepstack_routes()).route_layer(guards);
     let router = clients
         .merge(deepstack::with_failures(deepstack))
-        .merge(Router::from(description()))
+        .merge(Router::from(description()).layer(Extension(DocumentSource(openapi_document))))
         .merge(operation(state.options.metrics_elsewhere));
-    surrounded(router.with_state(state.clone()).merge(pages()), state)
+    surrounded(router.with_state(state.clone()).merge(pages()), &state)
 }
 
 /// The router of the metrics port: metrics and health checks for operators.
 pub fn operation_router(state: ApiState) -> Router {
-    surrounded(operation(false).with_state(state.clone()), state)
+    surrounded(operation(false).with_state(state.clone()), &state)
 }
 
 /// The router for connections beyond the limit: health checks, and metrics unless they have a port
 /// of their own. All other requests are refused.
 pub fn overload_router(state: ApiState) -> Router {
     let router = operation(state.options.metrics_elsewhere).with_state(state.clone());
-    surrounded(router.fallback(connection_limit::refuse), state)
+    surrounded(router.fallback(connection_limit::refuse), &state)
 }
 
 fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
@@ -160,17 +184,44 @@ fn pages() -> Router {
 /// Adds the layers of every route, the outermost first. A router clones and boxes each of its
 /// layers for each request, so all of these are one layer. A panic of a handler fails only its own
 /// request.
-fn surrounded(router: Router, state: ApiState) -> Router {
+fn surrounded(router: Router, state: &ApiState) -> Router {
+    let options = &state.options;
     let surroundings = Surroundings {
         metrics: state.metrics.clone(),
-        tracer: state.options.tracer.clone(),
+        tracer: options.tracer.clone(),
     };
+    let body_limits = BodyLimits {
+        request_timeout: options.request_timeout,
+        max_body_bytes: options.max_body_bytes,
+        min_upload_bytes_per_second: options.min_upload_bytes_per_second,
+    };
+    let header_limits = HeaderLimits {
+        max_headers: options.max_headers,
+        max_header_bytes: options.max_header_bytes,
+    };
+    let head_length = HeaderName::from_static(HEAD_LENGTH);
+    let sent = [LAST_EVENT_ID, head_length.clone()];
+    let read = [
+        SERVER_TIMING,
+        INFERENCE_TIME,
+        PERSON_COUNT,
+        QUEUE_TIME,
+        TOTAL_TIME,
+        head_length,
+    ];
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(surroundings, envelope::wrap))
-        .layer(option_layer(cors::layer(&state.options.cors_origins)))
+        .layer(option_layer(cors::layer(
+            &options.cors_origins,
+            &sent,
+            &read,
+        )))
         .layer(CatchPanicLayer::custom(envelope::of_panic))
-        .layer(from_fn_with_state(state.clone(), drain_body::discard))
-        .layer(from_fn_with_state(state, header_limits::within_bounds))
+        .layer(from_fn_with_state(body_limits, drain_body::discard))
+        .layer(from_fn_with_state(
+            header_limits,
+            header_limits::within_bounds,
+        ))
         .layer(from_fn(host::require));
     router.layer(layers)
 }

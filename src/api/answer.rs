@@ -11,9 +11,9 @@ pub(super) use self::format::TABLE;
 use crate::{
     annotated_image::{AnnotationError, AnnotationOptions, annotated_image},
     annotation_formats::{AnnotatedImage, BoxKind},
-    api::{
-        http::problem::{Problem, ProblemKind},
-        parameters::{self, pairs},
+    api::http::{
+        problem::{Problem, ProblemKind},
+        query::{pairs, take},
     },
     pipeline::{Detected, PipelineError},
 };
@@ -42,8 +42,8 @@ impl AnswerOptions {
         headers: &HeaderMap,
         file_name: Option<String>,
     ) -> Result<Self, Problem> {
-        let format = parameters::take(given, TABLE);
-        let picture = parameters::take(given, AnnotationOptions::TABLE);
+        let format = take(given, TABLE);
+        let picture = take(given, AnnotationOptions::TABLE);
         Ok(Self {
             format: AnswerFormat::read(pairs(&format), headers)?,
             picture: AnnotationOptions::parse(pairs(&picture))?,

@@ -2,6 +2,7 @@
 //! layers around every route. No file here depends on a route or a protocol.
 
 pub(super) mod accept;
+pub(super) mod access;
 pub(super) mod connection_limit;
 pub(super) mod cors;
 pub(super) mod csrf;
@@ -14,5 +15,7 @@ pub(super) mod host;
 pub(super) mod incoming_trace;
 pub(super) mod page_headers;
 pub(super) mod problem;
+pub(super) mod query;
 pub(super) mod rate_limit;
+pub(super) mod request_body;
 pub(super) mod request_id;

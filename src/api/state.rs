@@ -2,16 +2,23 @@
 
 use std::{num::NonZeroU64, ops::Deref, sync::Arc, time::Duration};
 
-use crate::{
-    api::{
-        Access, Readiness, RequestRate,
-        http::{deadline::Deadline, problem::ProblemKind},
-        upload::{BodyReader, UploadBudget},
+use axum::extract::FromRef;
+
+use super::{
+    http::{
+        access::Access,
+        deadline::{Deadline, RequestTimeout},
+        problem::{Problem, ProblemKind},
+        rate_limit::RequestRate,
+        request_body::{BodyReader, UploadBudget},
     },
+    readiness::{Phase, Readiness},
+};
+use crate::{
     calibration::Calibrations,
     inference::ModelRepository,
     metrics::Metrics,
-    pipeline::WorkerPool,
+    pipeline::{PipelineError, WorkerPool},
     results::{PicturesOf, ResultStore},
     telemetry::Tracer,
 };
@@ -125,6 +132,17 @@ impl ApiState {
         }))
     }
 
+    /// Returns the problem while the server is not ready.
+    pub(super) fn require_ready(&self) -> Result<(), Problem> {
+        let remote = self.models.remote();
+        match self.readiness.phase() {
+            Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
+            Phase::Ready => Err(PipelineError::InferenceUnavailable.into()),
+            Phase::WarmingUp => Err(Problem::warming_up()),
+            Phase::Stopping => Err(Problem::shutting_down()),
+        }
+    }
+
     /// Returns a reader of bodies up to `max_bytes`; `remedy` is the advice for larger ones.
     pub(super) fn body_reader(
         &self,
@@ -139,6 +157,12 @@ impl ApiState {
             least_bytes_per_second: self.options.min_upload_bytes_per_second,
             deadline,
         }
+    }
+}
+
+impl FromRef<ApiState> for RequestTimeout {
+    fn from_ref(state: &ApiState) -> Self {
+        Self(state.options.request_timeout)
     }
 }
 

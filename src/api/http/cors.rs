@@ -10,22 +10,18 @@ use axum::http::{
 use tower_http::cors::CorsLayer;
 
 use super::{
+    access::API_KEY,
     rate_limit::{RATE_LIMIT, RATE_LIMIT_POLICY},
     request_id,
 };
-use crate::{
-    api::{
-        access::API_KEY,
-        routes::{
-            detect::{INFERENCE_TIME, PERSON_COUNT, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
-            results::events::LAST_EVENT_ID,
-        },
-    },
-    open_inference::HEAD_LENGTH,
-};
 
-/// Returns the CORS layer for these origins; `None` if there are none.
-pub(in crate::api) fn layer(origins: &[String]) -> Option<CorsLayer> {
+/// Returns the CORS layer for these origins; `None` if there are none. `sent` and `read` are the
+/// headers of the routes that a page may send and read, besides the common ones.
+pub(in crate::api) fn layer(
+    origins: &[String],
+    sent: &[HeaderName],
+    read: &[HeaderName],
+) -> Option<CorsLayer> {
     let origins = origins.iter();
     // The settings check the origins: each is a valid header value.
     let origins: Vec<_> = origins
@@ -34,36 +30,28 @@ pub(in crate::api) fn layer(origins: &[String]) -> Option<CorsLayer> {
     if origins.is_empty() {
         return None;
     }
-    let head_length = HeaderName::from_static(HEAD_LENGTH);
-    let sent: [HeaderName; 8] = [
+    let common_sent = [
         AUTHORIZATION,
         API_KEY,
         CONTENT_TYPE,
         IF_MATCH,
         IF_NONE_MATCH,
-        LAST_EVENT_ID,
-        head_length.clone(),
         request_id::HEADER,
     ];
-    let read: [HeaderName; 13] = [
+    let common_read = [
         ETAG,
         LOCATION,
         RATE_LIMIT,
         RATE_LIMIT_POLICY,
         RETRY_AFTER,
-        SERVER_TIMING,
         WWW_AUTHENTICATE,
-        INFERENCE_TIME,
-        PERSON_COUNT,
-        QUEUE_TIME,
-        TOTAL_TIME,
-        head_length,
         request_id::HEADER,
     ];
+    let all = |common: &[HeaderName], others: &[HeaderName]| [common, others].concat();
     let layer = CorsLayer::new()
         .allow_origin(origins)
         .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
-        .allow_headers(sent)
-        .expose_headers(read);
+        .allow_headers(all(&common_sent, sent))
+        .expose_headers(all(&common_read, read));
     Some(layer)
 }

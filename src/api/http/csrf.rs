@@ -19,10 +19,10 @@ use axum::{
 };
 
 use super::{
+    access::Access,
     host::host_of,
     problem::{Problem, ProblemKind},
 };
-use crate::api::{Access, ApiOptions};
 
 /// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` and
 /// `X-Forwarded-…` by convention).
@@ -49,11 +49,11 @@ pub(in crate::api) struct AllowedOrigins {
 
 impl AllowedOrigins {
     /// Returns `None` if there are API keys.
-    pub(in crate::api) fn of(options: &ApiOptions) -> Option<Self> {
-        match options.access {
+    pub(in crate::api) fn of(access: &Access, cors_origins: &[String]) -> Option<Self> {
+        match access {
             Access::Open { own_machine_only } => Some(Self {
-                own_machine_only,
-                allowed: options.cors_origins.clone().into(),
+                own_machine_only: *own_machine_only,
+                allowed: cors_origins.into(),
             }),
             Access::Keys(_) => None,
         }

@@ -2,14 +2,21 @@
 
 use std::{convert::Infallible, future::Future, time::Duration};
 
-use axum::{extract::FromRequestParts, http::request::Parts};
+use axum::{
+    extract::{FromRef, FromRequestParts},
+    http::request::Parts,
+};
 use tokio::{
     task::spawn_blocking,
     time::{Instant, timeout_at},
 };
 
 use super::problem::{Problem, ProblemKind};
-use crate::{api::ApiState, pipeline::PipelineError};
+use crate::pipeline::PipelineError;
+
+/// The longest duration of a request, from its first byte to its response.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::api) struct RequestTimeout(pub(in crate::api) Duration);
 
 /// The time at which a response must be complete.
 #[derive(Debug, Clone, Copy)]
@@ -26,9 +33,12 @@ impl Deadline {
     }
 
     /// Returns the deadline of the request with this head, set when the request arrived.
-    pub(in crate::api) fn of(parts: &Parts, state: &ApiState) -> Self {
+    pub(in crate::api) fn of<S>(parts: &Parts, state: &S) -> Self
+    where
+        RequestTimeout: FromRef<S>,
+    {
         let begun = parts.extensions.get().copied();
-        begun.unwrap_or_else(|| Self::begin(state.options.request_timeout))
+        begun.unwrap_or_else(|| Self::begin(RequestTimeout::from_ref(state).0))
     }
 
     /// Returns this deadline, but at most `limit` after the request arrived.
@@ -94,10 +104,14 @@ impl Deadline {
     }
 }
 
-impl FromRequestParts<ApiState> for Deadline {
+impl<S> FromRequestParts<S> for Deadline
+where
+    S: Sync,
+    RequestTimeout: FromRef<S>,
+{
     type Rejection = Infallible;
 
-    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Infallible> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Infallible> {
         Ok(Self::of(parts, state))
     }
 }

@@ -3,8 +3,10 @@
 //! refused request is read and discarded, within limits.
 
 use std::{
+    num::NonZeroU64,
     pin::Pin,
     task::{Context, Poll},
+    time::Duration,
 };
 
 use axum::{
@@ -21,23 +23,33 @@ use bytes::Bytes;
 use http_body::{Frame, SizeHint};
 use tokio::{sync::oneshot, time::timeout_at};
 
-use super::deadline::Deadline;
-use crate::api::{
-    ApiState,
-    upload::{MinimumUploadRate, next_chunk},
+use super::{
+    deadline::Deadline,
+    request_body::{MinimumUploadRate, next_chunk},
 };
 
 /// Largest number of discarded bytes, as a multiple of the body limit.
 const DISCARDED_LIMITS: usize = 4;
 
+/// The limits of request bodies.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::api) struct BodyLimits {
+    /// Longest duration of a request, from its first byte to its response.
+    pub(in crate::api) request_timeout: Duration,
+    /// Largest request body, bytes.
+    pub(in crate::api) max_body_bytes: usize,
+    /// Least upload rate; `None` for no limit.
+    pub(in crate::api) min_upload_bytes_per_second: Option<NonZeroU64>,
+}
+
 /// Sets the deadline of the request, and drains the body that the handler left unread.
 pub(in crate::api) async fn discard(
-    State(state): State<ApiState>,
+    State(limits): State<BodyLimits>,
     request: Request,
     next: Next,
 ) -> Response {
     let (mut parts, body) = request.into_parts();
-    let deadline = Deadline::begin(state.options.request_timeout);
+    let deadline = Deadline::begin(limits.request_timeout);
     parts.extensions.insert(deadline);
     if body.is_end_stream() || parts.version >= Version::HTTP_2 {
         // An HTTP/2 client receives the response while it sends.
@@ -56,11 +68,8 @@ pub(in crate::api) async fn discard(
         && let Ok(body) = returned.try_recv()
         && (body.begun || !asks_first)
     {
-        let upload_rate = MinimumUploadRate::begin(state.options.min_upload_bytes_per_second);
-        let most = state
-            .options
-            .max_body_bytes
-            .saturating_mul(DISCARDED_LIMITS);
+        let upload_rate = MinimumUploadRate::begin(limits.min_upload_bytes_per_second);
+        let most = limits.max_body_bytes.saturating_mul(DISCARDED_LIMITS);
         throw_away(body.body, most, upload_rate, deadline).await;
     }
     response

@@ -8,22 +8,29 @@ use axum::{
 };
 
 use super::problem::{Problem, ProblemKind};
-use crate::api::ApiState;
 
 /// Bytes of a header line besides name and value: `: ` and the line end.
 const SEPARATORS: usize = 4;
 
+/// The limits of request heads.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::api) struct HeaderLimits {
+    /// Largest number of headers.
+    pub(in crate::api) max_headers: usize,
+    /// Largest head, bytes.
+    pub(in crate::api) max_header_bytes: usize,
+}
+
 /// Refuses a request with too many headers or too large a head.
 pub(in crate::api) async fn within_bounds(
-    State(state): State<ApiState>,
+    State(limits): State<HeaderLimits>,
     request: Request,
     next: Next,
 ) -> Response {
-    let options = &state.options;
-    let too_large = if request.headers().len() > options.max_headers {
-        Some(("headers", options.max_headers))
-    } else if bytes_of_head(&request) > options.max_header_bytes {
-        Some(("bytes of path and headers", options.max_header_bytes))
+    let too_large = if request.headers().len() > limits.max_headers {
+        Some(("headers", limits.max_headers))
+    } else if bytes_of_head(&request) > limits.max_header_bytes {
+        Some(("bytes of path and headers", limits.max_header_bytes))
     } else {
         None
     };

@@ -5,7 +5,6 @@
 
 mod calibration;
 mod kind;
-pub(in crate::api) mod pages;
 mod pipeline;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};

@@ -20,8 +20,11 @@ use axum::{
 };
 
 use self::buckets::{Buckets, Client, Standing};
-use super::problem::{Problem, ProblemKind};
-use crate::api::{Access, ApiOptions};
+use super::{
+    access::Access,
+    problem::{Problem, ProblemKind},
+};
+//{Problem, ProblemKind};
 
 pub(in crate::api) const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 pub(in crate::api) const RATE_LIMIT_POLICY: HeaderName =
@@ -55,18 +58,17 @@ pub(in crate::api) struct RateLimiter {
 }
 
 impl RateLimiter {
-    /// Returns full buckets; `None` without a rate limit.
-    pub(in crate::api) fn of(options: &ApiOptions) -> Option<Self> {
-        let rate = options.request_rate?;
+    /// Creates full buckets.
+    pub(in crate::api) fn new(rate: RequestRate, access: &Access) -> Self {
         let (interval, burst) = (rate.interval(), rate.burst.get());
         let window = whole_seconds(interval * burst);
         // Digits are visible ASCII.
         let policy = format!("\"default\";q={burst};w={window}").parse();
-        Some(Self {
-            access: options.access.clone(),
+        Self {
+            access: access.clone(),
             buckets: Arc::new(Mutex::new(Buckets::new(interval, burst))),
             policy: policy.unwrap_or(HeaderValue::from_static("\"default\"")),
-        })
+        }
     }
 
     /// Returns the client whose bucket the request uses.

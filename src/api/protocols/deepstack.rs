@@ -18,11 +18,11 @@ use self::{
 use crate::{
     api::{
         ApiState,
-        access::RequireRead,
         http::{
             problem::{Problem, ProblemKind},
             request_id::RequestId,
         },
+        require_scope::RequireRead,
         run_detection::run_detection,
     },
     calibration::CalibrationId,

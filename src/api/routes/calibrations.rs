@@ -25,13 +25,13 @@ use self::{
 use crate::{
     api::{
         ApiState,
-        access::{RequireAdmin, RequireRead},
         http::{
             deadline::Deadline,
             entity_tags::{entity_tag, is_unmodified},
             problem::{Problem, ProblemKind},
         },
         openapi::RawBytes,
+        require_scope::{RequireAdmin, RequireRead},
     },
     calibration::ChangeError,
 };

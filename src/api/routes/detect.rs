@@ -3,7 +3,7 @@
 use axum::{
     Extension,
     extract::State,
-    http::{HeaderName, HeaderValue, header::CONTENT_TYPE},
+    http::{HeaderValue, header::CONTENT_TYPE},
     response::{AppendHeaders, IntoResponse},
 };
 
@@ -11,22 +11,16 @@ use crate::{
     api::{
         ApiState,
         answer::AnswerOptions,
-        http::{problem::Problem, request_id::RequestId},
+        http::{problem::Problem, query::pairs, request_id::RequestId},
         openapi::{DetectForm, DetectQuery, RawBytes},
-        parameters::pairs,
-        report::{Report, ReportTimings},
+        report::Report,
+        report_headers::report_headers,
         run_detection::{DetectionOutcome, run_detection},
         upload::Upload,
     },
-    pipeline::{DetectJob, DetectParameters, DetectionReport},
+    pipeline::{DetectJob, DetectParameters},
     telemetry::RequestTrace,
 };
-
-pub(in crate::api) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
-pub(in crate::api) const QUEUE_TIME: HeaderName = HeaderName::from_static("x-queue-time");
-pub(in crate::api) const INFERENCE_TIME: HeaderName = HeaderName::from_static("x-inference-time");
-pub(in crate::api) const TOTAL_TIME: HeaderName = HeaderName::from_static("x-total-time");
-pub(in crate::api) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-count");
 
 /// Detect persons
 ///
@@ -78,14 +72,11 @@ pub(in crate::api) async fn detect_persons(
     let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
     let (report, content) = run_detection(&state, &trace, deadline, job, write).await?;
     let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
-    Ok((AppendHeaders(facts(&report)), media_type, content.bytes))
-}
-
-/// Returns the headers about a report: the number of persons and the times of the stages.
-pub(in crate::api) fn facts(report: &DetectionReport) -> [(HeaderName, HeaderValue); 5] {
-    let [stages, queue, inference, total] = timing_headers(&ReportTimings::from(&report.timings));
-    let count = (PERSON_COUNT, HeaderValue::from(report.persons.len()));
-    [stages, queue, inference, total, count]
+    Ok((
+        AppendHeaders(report_headers(&report)),
+        media_type,
+        content.bytes,
+    ))
 }
 
 fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {
@@ -93,20 +84,4 @@ fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerO
     let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
     let parameters = DetectParameters::parse(pairs(parameters))?;
     Ok((upload.job(parameters, request_id), answer))
-}
-
-/// Returns the stages as `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), and the stages
-/// that measure the load as plain numbers; all in milliseconds.
-fn timing_headers(timings: &ReportTimings) -> [(HeaderName, HeaderValue); 4] {
-    let stages = timings
-        .stages()
-        .map(|(stage, millis)| format!("{stage};dur={millis}"));
-    [
-        (SERVER_TIMING, stages.join(", ")),
-        (QUEUE_TIME, timings.queue.to_string()),
-        (INFERENCE_TIME, timings.inference.to_string()),
-        (TOTAL_TIME, timings.total.to_string()),
-    ]
-    // Names and numbers are visible ASCII.
-    .map(|(name, text)| (name, text.parse().unwrap_or(HeaderValue::from_static(""))))
 }

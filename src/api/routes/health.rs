@@ -8,72 +8,15 @@ use axum::{
     http::{HeaderMap, header::CONTENT_TYPE},
     response::IntoResponse,
 };
-use tokio::sync::watch;
 use utoipa::ToSchema;
 
 use crate::{
-    api::{ApiState, access::RequireRead, http::problem::Problem},
+    api::{ApiState, http::problem::Problem, require_scope::RequireRead},
     calibration::{CalibrationId, CalibrationsHealth},
-    pipeline::PipelineError,
 };
 
 /// Largest number of invalid files in a response.
 const MAX_PROBLEMS: usize = 100;
-
-/// The phase of the server's life.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// The models have not run yet.
-    WarmingUp,
-    /// The server accepts frames.
-    Ready,
-    /// The server is shutting down and finishes the requests that have arrived.
-    Stopping,
-}
-
-/// The current [`Phase`]. Clones share it.
-#[derive(Debug, Clone)]
-pub struct Readiness(watch::Sender<Phase>);
-
-impl Default for Readiness {
-    fn default() -> Self {
-        Self(watch::Sender::new(Phase::WarmingUp))
-    }
-}
-
-impl Readiness {
-    /// Marks the end of the warm-up. A server that is already stopping stays in that phase.
-    pub fn warmed_up(&self) {
-        self.0.send_if_modified(|phase| {
-            let warming_up = *phase == Phase::WarmingUp;
-            if warming_up {
-                *phase = Phase::Ready;
-            }
-            warming_up
-        });
-    }
-
-    /// Marks the beginning of the shutdown.
-    pub fn stopping(&self) {
-        self.0.send_replace(Phase::Stopping);
-    }
-
-    /// Returns the current phase.
-    #[must_use]
-    pub fn phase(&self) -> Phase {
-        *self.0.borrow()
-    }
-
-    /// Waits for the end of the warm-up.
-    pub async fn ready(&self) {
-        // `self` holds the sender, so the channel stays open.
-        let _ = self
-            .0
-            .subscribe()
-            .wait_for(|phase| *phase != Phase::WarmingUp)
-            .await;
-    }
-}
 
 /// The liveness of the server.
 #[derive(serde::Serialize, ToSchema)]
@@ -180,7 +123,7 @@ pub(in crate::api) async fn readyz(
     State(state): State<ApiState>,
     headers: HeaderMap,
 ) -> Result<Json<Ready>, Problem> {
-    require_ready(&state)?;
+    state.require_ready()?;
     let has_details = RequireRead::check(&state, &headers).is_ok();
     Ok(Json(Ready {
         status: "ready",
@@ -189,17 +132,6 @@ pub(in crate::api) async fn readyz(
             store_problem: described(state.results.health().problem, has_details),
         },
     }))
-}
-
-/// Returns the problem while the server is not ready.
-pub(in crate::api) fn require_ready(state: &ApiState) -> Result<(), Problem> {
-    let remote = state.models.remote();
-    match state.readiness.phase() {
-        Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
-        Phase::Ready => Err(PipelineError::InferenceUnavailable.into()),
-        Phase::WarmingUp => Err(Problem::warming_up()),
-        Phase::Stopping => Err(Problem::shutting_down()),
-    }
 }
 
 /// Get metrics

@@ -21,8 +21,8 @@ use self::row::CameraRow;
 use crate::{
     api::{
         ApiState,
-        access::RequireRead,
         http::problem::{Problem, ProblemKind},
+        require_scope::RequireRead,
     },
     quoted::Quoted,
     results::{ListenError, Unreachable},

@@ -9,15 +9,16 @@ use axum::{
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{
-    BodyReader,
-    budget::{Held, UploadBudget},
-};
 use crate::{
     access::Scope,
     api::{
-        ApiState, Phase,
-        http::{deadline::Deadline, problem::Problem},
+        ApiState,
+        http::{
+            deadline::Deadline,
+            problem::Problem,
+            request_body::{BodyReader, Held, UploadBudget},
+        },
+        readiness::Phase,
     },
 };
 

@@ -6,8 +6,9 @@ use utoipa::ToSchema;
 use crate::{
     access::Scope,
     api::{
-        ApiState, access,
+        ApiState,
         http::{
+            access,
             problem::{Problem, ProblemKind},
             request_id::RequestId,
         },
@@ -78,13 +79,17 @@ impl FromRequest<ApiState> for DeepStackUpload {
     }
 }
 
-fn use_of(name: &str) -> FieldUse {
-    match name {
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "other forms refuse unknown fields"
+)]
+fn use_of(name: &str) -> Result<FieldUse, Problem> {
+    Ok(match name {
         "image" => FieldUse::Frame,
         MIN_CONFIDENCE | API_KEY => FieldUse::Parameter,
         // DeepStack ignores unknown fields, and its clients rely on that.
         _ => FieldUse::None,
-    }
+    })
 }
 
 fn no_form() -> Problem {

@@ -9,9 +9,7 @@ use super::{
     Asked,
     metadata::{ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady},
 };
-use crate::api::{
-    ApiState, access::RequireDetect, http::problem::Problem, routes::health::require_ready,
-};
+use crate::api::{ApiState, http::problem::Problem, require_scope::RequireDetect};
 
 /// Get server metadata
 #[utoipa::path(
@@ -45,7 +43,7 @@ pub(in crate::api) async fn live() -> Json<ServerLive> {
 pub(in crate::api) async fn ready(
     State(state): State<ApiState>,
 ) -> Result<Json<ServerReady>, Problem> {
-    require_ready(&state)?;
+    state.require_ready()?;
     Ok(Json(ServerReady { ready: true }))
 }
 
@@ -104,7 +102,7 @@ pub(in crate::api) async fn model_ready(
     Path(name): Path<String>,
 ) -> Result<Json<ModelReady>, Problem> {
     Asked::find(&state, &name, None)?;
-    require_ready(&state)?;
+    state.require_ready()?;
     Ok(Json(ModelReady { name, ready: true }))
 }
 
@@ -127,6 +125,6 @@ pub(in crate::api) async fn model_version_ready(
     Path((name, version)): Path<(String, String)>,
 ) -> Result<Json<ModelReady>, Problem> {
     Asked::find(&state, &name, Some(&version))?;
-    require_ready(&state)?;
+    state.require_ready()?;
     Ok(Json(ModelReady { name, ready: true }))
 }

@@ -14,9 +14,8 @@ use super::{
 use crate::{
     api::{
         ApiState,
-        http::{deadline::Deadline, problem::Problem},
+        http::{deadline::Deadline, problem::Problem, request_body::Held},
         limit::Limit,
-        upload::Held,
     },
     inference::{HeadOutput, Model},
     open_inference::Datatype,

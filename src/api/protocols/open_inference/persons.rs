@@ -15,10 +15,9 @@ use super::{
 use crate::{
     api::{
         ApiState,
-        http::{deadline::Deadline, problem::Problem, request_id::RequestId},
-        parameters::pairs,
+        http::{deadline::Deadline, problem::Problem, query::pairs, request_id::RequestId},
         report::ReportPerson,
-        routes::detect::facts,
+        report_headers::report_headers,
         run_detection::{DetectionOutcome, run_detection},
     },
     open_inference::Datatype,
@@ -78,7 +77,7 @@ pub(super) async fn infer(
         InferAnswer::write(&answerer, &outputs, &request.wanted)
     };
     let (report, mut answer) = run_detection(state, trace, deadline, job, write).await?;
-    answer.facts = facts(&report).into();
+    answer.facts = report_headers(&report).into();
     Ok(answer)
 }
 

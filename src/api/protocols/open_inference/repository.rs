@@ -13,11 +13,11 @@ use utoipa::ToSchema;
 use crate::{
     api::{
         ApiState,
-        access::{RequireAdmin, RequireModelRead},
         http::{
             deadline::Deadline,
             problem::{Problem, ProblemKind},
         },
+        require_scope::{RequireAdmin, RequireModelRead},
     },
     inference::{InferenceError, Model, RepositoryError, RepositoryRow},
 };

@@ -9,9 +9,9 @@ use super::{
     wanted::Wanted,
 };
 use crate::{
-    api::{
-        http::problem::{Problem, ProblemKind},
-        upload::UploadBudget,
+    api::http::{
+        problem::{Problem, ProblemKind},
+        request_body::UploadBudget,
     },
     open_inference::HEAD_LENGTH,
     quoted::{Quoted, shortened},

@@ -4,9 +4,9 @@ use bytes::Bytes;
 use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
-    api::{
-        http::problem::{Problem, ProblemKind},
-        upload::{Held, UploadBudget},
+    api::http::{
+        problem::{Problem, ProblemKind},
+        request_body::{Held, UploadBudget},
     },
     open_inference::{Datatype, binary_data, json_data},
     quoted::{Quoted, shortened},

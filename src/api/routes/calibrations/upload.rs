@@ -12,8 +12,8 @@ use crate::{
         http::{
             deadline::Deadline,
             problem::{Problem, ProblemKind},
+            query::parameters_named,
         },
-        upload::parameters_named,
     },
     calibration::{CalibrationFile, Reading, native::NotAFrameSize},
 };

@@ -18,11 +18,10 @@ use super::{
 use crate::{
     api::{
         ApiState,
-        access::RequireRead,
-        http::{deadline::Deadline, problem::Problem},
+        http::{deadline::Deadline, problem::Problem, query::parameters_named},
         openapi::RawBytes,
         report::pixels,
-        upload::parameters_named,
+        require_scope::RequireRead,
     },
     calibration::{Calibration, Calibrations},
     pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},

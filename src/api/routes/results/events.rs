@@ -15,7 +15,7 @@ use futures_util::stream::unfold;
 
 use super::{NO_CACHE, address::CameraAddress, feed::Feed};
 use crate::{
-    api::{ApiState, access::RequireRead, http::problem::Problem},
+    api::{ApiState, http::problem::Problem, require_scope::RequireRead},
     results::Cameras,
 };
 

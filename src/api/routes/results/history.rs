@@ -17,8 +17,10 @@ use utoipa::ToSchema;
 use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
-        ApiState, access::RequireRead, http::problem::Problem, report::Report,
-        upload::parameters_named,
+        ApiState,
+        http::{problem::Problem, query::parameters_named},
+        report::Report,
+        require_scope::RequireRead,
     },
     pipeline::{ParameterError, whole_number},
     results::{Cameras, ReportId, StoredReport},

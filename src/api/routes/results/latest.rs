@@ -16,14 +16,14 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
-        access::RequireRead,
         http::{
             deadline::Deadline,
             entity_tags::{entity_tag, is_unmodified},
             problem::Problem,
+            query::parameters_named,
         },
         report::Report,
-        upload::parameters_named,
+        require_scope::RequireRead,
     },
     pipeline::whole_number,
     results::{Cameras, StoredReport},

@@ -15,15 +15,14 @@ use crate::{
     annotated_image::{AnnotationOptions, StoredFrame},
     api::{
         ApiState,
-        access::RequireRead,
         http::{
             deadline::Deadline,
             entity_tags::{entity_tag, is_unmodified},
             problem::{Problem, ProblemKind},
+            query::{pairs, query_parameters},
         },
         openapi::{AnnotationQuery, RawBytes},
-        parameters::pairs,
-        upload::query_parameters,
+        require_scope::RequireRead,
     },
     quoted::Quoted,
 };

@@ -54,12 +54,12 @@ impl<T> Held<T> {
 }
 
 impl Held<Bytes> {
-    pub(super) fn bytes(&self) -> Bytes {
+    pub(in crate::api) fn bytes(&self) -> Bytes {
         self.content.clone()
     }
 
     /// Replaces the bytes by a copied part of them.
-    pub(super) fn with_bytes(self, content: Bytes) -> Self {
+    pub(in crate::api) fn with_bytes(self, content: Bytes) -> Self {
         Self { content, ..self }
     }
 

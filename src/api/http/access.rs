@@ -3,21 +3,13 @@
 
 use std::sync::Arc;
 
-use axum::{
-    extract::FromRequestParts,
-    http::{HeaderMap, HeaderName, HeaderValue, header::AUTHORIZATION, request::Parts},
-};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header::AUTHORIZATION};
 
-use crate::{
-    access::{AccessKeys, Holder, Scope},
-    api::{
-        ApiState,
-        http::problem::{Problem, ProblemKind},
-    },
-};
+use super::problem::{Problem, ProblemKind};
+use crate::access::{AccessKeys, Holder, Scope};
 
 /// The header that holds a key alone.
-pub(super) const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
+pub(in crate::api) const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
 const BEARER: &[u8] = b"bearer ";
 
 /// The access rules of the server.
@@ -32,71 +24,14 @@ pub enum Access {
     Keys(Arc<AccessKeys>),
 }
 
-/// Proof that the request may detect persons.
-pub(super) struct RequireDetect;
-
-/// Proof that the request may read calibrations and reports.
-pub(super) struct RequireRead;
-
-/// Proof that the request may list models, which reveals file names of the server's machine.
-pub(super) struct RequireModelRead;
-
-/// Proof that the request may change the models and the calibrations of the server.
-pub(super) struct RequireAdmin;
-
-impl FromRequestParts<ApiState> for RequireDetect {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
-        state.options.access.check(&parts.headers, Scope::Detect)?;
-        Ok(Self)
-    }
-}
-
-impl FromRequestParts<ApiState> for RequireRead {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
-        Self::check(state, &parts.headers)
-    }
-}
-
-impl FromRequestParts<ApiState> for RequireModelRead {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
-        let access = &state.options.access;
-        access.check_of_its_own(&parts.headers, Scope::Read)?;
-        Ok(Self)
-    }
-}
-
-impl FromRequestParts<ApiState> for RequireAdmin {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
-        let access = &state.options.access;
-        access.check_of_its_own(&parts.headers, Scope::Admin)?;
-        Ok(Self)
-    }
-}
-
-impl RequireRead {
-    /// Checks the read scope again for a running request: its key may have been removed.
-    pub(super) fn check(state: &ApiState, headers: &HeaderMap) -> Result<Self, Problem> {
-        state.options.access.check(headers, Scope::Read)?;
-        Ok(Self)
-    }
-}
-
 impl Access {
     /// Checks that the keys allow `wanted` to the request with these headers.
-    pub(super) fn check(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
+    pub(in crate::api) fn check(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
         self.check_with(headers, None, wanted)
     }
 
     /// Like [`Self::check`], for a request whose key may be in a form.
-    pub(super) fn check_with(
+    pub(in crate::api) fn check_with(
         &self,
         headers: &HeaderMap,
         in_form: Option<&str>,
@@ -123,12 +58,12 @@ impl Access {
     }
 
     /// Returns `true` if every request needs a key.
-    pub(super) fn needs_keys(&self) -> bool {
+    pub(in crate::api) fn needs_keys(&self) -> bool {
         matches!(self, Self::Keys(_))
     }
 
     /// Returns the holder of the request's key, if the key is valid.
-    pub(super) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
+    pub(in crate::api) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
         match self {
             Self::Open { .. } => None,
             Self::Keys(keys) => keys.holder_of(only_key(shown_keys(headers)).ok()?),
@@ -137,7 +72,11 @@ impl Access {
 
     /// Like [`Self::check`]. Without keys, only a server that no other machine can reach allows the
     /// request.
-    fn check_of_its_own(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
+    pub(in crate::api) fn check_of_its_own(
+        &self,
+        headers: &HeaderMap,
+        wanted: Scope,
+    ) -> Result<(), Problem> {
         match self {
             Self::Open {
                 own_machine_only: false,
@@ -153,7 +92,7 @@ impl Access {
 }
 
 /// Returns `true` if these headers hold any key, valid or not.
-pub(super) fn shows_key(headers: &HeaderMap) -> bool {
+pub(in crate::api) fn shows_key(headers: &HeaderMap) -> bool {
     shown_keys(headers).next().is_some()
 }
 

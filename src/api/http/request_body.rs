@@ -1,4 +1,8 @@
-//! Reads a request body within limits.
+//! Reads a request body within limits: its size, its rate, the deadline of the request, and the
+//! memory of all requests together.
+
+mod budget;
+mod minimum_upload_rate;
 
 use std::{future::poll_fn, num::NonZeroU64, pin::Pin};
 
@@ -10,12 +14,13 @@ use bytes::{Bytes, BytesMut};
 use tokio::time::timeout_at;
 
 use super::{
-    MinimumUploadRate,
-    budget::{Held, UploadBudget},
-};
-use crate::api::http::{
     deadline::Deadline,
     problem::{Problem, ProblemKind},
+};
+
+pub(in crate::api) use self::{
+    budget::{Held, UploadBudget},
+    minimum_upload_rate::MinimumUploadRate,
 };
 
 /// The limits of a body.

@@ -12,8 +12,10 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::{Problem, ProblemKind};
-use crate::api::http::accept::Accepted;
+use crate::api::http::{
+    accept::Accepted,
+    problem::{Problem, ProblemKind},
+};
 
 /// The pages change with the version of the server only.
 const CACHED_FOR_AN_HOUR: HeaderValue = HeaderValue::from_static("public, max-age=3600");
