@@ -20,6 +20,7 @@ use axum::{
     Extension, Router,
     http::HeaderName,
     middleware::{from_fn, from_fn_with_state, map_response},
+    routing::get,
 };
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
@@ -146,11 +147,15 @@ pub fn router(state: ApiState) -> Router {
     let guards = ServiceBuilder::new()
         .layer(option_layer(own_pages))
         .layer(option_layer(limiter));
+    // Some clients ask for the metadata with a slash at the end.
+    let description = Router::from(description())
+        .route("/v2/", get(open_inference::describe::server))
+        .layer(Extension(DocumentSource(openapi_document)));
     let clients = Router::from(client_routes()).route_layer(guards.clone());
     let deepstack = Router::from(deepstack_routes()).route_layer(guards);
     let router = clients
         .merge(deepstack::with_failures(deepstack))
-        .merge(Router::from(description()).layer(Extension(DocumentSource(openapi_document))))
+        .merge(description)
         .merge(operation(state.options.metrics_elsewhere));
     surrounded(router.with_state(state.clone()).merge(pages()), &state)
 }

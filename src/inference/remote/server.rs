@@ -8,7 +8,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bytes::Bytes;
 use url::Url;
 
 use super::{
@@ -159,16 +158,18 @@ impl RemoteServer {
                 "it failed repeatedly, so no requests are sent until it is ready".to_owned(),
             ));
         }
-        let (body, head_length) = question
-            .body()
+        let message = question
+            .message()
             .map_err(|error| InferenceError::Run(error.to_string()))?;
         let path = ["v2", "models", model, "infer"];
         self.in_flight.fetch_add(1, Ordering::Relaxed);
-        let reply = self.connection.post(&path, &Bytes::from(body), head_length);
+        let reply = self
+            .connection
+            .post(&path, &message.body, message.head_length);
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         let wait = |reply: &Reply| reply.retry_after.unwrap_or(RETRY_AFTER);
         let answer = reply.and_then(|reply| match reply.status {
-            200 => Answer::read(&reply.body, reply.head_length).map(Ok),
+            200 => Answer::read(&reply.into_message()).map(Ok),
             429 => Ok(Err(wait(&reply))),
             503 if self.ready().is_ok() => Ok(Err(wait(&reply))),
             _ => Err(refusal(&reply)),

@@ -1,15 +1,17 @@
 //! Metadata and health checks of the server and its models.
 
-use axum::{
-    Json,
-    extract::{Path, State},
-};
+use axum::{Json, extract::State};
 
 use super::{
-    Asked,
-    metadata::{ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady},
+    own_metadata::{EXTENSIONS, NAME},
+    requested_model::{ModelAddress, RequestedModel},
 };
-use crate::api::{ApiState, http::problem::Problem, require_scope::RequireDetect};
+use crate::{
+    api::{ApiState, http::problem::Problem, require_scope::RequireDetect},
+    open_inference::metadata::{
+        ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady,
+    },
+};
 
 /// Get server metadata
 #[utoipa::path(
@@ -17,7 +19,11 @@ use crate::api::{ApiState, http::problem::Problem, require_scope::RequireDetect}
     responses((status = OK, description = "The name, version and extensions of the server.", body = ServerMetadata))
 )]
 pub(in crate::api) async fn server() -> Json<ServerMetadata> {
-    Json(ServerMetadata::default())
+    Json(ServerMetadata {
+        name: NAME.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        extensions: EXTENSIONS.map(ToOwned::to_owned).into(),
+    })
 }
 
 /// Check liveness (Open Inference Protocol)
@@ -61,9 +67,9 @@ pub(in crate::api) async fn ready(
 pub(in crate::api) async fn model(
     State(state): State<ApiState>,
     _finder: RequireDetect,
-    Path(name): Path<String>,
+    address: ModelAddress,
 ) -> Result<Json<ModelMetadata>, Problem> {
-    Ok(Json(Asked::find(&state, &name, None)?.metadata()))
+    Ok(Json(RequestedModel::find(&state, &address)?.metadata()))
 }
 
 /// Get metadata of a model version
@@ -80,11 +86,11 @@ pub(in crate::api) async fn model(
     )
 )]
 pub(in crate::api) async fn model_version(
-    State(state): State<ApiState>,
-    _finder: RequireDetect,
-    Path((name, version)): Path<(String, String)>,
+    state: State<ApiState>,
+    scope: RequireDetect,
+    address: ModelAddress,
 ) -> Result<Json<ModelMetadata>, Problem> {
-    Ok(Json(Asked::find(&state, &name, Some(&version))?.metadata()))
+    model(state, scope, address).await
 }
 
 /// Check the readiness of a model
@@ -99,11 +105,14 @@ pub(in crate::api) async fn model_version(
 pub(in crate::api) async fn model_ready(
     State(state): State<ApiState>,
     _finder: RequireDetect,
-    Path(name): Path<String>,
+    address: ModelAddress,
 ) -> Result<Json<ModelReady>, Problem> {
-    Asked::find(&state, &name, None)?;
+    RequestedModel::find(&state, &address)?;
     state.require_ready()?;
-    Ok(Json(ModelReady { name, ready: true }))
+    Ok(Json(ModelReady {
+        name: address.name,
+        ready: true,
+    }))
 }
 
 /// Check readiness of a model version
@@ -120,11 +129,9 @@ pub(in crate::api) async fn model_ready(
     )
 )]
 pub(in crate::api) async fn model_version_ready(
-    State(state): State<ApiState>,
-    _finder: RequireDetect,
-    Path((name, version)): Path<(String, String)>,
+    state: State<ApiState>,
+    scope: RequireDetect,
+    address: ModelAddress,
 ) -> Result<Json<ModelReady>, Problem> {
-    Asked::find(&state, &name, Some(&version))?;
-    state.require_ready()?;
-    Ok(Json(ModelReady { name, ready: true }))
+    model_ready(state, scope, address).await
 }

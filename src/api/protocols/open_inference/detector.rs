@@ -6,8 +6,8 @@ use jiff::Timestamp;
 
 use super::{
     answer::{Answerer, InferAnswer, Output, OutputValues},
-    metadata::{ModelMetadata, tensor},
-    persons::{self, TIMEOUT},
+    infer_parameters::{TIMEOUT, parameters},
+    own_metadata::{NAME, tensor},
     request::InferRequest,
     tensor::{Tensor, Values, misfit},
 };
@@ -18,7 +18,7 @@ use crate::{
         limit::Limit,
     },
     inference::{HeadOutput, Model},
-    open_inference::Datatype,
+    open_inference::{Datatype, metadata::ModelMetadata},
     pipeline::{DetectParameters, Interface, ParameterError, Ticket, ViewsJob},
     telemetry::RequestTrace,
 };
@@ -33,8 +33,8 @@ pub(super) fn metadata(model: &Model) -> ModelMetadata {
     let [boxes, scores] = OUTPUTS;
     ModelMetadata {
         name: model.name().to_owned(),
-        versions: [model.revision().to_owned()],
-        platform: "lookdown",
+        versions: vec![model.revision().to_owned()],
+        platform: NAME.to_owned(),
         inputs: vec![tensor(INPUT, Datatype::Fp32, [-1, 3, height, width])],
         outputs: vec![
             tensor(boxes, Datatype::Fp32, [-1, -1, 4]),
@@ -106,7 +106,7 @@ fn view_parameters(request: &InferRequest) -> Result<DetectParameters, Problem> 
         let problem = format!("a detector has no such parameter; the parameters are {known}");
         return Err(ParameterError::unknown(other, problem).into());
     }
-    Ok(persons::parameters(&request.parameters)?)
+    Ok(parameters(&request.parameters)?)
 }
 
 /// Returns `[views, candidates, 4]` and `[views, candidates]`, padded to the largest number of

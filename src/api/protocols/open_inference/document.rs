@@ -1,4 +1,4 @@
-//! Inference requests and responses in the OpenAPI document. `request_head` reads the requests,
+//! Inference requests and responses in the OpenAPI document. `request` reads the requests,
 //! `answer` writes the responses.
 
 use utoipa::{
@@ -9,7 +9,6 @@ use utoipa::{
     },
 };
 
-use super::answer::BinarySize;
 use crate::{api::openapi::fields, pipeline::Interface};
 
 /// An inference request with its tensors. A tensor whose bytes follow the JSON has the parameter
@@ -22,7 +21,7 @@ use crate::{api::openapi::fields, pipeline::Interface};
     "outputs": [{"name": "boxes"}, {"name": "scores"}]
 }))]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "documents the input of request_head")]
+#[expect(dead_code, reason = "documents the JSON that request reads")]
 pub(in crate::api) struct InferRequestBody {
     /// The ID of the request; the response repeats it.
     #[schema(max_length = 256)]
@@ -41,7 +40,7 @@ pub(in crate::api) struct InferRequestBody {
 /// An input tensor.
 #[derive(ToSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "documents the input of request_head")]
+#[expect(dead_code, reason = "documents the JSON that request reads")]
 struct InferInput {
     /// The name.
     name: String,
@@ -58,7 +57,7 @@ struct InferInput {
 /// A requested output.
 #[derive(ToSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "documents the input of request_head")]
+#[expect(dead_code, reason = "documents the JSON that request reads")]
 struct InferRequestedOutput {
     /// The name.
     name: String,
@@ -70,7 +69,7 @@ struct InferRequestedOutput {
 /// The parameters of a requested output.
 #[derive(ToSchema)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "documents the input of request_head")]
+#[expect(dead_code, reason = "documents the JSON that request reads")]
 struct InferOutputParameters {
     /// `true` to send the output as bytes after the JSON.
     binary_data: Option<bool>,
@@ -147,4 +146,12 @@ struct InferOutput {
     /// The values otherwise, flat and row-major.
     #[schema(nullable = false)]
     data: Option<Vec<serde_json::Value>>,
+}
+
+/// Parameters of an output that is sent as bytes.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "documents the output of answer")]
+struct BinarySize {
+    /// Number of bytes of this output after the JSON, in the order of the outputs.
+    binary_data_size: usize,
 }

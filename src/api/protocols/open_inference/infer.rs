@@ -1,18 +1,13 @@
 //! Inference requests.
 
-use axum::{
-    Extension,
-    extract::{Path, State},
-    response::IntoResponse,
-};
+use axum::{Extension, extract::State, response::IntoResponse};
 
 use super::{
-    Asked,
-    answer::InferAnswer,
     detector,
     document::{InferRequestBody, InferResponseBody},
     persons,
     request::InferRequest,
+    requested_model::{ModelAddress, RequestedModel},
 };
 use crate::{
     api::{
@@ -53,11 +48,24 @@ pub(in crate::api) async fn infer(
     State(state): State<ApiState>,
     Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
-    Path(name): Path<String>,
+    address: ModelAddress,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
-    let asked = Asked::find(&state, &name, None)?;
-    answered(&state, &request_id, &trace, asked, arrival).await
+    let model = RequestedModel::find(&state, &address)?;
+    trace.stage(
+        "upload",
+        arrival.deadline.began().into_std(),
+        arrival.arrived,
+    );
+    let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
+    let budget = state.uploads.clone();
+    let read = move || InferRequest::read(&headers, &body, &budget);
+    let read = arrival.deadline.blocking(read).await?;
+    let times = (arrival.deadline, arrival.received_at, arrival.arrived);
+    match model {
+        RequestedModel::Frames => persons::infer(&state, &request_id, &trace, read, times).await,
+        RequestedModel::Views(model) => detector::infer(&state, &trace, model, read, times).await,
+    }
 }
 
 /// Run inference with a model version
@@ -83,35 +91,11 @@ pub(in crate::api) async fn infer(
     )
 )]
 pub(in crate::api) async fn infer_version(
-    State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
-    Extension(trace): Extension<RequestTrace>,
-    Path((name, version)): Path<(String, String)>,
+    state: State<ApiState>,
+    request_id: Extension<RequestId>,
+    trace: Extension<RequestTrace>,
+    address: ModelAddress,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
-    let asked = Asked::find(&state, &name, Some(&version))?;
-    answered(&state, &request_id, &trace, asked, arrival).await
-}
-
-async fn answered(
-    state: &ApiState,
-    request_id: &RequestId,
-    trace: &RequestTrace,
-    asked: Asked,
-    arrival: ReceivedRequest,
-) -> Result<InferAnswer, Problem> {
-    trace.stage(
-        "upload",
-        arrival.deadline.began().into_std(),
-        arrival.arrived,
-    );
-    let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
-    let budget = state.uploads.clone();
-    let read = move || InferRequest::read(&headers, &body, &budget);
-    let read = arrival.deadline.blocking(read).await?;
-    let times = (arrival.deadline, arrival.received_at, arrival.arrived);
-    match asked {
-        Asked::Frames => persons::infer(state, request_id, trace, read, times).await,
-        Asked::Views(model) => detector::infer(state, trace, model, read, times).await,
-    }
+    infer(state, request_id, trace, address, arrival).await
 }

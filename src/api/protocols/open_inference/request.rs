@@ -2,10 +2,10 @@
 
 use axum::http::{HeaderMap, header::CONTENT_ENCODING};
 use bytes::Bytes;
+use serde_json::value::RawValue;
 
 use super::{
-    request_head::{self, InputHead, Parameter, Parameters, Table},
-    tensor::{Sent, Tensor, misfit},
+    tensor::{Tensor, misfit, refuse_others},
     wanted::Wanted,
 };
 use crate::{
@@ -13,7 +13,12 @@ use crate::{
         problem::{Problem, ProblemKind},
         request_body::UploadBudget,
     },
-    open_inference::HEAD_LENGTH,
+    open_inference::{
+        BINARY_SIZE, HEAD_LENGTH, TensorData,
+        bounded_json::Table,
+        message::{InputTensor, Message, read_request},
+        parameters::{Parameter, Parameters},
+    },
     quoted::{Quoted, shortened},
 };
 
@@ -21,10 +26,6 @@ use crate::{
 pub(super) const MAX_ID_CHARS: usize = 256;
 /// Longest description of a JSON error, characters: it may quote the request.
 const MAX_MESSAGE_CHARS: usize = 300;
-/// The parameter with the number of bytes of a tensor after the JSON.
-const BINARY_SIZE: &str = "binary_data_size";
-/// The prefix of the parameters of tensors in the shared memory of the server's machine.
-const SHARED_MEMORY: &str = "shared_memory";
 
 /// An inference request.
 pub(super) struct InferRequest {
@@ -48,9 +49,8 @@ impl InferRequest {
         {
             return Err(malformed("the body is compressed: send it uncompressed"));
         }
-        let length = head_length(headers, body)?;
-        let mut behind = body.slice(length..);
-        let mut head = request_head::read(&body[..length]).map_err(|error| {
+        let (json, mut behind) = split(headers, body)?;
+        let mut head = read_request(&json).map_err(|error| {
             let message: String = error.to_string().chars().take(MAX_MESSAGE_CHARS).collect();
             malformed(&format!(
                 "the JSON of the request cannot be used: {message}"
@@ -101,12 +101,17 @@ impl InferRequest {
     }
 }
 
-fn head_length(headers: &HeaderMap, body: &Bytes) -> Result<usize, Problem> {
+/// Splits a body into its JSON and the bytes after it.
+fn split(headers: &HeaderMap, body: &Bytes) -> Result<(Bytes, Bytes), Problem> {
     let Some(stated) = headers.get(HEAD_LENGTH) else {
-        return Ok(body.len());
+        return Ok((body.clone(), Bytes::new()));
     };
     let length = stated.to_str().ok().and_then(|stated| stated.parse().ok());
-    length.filter(|length| *length <= body.len()).ok_or_else(|| {
+    let message = length.map(|length| Message {
+        body: body.clone(),
+        head_length: Some(length),
+    });
+    message.and_then(|message| message.split()).ok_or_else(|| {
         let (stated, sent) = (String::from_utf8_lossy(stated.as_bytes()), body.len());
         let stated = Quoted(&stated);
         malformed(&format!(
@@ -118,31 +123,13 @@ fn head_length(headers: &HeaderMap, body: &Bytes) -> Result<usize, Problem> {
 
 /// Reads an input, whose values may be the next bytes after the JSON.
 fn read_input(
-    mut input: InputHead<'_>,
+    mut input: InputTensor<&RawValue>,
     behind: &mut Bytes,
     budget: &UploadBudget,
 ) -> Result<Tensor, Problem> {
     let size = binary_size(&input.name, &mut input.parameters)?;
-    let sent = match (input.data, size) {
-        (Some(data), None) => Sent::Json(data.get()),
-        (None, Some(size)) if size <= behind.len() => Sent::Binary(behind.split_to(size)),
-        (None, Some(size)) => {
-            let left = behind.len();
-            let wrong = format!(
-                "its {BINARY_SIZE} is {size}, and {left} bytes are left after the JSON, whose length is \
-                 said by {HEAD_LENGTH}"
-            );
-            return Err(misfit(&input.name, &wrong));
-        }
-        (Some(_), Some(_)) => {
-            let wrong = format!("it has data as well as {BINARY_SIZE}: send it once");
-            return Err(misfit(&input.name, &wrong));
-        }
-        (None, None) => {
-            let wrong = format!("it has neither data nor {BINARY_SIZE}");
-            return Err(misfit(&input.name, &wrong));
-        }
-    };
+    let sent = TensorData::take(input.data, size, behind);
+    let sent = sent.map_err(|wrong| misfit(&input.name, &wrong))?;
     Tensor::read(input.name, &input.datatype, &input.shape.0, sent, budget)
 }
 
@@ -161,24 +148,6 @@ fn binary_size(tensor: &str, parameters: &mut Parameters) -> Result<Option<usize
     })?;
     refuse_others(tensor, parameters, BINARY_SIZE)?;
     Ok(size)
-}
-
-/// Refuses the remaining parameters of a tensor.
-pub(super) fn refuse_others(
-    tensor: &str,
-    parameters: &Parameters,
-    known: &str,
-) -> Result<(), Problem> {
-    let Some((name, _)) = parameters.0.first() else {
-        return Ok(());
-    };
-    let wrong = if name.starts_with(SHARED_MEMORY) {
-        "shared memory is not supported: send tensors in the body".to_owned()
-    } else {
-        let name = Quoted(name);
-        format!("there is no tensor parameter {name}: use {known}")
-    };
-    Err(misfit(tensor, &wrong))
 }
 
 fn malformed(detail: &str) -> Problem {

@@ -8,7 +8,7 @@ use crate::{
         problem::{Problem, ProblemKind},
         request_body::{Held, UploadBudget},
     },
-    open_inference::{Datatype, binary_data, json_data},
+    open_inference::{Datatype, TensorData, element_count, parameters::Parameters},
     quoted::{Quoted, shortened},
 };
 
@@ -19,20 +19,15 @@ pub(super) struct Tensor {
     pub(super) values: Values,
 }
 
+/// The prefix of the parameters of tensors in the shared memory of the server's machine.
+const SHARED_MEMORY: &str = "shared_memory";
+
 /// The values of a tensor, with their share of the memory budget.
 pub(super) enum Values {
     /// The single element of a `BYTES` tensor.
     Frame(Bytes),
     /// Finite numbers, row-major.
     Numbers(Held<Vec<f32>>),
-}
-
-/// The values of a tensor as the client sent them.
-pub(super) enum Sent<'a> {
-    /// In the JSON.
-    Json(&'a str),
-    /// After the JSON.
-    Binary(Bytes),
 }
 
 impl Tensor {
@@ -42,12 +37,12 @@ impl Tensor {
         name: String,
         datatype: &str,
         shape: &[u32],
-        sent: Sent<'_>,
+        sent: TensorData<'_>,
         budget: &UploadBudget,
     ) -> Result<Self, Problem> {
         let (datatype, count) = elements(datatype, shape).map_err(|wrong| misfit(&name, &wrong))?;
         let room = budget.take(sent.unpacked_bytes(datatype, count))?;
-        let values = sent.values(datatype, count, room);
+        let values = unpacked(sent, datatype, count, room);
         let values = values.map_err(|wrong| misfit(&name, &wrong))?;
         let shape = shape.iter().map(|side| *side as usize).collect();
         Ok(Self {
@@ -66,8 +61,7 @@ fn elements(datatype: &str, shape: &[u32]) -> Result<(Datatype, usize), String> 
         let datatype = Quoted(datatype);
         format!("its datatype is {datatype}: send BYTES, FP32 or UINT8")
     })?;
-    let mut sides = shape.iter().map(|side| *side as usize);
-    let count = sides.try_fold(1_usize, usize::checked_mul);
+    let count = element_count(shape.iter().map(|side| *side as usize));
     let count =
         count.ok_or_else(|| format!("its shape {shape:?} has more elements than memory"))?;
     if datatype == Datatype::Bytes && count != 1 {
@@ -78,46 +72,38 @@ fn elements(datatype: &str, shape: &[u32]) -> Result<(Datatype, usize), String> 
     Ok((datatype, count))
 }
 
-impl Sent<'_> {
-    /// Returns the largest memory that `count` elements need besides the body, in bytes, before
-    /// they are read.
-    fn unpacked_bytes(&self, datatype: Datatype, count: usize) -> usize {
-        let numbers = |count| count * size_of::<f32>();
-        match (datatype, self) {
-            (Datatype::Bytes, Self::Json(text)) => json_data::bytes_at_most(text),
-            // The values are a part of the body.
-            (Datatype::Bytes, Self::Binary(_)) => 0,
-            (_, Self::Json(text)) => numbers(json_data::numbers_at_most(text, count)),
-            (_, Self::Binary(bytes)) => numbers(count.min(bytes.len())),
-        }
-    }
-
-    fn values(
-        self,
-        datatype: Datatype,
-        count: usize,
-        room: OwnedSemaphorePermit,
-    ) -> Result<Values, String> {
-        Ok(match (datatype, self) {
-            (Datatype::Bytes, Self::Json(text)) => {
-                Values::Frame(Held::new(json_data::only_bytes(text)?, room).into_bytes())
-            }
-            (Datatype::Bytes, Self::Binary(bytes)) => {
-                Values::Frame(binary_data::only_element(&bytes)?)
-            }
-            (_, Self::Json(text)) => {
-                let numbers = json_data::numbers(text, datatype, count)?;
-                Values::Numbers(Held::new(numbers, room))
-            }
-            (_, Self::Binary(bytes)) => {
-                let numbers = binary_data::numbers(&bytes, datatype, count)?;
-                Values::Numbers(Held::new(numbers, room))
-            }
-        })
-    }
+/// Reads the values of a tensor, which use the memory of `room`.
+fn unpacked(
+    sent: TensorData<'_>,
+    datatype: Datatype,
+    count: usize,
+    room: OwnedSemaphorePermit,
+) -> Result<Values, String> {
+    Ok(match datatype {
+        Datatype::Bytes => Values::Frame(Held::new(sent.element()?, room).into_bytes()),
+        _ => Values::Numbers(Held::new(sent.numbers(datatype, count)?, room)),
+    })
 }
 
 /// Returns the problem of an unusable tensor.
 pub(super) fn misfit(name: &str, wrong: &str) -> Problem {
     Problem::of_parameter(ProblemKind::InvalidTensor, shortened(name), wrong)
+}
+
+/// Refuses the parameters of a tensor that are left when the `known` one is taken.
+pub(super) fn refuse_others(
+    tensor: &str,
+    parameters: &Parameters,
+    known: &str,
+) -> Result<(), Problem> {
+    let Some((name, _)) = parameters.0.first() else {
+        return Ok(());
+    };
+    let wrong = if name.starts_with(SHARED_MEMORY) {
+        "shared memory is not supported: send tensors in the body".to_owned()
+    } else {
+        let name = Quoted(name);
+        format!("there is no tensor parameter {name}: use {known}")
+    };
+    Err(misfit(tensor, &wrong))
 }

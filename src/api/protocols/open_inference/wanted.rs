@@ -1,19 +1,18 @@
 //! The requested outputs of an inference request and their encoding.
 
-use super::{
-    request::refuse_others,
-    request_head::{OutputHead, Parameter, Parameters},
-    tensor::misfit,
-};
+use super::tensor::{misfit, refuse_others};
 use crate::{
     api::http::problem::{Problem, ProblemKind},
+    open_inference::{
+        BINARY_OUTPUT,
+        message::RequestedOutput,
+        parameters::{Parameter, Parameters},
+    },
     quoted::Quoted,
 };
 
 /// The request parameter that selects bytes for all outputs.
 const ALL_BINARY: &str = "binary_data_output";
-/// The output parameter that selects bytes for one output.
-const BINARY: &str = "binary_data";
 
 /// The requested outputs and their encoding.
 pub(super) struct Wanted {
@@ -27,20 +26,21 @@ impl Wanted {
     /// Takes the parameter for all outputs out of those of a request.
     pub(super) fn read(
         parameters: &mut Parameters,
-        outputs: impl Iterator<Item = OutputHead>,
+        outputs: impl Iterator<Item = RequestedOutput>,
     ) -> Result<Self, Problem> {
         let all_binary = flag(parameters, ALL_BINARY).map_err(|wrong| {
             Problem::of_parameter(ProblemKind::InvalidParameter, ALL_BINARY, &wrong)
         })?;
         let mut named: Vec<(String, Option<bool>)> = Vec::new();
-        for OutputHead {
+        for RequestedOutput {
             name,
             mut parameters,
         } in outputs
         {
-            let binary = flag(&mut parameters, BINARY);
-            let binary = binary.map_err(|wrong| misfit(&name, &format!("{BINARY}: {wrong}")))?;
-            refuse_others(&name, &parameters, BINARY)?;
+            let binary = flag(&mut parameters, BINARY_OUTPUT);
+            let binary =
+                binary.map_err(|wrong| misfit(&name, &format!("{BINARY_OUTPUT}: {wrong}")))?;
+            refuse_others(&name, &parameters, BINARY_OUTPUT)?;
             if named.iter().any(|(given, _)| *given == name) {
                 return Err(misfit(&name, "it is requested twice: request it once"));
             }
