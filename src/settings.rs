@@ -7,6 +7,7 @@
 mod access;
 mod calibrations;
 mod declare;
+mod entry;
 mod error;
 mod form;
 mod inference;
@@ -44,13 +45,8 @@ pub use variables::{environment, ignored_variables};
 pub(crate) use variables::variable_of;
 
 use self::{
-    declare::{Entry, Table},
-    mqtt::MqttKeys,
-    remote::RemoteKeys,
-    results::ResultKeys,
-    threads::ThreadKeys,
-    tls::TlsKeys,
-    values::Values,
+    declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
+    threads::ThreadKeys, tls::TlsKeys, values::Values,
 };
 use crate::{mqtt::MqttOptions, results::ResultLimits, server::ConnectionLimits, tls::TlsOptions};
 

@@ -43,7 +43,8 @@ pub struct ModelReady {
     pub ready: bool,
 }
 
-/// The metadata of a model. Other servers omit some members, or send `null`.
+// Other servers omit some members, or send `null`.
+/// The metadata of a model.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
 pub struct ModelMetadata {
     /// The name.

@@ -1,6 +1,9 @@
 //! Names of environment variables: `LOOKDOWN__SERVER__LISTEN` is the key `server.listen`.
 
-use super::{SettingsError, declare::Entry, entries, values::unknown};
+use super::{
+    SettingsError, entries,
+    entry::{Entry, unknown},
+};
 
 const PREFIX: &str = "LOOKDOWN__";
 /// The prefix of variables with a single underscore, which are not settings, such as

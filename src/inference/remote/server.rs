@@ -8,13 +8,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use url::Url;
-
 use super::{
     breaker::Breaker,
     connection::{Connection, Reply},
     exchange::{Answer, Question},
-    token::BearerToken,
+    options::RemoteOptions,
 };
 use crate::inference::InferenceError;
 
@@ -26,22 +24,6 @@ const RECENT: Duration = Duration::from_secs(2);
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 /// Most characters of the server's error message that are reported.
 const MAX_MESSAGE_CHARS: usize = 300;
-
-/// Settings of the inference server.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RemoteOptions {
-    /// The server's address, without `/v2`.
-    pub url: Url,
-    /// Token sent with every request, if any.
-    pub token: Option<BearerToken>,
-    /// Name on the server of the model whose readiness represents the server's.
-    pub model: String,
-    /// Manifest name of the model that is called `model` on the server. Other names are the same in
-    /// both.
-    pub called: String,
-    /// Timeout of one inference request.
-    pub patience: Duration,
-}
 
 /// Numbers of inference requests by result since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
