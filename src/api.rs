@@ -31,10 +31,9 @@ use self::{
     http::{
         connection_limit, cors,
         csrf::{self, AllowedOrigins},
-        drain_body::{self, BodyLimits},
+        drain_body,
         envelope::{self, Surroundings},
-        header_limits::{self, HeaderLimits},
-        host, page_headers,
+        header_limits, host, page_headers,
         rate_limit::{self, RateLimiter},
     },
     protocols::{
@@ -157,19 +156,19 @@ pub fn router(state: ApiState) -> Router {
         .merge(deepstack::with_failures(deepstack))
         .merge(description)
         .merge(operation(state.options.metrics_elsewhere));
-    surrounded(router.with_state(state.clone()).merge(pages()), &state)
+    surrounded(router.merge(pages()), state)
 }
 
 /// The router of the metrics port: metrics and health checks for operators.
 pub fn operation_router(state: ApiState) -> Router {
-    surrounded(operation(false).with_state(state.clone()), &state)
+    surrounded(operation(false), state)
 }
 
 /// The router for connections beyond the limit: health checks, and metrics unless they have a port
 /// of their own. All other requests are refused.
 pub fn overload_router(state: ApiState) -> Router {
-    let router = operation(state.options.metrics_elsewhere).with_state(state.clone());
-    surrounded(router.fallback(connection_limit::refuse), &state)
+    let router = operation(state.options.metrics_elsewhere);
+    surrounded(router.fallback(connection_limit::refuse), state)
 }
 
 fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
@@ -181,29 +180,21 @@ fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
 }
 
 /// The pages for browsers.
-fn pages() -> Router {
+fn pages() -> Router<ApiState> {
     let api_page = api_page().route_layer(map_response(page_headers::of_api_page));
     web_page::router().merge(api_page)
 }
 
-/// Adds the layers of every route, the outermost first. A router clones and boxes each of its
+/// Adds the state and the layers of every route, the outermost first. A router clones and boxes each of its
 /// layers for each request, so all of these are one layer. A panic of a handler fails only its own
 /// request.
-fn surrounded(router: Router, state: &ApiState) -> Router {
+fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
     let options = &state.options;
     let surroundings = Surroundings {
         metrics: state.metrics.clone(),
         tracer: options.tracer.clone(),
     };
-    let body_limits = BodyLimits {
-        request_timeout: options.request_timeout,
-        max_body_bytes: options.max_body_bytes,
-        min_upload_bytes_per_second: options.min_upload_bytes_per_second,
-    };
-    let header_limits = HeaderLimits {
-        max_headers: options.max_headers,
-        max_header_bytes: options.max_header_bytes,
-    };
+    let (body_limits, header_limits) = (options.body_limits(), options.header_limits());
     let head_length = HeaderName::from_static(HEAD_LENGTH);
     let sent = [LAST_EVENT_ID, head_length.clone()];
     let read = [
@@ -228,11 +219,11 @@ fn surrounded(router: Router, state: &ApiState) -> Router {
             header_limits::within_bounds,
         ))
         .layer(from_fn(host::require));
-    router.layer(layers)
+    router.with_state(state).layer(layers)
 }
 
 /// The API page, from files inside the executable. It loads nothing from other hosts.
-fn api_page() -> Router {
+fn api_page() -> Router<ApiState> {
     let config = Config::from("../openapi.json")
         .validator_url("none")
         .use_base_layout();

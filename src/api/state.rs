@@ -8,6 +8,8 @@ use super::{
     http::{
         access::Access,
         deadline::{Deadline, RequestTimeout},
+        drain_body::BodyLimits,
+        header_limits::HeaderLimits,
         problem::{Problem, ProblemKind},
         rate_limit::RequestRate,
         request_body::{BodyReader, UploadBudget},
@@ -58,6 +60,23 @@ pub struct ApiOptions {
 }
 
 impl ApiOptions {
+    /// The limits of request bodies.
+    pub(super) fn body_limits(&self) -> BodyLimits {
+        BodyLimits {
+            request_timeout: self.request_timeout,
+            max_body_bytes: self.max_body_bytes,
+            min_upload_bytes_per_second: self.min_upload_bytes_per_second,
+        }
+    }
+
+    /// The limits of request heads.
+    pub(super) fn header_limits(&self) -> HeaderLimits {
+        HeaderLimits {
+            max_headers: self.max_headers,
+            max_header_bytes: self.max_header_bytes,
+        }
+    }
+
     /// Options for tests: small bodies, and no access control.
     #[must_use]
     pub fn for_testing() -> Self {

@@ -1,8 +1,6 @@
 //! A checked calibration, and its fit to frames of other sizes.
 
-use std::path::Path;
-
-use super::{Areas, CalibrationError, CalibrationId};
+use super::{Areas, CalibrationId};
 use crate::{
     geometry::{Lens, Mount, Pixel},
     revision::revision_of,

@@ -7,6 +7,7 @@
 mod boxes_scores;
 mod candidate_collector;
 mod centernet;
+mod decoder;
 mod detr;
 mod end_to_end;
 mod grid;
@@ -23,7 +24,7 @@ mod yolox;
 
 use serde::Deserialize;
 
-use self::{candidate_collector::CandidateCollector, shape::Batch};
+use self::{candidate_collector::CandidateCollector, decoder::Decoder, shape::Batch};
 use super::{HeadOutput, InferenceError};
 use crate::imaging::NetworkInput;
 
@@ -75,20 +76,6 @@ pub struct CandidateOptions {
     pub score_floor: f64,
     /// Largest number of boxes per view. The best are kept.
     pub max_detections_per_view: usize,
-}
-
-/// Interface of all heads. `batch.views` is known in [`Decoder::decode`] only.
-trait Decoder {
-    /// Checks that outputs of these shapes can be decoded. The error is a sentence.
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String>;
-
-    /// Checks the outputs, then passes every candidate to `finds`.
-    fn decode(
-        &self,
-        outputs: &[TensorView<'_>],
-        batch: &Batch,
-        finds: &mut CandidateCollector,
-    ) -> Result<(), String>;
 }
 
 impl Head {

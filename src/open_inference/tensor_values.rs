@@ -49,7 +49,7 @@ impl TensorValues<'_> {
     pub fn put_bytes(&self, bytes: &mut Vec<u8>) -> Result<(), TryFromIntError> {
         match self {
             Self::Floats(values) => {
-                bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()))
+                bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
             }
             Self::Integers(values) => {
                 bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));

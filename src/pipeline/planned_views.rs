@@ -3,7 +3,11 @@
 use super::{Engine, PipelineError, Profile, outline::view_outline};
 use crate::{
     calibration::Calibration,
-    geometry::{Lens, Pixel, VirtualView, view_plan::Coverage},
+    geometry::{
+        Lens, Pixel, VirtualView,
+        pixels::{PixelConvention, cross_half_pixel},
+        view_plan::Coverage,
+    },
     imaging::MaskedPixels,
 };
 

@@ -3,6 +3,7 @@
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
 use super::{
+    SettingsError,
     declare::settings,
     form::{Form, Refusal, count, millis, parsed, path, share},
     locate::{DEFAULT_LIBRARY, locate},

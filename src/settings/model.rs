@@ -1,8 +1,12 @@
 //! The models.
 
-use std::{num::NonZeroU64, path::PathBuf};
+use std::{
+    num::NonZeroU64,
+    path::{Path, PathBuf},
+};
 
 use super::{
+    SettingsError,
     declare::settings,
     form::{names, optional, path, poll_seconds},
     locate::{DEFAULT_REPOSITORY, locate},

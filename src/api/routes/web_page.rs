@@ -16,10 +16,13 @@ use axum::{
 };
 
 use crate::{
-    api::http::{
-        entity_tags::{entity_tag, is_unmodified},
-        page_headers,
-        problem::{Problem, ProblemKind},
+    api::{
+        ApiState,
+        http::{
+            entity_tags::{entity_tag, is_unmodified},
+            page_headers,
+            problem::{Problem, ProblemKind},
+        },
     },
     revision::revision_of,
 };
@@ -95,7 +98,7 @@ impl Asset {
 }
 
 /// Returns the routes of the page and its files.
-pub(in crate::api) fn router() -> Router {
+pub(in crate::api) fn router() -> Router<ApiState> {
     let page = async |headers: HeaderMap| answer(PAGE, &headers, "/");
     let asset = async |Path(name): Path<String>, uri: Uri, headers: HeaderMap| {
         answer(&name, &headers, uri.path())
