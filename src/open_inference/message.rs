@@ -144,3 +144,48 @@ impl Message {
 pub fn read_request<'a, D: Deserialize<'a>>(json: &'a [u8]) -> serde_json::Result<InferRequest<D>> {
     serde_json::from_slice(json).map(|Table(request)| request)
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::value::RawValue;
+
+    use super::*;
+    use crate::open_inference::{Datatype, TensorData};
+
+    #[test]
+    fn a_written_response_is_read_with_the_same_values() {
+        let values = [0.1, -2.5];
+        let tensor = TensorValues::Floats(&values);
+        for as_bytes in [false, true] {
+            let output = OutputTensor {
+                name: "scores".to_owned(),
+                datatype: tensor.datatype().to_string(),
+                shape: vec![2],
+                parameters: as_bytes.then(|| OutputParameters {
+                    binary_data_size: Some(tensor.byte_count()),
+                }),
+                data: (!as_bytes).then_some(tensor),
+            };
+            let response = InferResponse {
+                model_name: "model".to_owned(),
+                model_version: None,
+                id: None,
+                outputs: vec![output],
+            };
+            let behind = [tensor];
+            let behind = if as_bytes { &behind[..] } else { &[] };
+            let message = Message::write(&response, behind).unwrap();
+            assert_eq!(message.head_length.is_some(), as_bytes);
+
+            let (json, mut behind) = message.split().unwrap();
+            let read: InferResponse<&RawValue> = serde_json::from_slice(&json).unwrap();
+            let output = &read.outputs[0];
+            assert_eq!(output.datatype, Datatype::Fp32.name());
+            let size = output.parameters.as_ref();
+            let size = size.and_then(|parameters| parameters.binary_data_size);
+            let sent = TensorData::take(output.data, size, &mut behind).unwrap();
+            assert_eq!(sent.floats(2).unwrap(), values);
+            assert!(behind.is_empty());
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! Dependencies between modules are acyclic, and only few modules use external systems.
 #![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
 
+mod file_circles;
 mod source_scan;
 
 use std::fs;

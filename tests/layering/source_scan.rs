@@ -64,7 +64,7 @@ pub fn used_paths(code: &str) -> BTreeSet<String> {
 }
 
 /// Adds the paths at the start of `code`, a path or a list of paths in braces. Returns the rest.
-fn collect_paths<'a>(code: &'a str, parent: &str, used: &mut BTreeSet<String>) -> &'a str {
+pub fn collect_paths<'a>(code: &'a str, parent: &str, used: &mut BTreeSet<String>) -> &'a str {
     let code = code.trim_start();
     if let Some(mut rest) = code.strip_prefix('{') {
         loop {
