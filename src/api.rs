@@ -1,59 +1,63 @@
 //! The HTTP API: the table of routes and the layers around them. No other module uses HTTP. Every
 //! failure is returned as a problem document.
 
-mod accept;
-mod access;
 mod answer;
-mod calibrations;
-mod connection_limit;
-mod cors;
-mod csrf;
-mod deadline;
-mod deepstack;
-mod detect;
-mod drain_body;
-mod entity_tags;
-mod envelope;
-mod header_limits;
-mod health;
-mod host;
-mod incoming_trace;
+mod http;
 mod limit;
 mod openapi;
-mod page_headers;
 mod parameters;
-mod problem;
-mod rate_limit;
+mod protocols;
+mod readiness;
 mod report;
-mod repository;
-mod request_id;
-mod results;
+mod report_headers;
+mod require_scope;
+mod routes;
 mod run_detection;
 mod state;
 mod upload;
-mod v2;
-mod web_page;
 
 use axum::{
-    Router,
+    Extension, Router,
+    http::HeaderName,
     middleware::{from_fn, from_fn_with_state, map_response},
+    routing::get,
 };
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use csrf::AllowedOrigins;
-use envelope::Surroundings;
-use rate_limit::RateLimiter;
+use self::{
+    http::{
+        connection_limit, cors,
+        csrf::{self, AllowedOrigins},
+        drain_body,
+        envelope::{self, Surroundings},
+        header_limits, host, page_headers,
+        rate_limit::{self, RateLimiter},
+    },
+    protocols::{
+        deepstack,
+        open_inference::{self, repository},
+    },
+    report_headers::{INFERENCE_TIME, PERSON_COUNT, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
+    routes::{
+        calibrations, detect, health,
+        openapi::{self as document, DocumentSource},
+        problems,
+        results::{self, events::LAST_EVENT_ID},
+        web_page,
+    },
+};
+use crate::open_inference::HEAD_LENGTH;
 
-pub use access::Access;
-pub use health::{Phase, Readiness};
-pub use openapi::document as openapi_document;
-pub use problem::pages::problem_table;
-pub use rate_limit::RequestRate;
-pub use report::Report;
-pub use state::{ApiOptions, ApiState};
+pub use self::{
+    http::{access::Access, rate_limit::RequestRate},
+    readiness::{Phase, Readiness},
+    report::Report,
+    routes::problems::problem_table,
+    state::{ApiOptions, ApiState},
+};
 
 /// All routes with their entries in the OpenAPI document.
 fn routes() -> OpenApiRouter<ApiState> {
@@ -62,6 +66,12 @@ fn routes() -> OpenApiRouter<ApiState> {
         .merge(description())
         .merge(probes())
         .merge(metrics())
+}
+
+/// Returns the OpenAPI document of all routes.
+#[must_use]
+pub fn openapi_document() -> utoipa::openapi::OpenApi {
+    openapi::complete(routes().into_openapi())
 }
 
 /// The routes of the native API.
@@ -84,12 +94,12 @@ fn client_routes() -> OpenApiRouter<ApiState> {
         .routes(routes!(results::history::get_history))
         .routes(routes!(results::events::of_camera))
         .routes(routes!(results::events::of_all))
-        .routes(routes!(v2::describe::model))
-        .routes(routes!(v2::describe::model_version))
-        .routes(routes!(v2::describe::model_ready))
-        .routes(routes!(v2::describe::model_version_ready))
-        .routes(routes!(v2::infer::infer))
-        .routes(routes!(v2::infer::infer_version))
+        .routes(routes!(open_inference::describe::model))
+        .routes(routes!(open_inference::describe::model_version))
+        .routes(routes!(open_inference::describe::model_ready))
+        .routes(routes!(open_inference::describe::model_version_ready))
+        .routes(routes!(open_inference::infer::infer))
+        .routes(routes!(open_inference::infer::infer_version))
         .routes(routes!(repository::index))
         .routes(routes!(repository::load))
         .routes(routes!(repository::unload))
@@ -105,18 +115,18 @@ fn deepstack_routes() -> OpenApiRouter<ApiState> {
 
 fn description() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
-        .routes(routes!(openapi::openapi_json))
-        .routes(routes!(problem::pages::list_problems))
-        .routes(routes!(problem::pages::get_problem))
-        .routes(routes!(v2::describe::server))
+        .routes(routes!(document::openapi_json))
+        .routes(routes!(problems::list_problems))
+        .routes(routes!(problems::get_problem))
+        .routes(routes!(open_inference::describe::server))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(health::livez))
         .routes(routes!(health::readyz))
-        .routes(routes!(v2::describe::live))
-        .routes(routes!(v2::describe::ready))
+        .routes(routes!(open_inference::describe::live))
+        .routes(routes!(open_inference::describe::ready))
 }
 
 fn metrics() -> OpenApiRouter<ApiState> {
@@ -126,29 +136,38 @@ fn metrics() -> OpenApiRouter<ApiState> {
 /// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
     let options = &state.options;
-    let own_pages = AllowedOrigins::of(options).map(|own| from_fn_with_state(own, csrf::refuse));
-    let limiter = RateLimiter::of(options).map(|all| from_fn_with_state(all, rate_limit::apply));
+    let access = &options.access;
+    let own_pages = AllowedOrigins::of(access, &options.cors_origins);
+    let own_pages = own_pages.map(|own| from_fn_with_state(own, csrf::refuse));
+    let limiter = options
+        .request_rate
+        .map(|rate| RateLimiter::new(rate, access));
+    let limiter = limiter.map(|all| from_fn_with_state(all, rate_limit::apply));
     let guards = ServiceBuilder::new()
         .layer(option_layer(own_pages))
         .layer(option_layer(limiter));
+    // Some clients ask for the metadata with a slash at the end.
+    let description = Router::from(description())
+        .route("/v2/", get(open_inference::describe::server))
+        .layer(Extension(DocumentSource(openapi_document)));
     let clients = Router::from(client_routes()).route_layer(guards.clone());
     let deepstack = Router::from(deepstack_routes()).route_layer(guards);
     let router = clients
         .merge(deepstack::with_failures(deepstack))
-        .merge(Router::from(description()))
+        .merge(description)
         .merge(operation(state.options.metrics_elsewhere));
-    surrounded(router.with_state(state.clone()).merge(pages()), state)
+    surrounded(router.merge(pages()), state)
 }
 
 /// The router of the metrics port: metrics and health checks for operators.
 pub fn operation_router(state: ApiState) -> Router {
-    surrounded(operation(false).with_state(state.clone()), state)
+    surrounded(operation(false), state)
 }
 
 /// The router for connections beyond the limit: health checks, and metrics unless they have a port
 /// of their own. All other requests are refused.
 pub fn overload_router(state: ApiState) -> Router {
-    let router = operation(state.options.metrics_elsewhere).with_state(state.clone());
+    let router = operation(state.options.metrics_elsewhere);
     surrounded(router.fallback(connection_limit::refuse), state)
 }
 
@@ -161,31 +180,50 @@ fn operation(metrics_elsewhere: bool) -> Router<ApiState> {
 }
 
 /// The pages for browsers.
-fn pages() -> Router {
+fn pages() -> Router<ApiState> {
     let api_page = api_page().route_layer(map_response(page_headers::of_api_page));
     web_page::router().merge(api_page)
 }
 
-/// Adds the layers of every route, the outermost first. A router clones and boxes each of its
+/// Adds the state and the layers of every route, the outermost first. A router clones and boxes each of its
 /// layers for each request, so all of these are one layer. A panic of a handler fails only its own
 /// request.
-fn surrounded(router: Router, state: ApiState) -> Router {
+fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
+    let options = &state.options;
     let surroundings = Surroundings {
         metrics: state.metrics.clone(),
-        tracer: state.options.tracer.clone(),
+        tracer: options.tracer.clone(),
     };
+    let (body_limits, header_limits) = (options.body_limits(), options.header_limits());
+    let head_length = HeaderName::from_static(HEAD_LENGTH);
+    let sent = [LAST_EVENT_ID, head_length.clone()];
+    let read = [
+        SERVER_TIMING,
+        INFERENCE_TIME,
+        PERSON_COUNT,
+        QUEUE_TIME,
+        TOTAL_TIME,
+        head_length,
+    ];
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(surroundings, envelope::wrap))
-        .layer(option_layer(cors::layer(&state.options.cors_origins)))
+        .layer(option_layer(cors::layer(
+            &options.cors_origins,
+            &sent,
+            &read,
+        )))
         .layer(CatchPanicLayer::custom(envelope::of_panic))
-        .layer(from_fn_with_state(state.clone(), drain_body::discard))
-        .layer(from_fn_with_state(state, header_limits::within_bounds))
+        .layer(from_fn_with_state(body_limits, drain_body::discard))
+        .layer(from_fn_with_state(
+            header_limits,
+            header_limits::within_bounds,
+        ))
         .layer(from_fn(host::require));
-    router.layer(layers)
+    router.with_state(state).layer(layers)
 }
 
 /// The API page, from files inside the executable. It loads nothing from other hosts.
-fn api_page() -> Router {
+fn api_page() -> Router<ApiState> {
     let config = Config::from("../openapi.json")
         .validator_url("none")
         .use_base_layout();

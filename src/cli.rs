@@ -10,23 +10,20 @@ mod model;
 mod parameters;
 mod progress;
 mod serve;
+mod settings_file;
 mod shell;
 mod tune;
 
 use std::{
     io::{self, Write},
-    path::PathBuf,
     process::ExitCode,
 };
 
 use anyhow::Context;
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::{
-    api,
-    settings::{self, Settings},
-    telemetry,
-};
+use self::settings_file::SettingsFile;
+use crate::api;
 
 /// Detects persons in the images of ceiling fisheye cameras.
 #[derive(Debug, Parser)]
@@ -66,27 +63,6 @@ enum Command {
     /// Write the manual pages
     #[command(hide = true)]
     Manual(shell::ManualArguments),
-}
-
-/// The source of the settings.
-#[derive(Debug, Args)]
-struct SettingsFile {
-    /// Settings file (TOML); variables such as `LOOKDOWN__SERVER__LISTEN` override it
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-}
-
-impl SettingsFile {
-    /// Loads and validates the settings, and starts logging as they say.
-    fn load(&self) -> anyhow::Result<Settings> {
-        let settings = settings::load(self.config.as_deref(), settings::environment())?;
-        telemetry::start_logs(&settings.log)?;
-        let names = settings::environment().map(|(name, _)| name);
-        if let Some(warning) = settings::ignored_variables(names) {
-            tracing::warn!("{warning}");
-        }
-        Ok(settings)
-    }
 }
 
 /// Runs the command line of this process. `commit` is the commit from which the binary was built,

@@ -9,6 +9,7 @@ mod candidate;
 mod fusion;
 mod overlap_grid;
 mod refinement;
+mod refinement_parameters;
 mod suppression;
 
 #[cfg(test)]
@@ -16,4 +17,5 @@ mod properties;
 
 pub use bbox::{BBox, BBoxError, FramePixels, ViewPixels};
 pub use candidate::{Candidate, MergedDetection};
-pub use refinement::{Refinement, RefinementParameters, refine};
+pub use refinement::refine;
+pub use refinement_parameters::{Refinement, RefinementParameters};

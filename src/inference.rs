@@ -2,6 +2,8 @@
 
 mod detector;
 mod device;
+mod error;
+mod head_output;
 pub mod heads;
 mod manifest;
 mod model;
@@ -13,9 +15,11 @@ mod repository;
 mod signature;
 mod staging;
 
-pub use detector::{Detector, InferenceError, ViewDetection};
+pub use detector::Detector;
 pub use device::{Device, UnknownDevice};
-pub use heads::{CandidateOptions, HeadOutput};
+pub use error::InferenceError;
+pub use head_output::{HeadOutput, ViewDetection};
+pub use heads::CandidateOptions;
 pub use manifest::{Layout, ManifestInput, ModelManifest};
 pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor};

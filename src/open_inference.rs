@@ -1,14 +1,28 @@
-//! The encoding of tensors in the Open Inference Protocol (KServe V2) over HTTP: as lists in JSON,
-//! or as bytes after it (the extension `binary_tensor_data`). Without I/O; shared by the server and
-//! the client of the protocol.
+//! The Open Inference Protocol (KServe V2) over HTTP: metadata, requests and responses, with
+//! tensors as lists in JSON or as bytes after it (the extension `binary_tensor_data`). Without I/O;
+//! shared by the server and the client of the protocol.
 
-pub mod binary_data;
+mod binary_data;
+pub mod bounded_json;
 mod datatype;
-pub mod json_data;
+mod json_data;
+pub mod message;
+pub mod metadata;
+pub mod parameters;
+mod tensor_data;
+mod tensor_values;
 
-pub use datatype::Datatype;
+pub use self::{
+    datatype::Datatype,
+    tensor_data::{TensorData, element_count},
+    tensor_values::TensorValues,
+};
 
 /// The header with the length of the JSON, when bytes follow it.
 pub const HEAD_LENGTH: &str = "inference-header-content-length";
 /// The extension of servers that accept and return tensors as bytes.
 pub const BINARY_EXTENSION: &str = "binary_tensor_data";
+/// The parameter of a tensor with the number of its bytes after the JSON.
+pub const BINARY_SIZE: &str = "binary_data_size";
+/// The parameter of a requested output that selects bytes.
+pub const BINARY_OUTPUT: &str = "binary_data";

@@ -11,6 +11,7 @@ mod job;
 mod merge;
 mod motion_cache;
 mod network;
+mod outline;
 mod parameter_error;
 mod parameter_spec;
 mod parameters;

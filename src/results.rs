@@ -1,6 +1,7 @@
 //! The result store: the latest report of each camera and some earlier ones, for later queries and
 //! for live streams. A report is stored as the exact bytes that answered its frame.
 
+mod cameras;
 mod listeners;
 mod memory;
 mod picture;
@@ -8,9 +9,10 @@ mod redis;
 mod report;
 mod store;
 
+pub use cameras::Cameras;
 pub use listeners::{ListenError, Listeners, Listening};
 pub use memory::MemoryResults;
 pub use picture::{NewPicture, PicturesOf, StoredPicture};
 pub use redis::{RedisAddress, RedisAddressError, RedisOptions, RedisResults};
 pub use report::{NewReport, ReportId, StoredReport};
-pub use store::{Cameras, ResultLimits, ResultStore, ResultUse, StoreHealth, Unreachable};
+pub use store::{ResultLimits, ResultStore, ResultUse, StoreHealth, Unreachable};

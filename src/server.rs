@@ -3,11 +3,12 @@
 
 mod accept;
 mod connection;
+mod connection_limits;
 mod connection_permits;
 mod connection_timeouts;
 mod instrumented_io;
 
-use std::{convert::Infallible, num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{convert::Infallible, sync::Arc, time::Duration};
 
 use hyper::{
     Request, Response,
@@ -19,6 +20,7 @@ use tokio::{
 };
 use tower::{BoxError, Service};
 
+pub use self::connection_limits::ConnectionLimits;
 use self::{
     accept::Acceptor,
     connection::Rules,
@@ -29,36 +31,6 @@ use crate::{metrics::Metrics, shutdown::Shutdown, tls::Tls};
 /// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe
 /// needs milliseconds.
 const TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_millis(500);
-
-/// The limits of connections.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ConnectionLimits {
-    /// Most connections that are served at the same time.
-    pub max_connections: NonZeroUsize,
-    /// Longest time for the head of a request. On a new connection it includes the time before the
-    /// first byte. Later it begins with the head's first byte.
-    pub header_timeout: Duration,
-    /// Longest time that a connection may be idle between two requests, or blocked because its
-    /// client does not read the response.
-    pub idle_timeout: Duration,
-    /// Most bytes of a request's head. The service refuses a longer head, and a head of more than
-    /// twice as many bytes never reaches it.
-    pub max_header_bytes: usize,
-    /// Most headers of a request, under the same rule.
-    pub max_headers: usize,
-}
-
-impl Default for ConnectionLimits {
-    fn default() -> Self {
-        Self {
-            max_connections: NonZeroUsize::new(512).unwrap_or(NonZeroUsize::MIN),
-            header_timeout: Duration::from_secs(10),
-            idle_timeout: Duration::from_secs(75),
-            max_header_bytes: 16 * 1024,
-            max_headers: 100,
-        }
-    }
-}
 
 /// The services that answer. Each request carries the address of its client, a [`std::net::SocketAddr`], among its
 /// extensions.

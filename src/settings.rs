@@ -7,6 +7,7 @@
 mod access;
 mod calibrations;
 mod declare;
+mod entry;
 mod error;
 mod form;
 mod inference;
@@ -39,18 +40,13 @@ pub use remote::RemoteSettings;
 pub use results::ResultSettings;
 pub use server::{ServerSettings, ShutdownSettings};
 pub use threads::ThreadPlan;
-pub use variables::{environment, ignored_variables};
+pub use variables::environment;
 
 pub(crate) use variables::variable_of;
 
 use self::{
-    declare::{Entry, Table},
-    mqtt::MqttKeys,
-    remote::RemoteKeys,
-    results::ResultKeys,
-    threads::ThreadKeys,
-    tls::TlsKeys,
-    values::Values,
+    declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
+    threads::ThreadKeys, tls::TlsKeys, values::Values,
 };
 use crate::{mqtt::MqttOptions, results::ResultLimits, server::ConnectionLimits, tls::TlsOptions};
 
@@ -157,4 +153,10 @@ pub fn load(
     environment: impl IntoIterator<Item = (String, String)>,
 ) -> Result<Settings, SettingsError> {
     Settings::read(&Values::read(file, environment, &entries())?)
+}
+
+/// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with
+/// the setting that each may have been meant for; `None` when there are none.
+pub fn ignored_variables(names: impl IntoIterator<Item = String>) -> Option<String> {
+    variables::ignored(names, &entries())
 }

@@ -1,5 +1,8 @@
 use super::*;
-use crate::geometry::Pixel;
+use crate::{
+    detection::BBox,
+    geometry::{OrientedBox, Pixel, floor::FloorPosition},
+};
 
 fn person(corners: [f64; 4], angle_deg: f64) -> AnnotatedBox {
     AnnotatedBox {

@@ -8,13 +8,13 @@ use bytes::Bytes;
 
 use self::format::AnswerFormat;
 pub(super) use self::format::TABLE;
-use super::{
-    parameters::{self, pairs},
-    problem::{Problem, ProblemKind},
-};
 use crate::{
     annotated_image::{AnnotationError, AnnotationOptions, annotated_image},
     annotation_formats::{AnnotatedImage, BoxKind},
+    api::http::{
+        problem::{Problem, ProblemKind},
+        query::{pairs, take},
+    },
     pipeline::{Detected, PipelineError},
 };
 
@@ -42,8 +42,8 @@ impl AnswerOptions {
         headers: &HeaderMap,
         file_name: Option<String>,
     ) -> Result<Self, Problem> {
-        let format = parameters::take(given, TABLE);
-        let picture = parameters::take(given, AnnotationOptions::TABLE);
+        let format = take(given, TABLE);
+        let picture = take(given, AnnotationOptions::TABLE);
         Ok(Self {
             format: AnswerFormat::read(pairs(&format), headers)?,
             picture: AnnotationOptions::parse(pairs(&picture))?,

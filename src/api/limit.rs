@@ -5,11 +5,11 @@ use std::{future::Future, time::Duration, time::Instant};
 
 use tokio::time::timeout_at;
 
-use super::{
-    deadline::Deadline,
-    problem::{Problem, ProblemKind},
-};
 use crate::{
+    api::http::{
+        deadline::Deadline,
+        problem::{Problem, ProblemKind},
+    },
     pipeline::{PipelineError, Timeline},
     telemetry::RequestTrace,
 };

@@ -5,12 +5,11 @@ mod failures;
 mod parameters;
 mod security;
 
-use axum::Json;
 use utoipa::{OpenApi, openapi};
 
 use security::Keys;
 
-use super::problem::ProblemBody;
+use crate::api::http::problem::ProblemBody;
 pub(super) use parameters::{AnnotationQuery, DetectForm, DetectQuery, RawBytes, fields};
 
 #[derive(OpenApi)]
@@ -35,19 +34,8 @@ pub(super) use parameters::{AnnotationQuery, DetectForm, DetectQuery, RawBytes, 
 )]
 pub(super) struct Common;
 
-/// Returns the OpenAPI document of all routes.
-#[must_use]
-pub fn document() -> openapi::OpenApi {
-    let mut document = super::routes().into_openapi();
+/// Adds the failures to the document of the routes.
+pub(super) fn complete(mut document: openapi::OpenApi) -> openapi::OpenApi {
     failures::describe(&mut document);
     document
-}
-
-/// Get the OpenAPI document
-#[utoipa::path(
-    get, path = "/openapi.json", tag = "operation", operation_id = "get_openapi",
-    responses((status = OK, description = "OpenAPI 3.1.", body = Object))
-)]
-pub(super) async fn openapi_json() -> Json<openapi::OpenApi> {
-    Json(document())
 }

@@ -5,9 +5,14 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 
-use super::{ApiState, deadline::Deadline, limit::Limit, problem::Problem, report::Report};
 use crate::{
     annotated_image::StoredFrame,
+    api::{
+        ApiState,
+        http::{deadline::Deadline, problem::Problem},
+        limit::Limit,
+        report::Report,
+    },
     metrics::Metrics,
     pipeline::{DetectJob, Detected, DetectionReport},
     results::{NewPicture, NewReport},

@@ -2,17 +2,25 @@
 
 use std::{num::NonZeroU64, ops::Deref, sync::Arc, time::Duration};
 
+use axum::extract::FromRef;
+
 use super::{
-    Access, Readiness, RequestRate,
-    deadline::Deadline,
-    problem::ProblemKind,
-    upload::{BodyReader, UploadBudget},
+    http::{
+        access::Access,
+        deadline::{Deadline, RequestTimeout},
+        drain_body::BodyLimits,
+        header_limits::HeaderLimits,
+        problem::{Problem, ProblemKind},
+        rate_limit::RequestRate,
+        request_body::{BodyReader, UploadBudget},
+    },
+    readiness::{Phase, Readiness},
 };
 use crate::{
     calibration::Calibrations,
     inference::ModelRepository,
     metrics::Metrics,
-    pipeline::WorkerPool,
+    pipeline::{PipelineError, WorkerPool},
     results::{PicturesOf, ResultStore},
     telemetry::Tracer,
 };
@@ -52,6 +60,23 @@ pub struct ApiOptions {
 }
 
 impl ApiOptions {
+    /// The limits of request bodies.
+    pub(super) fn body_limits(&self) -> BodyLimits {
+        BodyLimits {
+            request_timeout: self.request_timeout,
+            max_body_bytes: self.max_body_bytes,
+            min_upload_bytes_per_second: self.min_upload_bytes_per_second,
+        }
+    }
+
+    /// The limits of request heads.
+    pub(super) fn header_limits(&self) -> HeaderLimits {
+        HeaderLimits {
+            max_headers: self.max_headers,
+            max_header_bytes: self.max_header_bytes,
+        }
+    }
+
     /// Options for tests: small bodies, and no access control.
     #[must_use]
     pub fn for_testing() -> Self {
@@ -126,6 +151,17 @@ impl ApiState {
         }))
     }
 
+    /// Returns the problem while the server is not ready.
+    pub(super) fn require_ready(&self) -> Result<(), Problem> {
+        let remote = self.models.remote();
+        match self.readiness.phase() {
+            Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
+            Phase::Ready => Err(PipelineError::InferenceUnavailable.into()),
+            Phase::WarmingUp => Err(Problem::warming_up()),
+            Phase::Stopping => Err(Problem::shutting_down()),
+        }
+    }
+
     /// Returns a reader of bodies up to `max_bytes`; `remedy` is the advice for larger ones.
     pub(super) fn body_reader(
         &self,
@@ -140,6 +176,12 @@ impl ApiState {
             least_bytes_per_second: self.options.min_upload_bytes_per_second,
             deadline,
         }
+    }
+}
+
+impl FromRef<ApiState> for RequestTimeout {
+    fn from_ref(state: &ApiState) -> Self {
+        Self(state.options.request_timeout)
     }
 }
 

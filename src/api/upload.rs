@@ -1,43 +1,37 @@
 //! A frame and its parameters: `multipart/form-data`, or the frame as the body with the parameters
 //! in the query.
 //!
-//! The whole body is read first, within limits: its size, its rate, the deadline of the request,
-//! and the memory of all requests together.
+//! The whole body is read first, within limits.
 
-mod body;
-mod budget;
 mod form;
-mod minimum_upload_rate;
 mod names;
 mod received_request;
 
 use std::time::Instant;
 
 use axum::{
-    extract::{FromRequest, Query, Request},
-    http::{HeaderMap, Uri, header::CONTENT_TYPE},
+    extract::{FromRequest, Request},
+    http::{HeaderMap, header::CONTENT_TYPE},
 };
 use bytes::Bytes;
 use jiff::Timestamp;
 
-pub(super) use body::{BodyReader, next_chunk};
-pub(super) use budget::{Held, UploadBudget};
-pub(super) use minimum_upload_rate::MinimumUploadRate;
 pub(super) use received_request::ReceivedRequest;
 
 use names::{is_parameter, unknown_parameter};
 
 pub(super) use form::FieldUse;
 
-use super::{
-    ApiState,
-    deadline::Deadline,
-    problem::{Problem, ProblemKind},
-    request_id::RequestId,
-};
 use crate::{
     access::Scope,
-    pipeline::{DetectJob, DetectParameters, ParameterError},
+    api::{
+        ApiState,
+        http::{
+            deadline::Deadline, problem::Problem, query::query_parameters,
+            request_body::UploadBudget, request_id::RequestId,
+        },
+    },
+    pipeline::{DetectJob, DetectParameters},
 };
 
 /// A frame in memory with the parameters of its request.
@@ -89,7 +83,7 @@ impl Upload {
         request: Request,
         state: &ApiState,
         budget: &UploadBudget,
-        use_of: fn(&str) -> FieldUse,
+        use_of: fn(&str) -> Result<FieldUse, Problem>,
     ) -> Result<Self, Problem> {
         let ReceivedRequest {
             parts,
@@ -115,43 +109,6 @@ impl Upload {
             arrived,
         })
     }
-}
-
-/// Returns the names and values of the query parameters.
-pub(super) fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Problem> {
-    let pairs = Query::try_from_uri(uri).ok().map(|Query(pairs)| pairs);
-    // The decoder replaces bytes that are not UTF-8 by this character.
-    let is_text = |text: &String| !text.contains(char::REPLACEMENT_CHARACTER);
-    pairs
-        .filter(|pairs: &Vec<(String, String)>| {
-            pairs
-                .iter()
-                .all(|(name, value)| is_text(name) && is_text(value))
-        })
-        .ok_or_else(|| {
-            let detail = "the query cannot be read: send name=value&name=value, percent-encoded \
-                          UTF-8";
-            Problem::new(ProblemKind::MalformedRequest, detail)
-        })
-}
-
-/// Returns the values of the named query parameters, each at most once.
-pub(super) fn parameters_named<const COUNT: usize>(
-    uri: &Uri,
-    names: [&str; COUNT],
-) -> Result<[Option<String>; COUNT], Problem> {
-    let mut values = [const { None }; COUNT];
-    for (given, value) in query_parameters(uri)? {
-        let Some(index) = names.iter().position(|name| *name == given) else {
-            let known = names.join(", ");
-            let problem = format!("there is no such parameter; the parameters are {known}");
-            return Err(ParameterError::unknown(&given, problem).into());
-        };
-        if values[index].replace(value).is_some() {
-            return Err(ParameterError::repeated(&given).into());
-        }
-    }
-    Ok(values)
 }
 
 /// Returns `true` if the body is a multipart form.

@@ -1,8 +1,6 @@
 //! A checked calibration, and its fit to frames of other sizes.
 
-use std::path::Path;
-
-use super::{Areas, CalibrationError, CalibrationId, file};
+use super::{Areas, CalibrationId};
 use crate::{
     geometry::{Lens, Mount, Pixel},
     revision::revision_of,
@@ -44,14 +42,6 @@ pub struct FrameSizeMismatch {
 }
 
 impl Calibration {
-    /// Reads a calibration file with one camera, in any format of [`super::formats`].
-    ///
-    /// # Errors
-    /// [`CalibrationError`] when it cannot be read, is malformed, describes no camera or several.
-    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
-        file::read(path)
-    }
-
     pub(super) fn new(
         id: CalibrationId,
         content: &[u8],

@@ -35,29 +35,34 @@ pub fn content(path: &Path) -> Result<Vec<u8>, CalibrationError> {
     Ok(content)
 }
 
-/// Reads and checks the only camera of a file.
-pub(super) fn read(path: &Path) -> Result<Calibration, CalibrationError> {
-    let content = content(path)?;
-    let file = CalibrationFile::parse(&content)
-        .map_err(|problem| CalibrationError::in_file(path, problem))?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let mut cameras = file.calibrations(&stem, &content);
-    let calibration = match &cameras[..] {
-        [_] => cameras.swap_remove(0).1,
-        several => {
-            let ids: Vec<_> = several.iter().map(|(id, _)| id.as_str()).collect();
-            Err(FormatError::invalid(
-                "cameras",
-                format!(
-                    "the file holds {}: name one of {}, or take one out with `lookdown calibration \
-                     convert --camera`",
-                    ids.len(),
-                    ids.join(", ")
-                ),
-            ))
-        }
-    };
-    calibration.map_err(|problem| CalibrationError::in_file(path, problem))
+impl Calibration {
+    /// Reads a calibration file with one camera, in any format of [`super::formats`].
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when it cannot be read, is malformed, describes no camera or several.
+    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
+        let content = content(path)?;
+        let file = CalibrationFile::parse(&content)
+            .map_err(|problem| CalibrationError::in_file(path, problem))?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut cameras = file.calibrations(&stem, &content);
+        let calibration = match &cameras[..] {
+            [_] => cameras.swap_remove(0).1,
+            several => {
+                let ids: Vec<_> = several.iter().map(|(id, _)| id.as_str()).collect();
+                Err(FormatError::invalid(
+                    "cameras",
+                    format!(
+                        "the file holds {}: name one of {}, or take one out with `lookdown calibration \
+                         convert --camera`",
+                        ids.len(),
+                        ids.join(", ")
+                    ),
+                ))
+            }
+        };
+        calibration.map_err(|problem| CalibrationError::in_file(path, problem))
+    }
 }
 
 /// A camera of a file under its ID.

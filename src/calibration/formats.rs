@@ -4,6 +4,7 @@
 //! Each reader documents its format and the usual mistakes; `docs/calibrate.md` has the table.
 
 mod basalt;
+mod camera_file;
 mod camera_intrinsic_model;
 mod camera_matrix;
 mod camodocal;
@@ -15,6 +16,7 @@ mod document;
 mod error;
 mod fields;
 mod fisheye_calib_adapter;
+mod format;
 mod kalibr;
 mod moil;
 mod multicol;
@@ -29,74 +31,22 @@ mod recognise;
 mod ros;
 mod woodscape;
 
+pub use camera_file::{CalibrationFile, Camera, FileCamera};
 pub use error::FormatError;
-pub use recognise::Format;
+pub use format::Format;
 
 use self::{
+    camera_file::alone,
     document::Document,
     fields::Fields,
     recognise::{recognise_lines, recognise_tree},
 };
-use super::native::{NativeImage, NativeMask, NativeMount, NativeZone};
-use crate::geometry::lens::LensModel;
-use crate::warning::Warning;
+use super::native::NativeImage;
 
 /// Most cameras taken from one file.
 const MAX_CAMERAS: usize = 256;
 
-/// The content of a calibration file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CalibrationFile {
-    /// The format that was recognised.
-    pub format: Format,
-    /// Its cameras, in the file's order; at least one.
-    pub cameras: Vec<FileCamera>,
-}
-
-/// One camera of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FileCamera {
-    /// Its name in the file, where it has one.
-    pub name: Option<String>,
-    /// The camera; one that cannot be used does not spoil the others.
-    pub camera: Result<Camera, FormatError>,
-}
-
-/// A camera as written in a file, not checked yet.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Camera {
-    /// The size of the frames it was calibrated with; some formats have none.
-    pub image: Option<NativeImage>,
-    /// The lens.
-    pub lens: LensModel,
-    /// Its mount; only native files have one, others mean straight down.
-    pub mount: NativeMount,
-    /// Its zones; only native files have some.
-    pub zones: Vec<NativeZone>,
-    /// Its masks; only native files have some.
-    pub masks: Vec<NativeMask>,
-    /// The assumptions of the reader.
-    pub notes: Vec<Warning>,
-}
-
-impl Camera {
-    fn new(image: Option<NativeImage>, lens: impl Into<LensModel>) -> Self {
-        Self {
-            image,
-            lens: lens.into(),
-            mount: NativeMount::default(),
-            zones: Vec::new(),
-            masks: Vec::new(),
-            notes: Vec::new(),
-        }
-    }
-}
-
 impl CalibrationFile {
-    /// Largest content that is read, bytes: a real calibration has a few hundred, one that carries
-    /// its corner points some ten thousand.
-    pub const MAX_BYTES: usize = 1024 * 1024;
-
     /// Recognises and reads the content of a calibration file.
     ///
     /// # Errors
@@ -182,9 +132,4 @@ fn read_tree(format: Format, fields: &Fields<'_>) -> Result<Vec<FileCamera>, For
         Format::CameraIntrinsicModel => alone(camera_intrinsic_model::read(fields)),
         Format::Native | Format::OCamCalib | Format::MultiCol | Format::Colmap => Vec::new(),
     })
-}
-
-/// The camera of a format that holds one to a file.
-fn alone(camera: Result<Camera, FormatError>) -> Vec<FileCamera> {
-    vec![FileCamera { name: None, camera }]
 }

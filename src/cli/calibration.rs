@@ -3,17 +3,14 @@
 mod check;
 mod convert;
 mod fit;
+mod frame_file;
 mod source;
 
-use std::{fs, path::Path, process::ExitCode};
+use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::Subcommand;
 
-use crate::imaging::{
-    Frame,
-    decode::{DecodeLimits, decode},
-};
+use self::frame_file::read_frame;
 
 /// The subcommands for calibrations.
 #[derive(Debug, Subcommand)]
@@ -33,10 +30,4 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         Command::Convert(arguments) => convert::run(arguments),
         Command::Fit(arguments) => fit::run(arguments),
     }
-}
-
-/// Decodes a frame from an image file.
-fn read_frame(path: &Path) -> anyhow::Result<Frame> {
-    let encoded = fs::read(path).context("the file cannot be read")?;
-    Ok(decode(&encoded, &DecodeLimits::default())?.frame)
 }

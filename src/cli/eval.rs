@@ -1,5 +1,7 @@
 //! `lookdown eval`
 
+mod arguments;
+mod detect_group;
 mod output;
 mod plot_file;
 mod sweep;
@@ -13,101 +15,10 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use clap::{
-    Args,
-    builder::{PossibleValuesParser, TypedValueParser},
-};
 
-use self::{output::Output, plot_file::PlotFile, truth::TruthFlags};
-use super::{SettingsFile, parameters::one_of, progress::Progress};
-use crate::{
-    app::evaluation_engine,
-    detection::Refinement,
-    evaluation::{DataSet, DetectedRow, EvaluationError, detect},
-    geometry::FieldOfViewReading,
-    pipeline::{DetectParameters, Engine, Profile},
-    settings::Settings,
-};
-
-/// C_t without `--score-threshold`: low, as average precision considers all scores.
-const DEFAULT_SCORE_THRESHOLD: &str = "0.001";
-
-/// Arguments of `lookdown eval`.
-#[derive(Debug, Args)]
-pub(super) struct Arguments {
-    #[command(flatten)]
-    truth: TruthFlags,
-    /// Trade-off between accuracy and cost; may be repeated [default: balanced; with --sweep: paper]
-    #[arg(long, value_name = "NAME", value_parser = one_of::<Profile>())]
-    profile: Vec<Profile>,
-    /// Method that merges overlapping boxes into persons; may be repeated [default: all of them]
-    #[arg(long, value_name = "NAME", value_parser = one_of::<Refinement>())]
-    refine: Vec<Refinement>,
-    /// The rows of the paper's table: its three refinements, and the detector without views
-    #[arg(long, conflicts_with_all = ["profile", "refine"])]
-    paper: bool,
-    /// Write the paper's sweeps to this folder: `cells.csv` (AP of NMS and Soft-NMS over N_t from 0
-    /// to 1, of Gaussian Soft-NMS over C_t and sigma), `iou_threshold.svg` (AP over N_t) and
-    /// `matrix.jpg` (detections at each C_t and sigma in the image with the most persons)
-    #[arg(
-        long,
-        value_name = "FOLDER",
-        conflicts_with_all = ["refine", "paper", "iou_threshold", "sigma", "plot",
-                              "save_detections", "from_detections"]
-    )]
-    sweep: Option<PathBuf>,
-    /// Model [default: the profile's]
-    #[arg(long, value_name = "NAME")]
-    model: Option<String>,
-    /// Ignore persons with a lower score, 0 to 1
-    #[arg(long, value_name = "SCORE", default_value = DEFAULT_SCORE_THRESHOLD)]
-    score_threshold: String,
-    /// Boxes that overlap at least this much are the same person [default: the refinement's]
-    #[arg(long, value_name = "IOU")]
-    iou_threshold: Option<String>,
-    /// Width of Gaussian Soft-NMS [default: 0.3]
-    #[arg(long, value_name = "NUMBER")]
-    sigma: Option<String>,
-    /// The reading of the paper's field of view, for the profile paper: 53° across, 53° from corner to
-    /// corner, or its formula taken literally, 90°
-    #[arg(
-        long,
-        value_name = "READING",
-        default_value = "horizontal",
-        value_parser = PossibleValuesParser::new(["horizontal", "diagonal", "literal"])
-            .map(|name| reading(&name))
-    )]
-    field_of_view: FieldOfViewReading,
-    /// Print one JSON object per row instead of a table
-    #[arg(long)]
-    json: bool,
-    /// Also plot the precision-recall curves of all rows into one image
-    #[arg(long, value_name = "OUT.svg|OUT.png")]
-    plot: Option<PlotFile>,
-    /// Also write the detections as COCO results: a file per row, named
-    /// PROFILE.REFINEMENT.MODEL.json
-    #[arg(long, value_name = "FOLDER")]
-    save_detections: Option<PathBuf>,
-    /// Score these COCO results instead of running a model: a file, or all .json files of a folder;
-    /// may be repeated
-    #[arg(
-        long,
-        value_name = "FILE|FOLDER",
-        conflicts_with_all = ["profile", "refine", "paper", "model", "score_threshold",
-                              "iou_threshold", "sigma", "save_detections"]
-    )]
-    from_detections: Vec<PathBuf>,
-    #[command(flatten)]
-    settings_file: SettingsFile,
-}
-
-fn reading(name: &str) -> FieldOfViewReading {
-    match name {
-        "diagonal" => FieldOfViewReading::Diagonal,
-        "literal" => FieldOfViewReading::Literal,
-        _ => FieldOfViewReading::Horizontal,
-    }
-}
+pub(super) use self::arguments::Arguments;
+use self::{detect_group::detect_group, output::Output};
+use crate::{app::evaluation_engine, evaluation::DetectedRow};
 
 /// Scores every profile with every refinement.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
@@ -143,20 +54,6 @@ fn detect_groups(arguments: &Arguments, output: &mut Output) -> anyhow::Result<(
         }
     }
     Ok(())
-}
-
-fn detect_group(
-    engine: &Engine,
-    data_set: &DataSet,
-    group: &[DetectParameters],
-    settings: &Settings,
-) -> Result<Vec<DetectedRow>, EvaluationError> {
-    let name = group.first().map_or("", |first| first.profile.name());
-    let progress = Progress::start(name, data_set.images.len());
-    let at_once = settings.threads.frame_workers;
-    let rows = detect(engine, data_set, group, at_once, || progress.advance());
-    progress.finish();
-    rows
 }
 
 /// The files of `--from-detections`, those of a folder ordered by name.

@@ -10,6 +10,7 @@ mod encode;
 mod label;
 mod lens_sketch;
 mod mark;
+mod style;
 pub(super) mod text;
 
 use super::frame::Frame;
@@ -20,6 +21,7 @@ use effort::Effort;
 pub use encode::{EncodeError, encode_jpeg, encode_png};
 pub use lens_sketch::sketch_lens;
 pub use mark::{Head, Mark, OrientedMark};
+use style::{INK, is_drawable, line_width, text_height};
 
 /// Shapes and texts to draw into a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,9 +58,6 @@ const SHADOW_OPACITY: f64 = 0.7;
 const THIN_OPACITY: f64 = 0.6;
 const LINE: Rgb = [235, 240, 255];
 const LINE_OPACITY: f64 = 0.55;
-const INK: Rgb = [12, 14, 18];
-/// Far outside any frame, and small enough for exact distances.
-const MAX_COORDINATE: f64 = 1e6;
 
 impl Drawing {
     /// A drawing of both boxes of the marks, without lines, zones or a caption.
@@ -139,24 +138,4 @@ pub fn annotate_unless(
     let names: Vec<_> = drawing.zones.iter().filter_map(ZoneOutline::mark).collect();
     marks.extend(names.iter().map(|name| (name, area_sketch::ZONE)));
     label::Labels::new(frame, &marks, caption).draw(frame, &mut effort)
-}
-
-fn is_drawable(line: &[[f64; 2]]) -> bool {
-    let mut coordinates = line.iter().flatten();
-    // NaN fails every comparison.
-    coordinates.all(|coordinate| coordinate.abs() <= MAX_COORDINATE)
-}
-
-/// Width of the main outline in pixels: a 450th of the shorter side, with a visible minimum.
-fn line_width(frame: &Frame) -> f64 {
-    (shorter_side(frame) / 450.0).max(1.6)
-}
-
-/// Height of a line of text in pixels: a 48th of the shorter side, with a legible minimum.
-fn text_height(frame: &Frame) -> f64 {
-    (shorter_side(frame) / 48.0).max(12.0)
-}
-
-fn shorter_side(frame: &Frame) -> f64 {
-    f64::from(frame.width().min(frame.height()))
 }

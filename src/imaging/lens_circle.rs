@@ -7,6 +7,7 @@
 //!    least-squares circle is fitted to it (`rim`, `least_squares`).
 
 mod agreement;
+mod circle;
 mod consensus;
 mod least_squares;
 mod outline;
@@ -17,19 +18,9 @@ use std::f64::consts::TAU;
 
 use super::frame::Frame;
 pub use agreement::{AgreedCircle, agreed_circle};
+pub use circle::LensCircle;
 use rim::RimPoint;
 use surround::Surround;
-
-/// The edge of the lens image in pixel centres: the centre of the top-left pixel is (0, 0).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LensCircle {
-    /// Column of the centre, in pixels.
-    pub cx: f64,
-    /// Row of the centre, in pixels.
-    pub cy: f64,
-    /// Radius in pixels. The circle may extend beyond the frame.
-    pub radius: f64,
-}
 
 /// Frames with a shorter side below this show too little of a rim to measure.
 const MIN_SIDE: u32 = 32;
@@ -106,18 +97,5 @@ pub fn assumed_circle(width: u32, height: u32) -> LensCircle {
         cx: (f64::from(width) - 1.0) / 2.0,
         cy: (f64::from(height) - 1.0) / 2.0,
         radius: f64::from(width.min(height)) / 2.0,
-    }
-}
-
-impl LensCircle {
-    /// Signed distance of a point from the circle in pixels, positive outside.
-    fn distance(&self, [x, y]: [f64; 2]) -> f64 {
-        (x - self.cx).hypot(y - self.cy) - self.radius
-    }
-
-    /// Largest distance of a point from the circle to count as its rim: half a percent of the
-    /// radius, but at least the size of pixels and compression blur.
-    fn tolerance(&self) -> f64 {
-        (0.005 * self.radius).max(1.5)
     }
 }

@@ -1,6 +1,7 @@
 //! Remap tables: where a view samples the frame, and the sampling itself.
 
 mod band;
+mod block_size;
 mod frame_from_plane;
 mod node_grid;
 mod rendering;
@@ -16,7 +17,8 @@ use std::{collections::HashSet, sync::Arc};
 use rayon::prelude::*;
 
 use self::{
-    band::{Band, LANES},
+    band::Band,
+    block_size::LANES,
     frame_from_plane::FrameFromPlane,
     node_grid::NodeGrid,
     rendering::{Planes, Source},

@@ -7,6 +7,7 @@
 mod boxes_scores;
 mod candidate_collector;
 mod centernet;
+mod decoder;
 mod detr;
 mod end_to_end;
 mod grid;
@@ -23,8 +24,8 @@ mod yolox;
 
 use serde::Deserialize;
 
-use self::{candidate_collector::CandidateCollector, shape::Batch};
-use super::{InferenceError, ViewDetection};
+use self::{candidate_collector::CandidateCollector, decoder::Decoder, shape::Batch};
+use super::{HeadOutput, InferenceError};
 use crate::imaging::NetworkInput;
 
 pub use self::{
@@ -68,16 +69,6 @@ pub enum Head {
     EndToEnd(EndToEndHead),
 }
 
-/// Decoded outputs of a batch of views.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct HeadOutput {
-    /// The persons of each view, in the order of the network's candidates.
-    pub per_view: Vec<Vec<ViewDetection>>,
-    /// Candidates dropped because their score was not finite, or because it reached the floor
-    /// and their box was not finite or beyond ±1e9 pixels.
-    pub non_finite: usize,
-}
-
 /// Limits on the candidates that are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CandidateOptions {
@@ -85,32 +76,6 @@ pub struct CandidateOptions {
     pub score_floor: f64,
     /// Largest number of boxes per view. The best are kept.
     pub max_detections_per_view: usize,
-}
-
-impl HeadOutput {
-    /// Keeps the best `count` detections of each view.
-    pub(super) fn keep_best(&mut self, count: usize) {
-        for found in &mut self.per_view {
-            if found.len() > count {
-                found.select_nth_unstable_by(count, |a, b| b.score.total_cmp(&a.score));
-                found.truncate(count);
-            }
-        }
-    }
-}
-
-/// Interface of all heads. `batch.views` is known in [`Decoder::decode`] only.
-trait Decoder {
-    /// Checks that outputs of these shapes can be decoded. The error is a sentence.
-    fn check(&self, outputs: &[OutputShape<'_>], batch: &Batch) -> Result<(), String>;
-
-    /// Checks the outputs, then passes every candidate to `finds`.
-    fn decode(
-        &self,
-        outputs: &[TensorView<'_>],
-        batch: &Batch,
-        finds: &mut CandidateCollector,
-    ) -> Result<(), String>;
 }
 
 impl Head {

@@ -2,6 +2,8 @@
 
 mod description;
 mod environment;
+mod first_line;
+mod options;
 mod provider;
 
 use std::{num::NonZeroUsize, path::Path};
@@ -9,7 +11,7 @@ use std::{num::NonZeroUsize, path::Path};
 use ort::{session::Session, value::TensorRef};
 
 use super::{
-    CandidateOptions, Detector, Device, HeadOutput, InferenceError, ModelManifest,
+    Detector, HeadOutput, InferenceError, ModelManifest,
     heads::{Head, TensorView},
     onnx_file,
     signature::Signature,
@@ -22,17 +24,8 @@ use crate::{
 
 pub(super) use description::{FLOAT, Metadata, float_shapes};
 pub use description::{ModelDescription, OnnxTensor};
-
-/// Options for running a model.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OnnxOptions {
-    /// Device of the network.
-    pub device: Device,
-    /// Threads within one run of the network.
-    pub threads: NonZeroUsize,
-    /// Limits on the candidates that are kept.
-    pub candidates: CandidateOptions,
-}
+use first_line::first_line;
+pub use options::OnnxOptions;
 
 /// A model in an ONNX file, with the output head of its manifest.
 pub struct OnnxDetector {
@@ -150,13 +143,6 @@ fn check_sum(manifest: &ModelManifest, found: &str) -> Result<(), String> {
         )),
         _ => Ok(()),
     }
-}
-
-/// The runtime's error message without its call stack.
-fn first_line(error: &ort::Error) -> String {
-    let text = error.to_string();
-    let line = text.lines().next().unwrap_or_default().trim();
-    line.trim_end_matches('.').to_owned()
 }
 
 impl Detector for OnnxDetector {

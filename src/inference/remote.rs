@@ -6,6 +6,7 @@
 mod breaker;
 mod connection;
 mod exchange;
+mod options;
 mod server;
 mod token;
 mod understood;
@@ -23,7 +24,8 @@ use super::{
 };
 use crate::imaging::{NetworkInput, ViewBatch};
 
-pub use server::{RemoteCounts, RemoteOptions, RemoteServer};
+pub use options::RemoteOptions;
+pub use server::{RemoteCounts, RemoteServer};
 pub use token::{BearerToken, InvalidToken};
 
 /// A model on an inference server.

@@ -1,14 +1,16 @@
 //! Tensors as bytes: numbers little-endian and row-major, an element of `BYTES` after its length in
 //! four bytes, little-endian (extension `binary_tensor_data`).
 
-use bytes::{Buf, BufMut, Bytes, BytesMut};
+use std::num::TryFromIntError;
+
+use bytes::{Buf, BufMut, Bytes};
 
 use super::Datatype;
 
-const LENGTH_BYTES: usize = 4;
+/// Bytes of the length before an element of `BYTES`.
+pub(super) const LENGTH_BYTES: usize = 4;
 
 /// Returns the one element of a tensor of `BYTES`.
-///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -28,17 +30,17 @@ pub fn only_element(bytes: &Bytes) -> Result<Bytes, String> {
     Ok(rest)
 }
 
-/// Returns an element of `BYTES` after its length. `None` if the length exceeds four bytes.
-#[must_use]
-pub fn element(content: &[u8]) -> Option<Bytes> {
-    let mut bytes = BytesMut::with_capacity(LENGTH_BYTES + content.len());
-    bytes.put_u32_le(u32::try_from(content.len()).ok()?);
+/// Appends an element of `BYTES` after its length.
+///
+/// # Errors
+/// When the length exceeds four bytes.
+pub fn put_element(content: &[u8], bytes: &mut Vec<u8>) -> Result<(), TryFromIntError> {
+    bytes.put_u32_le(content.len().try_into()?);
     bytes.put_slice(content);
-    Some(bytes.freeze())
+    Ok(())
 }
 
 /// Returns `count` finite numbers of `UINT8` or `FP32`.
-///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -56,7 +58,6 @@ pub fn numbers(bytes: &[u8], datatype: Datatype, count: usize) -> Result<Vec<f32
 }
 
 /// Returns `count` numbers of `FP32`, finite or not.
-///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
@@ -82,18 +83,23 @@ mod tests {
 
     use super::*;
 
+    fn element(content: &[u8]) -> Bytes {
+        let mut bytes = Vec::new();
+        put_element(content, &mut bytes).unwrap();
+        bytes.into()
+    }
+
     proptest! {
         #[test]
         fn an_element_survives_a_round_trip(content in prop::collection::vec(any::<u8>(), 0..300)) {
-            let written = element(&content).unwrap();
-            prop_assert_eq!(only_element(&written).unwrap(), content);
+            prop_assert_eq!(only_element(&element(&content)).unwrap(), content);
         }
 
         #[test]
         fn any_bytes_give_an_element_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..40)) {
             let bytes = Bytes::from(bytes);
             match only_element(&bytes) {
-                Ok(content) => prop_assert_eq!(element(&content).unwrap(), bytes),
+                Ok(content) => prop_assert_eq!(element(&content), bytes),
                 Err(sentence) => prop_assert!(sentence.contains("length"), "{}", sentence),
             }
         }

@@ -35,7 +35,6 @@ pub fn numbers_at_most(json: &str, count: usize) -> usize {
 
 /// Returns the one element of a tensor of `BYTES`, encoded in base64.
 ///
-///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.
 pub fn only_bytes(json: &str) -> Result<Bytes, String> {
@@ -50,7 +49,6 @@ pub fn only_bytes(json: &str) -> Result<Bytes, String> {
 }
 
 /// Returns `count` finite numbers of `UINT8` or `FP32`.
-///
 ///
 /// # Errors
 /// The end of a sentence: what was sent, and what is needed.

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use super::planned_views::{crop_outline, view_outline};
+use super::outline::{crop_outline, view_outline};
 use crate::{
     calibration::CameraGeometry,
     detection::{BBox, FramePixels, ViewPixels},

@@ -5,6 +5,8 @@
 //! reads them, and no core waits for another. Only batches of several views are rendered in
 //! parallel by the thread pool.
 
+mod batch_options;
+mod claim;
 mod pass_task;
 mod run;
 mod view_queue;
@@ -15,12 +17,12 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::Arc,
     thread::JoinHandle,
-    time::Duration,
 };
 
 use rayon::ThreadPool;
 
-use self::view_queue::ViewQueue;
+pub use self::batch_options::BatchOptions;
+use self::{claim::Claim, view_queue::ViewQueue};
 use super::{
     Ticket,
     camera_rig::CameraRig,
@@ -34,21 +36,6 @@ use crate::{
 
 pub(super) use pass_task::PassTask;
 pub(super) use work::Work;
-
-/// Views of one pass that a thread has claimed.
-struct Claim {
-    task: Arc<PassTask>,
-    views: std::ops::Range<usize>,
-}
-
-/// Batching options for views.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BatchOptions {
-    /// The maximum number of views in one run of the network.
-    pub max_views: NonZeroUsize,
-    /// The maximum time that the first view of a batch waits for more views.
-    pub max_delay: Duration,
-}
 
 /// The inference threads and their queue. Dropping it ends the threads after the queued views are
 /// processed.

@@ -1,10 +1,10 @@
 //! The view plan of a camera, without a frame of it.
 
-use super::{Engine, PipelineError, Profile};
+use super::{Engine, PipelineError, Profile, outline::view_outline};
 use crate::{
     calibration::Calibration,
     geometry::{
-        FrameCrop, Lens, Pixel, VirtualView,
+        Lens, Pixel, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
         view_plan::Coverage,
     },
@@ -13,8 +13,6 @@ use crate::{
 
 /// Steps along each side of a view between the rays that test whether it covers the lens image.
 const SIGHT_STEPS: u32 = 64;
-/// Points of an outline along each side of a view.
-const POINTS_PER_SIDE: u32 = 16;
 
 /// The view plan of a camera and its cost.
 #[derive(Debug, Clone)]
@@ -131,21 +129,4 @@ fn sees(view: &VirtualView, lens: &Lens, masked: &MaskedPixels) -> bool {
             seen.is_some_and(|pixel| !masked.hides_position(pixel))
         })
     })
-}
-
-/// Returns the border of a view, clockwise from its top left corner, corner-origin frame pixels.
-/// Points beyond the lens image are moved to its rim.
-pub(super) fn view_outline(view: &VirtualView, lens: &Lens) -> Vec<Pixel> {
-    let rays = view.border_rays(POINTS_PER_SIDE);
-    rays.filter_map(|ray| lens.project_to_rim(&ray))
-        .map(|pixel| cross_half_pixel(pixel, PixelConvention::CornerOrigin))
-        .collect()
-}
-
-/// Returns the border of a crop, clockwise from its top left corner, corner-origin frame pixels.
-pub(super) fn crop_outline(crop: &FrameCrop) -> Vec<Pixel> {
-    let (width, height) = (f64::from(crop.width), f64::from(crop.height));
-    let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
-    let corners = corners.map(|[x, y]| crop.frame_from_crop(&Pixel::new(x, y)));
-    corners.to_vec()
 }

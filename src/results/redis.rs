@@ -12,6 +12,7 @@ mod outbox;
 mod reading;
 mod sender;
 mod session;
+mod shared;
 
 use std::{
     num::NonZeroUsize,
@@ -27,7 +28,8 @@ use redis::RedisResult;
 use tokio::{task::JoinSet, time::timeout};
 
 pub use self::address::{RedisAddress, RedisAddressError};
-use self::{keys::Keys, link::Link, outbox::Outbox, reading::Reader};
+pub use self::shared::RedisOptions;
+use self::{keys::Keys, link::Link, outbox::Outbox, reading::Reader, shared::Shared};
 use super::{
     Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
     StoreHealth, StoredPicture, StoredReport, Unreachable,
@@ -36,34 +38,12 @@ use super::{
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
 
-/// The Redis server and the part of it that this installation uses.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RedisOptions {
-    /// Its address.
-    pub address: RedisAddress,
-    /// The prefix of all keys: servers with the same prefix share their reports.
-    pub key_prefix: String,
-    /// The longest time for which a report is kept.
-    pub max_age: Duration,
-}
-
 /// Keeps reports in a Redis, within limits.
 #[derive(Debug)]
 pub struct RedisResults {
     shared: Arc<Shared>,
     /// Background tasks, aborted when this is dropped.
     _tasks: JoinSet<()>,
-}
-
-#[derive(Debug)]
-struct Shared {
-    options: RedisOptions,
-    limits: ResultLimits,
-    keys: Keys,
-    link: Link,
-    outbox: Outbox,
-    listeners: Arc<Listeners>,
-    stored: AtomicU64,
 }
 
 impl RedisResults {

@@ -4,16 +4,7 @@ use std::{num::NonZeroUsize, sync::Arc};
 
 use async_trait::async_trait;
 
-use super::{Listeners, NewPicture, NewReport, ReportId, StoredPicture, StoredReport};
-
-/// The cameras of a query.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Cameras {
-    /// Every camera.
-    All,
-    /// This camera.
-    One(String),
-}
+use super::{Cameras, Listeners, NewPicture, NewReport, ReportId, StoredPicture, StoredReport};
 
 /// The result store does not answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -1,51 +1,7 @@
 //! The declaration of settings: `settings!` makes the struct, its defaults, its reader and its rows
 //! of the reference from one list.
 
-use super::{SettingsError, form::Form, values::Values};
-
-/// A setting as the reference shows it.
-#[derive(Debug, Clone)]
-#[cfg_attr(
-    not(test),
-    expect(
-        dead_code,
-        reason = "only the tests that generate the reference read all of it"
-    )
-)]
-pub(super) struct Entry {
-    /// The key with its table, such as `server.tls.certificate`.
-    pub(super) key: &'static str,
-    /// The documentation, one line of the source after the other.
-    pub(super) help: &'static [&'static str],
-    /// The values that are accepted, as a phrase.
-    pub(super) kind: String,
-    /// The default as TOML.
-    pub(super) default: toml::Value,
-    /// The value that the settings file shows in a comment, where an empty value is refused.
-    pub(super) example: Option<&'static str>,
-}
-
-impl Entry {
-    pub(super) fn new<T>(
-        key: &'static str,
-        help: &'static [&'static str],
-        form: &Form<T>,
-        default: &T,
-    ) -> Self {
-        Self {
-            key,
-            help,
-            kind: form.kind.clone(),
-            default: (form.write)(default),
-            example: form.example,
-        }
-    }
-
-    /// The table and the key in it.
-    pub(super) fn split(&self) -> (&'static str, &'static str) {
-        self.key.rsplit_once('.').unwrap_or(("", self.key))
-    }
-}
+use super::{SettingsError, entry::Entry, values::Values};
 
 /// Settings of one table, or some of them.
 pub(super) trait Table: Sized {
@@ -120,9 +76,9 @@ macro_rules! settings {
                 })
             }
 
-            fn entries() -> Vec<$crate::settings::declare::Entry> {
+            fn entries() -> Vec<$crate::settings::entry::Entry> {
                 let defaults = Self::default();
-                vec![$($crate::settings::declare::Entry::new(
+                vec![$($crate::settings::entry::Entry::new(
                     settings!(@key $table, $field $($key)?),
                     &[$($help),*],
                     &$form,

@@ -3,9 +3,10 @@
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
 use super::{
+    SettingsError,
     declare::settings,
     form::{Form, Refusal, count, millis, parsed, path, share},
-    locate::DEFAULT_LIBRARY,
+    locate::{DEFAULT_LIBRARY, locate},
 };
 use crate::inference::{Device, UnknownDevice};
 
@@ -44,4 +45,21 @@ fn device() -> Form<Device> {
         move |name| parse(name).map_err(|error: UnknownDevice| Refusal::Shown(error.to_string())),
         Device::to_string,
     )
+}
+
+impl InferenceSettings {
+    /// Returns the path of the ONNX Runtime library.
+    ///
+    /// # Errors
+    /// [`SettingsError::Missing`] when it does not exist.
+    pub fn find_library(&self) -> Result<PathBuf, SettingsError> {
+        locate(&self.library_path, DEFAULT_LIBRARY).ok_or_else(|| SettingsError::Missing {
+            key: "inference.library_path",
+            what: "ONNX Runtime library",
+            path: self.library_path.clone(),
+            remedy: "run `make setup`, or set LOOKDOWN__INFERENCE__LIBRARY_PATH to \
+                     libonnxruntime.so"
+                .to_owned(),
+        })
+    }
 }

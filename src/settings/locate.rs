@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{InferenceSettings, ModelSettings, SettingsError};
+use super::SettingsError;
 
 /// Default folder of calibration files.
 pub(super) const DEFAULT_CALIBRATIONS: &str = "calibrations";
@@ -28,61 +28,6 @@ pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError
     Ok(found)
 }
 
-impl ModelSettings {
-    /// Returns the folder or file of the single model for all profiles, if it is set.
-    ///
-    /// # Errors
-    /// [`SettingsError::Missing`] when it does not exist.
-    pub fn find_one(&self) -> Result<Option<PathBuf>, SettingsError> {
-        match &self.path {
-            Some(path) if !path.exists() => Err(SettingsError::Missing {
-                key: "model.path",
-                what: "model",
-                path: path.clone(),
-                remedy: "set LOOKDOWN__MODEL__PATH to a model folder, or leave it out".to_owned(),
-            }),
-            path => Ok(path.clone()),
-        }
-    }
-
-    /// Returns the folder of models. The default folder may be missing if there is a single model
-    /// for all profiles.
-    ///
-    /// # Errors
-    /// [`SettingsError::Missing`] when it does not exist.
-    pub fn find_repository(&self) -> Result<PathBuf, SettingsError> {
-        let is_default = self.repository == Path::new(DEFAULT_REPOSITORY);
-        match locate(&self.repository, DEFAULT_REPOSITORY) {
-            Some(found) => Ok(found),
-            None if is_default && self.path.is_some() => Ok(self.repository.clone()),
-            None => Err(SettingsError::Missing {
-                key: "model.repository",
-                what: "folder of models",
-                path: self.repository.clone(),
-                remedy: "run `make setup`, or set LOOKDOWN__MODEL__REPOSITORY to another"
-                    .to_owned(),
-            }),
-        }
-    }
-}
-
-impl InferenceSettings {
-    /// Returns the path of the ONNX Runtime library.
-    ///
-    /// # Errors
-    /// [`SettingsError::Missing`] when it does not exist.
-    pub fn find_library(&self) -> Result<PathBuf, SettingsError> {
-        locate(&self.library_path, DEFAULT_LIBRARY).ok_or_else(|| SettingsError::Missing {
-            key: "inference.library_path",
-            what: "ONNX Runtime library",
-            path: self.library_path.clone(),
-            remedy: "run `make setup`, or set LOOKDOWN__INFERENCE__LIBRARY_PATH to \
-                     libonnxruntime.so"
-                .to_owned(),
-        })
-    }
-}
-
 /// Returns the existing file or folder at `path` in the current directory, or else beside the
 /// executable or in the folders above it.
 #[must_use]
@@ -100,7 +45,7 @@ pub fn find_beside_executable(path: &Path) -> Option<PathBuf> {
 /// A given path is used unchanged. The default path is searched for in the current directory, then
 /// beside the executable and in the folders above it. So
 /// `/anywhere/lookdown/target/release/lookdown` finds its files from any current directory.
-fn locate(path: &Path, default: &str) -> Option<PathBuf> {
+pub(super) fn locate(path: &Path, default: &str) -> Option<PathBuf> {
     if path == Path::new(default) {
         return find_beside_executable(path);
     }

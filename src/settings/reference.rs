@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use super::{declare::Entry, entries, load, variables::variable_of};
+use super::{entries, entry::Entry, load, variables::variable_of};
 
 /// Width of the generated files, characters.
 const WIDTH: usize = 100;

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use super::{
     SettingsError,
-    declare::Entry,
+    entry::{Entry, unknown},
     form::{Form, Written},
     variables,
 };
@@ -83,40 +83,6 @@ impl Values {
         (form.read)(written)
             .map(Some)
             .map_err(|refusal| SettingsError::of(key, || written.shown(), refusal))
-    }
-}
-
-/// The refusal of a key that does not exist, which stands at `place`.
-pub(super) fn unknown(place: &str, key: &str, entries: &[Entry]) -> SettingsError {
-    let (above, name) = key.rsplit_once('.').unwrap_or(("", key));
-    let is_table = entries.iter().any(|entry| entry.split().0 == above);
-    let (parent, mut known): (String, Vec<_>) = if is_table {
-        let inside = entries.iter().filter(|entry| entry.split().0 == above);
-        (
-            format!("in the table `{above}`"),
-            inside.map(|entry| entry.split().1).collect(),
-        )
-    } else {
-        (
-            "among the tables".to_owned(),
-            entries.iter().map(|entry| entry.split().0).collect(),
-        )
-    };
-    known.dedup();
-    SettingsError::Unknown {
-        place: place.to_owned(),
-        name: if is_table || above.is_empty() {
-            name
-        } else {
-            above
-        }
-        .to_owned(),
-        parent,
-        known: known
-            .iter()
-            .map(|name| format!("`{name}`"))
-            .collect::<Vec<_>>()
-            .join(", "),
     }
 }
 

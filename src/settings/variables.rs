@@ -1,6 +1,9 @@
 //! Names of environment variables: `LOOKDOWN__SERVER__LISTEN` is the key `server.listen`.
 
-use super::{SettingsError, declare::Entry, entries, values::unknown};
+use super::{
+    SettingsError,
+    entry::{Entry, unknown},
+};
 
 const PREFIX: &str = "LOOKDOWN__";
 /// The prefix of variables with a single underscore, which are not settings, such as
@@ -53,8 +56,10 @@ pub(super) fn key_of(name: &str, entries: &[Entry]) -> Result<Option<String>, Se
 
 /// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with
 /// the setting that each may have been meant for; `None` when there are none.
-pub fn ignored_variables(names: impl IntoIterator<Item = String>) -> Option<String> {
-    let entries = entries();
+pub(super) fn ignored(
+    names: impl IntoIterator<Item = String>,
+    entries: &[Entry],
+) -> Option<String> {
     let ignored = names.into_iter().filter(|name| {
         let upper = name.to_uppercase();
         upper.starts_with(NEARLY) && !upper.starts_with(PREFIX)

@@ -6,7 +6,7 @@ use strum::VariantNames;
 use crate::{
     annotated_image::ImageFormat,
     annotation_formats::AnnotationFormat,
-    api::{
+    api::http::{
         accept::Accepted,
         problem::{Problem, ProblemKind},
     },

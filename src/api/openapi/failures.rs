@@ -9,7 +9,7 @@ use utoipa::{
     },
 };
 
-use crate::api::problem::ProblemBody;
+use crate::api::http::problem::ProblemBody;
 
 /// The name of the response among the document's components.
 const NAME: &str = "Problem";

@@ -10,8 +10,7 @@ use axum::{
 };
 use bytes::Bytes;
 
-use super::names::unknown_parameter;
-use crate::api::problem::{Problem, ProblemKind};
+use crate::api::http::problem::{Problem, ProblemKind};
 
 /// Largest number of fields of a form: every parameter and the frame, with room for repeated
 /// fields, which have a better error message.
@@ -31,8 +30,6 @@ pub(in crate::api) enum FieldUse {
     Parameter,
     /// Not used and ignored.
     None,
-    /// Not allowed: the form is refused.
-    Refused,
 }
 
 /// The content of a form.
@@ -47,7 +44,7 @@ pub(super) struct Form {
 pub(super) async fn parse(
     parts: Parts,
     body: Bytes,
-    use_of: fn(&str) -> FieldUse,
+    use_of: fn(&str) -> Result<FieldUse, Problem>,
 ) -> Result<Form, Problem> {
     let mut request = Request::from_parts(parts, Body::from(body));
     // The body was limited when it was read.
@@ -66,7 +63,7 @@ pub(super) async fn parse(
             return Err(malformed(&detail));
         }
         let name = field.name().unwrap_or_default().to_owned();
-        match use_of(&name) {
+        match use_of(&name)? {
             FieldUse::Frame => {
                 file_name = field.file_name().and_then(name_of_file);
                 let bytes = field.bytes().await.map_err(broken)?;
@@ -79,7 +76,6 @@ pub(super) async fn parse(
                 parameters.push((name, value));
             }
             FieldUse::None => {}
-            FieldUse::Refused => return Err(unknown_parameter(&name)),
         }
     }
     Ok(Form {

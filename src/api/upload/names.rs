@@ -2,7 +2,7 @@
 
 use super::form::FieldUse;
 use crate::{
-    api::{parameters, problem::Problem},
+    api::{http::problem::Problem, parameters},
     pipeline::ParameterError,
 };
 
@@ -14,14 +14,14 @@ pub(super) fn is_parameter(name: &str) -> bool {
     parameters::all().any(|known| known.name == name)
 }
 
-/// Returns the use of a field of the form.
-pub(super) fn use_of(name: &str) -> FieldUse {
+/// Returns the use of a field of the form; other fields are refused.
+pub(super) fn use_of(name: &str) -> Result<FieldUse, Problem> {
     if FRAME_NAMES.contains(&name) {
-        FieldUse::Frame
+        Ok(FieldUse::Frame)
     } else if is_parameter(name) {
-        FieldUse::Parameter
+        Ok(FieldUse::Parameter)
     } else {
-        FieldUse::Refused
+        Err(unknown_parameter(name))
     }
 }
 

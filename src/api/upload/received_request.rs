@@ -9,13 +9,17 @@ use axum::{
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{
-    BodyReader,
-    budget::{Held, UploadBudget},
-};
 use crate::{
     access::Scope,
-    api::{ApiState, Phase, deadline::Deadline, problem::Problem},
+    api::{
+        ApiState,
+        http::{
+            deadline::Deadline,
+            problem::Problem,
+            request_body::{BodyReader, Held, UploadBudget},
+        },
+        readiness::Phase,
+    },
 };
 
 /// A complete detection request. As an extractor, it also checks the scope `detect`.

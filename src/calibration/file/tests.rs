@@ -9,7 +9,7 @@ fn read_text(name: &str, text: &str) -> Result<Calibration, CalibrationError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, text).unwrap();
-    read(&path)
+    Calibration::read(&path)
 }
 
 fn refusal(text: &str) -> String {

@@ -1,52 +1,6 @@
 //! Recognition of a file's format from its content alone.
 
-use strum::IntoStaticStr;
-
-use super::fields::Fields;
-
-/// A format that is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr)]
-#[expect(missing_docs, reason = "the formats' own names")]
-pub enum Format {
-    #[strum(serialize = "native")]
-    Native,
-    #[strum(serialize = "Kalibr camchain")]
-    Kalibr,
-    #[strum(serialize = "OpenCV FileStorage")]
-    OpenCv,
-    #[strum(serialize = "ROS camera_info")]
-    Ros,
-    #[strum(serialize = "OCamCalib")]
-    OCamCalib,
-    #[strum(serialize = "py-OCamCalib")]
-    PyOCamCalib,
-    #[strum(serialize = "MultiCol-SLAM")]
-    MultiCol,
-    #[strum(serialize = "COLMAP cameras.txt")]
-    Colmap,
-    #[strum(serialize = "camodocal")]
-    Camodocal,
-    #[strum(serialize = "Basalt")]
-    Basalt,
-    #[strum(serialize = "WoodScape")]
-    WoodScape,
-    #[strum(serialize = "NVIDIA f-theta")]
-    NvidiaFTheta,
-    #[strum(serialize = "MOIL")]
-    Moil,
-    #[strum(serialize = "fisheye-calib-adapter")]
-    FisheyeCalibAdapter,
-    #[strum(serialize = "camera-intrinsic-model")]
-    CameraIntrinsicModel,
-}
-
-impl Format {
-    /// Returns the name under which its users know it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-}
+use super::{Format, fields::Fields};
 
 /// The line-based format of a text, if it is in one.
 pub(super) fn recognise_lines(text: &str) -> Option<Format> {

@@ -1,10 +1,18 @@
 //! Tests of the recognition of data sets, and of operations on all kinds.
 
-use std::path::Path;
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use super::{
     test_support::{boxes, folder, open, refusal},
     *,
+};
+use crate::{
+    calibration::Calibration,
+    detection::BBox,
+    evaluation::{Outline, Scoring},
 };
 
 const CALIBRATION: &str = r#"{"id":"lobby","image":{"width":600,"height":600},

@@ -16,6 +16,11 @@ pub(super) trait Model {
     }
 }
 
+/// The default of a scale.
+pub(super) fn one() -> f64 {
+    1.0
+}
+
 /// Declares the struct of a model: its own parameters, and those of its image plane.
 ///
 /// The struct has the shape of the `lens` table of native calibration files. The word after the

@@ -19,8 +19,3 @@ lens_models! {
     fov::Fov,
     f_theta::FTheta,
 }
-
-/// The default of a scale.
-fn one() -> f64 {
-    1.0
-}

@@ -8,13 +8,8 @@
 use std::{array, ops::Range};
 
 use super::{
-    frame_from_plane::FrameFromPlane,
-    node_grid::{NODE_STEP, Nodes},
-    visibility::Visibility,
+    block_size::LANES, frame_from_plane::FrameFromPlane, node_grid::Nodes, visibility::Visibility,
 };
-
-/// Pixels rendered at once: from node to node.
-pub(super) const LANES: usize = NODE_STEP as usize;
 
 /// Vertical position of each row of pixels between two rows of nodes, 0 to 1.
 const DOWN: [f32; LANES] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875];

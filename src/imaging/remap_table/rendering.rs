@@ -1,6 +1,9 @@
 //! Rendering a band of a view, eight pixels at a time, whichever way these are sampled.
 
-use super::band::{Band, Block, LANES, Seen};
+use super::{
+    band::{Band, Block, Seen},
+    block_size::LANES,
+};
 use crate::imaging::{Frame, NetworkInput};
 
 /// Weights of right neighbours are whole fractions of this: with pixels of eight bits, a product

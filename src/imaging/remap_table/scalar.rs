@@ -1,7 +1,8 @@
 //! Sampling one pixel at a time, on every machine.
 
 use super::{
-    band::{Band, Block, LANES, Lanes, Seen},
+    band::{Band, Block, Lanes, Seen},
+    block_size::LANES,
     rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
 };
 

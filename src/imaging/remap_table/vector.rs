@@ -19,7 +19,8 @@ use std::{
 };
 
 use super::{
-    band::{Band, Block, LANES, Lanes, Seen},
+    band::{Band, Block, Lanes, Seen},
+    block_size::LANES,
     rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
 };
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::band::LANES;
+use super::block_size::LANES;
 use crate::geometry::{Lens, Pixel, VirtualView};
 
 /// In each row of a view one span of pixels, which meets a cone about the optical axis: what the

@@ -1,12 +1,10 @@
 //! Collection of the persons of a batch, candidate by candidate.
 
-use super::{
-    HeadOutput, ViewDetection,
-    score::{Floor, Score},
-};
+use super::score::{Floor, Score};
 use crate::{
     detection::{BBox, BBoxError, ViewPixels},
     imaging::NetworkInput,
+    inference::{HeadOutput, ViewDetection},
 };
 
 /// Collects persons and counts the dropped candidates.

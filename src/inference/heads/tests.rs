@@ -3,8 +3,8 @@
 mod known_models;
 mod refusals;
 
-use super::{Head, HeadOutput, InferenceError, TensorView, ViewDetection};
-use crate::{detection::BBox, imaging::NetworkInput};
+use super::{Head, HeadOutput, InferenceError, TensorView};
+use crate::{detection::BBox, imaging::NetworkInput, inference::ViewDetection};
 
 /// The head of a manifest's `[output]` table.
 fn head(manifest: &str) -> Head {

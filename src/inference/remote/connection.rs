@@ -11,7 +11,7 @@ use reqwest::{
 use url::Url;
 
 use super::RemoteOptions;
-use crate::open_inference::HEAD_LENGTH;
+use crate::open_inference::{HEAD_LENGTH, message::Message};
 
 /// Connect timeout.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -36,6 +36,16 @@ pub(super) struct Reply {
     /// Length of the JSON, if bytes follow it.
     pub(super) head_length: Option<usize>,
     pub(super) body: Vec<u8>,
+}
+
+impl Reply {
+    /// Returns the body as a message of the protocol.
+    pub(super) fn into_message(self) -> Message {
+        Message {
+            body: self.body.into(),
+            head_length: self.head_length,
+        }
+    }
 }
 
 impl Connection {

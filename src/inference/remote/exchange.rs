@@ -1,9 +1,15 @@
-//! Inference requests and responses in their wire format.
+//! Inference requests with views, and their responses.
 
-use serde::{Deserialize, Serialize};
+use serde::ser::Error;
 use serde_json::value::RawValue;
 
-use crate::open_inference::{Datatype, binary_data, json_data};
+use crate::open_inference::{
+    BINARY_OUTPUT, BINARY_SIZE, Datatype, TensorData, TensorValues,
+    bounded_json::{Entries, Table},
+    element_count,
+    message::{InferRequest, InferResponse, InputTensor, Message, RequestedOutput},
+    parameters::{Parameter, Parameters},
+};
 
 /// An inference request with views for a model.
 pub(super) struct Question<'a> {
@@ -29,125 +35,66 @@ pub(super) struct Output {
     pub(super) values: Vec<f32>,
 }
 
-#[derive(Serialize)]
-struct QuestionHead<'a> {
-    inputs: [InputHead<'a>; 1],
-    outputs: Vec<WantedHead<'a>>,
-}
-
-#[derive(Serialize)]
-struct InputHead<'a> {
-    name: &'a str,
-    shape: &'a [usize],
-    datatype: Datatype,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parameters: Option<BinarySize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    data: Option<&'a [f32]>,
-}
-
-#[derive(Serialize)]
-struct WantedHead<'a> {
-    name: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parameters: Option<Binary>,
-}
-
-#[derive(Serialize)]
-struct Binary {
-    binary_data: bool,
-}
-
-#[derive(Serialize)]
-struct BinarySize {
-    binary_data_size: usize,
-}
-
-#[derive(Deserialize)]
-struct AnswerHead<'a> {
-    #[serde(borrow)]
-    outputs: Vec<OutputHead<'a>>,
-}
-
-#[derive(Deserialize)]
-struct OutputHead<'a> {
-    name: String,
-    shape: Vec<usize>,
-    datatype: String,
-    #[serde(default)]
-    parameters: Option<OutputParameters>,
-    #[serde(borrow, default)]
-    data: Option<&'a RawValue>,
-}
-
-#[derive(Deserialize)]
-struct OutputParameters {
-    binary_data_size: Option<usize>,
-}
-
 impl Question<'_> {
-    /// The body of the request, and the length of its JSON if bytes follow.
-    pub(super) fn body(&self) -> serde_json::Result<(Vec<u8>, Option<usize>)> {
-        let wanted = self.outputs.iter().map(|name| WantedHead {
-            name,
-            parameters: self.as_bytes.then_some(Binary { binary_data: true }),
+    /// Returns the message of the request.
+    pub(super) fn message(&self) -> serde_json::Result<Message> {
+        let values = TensorValues::Floats(self.values);
+        let flag = self.as_bytes.then_some(Parameter::Flag(true));
+        let outputs = self.outputs.iter().map(|name| RequestedOutput {
+            name: name.clone(),
+            parameters: Parameters::only(BINARY_OUTPUT, flag.clone()),
         });
-        let head = QuestionHead {
-            inputs: [InputHead {
-                name: self.input,
-                shape: self.shape,
-                datatype: Datatype::Fp32,
-                parameters: self.as_bytes.then_some(BinarySize {
-                    binary_data_size: size_of_val(self.values),
-                }),
-                data: (!self.as_bytes).then_some(self.values),
-            }],
-            outputs: wanted.collect(),
+        let size = Parameter::Number(values.byte_count().to_string());
+        let sides = self.shape.iter().map(|&side| u32::try_from(side));
+        let input = InputTensor {
+            name: self.input.to_owned(),
+            shape: Entries(sides.collect::<Result<_, _>>().map_err(Error::custom)?),
+            datatype: values.datatype().to_string(),
+            parameters: Parameters::only(BINARY_SIZE, self.as_bytes.then_some(size)),
+            data: (!self.as_bytes).then_some(values),
         };
-        let mut body = serde_json::to_vec(&head)?;
-        if !self.as_bytes {
-            return Ok((body, None));
-        }
-        let length = body.len();
-        body.reserve_exact(size_of_val(self.values));
-        body.extend(self.values.iter().flat_map(|value| value.to_le_bytes()));
-        Ok((body, Some(length)))
+        let head = InferRequest {
+            id: None,
+            parameters: Parameters::default(),
+            inputs: Entries(vec![Table(input)]),
+            outputs: Some(Entries(outputs.map(Table).collect())),
+        };
+        let behind = [values];
+        Message::write(&head, if self.as_bytes { &behind } else { &[] })
     }
 }
 
 impl Answer {
-    /// Parses a response. `head_length` is the length of its JSON if bytes follow.
+    /// Parses a response.
     ///
     /// # Errors
     /// Description of the error.
-    pub(super) fn read(body: &[u8], head_length: Option<usize>) -> Result<Self, String> {
-        let (json, mut behind) = body
-            .split_at_checked(head_length.unwrap_or(body.len()))
+    pub(super) fn read(message: &Message) -> Result<Self, String> {
+        let (json, mut behind) = message
+            .split()
             .ok_or("its response is shorter than its declared length")?;
-        let head: AnswerHead = serde_json::from_slice(json)
+        let head: InferResponse<&RawValue> = serde_json::from_slice(&json)
             .map_err(|error| format!("its response cannot be read: {error}"))?;
         let mut outputs = Vec::new();
         for output in head.outputs {
+            let name = output.name;
+            let wrong = |wrong| format!("its output {name:?}: {wrong}");
             let size = output
                 .parameters
                 .and_then(|parameters| parameters.binary_data_size);
-            let bytes = behind.split_at_checked(size.unwrap_or(0));
-            let (bytes, rest) = bytes.ok_or("its response is shorter than its outputs declare")?;
-            behind = rest;
+            // Some servers send an empty list beside the bytes.
+            let data = output.data.filter(|_| size.is_none());
+            let data = TensorData::take(data, size, &mut behind);
             // Heads read only floats, but a model may have further outputs.
             if output.datatype != Datatype::Fp32.name() {
+                if size.is_some() {
+                    data.map_err(wrong)?;
+                }
                 continue;
             }
-            let mut sides = output.shape.iter();
-            let count = sides.try_fold(1_usize, |count, &side| count.checked_mul(side));
+            let count = element_count(output.shape.iter().copied());
             let count = count.ok_or("its response contains an impossible shape")?;
-            let values = match (output.data, size) {
-                (_, Some(_)) => binary_data::floats(bytes, count),
-                (Some(data), None) => json_data::numbers(data.get(), Datatype::Fp32, count),
-                (None, None) => Err("it has no data".to_owned()),
-            };
-            let name = output.name;
-            let values = values.map_err(|wrong| format!("its output {name:?}: {wrong}"))?;
+            let values = data.and_then(|data| data.floats(count)).map_err(wrong)?;
             outputs.push(Output {
                 name,
                 shape: output.shape,
@@ -160,11 +107,12 @@ impl Answer {
 
 #[cfg(test)]
 mod tests {
+    use bytes::Bytes;
     use serde_json::{Value, json};
 
     use super::*;
 
-    fn question(as_bytes: bool) -> (Vec<u8>, Option<usize>) {
+    fn question(as_bytes: bool) -> (Bytes, Option<usize>) {
         let question = Question {
             input: "images",
             shape: &[1, 3, 1, 1],
@@ -172,7 +120,15 @@ mod tests {
             outputs: &["boxes".to_owned()],
             as_bytes,
         };
-        question.body().unwrap()
+        let message = question.message().unwrap();
+        (message.body, message.head_length)
+    }
+
+    fn read(body: Vec<u8>, head_length: usize) -> Result<Answer, String> {
+        Answer::read(&Message {
+            body: body.into(),
+            head_length: Some(head_length),
+        })
     }
 
     #[test]
@@ -199,7 +155,8 @@ mod tests {
             written["outputs"][0]["parameters"],
             json!({ "binary_data": true })
         );
-        assert_eq!(binary_data::floats(behind, 3).unwrap(), [0.1, 1.0, -2.5]);
+        let sent = TensorData::Binary(Bytes::copy_from_slice(behind));
+        assert_eq!(sent.floats(3).unwrap(), [0.1, 1.0, -2.5]);
     }
 
     #[test]
@@ -212,7 +169,7 @@ mod tests {
         let head = head.to_string();
         let numbers = [f32::NAN.to_le_bytes(), 2.0_f32.to_le_bytes()].concat();
         let body = [head.as_bytes(), &[9; 8], &numbers].concat();
-        let answer = Answer::read(&body, Some(head.len())).unwrap();
+        let answer = read(body, head.len()).unwrap();
         let names: Vec<_> = answer
             .outputs
             .iter()
@@ -237,22 +194,18 @@ mod tests {
             (
                 output(size(9), json!(null)),
                 &[0; 8][..],
-                "shorter than its outputs",
+                "8 bytes are left",
             ),
             (output(size(4), json!(null)), &[0; 4], "needs 2"),
             (output(json!({}), json!([1])), &[], "needs 2"),
-            (output(json!(null), json!(null)), &[], "no data"),
+            (output(json!(null), json!(null)), &[], "neither data"),
             (json!({ "error": "no" }), &[], "cannot be read"),
         ] {
             let head = head.to_string();
             let body = [head.as_bytes(), behind].concat();
-            let message = Answer::read(&body, Some(head.len())).unwrap_err();
+            let message = read(body, head.len()).unwrap_err();
             assert!(message.contains(part), "{message}");
         }
-        assert!(
-            Answer::read(b"{}", Some(3))
-                .unwrap_err()
-                .contains("shorter")
-        );
+        assert!(read(b"{}".to_vec(), 3).unwrap_err().contains("shorter"));
     }
 }

@@ -8,14 +8,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bytes::Bytes;
-use url::Url;
-
 use super::{
     breaker::Breaker,
     connection::{Connection, Reply},
     exchange::{Answer, Question},
-    token::BearerToken,
+    options::RemoteOptions,
 };
 use crate::inference::InferenceError;
 
@@ -27,22 +24,6 @@ const RECENT: Duration = Duration::from_secs(2);
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 /// Most characters of the server's error message that are reported.
 const MAX_MESSAGE_CHARS: usize = 300;
-
-/// Settings of the inference server.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RemoteOptions {
-    /// The server's address, without `/v2`.
-    pub url: Url,
-    /// Token sent with every request, if any.
-    pub token: Option<BearerToken>,
-    /// Name on the server of the model whose readiness represents the server's.
-    pub model: String,
-    /// Manifest name of the model that is called `model` on the server. Other names are the same in
-    /// both.
-    pub called: String,
-    /// Timeout of one inference request.
-    pub patience: Duration,
-}
 
 /// Numbers of inference requests by result since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -159,16 +140,18 @@ impl RemoteServer {
                 "it failed repeatedly, so no requests are sent until it is ready".to_owned(),
             ));
         }
-        let (body, head_length) = question
-            .body()
+        let message = question
+            .message()
             .map_err(|error| InferenceError::Run(error.to_string()))?;
         let path = ["v2", "models", model, "infer"];
         self.in_flight.fetch_add(1, Ordering::Relaxed);
-        let reply = self.connection.post(&path, &Bytes::from(body), head_length);
+        let reply = self
+            .connection
+            .post(&path, &message.body, message.head_length);
         self.in_flight.fetch_sub(1, Ordering::Relaxed);
         let wait = |reply: &Reply| reply.retry_after.unwrap_or(RETRY_AFTER);
         let answer = reply.and_then(|reply| match reply.status {
-            200 => Answer::read(&reply.body, reply.head_length).map(Ok),
+            200 => Answer::read(&reply.into_message()).map(Ok),
             429 => Ok(Err(wait(&reply))),
             503 if self.ready().is_ok() => Ok(Err(wait(&reply))),
             _ => Err(refusal(&reply)),

@@ -10,7 +10,10 @@ use crate::{
         onnx::{FLOAT, Metadata, float_shapes},
         signature::Signature,
     },
-    open_inference::{BINARY_EXTENSION, Datatype},
+    open_inference::{
+        BINARY_EXTENSION, Datatype,
+        metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
+    },
     revision::revision_of,
 };
 
@@ -29,29 +32,6 @@ pub(super) struct RemoteModel {
     pub(super) as_bytes: bool,
 }
 
-#[derive(Deserialize)]
-struct ServerMetadata {
-    #[serde(default)]
-    extensions: Vec<String>,
-}
-
-#[derive(Deserialize)]
-struct ModelMetadata {
-    #[serde(default)]
-    versions: Option<Vec<String>>,
-    #[serde(default)]
-    inputs: Option<Vec<TensorMetadata>>,
-    #[serde(default)]
-    outputs: Option<Vec<TensorMetadata>>,
-}
-
-#[derive(Deserialize)]
-struct TensorMetadata {
-    name: String,
-    datatype: String,
-    shape: Vec<i64>,
-}
-
 impl RemoteModel {
     /// Fetches the metadata and checks it against the manifest.
     pub(super) fn ask(
@@ -65,19 +45,19 @@ impl RemoteModel {
         };
         let metadata: ServerMetadata = fetch(server, &["v2"])?;
         let model: ModelMetadata = fetch(server, &["v2", "models", &name_there])?;
-        let (Some(inputs), Some(outputs)) = (&model.inputs, &model.outputs) else {
+        if model.inputs.is_empty() || model.outputs.is_empty() {
             return Err(unusable(
                 "its metadata lacks inputs and outputs: declare them on the server".to_owned(),
             ));
-        };
-        let (inputs, outputs) = (tensors(inputs), tensors(outputs));
+        }
+        let (inputs, outputs) = (tensors(&model.inputs), tensors(&model.outputs));
         let signature = Signature::of(&inputs, &manifest.input, &Metadata::default());
         let signature = signature.map_err(unusable)?;
         let shapes: Vec<_> = float_shapes(&outputs).collect();
         let size = (signature.width, signature.height);
         manifest.output.check(&shapes, size).map_err(unusable)?;
         let (scale, offset) = manifest.input.normalisation().map_err(unusable)?;
-        let versions = model.versions.as_deref().unwrap_or_default();
+        let versions = &model.versions;
         let (input, output) = (&manifest.input, &manifest.output);
         let used = format!("{name_there} {versions:?} {inputs:?} {outputs:?} {input:?} {output:?}");
         Ok(Self {

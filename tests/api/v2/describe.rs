@@ -11,6 +11,7 @@ use crate::service::{Bounds, Service};
 async fn the_server_and_its_models_describe_themselves() {
     let service = Service::start();
     let server = service.get("/v2").await.json();
+    assert_eq!(service.get("/v2/").await.json(), server);
     assert_eq!(server["name"], "lookdown");
     assert_eq!(
         server["extensions"],

@@ -20,7 +20,7 @@ lens_parameters! {
         #[serde(skip_serializing_if = "Option::is_none")]
         pub pixel_to_angle: Option<[f64; 6]>,
         /// Stretch of the columns.
-        #[serde(default = "super::one")]
+        #[serde(default = "crate::geometry::lens::model::one")]
         pub c: f64,
         /// Shift of the column per unit of `y`.
         #[serde(default)]

@@ -21,7 +21,7 @@ lens_parameters! {
         /// The direct polynomial, `a0 … an`; `a0` is negative.
         pub polynomial: Vec<f64>,
         /// Stretch of the rows.
-        #[serde(default = "super::one")]
+        #[serde(default = "crate::geometry::lens::model::one")]
         pub c: f64,
         /// Shift of the row per unit of `x`.
         #[serde(default)]

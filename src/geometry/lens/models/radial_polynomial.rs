@@ -12,7 +12,7 @@ lens_parameters! {
         /// `c0 … cn`; `c0` is 0.
         pub coefficients: Vec<f64>,
         /// The height of a pixel's step over its width.
-        #[serde(default = "super::one")]
+        #[serde(default = "crate::geometry::lens::model::one")]
         pub aspect: f64,
     }
 }

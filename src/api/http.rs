@@ -1,0 +1,21 @@
+//! HTTP infrastructure: problem documents, deadlines, request bodies, conditional requests and the
+//! layers around every route. No file here depends on a route or a protocol.
+
+pub(super) mod accept;
+pub(super) mod access;
+pub(super) mod connection_limit;
+pub(super) mod cors;
+pub(super) mod csrf;
+pub(super) mod deadline;
+pub(super) mod drain_body;
+pub(super) mod entity_tags;
+pub(super) mod envelope;
+pub(super) mod header_limits;
+pub(super) mod host;
+pub(super) mod incoming_trace;
+pub(super) mod page_headers;
+pub(super) mod problem;
+pub(super) mod query;
+pub(super) mod rate_limit;
+pub(super) mod request_body;
+pub(super) mod request_id;

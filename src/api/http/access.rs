@@ -1,0 +1,126 @@
+//! Authorization. With API keys, a request needs a key with the required scope. Without keys, every
+//! client may detect and read, and only clients on the same machine may make changes.
+
+use std::sync::Arc;
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header::AUTHORIZATION};
+
+use super::problem::{Problem, ProblemKind};
+use crate::access::{AccessKeys, Holder, Scope};
+
+/// The header that holds a key alone.
+pub(in crate::api) const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
+const BEARER: &[u8] = b"bearer ";
+
+/// The access rules of the server.
+#[derive(Debug, Clone)]
+pub enum Access {
+    /// The server has no keys.
+    Open {
+        /// `true` if only clients on the same machine reach the server. They may then make changes.
+        own_machine_only: bool,
+    },
+    /// Every request needs a key.
+    Keys(Arc<AccessKeys>),
+}
+
+impl Access {
+    /// Checks that the keys allow `wanted` to the request with these headers.
+    pub(in crate::api) fn check(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
+        self.check_with(headers, None, wanted)
+    }
+
+    /// Like [`Self::check`], for a request whose key may be in a form.
+    pub(in crate::api) fn check_with(
+        &self,
+        headers: &HeaderMap,
+        in_form: Option<&str>,
+        wanted: Scope,
+    ) -> Result<(), Problem> {
+        let Self::Keys(keys) = self else {
+            return Ok(());
+        };
+        let key = only_key(shown_keys(headers).chain(in_form.map(str::as_bytes)))?;
+        let holder = keys.holder_of(key).ok_or_else(|| {
+            let detail = "the key is not valid: it was mistyped, or the server's operator \
+                          has removed it";
+            Problem::new(ProblemKind::KeyRequired, detail)
+        })?;
+        if holder.scopes.allow(wanted) {
+            return Ok(());
+        }
+        let detail = format!(
+            "the key {} has the scope {}: this needs a key with the scope {wanted}",
+            holder.name,
+            holder.scopes.joined(" and "),
+        );
+        Err(Problem::new(ProblemKind::Forbidden, detail))
+    }
+
+    /// Returns `true` if every request needs a key.
+    pub(in crate::api) fn needs_keys(&self) -> bool {
+        matches!(self, Self::Keys(_))
+    }
+
+    /// Returns the holder of the request's key, if the key is valid.
+    pub(in crate::api) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
+        match self {
+            Self::Open { .. } => None,
+            Self::Keys(keys) => keys.holder_of(only_key(shown_keys(headers)).ok()?),
+        }
+    }
+
+    /// Like [`Self::check`]. Without keys, only a server that no other machine can reach allows the
+    /// request.
+    pub(in crate::api) fn check_of_its_own(
+        &self,
+        headers: &HeaderMap,
+        wanted: Scope,
+    ) -> Result<(), Problem> {
+        match self {
+            Self::Open {
+                own_machine_only: false,
+            } => {
+                let detail = "without keys (access.keys_file), models and calibrations are \
+                              changed on the server's own machine only: this server listens on \
+                              others, too (server.listen)";
+                Err(Problem::new(ProblemKind::Forbidden, detail))
+            }
+            _ => self.check(headers, wanted),
+        }
+    }
+}
+
+/// Returns `true` if these headers hold any key, valid or not.
+pub(in crate::api) fn shows_key(headers: &HeaderMap) -> bool {
+    shown_keys(headers).next().is_some()
+}
+
+/// Returns the keys in the headers. Other schemes of `Authorization` are ignored: they may be meant
+/// for a proxy.
+fn shown_keys(headers: &HeaderMap) -> impl Iterator<Item = &[u8]> {
+    let bearers = headers.get_all(AUTHORIZATION).iter().filter_map(|value| {
+        let (scheme, key) = value.as_bytes().split_at_checked(BEARER.len())?;
+        scheme
+            .eq_ignore_ascii_case(BEARER)
+            .then(|| key.trim_ascii())
+    });
+    let plain = headers.get_all(API_KEY).iter();
+    bearers.chain(plain.map(HeaderValue::as_bytes))
+}
+
+/// Returns the single key of a request.
+fn only_key<'a>(mut keys: impl Iterator<Item = &'a [u8]>) -> Result<&'a [u8], Problem> {
+    match (keys.next(), keys.next()) {
+        (Some(key), None) => Ok(key),
+        (None, _) => Err(Problem::new(
+            ProblemKind::KeyRequired,
+            "the request needs a key: send it as Authorization: Bearer KEY or as X-API-Key: KEY",
+        )),
+        (Some(_), Some(_)) => Err(Problem::new(
+            ProblemKind::KeyRequired,
+            "more than one key was sent: send one, as Authorization: Bearer KEY or as X-API-Key: \
+             KEY",
+        )),
+    }
+}

@@ -1,0 +1,82 @@
+//! Entity tags and conditional requests (RFC 9110, sections 8.8.3 and 13.1.2).
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header::IF_NONE_MATCH};
+
+use super::problem::{Problem, ProblemKind};
+
+/// The entity tags that a header lists.
+pub(in crate::api) enum Named {
+    Any,
+    Tags(Vec<String>),
+}
+
+/// Returns the entity tag of an opaque value.
+pub(in crate::api) fn entity_tag(value: &str) -> HeaderValue {
+    // Revisions and report IDs are digits.
+    HeaderValue::from_str(&format!("\"{value}\"")).unwrap_or(HeaderValue::from_static("\"\""))
+}
+
+/// Returns `true` if `If-None-Match` lists this value: the client has the current version.
+pub(in crate::api) fn is_unmodified(headers: &HeaderMap, value: &str) -> Result<bool, Problem> {
+    Ok(match named(headers, &IF_NONE_MATCH, true)? {
+        None => false,
+        Some(Named::Any) => true,
+        Some(Named::Tags(tags)) => tags.iter().any(|tag| tag == value),
+    })
+}
+
+/// Parses the entity tags of a header. Weak tags match nothing unless `weak` allows them. Empty
+/// list elements are ignored (RFC 9110, section 5.6.1.2). A header without any tag is an error.
+pub(in crate::api) fn named(
+    headers: &HeaderMap,
+    header: &HeaderName,
+    weak: bool,
+) -> Result<Option<Named>, Problem> {
+    if !headers.contains_key(header) {
+        return Ok(None);
+    }
+    let mut tags = Vec::new();
+    let mut any = false;
+    let mut is_empty = true;
+    for value in headers.get_all(header) {
+        // A comma may be part of a tag.
+        let mut in_tag = false;
+        let is_between = |byte: &u8| {
+            in_tag ^= *byte == b'"';
+            *byte == b',' && !in_tag
+        };
+        let elements = value.as_bytes().split(is_between);
+        for element in elements.filter(|element| !element.trim_ascii().is_empty()) {
+            is_empty = false;
+            let tag = std::str::from_utf8(element).map_or("", str::trim);
+            let (is_weak, opaque) = match tag.strip_prefix("W/") {
+                Some(opaque) => (true, opaque),
+                None => (false, tag),
+            };
+            let inner = opaque
+                .strip_prefix('"')
+                .and_then(|opaque| opaque.strip_suffix('"'));
+            match inner {
+                Some(inner) if weak || !is_weak => tags.push(inner.to_owned()),
+                // A weak tag does not promise equal bytes.
+                Some(_) => {}
+                None if tag == "*" => any = true,
+                None => return Err(no_entity_tag(header, tag)),
+            }
+        }
+    }
+    if is_empty {
+        return Err(no_entity_tag(header, ""));
+    }
+    Ok(Some(if any { Named::Any } else { Named::Tags(tags) }))
+}
+
+fn no_entity_tag(header: &HeaderName, text: &str) -> Problem {
+    let detail = format!(
+        "{header}: {text:?} is not an entity tag: repeat the ETag of a response with its quotes, or send *"
+    );
+    Problem::new(ProblemKind::MalformedRequest, detail)
+}
+
+#[cfg(test)]
+mod tests;

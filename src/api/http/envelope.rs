@@ -1,0 +1,211 @@
+//! The layer around every request: request ID, log line, metrics and problem documents.
+
+use std::{any::Any, sync::Arc, time::Instant};
+
+use axum::{
+    Json,
+    extract::{MatchedPath, Request, State},
+    http::{HeaderValue, Method, StatusCode, header},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+use tracing::Instrument;
+use uuid::Uuid;
+
+use super::{
+    incoming_trace, page_headers,
+    problem::Problem,
+    request_id::{self, RequestId},
+};
+use crate::{
+    metrics::Metrics,
+    telemetry::{RequestTrace, Tracer},
+};
+
+/// The route label of requests that match no route.
+const UNMATCHED: &str = "unmatched";
+/// The log target of the access log, for `log.filter`.
+const ACCESS_LOG: &str = "lookdown::access";
+
+/// The state of this layer: metrics and traces.
+#[derive(Clone)]
+pub(in crate::api) struct Surroundings {
+    pub(in crate::api) metrics: Arc<Metrics>,
+    pub(in crate::api) tracer: Tracer,
+}
+
+/// The problem of a failed request, for the log.
+struct Failure {
+    /// The name of its kind.
+    reason: &'static str,
+    /// The ID of the occurrence: the `instance` of the problem document.
+    occurrence: Uuid,
+}
+
+/// Returns the response to a request whose handler panicked.
+pub(in crate::api) fn of_panic(_: Box<dyn Any + Send>) -> Response {
+    Problem::fault().into_response()
+}
+
+/// Adds the request ID, the access log line, the metrics and the problem document.
+pub(in crate::api) async fn wrap(
+    State(Surroundings { metrics, tracer }): State<Surroundings>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let started = Instant::now();
+    let request_id = RequestId::of(request.headers());
+    let method = method_label(request.method());
+    let path = request.uri().path().to_owned();
+    let route = request.extensions().get::<MatchedPath>().cloned();
+    let route = route.as_ref().map_or(UNMATCHED, MatchedPath::as_str);
+    request.extensions_mut().insert(request_id.clone());
+    let trace = incoming_trace::begin(&tracer, || format!("{method} {route}"), request.headers());
+    request.extensions_mut().insert(trace.clone());
+
+    // The span has the highest level, so no filter removes the request ID from a line.
+    let span = tracing::error_span!(
+        "request",
+        request_id = request_id.as_str(),
+        trace_id = trace.id().map(tracing::field::display),
+        method,
+        route
+    );
+    let mut response = next.run(request).instrument(span.clone()).await;
+    let _in_request = span.enter();
+    let mut failure = None;
+    if let Some(problem) = Problem::take_from(&mut response, method, &path) {
+        let (reason, occurrence) = (problem.kind().name(), Uuid::now_v7());
+        failure = Some(Failure { reason, occurrence });
+        metrics.failures.with_label_values(&[reason]).inc();
+        if let Some(cause) = problem.cause() {
+            tracing::error!(instance = %occurrence, "{cause:#}");
+        }
+        response = write_problem(response, problem, &occurrence, &request_id);
+    }
+    let status = response.status();
+    let class = status_class(status);
+    metrics
+        .http_requests
+        .with_label_values(&[route, method, class])
+        .inc();
+    let elapsed = started.elapsed().as_secs_f64();
+    metrics
+        .http_request_duration
+        .with_label_values(&[route, method])
+        .observe(elapsed);
+    log_answer(status, elapsed, failure.as_ref());
+    trace.note("http.request.method", method);
+    trace.note("http.route", route.to_owned());
+    trace.note("http.response.status_code", i64::from(status.as_u16()));
+    trace.note("url.path", path);
+    trace.note("lookdown.request_id", request_id.as_str().to_owned());
+    end(&trace, status, failure.map(|failure| failure.reason));
+    let headers = response.headers_mut();
+    headers.insert(request_id::HEADER, request_id.header_value());
+    page_headers::complete(headers);
+    response
+}
+
+/// Writes the access log line: level info for server errors, otherwise debug.
+fn log_answer(status: StatusCode, seconds: f64, failure: Option<&Failure>) {
+    let code = status.as_u16();
+    let reason = failure.map(|failure| failure.reason);
+    let instance = failure.map(|failure| tracing::field::display(failure.occurrence));
+    if status.is_server_error() {
+        tracing::info!(target: ACCESS_LOG, status = code, seconds, reason, instance, "answered");
+    } else {
+        tracing::debug!(target: ACCESS_LOG, status = code, seconds, reason, instance, "answered");
+    }
+}
+
+/// Ends the span of the request. Only server errors set its error status.
+fn end(trace: &RequestTrace, status: StatusCode, reason: Option<&'static str>) {
+    if let Some(reason) = reason {
+        trace.note("error.type", reason);
+    }
+    let fault = reason.filter(|_| status.is_server_error());
+    trace.end(fault);
+}
+
+/// Writes the problem as the body and keeps the headers of the response (`Allow`, `Retry-After` …).
+fn write_problem(
+    response: Response,
+    problem: Problem,
+    occurrence: &Uuid,
+    request_id: &RequestId,
+) -> Response {
+    let status = problem.status();
+    let body = Json(problem.body(occurrence, request_id.as_str())).into_response();
+    let (mut parts, _) = response.into_parts();
+    parts.status = status;
+    parts.headers.remove(header::CONTENT_LENGTH);
+    let problem_json = HeaderValue::from_static("application/problem+json");
+    parts.headers.insert(header::CONTENT_TYPE, problem_json);
+    Response::from_parts(parts, body.into_body())
+}
+
+/// Returns a metric label from a fixed list: clients can send arbitrary methods.
+fn method_label(method: &Method) -> &'static str {
+    match *method {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::PUT => "PUT",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
+        Method::PATCH => "PATCH",
+        _ => "other",
+    }
+}
+
+fn status_class(status: StatusCode) -> &'static str {
+    match status.as_u16() / 100 {
+        2 => "2xx",
+        3 => "3xx",
+        4 => "4xx",
+        5 => "5xx",
+        _ => "1xx",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::{Router, body::Body, middleware::from_fn_with_state, routing::get};
+    use http_body_util::BodyExt;
+    use tower::ServiceExt;
+    use tower_http::catch_panic::CatchPanicLayer;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_panicking_handler_costs_one_request_and_reveals_nothing() {
+        async fn panics() -> &'static str {
+            panic!("the secret cause")
+        }
+        let metrics = Arc::new(Metrics::new().unwrap());
+        let surroundings = Surroundings {
+            metrics: Arc::clone(&metrics),
+            tracer: Tracer::default(),
+        };
+        let router = Router::new()
+            .route("/panics", get(panics))
+            .route("/works", get(async || "fine"))
+            .layer(CatchPanicLayer::custom(of_panic))
+            .layer(from_fn_with_state(surroundings, wrap));
+
+        let get = |path| Request::get(path).body(Body::empty()).unwrap();
+        let response = router.clone().oneshot(get("/panics")).await.unwrap();
+        assert_eq!(response.status(), StatusCode::INTERNAL_SERVER_ERROR);
+        let media_type = &response.headers()[header::CONTENT_TYPE];
+        assert_eq!(media_type, "application/problem+json");
+        let body = response.into_body().collect().await.unwrap().to_bytes();
+        let body = String::from_utf8_lossy(&body);
+        assert!(body.contains("/problems/internal"), "{body}");
+        assert!(!body.contains("secret"), "{body}");
+        assert_eq!(metrics.failures.with_label_values(&["internal"]).get(), 1);
+
+        let response = router.oneshot(get("/works")).await.unwrap();
+        assert_eq!(response.status(), StatusCode::OK);
+    }
+}

@@ -1,0 +1,235 @@
+//! Failures as problem documents (RFC 9457).
+//!
+//! A handler returns a [`Problem`]. The [envelope](super::envelope) writes it with a request ID and
+//! an ID of the occurrence, logs its cause and counts it. The [table](kind) declares the kinds.
+
+mod calibration;
+mod kind;
+mod pipeline;
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use axum::{
+    http::{
+        HeaderValue, StatusCode,
+        header::{RETRY_AFTER, WWW_AUTHENTICATE},
+    },
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+pub(in crate::api) use kind::ProblemKind;
+
+/// The longest `Retry-After`.
+const MAX_RETRY_AFTER_SECONDS: u64 = 60;
+
+/// The reason why a request failed.
+#[derive(Debug, Clone)]
+pub(in crate::api) struct Problem {
+    kind: ProblemKind,
+    status: StatusCode,
+    detail: String,
+    /// The parameter or form field at fault.
+    parameter: Option<String>,
+    /// A better `Retry-After` than that of the kind.
+    retry_after: Option<Duration>,
+    /// Members that a protocol adds to the document.
+    members: BTreeMap<&'static str, Value>,
+    /// The internal error: logged, never sent.
+    cause: Option<Arc<anyhow::Error>>,
+}
+
+impl Problem {
+    /// Creates a problem with a detail of one sentence.
+    pub(in crate::api) fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        Self {
+            kind,
+            status: kind.status(),
+            detail: detail.into(),
+            parameter: None,
+            retry_after: None,
+            members: BTreeMap::new(),
+            cause: None,
+        }
+    }
+
+    /// Creates a problem of one parameter or form field: the detail is `parameter: fault`.
+    pub(in crate::api) fn of_parameter(kind: ProblemKind, parameter: &str, fault: &str) -> Self {
+        Self::new(kind, format!("{parameter}: {fault}")).with_parameter(parameter)
+    }
+
+    /// An internal error; only the log has its cause.
+    pub(in crate::api) fn internal(cause: impl Into<anyhow::Error>) -> Self {
+        Self {
+            cause: Some(Arc::new(cause.into())),
+            ..Self::fault()
+        }
+    }
+
+    /// An internal error that was logged where it occurred.
+    pub(in crate::api) fn fault() -> Self {
+        Self::new(
+            ProblemKind::Internal,
+            "the server failed to process the request: its log has the reason under this request_id",
+        )
+    }
+
+    /// The models are not ready yet.
+    pub(in crate::api) fn warming_up() -> Self {
+        Self::new(
+            ProblemKind::WarmingUp,
+            "the server is warming up: retry in a second",
+        )
+    }
+
+    /// The server is shutting down.
+    pub(in crate::api) fn shutting_down() -> Self {
+        let detail = "the server is shutting down: send the request to another one";
+        Self::new(ProblemKind::ShuttingDown, detail)
+    }
+
+    /// Returns the problem of a failed response: the one that the handler returned, or one for a
+    /// failure of the framework.
+    pub(in crate::api) fn take_from(
+        response: &mut Response,
+        method: &str,
+        path: &str,
+    ) -> Option<Self> {
+        if let Some(problem) = response.extensions_mut().remove::<Self>() {
+            return Some(problem);
+        }
+        match response.status() {
+            StatusCode::NOT_FOUND => Some(Self::new(
+                ProblemKind::NotFound,
+                format!("there is no resource at {path}: GET /docs lists all paths"),
+            )),
+            StatusCode::METHOD_NOT_ALLOWED => Some(Self::new(
+                ProblemKind::MethodNotAllowed,
+                format!("{path} does not support {method}: use a method of the header Allow"),
+            )),
+            status if status.is_client_error() => Some(Self::new(
+                ProblemKind::MalformedRequest,
+                "the request is malformed: compare it with GET /docs",
+            )),
+            status if status.is_server_error() => Some(Self::fault()),
+            _ => None,
+        }
+    }
+
+    /// Sets the least time before a retry.
+    pub(in crate::api) fn with_retry_after(self, retry_after: Duration) -> Self {
+        Self {
+            retry_after: Some(retry_after),
+            ..self
+        }
+    }
+
+    /// Sets the parameter or form field at fault.
+    pub(in crate::api) fn with_parameter(self, parameter: impl Into<String>) -> Self {
+        Self {
+            parameter: Some(parameter.into()),
+            ..self
+        }
+    }
+
+    /// Sets another status than that of the kind.
+    pub(in crate::api) fn with_status(self, status: StatusCode) -> Self {
+        Self { status, ..self }
+    }
+
+    /// Adds a member to the document.
+    pub(in crate::api) fn with_member(
+        mut self,
+        name: &'static str,
+        value: impl Into<Value>,
+    ) -> Self {
+        self.members.insert(name, value.into());
+        self
+    }
+
+    pub(in crate::api) fn kind(&self) -> ProblemKind {
+        self.kind
+    }
+
+    pub(in crate::api) fn status(&self) -> StatusCode {
+        self.status
+    }
+
+    pub(in crate::api) fn cause(&self) -> Option<&anyhow::Error> {
+        self.cause.as_deref()
+    }
+
+    /// The document that the client gets.
+    pub(in crate::api) fn body(self, occurrence: &Uuid, request_id: &str) -> ProblemBody {
+        ProblemBody {
+            r#type: self.kind.path(),
+            title: self.kind.title(),
+            status: self.status.as_u16(),
+            error: self.detail.clone(),
+            detail: self.detail,
+            instance: occurrence.urn().to_string(),
+            request_id: request_id.to_owned(),
+            parameter: self.parameter,
+            members: self.members,
+        }
+    }
+}
+
+/// Status and headers; the envelope writes the body.
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let mut response = self.status.into_response();
+        if let Some(least) = self.kind.retry_after_seconds() {
+            let wanted = self.retry_after.map_or(0, |after| after.as_secs() + 1);
+            let seconds = HeaderValue::from(wanted.clamp(least, MAX_RETRY_AFTER_SECONDS));
+            response.headers_mut().insert(RETRY_AFTER, seconds);
+        }
+        if self.kind == ProblemKind::KeyRequired {
+            let scheme = HeaderValue::from_static("Bearer");
+            response.headers_mut().insert(WWW_AUTHENTICATE, scheme);
+        }
+        response.extensions_mut().insert(self);
+        response
+    }
+}
+
+/// The reason why a request failed (RFC 9457).
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Problem, example = json!({
+    "type": "/problems/invalid-parameter",
+    "title": "Invalid parameter",
+    "status": 422,
+    "detail": "score_threshold: 1.5 is outside 0 to 1",
+    "instance": "urn:uuid:0197a3c5-8f0e-7c3e-9a55-2f8e4b1d6c71",
+    "error": "score_threshold: 1.5 is outside 0 to 1",
+    "parameter": "score_threshold",
+    "request_id": "0197a3c5-8f0e-7c3e-9a55-2f8e4b1d6c70"
+}))]
+pub(in crate::api) struct ProblemBody {
+    /// Identifies the kind of problem: the path of its documentation on this server. Stable.
+    #[schema(format = "uri-reference")]
+    r#type: String,
+    /// The kind of problem in words.
+    title: &'static str,
+    /// The HTTP status.
+    status: u16,
+    /// The fault of this request and its remedy, as one sentence.
+    detail: String,
+    /// Identifies this occurrence, also in the server's log.
+    #[schema(format = "uri")]
+    instance: String,
+    /// The same as `detail`, for clients that expect it here.
+    error: String,
+    /// Identifies the request: the client's own `X-Request-Id`, or a generated one.
+    request_id: String,
+    /// The parameter, form field or field of the calibration at fault; absent where none is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    parameter: Option<String>,
+    #[serde(flatten)]
+    #[schema(ignore)]
+    members: BTreeMap<&'static str, Value>,
+}

@@ -1,0 +1,114 @@
+//! The DeepStack API, for clients such as Home Assistant and Blue Iris. Requests and responses
+//! follow DeepStack's server (Go, `server/server.go`) and its clients `deepstack-python` and
+//! `deepstack-sdk`.
+
+mod answer;
+mod failures;
+mod form;
+
+use axum::{
+    Extension, Json,
+    extract::{Path, State},
+};
+
+use self::{
+    answer::{DeepStackAnswer, DeepStackModels},
+    form::{DeepStackForm, DeepStackUpload},
+};
+use crate::{
+    api::{
+        ApiState,
+        http::{
+            problem::{Problem, ProblemKind},
+            request_id::RequestId,
+        },
+        require_scope::RequireRead,
+        run_detection::run_detection,
+    },
+    calibration::CalibrationId,
+    telemetry::RequestTrace,
+};
+
+pub(in crate::api) use failures::with_failures;
+
+/// Detect persons (DeepStack)
+///
+/// Without a calibration, the lens circle is detected in the frame. An ideal 180° equidistant lens
+/// that points straight down is assumed. Unknown fields are ignored.
+#[utoipa::path(
+    post, path = "/v1/vision/detection", tag = "deepstack", operation_id = "detect_as_deepstack",
+    request_body(content = DeepStackForm, content_type = "multipart/form-data"),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The persons found, possibly none.", body = DeepStackAnswer),
+    )
+)]
+pub(in crate::api) async fn detect_as_deepstack(
+    State(state): State<ApiState>,
+    Extension(request_id): Extension<RequestId>,
+    Extension(trace): Extension<RequestTrace>,
+    upload: DeepStackUpload,
+) -> Result<Json<DeepStackAnswer>, Problem> {
+    answer(&state, &trace, upload, None, &request_id).await
+}
+
+/// Detect persons with a calibration (DeepStack)
+///
+/// The calibration ID replaces the name of DeepStack's custom model.
+#[utoipa::path(
+    post, path = "/v1/vision/custom/{calibration}", tag = "deepstack",
+    operation_id = "detect_as_deepstack_with",
+    params(("calibration" = String, Path, description = "The calibration's ID.")),
+    request_body(content = DeepStackForm, content_type = "multipart/form-data"),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The persons found, possibly none.", body = DeepStackAnswer),
+    )
+)]
+pub(in crate::api) async fn detect_as_deepstack_with(
+    State(state): State<ApiState>,
+    Path(calibration): Path<String>,
+    Extension(request_id): Extension<RequestId>,
+    Extension(trace): Extension<RequestTrace>,
+    upload: DeepStackUpload,
+) -> Result<Json<DeepStackAnswer>, Problem> {
+    // A name that is not a valid ID is reported as an unknown model.
+    let calibration: CalibrationId = calibration
+        .parse()
+        .map_err(|error| Problem::new(ProblemKind::UnknownCalibration, format!("{error}")))?;
+    answer(&state, &trace, upload, Some(calibration), &request_id).await
+}
+
+async fn answer(
+    state: &ApiState,
+    trace: &RequestTrace,
+    DeepStackUpload(upload): DeepStackUpload,
+    calibration: Option<CalibrationId>,
+    request_id: &RequestId,
+) -> Result<Json<DeepStackAnswer>, Problem> {
+    let limit = upload.deadline;
+    trace.stage("upload", limit.began().into_std(), upload.arrived);
+    let job = form::job(upload, calibration, request_id)?;
+    let written = run_detection(state, trace, limit, job, |found| {
+        Ok(DeepStackAnswer::from(found.report))
+    });
+    let (_, answer) = written.await?;
+    Ok(Json(answer))
+}
+
+/// List calibrations (DeepStack)
+///
+/// The original DeepStack has no such route. Its successors have it, and Blue Iris calls it.
+#[utoipa::path(
+    post, path = "/v1/vision/custom/list", tag = "deepstack", operation_id = "list_as_deepstack",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "The IDs of the calibrations in use.", body = DeepStackModels),
+    )
+)]
+pub(in crate::api) async fn list_as_deepstack(
+    State(state): State<ApiState>,
+    _reader: RequireRead,
+) -> Json<DeepStackModels> {
+    Json(state.calibrations.rows().into_iter().collect())
+}

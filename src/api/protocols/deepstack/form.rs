@@ -1,0 +1,132 @@
+//! The form that DeepStack's clients send: the frame in `image`, `min_confidence` and `api_key`.
+
+use axum::extract::{FromRequest, Request};
+use utoipa::ToSchema;
+
+use crate::{
+    access::Scope,
+    api::{
+        ApiState,
+        http::{
+            access,
+            problem::{Problem, ProblemKind},
+            request_id::RequestId,
+        },
+        upload::{FieldUse, Upload, is_multipart},
+    },
+    calibration::CalibrationId,
+    pipeline::{DetectJob, DetectParameters, ParameterError},
+};
+
+const MIN_CONFIDENCE: &str = "min_confidence";
+const API_KEY: &str = "api_key";
+/// The default of DeepStack's server.
+const DEFAULT_MIN_CONFIDENCE: &str = "0.4";
+/// The name of `min_confidence` in this API.
+const SCORE_THRESHOLD: &str = "score_threshold";
+
+/// A frame in DeepStack's form.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "documents the form that is parsed below")]
+pub(in crate::api) struct DeepStackForm {
+    /// The frame: a JPEG, PNG or WebP file.
+    #[schema(value_type = String, format = Binary, content_media_type = "application/octet-stream")]
+    image: Vec<u8>,
+    /// Least confidence; persons with a lower one are omitted.
+    #[schema(nullable = false, minimum = 0, maximum = 1, default = 0.4)]
+    min_confidence: Option<f64>,
+    /// An API key with the scope `detect`, for clients that cannot send it in a header. Empty for
+    /// none.
+    #[schema(nullable = false)]
+    api_key: Option<String>,
+}
+
+/// A frame in DeepStack's form, whose key has been checked.
+pub(in crate::api) struct DeepStackUpload(pub(super) Upload);
+
+impl FromRequest<ApiState> for DeepStackUpload {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let known = &state.options.access;
+        let headers = request.headers();
+        let is_form = is_multipart(headers);
+        // A key in a header is checked before the body is read. Other keys are in the form. That
+        // form is read within a small memory budget of its own, so clients without a key cannot use
+        // up the memory of the others.
+        let mut budget = &state.uploads;
+        if !is_form || access::shows_key(headers) {
+            known.check(headers, Scope::Detect)?;
+        } else if known.needs_keys() {
+            budget = &state.unauthenticated_uploads;
+        }
+        if !is_form {
+            return Err(no_form());
+        }
+        let mut upload = Upload::receive(request, state, budget, use_of).await?;
+        let mut keys = upload
+            .parameters
+            .extract_if(.., |(name, _)| name == API_KEY);
+        // Clients without a key send an empty field.
+        let key = keys.next().filter(|(_, key)| !key.is_empty());
+        if keys.next().is_some() {
+            return Err(ParameterError::repeated(API_KEY).into());
+        }
+        drop(keys);
+        let key = key.as_ref().map(|(_, key)| key.as_str());
+        known.check_with(&upload.headers, key, Scope::Detect)?;
+        Ok(Self(upload))
+    }
+}
+
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "other forms refuse unknown fields"
+)]
+fn use_of(name: &str) -> Result<FieldUse, Problem> {
+    Ok(match name {
+        "image" => FieldUse::Frame,
+        MIN_CONFIDENCE | API_KEY => FieldUse::Parameter,
+        // DeepStack ignores unknown fields, and its clients rely on that.
+        _ => FieldUse::None,
+    })
+}
+
+fn no_form() -> Problem {
+    let fault = "send the frame in a form (multipart/form-data), as in curl -F \
+                 image=@frame.jpg";
+    Problem::of_parameter(ProblemKind::MissingImage, "image", fault)
+}
+
+/// Returns the detection job of this form.
+pub(super) fn job(
+    upload: Upload,
+    calibration: Option<CalibrationId>,
+    request_id: &RequestId,
+) -> Result<DetectJob, Problem> {
+    // All remaining fields have this name.
+    let thresholds = upload
+        .parameters
+        .iter()
+        .filter(|(_, value)| !value.is_empty());
+    let mut thresholds: Vec<_> = thresholds
+        .map(|(_, value)| (SCORE_THRESHOLD, value.as_str()))
+        .collect();
+    if thresholds.is_empty() {
+        thresholds.push((SCORE_THRESHOLD, DEFAULT_MIN_CONFIDENCE));
+    }
+    let parameters = DetectParameters::parse(thresholds).map_err(renamed)?;
+    let parameters = DetectParameters {
+        calibration,
+        ..parameters
+    };
+    Ok(upload.job(parameters, request_id))
+}
+
+/// Replaces the parameter name in an error by the name that the client sent.
+fn renamed(error: ParameterError) -> ParameterError {
+    ParameterError {
+        name: MIN_CONFIDENCE.to_owned(),
+        ..error
+    }
+}

@@ -1,0 +1,20 @@
+//! The Open Inference Protocol (KServe V2) over HTTP, with tensors as JSON or as bytes after it
+//! (the extension `binary_tensor_data`). Source: the repository `open-inference-protocol`, and the
+//! extensions as Triton Inference Server describes them.
+//!
+//! The model `lookdown` accepts a frame and returns its persons. Each loaded detector accepts views
+//! and returns its detections.
+
+mod answer;
+pub(in crate::api) mod describe;
+mod detector;
+mod document;
+pub(in crate::api) mod infer;
+mod infer_parameters;
+mod own_metadata;
+mod persons;
+pub(in crate::api) mod repository;
+mod request;
+mod requested_model;
+mod tensor;
+mod wanted;

@@ -1,0 +1,118 @@
+//! Inference responses: JSON with the tensors inside or as bytes after it.
+
+use axum::{
+    http::{HeaderName, HeaderValue, header::CONTENT_TYPE},
+    response::{AppendHeaders, IntoResponse, Response},
+};
+use bytes::Bytes;
+
+use super::wanted::Wanted;
+use crate::{
+    api::http::problem::Problem,
+    open_inference::{
+        HEAD_LENGTH, TensorValues,
+        message::{InferResponse, Message, OutputParameters, OutputTensor},
+    },
+};
+
+/// An inference response.
+pub(super) struct InferAnswer {
+    message: Message,
+    /// The headers about a report.
+    pub(super) report_headers: Vec<(HeaderName, HeaderValue)>,
+}
+
+/// An output tensor.
+pub(super) struct Output {
+    pub(super) name: &'static str,
+    pub(super) shape: Vec<usize>,
+    pub(super) values: OutputValues,
+}
+
+/// The values of an output, row-major.
+pub(super) enum OutputValues {
+    Floats(Vec<f32>),
+    Integers(Vec<i32>),
+    /// The single element of a `BYTES` tensor.
+    Text(Bytes),
+}
+
+/// The model that responds.
+pub(super) struct Answerer<'a> {
+    pub(super) model: &'a str,
+    pub(super) version: &'a str,
+    pub(super) id: Option<&'a str>,
+}
+
+impl OutputValues {
+    fn as_tensor(&self) -> Result<TensorValues<'_>, Problem> {
+        Ok(match self {
+            Self::Floats(values) => TensorValues::Floats(values),
+            Self::Integers(values) => TensorValues::Integers(values),
+            Self::Text(text) => {
+                TensorValues::Text([str::from_utf8(text).map_err(Problem::internal)?])
+            }
+        })
+    }
+}
+
+impl InferAnswer {
+    /// Writes the requested outputs.
+    pub(super) fn write(
+        answerer: &Answerer<'_>,
+        outputs: &[Output],
+        wanted: &Wanted,
+    ) -> Result<Self, Problem> {
+        let mut behind = Vec::new();
+        let mut written = Vec::with_capacity(outputs.len());
+        for output in outputs {
+            let Some(binary) = wanted.how(output.name) else {
+                continue;
+            };
+            let values = output.values.as_tensor()?;
+            if binary {
+                behind.push(values);
+            }
+            written.push(OutputTensor {
+                name: output.name.to_owned(),
+                datatype: values.datatype().to_string(),
+                shape: output.shape.clone(),
+                parameters: binary.then(|| OutputParameters {
+                    binary_data_size: Some(values.byte_count()),
+                }),
+                data: (!binary).then_some(values),
+            });
+        }
+        let response = InferResponse {
+            model_name: answerer.model.to_owned(),
+            model_version: Some(answerer.version.to_owned()),
+            id: answerer.id.map(ToOwned::to_owned),
+            outputs: written,
+        };
+        let message = Message::write(&response, &behind).map_err(Problem::internal)?;
+        Ok(Self {
+            message,
+            report_headers: Vec::new(),
+        })
+    }
+}
+
+impl IntoResponse for InferAnswer {
+    fn into_response(self) -> Response {
+        let Message { body, head_length } = self.message;
+        let media_type = match head_length {
+            Some(_) => "application/octet-stream",
+            None => "application/json",
+        };
+        let mut response = (AppendHeaders(self.report_headers), body).into_response();
+        let headers = response.headers_mut();
+        headers.insert(CONTENT_TYPE, HeaderValue::from_static(media_type));
+        if let Some(length) = head_length {
+            headers.insert(
+                HeaderName::from_static(HEAD_LENGTH),
+                HeaderValue::from(length),
+            );
+        }
+        response
+    }
+}

@@ -1,0 +1,137 @@
+//! Metadata and health checks of the server and its models.
+
+use axum::{Json, extract::State};
+
+use super::{
+    own_metadata::{EXTENSIONS, NAME},
+    requested_model::{ModelAddress, RequestedModel},
+};
+use crate::{
+    api::{ApiState, http::problem::Problem, require_scope::RequireDetect},
+    open_inference::metadata::{
+        ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady,
+    },
+};
+
+/// Get server metadata
+#[utoipa::path(
+    get, path = "/v2", tag = "operation", operation_id = "get_server_metadata",
+    responses((status = OK, description = "The name, version and extensions of the server.", body = ServerMetadata))
+)]
+pub(in crate::api) async fn server() -> Json<ServerMetadata> {
+    Json(ServerMetadata {
+        name: NAME.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        extensions: EXTENSIONS.map(ToOwned::to_owned).into(),
+    })
+}
+
+/// Check liveness (Open Inference Protocol)
+///
+/// Equivalent to `/livez`.
+#[utoipa::path(
+    get, path = "/v2/health/live", tag = "operation", operation_id = "get_server_liveness",
+    responses((status = OK, description = "The process is alive.", body = ServerLive))
+)]
+pub(in crate::api) async fn live() -> Json<ServerLive> {
+    Json(ServerLive { live: true })
+}
+
+/// Check readiness (Open Inference Protocol)
+///
+/// Equivalent to `/readyz`.
+#[utoipa::path(
+    get, path = "/v2/health/ready", tag = "operation", operation_id = "get_server_readiness",
+    responses(
+        (status = OK, description = "The server accepts frames.", body = ServerReady),
+    )
+)]
+pub(in crate::api) async fn ready(
+    State(state): State<ApiState>,
+) -> Result<Json<ServerReady>, Problem> {
+    state.require_ready()?;
+    Ok(Json(ServerReady { ready: true }))
+}
+
+/// Get model metadata
+///
+/// `lookdown` accepts a frame and returns persons; the detectors accept views.
+#[utoipa::path(
+    get, path = "/v2/models/{name}", tag = "inference", operation_id = "get_model",
+    params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The inputs and outputs of the model.", body = ModelMetadata),
+    )
+)]
+pub(in crate::api) async fn model(
+    State(state): State<ApiState>,
+    _finder: RequireDetect,
+    address: ModelAddress,
+) -> Result<Json<ModelMetadata>, Problem> {
+    Ok(Json(RequestedModel::find(&state, &address)?.metadata()))
+}
+
+/// Get metadata of a model version
+#[utoipa::path(
+    get, path = "/v2/models/{name}/versions/{version}", tag = "inference",
+    operation_id = "get_model_version",
+    params(
+        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
+        ("version" = String, Path, description = "The version in the metadata of the model."),
+    ),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The inputs and outputs of the model.", body = ModelMetadata),
+    )
+)]
+pub(in crate::api) async fn model_version(
+    state: State<ApiState>,
+    scope: RequireDetect,
+    address: ModelAddress,
+) -> Result<Json<ModelMetadata>, Problem> {
+    model(state, scope, address).await
+}
+
+/// Check the readiness of a model
+#[utoipa::path(
+    get, path = "/v2/models/{name}/ready", tag = "inference", operation_id = "get_model_readiness",
+    params(("name" = String, Path, description = "`lookdown`, or the name of a detector.")),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "It can.", body = ModelReady),
+    )
+)]
+pub(in crate::api) async fn model_ready(
+    State(state): State<ApiState>,
+    _finder: RequireDetect,
+    address: ModelAddress,
+) -> Result<Json<ModelReady>, Problem> {
+    RequestedModel::find(&state, &address)?;
+    state.require_ready()?;
+    Ok(Json(ModelReady {
+        name: address.name,
+        ready: true,
+    }))
+}
+
+/// Check readiness of a model version
+#[utoipa::path(
+    get, path = "/v2/models/{name}/versions/{version}/ready", tag = "inference",
+    operation_id = "get_model_version_readiness",
+    params(
+        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
+        ("version" = String, Path, description = "The version in the metadata of the model."),
+    ),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "It can.", body = ModelReady),
+    )
+)]
+pub(in crate::api) async fn model_version_ready(
+    state: State<ApiState>,
+    scope: RequireDetect,
+    address: ModelAddress,
+) -> Result<Json<ModelReady>, Problem> {
+    model_ready(state, scope, address).await
+}

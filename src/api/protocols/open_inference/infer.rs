@@ -1,0 +1,101 @@
+//! Inference requests.
+
+use axum::{Extension, extract::State, response::IntoResponse};
+
+use super::{
+    detector,
+    document::{InferRequestBody, InferResponseBody},
+    persons,
+    request::InferRequest,
+    requested_model::{ModelAddress, RequestedModel},
+};
+use crate::{
+    api::{
+        ApiState,
+        http::{problem::Problem, request_id::RequestId},
+        openapi::RawBytes,
+        upload::ReceivedRequest,
+    },
+    telemetry::RequestTrace,
+};
+
+/// Run inference
+///
+/// `lookdown` accepts `image` (`BYTES`, `[1]`): an encoded frame, base64 in JSON, or unchanged
+/// bytes after it. It returns `boxes` (`[persons, 4]`), `scores`, `oriented_boxes` (`[persons,
+/// 5]`), `views` and `report`. The parameters of `/detect` are parameters of the request. A
+/// detector accepts `views` (`FP32` or `UINT8`, `[views, 3, height, width]`, pixels 0 to 255) and
+/// returns `boxes` (`[views, candidates, 4]`) and `scores` (`[views, candidates]`), padded with
+/// zeros.
+#[utoipa::path(
+    post, path = "/v2/models/{name}/infer", tag = "inference", operation_id = "infer_with_model",
+    params(
+        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
+        ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
+         description = "The length of the JSON, if tensors follow it as bytes."),
+    ),
+    request_body(
+        description = "JSON, or JSON followed by the bytes of tensors.",
+        content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
+    ),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The outputs.",
+         content((InferResponseBody = "application/json"), ("application/octet-stream"))),
+    )
+)]
+pub(in crate::api) async fn infer(
+    State(state): State<ApiState>,
+    Extension(request_id): Extension<RequestId>,
+    Extension(trace): Extension<RequestTrace>,
+    address: ModelAddress,
+    arrival: ReceivedRequest,
+) -> Result<impl IntoResponse, Problem> {
+    let model = RequestedModel::find(&state, &address)?;
+    trace.stage(
+        "upload",
+        arrival.deadline.began().into_std(),
+        arrival.arrived,
+    );
+    let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
+    let budget = state.uploads.clone();
+    let read = move || InferRequest::read(&headers, &body, &budget);
+    let read = arrival.deadline.blocking(read).await?;
+    let times = (arrival.deadline, arrival.received_at, arrival.arrived);
+    match model {
+        RequestedModel::Frames => persons::infer(&state, &request_id, &trace, read, times).await,
+        RequestedModel::Views(model) => detector::infer(&state, &trace, model, read, times).await,
+    }
+}
+
+/// Run inference with a model version
+///
+/// Equivalent to the route without a version.
+#[utoipa::path(
+    post, path = "/v2/models/{name}/versions/{version}/infer", tag = "inference",
+    operation_id = "infer_with_model_version",
+    params(
+        ("name" = String, Path, description = "`lookdown`, or the name of a detector."),
+        ("version" = String, Path, description = "The version in the metadata of the model."),
+        ("Inference-Header-Content-Length" = Option<u32>, Header, nullable = false,
+         description = "The length of the JSON, if tensors follow it as bytes."),
+    ),
+    request_body(
+        description = "JSON, or JSON followed by the bytes of tensors.",
+        content((InferRequestBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))
+    ),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The outputs.",
+         content((InferResponseBody = "application/json"), ("application/octet-stream"))),
+    )
+)]
+pub(in crate::api) async fn infer_version(
+    state: State<ApiState>,
+    request_id: Extension<RequestId>,
+    trace: Extension<RequestTrace>,
+    address: ModelAddress,
+    arrival: ReceivedRequest,
+) -> Result<impl IntoResponse, Problem> {
+    infer(state, request_id, trace, address, arrival).await
+}

@@ -1,0 +1,73 @@
+//! Extractors that prove a scope: the only handlers without one are health checks, metrics and
+//! documentation.
+
+use std::marker::PhantomData;
+
+use axum::{
+    extract::FromRequestParts,
+    http::{HeaderMap, request::Parts},
+};
+
+use super::{ApiState, http::problem::Problem};
+use crate::access::Scope;
+
+/// Proof that the request has the scope of `S`.
+pub(super) struct RequireScope<S>(PhantomData<S>);
+
+/// Proof that the request may detect persons.
+pub(super) type RequireDetect = RequireScope<Detect>;
+/// Proof that the request may read calibrations and reports.
+pub(super) type RequireRead = RequireScope<Read>;
+/// Proof that the request may list models, which reveals file names of the server's machine.
+pub(super) type RequireModelRead = RequireScope<ModelRead>;
+/// Proof that the request may change the models and the calibrations of the server.
+pub(super) type RequireAdmin = RequireScope<Admin>;
+
+/// A required scope.
+pub(super) trait RequiredScope {
+    /// The scope of the key.
+    const SCOPE: Scope;
+    /// `true` if a server without keys allows the request on its own machine only.
+    const OWN_MACHINE_ONLY: bool;
+}
+
+/// Declares the required scopes: a name, its [`Scope`] and `OWN_MACHINE_ONLY`.
+macro_rules! required_scopes {
+    ($($name:ident = $scope:ident, $own_machine_only:literal;)+) => {$(
+        #[doc = concat!("The marker of [`Require", stringify!($name), "`].")]
+        pub(super) struct $name;
+
+        impl RequiredScope for $name {
+            const SCOPE: Scope = Scope::$scope;
+            const OWN_MACHINE_ONLY: bool = $own_machine_only;
+        }
+    )+};
+}
+
+required_scopes! {
+    Detect = Detect, false;
+    Read = Read, false;
+    ModelRead = Read, true;
+    Admin = Admin, true;
+}
+
+impl<S: RequiredScope> RequireScope<S> {
+    /// Checks the scope. A running request repeats the check, as its key may have been removed.
+    pub(super) fn check(state: &ApiState, headers: &HeaderMap) -> Result<Self, Problem> {
+        let access = &state.options.access;
+        if S::OWN_MACHINE_ONLY {
+            access.check_of_its_own(headers, S::SCOPE)?;
+        } else {
+            access.check(headers, S::SCOPE)?;
+        }
+        Ok(Self(PhantomData))
+    }
+}
+
+impl<S: RequiredScope> FromRequestParts<ApiState> for RequireScope<S> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &ApiState) -> Result<Self, Problem> {
+        Self::check(state, &parts.headers)
+    }
+}

@@ -1,0 +1,87 @@
+//! `POST /detect`: detects the persons in one frame.
+
+use axum::{
+    Extension,
+    extract::State,
+    http::{HeaderValue, header::CONTENT_TYPE},
+    response::{AppendHeaders, IntoResponse},
+};
+
+use crate::{
+    api::{
+        ApiState,
+        answer::AnswerOptions,
+        http::{problem::Problem, query::pairs, request_id::RequestId},
+        openapi::{DetectForm, DetectQuery, RawBytes},
+        report::Report,
+        report_headers::report_headers,
+        run_detection::{DetectionOutcome, run_detection},
+        upload::Upload,
+    },
+    pipeline::{DetectJob, DetectParameters},
+    telemetry::RequestTrace,
+};
+
+/// Detect persons
+///
+/// Send the frame as the form field `img` with parameters as further fields, or as the body with
+/// parameters in the query. JPEG, PNG and WebP are accepted, whatever the content type. Without
+/// `calibration`, the lens circle is detected in the frame, and an ideal 180° equidistant lens that
+/// points straight down is assumed.
+///
+/// The response is the report as JSON. `format` or `Accept` selects the annotated image or a file
+/// for annotation tools instead.
+#[utoipa::path(
+    post, path = "/detect", tag = "detection", operation_id = "detect_persons",
+    params(DetectQuery),
+    request_body(
+        description = "The frame: a form, or the file alone (JPEG, PNG or WebP, with any other content type).",
+        content(
+            (DetectForm = "multipart/form-data"),
+            (inline(RawBytes) = "application/octet-stream"),
+        )
+    ),
+    security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
+    responses(
+        (status = OK, description = "The persons found, possibly none.",
+         content(
+            (Report = "application/json"),
+            ("image/jpeg"), ("image/png"),
+            (Object = "application/geo+json"), (Object = "application/x.coco+json"),
+            (String = "application/xml"), (String = "text/plain"),
+         ),
+         headers(
+            ("X-Person-Count" = u64, description = "The number of detected persons."),
+            ("X-Request-Id" = String, description = "The ID of the request, or a generated one."),
+            ("Server-Timing" = String, description = "The stages, milliseconds."),
+            ("X-Queue-Time" = f64, description = "Time that views waited for the model, milliseconds."),
+            ("X-Inference-Time" = f64, description = "Time that the model ran, milliseconds."),
+            ("X-Total-Time" = f64, description = "Time from the arrival of the frame to its report, milliseconds."),
+         )),
+    )
+)]
+pub(in crate::api) async fn detect_persons(
+    State(state): State<ApiState>,
+    Extension(request_id): Extension<RequestId>,
+    Extension(trace): Extension<RequestTrace>,
+    upload: Upload,
+) -> Result<impl IntoResponse, Problem> {
+    let deadline = upload.deadline;
+    trace.stage("upload", deadline.began().into_std(), upload.arrived);
+    let (job, answer) = job(upload, &request_id)?;
+    let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
+    let (report, content) = run_detection(&state, &trace, deadline, job, write).await?;
+    let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
+    Ok((
+        AppendHeaders(report_headers(&report)),
+        media_type,
+        content.bytes,
+    ))
+}
+
+fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {
+    let parameters = &mut upload.parameters;
+    let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
+    let parameters = DetectParameters::parse(pairs(parameters))?;
+    Ok((upload.job(parameters, request_id), answer))
+}

@@ -1,0 +1,95 @@
+//! Streams of reports: server-sent events (HTML Living Standard, section 9.2).
+
+use std::{convert::Infallible, sync::Arc};
+
+use axum::{
+    body::Body,
+    extract::State,
+    http::{
+        HeaderMap, HeaderName,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
+    },
+    response::{IntoResponse, Response},
+};
+use futures_util::stream::unfold;
+
+use super::{NO_CACHE, address::CameraAddress, feed::Feed};
+use crate::{
+    api::{ApiState, http::problem::Problem, require_scope::RequireRead},
+    results::Cameras,
+};
+
+pub(in crate::api) const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
+/// Disables the response buffering of nginx and compatible proxies.
+const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
+
+/// Stream the reports of a camera
+///
+/// Server-sent events: the latest report at once, then each new report with its ID. A client that
+/// reconnects with `Last-Event-ID`, as browsers do automatically, first receives the missed reports
+/// that are still stored.
+#[utoipa::path(
+    get, path = "/results/{camera}/events", tag = "results", operation_id = "listen_to_camera",
+    params(
+        ("camera" = String, Path, description = "The name of the camera; it need not have a report yet."),
+        ("Last-Event-ID" = Option<String>, Header, nullable = false,
+            description = "The ID of the last report that the client received."),
+    ),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "An unlimited stream; the data of each event is a report.",
+         body = String, content_type = "text/event-stream"),
+    )
+)]
+pub(in crate::api) async fn of_camera(
+    State(state): State<ApiState>,
+    _reader: RequireRead,
+    CameraAddress(camera): CameraAddress,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    stream(state, Cameras::One(camera), headers).await
+}
+
+/// Stream all reports
+///
+/// Server-sent events: the latest report of each camera, then every new report.
+#[utoipa::path(
+    get, path = "/events", tag = "results", operation_id = "listen_to_all",
+    params(
+        ("Last-Event-ID" = Option<String>, Header, nullable = false,
+            description = "The ID of the last report that the client received."),
+    ),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "An unlimited stream; the data of each event is a report.",
+         body = String, content_type = "text/event-stream"),
+    )
+)]
+pub(in crate::api) async fn of_all(
+    State(state): State<ApiState>,
+    _reader: RequireRead,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    stream(state, Cameras::All, headers).await
+}
+
+async fn stream(
+    state: ApiState,
+    cameras: Cameras,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let last_heard = headers.get(LAST_EVENT_ID);
+    // An invalid ID does not come from this server and is ignored.
+    let last_heard = last_heard.and_then(|id| id.to_str().ok()?.parse().ok());
+    let feed = Feed::begin(Arc::clone(&state.results), cameras, last_heard).await?;
+    let listener = (feed, state, headers);
+    let events = unfold(listener, async |(mut feed, state, headers)| {
+        let event = feed.next().await?;
+        // A stream must not outlive its key.
+        RequireRead::check(&state, &headers).ok()?;
+        Some((Ok::<_, Infallible>(event), (feed, state, headers)))
+    });
+    let headers = [(CONTENT_TYPE, "text/event-stream"), (ACCEL_BUFFERING, "no")];
+    let cache = [(CACHE_CONTROL, NO_CACHE)];
+    Ok((headers, cache, Body::from_stream(events)).into_response())
+}

@@ -1,0 +1,103 @@
+//! The event source of a subscriber: missed reports, then new ones, with keep-alive comments in
+//! between.
+
+use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc, time::Duration};
+
+use bytes::{BufMut, Bytes, BytesMut};
+use tokio::time::{sleep, timeout};
+
+use crate::{
+    api::http::problem::Problem,
+    results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
+};
+
+/// Interval without a report after which a keep-alive comment is sent. Proxies close silent
+/// connections, and the comment detects clients that have disconnected.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+const SIGN_OF_LIFE: Bytes = Bytes::from_static(b": nothing new\n\n");
+/// Pause before a retry when the result store does not respond.
+const PAUSE: Duration = Duration::from_secs(1);
+/// Largest number of missed reports per read.
+const PAGE: usize = 32;
+
+/// The position of a subscriber in the reports.
+pub(super) struct Feed {
+    results: Arc<dyn ResultStore>,
+    cameras: Cameras,
+    listening: Listening,
+    /// The last report that was sent.
+    last: ReportId,
+    /// Reports from before the subscription, to be sent first.
+    missed: VecDeque<Arc<StoredReport>>,
+    /// `true` if the store may have more missed reports.
+    behind: bool,
+}
+
+impl Feed {
+    /// Continues after the last received report, or begins with the latest one of each camera.
+    ///
+    /// # Errors
+    /// [`Problem`] when there are too many subscribers, or the result store does not respond.
+    pub(super) async fn begin(
+        results: Arc<dyn ResultStore>,
+        cameras: Cameras,
+        last_heard: Option<ReportId>,
+    ) -> Result<Self, Problem> {
+        // Subscribes before the first read, so no report is missed in between.
+        let listening = results.listeners().listen(cameras.clone())?;
+        let latest = match &cameras {
+            Cameras::All => results.latest_of_all().await?,
+            Cameras::One(camera) => results.latest(camera).await?.into_iter().collect(),
+        };
+        let newest = latest.last().map(|report| report.id).unwrap_or_default();
+        // An ID later than all reports is from another server: no report here follows it.
+        let last_heard = last_heard.filter(|id| *id <= newest);
+        Ok(Self {
+            results,
+            cameras,
+            listening,
+            last: last_heard.unwrap_or(newest),
+            behind: last_heard.is_some(),
+            missed: match last_heard {
+                None => latest.into(),
+                Some(_) => VecDeque::new(),
+            },
+        })
+    }
+
+    /// Returns the next event or comment; `None` at the end of the stream.
+    pub(super) async fn next(&mut self) -> Option<Bytes> {
+        loop {
+            if let Some(missed) = self.missed.pop_front() {
+                return Some(self.event(&missed));
+            }
+            if self.behind {
+                let page = NonZeroUsize::new(PAGE).unwrap_or(NonZeroUsize::MIN);
+                let missed = self.results.since(&self.cameras, self.last, page).await;
+                let Ok(missed) = missed else {
+                    sleep(PAUSE).await;
+                    return Some(SIGN_OF_LIFE);
+                };
+                self.behind = !missed.is_empty();
+                self.missed = missed.into();
+                continue;
+            }
+            match timeout(KEEP_ALIVE, self.listening.next()).await {
+                Err(_) => return Some(SIGN_OF_LIFE),
+                Ok(None) => return None,
+                Ok(Some(report)) if report.id > self.last => return Some(self.event(&report)),
+                // The report was already sent with the missed ones.
+                Ok(Some(_)) => {}
+            }
+        }
+    }
+
+    fn event(&mut self, stored: &StoredReport) -> Bytes {
+        self.last = stored.id;
+        let mut text = BytesMut::with_capacity(stored.report.json.len() + 64);
+        text.put_slice(format!("id: {}\ndata: ", stored.id).as_bytes());
+        text.put_slice(&stored.report.json);
+        text.put_slice(b"\n\n");
+        text.freeze()
+    }
+}

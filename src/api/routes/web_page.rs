@@ -1,0 +1,147 @@
+//! The web page at `/`: the files of the folder `web` and the samples, inside the executable. It
+//! loads nothing from other hosts and uses the public API.
+
+use std::sync::LazyLock;
+
+use axum::{
+    Router,
+    extract::Path,
+    http::{
+        HeaderMap, HeaderValue, StatusCode, Uri,
+        header::{CACHE_CONTROL, CONTENT_TYPE, ETAG},
+    },
+    middleware::map_response,
+    response::{IntoResponse, Response},
+    routing::get,
+};
+
+use crate::{
+    api::{
+        ApiState,
+        http::{
+            entity_tags::{entity_tag, is_unmodified},
+            page_headers,
+            problem::{Problem, ProblemKind},
+        },
+    },
+    revision::revision_of,
+};
+
+/// A file of the page.
+struct Asset {
+    name: &'static str,
+    media_type: &'static str,
+    content: &'static [u8],
+    /// The revision; it changes with the content.
+    revision: String,
+}
+
+const PAGE: &str = "index.html";
+
+macro_rules! assets {
+    ($($name:literal from $folder:literal),* $(,)?) => {
+        vec![$(Asset::new(
+            $name,
+            include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/", $folder, "/", $name)),
+        )),*]
+    };
+}
+
+/// All files of the page. A test checks that none is missing.
+static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
+    assets![
+        "index.html" from "web",
+        "style.css" from "web",
+        "panels.css" from "web",
+        "icon.svg" from "web",
+        "main.js" from "web",
+        "dom.js" from "web",
+        "server.js" from "web",
+        "shared.js" from "web",
+        "key.js" from "web",
+        "progress.js" from "web",
+        "frame.js" from "web",
+        "parameters.js" from "web",
+        "detect.js" from "web",
+        "marks.js" from "web",
+        "findings.js" from "web",
+        "geometry.js" from "web",
+        "views.js" from "web",
+        "straighten.js" from "web",
+        "live.js" from "web",
+        "plot.js" from "web",
+        "floor.js" from "web",
+        "lens.js" from "web",
+        "calibrate.js" from "web",
+        "circle_handles.js" from "web",
+        "office.jpg" from "samples",
+        "canteen.jpg" from "samples",
+        "lounge.jpg" from "samples",
+    ]
+});
+
+impl Asset {
+    fn new(name: &'static str, content: &'static [u8]) -> Self {
+        Self {
+            name,
+            media_type: match name.rsplit_once('.') {
+                Some((_, "html")) => "text/html; charset=utf-8",
+                Some((_, "css")) => "text/css; charset=utf-8",
+                Some((_, "js")) => "text/javascript; charset=utf-8",
+                Some((_, "svg")) => "image/svg+xml",
+                _ => "image/jpeg",
+            },
+            content,
+            revision: revision_of(content),
+        }
+    }
+}
+
+/// Returns the routes of the page and its files.
+pub(in crate::api) fn router() -> Router<ApiState> {
+    let page = async |headers: HeaderMap| answer(PAGE, &headers, "/");
+    let asset = async |Path(name): Path<String>, uri: Uri, headers: HeaderMap| {
+        answer(&name, &headers, uri.path())
+    };
+    Router::new()
+        .route("/", get(page))
+        .route("/assets/{name}", get(asset))
+        .route_layer(map_response(page_headers::of_web_page))
+}
+
+fn answer(name: &str, headers: &HeaderMap, path: &str) -> Result<Response, Problem> {
+    let asset = ASSETS.iter().find(|asset| asset.name == name);
+    let asset = asset.ok_or_else(|| {
+        Problem::new(
+            ProblemKind::NotFound,
+            format!("there is no resource at {path}"),
+        )
+    })?;
+    // Browsers may cache the file but must revalidate it: after an update of the server, old and
+    // new scripts must not mix.
+    let kept = [
+        (ETAG, entity_tag(&asset.revision)),
+        (CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+    ];
+    if is_unmodified(headers, &asset.revision)? {
+        return Ok((StatusCode::NOT_MODIFIED, kept).into_response());
+    }
+    Ok((kept, [(CONTENT_TYPE, asset.media_type)], asset.content).into_response())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn every_file_of_the_folder_is_served() {
+        for file in fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/web")).unwrap() {
+            let name = file.unwrap().file_name().into_string().unwrap();
+            let is_served = ASSETS.iter().any(|asset| asset.name == name);
+            // This file tells Node the module type for tests and is not served.
+            assert_eq!(is_served, name != "package.json", "{name}");
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The content of a calibration file: cameras that are not checked yet.
+
+use super::{Format, FormatError};
+use crate::{
+    calibration::native::{NativeImage, NativeMask, NativeMount, NativeZone},
+    geometry::lens::LensModel,
+    warning::Warning,
+};
+
+/// The content of a calibration file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationFile {
+    /// The format that was recognised.
+    pub format: Format,
+    /// Its cameras, in the file's order; at least one.
+    pub cameras: Vec<FileCamera>,
+}
+
+/// One camera of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileCamera {
+    /// Its name in the file, where it has one.
+    pub name: Option<String>,
+    /// The camera; one that cannot be used does not spoil the others.
+    pub camera: Result<Camera, FormatError>,
+}
+
+/// A camera as written in a file, not checked yet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// The size of the frames it was calibrated with; some formats have none.
+    pub image: Option<NativeImage>,
+    /// The lens.
+    pub lens: LensModel,
+    /// Its mount; only native files have one, others mean straight down.
+    pub mount: NativeMount,
+    /// Its zones; only native files have some.
+    pub zones: Vec<NativeZone>,
+    /// Its masks; only native files have some.
+    pub masks: Vec<NativeMask>,
+    /// The assumptions of the reader.
+    pub notes: Vec<Warning>,
+}
+
+impl Camera {
+    pub(super) fn new(image: Option<NativeImage>, lens: impl Into<LensModel>) -> Self {
+        Self {
+            image,
+            lens: lens.into(),
+            mount: NativeMount::default(),
+            zones: Vec::new(),
+            masks: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+}
+
+impl CalibrationFile {
+    /// Largest content that is read, bytes: a real calibration has a few hundred, one that carries
+    /// its corner points some ten thousand.
+    pub const MAX_BYTES: usize = 1024 * 1024;
+}
+
+/// The camera of a format that holds one to a file.
+pub(super) fn alone(camera: Result<Camera, FormatError>) -> Vec<FileCamera> {
+    vec![FileCamera { name: None, camera }]
+}

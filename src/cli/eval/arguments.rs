@@ -1,0 +1,96 @@
+//! The arguments of `lookdown eval`.
+
+use std::path::PathBuf;
+
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
+
+use super::{plot_file::PlotFile, truth::TruthFlags};
+use crate::{
+    cli::{parameters::one_of, settings_file::SettingsFile},
+    detection::Refinement,
+    geometry::FieldOfViewReading,
+    pipeline::Profile,
+};
+
+/// C_t without `--score-threshold`: low, as average precision considers all scores.
+const DEFAULT_SCORE_THRESHOLD: &str = "0.001";
+
+/// Arguments of `lookdown eval`.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Arguments {
+    #[command(flatten)]
+    pub(super) truth: TruthFlags,
+    /// Trade-off between accuracy and cost; may be repeated [default: balanced; with --sweep: paper]
+    #[arg(long, value_name = "NAME", value_parser = one_of::<Profile>())]
+    pub(super) profile: Vec<Profile>,
+    /// Method that merges overlapping boxes into persons; may be repeated [default: all of them]
+    #[arg(long, value_name = "NAME", value_parser = one_of::<Refinement>())]
+    pub(super) refine: Vec<Refinement>,
+    /// The rows of the paper's table: its three refinements, and the detector without views
+    #[arg(long, conflicts_with_all = ["profile", "refine"])]
+    pub(super) paper: bool,
+    /// Write the paper's sweeps to this folder: `cells.csv` (AP of NMS and Soft-NMS over N_t from 0
+    /// to 1, of Gaussian Soft-NMS over C_t and sigma), `iou_threshold.svg` (AP over N_t) and
+    /// `matrix.jpg` (detections at each C_t and sigma in the image with the most persons)
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        conflicts_with_all = ["refine", "paper", "iou_threshold", "sigma", "plot",
+                              "save_detections", "from_detections"]
+    )]
+    pub(super) sweep: Option<PathBuf>,
+    /// Model [default: the profile's]
+    #[arg(long, value_name = "NAME")]
+    pub(super) model: Option<String>,
+    /// Ignore persons with a lower score, 0 to 1
+    #[arg(long, value_name = "SCORE", default_value = DEFAULT_SCORE_THRESHOLD)]
+    pub(super) score_threshold: String,
+    /// Boxes that overlap at least this much are the same person [default: the refinement's]
+    #[arg(long, value_name = "IOU")]
+    pub(super) iou_threshold: Option<String>,
+    /// Width of Gaussian Soft-NMS [default: 0.3]
+    #[arg(long, value_name = "NUMBER")]
+    pub(super) sigma: Option<String>,
+    /// The reading of the paper's field of view, for the profile paper: 53° across, 53° from corner to
+    /// corner, or its formula taken literally, 90°
+    #[arg(
+        long,
+        value_name = "READING",
+        default_value = "horizontal",
+        value_parser = PossibleValuesParser::new(["horizontal", "diagonal", "literal"])
+            .map(|name| reading(&name))
+    )]
+    pub(super) field_of_view: FieldOfViewReading,
+    /// Print one JSON object per row instead of a table
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Also plot the precision-recall curves of all rows into one image
+    #[arg(long, value_name = "OUT.svg|OUT.png")]
+    pub(super) plot: Option<PlotFile>,
+    /// Also write the detections as COCO results: a file per row, named
+    /// PROFILE.REFINEMENT.MODEL.json
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) save_detections: Option<PathBuf>,
+    /// Score these COCO results instead of running a model: a file, or all .json files of a folder;
+    /// may be repeated
+    #[arg(
+        long,
+        value_name = "FILE|FOLDER",
+        conflicts_with_all = ["profile", "refine", "paper", "model", "score_threshold",
+                              "iou_threshold", "sigma", "save_detections"]
+    )]
+    pub(super) from_detections: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) settings_file: SettingsFile,
+}
+
+fn reading(name: &str) -> FieldOfViewReading {
+    match name {
+        "diagonal" => FieldOfViewReading::Diagonal,
+        "literal" => FieldOfViewReading::Literal,
+        _ => FieldOfViewReading::Horizontal,
+    }
+}

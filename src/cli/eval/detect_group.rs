@@ -1,0 +1,23 @@
+//! One pass over a data set for several rows.
+
+use crate::{
+    cli::progress::Progress,
+    evaluation::{DataSet, DetectedRow, EvaluationError, detect},
+    pipeline::{DetectParameters, Engine},
+    settings::Settings,
+};
+
+/// Detects the persons of a data set once for all rows of a group.
+pub(super) fn detect_group(
+    engine: &Engine,
+    data_set: &DataSet,
+    group: &[DetectParameters],
+    settings: &Settings,
+) -> Result<Vec<DetectedRow>, EvaluationError> {
+    let name = group.first().map_or("", |first| first.profile.name());
+    let progress = Progress::start(name, data_set.images.len());
+    let at_once = settings.threads.frame_workers;
+    let rows = detect(engine, data_set, group, at_once, || progress.advance());
+    progress.finish();
+    rows
+}

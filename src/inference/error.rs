@@ -1,0 +1,98 @@
+//! Errors of all detectors.
+
+use std::{path::PathBuf, time::Duration};
+
+use super::Device;
+
+/// A model that cannot be loaded or run. Every message is one sentence that includes the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum InferenceError {
+    /// The ONNX Runtime library cannot be used.
+    #[error(
+        "inference.library_path: ONNX Runtime cannot be loaded from {path}: {detail}; run `make \
+         setup`, or point it to libonnxruntime.so 1.24 or newer"
+    )]
+    Runtime {
+        /// Path of the library.
+        path: PathBuf,
+        /// Error of the loader.
+        detail: String,
+    },
+    /// The library has no support for the device.
+    #[error(
+        "inference.device: {device} needs a library that can use it, and {path} cannot; point \
+         inference.library_path to the libonnxruntime.so of the package onnxruntime-gpu, or use cpu"
+    )]
+    NoProvider {
+        /// The configured device.
+        device: Device,
+        /// The library.
+        path: PathBuf,
+    },
+    /// The device or its driver is missing.
+    #[error(
+        "inference.device: {device} cannot be used: {detail}; check the GPU's number and its \
+         driver, CUDA and cuDNN libraries, or use cpu"
+    )]
+    NoDevice {
+        /// The configured device.
+        device: Device,
+        /// Error of the runtime.
+        detail: String,
+    },
+    /// The model file or its manifest cannot be read.
+    #[error(
+        "model: {path} cannot be read: {detail}; `make setup` fetches the default models and \
+         `make models` the others"
+    )]
+    Unreadable {
+        /// Path of the file.
+        path: PathBuf,
+        /// Cause of the failure.
+        detail: String,
+    },
+    /// The model is not supported.
+    #[error("model: {path} cannot be used: {problem}")]
+    Unusable {
+        /// Path of the file.
+        path: PathBuf,
+        /// The mismatch: what was found and what is needed.
+        problem: String,
+    },
+    /// The model on the inference server is not supported.
+    #[error("model: {model} on the server of inference.url cannot be used: {problem}")]
+    RemoteModel {
+        /// Name of the model on the server.
+        model: String,
+        /// The mismatch: what was found and what is needed.
+        problem: String,
+    },
+    /// The inference server is overloaded.
+    #[error("the inference server is overloaded: send fewer frames at a time, or retry")]
+    RemoteBusy {
+        /// Time to wait before a retry.
+        retry_after: Duration,
+    },
+    /// The inference server cannot be reached, or its response is invalid.
+    #[error("inference.url: the server at {url} cannot be used: {detail}")]
+    Remote {
+        /// Address of the server.
+        url: String,
+        /// Cause of the failure.
+        detail: String,
+    },
+    /// The inference server requires a token, or rejects this one.
+    #[error(
+        "inference.bearer_token: the server at {url} rejects the request: {detail}; set the \
+         token that the server's operator issued"
+    )]
+    RemoteDenied {
+        /// Address of the server.
+        url: String,
+        /// Response of the server.
+        detail: String,
+    },
+    /// The runtime failed on a batch.
+    #[error("the network failed: {0}")]
+    Run(String),
+}

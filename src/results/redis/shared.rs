@@ -1,0 +1,32 @@
+//! The options and the state that the store shares with its background tasks.
+
+use std::{
+    sync::{Arc, atomic::AtomicU64},
+    time::Duration,
+};
+
+use super::{RedisAddress, keys::Keys, link::Link, outbox::Outbox};
+use crate::results::{Listeners, ResultLimits};
+
+/// The Redis server and the part of it that this installation uses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RedisOptions {
+    /// Its address.
+    pub address: RedisAddress,
+    /// The prefix of all keys: servers with the same prefix share their reports.
+    pub key_prefix: String,
+    /// The longest time for which a report is kept.
+    pub max_age: Duration,
+}
+
+/// The state that the store shares with its background tasks.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) options: RedisOptions,
+    pub(super) limits: ResultLimits,
+    pub(super) keys: Keys,
+    pub(super) link: Link,
+    pub(super) outbox: Outbox,
+    pub(super) listeners: Arc<Listeners>,
+    pub(super) stored: AtomicU64,
+}

@@ -1,0 +1,81 @@
+//! A setting in the reference, and the error for keys that no setting has.
+
+use super::{SettingsError, form::Form};
+
+/// A setting as the reference shows it.
+#[derive(Debug, Clone)]
+#[cfg_attr(
+    not(test),
+    expect(
+        dead_code,
+        reason = "only the tests that generate the reference read all of it"
+    )
+)]
+pub(super) struct Entry {
+    /// The key with its table, such as `server.tls.certificate`.
+    pub(super) key: &'static str,
+    /// The documentation, one line of the source after the other.
+    pub(super) help: &'static [&'static str],
+    /// The values that are accepted, as a phrase.
+    pub(super) kind: String,
+    /// The default as TOML.
+    pub(super) default: toml::Value,
+    /// The value that the settings file shows in a comment, where an empty value is refused.
+    pub(super) example: Option<&'static str>,
+}
+
+impl Entry {
+    pub(super) fn new<T>(
+        key: &'static str,
+        help: &'static [&'static str],
+        form: &Form<T>,
+        default: &T,
+    ) -> Self {
+        Self {
+            key,
+            help,
+            kind: form.kind.clone(),
+            default: (form.write)(default),
+            example: form.example,
+        }
+    }
+
+    /// The table and the key in it.
+    pub(super) fn split(&self) -> (&'static str, &'static str) {
+        self.key.rsplit_once('.').unwrap_or(("", self.key))
+    }
+}
+
+/// The refusal of a key that does not exist, which stands at `place`.
+pub(super) fn unknown(place: &str, key: &str, entries: &[Entry]) -> SettingsError {
+    let (above, name) = key.rsplit_once('.').unwrap_or(("", key));
+    let is_table = entries.iter().any(|entry| entry.split().0 == above);
+    let (parent, mut known): (String, Vec<_>) = if is_table {
+        let inside = entries.iter().filter(|entry| entry.split().0 == above);
+        (
+            format!("in the table `{above}`"),
+            inside.map(|entry| entry.split().1).collect(),
+        )
+    } else {
+        (
+            "among the tables".to_owned(),
+            entries.iter().map(|entry| entry.split().0).collect(),
+        )
+    };
+    known.dedup();
+    SettingsError::Unknown {
+        place: place.to_owned(),
+        name: if is_table || above.is_empty() {
+            name
+        } else {
+            above
+        }
+        .to_owned(),
+        parent,
+        known: known
+            .iter()
+            .map(|name| format!("`{name}`"))
+            .collect::<Vec<_>>()
+            .join(", "),
+    }
+}
