@@ -25,6 +25,7 @@ mod service_rate;
 mod test_support;
 mod ticket;
 mod timeline;
+mod turns;
 mod worker_pool;
 
 pub use default_models::DefaultModels;

@@ -8,19 +8,20 @@ use std::{
 };
 
 /// Every module, and the modules of this crate it may use.
-const MAY_USE: [(&str, &[&str]); 29] = [
+const MAY_USE: [(&str, &[&str]); 30] = [
     ("plain_name", &[]),
     ("quoted", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
     ("revision", &[]),
     ("warning", &[]),
+    ("fairness", &[]),
     ("geometry", &[]),
     ("detection", &[]),
     ("metrics", &[]),
     ("shutdown", &[]),
     ("poller", &[]),
-    ("results", &[]),
+    ("results", &["fairness"]),
     ("open_inference", &[]),
     ("imaging", &["geometry"]),
     (
@@ -33,7 +34,7 @@ const MAY_USE: [(&str, &[&str]); 29] = [
     ),
     ("tls", &["metrics", "watched_file"]),
     ("server", &["metrics", "shutdown", "tls"]),
-    ("mqtt", &["metrics", "results", "tls"]),
+    ("mqtt", &["fairness", "metrics", "results", "tls"]),
     (
         "settings",
         &["access", "inference", "mqtt", "results", "server", "tls"],
@@ -43,6 +44,7 @@ const MAY_USE: [(&str, &[&str]); 29] = [
     (
         "pipeline",
         &[
+            "fairness",
             "geometry",
             "detection",
             "imaging",
@@ -72,6 +74,7 @@ const MAY_USE: [(&str, &[&str]); 29] = [
             "access",
             "annotated_image",
             "annotation_formats",
+            "fairness",
             "geometry",
             "detection",
             "imaging",

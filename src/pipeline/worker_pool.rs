@@ -162,9 +162,8 @@ impl WorkerPool {
         let _withdrawal = ticket.withdrawn.clone().drop_guard();
         let (answer, waiting) = oneshot::channel();
         self.shared.rate().began(Instant::now());
-        let priority = ticket.priority;
         let entry = Entry {
-            ticket,
+            ticket: ticket.clone(),
             work: Box::new(|engine| {
                 let outcome = catch_unwind(AssertUnwindSafe(|| work(engine)));
                 let panicked = || internal(anyhow::anyhow!("a worker panicked on a frame"));
@@ -178,7 +177,7 @@ impl WorkerPool {
             request: tracing::Span::current(),
             place,
         };
-        let queued = self.shared.queue.push(priority, entry);
+        let queued = self.shared.queue.push(&ticket, 1, entry);
         queued.map_err(|_| PipelineError::ShuttingDown)?;
         // The sender of a withdrawn frame is dropped without an answer.
         waiting.await.unwrap_or(Err(PipelineError::Withdrawn))
