@@ -69,7 +69,7 @@ fn drawn(
     options: &AnnotationOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<u8>, AnnotationError> {
-    let width = options.width.unwrap_or(DEFAULT_MAX_WIDTH);
+    let width = options.drawn_width();
     let mut picture = if frame.width() > width {
         narrowed(&frame, width)
     } else {

@@ -5,6 +5,7 @@ mod accept;
 mod access;
 mod answer;
 mod calibrations;
+mod caller;
 mod connection_limit;
 mod cors;
 mod csrf;

@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use strum::{EnumString, VariantArray, VariantNames};
 
+use super::DEFAULT_MAX_WIDTH;
 use crate::pipeline::{
     GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
     parameter_table,
@@ -93,6 +94,12 @@ impl AnnotationOptions {
             width: given.optional(&WIDTH)?,
             quality: given.value(&QUALITY)?,
         })
+    }
+
+    /// Returns the maximum width of the image, pixels.
+    #[must_use]
+    pub fn drawn_width(&self) -> u32 {
+        self.width.unwrap_or(DEFAULT_MAX_WIDTH)
     }
 }
 

@@ -19,7 +19,6 @@ use super::{
     ApiState,
     access::RequireRead,
     problem::{Problem, ProblemKind},
-    request_id::RequestId,
     run_detection::run_detection,
 };
 use crate::{calibration::CalibrationId, telemetry::RequestTrace};
@@ -40,11 +39,10 @@ pub(super) use failures::with_failures;
 )]
 pub(super) async fn detect_as_deepstack(
     State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     upload: DeepStackUpload,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
-    answer(&state, &trace, upload, None, &request_id).await
+    answer(&state, &trace, upload, None).await
 }
 
 /// Detect persons with a calibration (DeepStack)
@@ -63,7 +61,6 @@ pub(super) async fn detect_as_deepstack(
 pub(super) async fn detect_as_deepstack_with(
     State(state): State<ApiState>,
     Path(calibration): Path<String>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     upload: DeepStackUpload,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
@@ -71,7 +68,7 @@ pub(super) async fn detect_as_deepstack_with(
     let calibration: CalibrationId = calibration
         .parse()
         .map_err(|error| Problem::new(ProblemKind::UnknownCalibration, format!("{error}")))?;
-    answer(&state, &trace, upload, Some(calibration), &request_id).await
+    answer(&state, &trace, upload, Some(calibration)).await
 }
 
 async fn answer(
@@ -79,11 +76,10 @@ async fn answer(
     trace: &RequestTrace,
     DeepStackUpload(upload): DeepStackUpload,
     calibration: Option<CalibrationId>,
-    request_id: &RequestId,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
     let limit = upload.deadline;
     trace.stage("upload", limit.began().into_std(), upload.arrived);
-    let job = form::job(upload, calibration, request_id)?;
+    let job = form::job(upload, calibration)?;
     let written = run_detection(state, trace, limit, job, |found| {
         Ok(DeepStackAnswer::from(found.report))
     });

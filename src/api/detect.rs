@@ -14,7 +14,6 @@ use super::{
     parameters::pairs,
     problem::Problem,
     report::{Report, ReportTimings},
-    request_id::RequestId,
     run_detection::{DetectionOutcome, run_detection},
     upload::Upload,
 };
@@ -69,13 +68,12 @@ pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-co
 )]
 pub(super) async fn detect_persons(
     State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
     let deadline = upload.deadline;
     trace.stage("upload", deadline.began().into_std(), upload.arrived);
-    let (job, answer) = job(upload, &request_id)?;
+    let (job, answer) = job(upload)?;
     let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
     let (report, content) = run_detection(&state, &trace, deadline, job, write).await?;
     let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
@@ -89,11 +87,13 @@ pub(super) fn facts(report: &DetectionReport) -> [(HeaderName, HeaderValue); 5] 
     [stages, queue, inference, total, count]
 }
 
-fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {
+fn job(mut upload: Upload) -> Result<(DetectJob, AnswerOptions), Problem> {
     let parameters = &mut upload.parameters;
     let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
     let parameters = DetectParameters::parse(pairs(parameters))?;
-    Ok((upload.job(parameters, request_id), answer))
+    let mut job = upload.job(parameters)?;
+    job.ticket.drawn_width = answer.drawn_width();
+    Ok((job, answer))
 }
 
 /// Returns the stages as `Server-Timing: decode;dur=3.1, …, total;dur=412.0` (W3C), and the stages

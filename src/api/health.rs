@@ -1,6 +1,6 @@
 //! Health checks and metrics.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, time::Instant};
 
 use axum::{
     Json,
@@ -11,7 +11,11 @@ use axum::{
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-use super::{ApiState, access::RequireRead, problem::Problem};
+use super::{
+    ApiState,
+    access::RequireRead,
+    problem::{Problem, ProblemKind},
+};
 use crate::{
     calibration::{CalibrationId, CalibrationsHealth},
     pipeline::PipelineError,
@@ -167,8 +171,9 @@ pub(super) async fn livez() -> Json<Health> {
 
 /// Check readiness
 ///
-/// Ready after the first run of the models, unless the inference server does not respond or the
-/// server is shutting down. Invalid calibration files and an unreachable result store are reported,
+/// Ready after the first run of the models, unless the inference server does not respond, frames
+/// make no progress for twice `server.request_timeout_millis`, or the server is shutting down.
+/// Invalid calibration files and an unreachable result store are reported,
 /// but the server stays ready: the previous calibrations remain in use.
 #[utoipa::path(
     get, path = "/readyz", tag = "operation", operation_id = "get_readiness",
@@ -194,6 +199,15 @@ pub(super) async fn readyz(
 /// Returns the problem while the server is not ready.
 pub(super) fn require_ready(state: &ApiState) -> Result<(), Problem> {
     let remote = state.models.remote();
+    let limit = state.options.stall_limit();
+    if let Some(stall) = state.workers.stall(Instant::now(), limit) {
+        let seconds = stall.since.as_secs();
+        let detail = format!(
+            "no frame has made progress for {seconds} s: the log names them; restart the server if \
+             it stays so"
+        );
+        return Err(Problem::new(ProblemKind::Stalled, detail));
+    }
     match state.readiness.phase() {
         Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
         Phase::Ready => Err(PipelineError::InferenceUnavailable.into()),
@@ -216,6 +230,8 @@ pub(super) async fn metrics(State(state): State<ApiState>) -> Result<impl IntoRe
     state
         .metrics
         .show_frames(workers.pending(), workers.withdrawn());
+    let quiet = workers.quiet_for(Instant::now());
+    state.metrics.show_progress(quiet, workers.stalls());
     show_models(&state);
     show_remote(&state);
     show_calibrations(&state);

@@ -10,6 +10,7 @@ use super::{
 };
 use crate::{
     calibration::Calibrations,
+    fairness::Client,
     inference::ModelRepository,
     metrics::Metrics,
     pipeline::WorkerPool,
@@ -52,6 +53,13 @@ pub struct ApiOptions {
 }
 
 impl ApiOptions {
+    /// Returns the time without progress of the workers after which the server is not ready. Each
+    /// request ends within half of it.
+    #[must_use]
+    pub fn stall_limit(&self) -> Duration {
+        self.request_timeout * 2
+    }
+
     /// Options for tests: small bodies, and no access control.
     #[must_use]
     pub fn for_testing() -> Self {
@@ -117,26 +125,39 @@ impl ApiState {
             results,
             metrics,
             readiness,
-            uploads: UploadBudget::new(options.max_upload_bytes, "send fewer at a time, or retry"),
+            uploads: UploadBudget::new(
+                options.max_upload_bytes,
+                options.max_body_bytes,
+                "send fewer at a time, or retry",
+            ),
             unauthenticated_uploads: UploadBudget::new(
                 options.max_upload_bytes / UNAUTHENTICATED_SHARE,
+                1,
                 "send the key in a header, X-API-Key: KEY, or retry",
             ),
             options,
         }))
     }
 
-    /// Returns a reader of bodies up to `max_bytes`; `remedy` is the advice for larger ones.
+    /// Returns the time without progress of the workers after which the server is not ready.
+    #[must_use]
+    pub fn stall_limit(&self) -> Duration {
+        self.options.stall_limit()
+    }
+
+    /// Returns a reader of the bodies of a client, up to `max_bytes`; `remedy` is the advice for
+    /// larger ones.
     pub(super) fn body_reader(
         &self,
+        client: &Client,
         max_bytes: usize,
         remedy: &'static str,
         deadline: Deadline,
-    ) -> BodyReader<'_> {
+    ) -> BodyReader {
         BodyReader {
             max_bytes,
             remedy,
-            budget: &self.uploads,
+            budget: self.uploads.of(client),
             least_bytes_per_second: self.options.min_upload_bytes_per_second,
             deadline,
         }

@@ -28,6 +28,16 @@ impl Priority {
             7.. => Self::Low,
         }
     }
+
+    /// Returns the smallest level of the priority.
+    #[must_use]
+    pub fn highest_level(self) -> u32 {
+        match self {
+            Self::High => 1,
+            Self::Normal => 4,
+            Self::Low => 7,
+        }
+    }
 }
 
 /// Travels with a frame through every queue.
@@ -37,6 +47,10 @@ pub struct Ticket {
     pub priority: Priority,
     /// The client whose turns and budgets the frame uses.
     pub client: Client,
+    /// The ID of the request for logs; empty if it has none.
+    pub request_id: String,
+    /// The width of the annotated image that the response draws, pixels; 0 for none.
+    pub drawn_width: u32,
     /// The token that is cancelled when the client disconnects. Work that has not begun is skipped.
     pub withdrawn: CancellationToken,
     /// The times at which the frame entered and left each stage.

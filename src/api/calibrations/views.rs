@@ -17,8 +17,8 @@ use super::{
 };
 use crate::{
     api::{
-        ApiState, access::RequireRead, deadline::Deadline, openapi::RawBytes, problem::Problem,
-        report::pixels, upload::parameters_named,
+        ApiState, access::RequireRead, caller::Caller, deadline::Deadline, openapi::RawBytes,
+        problem::Problem, report::pixels, upload::parameters_named,
     },
     calibration::{Calibration, Calibrations},
     pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},
@@ -124,6 +124,7 @@ pub(in crate::api) async fn get_views(
     State(state): State<ApiState>,
     _reader: RequireRead,
     deadline: Deadline,
+    caller: Caller,
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
 ) -> Result<Response, Problem> {
@@ -134,7 +135,7 @@ pub(in crate::api) async fn get_views(
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
     let plan = move |engine: &Engine| request.plan(engine, &entry.calibration);
-    answered(&state, deadline, plan).await
+    answered(&state, deadline, &caller, plan).await
 }
 
 /// Preview a view plan
@@ -161,6 +162,7 @@ pub(in crate::api) async fn try_views(
     State(state): State<ApiState>,
     _reader: RequireRead,
     deadline: Deadline,
+    caller: Caller,
     NewCalibrationAddress(id): NewCalibrationAddress,
     trial: CalibrationTrial,
 ) -> Result<Response, Problem> {
@@ -170,7 +172,7 @@ pub(in crate::api) async fn try_views(
         let entry = Calibrations::check(&id, &content, &reading)?;
         request.plan(engine, &entry.calibration)
     };
-    answered(&state, deadline, plan).await
+    answered(&state, deadline, &caller, plan).await
 }
 
 /// Returns a view plan as JSON. A plan may have megabytes, so it is built and serialised under a
@@ -178,10 +180,11 @@ pub(in crate::api) async fn try_views(
 async fn answered(
     state: &ApiState,
     deadline: Deadline,
+    caller: &Caller,
     plan: impl FnOnce(&Engine) -> Result<ViewPlanInfo, Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
     let workers = Arc::clone(&state.workers);
-    let planning = state.workers.run(move |_| {
+    let planning = state.workers.run(caller.ticket(), move |_| {
         let plan = plan(workers.engine())?;
         serde_json::to_vec(&plan).map_err(Problem::internal)
     });

@@ -15,12 +15,14 @@ use super::{
 };
 use crate::{
     access::Scope,
-    api::{ApiState, Phase, deadline::Deadline, problem::Problem},
+    api::{ApiState, Phase, caller::Caller, deadline::Deadline, problem::Problem},
 };
 
 /// A complete detection request. As an extractor, it also checks the scope `detect`.
 pub(in crate::api) struct ReceivedRequest {
     pub(in crate::api) parts: Parts,
+    /// The caller by the key in the headers.
+    pub(in crate::api) caller: Caller,
     pub(in crate::api) body: Held<Bytes>,
     /// The deadline of the response.
     pub(in crate::api) deadline: Deadline,
@@ -52,17 +54,20 @@ impl ReceivedRequest {
         if state.readiness.phase() == Phase::WarmingUp {
             return Err(Problem::warming_up());
         }
+        let caller = Caller::of(&parts, state);
         // A frame that finds no place in the queue is refused before its body is read.
-        state.workers.admits()?;
+        state.workers.admits(&caller.client)?;
         let deadline = Deadline::of(&parts, state);
+        let max_bytes = state.options.max_body_bytes;
         let remedy = "send a smaller image or raise server.max_body_bytes";
         let reader = BodyReader {
-            budget,
-            ..state.body_reader(state.options.max_body_bytes, remedy, deadline)
+            budget: budget.of(&caller.client),
+            ..state.body_reader(&caller.client, max_bytes, remedy, deadline)
         };
         let body = reader.read(&parts.headers, body).await?;
         Ok(Self {
             parts,
+            caller,
             body,
             deadline,
             received_at,

@@ -12,10 +12,12 @@ use super::{
     tensor::{Tensor, Values, misfit},
 };
 use crate::{
-    api::{ApiState, deadline::Deadline, limit::Limit, problem::Problem, upload::Held},
+    api::{
+        ApiState, caller::Caller, deadline::Deadline, limit::Limit, problem::Problem, upload::Held,
+    },
     inference::{HeadOutput, Model},
     open_inference::Datatype,
-    pipeline::{DetectParameters, Interface, ParameterError, Ticket, ViewsJob},
+    pipeline::{DetectParameters, Interface, ParameterError, ViewsJob},
     telemetry::RequestTrace,
 };
 
@@ -41,15 +43,15 @@ pub(super) fn metadata(model: &Model) -> ModelMetadata {
 
 pub(super) async fn infer(
     state: &ApiState,
+    caller: &Caller,
     trace: &RequestTrace,
-    model: Arc<Model>,
-    mut request: InferRequest,
+    (model, mut request): (Arc<Model>, InferRequest),
     (deadline, _, arrived): (Deadline, Timestamp, Instant),
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
     let pixels = Box::new(pixels(request.only_input(INPUT)?, &model)?);
     let parameters = view_parameters(&request)?;
-    let ticket = Ticket::of(parameters.priority);
+    let ticket = caller.ticket_at(parameters.priority)?;
     let timeline = ticket.timeline.clone();
     let job = ViewsJob {
         arrived,

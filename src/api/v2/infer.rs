@@ -15,10 +15,7 @@ use super::{
     request::InferRequest,
 };
 use crate::{
-    api::{
-        ApiState, openapi::RawBytes, problem::Problem, request_id::RequestId,
-        upload::ReceivedRequest,
-    },
+    api::{ApiState, openapi::RawBytes, problem::Problem, upload::ReceivedRequest},
     telemetry::RequestTrace,
 };
 
@@ -49,13 +46,12 @@ use crate::{
 )]
 pub(in crate::api) async fn infer(
     State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     Path(name): Path<String>,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
     let asked = Asked::find(&state, &name, None)?;
-    answered(&state, &request_id, &trace, asked, arrival).await
+    answered(&state, &trace, asked, arrival).await
 }
 
 /// Run inference with a model version
@@ -82,18 +78,16 @@ pub(in crate::api) async fn infer(
 )]
 pub(in crate::api) async fn infer_version(
     State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     Path((name, version)): Path<(String, String)>,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
     let asked = Asked::find(&state, &name, Some(&version))?;
-    answered(&state, &request_id, &trace, asked, arrival).await
+    answered(&state, &trace, asked, arrival).await
 }
 
 async fn answered(
     state: &ApiState,
-    request_id: &RequestId,
     trace: &RequestTrace,
     asked: Asked,
     arrival: ReceivedRequest,
@@ -104,12 +98,13 @@ async fn answered(
         arrival.arrived,
     );
     let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
-    let budget = state.uploads.clone();
+    let caller = arrival.caller;
+    let budget = state.uploads.of(&caller.client);
     let read = move || InferRequest::read(&headers, &body, &budget);
     let read = arrival.deadline.blocking(read).await?;
     let times = (arrival.deadline, arrival.received_at, arrival.arrived);
     match asked {
-        Asked::Frames => persons::infer(state, request_id, trace, read, times).await,
-        Asked::Views(model) => detector::infer(state, trace, model, read, times).await,
+        Asked::Frames => persons::infer(state, &caller, trace, read, times).await,
+        Asked::Views(model) => detector::infer(state, &caller, trace, (model, read), times).await,
     }
 }

@@ -1,13 +1,13 @@
 //! Input tensors: a name, a shape, and one frame or many numbers.
 
 use bytes::Bytes;
-use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     api::{
         problem::{Problem, ProblemKind},
         upload::{Held, UploadBudget},
     },
+    fairness::BudgetShare,
     open_inference::{Datatype, binary_data, json_data},
     quoted::{Quoted, shortened},
 };
@@ -92,12 +92,7 @@ impl Sent<'_> {
         }
     }
 
-    fn values(
-        self,
-        datatype: Datatype,
-        count: usize,
-        room: OwnedSemaphorePermit,
-    ) -> Result<Values, String> {
+    fn values(self, datatype: Datatype, count: usize, room: BudgetShare) -> Result<Values, String> {
         Ok(match (datatype, self) {
             (Datatype::Bytes, Self::Json(text)) => {
                 Values::Frame(Held::new(json_data::only_bytes(text)?, room).into_bytes())
