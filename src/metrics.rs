@@ -83,9 +83,9 @@ metrics! {
     pending_frames: IntGauge = "pending_frames" [];
     /// Frames dropped because their client had disconnected.
     withdrawn_frames: IntCounter = "withdrawn_frames_total" [];
-    /// Time since a frame last made progress, seconds; 0 without frames.
+    /// Seconds since the last progress of a frame; 0 without frames.
     seconds_without_progress: IntGauge = "seconds_without_progress" [];
-    /// Times that no frame made progress for twice the request timeout.
+    /// Stalls: no frame progressed for twice `server.request_timeout_millis`.
     worker_stalls: IntCounter = "worker_stalls_total" [];
     /// Always 1; the labels are the loaded models.
     model_info: IntGaugeVec = "model_info" ["model", "revision"];

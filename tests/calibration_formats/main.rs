@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a failed call fails the test")]
 
 mod answers;
+mod complexity;
 mod damage;
 mod export;
 mod published;
