@@ -3,8 +3,8 @@
 //! Within a priority, clients take turns in proportion to the cost of their entries: start-time
 //! fair queueing (Goyal, Vin and Cheng, 1996) with equal weights. An entry starts, in virtual time,
 //! when the previous entry of its client ends, but not before now. Entries leave in the order of
-//! their starts. Virtual time advances by the cost of what leaves, divided among the clients that
-//! wait. So a client with many entries delays another client by one entry each round only, and an
+//! their starts. Virtual time advances by the cost of what leaves, divided among the active
+//! clients. So a client with many entries delays another client by one entry each round only, and an
 //! idle client saves up nothing.
 
 use std::collections::HashMap;
@@ -14,6 +14,8 @@ use crate::fairness::Client;
 
 /// Virtual time of a cost of 1. Shares of it are rounded down.
 const UNIT: u64 = 1 << 20;
+/// Most clients among which a cost is divided, so that virtual time always advances.
+const MAX_CLIENTS: u64 = 256;
 
 /// A position in a queue.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -26,7 +28,7 @@ pub(super) struct Turn {
     client: Client,
 }
 
-/// Assigns positions in a queue. Its memory is bounded by the number of entries in the queue.
+/// Assigns positions in a queue. A client is forgotten when its last entry has ended in virtual time.
 #[derive(Debug, Default)]
 pub(super) struct Turns {
     arrivals: u64,
@@ -71,8 +73,9 @@ impl Turns {
     /// Records that an entry has left the queue. An entry that was withdrawn counts as served.
     pub(super) fn end(&mut self, turn: &Turn) {
         let lane = self.lane(turn.priority);
-        let clients = lane.flows.values().filter(|flow| flow.waiting > 0).count();
-        let clients = u64::try_from(clients).unwrap_or(u64::MAX).max(1);
+        // Includes clients without waiting entries whose last one has not ended in virtual time.
+        let clients = u64::try_from(lane.flows.len()).unwrap_or(u64::MAX);
+        let clients = clients.clamp(1, MAX_CLIENTS);
         lane.now = (lane.now.saturating_add(turn.cost / clients)).max(turn.start);
         if let Some(flow) = lane.flows.get_mut(&turn.client) {
             flow.waiting = flow.waiting.saturating_sub(1);

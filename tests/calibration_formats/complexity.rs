@@ -91,7 +91,7 @@ const FILLERS: [Filler; 58] = [
     Filler::Numbered("<k#>#</k#>"),
     Filler::Numbered("# PINHOLE # # # # # #\n"),
     Filler::Numbered("[#, #],"),
-    Filler::Numbered("{\"name\":\"z#\",\"floor\":[[0,0],[1,0],[1,#]]},"),
+    Filler::Numbered("{\"name\":\"z#\",\"floor_m\":[[0,0],[1,0],[1,#]]},"),
     Filler::Staircase("a:\n"),
 ];
 
@@ -183,8 +183,8 @@ impl Recipe {
 /// Returns positions of different kinds in a file: its start, and behind its middle line end, colon,
 /// digit and so on.
 fn positions(file: &str, is_long: bool) -> Vec<usize> {
-    let wanted = ['\n', ':', '7', '{', '[', '"', '>'];
-    let wanted = &wanted[..if is_long { wanted.len() } else { 3 }];
+    let wanted = ['\n', ':', '7', '[', '{', '"', '>'];
+    let wanted = &wanted[..if is_long { wanted.len() } else { 4 }];
     let mut positions = vec![0];
     for &wanted in wanted {
         let found: Vec<_> = file.match_indices(wanted).map(|(at, _)| at + 1).collect();
@@ -195,11 +195,19 @@ fn positions(file: &str, is_long: bool) -> Vec<usize> {
     positions
 }
 
+/// A native file with zones and masks.
+const ZONES: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
+  "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5},
+  "mount": {"world_up": [0, 0, -1], "height_m": 3},
+  "zones": [{"name": "a", "frame_px": [[0,0], [100,0], [100,200]]},
+    {"name": "b", "floor_m": [[0,0], [1,0], [1,1]]}],
+  "masks": [{"frame_px": [[0,0], [100,0], [100,200]]}] }"#;
+
 /// Returns one file of each format, or every file.
 fn files(is_long: bool) -> Vec<String> {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/");
     let folders = ["tests/fixtures/calibrations", "samples/calibrations"];
-    let mut files = BTreeMap::new();
+    let mut files = BTreeMap::from([("zones".to_owned(), ZONES.to_owned())]);
     for folder in folders {
         for entry in fs::read_dir(format!("{root}{folder}")).unwrap() {
             let path = entry.unwrap().path();
