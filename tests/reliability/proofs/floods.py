@@ -12,8 +12,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from harness.processes import Server, free_ports, running
 from harness.places import LOOKDOWN
+from harness.processes import free_ports, running
 from support.effort import Effort
 from support.exchange import Lost, connect, exchange, read_answer, request
 from support.keys import write_keys
