@@ -243,7 +243,7 @@ async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<Store
             Err(ListenError::Ended) => return,
             // A permit is released when another listener leaves.
             Err(ListenError::Full { .. } | ListenError::ShareUsed { .. }) => {
-                sleep(SHORTEST_PAUSE).await
+                sleep(SHORTEST_PAUSE).await;
             }
         }
     }

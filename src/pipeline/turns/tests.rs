@@ -1,3 +1,10 @@
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "ticks and counts of a simulation are small"
+)]
+
 use std::collections::BTreeMap;
 
 use super::*;
