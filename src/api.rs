@@ -2,6 +2,7 @@
 //! failure is returned as a problem document.
 
 mod answer;
+mod caller;
 mod http;
 mod limit;
 mod openapi;

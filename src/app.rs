@@ -5,7 +5,7 @@ mod models;
 mod serving;
 mod sockets;
 
-use std::{num::NonZeroU64, sync::Arc};
+use std::{num::NonZeroU64, sync::Arc, time::Instant};
 
 use anyhow::Context;
 
@@ -35,6 +35,9 @@ pub(crate) use models::onnx_options;
 
 /// Interval of the checks of the inference server, seconds.
 const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
+
+/// Interval of the checks for workers without progress, seconds.
+const WATCHDOG_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
 /// An engine with its calibrations and models.
 pub struct Assembly {
@@ -278,6 +281,13 @@ impl App {
             let every = tls.poll_seconds()?;
             Some(Poller::start("tls-watcher", every, move || tls.refresh()))
         });
+        let (workers, limit) = (Arc::clone(&self.workers), self.state.stall_limit());
+        let watchdog = Poller::start("worker-watchdog", WATCHDOG_EVERY, move || {
+            if let Some(stall) = workers.new_stall(Instant::now(), limit) {
+                let seconds = stall.since.as_secs();
+                tracing::error!(seconds, "no frame makes progress; in flight are {stall}");
+            }
+        });
         let remote = self.models.remote().cloned();
         let remote_poller = remote.map(|remote| {
             Poller::start("remote-watcher", REMOTE_EVERY, move || {
@@ -289,7 +299,8 @@ impl App {
             .chain(remote_poller)
             .chain(calibration_poller)
             .chain(key_poller)
-            .chain(tls);
+            .chain(tls)
+            .chain([watchdog]);
         pollers
             .collect::<Result<_, _>>()
             .context("the operating system creates no thread to watch files")

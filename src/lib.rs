@@ -14,6 +14,7 @@ pub mod calibration;
 pub mod cli;
 pub mod detection;
 pub mod evaluation;
+pub mod fairness;
 pub mod geometry;
 pub mod imaging;
 pub mod inference;

@@ -8,6 +8,7 @@ mod zone_persons;
 use std::{
     collections::BTreeSet,
     sync::{Mutex, MutexGuard, PoisonError},
+    time::Duration,
 };
 
 use prometheus::{
@@ -80,6 +81,10 @@ metrics! {
     pending_frames: IntGauge = "pending_frames" [];
     /// Frames dropped because their client had disconnected.
     withdrawn_frames: IntCounter = "withdrawn_frames_total" [];
+    /// Seconds since the last progress of a frame; 0 without frames.
+    seconds_without_progress: IntGauge = "seconds_without_progress" [];
+    /// Stalls: no frame progressed for twice `server.request_timeout_millis`.
+    worker_stalls: IntCounter = "worker_stalls_total" [];
     /// Always 1; the labels are the loaded models.
     model_info: IntGaugeVec = "model_info" ["model", "revision"];
     /// Model loads, by result.
@@ -180,6 +185,14 @@ impl Metrics {
         let _one_scrape = self.one_scrape();
         self.pending_frames.set(count(pending));
         raise_to(&self.withdrawn_frames, withdrawn);
+    }
+
+    /// Sets the time since the last progress of a frame, and the number of stalls since the start.
+    pub fn show_progress(&self, quiet_for: Duration, stalls: u64) {
+        let _one_scrape = self.one_scrape();
+        let seconds = i64::try_from(quiet_for.as_secs()).unwrap_or(i64::MAX);
+        self.seconds_without_progress.set(seconds);
+        raise_to(&self.worker_stalls, stalls);
     }
 
     /// Sets the loaded models, each by name and revision, and the number of loads since the start,

@@ -59,6 +59,12 @@ pub enum KeyError {
         /// The position of the key, from 1.
         position: usize,
     },
+    /// The priority is not a level.
+    #[error("key {position}: highest_priority must be 1 (highest) to 9; without it, it is 5")]
+    Priority {
+        /// The position of the key, from 1.
+        position: usize,
+    },
     /// Two keys have the same name.
     #[error("key {position}: its name is used twice: give each key its own name")]
     Repeated {

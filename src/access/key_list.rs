@@ -5,18 +5,20 @@ use std::{collections::BTreeMap, str::FromStr};
 use serde::Deserialize;
 use subtle::{Choice, ConditionallySelectable};
 
-use super::{KeyDigest, KeyError, KeyName, Scope, Scopes};
+use super::{KeyDigest, KeyError, KeyName, PriorityLevel, Scope, Scopes};
 
 /// Most keys: every request is compared with all of them.
 const MAX_KEYS: usize = 1000;
 
-/// The holder of a key: its name and its scopes.
+/// The holder of a key: its name, its scopes and its highest priority.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Holder {
     /// The name of the key.
     pub name: KeyName,
     /// The operations that the key permits.
     pub scopes: Scopes,
+    /// The highest priority of its requests.
+    pub highest_priority: PriorityLevel,
 }
 
 /// Keys by their digests.
@@ -29,12 +31,12 @@ pub struct KeyList(Vec<(KeyDigest, Holder)>);
 struct Row {
     scopes: Vec<String>,
     sha256: String,
+    highest_priority: Option<u32>,
 }
 
 impl KeyList {
     /// Parses the keys of a TOML file: a line `name = { scopes = ["detect"], sha256 = "…" }` for
-    /// each.
-    ///
+    /// each, with `highest_priority = 1` to 9 if that is not 5.
     ///
     /// # Errors
     /// [`KeyError`] with the line or the key that cannot be used.
@@ -48,7 +50,7 @@ impl KeyList {
         let mut list = Self::default();
         for (name, row) in rows {
             let scopes: Vec<_> = row.scopes.iter().map(String::as_str).collect();
-            list.add(&name, &scopes, &row.sha256)?;
+            list.add(&name, &scopes, &row.sha256, row.highest_priority)?;
         }
         Ok(list)
     }
@@ -96,14 +98,29 @@ impl KeyList {
         self.0.get(index).map(|(_, holder)| holder)
     }
 
-    fn add(&mut self, name: &str, scopes: &[&str], sha256: &str) -> Result<(), KeyError> {
+    fn add(
+        &mut self,
+        name: &str,
+        scopes: &[&str],
+        sha256: &str,
+        highest_priority: Option<u32>,
+    ) -> Result<(), KeyError> {
         let position = self.0.len() + 1;
         let name = name.parse().map_err(|_| KeyError::Name { position })?;
         let scopes: Result<Vec<Scope>, _> = scopes.iter().map(|scope| scope.parse()).collect();
         let scopes = scopes.ok().and_then(|scopes| Scopes::new(&scopes));
         let scopes = scopes.ok_or(KeyError::Scopes { position })?;
         let digest = KeyDigest::parse(sha256).ok_or(KeyError::Digest { position })?;
-        self.push(digest, Holder { name, scopes })
+        let highest_priority = match highest_priority {
+            Some(level) => PriorityLevel::new(level).ok_or(KeyError::Priority { position })?,
+            None => PriorityLevel::default(),
+        };
+        let holder = Holder {
+            name,
+            scopes,
+            highest_priority,
+        };
+        self.push(digest, holder)
     }
 
     fn push(&mut self, digest: KeyDigest, holder: Holder) -> Result<(), KeyError> {
@@ -119,7 +136,8 @@ impl KeyList {
     }
 }
 
-/// `name:scope+scope:sha256`, separated by commas, as an environment variable has them.
+/// `name:scope+scope:sha256` or `name:scope+scope:sha256:highest_priority`, separated by commas, as
+/// an environment variable has them.
 impl FromStr for KeyList {
     type Err = KeyError;
 
@@ -129,10 +147,14 @@ impl FromStr for KeyList {
         for entry in entries.filter(|entry| !entry.is_empty()) {
             let position = list.0.len() + 1;
             let parts: Vec<_> = entry.split(':').collect();
-            let [name, scopes, sha256] = parts[..] else {
-                return Err(KeyError::Entry { position });
+            let (name, scopes, sha256, level) = match parts[..] {
+                [name, scopes, sha256] => (name, scopes, sha256, None),
+                [name, scopes, sha256, level] => (name, scopes, sha256, Some(level)),
+                _ => return Err(KeyError::Entry { position }),
             };
-            list.add(name, &scopes.split('+').collect::<Vec<_>>(), sha256)?;
+            let level = level.map(str::parse).transpose();
+            let level = level.map_err(|_| KeyError::Priority { position })?;
+            list.add(name, &scopes.split('+').collect::<Vec<_>>(), sha256, level)?;
         }
         Ok(list)
     }

@@ -51,6 +51,14 @@ impl AnswerOptions {
         })
     }
 
+    /// Returns the width of the annotated image, pixels; 0 for other formats.
+    pub(super) fn drawn_width(&self) -> u32 {
+        match self.format {
+            AnswerFormat::Picture(_) => self.picture.width,
+            AnswerFormat::Report | AnswerFormat::Annotations(_) => 0,
+        }
+    }
+
     /// Builds the response for a frame whose report is `json`. Drawing blocks: call it on a worker
     /// thread.
     pub(super) fn content(self, detected: Detected, json: &Bytes) -> Result<Content, Problem> {

@@ -1,6 +1,11 @@
 //! The shared state of the handlers.
 
-use std::{num::NonZeroU64, ops::Deref, sync::Arc, time::Duration};
+use std::{
+    num::NonZeroU64,
+    ops::Deref,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use axum::extract::FromRef;
 
@@ -18,6 +23,7 @@ use super::{
 };
 use crate::{
     calibration::Calibrations,
+    fairness::Client,
     inference::ModelRepository,
     metrics::Metrics,
     pipeline::{PipelineError, WorkerPool},
@@ -75,6 +81,13 @@ impl ApiOptions {
             max_headers: self.max_headers,
             max_header_bytes: self.max_header_bytes,
         }
+    }
+
+    /// Returns the time without progress of the workers after which the server is not ready. Each
+    /// request ends within half of it.
+    #[must_use]
+    pub fn stall_limit(&self) -> Duration {
+        self.request_timeout * 2
     }
 
     /// Options for tests: small bodies, and no access control.
@@ -142,9 +155,14 @@ impl ApiState {
             results,
             metrics,
             readiness,
-            uploads: UploadBudget::new(options.max_upload_bytes, "send fewer at a time, or retry"),
+            uploads: UploadBudget::new(
+                options.max_upload_bytes,
+                options.max_body_bytes,
+                "send fewer at a time, or retry",
+            ),
             unauthenticated_uploads: UploadBudget::new(
                 options.max_upload_bytes / UNAUTHENTICATED_SHARE,
+                1,
                 "send the key in a header, X-API-Key: KEY, or retry",
             ),
             options,
@@ -153,6 +171,15 @@ impl ApiState {
 
     /// Returns the problem while the server is not ready.
     pub(super) fn require_ready(&self) -> Result<(), Problem> {
+        let limit = self.options.stall_limit();
+        if let Some(stall) = self.workers.stall(Instant::now(), limit) {
+            let seconds = stall.since.as_secs();
+            let detail = format!(
+                "no frame has made progress for {seconds} s: the log names them; restart the server \
+                 if it stays so"
+            );
+            return Err(Problem::new(ProblemKind::Stalled, detail));
+        }
         let remote = self.models.remote();
         match self.readiness.phase() {
             Phase::Ready if remote.is_none_or(|remote| remote.is_available()) => Ok(()),
@@ -162,17 +189,25 @@ impl ApiState {
         }
     }
 
-    /// Returns a reader of bodies up to `max_bytes`; `remedy` is the advice for larger ones.
+    /// Returns the time without progress of the workers after which the server is not ready.
+    #[must_use]
+    pub fn stall_limit(&self) -> Duration {
+        self.options.stall_limit()
+    }
+
+    /// Returns a reader of the bodies of a client, up to `max_bytes`; `remedy` is the advice for
+    /// larger ones.
     pub(super) fn body_reader(
         &self,
+        client: &Client,
         max_bytes: usize,
         remedy: &'static str,
         deadline: Deadline,
-    ) -> BodyReader<'_> {
+    ) -> BodyReader {
         BodyReader {
             max_bytes,
             remedy,
-            budget: &self.uploads,
+            budget: self.uploads.of(client),
             least_bytes_per_second: self.options.min_upload_bytes_per_second,
             deadline,
         }

@@ -26,9 +26,10 @@ use crate::{
     access::Scope,
     api::{
         ApiState,
+        caller::Caller,
         http::{
             deadline::Deadline, problem::Problem, query::query_parameters,
-            request_body::UploadBudget, request_id::RequestId,
+            request_body::UploadBudget,
         },
     },
     pipeline::{DetectJob, DetectParameters},
@@ -42,6 +43,8 @@ pub(super) struct Upload {
     pub(super) file_name: Option<String>,
     /// The headers of the request, such as `Accept`.
     pub(super) headers: HeaderMap,
+    /// The caller.
+    pub(super) caller: Caller,
     /// Parameters by name. The names are checked, the values are not.
     pub(super) parameters: Vec<(String, String)>,
     /// The deadline of the response.
@@ -72,9 +75,19 @@ impl FromRequest<ApiState> for Upload {
 
 impl Upload {
     /// Returns the detection job with the parsed parameters.
-    pub(super) fn job(self, parameters: DetectParameters, request_id: &RequestId) -> DetectJob {
-        let id = request_id.as_str();
-        DetectJob::sent(self.image, parameters, id, self.received_at, self.arrived)
+    ///
+    /// # Errors
+    /// [`Problem`] if the caller may not use the priority.
+    pub(super) fn job(self, parameters: DetectParameters) -> Result<DetectJob, Problem> {
+        let ticket = self.caller.ticket_at(parameters.priority)?;
+        let (received_at, arrived) = (self.received_at, self.arrived);
+        Ok(DetectJob::sent(
+            self.image,
+            parameters,
+            ticket,
+            received_at,
+            arrived,
+        ))
     }
 
     /// Reads a frame, alone or in a form whose fields `use_of` classifies by name. The body uses
@@ -87,6 +100,7 @@ impl Upload {
     ) -> Result<Self, Problem> {
         let ReceivedRequest {
             parts,
+            caller,
             body: held,
             deadline,
             received_at,
@@ -103,6 +117,7 @@ impl Upload {
             image: image.into_bytes(),
             file_name,
             headers,
+            caller,
             parameters,
             deadline,
             received_at,

@@ -75,6 +75,18 @@ pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Decod
     }
 }
 
+/// Returns the width and the height that the header of an image states, without decoding a pixel.
+/// `None` if the header cannot be read.
+#[must_use]
+pub fn declared_size(bytes: &[u8]) -> Option<(u32, u32)> {
+    match image::guess_format(bytes).ok()? {
+        ImageFormat::Jpeg => Some(JpegDecoder::new(Cursor::new(bytes)).ok()?.dimensions()),
+        ImageFormat::Png => container::png_size(bytes),
+        ImageFormat::WebP => Some(WebPDecoder::new(Cursor::new(bytes)).ok()?.dimensions()),
+        _ => None,
+    }
+}
+
 fn decode_jpeg(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, DecodeError> {
     let task = Task::new("JPEG", limits);
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| task.refusal(e))?;

@@ -19,6 +19,7 @@ use super::{
     topics::Topics,
 };
 use crate::{
+    fairness::Client,
     metrics::Metrics,
     results::{self, ListenError, ResultStore, StoredReport},
     tls::{ClientTls, TlsError},
@@ -229,7 +230,10 @@ impl Publisher {
 /// Forwards the results to the queue until they end. Never waits for the broker.
 async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<StoredReport>>) {
     loop {
-        match results.listeners().listen(results::Cameras::All) {
+        match results
+            .listeners()
+            .listen(&Client::Only, results::Cameras::All)
+        {
             Ok(mut listening) => {
                 while let Some(report) = listening.next().await {
                     // The receiver of the queue is dropped when the publisher ends.
@@ -238,7 +242,9 @@ async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<Store
             }
             Err(ListenError::Ended) => return,
             // A permit is released when another listener leaves.
-            Err(ListenError::Full { .. }) => sleep(SHORTEST_PAUSE).await,
+            Err(ListenError::Full { .. } | ListenError::ShareUsed { .. }) => {
+                sleep(SHORTEST_PAUSE).await;
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::ParameterError;
-use crate::{imaging::decode::DecodeError, inference::InferenceError};
+use crate::{fairness::Client, imaging::decode::DecodeError, inference::InferenceError};
 
 /// The reason why a frame has no report.
 #[derive(Debug, thiserror::Error)]
@@ -73,6 +73,21 @@ pub enum PipelineError {
     #[error("the queue is full ({capacity} frames): send fewer frames at a time, or retry")]
     Overloaded {
         /// The maximum number of frames that wait or are processed.
+        capacity: usize,
+        /// The estimated time to serve the present frames, at the recent service rate.
+        retry_after: Duration,
+    },
+    /// The client has too many frames in the queue.
+    #[error(
+        "{client} uses its share of the queue already ({share} of {capacity} frames): send fewer \
+         frames at a time, or retry"
+    )]
+    ShareUsed {
+        /// The client.
+        client: Client,
+        /// The maximum number of frames of one client.
+        share: usize,
+        /// The maximum number of frames of all clients.
         capacity: usize,
         /// The estimated time to serve the present frames, at the recent service rate.
         retry_after: Duration,

@@ -6,11 +6,12 @@ use std::{
 };
 
 use super::{
-    Priority,
-    ticket::{Turn, Turns},
+    Ticket,
+    turns::{Turn, Turns},
 };
 
-/// A queue ordered by priority, then by arrival. The caller of `push` bounds its length.
+/// A queue ordered by priority, then by the turns of the clients. The caller of `push` bounds its
+/// length.
 pub(super) struct FrameQueue<T> {
     state: Mutex<State<T>>,
     changed: Condvar,
@@ -34,13 +35,14 @@ impl<T> FrameQueue<T> {
         }
     }
 
-    /// Queues an entry. Returns it as an error if the queue is closed.
-    pub(super) fn push(&self, priority: Priority, entry: T) -> Result<(), T> {
+    /// Queues an entry, which costs its client `cost`. Returns it as an error if the queue is
+    /// closed.
+    pub(super) fn push(&self, ticket: &Ticket, cost: usize, entry: T) -> Result<(), T> {
         let mut state = self.lock();
         if state.closed {
             return Err(entry);
         }
-        let turn = state.turns.next(priority);
+        let turn = state.turns.next(ticket.priority, &ticket.client, cost);
         state.waiting.insert(turn, entry);
         drop(state);
         self.changed.notify_one();
@@ -55,7 +57,9 @@ impl<T> FrameQueue<T> {
                 state.waiting.is_empty() && !state.closed
             })
             .unwrap_or_else(PoisonError::into_inner);
-        state.waiting.pop_first().map(|(_, entry)| entry)
+        let (turn, entry) = state.waiting.pop_first()?;
+        state.turns.end(&turn);
+        Some(entry)
     }
 
     /// Closes the queue for new entries. Waiting entries can still be popped.
@@ -73,24 +77,48 @@ impl<T> FrameQueue<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{fairness::Client, pipeline::Priority};
+
+    fn ticket(level: u32, name: &str) -> Ticket {
+        Ticket {
+            priority: Priority::of_level(level),
+            client: Client::with_key(name),
+            ..Ticket::default()
+        }
+    }
+
+    fn drained<T>(queue: &FrameQueue<T>) -> Vec<T> {
+        queue.close();
+        std::iter::from_fn(|| queue.pop()).collect()
+    }
 
     #[test]
     fn frames_leave_by_priority_then_by_arrival() {
         let queue = FrameQueue::new();
         for (level, name) in [(5, "a"), (9, "b"), (6, "c"), (1, "d"), (7, "e")] {
-            let priority = Priority::of_level(level);
-            queue.push(priority, name).unwrap();
+            queue.push(&ticket(level, "one"), 1, name).unwrap();
         }
-        queue.close();
-        let served: Vec<_> = std::iter::from_fn(|| queue.pop()).collect();
-        assert_eq!(served, ["d", "a", "c", "b", "e"]);
+        assert_eq!(drained(&queue), ["d", "a", "c", "b", "e"]);
+    }
+
+    #[test]
+    fn clients_of_one_priority_take_turns() {
+        let queue = FrameQueue::new();
+        for entry in ["g1", "g2", "g3", "g4"] {
+            queue.push(&ticket(5, "greedy"), 1, entry).unwrap();
+        }
+        queue.push(&ticket(5, "one"), 1, "o1").unwrap();
+        queue.push(&ticket(5, "two"), 1, "t1").unwrap();
+        queue.push(&ticket(5, "one"), 1, "o2").unwrap();
+        let order = ["g1", "o1", "t1", "g2", "o2", "g3", "g4"];
+        assert_eq!(drained(&queue), order);
     }
 
     #[test]
     fn a_closed_queue_returns_new_entries() {
         let queue = FrameQueue::new();
         queue.close();
-        assert_eq!(queue.push(Priority::default(), 7), Err(7));
+        assert_eq!(queue.push(&Ticket::default(), 1, 7), Err(7));
         assert_eq!(queue.pop(), None);
     }
 }

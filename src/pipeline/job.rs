@@ -34,21 +34,21 @@ pub struct DetectJob {
 }
 
 impl DetectJob {
-    /// Creates the job for a frame of a client, with the priority in its parameters.
+    /// Creates the job for a frame of a client.
     #[must_use]
     pub fn sent(
         image: Bytes,
         parameters: DetectParameters,
-        request_id: &str,
+        ticket: Ticket,
         received_at: Timestamp,
         arrived: Instant,
     ) -> Self {
         Self {
-            request_id: request_id.to_owned(),
+            request_id: ticket.request_id.clone(),
             received_at,
             arrived,
             image,
-            ticket: Ticket::of(parameters.priority),
+            ticket,
             parameters,
             calibration: None,
         }

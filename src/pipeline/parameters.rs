@@ -142,8 +142,8 @@ parameter_table! {
         name: "priority",
         kind: ParameterKind::Whole { min: 1, max: 9 },
         default: ParameterDefault::Value("5"),
-        help: "Priority among queued frames: 1 to 3 are high, 4 to 6 normal, 7 to 9 low. Frames of the \
-               same priority are processed in the order of their arrival.",
+        help: "Priority among queued frames: 1 to 3 are high, 4 to 6 normal, 7 to 9 low. Clients of \
+               the same priority take turns. A key may limit the priority (`highest_priority`).",
         example: None,
         interfaces: EVERY_REQUEST,
     };

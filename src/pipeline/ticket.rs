@@ -1,10 +1,12 @@
-//! The ticket of a frame in every queue: its priority, its cancellation token and its timeline.
+//! The ticket of a frame in every queue: its priority, its client, its cancellation token and its
+//! timeline.
 
 use tokio_util::sync::CancellationToken;
 
 use super::Timeline;
+use crate::fairness::Client;
 
-/// The priority of a frame in every queue. Frames of one priority are served in order of arrival.
+/// The priority of a frame in every queue. Within a priority, clients take turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Priority {
     /// Served first.
@@ -26,6 +28,16 @@ impl Priority {
             7.. => Self::Low,
         }
     }
+
+    /// Returns the smallest level of the priority.
+    #[must_use]
+    pub fn highest_level(self) -> u32 {
+        match self {
+            Self::High => 1,
+            Self::Normal => 4,
+            Self::Low => 7,
+        }
+    }
 }
 
 /// Travels with a frame through every queue.
@@ -33,6 +45,12 @@ impl Priority {
 pub struct Ticket {
     /// The priority of the frame.
     pub priority: Priority,
+    /// The client whose turns and budgets the frame uses.
+    pub client: Client,
+    /// The ID of the request for logs; empty if it has none.
+    pub request_id: String,
+    /// The width of the annotated image that the response draws, pixels; 0 for none.
+    pub drawn_width: u32,
     /// The token that is cancelled when the client disconnects. Work that has not begun is skipped.
     pub withdrawn: CancellationToken,
     /// The times at which the frame entered and left each stage.
@@ -46,29 +64,6 @@ impl Ticket {
         Self {
             priority,
             ..Self::default()
-        }
-    }
-}
-
-/// A position in a queue, ordered by priority, then by arrival.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Turn {
-    priority: Priority,
-    arrival: u64,
-}
-
-/// Assigns positions in a queue.
-#[derive(Debug, Default)]
-pub(super) struct Turns {
-    arrivals: u64,
-}
-
-impl Turns {
-    pub(super) fn next(&mut self, priority: Priority) -> Turn {
-        self.arrivals += 1;
-        Turn {
-            priority,
-            arrival: self.arrivals,
         }
     }
 }

@@ -55,6 +55,8 @@ pub struct Timeline(Arc<Mutex<Stages>>);
 struct Stages {
     over: Vec<StageSpan>,
     now: Option<(Stage, Instant)>,
+    /// The last sign of progress: a change of the stage, or a batch of views.
+    progressed: Option<Instant>,
 }
 
 impl Stages {
@@ -66,9 +68,14 @@ impl Stages {
         last.map_or(at, |last| last.max(at))
     }
 
+    fn progress(&mut self, at: Instant) {
+        self.progressed = self.progressed.max(Some(at));
+    }
+
     fn leave(&mut self, at: Instant) {
         if let Some((stage, began)) = self.now.take() {
             let ended = at.max(began);
+            self.progress(ended);
             self.over.push(StageSpan {
                 stage,
                 began,
@@ -103,6 +110,7 @@ impl Timeline {
     /// Records that the frame leaves its current stage and enters `stage`.
     pub(super) fn enter(&self, stage: Stage, at: Instant) {
         let mut stages = self.lock();
+        stages.progress(at);
         if stages.now.is_none_or(|(now, _)| now != stage) {
             let at = stages.not_before_the_last(at);
             stages.leave(at);
@@ -113,6 +121,17 @@ impl Timeline {
     /// Records that the frame leaves its current stage.
     pub(super) fn leave(&self, at: Instant) {
         self.lock().leave(at);
+    }
+
+    /// Records that the work of the current stage progresses.
+    pub(super) fn progress(&self, at: Instant) {
+        self.lock().progress(at);
+    }
+
+    /// Returns the current stage and the time of the last progress.
+    pub(super) fn standing(&self) -> (Option<Stage>, Option<Instant>) {
+        let stages = self.lock();
+        (stages.now.map(|(stage, _)| stage), stages.progressed)
     }
 
     fn lock(&self) -> MutexGuard<'_, Stages> {

@@ -8,17 +8,24 @@ use std::{
         atomic::{AtomicU64, Ordering},
     },
     thread::JoinHandle,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    DetectJob, Detected, Engine, PipelineError, Stage, Ticket, ViewsJob, error::internal,
-    frame_queue::FrameQueue, service_rate::ServiceRate,
+    DetectJob, Detected, Engine, PipelineError, Stage, Stall, Ticket, ViewsJob,
+    error::internal,
+    frame_cost,
+    frame_queue::FrameQueue,
+    in_flight::{InFlight, Place},
+    service_rate::ServiceRate,
 };
-use crate::inference::HeadOutput;
+use crate::{
+    fairness::{BudgetError, Client, SharedBudget},
+    inference::HeadOutput,
+};
 
 /// The whole work on a frame, including the channel that returns the result to the caller.
 type Work = Box<dyn FnOnce(&Engine) -> Done + Send>;
@@ -36,8 +43,8 @@ struct Entry {
     work: Work,
     /// The tracing span to which the log lines of the work belong.
     request: tracing::Span,
-    /// The permit, held until the work has ended, even when its client has disconnected.
-    place: OwnedSemaphorePermit,
+    /// The permits, held until the work has ended, even when its client has disconnected.
+    place: Place,
 }
 
 /// Named threads that run the engine on a bounded number of frames.
@@ -49,14 +56,15 @@ pub struct WorkerPool {
 struct Shared {
     engine: Arc<Engine>,
     queue: FrameQueue<Entry>,
-    places: Arc<Semaphore>,
-    capacity: NonZeroUsize,
+    budget: SharedBudget,
+    in_flight: Arc<InFlight>,
     rate: Mutex<ServiceRate>,
     withdrawn: AtomicU64,
 }
 
 impl WorkerPool {
-    /// Starts `workers` threads. At most `capacity` frames may be queued or in progress.
+    /// Starts `workers` threads. At most `capacity` frames of a usual size may be queued or in
+    /// progress, and half of them may be of one client. Larger frames cost more permits.
     ///
     /// # Errors
     /// An I/O error when the operating system cannot start a thread.
@@ -68,8 +76,8 @@ impl WorkerPool {
         let shared = Arc::new(Shared {
             engine: Arc::clone(engine),
             queue: FrameQueue::new(),
-            places: Arc::new(Semaphore::new(capacity.get())),
-            capacity,
+            budget: SharedBudget::new(capacity.get()),
+            in_flight: Arc::default(),
             rate: Mutex::default(),
             withdrawn: AtomicU64::new(0),
         });
@@ -95,8 +103,8 @@ impl WorkerPool {
     /// has not begun is skipped.
     ///
     /// # Errors
-    /// [`PipelineError::Overloaded`] at once when the queue is full,
-    /// [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise the error of the
+    /// [`PipelineError::Overloaded`] at once when the queue is full, [`PipelineError::ShareUsed`]
+    /// when the client has too many frames in it, [`PipelineError::ShuttingDown`] after [`WorkerPool::shut_down`], otherwise the error of the
     /// engine.
     pub async fn detect(&self, job: DetectJob) -> Result<Detected, PipelineError> {
         self.detect_and(job, |detected| detected).await
@@ -114,8 +122,9 @@ impl WorkerPool {
     ) -> Result<T, PipelineError> {
         let ticket = job.ticket.clone();
         ticket.timeline.enter(Stage::Queue, job.arrived);
+        let cost = frame_cost::of_frame(&job);
         let work = move |engine: &Engine| engine.detect(&job).map(finish);
-        self.queue(ticket, work).await
+        self.queue(ticket, cost, work).await
     }
 
     /// Queues views rendered by the client and waits for their detections. Otherwise the same as
@@ -130,41 +139,42 @@ impl WorkerPool {
     ) -> Result<T, PipelineError> {
         let ticket = job.ticket.clone();
         ticket.timeline.enter(Stage::Queue, job.arrived);
+        let cost = frame_cost::of_views(&job);
         let work = move |engine: &Engine| engine.infer_views(&job).map(finish);
-        self.queue(ticket, work).await
+        self.queue(ticket, cost, work).await
     }
 
-    /// Runs other slow work, such as drawing, at normal priority. It takes a permit like a frame,
-    /// so its amount is bounded. Dropping the future withdraws work that has not begun, and cancels
+    /// Runs other slow work, such as drawing. It takes a permit like a frame, so its amount is
+    /// bounded. Dropping the future withdraws work that has not begun, and cancels
     /// the token passed to the work so that long work can stop.
     ///
     /// # Errors
     /// The same as [`WorkerPool::detect`].
     pub async fn run<T: Send + 'static>(
         &self,
+        ticket: Ticket,
         work: impl FnOnce(&CancellationToken) -> T + Send + 'static,
     ) -> Result<T, PipelineError> {
-        let ticket = Ticket::default();
         let withdrawn = ticket.withdrawn.clone();
-        self.queue(ticket, move |_: &Engine| Ok(work(&withdrawn)))
+        self.queue(ticket, 1, move |_: &Engine| Ok(work(&withdrawn)))
             .await
     }
 
     async fn queue<T: Send + 'static>(
         &self,
         ticket: Ticket,
+        cost: usize,
         work: impl FnOnce(&Engine) -> Result<T, PipelineError> + Send + 'static,
     ) -> Result<T, PipelineError> {
-        let places = Arc::clone(&self.shared.places);
-        let Ok(place) = places.try_acquire_owned() else {
-            return Err(self.overloaded());
-        };
+        let cost = cost.min(self.shared.budget.share());
+        let permits = self.shared.budget.take(&ticket.client, cost);
+        let permits = permits.map_err(|error| self.refusal(error, &ticket.client))?;
+        let place = self.shared.in_flight.add(&ticket, permits, Instant::now());
         let _withdrawal = ticket.withdrawn.clone().drop_guard();
         let (answer, waiting) = oneshot::channel();
         self.shared.rate().began(Instant::now());
-        let priority = ticket.priority;
         let entry = Entry {
-            ticket,
+            ticket: ticket.clone(),
             work: Box::new(|engine| {
                 let outcome = catch_unwind(AssertUnwindSafe(|| work(engine)));
                 let panicked = || internal(anyhow::anyhow!("a worker panicked on a frame"));
@@ -178,22 +188,21 @@ impl WorkerPool {
             request: tracing::Span::current(),
             place,
         };
-        let queued = self.shared.queue.push(priority, entry);
+        let queued = self.shared.queue.push(&ticket, cost, entry);
         queued.map_err(|_| PipelineError::ShuttingDown)?;
         // The sender of a withdrawn frame is dropped without an answer.
         waiting.await.unwrap_or(Err(PipelineError::Withdrawn))
     }
 
-    /// Checks whether the queue has a free permit, so that a request can be refused before its body
-    /// is read.
+    /// Checks whether the queue has a free permit for a client, so that a request can be refused
+    /// before its body is read.
     ///
     /// # Errors
-    /// [`PipelineError::Overloaded`] when the queue is full.
-    pub fn admits(&self) -> Result<(), PipelineError> {
-        if self.shared.places.available_permits() == 0 {
-            return Err(self.overloaded());
-        }
-        Ok(())
+    /// [`PipelineError::Overloaded`] when the queue is full, [`PipelineError::ShareUsed`] when the
+    /// client has too many frames in it.
+    pub fn admits(&self, client: &Client) -> Result<(), PipelineError> {
+        let checked = self.shared.budget.check(client, 1);
+        checked.map_err(|error| self.refusal(error, client))
     }
 
     /// Returns the number of frames queued or in progress.
@@ -208,6 +217,30 @@ impl WorkerPool {
         self.shared.withdrawn.load(Ordering::Relaxed)
     }
 
+    /// Returns the stall of the pool: there is work, and for at least `limit` none has progressed.
+    #[must_use]
+    pub fn stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
+        self.shared.in_flight.stall(now, limit)
+    }
+
+    /// Returns a stall like [`WorkerPool::stall`], but each only once, for the log.
+    #[must_use]
+    pub fn new_stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
+        self.shared.in_flight.new_stall(now, limit)
+    }
+
+    /// Returns the number of stalls that [`WorkerPool::new_stall`] has returned.
+    #[must_use]
+    pub fn stalls(&self) -> u64 {
+        self.shared.in_flight.stalls()
+    }
+
+    /// Returns the time since the last progress. Zero without work.
+    #[must_use]
+    pub fn quiet_for(&self, now: Instant) -> Duration {
+        self.shared.in_flight.quiet_for(now)
+    }
+
     /// Refuses new frames, finishes the queued frames and ends the threads. Blocks.
     pub fn shut_down(&self) {
         self.shared.queue.close();
@@ -218,10 +251,20 @@ impl WorkerPool {
         }
     }
 
-    fn overloaded(&self) -> PipelineError {
-        PipelineError::Overloaded {
-            capacity: self.shared.capacity.get(),
-            retry_after: self.shared.rate().time_for(self.pending()),
+    fn refusal(&self, error: BudgetError, client: &Client) -> PipelineError {
+        let capacity = self.shared.budget.total();
+        let retry_after = self.shared.rate().time_for(self.pending());
+        match error {
+            BudgetError::Full => PipelineError::Overloaded {
+                capacity,
+                retry_after,
+            },
+            BudgetError::ShareUsed { share } => PipelineError::ShareUsed {
+                client: client.clone(),
+                share,
+                capacity,
+                retry_after,
+            },
         }
     }
 }
@@ -239,13 +282,15 @@ impl Shared {
             let _in_request = request.enter();
             if ticket.withdrawn.is_cancelled() {
                 self.withdrawn.fetch_add(1, Ordering::Relaxed);
-                drop((work, place));
+                drop(work);
+                place.end(Instant::now());
                 self.rate().given_up(self.pending());
                 continue;
             }
+            place.begin(Instant::now());
             let done = work(&self.engine);
             // A client that sends the next frame after this answer must find the permit free.
-            drop(place);
+            place.end(Instant::now());
             self.rate().ended(Instant::now(), self.pending());
             if done.withdrawn {
                 self.withdrawn.fetch_add(1, Ordering::Relaxed);
@@ -255,7 +300,7 @@ impl Shared {
     }
 
     fn pending(&self) -> usize {
-        self.capacity.get() - self.places.available_permits()
+        self.in_flight.count()
     }
 
     fn rate(&self) -> MutexGuard<'_, ServiceRate> {

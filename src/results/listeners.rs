@@ -10,16 +10,30 @@ use std::{
 use tokio::sync::mpsc;
 
 use super::{Cameras, StoredReport};
+use crate::fairness::{BudgetError, BudgetShare, Client, SharedBudget};
 
 /// Most reports that wait for a listener.
 const QUEUE: usize = 64;
 
 /// The reason why a new listener is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ListenError {
     /// The maximum number of listeners is reached.
     #[error("all {most} permitted listeners are connected (results.max_listeners)")]
     Full {
+        /// The maximum number of listeners.
+        most: usize,
+    },
+    /// The client has too many listeners.
+    #[error(
+        "{client} uses its share of the listeners already ({share} of {most}, \
+         results.max_listeners): close event streams, or retry"
+    )]
+    ShareUsed {
+        /// The client.
+        client: Client,
+        /// The maximum number of listeners of one client.
+        share: usize,
         /// The maximum number of listeners.
         most: usize,
     },
@@ -31,26 +45,25 @@ pub enum ListenError {
 /// All listeners.
 #[derive(Debug)]
 pub struct Listeners {
-    most: NonZeroUsize,
+    /// The permits, including those of dropped listeners that have not noticed yet.
+    budget: SharedBudget,
     group: Mutex<Group>,
 }
 
 #[derive(Debug, Default)]
 struct Group {
     ended: bool,
-    /// Permits in use, including those of dropped listeners that have not noticed yet.
-    places: usize,
     dropped: u64,
     last_number: u64,
     queues: HashMap<Cameras, HashMap<u64, mpsc::Sender<Arc<StoredReport>>>>,
 }
 
 impl Listeners {
-    /// Creates a group of at most `most` listeners.
+    /// Creates a group of at most `most` listeners, of which half may be of one client.
     #[must_use]
     pub fn new(most: NonZeroUsize) -> Self {
         Self {
-            most,
+            budget: SharedBudget::new(most.get()),
             group: Mutex::default(),
         }
     }
@@ -58,17 +71,26 @@ impl Listeners {
     /// Adds a listener that receives everything published from now on.
     ///
     /// # Errors
-    /// [`ListenError`] when all permits are in use, or the server is shutting down.
-    pub fn listen(self: &Arc<Self>, to: Cameras) -> Result<Listening, ListenError> {
+    /// [`ListenError`] when all permits, or those of the client, are in use, or the server is
+    /// shutting down.
+    pub fn listen(
+        self: &Arc<Self>,
+        client: &Client,
+        to: Cameras,
+    ) -> Result<Listening, ListenError> {
         let mut group = self.group();
         if group.ended {
             return Err(ListenError::Ended);
         }
-        let most = self.most.get();
-        if group.places >= most {
-            return Err(ListenError::Full { most });
-        }
-        group.places += 1;
+        let most = self.budget.total();
+        let permit = self.budget.take(client, 1).map_err(|error| match error {
+            BudgetError::Full => ListenError::Full { most },
+            BudgetError::ShareUsed { share } => ListenError::ShareUsed {
+                client: client.clone(),
+                share,
+                most,
+            },
+        })?;
         group.last_number += 1;
         let number = group.last_number;
         let (sender, queue) = mpsc::channel(QUEUE);
@@ -79,6 +101,7 @@ impl Listeners {
             to,
             number,
             listeners: Arc::clone(self),
+            _permit: permit,
         })
     }
 
@@ -115,7 +138,7 @@ impl Listeners {
     /// The number of permits in use.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.group().places
+        self.budget.used()
     }
 
     /// The number of listeners that were dropped because they did not keep up.
@@ -131,7 +154,6 @@ impl Listeners {
 
     fn leave(&self, to: &Cameras, number: u64) {
         let mut group = self.group();
-        group.places -= 1;
         if let Some(queues) = group.queues.get_mut(to) {
             queues.remove(&number);
             if queues.is_empty() {
@@ -148,6 +170,7 @@ pub struct Listening {
     to: Cameras,
     number: u64,
     listeners: Arc<Listeners>,
+    _permit: BudgetShare,
 }
 
 impl Listening {

@@ -22,7 +22,8 @@ settings! {
         /// The interval in seconds at which that file is checked for changes. 0: never. An invalid
         /// new version leaves the old keys in use and shows in the log.
         poll_seconds: Option<NonZeroU64> = NonZeroU64::new(2) => poll_seconds();
-        /// Keys in addition to those of the file, each as `name:scope+scope:sha256`.
+        /// Keys in addition to those of the file, each as `name:scope+scope:sha256`, with
+        /// `:highest_priority` behind it where that is not 5.
         keys: KeyList = KeyList::default() => keys();
         /// Origins of web pages that may call the server from a browser, such as
         /// `https://dashboard.example`.

@@ -59,7 +59,7 @@ settings! {
         /// first.
         max_pictures => count();
         /// The most event streams and requests that wait for a newer report. Further ones are
-        /// answered with 429.
+        /// answered with 429. One of several clients may have half of them.
         max_listeners => count();
     }
 }

@@ -332,8 +332,8 @@ async fn forms_without_a_known_key_leave_memory_to_others() {
     let service = guarded_within(
         "detect",
         Bounds {
-            // The share of forms with the key inside holds one of them.
-            max_upload_bytes: 8 * image.len() * 3 / 2,
+            // The share of one client in forms with the key inside holds one of them.
+            max_upload_bytes: 8 * image.len() * 3,
             ..Bounds::default()
         },
     );

@@ -2,6 +2,7 @@
 //! lens that the program defines.
 
 mod answers;
+mod complexity;
 mod damage;
 mod export;
 mod published;

@@ -14,13 +14,14 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 
 from harness.machine import made  # noqa: E402
 from harness.processes import BenchError  # noqa: E402
-from proofs import clock, contract, descriptors, disk, kill, memory, overload, reload, rude, soak, stop  # noqa: E402
+from proofs import clock, contract, descriptors, disk, fairness, floods, kill, memory, overload, reload  # noqa: E402
+from proofs import rude, soak, stop  # noqa: E402
 from support.effort import LONG, SHORT  # noqa: E402
 from support.places import WORK  # noqa: E402
 from support.row import Row  # noqa: E402
 from support.tell import markdown  # noqa: E402
 
-PARTS = (contract, kill, stop, reload, disk, descriptors, memory, clock, rude, overload, soak)
+PARTS = (contract, kill, stop, reload, disk, descriptors, memory, clock, rude, floods, fairness, overload, soak)
 EFFORTS = {effort.name: effort for effort in (SHORT, LONG)}
 
 

@@ -9,19 +9,20 @@ use source_scan::{absolute, code, names_crate, sources, used_paths};
 
 /// Every module, and the modules of this crate it may use. A row for a part of a module replaces
 /// the row of the module for the files of that part.
-const MAY_USE: [(&str, &[&str]); 32] = [
+const MAY_USE: [(&str, &[&str]); 33] = [
     ("plain_name", &[]),
     ("quoted", &[]),
     ("watched_file", &[]),
     ("access", &["plain_name", "watched_file"]),
     ("revision", &[]),
     ("warning", &[]),
+    ("fairness", &[]),
     ("geometry", &[]),
     ("detection", &[]),
     ("metrics", &[]),
     ("shutdown", &[]),
     ("poller", &[]),
-    ("results", &[]),
+    ("results", &["fairness"]),
     ("open_inference", &[]),
     ("imaging", &["geometry"]),
     (
@@ -34,7 +35,7 @@ const MAY_USE: [(&str, &[&str]); 32] = [
     ),
     ("tls", &["metrics", "watched_file"]),
     ("server", &["metrics", "shutdown", "tls"]),
-    ("mqtt", &["metrics", "results", "tls"]),
+    ("mqtt", &["fairness", "metrics", "results", "tls"]),
     (
         "settings",
         &["access", "inference", "mqtt", "results", "server", "tls"],
@@ -44,6 +45,7 @@ const MAY_USE: [(&str, &[&str]); 32] = [
     (
         "pipeline",
         &[
+            "fairness",
             "geometry",
             "detection",
             "imaging",
@@ -113,6 +115,7 @@ const MAY_USE: [(&str, &[&str]); 32] = [
             "access",
             "annotated_image",
             "annotation_formats",
+            "fairness",
             "geometry",
             "detection",
             "imaging",

@@ -112,3 +112,22 @@ fn more_than_a_thousand_keys_are_refused() {
     let refusal = KeyList::from_toml(&lines(MAX_KEYS + 1)).unwrap_err();
     assert!(refusal.to_string().contains("more than 1000"));
 }
+
+#[test]
+fn a_key_states_its_highest_priority_or_has_the_default() {
+    let digest = digest_of("one");
+    let level_of = |list: KeyList| list.holder_of(b"one").unwrap().highest_priority.get();
+    for (given, expected) in [("", 5), (", highest_priority = 1", 1)] {
+        let text = format!("gate = {{ scopes = [\"read\"], sha256 = \"{digest}\"{given} }}");
+        assert_eq!(level_of(KeyList::from_toml(&text).unwrap()), expected);
+    }
+    for (given, expected) in [("", 5), (":9", 9)] {
+        let text = format!("gate:read:{digest}{given}");
+        assert_eq!(level_of(text.parse().unwrap()), expected);
+    }
+    for wrong in ["0", "10", "high", "-1"] {
+        let text = format!("gate:read:{digest}:{wrong}");
+        let message = text.parse::<KeyList>().unwrap_err().to_string();
+        assert!(message.contains("1 (highest) to 9"), "{message}");
+    }
+}

@@ -25,8 +25,13 @@ pub enum Access {
 }
 
 impl Access {
-    /// Checks that the keys allow `wanted` to the request with these headers.
-    pub(in crate::api) fn check(&self, headers: &HeaderMap, wanted: Scope) -> Result<(), Problem> {
+    /// Checks that the keys allow `wanted` to the request with these headers. Returns the holder of
+    /// its key, if there are keys.
+    pub(in crate::api) fn check(
+        &self,
+        headers: &HeaderMap,
+        wanted: Scope,
+    ) -> Result<Option<Holder>, Problem> {
         self.check_with(headers, None, wanted)
     }
 
@@ -36,9 +41,9 @@ impl Access {
         headers: &HeaderMap,
         in_form: Option<&str>,
         wanted: Scope,
-    ) -> Result<(), Problem> {
+    ) -> Result<Option<Holder>, Problem> {
         let Self::Keys(keys) = self else {
-            return Ok(());
+            return Ok(None);
         };
         let key = only_key(shown_keys(headers).chain(in_form.map(str::as_bytes)))?;
         let holder = keys.holder_of(key).ok_or_else(|| {
@@ -47,7 +52,7 @@ impl Access {
             Problem::new(ProblemKind::KeyRequired, detail)
         })?;
         if holder.scopes.allow(wanted) {
-            return Ok(());
+            return Ok(Some(holder));
         }
         let detail = format!(
             "the key {} has the scope {}: this needs a key with the scope {wanted}",
@@ -86,7 +91,7 @@ impl Access {
                               others, too (server.listen)";
                 Err(Problem::new(ProblemKind::Forbidden, detail))
             }
-            _ => self.check(headers, wanted),
+            _ => self.check(headers, wanted).map(drop),
         }
     }
 }

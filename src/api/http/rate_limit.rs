@@ -19,12 +19,12 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use self::buckets::{Buckets, Client, Standing};
+use self::buckets::{Buckets, Standing};
 use super::{
     access::Access,
     problem::{Problem, ProblemKind},
 };
-//{Problem, ProblemKind};
+use crate::fairness::Client;
 
 pub(in crate::api) const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 pub(in crate::api) const RATE_LIMIT_POLICY: HeaderName =
@@ -78,7 +78,7 @@ impl RateLimiter {
             address.map(SocketAddr::ip)
         };
         match self.access.holder(request.headers()) {
-            Some(holder) => Client::Key(holder.name.to_string()),
+            Some(holder) => Client::with_key(holder.name.as_str()),
             None => address().map_or(Client::Others, Client::at),
         }
     }

@@ -24,17 +24,17 @@ pub(in crate::api) use self::{
 };
 
 /// The limits of a body.
-pub(in crate::api) struct BodyReader<'a> {
+pub(in crate::api) struct BodyReader {
     pub(in crate::api) max_bytes: usize,
     /// The advice for a larger body.
     pub(in crate::api) remedy: &'static str,
-    pub(in crate::api) budget: &'a UploadBudget,
+    pub(in crate::api) budget: UploadBudget,
     /// Least rate; `None` for no limit.
     pub(in crate::api) least_bytes_per_second: Option<NonZeroU64>,
     pub(in crate::api) deadline: Deadline,
 }
 
-impl BodyReader<'_> {
+impl BodyReader {
     /// Reads a whole body.
     pub(in crate::api) async fn read(
         &self,

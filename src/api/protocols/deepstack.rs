@@ -18,10 +18,7 @@ use self::{
 use crate::{
     api::{
         ApiState,
-        http::{
-            problem::{Problem, ProblemKind},
-            request_id::RequestId,
-        },
+        http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
         run_detection::run_detection,
     },
@@ -45,11 +42,10 @@ pub(in crate::api) use failures::with_failures;
 )]
 pub(in crate::api) async fn detect_as_deepstack(
     State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     upload: DeepStackUpload,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
-    answer(&state, &trace, upload, None, &request_id).await
+    answer(&state, &trace, upload, None).await
 }
 
 /// Detect persons with a calibration (DeepStack)
@@ -68,7 +64,6 @@ pub(in crate::api) async fn detect_as_deepstack(
 pub(in crate::api) async fn detect_as_deepstack_with(
     State(state): State<ApiState>,
     Path(calibration): Path<String>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     upload: DeepStackUpload,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
@@ -76,7 +71,7 @@ pub(in crate::api) async fn detect_as_deepstack_with(
     let calibration: CalibrationId = calibration
         .parse()
         .map_err(|error| Problem::new(ProblemKind::UnknownCalibration, format!("{error}")))?;
-    answer(&state, &trace, upload, Some(calibration), &request_id).await
+    answer(&state, &trace, upload, Some(calibration)).await
 }
 
 async fn answer(
@@ -84,11 +79,10 @@ async fn answer(
     trace: &RequestTrace,
     DeepStackUpload(upload): DeepStackUpload,
     calibration: Option<CalibrationId>,
-    request_id: &RequestId,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
     let limit = upload.deadline;
     trace.stage("upload", limit.began().into_std(), upload.arrived);
-    let job = form::job(upload, calibration, request_id)?;
+    let job = form::job(upload, calibration)?;
     let written = run_detection(state, trace, limit, job, |found| {
         Ok(DeepStackAnswer::from(found.report))
     });

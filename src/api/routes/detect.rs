@@ -11,7 +11,7 @@ use crate::{
     api::{
         ApiState,
         answer::AnswerOptions,
-        http::{problem::Problem, query::pairs, request_id::RequestId},
+        http::{problem::Problem, query::pairs},
         openapi::{DetectForm, DetectQuery, RawBytes},
         report::Report,
         report_headers::report_headers,
@@ -62,13 +62,12 @@ use crate::{
 )]
 pub(in crate::api) async fn detect_persons(
     State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     upload: Upload,
 ) -> Result<impl IntoResponse, Problem> {
     let deadline = upload.deadline;
     trace.stage("upload", deadline.began().into_std(), upload.arrived);
-    let (job, answer) = job(upload, &request_id)?;
+    let (job, answer) = job(upload)?;
     let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
     let (report, content) = run_detection(&state, &trace, deadline, job, write).await?;
     let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
@@ -79,9 +78,11 @@ pub(in crate::api) async fn detect_persons(
     ))
 }
 
-fn job(mut upload: Upload, request_id: &RequestId) -> Result<(DetectJob, AnswerOptions), Problem> {
+fn job(mut upload: Upload) -> Result<(DetectJob, AnswerOptions), Problem> {
     let parameters = &mut upload.parameters;
     let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
     let parameters = DetectParameters::parse(pairs(parameters))?;
-    Ok((upload.job(parameters, request_id), answer))
+    let mut job = upload.job(parameters)?;
+    job.ticket.drawn_width = answer.drawn_width();
+    Ok((job, answer))
 }

@@ -1,6 +1,6 @@
 //! Health checks and metrics.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, time::Instant};
 
 use axum::{
     Json,
@@ -110,8 +110,9 @@ pub(in crate::api) async fn livez() -> Json<Health> {
 
 /// Check readiness
 ///
-/// Ready after the first run of the models, unless the inference server does not respond or the
-/// server is shutting down. Invalid calibration files and an unreachable result store are reported,
+/// Ready after the first run of the models, unless the inference server does not respond, frames
+/// make no progress for twice `server.request_timeout_millis`, or the server is shutting down.
+/// Invalid calibration files and an unreachable result store are reported,
 /// but the server stays ready: the previous calibrations remain in use.
 #[utoipa::path(
     get, path = "/readyz", tag = "operation", operation_id = "get_readiness",
@@ -150,6 +151,8 @@ pub(in crate::api) async fn metrics(
     state
         .metrics
         .show_frames(workers.pending(), workers.withdrawn());
+    let quiet = workers.quiet_for(Instant::now());
+    state.metrics.show_progress(quiet, workers.stalls());
     show_models(&state);
     show_remote(&state);
     show_calibrations(&state);

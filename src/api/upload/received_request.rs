@@ -13,6 +13,7 @@ use crate::{
     access::Scope,
     api::{
         ApiState,
+        caller::Caller,
         http::{
             deadline::Deadline,
             problem::Problem,
@@ -25,6 +26,8 @@ use crate::{
 /// A complete detection request. As an extractor, it also checks the scope `detect`.
 pub(in crate::api) struct ReceivedRequest {
     pub(in crate::api) parts: Parts,
+    /// The caller by the key in the headers.
+    pub(in crate::api) caller: Caller,
     pub(in crate::api) body: Held<Bytes>,
     /// The deadline of the response.
     pub(in crate::api) deadline: Deadline,
@@ -56,17 +59,20 @@ impl ReceivedRequest {
         if state.readiness.phase() == Phase::WarmingUp {
             return Err(Problem::warming_up());
         }
+        let caller = Caller::of(&parts, state);
         // A frame that finds no place in the queue is refused before its body is read.
-        state.workers.admits()?;
+        state.workers.admits(&caller.client)?;
         let deadline = Deadline::of(&parts, state);
+        let max_bytes = state.options.max_body_bytes;
         let remedy = "send a smaller image or raise server.max_body_bytes";
         let reader = BodyReader {
-            budget,
-            ..state.body_reader(state.options.max_body_bytes, remedy, deadline)
+            budget: budget.of(&caller.client),
+            ..state.body_reader(&caller.client, max_bytes, remedy, deadline)
         };
         let body = reader.read(&parts.headers, body).await?;
         Ok(Self {
             parts,
+            caller,
             body,
             deadline,
             received_at,

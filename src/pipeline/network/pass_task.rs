@@ -113,6 +113,7 @@ impl PassTask {
         found: impl Iterator<Item = Vec<ViewDetection>>,
         work: Work,
     ) {
+        self.ticket.timeline.progress(work.ended);
         let mut progress = self.lock();
         progress.missing -= views.len();
         for (slot, found) in progress.per_view[views].iter_mut().zip(found) {

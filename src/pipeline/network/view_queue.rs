@@ -12,7 +12,7 @@ use crate::{
     inference::Model,
     pipeline::{
         PipelineError,
-        ticket::{Turn, Turns},
+        turns::{Turn, Turns},
     },
 };
 
@@ -60,7 +60,9 @@ impl ViewQueue {
             return;
         }
         let mut state = self.lock();
-        let turn = state.turns.next(task.ticket.priority);
+        let ticket = &task.ticket;
+        let cost = task.rig.view_count();
+        let turn = state.turns.next(ticket.priority, &ticket.client, cost);
         let waiting = Waiting { task, next_view: 0 };
         state.waiting.insert(turn, waiting);
         drop(state);
@@ -113,13 +115,11 @@ impl ViewQueue {
 impl State {
     /// Drops the views of failed tasks and of tasks whose client has disconnected.
     fn drop_pointless(&mut self) {
-        self.waiting.retain(|_, waiting| {
-            let pointless = waiting.task.is_pointless();
-            if pointless {
-                waiting.task.fail(PipelineError::Withdrawn);
-            }
-            !pointless
-        });
+        let pointless = |_: &Turn, waiting: &mut Waiting| waiting.task.is_pointless();
+        for (turn, waiting) in self.waiting.extract_if(.., pointless) {
+            waiting.task.fail(PipelineError::Withdrawn);
+            self.turns.end(&turn);
+        }
     }
 
     /// Returns the number of views queued for a model.
@@ -148,7 +148,10 @@ impl State {
             room -= end - waiting.next_view;
             waiting.next_view = end;
         }
-        self.waiting.retain(|_, waiting| waiting.views_left() > 0);
+        let is_claimed = |_: &Turn, waiting: &mut Waiting| waiting.views_left() == 0;
+        for (turn, _) in self.waiting.extract_if(.., is_claimed) {
+            self.turns.end(&turn);
+        }
         claims
     }
 }

@@ -65,14 +65,67 @@ async fn a_full_queue_refuses_frames_until_it_has_drained() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_costly_frame_takes_more_permits_but_at_most_half() {
+    // 128 views and more cost 5 permits, of which 4 are half of the queue.
+    let (pool, begins, go) = gated_pool(8);
+    let paper = || {
+        let image = frame_with_disc(100, [30.0, 50.0], 8.0);
+        job(image, &[("profile", "paper")])
+    };
+    let first = spawn(&pool);
+    begins.recv().unwrap();
+    let costly = Arc::clone(&pool);
+    let costly = tokio::spawn(async move { costly.detect(paper()).await.map(drop) });
+    until_pending(&pool, 2).await;
+    let refused = pool.detect(paper()).await.unwrap_err();
+    assert!(matches!(refused, PipelineError::Overloaded { .. }));
+    let others: Vec<_> = (0..3).map(|_| spawn(&pool)).collect();
+    until_pending(&pool, 5).await;
+    assert!(pool.admits(&Client::Only).is_err());
+    costly.abort();
+    for _ in 0..4 {
+        go.send(()).unwrap();
+    }
+    first.await.unwrap().unwrap();
+    for other in others {
+        other.await.unwrap().unwrap();
+    }
+    until_pending(&pool, 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_client_leaves_half_of_the_queue_to_others() {
+    let (pool, begins, go) = gated_pool(4);
+    let detect = |name: &str| {
+        let (pool, mut job) = (Arc::clone(&pool), direct_job());
+        job.ticket.client = Client::with_key(name);
+        tokio::spawn(async move { pool.detect(job).await.map(drop) })
+    };
+    let greedy = [detect("greedy"), detect("greedy")];
+    until_pending(&pool, 2).await;
+    begins.recv().unwrap();
+    let refused = detect("greedy").await.unwrap().unwrap_err().to_string();
+    let expected = "the key greedy uses its share of the queue already (2 of 4 frames)";
+    assert!(refused.starts_with(expected), "{refused}");
+    let modest = detect("modest");
+    until_pending(&pool, 3).await;
+    for _ in 0..3 {
+        go.send(()).unwrap();
+    }
+    for frame in greedy.into_iter().chain([modest]) {
+        frame.await.unwrap().unwrap();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn other_work_takes_a_permit_and_waits_for_its_turn() {
     let (pool, begins, go) = gated_pool(2);
     let first = spawn(&pool);
     begins.recv().unwrap();
     let others = Arc::clone(&pool);
-    let other = tokio::spawn(async move { others.run(|_| 7).await });
+    let other = tokio::spawn(async move { others.run(Ticket::default(), |_| 7).await });
     until_pending(&pool, 2).await;
-    let refused = pool.run(|_| 8).await.unwrap_err();
+    let refused = pool.run(Ticket::default(), |_| 8).await.unwrap_err();
     assert!(matches!(
         refused,
         PipelineError::Overloaded { capacity: 2, .. }

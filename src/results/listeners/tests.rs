@@ -28,8 +28,8 @@ fn lobby() -> Cameras {
 #[tokio::test]
 async fn listeners_receive_reports_of_their_camera_or_of_all() {
     let listeners = room_for(2);
-    let mut one = listeners.listen(lobby()).unwrap();
-    let mut all = listeners.listen(Cameras::All).unwrap();
+    let mut one = listeners.listen(&Client::Only, lobby()).unwrap();
+    let mut all = listeners.listen(&Client::Only, Cameras::All).unwrap();
     for camera in ["hall", "lobby"] {
         listeners.tell(&report_of(camera));
     }
@@ -41,20 +41,20 @@ async fn listeners_receive_reports_of_their_camera_or_of_all() {
 #[test]
 fn listener_limit_holds_and_a_dropped_listener_frees_a_permit() {
     let listeners = room_for(2);
-    let first = listeners.listen(lobby()).unwrap();
-    let _second = listeners.listen(Cameras::All).unwrap();
-    let refused = listeners.listen(lobby()).unwrap_err();
+    let first = listeners.listen(&Client::Only, lobby()).unwrap();
+    let _second = listeners.listen(&Client::Only, Cameras::All).unwrap();
+    let refused = listeners.listen(&Client::Only, lobby()).unwrap_err();
     assert_eq!(refused, ListenError::Full { most: 2 });
     drop(first);
     assert_eq!(listeners.count(), 1);
-    let _third = listeners.listen(lobby()).unwrap();
+    let _third = listeners.listen(&Client::Only, lobby()).unwrap();
     assert_eq!(listeners.dropped(), 0);
 }
 
 #[tokio::test]
 async fn slow_listener_gets_its_queue_and_nothing_more() {
     let listeners = room_for(2);
-    let mut slow = listeners.listen(lobby()).unwrap();
+    let mut slow = listeners.listen(&Client::Only, lobby()).unwrap();
     for _ in 0..=QUEUE {
         listeners.tell(&report_of("lobby"));
     }
@@ -70,18 +70,44 @@ async fn slow_listener_gets_its_queue_and_nothing_more() {
 #[tokio::test]
 async fn end_closes_all_streams_and_refuses_new_listeners() {
     let listeners = room_for(2);
-    let mut listening = listeners.listen(lobby()).unwrap();
+    let mut listening = listeners.listen(&Client::Only, lobby()).unwrap();
     listeners.end();
     assert!(listening.next().await.is_none());
-    assert_eq!(listeners.listen(lobby()).unwrap_err(), ListenError::Ended);
+    assert_eq!(
+        listeners.listen(&Client::Only, lobby()).unwrap_err(),
+        ListenError::Ended
+    );
 }
 
 #[test]
 fn dropped_listeners_leave_nothing_behind() {
     let listeners = room_for(100);
     for number in 0..1000 {
-        drop(listeners.listen(Cameras::One(number.to_string())).unwrap());
+        drop(
+            listeners
+                .listen(&Client::Only, Cameras::One(number.to_string()))
+                .unwrap(),
+        );
     }
     assert_eq!(listeners.count(), 0);
     assert!(listeners.group().queues.is_empty());
+}
+
+#[test]
+fn one_client_leaves_half_of_the_listeners_to_others() {
+    let listeners = room_for(4);
+    let (greedy, modest) = (Client::with_key("greedy"), Client::with_key("modest"));
+    let held = [(); 2].map(|()| listeners.listen(&greedy, Cameras::All).unwrap());
+    let refused = listeners.listen(&greedy, lobby()).unwrap_err();
+    assert_eq!(
+        refused,
+        ListenError::ShareUsed {
+            client: greedy.clone(),
+            share: 2,
+            most: 4
+        }
+    );
+    let _other = listeners.listen(&modest, lobby()).unwrap();
+    drop(held);
+    assert!(listeners.listen(&greedy, lobby()).is_ok());
 }

@@ -22,6 +22,10 @@ class Effort:
     huge_frames: int
     """Frames of each kind."""
     soak_seconds: float
+    flood_clients: int
+    """Clients of each flood at the same time."""
+    flood_seconds: float
+    fairness_seconds: float
 
 
 SHORT = Effort(
@@ -34,6 +38,9 @@ SHORT = Effort(
     rude_clients=100,
     huge_frames=5,
     soak_seconds=20.0,
+    flood_clients=700,
+    flood_seconds=4.0,
+    fairness_seconds=8.0,
 )
 
 LONG = Effort(
@@ -46,4 +53,7 @@ LONG = Effort(
     rude_clients=400,
     huge_frames=100,
     soak_seconds=1800.0,
+    flood_clients=1000,
+    flood_seconds=30.0,
+    fairness_seconds=60.0,
 )

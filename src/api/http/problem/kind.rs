@@ -170,6 +170,9 @@ problems! {
     /// The server is shutting down.
     ShuttingDown = SERVICE_UNAVAILABLE "shutting-down" "Server shutting down" retry_after_seconds 1
         => "Send the request to another server.";
+    /// No frame makes progress: the workers or the network are stuck.
+    Stalled = SERVICE_UNAVAILABLE "stalled" "Service unavailable" retry_after_seconds 1
+        => "Search the log for the frames without progress; restart the server if it stays so.";
     /// The deadline of the request has passed.
     Timeout = GATEWAY_TIMEOUT "timeout" "Gateway timeout"
         => "Use a faster profile, send fewer frames at a time, or raise `timeout_millis`.";

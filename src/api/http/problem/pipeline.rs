@@ -18,9 +18,9 @@ impl From<PipelineError> for Problem {
                 ProblemKind::UnfitImage
             }
             PipelineError::ModelStarting => ProblemKind::WarmingUp,
-            PipelineError::Overloaded { .. } | PipelineError::InferenceBusy { .. } => {
-                ProblemKind::Overloaded
-            }
+            PipelineError::Overloaded { .. }
+            | PipelineError::ShareUsed { .. }
+            | PipelineError::InferenceBusy { .. } => ProblemKind::Overloaded,
             PipelineError::InferenceUnavailable => ProblemKind::InferenceUnavailable,
             PipelineError::ShuttingDown => ProblemKind::ShuttingDown,
             PipelineError::Withdrawn => ProblemKind::Timeout,
@@ -30,6 +30,7 @@ impl From<PipelineError> for Problem {
         let problem = match error {
             PipelineError::Internal(cause) => Self::internal(cause),
             PipelineError::Overloaded { retry_after, .. }
+            | PipelineError::ShareUsed { retry_after, .. }
             | PipelineError::InferenceBusy { retry_after } => {
                 Self::new(kind, error.to_string()).with_retry_after(retry_after)
             }

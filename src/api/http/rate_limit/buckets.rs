@@ -3,39 +3,15 @@
 
 use std::{
     collections::HashMap,
-    net::{IpAddr, Ipv6Addr},
     time::{Duration, Instant},
 };
+
+use crate::fairness::Client;
 
 /// Largest number of buckets. Further addresses share one bucket.
 const MAX_BUCKETS: usize = 10_000;
 /// Shortest interval between two removals of full buckets at that number.
 const PURGE_EVERY: Duration = Duration::from_secs(1);
-
-/// The owner of a bucket.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) enum Client {
-    /// The client with the key of this name.
-    Key(String),
-    /// The client at this address.
-    Address(IpAddr),
-    /// All clients at addresses without a bucket of their own.
-    Others,
-}
-
-impl Client {
-    /// Returns the client at an address. A host has at least a /64 of IPv6 addresses, so such a
-    /// prefix is one client.
-    pub(super) fn at(address: IpAddr) -> Self {
-        Self::Address(match address.to_canonical() {
-            IpAddr::V6(address) => {
-                let prefix = address.to_bits() & !u128::from(u64::MAX);
-                Ipv6Addr::from_bits(prefix).into()
-            }
-            address @ IpAddr::V4(_) => address,
-        })
-    }
-}
 
 /// The state of a client's rate limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,12 +91,14 @@ impl Buckets {
 
 #[cfg(test)]
 mod tests {
+    use std::net::IpAddr;
+
     use proptest::prelude::*;
 
     use super::*;
 
     fn key(name: &str) -> Client {
-        Client::Key(name.to_owned())
+        Client::with_key(name)
     }
 
     fn address(number: u32) -> Client {
@@ -158,15 +136,6 @@ mod tests {
             assert!(buckets.take(client.clone(), now).admitted, "{client:?}");
             assert!(!buckets.take(client.clone(), now).admitted, "{client:?}");
         }
-    }
-
-    #[test]
-    fn the_addresses_of_a_host_are_one_client() {
-        let at = |text: &str| Client::at(text.parse().unwrap());
-        assert_eq!(at("2001:db8:1:2::1"), at("2001:db8:1:2:ffff::9"));
-        assert_ne!(at("2001:db8:1:2::1"), at("2001:db8:1:3::1"));
-        assert_eq!(at("::ffff:192.0.2.1"), at("192.0.2.1"));
-        assert_ne!(at("192.0.2.1"), at("192.0.2.2"));
     }
 
     #[test]

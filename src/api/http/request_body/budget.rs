@@ -1,39 +1,57 @@
 //! The memory budget of requests: their bodies, and the tensors unpacked from them.
 
-use std::sync::Arc;
-
 use bytes::Bytes;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::api::http::problem::{Problem, ProblemKind};
+use crate::{
+    api::http::problem::{Problem, ProblemKind},
+    fairness::{BudgetError, BudgetShare, Client, SharedBudget},
+};
 
 /// The memory of all bodies and of the tensors unpacked from them, in bytes. Clones share it.
 #[derive(Clone)]
 pub(in crate::api) struct UploadBudget {
-    bytes: Arc<Semaphore>,
+    bytes: SharedBudget,
+    /// The client that uses it.
+    client: Client,
     /// The advice for a client whose body finds no free memory.
     remedy: &'static str,
 }
 
 impl UploadBudget {
-    pub(in crate::api) fn new(bytes: usize, remedy: &'static str) -> Self {
-        let bytes = Semaphore::new(bytes.min(Semaphore::MAX_PERMITS));
+    /// Creates a budget. One client may use at most half of it, but at least `least_share`.
+    pub(in crate::api) fn new(bytes: usize, least_share: usize, remedy: &'static str) -> Self {
         Self {
-            bytes: Arc::new(bytes),
+            bytes: SharedBudget::with_least_share(bytes, least_share),
+            client: Client::Others,
             remedy,
         }
     }
 
-    /// Reserves a number of bytes until the permit is dropped. Fails when fewer are free.
-    pub(in crate::api) fn take(&self, bytes: usize) -> Result<OwnedSemaphorePermit, Problem> {
-        let bytes = u32::try_from(bytes).map_err(|_| self.exhausted())?;
-        let share = Arc::clone(&self.bytes).try_acquire_many_owned(bytes);
-        share.map_err(|_| self.exhausted())
+    /// Returns the same budget as a client may use it.
+    pub(in crate::api) fn of(&self, client: &Client) -> Self {
+        Self {
+            client: client.clone(),
+            ..self.clone()
+        }
     }
 
-    fn exhausted(&self) -> Problem {
-        let remedy = self.remedy;
-        let detail = format!("too many request bodies are in memory already: {remedy}");
+    /// Reserves a number of bytes until the permit is dropped. Fails when fewer are free.
+    pub(in crate::api) fn take(&self, bytes: usize) -> Result<BudgetShare, Problem> {
+        let share = self.bytes.take(&self.client, bytes);
+        share.map_err(|error| self.exhausted(error))
+    }
+
+    fn exhausted(&self, error: BudgetError) -> Problem {
+        let (client, remedy) = (&self.client, self.remedy);
+        let detail = match error {
+            BudgetError::Full => {
+                format!("too many request bodies are in memory already: {remedy}")
+            }
+            BudgetError::ShareUsed { share } => format!(
+                "{client} uses its share of the memory for request bodies already ({share} \
+                 bytes): {remedy}"
+            ),
+        };
         Problem::new(ProblemKind::Overloaded, detail)
     }
 }
@@ -41,11 +59,11 @@ impl UploadBudget {
 /// A value in memory together with its permit.
 pub(in crate::api) struct Held<T> {
     content: T,
-    _share: OwnedSemaphorePermit,
+    _share: BudgetShare,
 }
 
 impl<T> Held<T> {
-    pub(in crate::api) fn new(content: T, share: OwnedSemaphorePermit) -> Self {
+    pub(in crate::api) fn new(content: T, share: BudgetShare) -> Self {
         Self {
             content,
             _share: share,

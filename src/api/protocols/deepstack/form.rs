@@ -10,7 +10,6 @@ use crate::{
         http::{
             access,
             problem::{Problem, ProblemKind},
-            request_id::RequestId,
         },
         upload::{FieldUse, Upload, is_multipart},
     },
@@ -74,7 +73,8 @@ impl FromRequest<ApiState> for DeepStackUpload {
         }
         drop(keys);
         let key = key.as_ref().map(|(_, key)| key.as_str());
-        known.check_with(&upload.headers, key, Scope::Detect)?;
+        let holder = known.check_with(&upload.headers, key, Scope::Detect)?;
+        upload.caller = upload.caller.with_holder(known, holder.as_ref());
         Ok(Self(upload))
     }
 }
@@ -102,7 +102,6 @@ fn no_form() -> Problem {
 pub(super) fn job(
     upload: Upload,
     calibration: Option<CalibrationId>,
-    request_id: &RequestId,
 ) -> Result<DetectJob, Problem> {
     // All remaining fields have this name.
     let thresholds = upload
@@ -120,7 +119,7 @@ pub(super) fn job(
         calibration,
         ..parameters
     };
-    Ok(upload.job(parameters, request_id))
+    upload.job(parameters)
 }
 
 /// Replaces the parameter name in an error by the name that the client sent.

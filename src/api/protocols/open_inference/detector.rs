@@ -14,12 +14,13 @@ use super::{
 use crate::{
     api::{
         ApiState,
+        caller::Caller,
         http::{deadline::Deadline, problem::Problem, request_body::Held},
         limit::Limit,
     },
     inference::{HeadOutput, Model},
     open_inference::{Datatype, metadata::ModelMetadata},
-    pipeline::{DetectParameters, Interface, ParameterError, Ticket, ViewsJob},
+    pipeline::{DetectParameters, Interface, ParameterError, ViewsJob},
     telemetry::RequestTrace,
 };
 
@@ -45,15 +46,15 @@ pub(super) fn metadata(model: &Model) -> ModelMetadata {
 
 pub(super) async fn infer(
     state: &ApiState,
+    caller: &Caller,
     trace: &RequestTrace,
-    model: Arc<Model>,
-    mut request: InferRequest,
+    (model, mut request): (Arc<Model>, InferRequest),
     (deadline, _, arrived): (Deadline, Timestamp, Instant),
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
     let pixels = Box::new(pixels(request.only_input(INPUT)?, &model)?);
     let parameters = view_parameters(&request)?;
-    let ticket = Ticket::of(parameters.priority);
+    let ticket = caller.ticket_at(parameters.priority)?;
     let timeline = ticket.timeline.clone();
     let job = ViewsJob {
         arrived,

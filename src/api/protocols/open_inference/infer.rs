@@ -10,12 +10,7 @@ use super::{
     requested_model::{ModelAddress, RequestedModel},
 };
 use crate::{
-    api::{
-        ApiState,
-        http::{problem::Problem, request_id::RequestId},
-        openapi::RawBytes,
-        upload::ReceivedRequest,
-    },
+    api::{ApiState, http::problem::Problem, openapi::RawBytes, upload::ReceivedRequest},
     telemetry::RequestTrace,
 };
 
@@ -46,7 +41,6 @@ use crate::{
 )]
 pub(in crate::api) async fn infer(
     State(state): State<ApiState>,
-    Extension(request_id): Extension<RequestId>,
     Extension(trace): Extension<RequestTrace>,
     address: ModelAddress,
     arrival: ReceivedRequest,
@@ -58,13 +52,16 @@ pub(in crate::api) async fn infer(
         arrival.arrived,
     );
     let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
-    let budget = state.uploads.clone();
+    let caller = arrival.caller;
+    let budget = state.uploads.of(&caller.client);
     let read = move || InferRequest::read(&headers, &body, &budget);
     let read = arrival.deadline.blocking(read).await?;
     let times = (arrival.deadline, arrival.received_at, arrival.arrived);
     match model {
-        RequestedModel::Frames => persons::infer(&state, &request_id, &trace, read, times).await,
-        RequestedModel::Views(model) => detector::infer(&state, &trace, model, read, times).await,
+        RequestedModel::Frames => persons::infer(&state, &caller, &trace, read, times).await,
+        RequestedModel::Views(model) => {
+            detector::infer(&state, &caller, &trace, (model, read), times).await
+        }
     }
 }
 
@@ -92,10 +89,9 @@ pub(in crate::api) async fn infer(
 )]
 pub(in crate::api) async fn infer_version(
     state: State<ApiState>,
-    request_id: Extension<RequestId>,
     trace: Extension<RequestTrace>,
     address: ModelAddress,
     arrival: ReceivedRequest,
 ) -> Result<impl IntoResponse, Problem> {
-    infer(state, request_id, trace, address, arrival).await
+    infer(state, trace, address, arrival).await
 }

@@ -14,7 +14,8 @@ use super::{
 use crate::{
     api::{
         ApiState,
-        http::{deadline::Deadline, problem::Problem, request_id::RequestId},
+        caller::Caller,
+        http::{deadline::Deadline, problem::Problem},
         report::ReportPerson,
         report_headers::report_headers,
         run_detection::{DetectionOutcome, run_detection},
@@ -51,7 +52,7 @@ pub(super) fn metadata() -> ModelMetadata {
 
 pub(super) async fn infer(
     state: &ApiState,
-    request_id: &RequestId,
+    caller: &Caller,
     trace: &RequestTrace,
     mut request: InferRequest,
     (deadline, received_at, arrived): (Deadline, Timestamp, Instant),
@@ -64,7 +65,8 @@ pub(super) async fn infer(
         return Err(misfit(INPUT, "it is empty: send an encoded frame"));
     }
     let parameters = parameters(&request.parameters)?;
-    let job = DetectJob::sent(image, parameters, request_id.as_str(), received_at, arrived);
+    let ticket = caller.ticket_at(parameters.priority)?;
+    let job = DetectJob::sent(image, parameters, ticket, received_at, arrived);
     let write = move |found: DetectionOutcome<'_>| {
         let answerer = Answerer {
             model: FRAME_MODEL,

@@ -1,13 +1,13 @@
 //! Input tensors: a name, a shape, and one frame or many numbers.
 
 use bytes::Bytes;
-use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     api::http::{
         problem::{Problem, ProblemKind},
         request_body::{Held, UploadBudget},
     },
+    fairness::BudgetShare,
     open_inference::{Datatype, TensorData, element_count, parameters::Parameters},
     quoted::{Quoted, shortened},
 };
@@ -77,7 +77,7 @@ fn unpacked(
     sent: TensorData<'_>,
     datatype: Datatype,
     count: usize,
-    room: OwnedSemaphorePermit,
+    room: BudgetShare,
 ) -> Result<Values, String> {
     Ok(match datatype {
         Datatype::Bytes => Values::Frame(Held::new(sent.element()?, room).into_bytes()),

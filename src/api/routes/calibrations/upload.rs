@@ -9,6 +9,7 @@ use bytes::Bytes;
 use crate::{
     api::{
         ApiState,
+        caller::Caller,
         http::{
             deadline::Deadline,
             problem::{Problem, ProblemKind},
@@ -78,7 +79,9 @@ async fn content(request: Request, state: &ApiState) -> Result<(Bytes, Uri), Pro
     let (parts, body) = request.into_parts();
     let deadline = Deadline::of(&parts, state);
     let remedy = "send a calibration file";
-    let reader = state.body_reader(CalibrationFile::MAX_BYTES, remedy, deadline);
+    let caller = Caller::of(&parts, state);
+    let max_bytes = CalibrationFile::MAX_BYTES;
+    let reader = state.body_reader(&caller.client, max_bytes, remedy, deadline);
     let content = reader.read(&parts.headers, body).await?;
     Ok((content.into_bytes(), parts.uri))
 }

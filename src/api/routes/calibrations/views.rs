@@ -18,6 +18,7 @@ use super::{
 use crate::{
     api::{
         ApiState,
+        caller::Caller,
         http::{deadline::Deadline, problem::Problem, query::parameters_named},
         openapi::RawBytes,
         report::pixels,
@@ -127,6 +128,7 @@ pub(in crate::api) async fn get_views(
     State(state): State<ApiState>,
     _reader: RequireRead,
     deadline: Deadline,
+    caller: Caller,
     CalibrationAddress(id): CalibrationAddress,
     uri: Uri,
 ) -> Result<Response, Problem> {
@@ -137,7 +139,7 @@ pub(in crate::api) async fn get_views(
         .entry(&id)
         .ok_or_else(|| unknown(&state, &id))?;
     let plan = move |engine: &Engine| request.plan(engine, &entry.calibration);
-    answered(&state, deadline, plan).await
+    answered(&state, deadline, &caller, plan).await
 }
 
 /// Preview a view plan
@@ -164,6 +166,7 @@ pub(in crate::api) async fn try_views(
     State(state): State<ApiState>,
     _reader: RequireRead,
     deadline: Deadline,
+    caller: Caller,
     NewCalibrationAddress(id): NewCalibrationAddress,
     trial: CalibrationTrial,
 ) -> Result<Response, Problem> {
@@ -173,7 +176,7 @@ pub(in crate::api) async fn try_views(
         let entry = Calibrations::check(&id, &content, &reading)?;
         request.plan(engine, &entry.calibration)
     };
-    answered(&state, deadline, plan).await
+    answered(&state, deadline, &caller, plan).await
 }
 
 /// Returns a view plan as JSON. A plan may have megabytes, so it is built and serialised under a
@@ -181,10 +184,11 @@ pub(in crate::api) async fn try_views(
 async fn answered(
     state: &ApiState,
     deadline: Deadline,
+    caller: &Caller,
     plan: impl FnOnce(&Engine) -> Result<ViewPlanInfo, Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
     let workers = Arc::clone(&state.workers);
-    let planning = state.workers.run(move |_| {
+    let planning = state.workers.run(caller.ticket(), move |_| {
         let plan = plan(workers.engine())?;
         serde_json::to_vec(&plan).map_err(Problem::internal)
     });

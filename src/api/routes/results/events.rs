@@ -15,7 +15,7 @@ use futures_util::stream::unfold;
 
 use super::{NO_CACHE, address::CameraAddress, feed::Feed};
 use crate::{
-    api::{ApiState, http::problem::Problem, require_scope::RequireRead},
+    api::{ApiState, caller::Caller, http::problem::Problem, require_scope::RequireRead},
     results::Cameras,
 };
 
@@ -44,10 +44,11 @@ const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering")
 pub(in crate::api) async fn of_camera(
     State(state): State<ApiState>,
     _reader: RequireRead,
+    caller: Caller,
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    stream(state, Cameras::One(camera), headers).await
+    stream(state, &caller, Cameras::One(camera), headers).await
 }
 
 /// Stream all reports
@@ -68,20 +69,28 @@ pub(in crate::api) async fn of_camera(
 pub(in crate::api) async fn of_all(
     State(state): State<ApiState>,
     _reader: RequireRead,
+    caller: Caller,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    stream(state, Cameras::All, headers).await
+    stream(state, &caller, Cameras::All, headers).await
 }
 
 async fn stream(
     state: ApiState,
+    caller: &Caller,
     cameras: Cameras,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let last_heard = headers.get(LAST_EVENT_ID);
     // An invalid ID does not come from this server and is ignored.
     let last_heard = last_heard.and_then(|id| id.to_str().ok()?.parse().ok());
-    let feed = Feed::begin(Arc::clone(&state.results), cameras, last_heard).await?;
+    let feed = Feed::begin(
+        Arc::clone(&state.results),
+        &caller.client,
+        cameras,
+        last_heard,
+    )
+    .await?;
     let listener = (feed, state, headers);
     let events = unfold(listener, async |(mut feed, state, headers)| {
         let event = feed.next().await?;

@@ -8,6 +8,7 @@ use tokio::time::{sleep, timeout};
 
 use crate::{
     api::http::problem::Problem,
+    fairness::Client,
     results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
 };
 
@@ -40,11 +41,12 @@ impl Feed {
     /// [`Problem`] when there are too many subscribers, or the result store does not respond.
     pub(super) async fn begin(
         results: Arc<dyn ResultStore>,
+        client: &Client,
         cameras: Cameras,
         last_heard: Option<ReportId>,
     ) -> Result<Self, Problem> {
         // Subscribes before the first read, so no report is missed in between.
-        let listening = results.listeners().listen(cameras.clone())?;
+        let listening = results.listeners().listen(client, cameras.clone())?;
         let latest = match &cameras {
             Cameras::All => results.latest_of_all().await?,
             Cameras::One(camera) => results.latest(camera).await?.into_iter().collect(),

@@ -16,6 +16,7 @@ use super::{NO_CACHE, address::CameraAddress, unknown};
 use crate::{
     api::{
         ApiState,
+        caller::Caller,
         http::{
             deadline::Deadline,
             entity_tags::{entity_tag, is_unmodified},
@@ -60,6 +61,7 @@ pub(in crate::api) async fn get_latest(
     State(state): State<ApiState>,
     _reader: RequireRead,
     deadline: Deadline,
+    caller: Caller,
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
     uri: Uri,
@@ -73,7 +75,7 @@ pub(in crate::api) async fn get_latest(
         state.results.latest(&camera).await?
     } else {
         let limit = deadline.within(wait);
-        let report = wait_for_newer(&state, &camera, &headers, limit).await?;
+        let report = wait_for_newer(&state, &caller, &camera, &headers, limit).await?;
         // The key may have been removed during the wait.
         RequireRead::check(&state, &headers)?;
         report
@@ -92,13 +94,14 @@ pub(in crate::api) async fn get_latest(
 /// time.
 async fn wait_for_newer(
     state: &ApiState,
+    caller: &Caller,
     camera: &str,
     headers: &HeaderMap,
     limit: Deadline,
 ) -> Result<Option<Arc<StoredReport>>, Problem> {
     // Subscribes before the first read, so no report is missed in between.
     let listeners = state.results.listeners();
-    let mut listening = listeners.listen(Cameras::One(camera.to_owned()))?;
+    let mut listening = listeners.listen(&caller.client, Cameras::One(camera.to_owned()))?;
     let mut report = state.results.latest(camera).await?;
     let is_new = |report: &StoredReport| {
         let known = is_unmodified(headers, &report.id.to_string());

@@ -15,6 +15,7 @@ use crate::{
     annotated_image::{AnnotationOptions, StoredFrame},
     api::{
         ApiState,
+        caller::Caller,
         http::{
             deadline::Deadline,
             entity_tags::{entity_tag, is_unmodified},
@@ -58,6 +59,7 @@ pub(in crate::api) async fn get_picture(
     State(state): State<ApiState>,
     _reader: RequireRead,
     deadline: Deadline,
+    caller: Caller,
     CameraAddress(camera): CameraAddress,
     headers: HeaderMap,
     uri: Uri,
@@ -76,9 +78,9 @@ pub(in crate::api) async fn get_picture(
         jpeg: kept.picture.frame.clone(),
         sketch: kept.picture.sketch.clone(),
     };
-    let drawing = state
-        .workers
-        .run(move |withdrawn| frame.annotated(&options, &|| withdrawn.is_cancelled()));
+    let drawing = state.workers.run(caller.ticket(), move |withdrawn| {
+        frame.annotated(&options, &|| withdrawn.is_cancelled())
+    });
     let drawn = deadline.wait("the image was not drawn", drawing).await?;
     let picture = Bytes::from(drawn.map_err(Problem::internal)?);
     Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], picture).into_response())

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::api::{
     ApiState,
+    caller::Caller,
     http::{
         deadline::Deadline,
         problem::{Problem, ProblemKind},
@@ -55,7 +56,9 @@ impl<T: DeserializeOwned + Default> FromRequest<ApiState> for SmallBody<T> {
     async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
         let (parts, body) = request.into_parts();
         let deadline = Deadline::of(&parts, state);
-        let reader = state.body_reader(MAX_BYTES, "send a shorter body", deadline);
+        let caller = Caller::of(&parts, state);
+        let remedy = "send a shorter body";
+        let reader = state.body_reader(&caller.client, MAX_BYTES, remedy, deadline);
         let bytes = reader.read(&parts.headers, body).await?.into_bytes();
         if bytes.is_empty() {
             return Ok(Self(T::default()));

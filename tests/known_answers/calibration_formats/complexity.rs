@@ -1,0 +1,286 @@
+//! A search for inputs whose parsing takes more than linear time.
+//!
+//! Each recipe inserts one kind of filler into a calibration file: repeated, nested, numbered or
+//! long. The slowest recipes of each format, by the time for a byte, are grown by a factor of eight,
+//! and so may be their time, with a margin for noise. No limit is absolute, so that the test holds on
+//! slow machines. `LOOKDOWN_COMPLEXITY=long` uses every file, more positions, pairs of the slowest
+//! recipes, and the size of the largest permitted file.
+
+use std::{collections::BTreeMap, env, fs, time::Duration, time::Instant};
+
+use lookdown::calibration::CalibrationFile;
+
+/// The factor between the two sizes of a file.
+const GROWTH: usize = 8;
+/// The largest permitted factor between the two times.
+const MAX_RATIO: f64 = 16.0;
+/// Shorter times are noise.
+const LEAST: Duration = Duration::from_micros(500);
+/// Measurements of a ratio that seems too large.
+const ROUNDS: usize = 8;
+/// Recipes of each file that are grown in the short form.
+const GROWN: usize = 8;
+
+/// A kind of filler.
+#[derive(Clone, Copy)]
+enum Filler {
+    /// A text, repeated.
+    Repeated(&'static str),
+    /// A text before and one after, both repeated equally often.
+    Nested(&'static str, &'static str),
+    /// A text with a counter in place of each `#`.
+    Numbered(&'static str),
+    /// Lines of which each is indented by one space more.
+    Staircase(&'static str),
+}
+
+const FILLERS: [Filler; 58] = [
+    Filler::Repeated("a"),
+    Filler::Repeated("1"),
+    Filler::Repeated("0"),
+    Filler::Repeated(" "),
+    Filler::Repeated("\n"),
+    Filler::Repeated("\t"),
+    Filler::Repeated("\r\n"),
+    Filler::Repeated("é"),
+    Filler::Repeated("1 "),
+    Filler::Repeated("1,"),
+    Filler::Repeated("1\n"),
+    Filler::Repeated("-1.5e3, "),
+    Filler::Repeated("["),
+    Filler::Repeated("{"),
+    Filler::Repeated("[1],"),
+    Filler::Repeated("{},"),
+    Filler::Repeated("\""),
+    Filler::Repeated("'"),
+    Filler::Repeated("''"),
+    Filler::Repeated("\\u0041"),
+    Filler::Repeated("\"\\n\","),
+    Filler::Repeated("# a\n"),
+    Filler::Repeated("- "),
+    Filler::Repeated("- a\n"),
+    Filler::Repeated("? "),
+    Filler::Repeated("a: "),
+    Filler::Repeated(":"),
+    Filler::Repeated("a: |\n b\n"),
+    Filler::Repeated("!!map "),
+    Filler::Repeated("---\n"),
+    Filler::Repeated("%YAML:1.0\n"),
+    Filler::Repeated("*a, "),
+    Filler::Repeated("<<: *a\n"),
+    Filler::Repeated("&a "),
+    Filler::Repeated("<a>"),
+    Filler::Repeated("<a/>"),
+    Filler::Repeated("<a b=\"c\"/>"),
+    Filler::Repeated("<!-- a -->"),
+    Filler::Repeated("&amp;"),
+    Filler::Repeated("<![CDATA[1]]>"),
+    Filler::Repeated("[[a]]\n"),
+    Filler::Repeated("1 SIMPLE_RADIAL_FISHEYE 64 64 30 32 32 0\n"),
+    Filler::Nested("[", "]"),
+    Filler::Nested("{\"a\":", "}"),
+    Filler::Nested("{a: ", "}"),
+    Filler::Nested("<a>", "</a>"),
+    Filler::Nested("\"a\":[", "],"),
+    Filler::Numbered("\"k#\":#,"),
+    Filler::Numbered("k#: #\n"),
+    Filler::Numbered("k#: &k# [*k#]\n"),
+    Filler::Numbered("k#=#\n"),
+    Filler::Numbered("[k#]\n"),
+    Filler::Numbered("a.b.k# = 1\n"),
+    Filler::Numbered("<k#>#</k#>"),
+    Filler::Numbered("# PINHOLE # # # # # #\n"),
+    Filler::Numbered("[#, #],"),
+    Filler::Numbered("{\"name\":\"z#\",\"floor_m\":[[0,0],[1,0],[1,#]]},"),
+    Filler::Staircase("a:\n"),
+];
+
+impl Filler {
+    fn text(self, bytes: usize) -> String {
+        match self {
+            Self::Repeated(text) => text.repeat(bytes / text.len()),
+            Self::Nested(open, close) => {
+                let depth = bytes / (open.len() + close.len());
+                open.repeat(depth) + &close.repeat(depth)
+            }
+            Self::Numbered(text) => {
+                let mut filler = String::with_capacity(bytes);
+                for number in 0.. {
+                    let next = text.replace('#', &number.to_string());
+                    if filler.len() + next.len() > bytes {
+                        break;
+                    }
+                    filler.push_str(&next);
+                }
+                filler
+            }
+            Self::Staircase(line) => {
+                let mut filler = String::with_capacity(bytes);
+                for depth in 0.. {
+                    if filler.len() + depth + line.len() > bytes {
+                        break;
+                    }
+                    filler.push_str(&" ".repeat(depth));
+                    filler.push_str(line);
+                }
+                filler
+            }
+        }
+    }
+}
+
+/// A file with fillers at some positions.
+#[derive(Clone)]
+struct Recipe {
+    file: String,
+    fillers: Vec<(usize, usize)>,
+}
+
+impl Recipe {
+    /// Returns the content, which has about `bytes` of fillers.
+    fn content(&self, bytes: usize) -> String {
+        let bytes = bytes.min(CalibrationFile::MAX_BYTES - self.file.len());
+        let each = bytes / self.fillers.len();
+        let mut content = self.file.clone();
+        // The last position first, so that the others stay valid.
+        let mut fillers = self.fillers.clone();
+        fillers.sort_unstable_by(|a, b| b.cmp(a));
+        for (position, filler) in fillers {
+            content.insert_str(position, &FILLERS[filler].text(each));
+        }
+        content
+    }
+
+    fn time(&self, bytes: usize) -> Duration {
+        let content = self.content(bytes);
+        let before = Instant::now();
+        if let Ok(file) = CalibrationFile::parse(content.as_bytes()) {
+            assert!(!file.calibrations("x", content.as_bytes()).is_empty());
+        }
+        before.elapsed()
+    }
+
+    /// Returns the ratio of the times of a large and a small file, each the smallest of a few.
+    fn ratio(&self, bytes: usize) -> f64 {
+        let (mut small, mut large) = (Duration::MAX, Duration::MAX);
+        let mut ratio = f64::INFINITY;
+        for _ in 0..ROUNDS {
+            small = small.min(self.time(bytes / GROWTH).max(LEAST));
+            large = large.min(self.time(bytes));
+            ratio = large.as_secs_f64() / small.as_secs_f64();
+            if ratio <= MAX_RATIO {
+                break;
+            }
+        }
+        ratio
+    }
+
+    fn start(&self) -> String {
+        self.content(100).chars().take(400).collect()
+    }
+}
+
+/// Returns positions of different kinds in a file: its start, and behind its middle line end, colon,
+/// digit and so on.
+fn positions(file: &str, is_long: bool) -> Vec<usize> {
+    let wanted = ['\n', ':', '7', '[', '{', '"', '>'];
+    let wanted = &wanted[..if is_long { wanted.len() } else { 4 }];
+    let mut positions = vec![0];
+    for &wanted in wanted {
+        let found: Vec<_> = file.match_indices(wanted).map(|(at, _)| at + 1).collect();
+        positions.extend(found.get(found.len() / 2));
+    }
+    positions.sort_unstable();
+    positions.dedup();
+    positions
+}
+
+/// A native file with zones and masks.
+const ZONES: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
+  "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5},
+  "mount": {"world_up": [0, 0, -1], "height_m": 3},
+  "zones": [{"name": "a", "frame_px": [[0,0], [100,0], [100,200]]},
+    {"name": "b", "floor_m": [[0,0], [1,0], [1,1]]}],
+  "masks": [{"frame_px": [[0,0], [100,0], [100,200]]}] }"#;
+
+/// Returns one file of each format, or every file.
+fn files(is_long: bool) -> Vec<String> {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/");
+    let folders = ["tests/fixtures/calibrations", "samples/calibrations"];
+    let mut files = BTreeMap::from([("zones".to_owned(), ZONES.to_owned())]);
+    for folder in folders {
+        for entry in fs::read_dir(format!("{root}{folder}")).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|ending| ending == "py") {
+                continue;
+            }
+            let content = fs::read(&path).unwrap();
+            if let Ok(file) = CalibrationFile::parse(&content) {
+                let text = String::from_utf8(content).unwrap();
+                // The same format in XML, YAML and JSON has different parsers.
+                let syntax = text.trim_start().chars().next();
+                let name = path.display().to_string();
+                let key = format!(
+                    "{:?} {syntax:?} {}",
+                    file.format,
+                    if is_long { &name } else { "" }
+                );
+                files.insert(key, text);
+            }
+        }
+    }
+    files.into_values().collect()
+}
+
+#[test]
+fn parsing_time_grows_linearly_with_the_file() {
+    let is_long = env::var("LOOKDOWN_COMPLEXITY").is_ok_and(|form| form == "long");
+    let bytes = CalibrationFile::MAX_BYTES / if is_long { 1 } else { 32 };
+    let (mut slowest, mut tried) = ((Duration::ZERO, String::new()), 0);
+    for file in files(is_long) {
+        let mut recipes = Vec::new();
+        for position in positions(&file, is_long) {
+            for filler in 0..FILLERS.len() {
+                let recipe = Recipe {
+                    file: file.clone(),
+                    fillers: vec![(position, filler)],
+                };
+                recipes.push((recipe.time(bytes / GROWTH), recipe));
+            }
+        }
+        tried += recipes.len();
+        recipes.sort_by_key(|(time, _)| std::cmp::Reverse(*time));
+        if is_long {
+            let best: Vec<_> = recipes
+                .iter()
+                .take(GROWN)
+                .map(|(_, one)| one.clone())
+                .collect();
+            for (index, one) in best.iter().enumerate() {
+                for other in &best[..index] {
+                    let mut pair = one.clone();
+                    pair.fillers.extend(other.fillers.iter().copied());
+                    recipes.push((Duration::ZERO, pair));
+                }
+            }
+        }
+        for (_, recipe) in recipes {
+            let ratio = recipe.ratio(bytes);
+            assert!(
+                ratio <= MAX_RATIO,
+                "the time grows by {ratio:.0} for {:?}: {}",
+                recipe.fillers,
+                recipe.start()
+            );
+            let time = recipe.time(bytes);
+            if time > slowest.0 {
+                slowest = (time, recipe.start());
+            }
+        }
+    }
+    println!(
+        "{tried} recipes; slowest {:.3} s: {}",
+        slowest.0.as_secs_f64(),
+        slowest.1
+    );
+}
