@@ -169,6 +169,8 @@ impl App {
             calibrations,
             models,
         } = assembly;
+        settings.access.check_exposure(settings.server.listen)?;
+        let keys = open_keys(&settings.access)?;
         let to_load = models_to_load(engine.default_models(), &settings.model.also_load);
         let (workers, capacity) = (
             settings.threads.frame_workers,
@@ -180,7 +182,6 @@ impl App {
         let metrics = Arc::new(Metrics::new()?);
         let results = open_results(&settings.results);
         let readiness = Readiness::default();
-        let keys = open_keys(&settings.access)?;
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
             None => None,
@@ -192,7 +193,7 @@ impl App {
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
             None => Access::Open {
-                own_machine_only: settings.server.listen.ip().is_loopback(),
+                own_machine_only: !settings.access.open,
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
@@ -334,10 +335,9 @@ fn open_results(settings: &ResultSettings) -> Arc<dyn ResultStore> {
 /// Opens the API keys of the settings. `None` if the settings name neither keys nor a file. With a
 /// file, keys are required even while it holds none.
 fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>>> {
-    let file = settings.keys_file.as_deref();
-    if settings.keys.is_empty() && file.is_none() {
+    if !settings.needs_keys() {
         return Ok(None);
     }
-    let keys = AccessKeys::open(settings.keys.clone(), file)?;
+    let keys = AccessKeys::open(settings.keys.clone(), settings.keys_file.as_deref())?;
     Ok(Some(Arc::new(keys)))
 }

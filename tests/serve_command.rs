@@ -52,7 +52,7 @@ fn every_invalid_setting_ends_the_start_with_a_sentence() {
     );
     fs::write(Path::new(&other_sum).join("model.toml"), manifest).unwrap();
 
-    let cases: [(&str, &str, &[&str]); 17] = [
+    let cases: [(&str, &str, &[&str]); 18] = [
         ("SERVER__LISTN", "127.0.0.1:1", &["server", "`listn`"]),
         (
             "SERVER__LISTEN",
@@ -68,6 +68,11 @@ fn every_invalid_setting_ends_the_start_with_a_sentence() {
             "SERVER__LISTEN",
             "192.0.2.1:80",
             &["server.listen", "192.0.2.1:80"],
+        ),
+        (
+            "SERVER__LISTEN",
+            "0.0.0.0:0",
+            &["0.0.0.0:0", "access.keys_file", "access.open"],
         ),
         (
             "SERVER__METRICS_LISTEN",
@@ -165,11 +170,63 @@ fn a_check_reports_models_and_access_and_serves_no_client() {
     assert!(keyed.contains("\n  gate: detect, read\n"), "{keyed}");
 }
 
+#[test]
+fn only_keys_or_access_open_let_a_server_start_on_a_network() {
+    const NETWORK: (&str, &str) = ("LOOKDOWN__SERVER__LISTEN", "0.0.0.0:0");
+    const OPEN: (&str, &str) = ("LOOKDOWN__ACCESS__OPEN", "true");
+    let check = |variables: &[(&str, &str)]| {
+        let output = run(&["serve", "--check"], variables);
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let open = check(&[NETWORK, OPEN]);
+    assert!(
+        open.contains("access: open (access.open), without API keys"),
+        "{open}"
+    );
+    assert!(open.contains("changes are refused"), "{open}");
+    let keys = format!("gate:detect+read:{:064}", 7);
+    let keys = ("LOOKDOWN__ACCESS__KEYS", &*keys);
+    // With keys, `access.open` has no effect.
+    for variables in [&[NETWORK, keys][..], &[NETWORK, keys, OPEN]] {
+        let keyed = check(variables);
+        assert!(keyed.contains("needs an API key; 1 known"), "{keyed}");
+    }
+    // The address of metrics and probes needs neither.
+    check(&[("LOOKDOWN__SERVER__METRICS_LISTEN", "0.0.0.0:0")]);
+}
+
+#[test]
+fn an_open_server_refuses_changes_and_warns_at_the_start() {
+    let open = ("LOOKDOWN__ACCESS__OPEN", "true");
+    let server = Server::start("", &[NO_GRACE, open]);
+    let status = |request: &str| {
+        let mut connection = server.connect();
+        let head = format!("{request} HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n\r\n");
+        connection.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        connection.read_to_string(&mut answer).unwrap();
+        answer
+    };
+    assert!(status("GET /calibrations").contains(" 200 "));
+    let refused = status("DELETE /calibrations/lobby");
+    assert!(
+        refused.contains(" 403 ") && refused.contains("access.keys_file"),
+        "{refused}"
+    );
+    let before = server.before_ready.join("\n");
+    assert_eq!(before.matches("access.open is true").count(), 1, "{before}");
+    server.signal("TERM");
+    server.has_ended();
+}
+
 /// A running server.
 struct Server {
     process: Child,
     log: Lines<BufReader<ChildStderr>>,
     port: String,
+    /// The log lines between the start to listen and readiness.
+    before_ready: Vec<String>,
 }
 
 impl Server {
@@ -187,11 +244,16 @@ impl Server {
             process,
             log,
             port: String::new(),
+            before_ready: Vec::new(),
         };
         let line = server.says("listening on http");
         let (_, rest) = line.split_once("://127.0.0.1:").unwrap();
         rest.split_once(',').unwrap().0.clone_into(&mut server.port);
-        server.says("ready: try curl");
+        let mut lines = server.log.by_ref().map(Result::unwrap);
+        let before = lines.by_ref();
+        server.before_ready = before
+            .take_while(|line| !line.contains("ready: try curl"))
+            .collect();
         server
     }
 

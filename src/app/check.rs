@@ -27,14 +27,14 @@ impl App {
     fn access_report(&self) -> String {
         let address = self.settings.server.listen;
         let mut report = match &self.keys {
-            None if address.ip().is_loopback() => format!(
+            None if !self.settings.access.open => format!(
                 "access: open, without API keys: every client on this machine may send frames, read \
                  and change everything at {address}"
             ),
             None => format!(
-                "access: open, without API keys: every client that reaches {address} may send frames \
-                 and read calibrations and reports; changes are refused; set access.keys_file to need \
-                 keys"
+                "access: open (access.open), without API keys: every client that reaches {address} \
+                 may send frames and read calibrations and reports; changes are refused; set \
+                 access.keys_file to need keys"
             ),
             Some(keys) => {
                 let keys = keys.known();

@@ -34,11 +34,10 @@ impl App {
         let address = sockets.main.local_addr()?;
         let scheme = if self.tls.is_some() { "https" } else { "http" };
         log_start(&self.settings, scheme, address);
-        if self.keys.is_none() && !address.ip().is_loopback() {
+        if self.keys.is_none() && self.settings.access.open {
             tracing::warn!(
-                "other machines can reach this server without a key: any client may send frames and \
-                 read calibrations and reports; set access.keys_file, or set server.listen to \
-                 127.0.0.1"
+                "access.open is true and no API keys are set: every client that reaches {address} may \
+                 send frames and read calibrations and reports; set access.keys_file to require keys"
             );
         }
         let _pollers = self.start_pollers()?;
