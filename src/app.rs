@@ -180,7 +180,7 @@ impl App {
             .context("the operating system creates no thread for a worker")?;
         let workers = Arc::new(workers);
         let metrics = Arc::new(Metrics::new()?);
-        let results = open_results(&settings.results);
+        let results = open_results(&settings.results)?;
         let readiness = Readiness::default();
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
@@ -325,11 +325,11 @@ pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrati
 }
 
 /// Opens the result store of the settings. It connects to a Redis in the background.
-fn open_results(settings: &ResultSettings) -> Arc<dyn ResultStore> {
-    match settings.redis.clone() {
-        Some(redis) => Arc::new(RedisResults::start(redis, settings.limits)),
+fn open_results(settings: &ResultSettings) -> anyhow::Result<Arc<dyn ResultStore>> {
+    Ok(match settings.redis.clone() {
+        Some(redis) => Arc::new(RedisResults::start(redis, settings.limits)?),
         None => Arc::new(MemoryResults::new(settings.limits)),
-    }
+    })
 }
 
 /// Opens the API keys of the settings. `None` if the settings name neither keys nor a file. With a

@@ -20,7 +20,7 @@ const MAY_USE: [(&str, &[&str]); 29] = [
     ("metrics", &[]),
     ("shutdown", &[]),
     ("poller", &[]),
-    ("results", &[]),
+    ("results", &["quoted", "tls"]),
     ("open_inference", &[]),
     ("imaging", &["geometry"]),
     (
