@@ -29,7 +29,13 @@ const MAY_USE: [(&str, &[&str]); 29] = [
     ),
     (
         "inference",
-        &["detection", "imaging", "open_inference", "revision"],
+        &[
+            "detection",
+            "imaging",
+            "open_inference",
+            "quoted",
+            "revision",
+        ],
     ),
     ("tls", &["metrics", "watched_file"]),
     ("server", &["metrics", "shutdown", "tls"]),
