@@ -2,6 +2,7 @@
 
 mod check;
 mod models;
+mod reload;
 mod serving;
 mod sockets;
 
@@ -29,6 +30,7 @@ use crate::{
     tls::Tls,
 };
 
+pub use reload::Reloader;
 pub use sockets::Sockets;
 
 pub(crate) use models::onnx_options;

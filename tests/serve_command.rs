@@ -306,6 +306,55 @@ fn sigint_shuts_down_without_a_grace_period() {
 }
 
 #[test]
+fn sighup_reloads_the_keys_and_does_not_end_the_server() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    let (first, second) = (lookdown_key("first"), lookdown_key("second"));
+    fs::write(&file, &first.line).unwrap();
+    let keys_file = ("LOOKDOWN__ACCESS__KEYS_FILE", file.to_str().unwrap());
+    let never = ("LOOKDOWN__ACCESS__POLL_SECONDS", "0");
+    let mut server = Server::start("", &[NO_GRACE, keys_file, never]);
+    let status = |server: &Server, key: &str| {
+        let mut connection = server.connect();
+        let head = format!(
+            "GET /calibrations HTTP/1.1\r\nHost: lookdown\r\nX-API-Key: {key}\r\n\
+             Connection: close\r\n\r\n"
+        );
+        connection.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        connection.read_to_string(&mut answer).unwrap();
+        answer.split(' ').nth(1).unwrap().to_owned()
+    };
+    assert_eq!(status(&server, &first.key), "200");
+    fs::write(&file, &second.line).unwrap();
+    for _ in 0..2 {
+        server.signal("HUP");
+        server.says("SIGHUP");
+        assert_eq!(status(&server, &first.key), "401");
+        assert_eq!(status(&server, &second.key), "200");
+    }
+    server.signal("TERM");
+    server.has_ended();
+}
+
+/// A new API key, and its line for the file of keys.
+struct Key {
+    key: String,
+    line: String,
+}
+
+fn lookdown_key(name: &str) -> Key {
+    let output = run(&["key", "new", "--name", name, "--scope", "read"], &[]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let mut next = || lines.find(|line| !line.is_empty()).unwrap().to_owned();
+    Key {
+        key: next(),
+        line: next(),
+    }
+}
+
+#[test]
 fn a_second_signal_ends_the_server_at_once() {
     let mut server = Server::start("", &[LONG_GRACE]);
     server.signal("TERM");

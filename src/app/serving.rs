@@ -19,6 +19,10 @@ use crate::{
 
 /// Longest time that the shutdown waits for the MQTT broker.
 const FAREWELL: Duration = Duration::from_secs(3);
+/// Longest time that the shutdown waits for a model that is being loaded.
+const LONGEST_LOAD: Duration = Duration::from_secs(10);
+/// Interval of the checks during that wait.
+const LOAD_CHECK: Duration = Duration::from_millis(20);
 /// Pause before a model is loaded again after a transient failure.
 const BEFORE_ANOTHER_LOAD: Duration = Duration::from_secs(1);
 
@@ -82,7 +86,7 @@ impl App {
             }
             pending::<()>().await;
         };
-        tokio::select! {
+        let outcome = tokio::select! {
             biased;
             () = shutdown.requested_at_once() => {
                 tracing::warn!("stopped at once");
@@ -94,7 +98,20 @@ impl App {
                 tracing::warn!("stopped before all requests had ended");
                 Ok(())
             }
-        }
+        };
+        self.end_of_load().await;
+        outcome
+    }
+
+    /// Waits until no model is being loaded, within limits: ONNX Runtime crashes the process if it
+    /// ends during a load.
+    async fn end_of_load(&self) {
+        let ended = async {
+            while self.models.is_loading() {
+                sleep(LOAD_CHECK).await;
+            }
+        };
+        let _ = timeout(LONGEST_LOAD, ended).await;
     }
 
     /// Serves metrics and probes on their own port until the process ends.

@@ -205,9 +205,11 @@ fn nothing_is_unloaded_while_a_model_is_being_loaded() {
         steps.wait();
         let refused = repository.unload("b").unwrap_err();
         assert!(matches!(refused, RepositoryError::Busy), "{refused}");
+        assert!(repository.is_loading());
         steps.wait();
         loading.join().unwrap().unwrap();
     });
+    assert!(!repository.is_loading());
     repository.unload("b").unwrap();
 }
 
