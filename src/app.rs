@@ -6,7 +6,7 @@ mod reload;
 mod serving;
 mod sockets;
 
-use std::{num::NonZeroU64, sync::Arc};
+use std::{num::NonZeroU64, sync::Arc, time::Duration};
 
 use anyhow::Context;
 
@@ -35,6 +35,9 @@ pub use sockets::Sockets;
 
 pub(crate) use models::onnx_options;
 
+/// Longest time that the start waits for the calibrations. The rest is read while the server
+/// listens, and the server is ready after that.
+const CALIBRATIONS_WAIT: Duration = Duration::from_secs(3);
 /// Interval of the checks of the inference server, seconds.
 const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
@@ -54,11 +57,15 @@ pub struct Assembly {
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
-    assemble_with(settings, FieldOfViewReading::default())
+    let (store, writable) = calibration_store(settings)?;
+    let calibrations = Calibrations::open_within(store, writable, CALIBRATIONS_WAIT);
+    let calibrations = calibrations.context("calibrations.path")?;
+    assemble_with(settings, calibrations, FieldOfViewReading::default())
 }
 
 fn assemble_with(
     settings: &Settings,
+    calibrations: Arc<Calibrations>,
     paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Assembly> {
     let (models, default_models) = models::open(settings)?;
@@ -75,7 +82,6 @@ fn assemble_with(
         rig_cache_bytes: settings.calibrations.cache_bytes,
         inference_cache_frames: settings.inference.inference_cache_frames,
     };
-    let calibrations = Arc::new(open_calibrations(settings)?);
     let known = Some(Arc::clone(&calibrations));
     let engine = Engine::new(Arc::clone(models.registry()), known, options)
         .context("the operating system gives no threads")?;
@@ -115,7 +121,9 @@ pub fn evaluation_engine(
     requests: &[DetectParameters],
     paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Engine> {
-    let Assembly { engine, models, .. } = assemble_with(settings, paper_field_of_view)?;
+    let calibrations = Arc::new(open_calibrations(settings)?);
+    let assembly = assemble_with(settings, calibrations, paper_field_of_view)?;
+    let Assembly { engine, models, .. } = assembly;
     for request in requests {
         let defaults = engine.default_models();
         let needed = match &request.model {
@@ -308,6 +316,12 @@ fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
 }
 
 pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrations> {
+    let (store, writable) = calibration_store(settings)?;
+    Calibrations::open(store, writable).context("calibrations.path")
+}
+
+/// The calibration store of the settings, and true if it may be changed.
+fn calibration_store(settings: &Settings) -> anyhow::Result<(Box<dyn CalibrationStore>, bool)> {
     let settings = &settings.calibrations;
     let store: Box<dyn CalibrationStore> = match &settings.path {
         CalibrationPlace::Bucket(url) => {
@@ -323,7 +337,7 @@ pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrati
             None => FolderStore::that_may_be_missing(folder),
         }),
     };
-    Calibrations::open(store, settings.writable).context("calibrations.path")
+    Ok((store, settings.writable))
 }
 
 /// Opens the result store of the settings. It connects to a Redis in the background.

@@ -200,22 +200,40 @@ fn only_keys_or_access_open_let_a_server_start_on_a_network() {
 fn an_open_server_refuses_changes_and_warns_at_the_start() {
     let open = ("LOOKDOWN__ACCESS__OPEN", "true");
     let server = Server::start("", &[NO_GRACE, open]);
-    let status = |request: &str| {
-        let mut connection = server.connect();
-        let head = format!("{request} HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n\r\n");
-        connection.write_all(head.as_bytes()).unwrap();
-        let mut answer = String::new();
-        connection.read_to_string(&mut answer).unwrap();
-        answer
-    };
-    assert!(status("GET /calibrations").contains(" 200 "));
-    let refused = status("DELETE /calibrations/lobby");
+    assert!(server.get("/calibrations", "").contains(" 200 "));
+    let refused = server.ask("DELETE /calibrations/lobby", "");
     assert!(
         refused.contains(" 403 ") && refused.contains("access.keys_file"),
         "{refused}"
     );
     let before = server.before_ready.join("\n");
     assert_eq!(before.matches("access.open is true").count(), 1, "{before}");
+    server.signal("TERM");
+    server.has_ended();
+}
+
+#[test]
+fn a_silent_calibration_store_does_not_delay_livez() {
+    let bucket = TcpListener::bind("127.0.0.1:0").unwrap();
+    let endpoint = format!("http://{}", bucket.local_addr().unwrap());
+    let mut server = Server::listening(
+        "",
+        &[
+            NO_GRACE,
+            ("LOOKDOWN__CALIBRATIONS__PATH", "s3://cameras"),
+            ("AWS_ENDPOINT", &endpoint),
+            ("AWS_ALLOW_HTTP", "true"),
+            ("AWS_ACCESS_KEY_ID", "me"),
+            ("AWS_SECRET_ACCESS_KEY", "secret"),
+        ],
+    );
+    // The connection of the server waits in the backlog, so the store is still being read.
+    assert!(server.get("/livez", "").contains(" 200 "));
+    assert!(server.get("/readyz", "").contains(" 503 "));
+    drop(bucket);
+    server.becomes_ready();
+    let ready = server.get("/readyz", "");
+    assert!(ready.contains("store_problem"), "{ready}");
     server.signal("TERM");
     server.has_ended();
 }
@@ -232,6 +250,13 @@ struct Server {
 impl Server {
     /// Starts a server by a shell after `preparation`, and waits until it is ready.
     fn start(preparation: &str, environment: &[(&str, &str)]) -> Self {
+        let mut server = Self::listening(preparation, environment);
+        server.becomes_ready();
+        server
+    }
+
+    /// Starts a server by a shell after `preparation`, and waits until it listens.
+    fn listening(preparation: &str, environment: &[(&str, &str)]) -> Self {
         let mut process = Command::new("sh")
             .args(["-c", &format!("{preparation}\nexec {LOOKDOWN} serve")])
             .envs([FREE_ADDRESS])
@@ -249,12 +274,15 @@ impl Server {
         let line = server.says("listening on http");
         let (_, rest) = line.split_once("://127.0.0.1:").unwrap();
         rest.split_once(',').unwrap().0.clone_into(&mut server.port);
-        let mut lines = server.log.by_ref().map(Result::unwrap);
-        let before = lines.by_ref();
-        server.before_ready = before
+        server
+    }
+
+    /// Waits until the server is ready.
+    fn becomes_ready(&mut self) {
+        let lines = self.log.by_ref().map(Result::unwrap);
+        self.before_ready = lines
             .take_while(|line| !line.contains("ready: try curl"))
             .collect();
-        server
     }
 
     /// The next log line that contains this text.
@@ -266,6 +294,21 @@ impl Server {
 
     fn connect(&self) -> TcpStream {
         TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap()
+    }
+
+    /// Sends a GET request with these header lines, and returns the response.
+    fn get(&self, path: &str, headers: &str) -> String {
+        self.ask(&format!("GET {path}"), headers)
+    }
+
+    fn ask(&self, request: &str, headers: &str) -> String {
+        let head =
+            format!("{request} HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n{headers}\r\n");
+        let mut connection = self.connect();
+        connection.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        connection.read_to_string(&mut answer).unwrap();
+        answer
     }
 
     fn signal(&self, name: &str) {
@@ -315,14 +358,7 @@ fn sighup_reloads_the_keys_and_does_not_end_the_server() {
     let never = ("LOOKDOWN__ACCESS__POLL_SECONDS", "0");
     let mut server = Server::start("", &[NO_GRACE, keys_file, never]);
     let status = |server: &Server, key: &str| {
-        let mut connection = server.connect();
-        let head = format!(
-            "GET /calibrations HTTP/1.1\r\nHost: lookdown\r\nX-API-Key: {key}\r\n\
-             Connection: close\r\n\r\n"
-        );
-        connection.write_all(head.as_bytes()).unwrap();
-        let mut answer = String::new();
-        connection.read_to_string(&mut answer).unwrap();
+        let answer = server.get("/calibrations", &format!("X-API-Key: {key}\r\n"));
         answer.split(' ').nth(1).unwrap().to_owned()
     };
     assert_eq!(status(&server, &first.key), "200");
@@ -374,12 +410,7 @@ fn lack_of_file_descriptors_is_logged_once_and_recovered_from() {
     let complaint = "connections cannot be accepted";
     server.says(complaint);
     drop(held);
-    let mut connection = server.connect();
-    connection
-        .write_all(b"GET /livez HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n\r\n")
-        .unwrap();
-    let mut answer = String::new();
-    connection.read_to_string(&mut answer).unwrap();
+    let answer = server.get("/livez", "");
     assert!(answer.contains("200 OK"), "{answer}");
     server.signal("TERM");
     let rest = server.has_ended();

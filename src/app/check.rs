@@ -1,20 +1,31 @@
 //! The report of `lookdown serve --check`.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, thread, time::Duration};
+
+use anyhow::bail;
 
 use super::App;
+
+/// Interval of the checks that the calibrations were read.
+const READ_CHECK: Duration = Duration::from_millis(50);
 
 impl App {
     /// Loads every model that is served, and describes the server that could start: a line on models
     /// and calibrations, and lines on the clients that have access. Blocks.
     ///
     /// # Errors
-    /// When a model cannot be loaded.
+    /// When a model cannot be loaded, or the calibration store cannot be read.
     pub fn check(&self) -> anyhow::Result<String> {
         for name in &self.to_load {
             self.models.load(name)?;
         }
+        while !self.calibrations.is_read() {
+            thread::sleep(READ_CHECK);
+        }
         let health = self.calibrations.health();
+        if let Some(problem) = health.store_problem {
+            bail!("calibrations.path: {problem}");
+        }
         Ok(format!(
             "ready to serve on {}: the models {} and {} calibrations can be used\n{}",
             self.settings.server.listen,

@@ -23,6 +23,8 @@ const FAREWELL: Duration = Duration::from_secs(3);
 const LONGEST_LOAD: Duration = Duration::from_secs(10);
 /// Interval of the checks during that wait.
 const LOAD_CHECK: Duration = Duration::from_millis(20);
+/// Interval of the checks that the calibrations were read.
+const READ_CHECK: Duration = Duration::from_millis(50);
 /// Pause before a model is loaded again after a transient failure.
 const BEFORE_ANOTHER_LOAD: Duration = Duration::from_secs(1);
 
@@ -175,7 +177,8 @@ impl App {
         }
     }
 
-    /// Loads the models until a stop is requested. The server is ready when all are loaded.
+    /// Loads the models until a stop is requested. The server is ready when all are loaded and the
+    /// calibrations were read.
     async fn load_models(
         &self,
         scheme: &str,
@@ -187,6 +190,9 @@ impl App {
                 break;
             }
             self.load(name, shutdown).await?;
+        }
+        while !self.calibrations.is_read() && !shutdown.is_requested() {
+            sleep(READ_CHECK).await;
         }
         // Each profile needs its model: a server with some of them would refuse the others' frames.
         if self.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {
