@@ -46,13 +46,13 @@ mod tests {
     #[test]
     fn dropping_a_poller_does_not_wait_for_a_stuck_run() {
         let (done, stuck) = sync_channel::<()>(0);
-        let (began, begun) = sync_channel(0);
+        let (start, started) = sync_channel(0);
         let poller = Poller::start("stuck", NonZeroU64::MIN, move || {
             // Both ends are there until the end of the test.
-            let _ = began.send(());
+            let _ = start.send(());
             let _ = stuck.recv();
         });
-        begun.recv().unwrap();
+        started.recv().unwrap();
         drop(poller.unwrap());
         drop(done);
     }

@@ -83,10 +83,10 @@ impl EvilServer {
         let address = listener.local_addr().unwrap();
         let sent = Arc::new(AtomicU64::new(0));
         let counter = Arc::clone(&sent);
-        thread::spawn(move || {
+        named(move || {
             for stream in listener.incoming().map_while(Result::ok) {
                 let (evil, counter) = (evil.clone(), Arc::clone(&counter));
-                thread::spawn(move || answer(stream, &evil, &counter));
+                named(move || answer(stream, &evil, &counter));
             }
         });
         Self { address, sent }
@@ -97,8 +97,14 @@ impl EvilServer {
     }
 }
 
+/// Starts a thread, which ends with its connection or its listener.
+fn named<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
+    let thread = thread::Builder::new().name("evil-peer".to_owned());
+    thread.spawn(work).unwrap()
+}
+
 fn answer(mut stream: TcpStream, evil: &Evil, sent: &AtomicU64) -> Option<()> {
-    let count = stream.read(&mut [0; 1 << 16]).ok()?;
+    let count = stream.read(&mut [0; 1 << 13]).ok()?;
     if count == 0 {
         return None;
     }
@@ -111,7 +117,7 @@ fn answer(mut stream: TcpStream, evil: &Evil, sent: &AtomicU64) -> Option<()> {
         stream.write_all(&evil.rest).ok()?;
         sent.fetch_add(evil.rest.len() as u64, Ordering::Relaxed);
         thread::sleep(evil.pause);
-        if evil.rest.is_empty() && stream.read(&mut [0; 1 << 16]).is_ok_and(|count| count == 0) {
+        if evil.rest.is_empty() && stream.read(&mut [0; 1 << 13]).is_ok_and(|count| count == 0) {
             return None;
         }
     }
@@ -156,7 +162,7 @@ fn responses_of_an_inference_server_are_bounded() {
 #[test]
 fn responses_of_a_bucket_are_bounded() {
     let tests = every_kind().into_iter().map(|evil| {
-        thread::spawn(move || {
+        named(move || {
             let name = evil.name;
             let peer = EvilServer::start(evil);
             let variables = [

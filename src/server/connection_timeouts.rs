@@ -49,13 +49,12 @@ const HEAD_END: &[u8] = b"\r\n\r\n";
 impl RequestBytes {
     fn add(&mut self, bytes: &[u8]) {
         self.tail.extend_from_slice(bytes);
-        match &mut self.after_head {
-            Some(count) => *count += bytes.len() as u64,
-            None => {
-                let mut parts = self.tail.windows(HEAD_END.len());
-                let end = parts.position(|part| part == HEAD_END);
-                self.after_head = end.map(|at| (self.tail.len() - at - HEAD_END.len()) as u64);
-            }
+        if let Some(count) = &mut self.after_head {
+            *count += bytes.len() as u64;
+        } else {
+            let mut parts = self.tail.windows(HEAD_END.len());
+            let end = parts.position(|part| part == HEAD_END);
+            self.after_head = end.map(|at| (self.tail.len() - at - HEAD_END.len()) as u64);
         }
         self.tail
             .drain(..self.tail.len().saturating_sub(HEAD_END.len()));

@@ -169,7 +169,7 @@ fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
 }
 
 #[test]
-fn a_swapped_file_with_another_sum_is_refused_at_load_and_reload() {
+fn a_file_with_another_sum_is_refused_at_load_and_reload() {
     let models = Models::new();
     let sum = sha256_of(&fs::read(fixture("any_batch")).unwrap());
     let wanted = format!("sha256 = \"{sum}\"\n");

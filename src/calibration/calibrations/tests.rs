@@ -312,7 +312,7 @@ fn slow_files(time_limit: Duration) -> SlowFiles {
     }
 }
 
-const LONG: Duration = Duration::from_secs(60);
+const LONG: Duration = Duration::from_mins(1);
 const SHORT: Duration = Duration::from_millis(400);
 
 fn open_slow(folder: &Path, reader: FileReader, patience: Duration) -> Arc<Calibrations> {

@@ -100,7 +100,7 @@ impl ReplyMeter {
             let (part, rest) = bytes.split_at(end.map_or(bytes.len(), |end| end + 1));
             bytes = rest;
             if self.line.len() + part.len() > MAX_LINE_BYTES {
-                return Err(refused(format!(
+                return Err(refused(&format!(
                     "a line of more than {MAX_LINE_BYTES} bytes"
                 )));
             }
@@ -134,7 +134,7 @@ impl ReplyMeter {
             }
             other => {
                 let other = char::from(other);
-                return Err(refused(format!("{other:?} instead of a value of RESP2")));
+                return Err(refused(&format!("{other:?} instead of a value of RESP2")));
             }
         }
         Ok(())
@@ -144,7 +144,7 @@ impl ReplyMeter {
     fn length(&self) -> io::Result<Option<u64>> {
         let text = str::from_utf8(&self.line[1..]).ok();
         let length = text.and_then(|text| text.trim().parse::<i64>().ok());
-        let length = length.ok_or_else(|| refused("a length that is no number".to_owned()))?;
+        let length = length.ok_or_else(|| refused("a length that is no number"))?;
         Ok(u64::try_from(length).ok())
     }
 
@@ -152,7 +152,7 @@ impl ReplyMeter {
         self.cost = self.cost.saturating_add(cost);
         if self.cost > self.max_bytes {
             let max = self.max_bytes;
-            return Err(refused(format!("a reply of more than {max} bytes")));
+            return Err(refused(&format!("a reply of more than {max} bytes")));
         }
         Ok(())
     }
@@ -165,7 +165,7 @@ impl ReplyMeter {
     }
 }
 
-fn refused(sent: String) -> io::Error {
+fn refused(sent: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, format!("Redis sent {sent}"))
 }
 

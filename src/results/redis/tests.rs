@@ -42,11 +42,11 @@ impl EvilRedis {
         let port = listener.local_addr().unwrap().port();
         let sent = Arc::new(AtomicU64::new(0));
         let (evil, counter) = (Arc::new(evil), Arc::clone(&sent));
-        thread::spawn(move || {
+        named(move || {
             for stream in listener.incoming().map_while(Result::ok) {
                 let (evil, counter) = (Arc::clone(&evil), Arc::clone(&counter));
                 // It ends when the client disconnects.
-                thread::spawn(move || serve(stream, &evil, &counter));
+                named(move || serve(stream, &evil, &counter));
             }
         });
         Self { port, sent }
@@ -62,7 +62,7 @@ impl EvilRedis {
         let options = RedisOptions {
             address: format!("redis://127.0.0.1:{}", self.port).parse().unwrap(),
             key_prefix: "lookdown".to_owned(),
-            max_age: Duration::from_secs(60),
+            max_age: Duration::from_mins(1),
         };
         let store = RedisResults::start(options, limits).unwrap();
         timeout(TIMEOUT, store.shared.link.next_line())
@@ -70,6 +70,12 @@ impl EvilRedis {
             .unwrap();
         store
     }
+}
+
+/// Starts a thread, which ends with its connection or its listener.
+fn named<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
+    let thread = thread::Builder::new().name("evil-peer".to_owned());
+    thread.spawn(work).unwrap()
 }
 
 fn serve(mut stream: TcpStream, evil: &Evil, sent: &AtomicU64) -> Option<()> {
