@@ -2,10 +2,15 @@
 
 mod check;
 mod models;
+mod reload;
 mod serving;
 mod sockets;
 
-use std::{num::NonZeroU64, sync::Arc, time::Instant};
+use std::{
+    num::NonZeroU64,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use anyhow::Context;
 
@@ -29,10 +34,14 @@ use crate::{
     tls::Tls,
 };
 
+pub use reload::Reloader;
 pub use sockets::Sockets;
 
 pub(crate) use models::onnx_options;
 
+/// Longest time that the start waits for the calibrations. The rest is read while the server
+/// listens, and the server is ready after that.
+const CALIBRATIONS_WAIT: Duration = Duration::from_secs(3);
 /// Interval of the checks of the inference server, seconds.
 const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
@@ -55,11 +64,15 @@ pub struct Assembly {
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
-    assemble_with(settings, FieldOfViewReading::default())
+    let (store, writable) = calibration_store(settings)?;
+    let calibrations = Calibrations::open_within(store, writable, CALIBRATIONS_WAIT);
+    let calibrations = calibrations.context("calibrations.path")?;
+    assemble_with(settings, calibrations, FieldOfViewReading::default())
 }
 
 fn assemble_with(
     settings: &Settings,
+    calibrations: Arc<Calibrations>,
     paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Assembly> {
     let (models, default_models) = models::open(settings)?;
@@ -76,7 +89,6 @@ fn assemble_with(
         rig_cache_bytes: settings.calibrations.cache_bytes,
         inference_cache_frames: settings.inference.inference_cache_frames,
     };
-    let calibrations = Arc::new(open_calibrations(settings)?);
     let known = Some(Arc::clone(&calibrations));
     let engine = Engine::new(Arc::clone(models.registry()), known, options)
         .context("the operating system gives no threads")?;
@@ -116,7 +128,9 @@ pub fn evaluation_engine(
     requests: &[DetectParameters],
     paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Engine> {
-    let Assembly { engine, models, .. } = assemble_with(settings, paper_field_of_view)?;
+    let calibrations = Arc::new(open_calibrations(settings)?);
+    let assembly = assemble_with(settings, calibrations, paper_field_of_view)?;
+    let Assembly { engine, models, .. } = assembly;
     for request in requests {
         let defaults = engine.default_models();
         let needed = match &request.model {
@@ -178,6 +192,8 @@ impl App {
             calibrations,
             models,
         } = assembly;
+        settings.access.check_exposure(settings.server.listen)?;
+        let keys = open_keys(&settings.access)?;
         let to_load = models_to_load(engine.default_models(), &settings.model.also_load);
         let (workers, capacity) = (
             settings.threads.frame_workers,
@@ -187,9 +203,8 @@ impl App {
             .context("the operating system creates no thread for a worker")?;
         let workers = Arc::new(workers);
         let metrics = Arc::new(Metrics::new()?);
-        let results = open_results(&settings.results);
+        let results = open_results(&settings.results)?;
         let readiness = Readiness::default();
-        let keys = open_keys(&settings.access)?;
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
             None => None,
@@ -201,7 +216,7 @@ impl App {
         let access = match &keys {
             Some(keys) => Access::Keys(Arc::clone(keys)),
             None => Access::Open {
-                own_machine_only: settings.server.listen.ip().is_loopback(),
+                own_machine_only: !settings.access.open,
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
@@ -322,6 +337,12 @@ fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
 }
 
 pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrations> {
+    let (store, writable) = calibration_store(settings)?;
+    Calibrations::open(store, writable).context("calibrations.path")
+}
+
+/// The calibration store of the settings, and true if it may be changed.
+fn calibration_store(settings: &Settings) -> anyhow::Result<(Box<dyn CalibrationStore>, bool)> {
     let settings = &settings.calibrations;
     let store: Box<dyn CalibrationStore> = match &settings.path {
         CalibrationPlace::Bucket(url) => {
@@ -337,24 +358,23 @@ pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrati
             None => FolderStore::that_may_be_missing(folder),
         }),
     };
-    Calibrations::open(store, settings.writable).context("calibrations.path")
+    Ok((store, settings.writable))
 }
 
 /// Opens the result store of the settings. It connects to a Redis in the background.
-fn open_results(settings: &ResultSettings) -> Arc<dyn ResultStore> {
-    match settings.redis.clone() {
-        Some(redis) => Arc::new(RedisResults::start(redis, settings.limits)),
+fn open_results(settings: &ResultSettings) -> anyhow::Result<Arc<dyn ResultStore>> {
+    Ok(match settings.redis.clone() {
+        Some(redis) => Arc::new(RedisResults::start(redis, settings.limits)?),
         None => Arc::new(MemoryResults::new(settings.limits)),
-    }
+    })
 }
 
 /// Opens the API keys of the settings. `None` if the settings name neither keys nor a file. With a
 /// file, keys are required even while it holds none.
 fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>>> {
-    let file = settings.keys_file.as_deref();
-    if settings.keys.is_empty() && file.is_none() {
+    if !settings.needs_keys() {
         return Ok(None);
     }
-    let keys = AccessKeys::open(settings.keys.clone(), file)?;
+    let keys = AccessKeys::open(settings.keys.clone(), settings.keys_file.as_deref())?;
     Ok(Some(Arc::new(keys)))
 }

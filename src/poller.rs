@@ -4,15 +4,15 @@ use std::{
     io,
     num::NonZeroU64,
     sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel},
-    thread::{self, JoinHandle},
+    thread,
     time::Duration,
 };
 
-/// A named thread that runs a task. Dropping it ends the thread.
+/// A named thread that runs a task. Dropping it ends the thread after the current run, and does not
+/// wait for that: a run may take as long as a store or a server does not answer.
 pub struct Poller {
     /// Dropping it ends the thread.
-    alive: Option<SyncSender<()>>,
-    thread: Option<JoinHandle<()>>,
+    _alive: SyncSender<()>,
 }
 
 impl Poller {
@@ -28,26 +28,32 @@ impl Poller {
     ) -> io::Result<Self> {
         let (alive, ended) = sync_channel::<()>(0);
         let pause = Duration::from_secs(seconds.get());
-        let thread = thread::Builder::new()
+        thread::Builder::new()
             .name(name.to_owned())
             .spawn(move || {
                 while ended.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
                     task();
                 }
             })?;
-        Ok(Self {
-            alive: Some(alive),
-            thread: Some(thread),
-        })
+        Ok(Self { _alive: alive })
     }
 }
 
-impl Drop for Poller {
-    fn drop(&mut self) {
-        drop(self.alive.take());
-        if let Some(thread) = self.thread.take() {
-            // The panic of a task was already logged.
-            let _ = thread.join();
-        }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dropping_a_poller_does_not_wait_for_a_stuck_run() {
+        let (done, stuck) = sync_channel::<()>(0);
+        let (start, started) = sync_channel(0);
+        let poller = Poller::start("stuck", NonZeroU64::MIN, move || {
+            // Both ends are there until the end of the test.
+            let _ = start.send(());
+            let _ = stuck.recv();
+        });
+        started.recv().unwrap();
+        drop(poller.unwrap());
+        drop(done);
     }
 }

@@ -4,6 +4,8 @@ use std::fmt;
 
 /// Largest number of characters of a client's text that are repeated.
 const MAX_CHARS: usize = 64;
+/// Largest number of characters of an error.
+const MAX_ERROR_CHARS: usize = 300;
 
 /// Displays a text in quotation marks with its control characters escaped, cut after 64 characters:
 /// enough to recognise it, too short to fill a log.
@@ -16,6 +18,22 @@ impl fmt::Display for Quoted<'_> {
         let ellipsis = if kept.len() < self.0.len() { "…" } else { "" };
         write!(formatter, "{kept:?}{ellipsis}")
     }
+}
+
+/// Formats an error that may repeat the text of another server: one line of at most 300 characters,
+/// so that it can neither forge nor fill log lines.
+#[must_use]
+pub fn one_line(error: &impl fmt::Display) -> String {
+    let text = error.to_string();
+    let line = text.chars().take(MAX_ERROR_CHARS);
+    line.map(|character| {
+        if character.is_control() {
+            ' '
+        } else {
+            character
+        }
+    })
+    .collect()
 }
 
 /// Returns the first 64 characters of a text.
@@ -34,6 +52,13 @@ mod tests {
         assert_eq!(Quoted("1.5").to_string(), "\"1.5\"");
         assert_eq!(Quoted("").to_string(), "\"\"");
         assert_eq!(Quoted("a\n\"b").to_string(), r#""a\n\"b""#);
+    }
+
+    #[test]
+    fn an_error_is_one_line_of_limited_length() {
+        let error = "refused\r\n2026-11-22 WARN\tforged\u{1b}[31m";
+        assert_eq!(one_line(&error), "refused  2026-11-22 WARN forged [31m");
+        assert_eq!(one_line(&"ä".repeat(1000)).chars().count(), 300);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-"""The pinned versions and sums of `pins.toml`, checked as they are read."""
+"""The pinned versions and sums of `pins.toml` and of the models' manifests, checked as they are read."""
 
 import re
 import tomllib
@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 
 from .console import SetupError
 
+MODELS = Path(__file__).resolve().parents[2] / "models"
 SHA256 = re.compile(r"[0-9a-f]{64}")
 REGISTRIES = ("npm", "pypi")
 
@@ -96,20 +97,24 @@ class Pins:
     checker: tuple[Requirement, ...]
 
 
-def read_pins(file: Path) -> Pins:
-    """Reads the pins; a missing key or a malformed sum is an error that names the file."""
+def read_pins(file: Path, models_folder: Path = MODELS) -> Pins:
+    """Reads the pins; a missing key or a malformed sum is an error that names the file.
+
+    The sums of the ONNX files are those of the manifests in `models`, which the server checks as well.
+    """
     try:
         document = tomllib.loads(file.read_text(encoding="utf-8"))
         runtime = document["runtime"]
         models = {
-            name: _model(name, table, document["archives"][table["archive"]])
+            name: _model(name, table, document["archives"][table["archive"]], models_folder)
             for name, table in document["models"].items()
         }
         return Pins(
             runtime={cpu: _runtime(runtime, runtime[cpu]) for cpu in ("x86_64", "aarch64")},
             models=tuple(models.values()),
             quantised=tuple(
-                _quantised(name, table, models[table["source"]]) for name, table in document["quantised"].items()
+                _quantised(name, table, models[table["source"]], models_folder)
+                for name, table in document["quantised"].items()
             ),
             converter=tuple(_requirement(table) for table in document["converter"]),
             node=tuple(_requirement(table) for table in document["node"]),
@@ -131,7 +136,7 @@ def _runtime(common: dict, table: dict) -> Runtime:
     )
 
 
-def _model(name: str, table: dict, archive: dict) -> Model:
+def _model(name: str, table: dict, archive: dict, models_folder: Path) -> Model:
     if archive["registry"] not in REGISTRIES:
         raise ValueError(f"'{archive['registry']}' is not one of the registries {', '.join(REGISTRIES)}")
     return Model(
@@ -140,14 +145,24 @@ def _model(name: str, table: dict, archive: dict) -> Model:
         registry=archive["registry"],
         members=_members(table),
         converter=tuple(table["converter"]),
-        onnx_sha256=_sha256(table["onnx_sha256"]),
+        onnx_sha256=_onnx_sha256(models_folder, name),
         default=table.get("default", False),
         caution=table.get("caution"),
     )
 
 
-def _quantised(name: str, table: dict, source: Model) -> Quantised:
-    return Quantised(name, source, _sha256(table["onnx_sha256"]), table.get("default", False))
+def _quantised(name: str, table: dict, source: Model, models_folder: Path) -> Quantised:
+    return Quantised(name, source, _onnx_sha256(models_folder, name), table.get("default", False))
+
+
+def _onnx_sha256(models_folder: Path, name: str) -> str:
+    manifest = models_folder / name / "model.toml"
+    try:
+        return _sha256(tomllib.loads(manifest.read_text(encoding="utf-8"))["sha256"])
+    except KeyError:
+        raise ValueError(f"{manifest}: the key 'sha256' is missing") from None
+    except OSError as error:
+        raise ValueError(f"{manifest} cannot be read: {error.strerror}") from None
 
 
 def _archive(table: dict) -> Archive:

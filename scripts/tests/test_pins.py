@@ -7,6 +7,7 @@ from pathlib import Path
 
 from assets.console import SetupError
 from assets.pins import read_pins
+from assets.sums import sha256_of
 
 from .support import InEmptyRepository
 
@@ -36,6 +37,13 @@ class ShippedPins(InEmptyRepository):
             text = (SCRIPTS.parent / "models" / model.name / "model.toml").read_text(encoding="utf-8")
             manifest = tomllib.loads(text)
             self.assertEqual((manifest["name"], manifest["onnx"]), (model.name, "model.onnx"))
+
+    def test_every_fetched_model_has_the_sum_of_its_manifest(self):
+        pins = read_pins(SHIPPED)
+        for model in pins.models + pins.quantised:
+            onnx_file = SCRIPTS.parent / "models" / model.name / "model.onnx"
+            if onnx_file.is_file():
+                self.assertEqual(sha256_of(onnx_file), model.onnx_sha256, model.name)
 
     def test_every_int8_model_has_the_ranges_of_its_source(self):
         for model in read_pins(SHIPPED).quantised:
@@ -73,6 +81,15 @@ class DamagedPins(InEmptyRepository):
 
     def test_a_sum_that_is_too_short_is_refused(self):
         self.refused(r'sha256 = "[0-9a-f]{4}', 'sha256 = "', "is not a sha256 sum")
+
+    def test_a_model_without_a_sum_in_its_manifest_is_refused(self):
+        with self.assertRaisesRegex(SetupError, "model.toml cannot be read"):
+            read_pins(SHIPPED, self.places.root / "models")
+        for model in (SCRIPTS.parent / "models").iterdir():
+            text = (model / "model.toml").read_text(encoding="utf-8")
+            self.write(f"models/{model.name}/model.toml", re.sub("sha256.*", "", text).encode())
+        with self.assertRaisesRegex(SetupError, "model.toml: the key 'sha256' is missing"):
+            read_pins(SHIPPED, self.places.root / "models")
 
     def test_a_missing_key_is_named(self):
         self.refused(r"converter = .*", "", "the key 'converter' is missing")

@@ -1,20 +1,31 @@
 //! The report of `lookdown serve --check`.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, thread, time::Duration};
+
+use anyhow::bail;
 
 use super::App;
+
+/// Interval of the checks that the calibrations were read.
+const READ_CHECK: Duration = Duration::from_millis(50);
 
 impl App {
     /// Loads every model that is served, and describes the server that could start: a line on models
     /// and calibrations, and lines on the clients that have access. Blocks.
     ///
     /// # Errors
-    /// Returns an error if a model cannot be loaded.
+    /// Returns an error if a model cannot be loaded, or if the calibration store cannot be read.
     pub fn check(&self) -> anyhow::Result<String> {
         for name in &self.to_load {
             self.models.load(name)?;
         }
+        while !self.calibrations.is_read() {
+            thread::sleep(READ_CHECK);
+        }
         let health = self.calibrations.health();
+        if let Some(problem) = health.store_problem {
+            bail!("calibrations.path: {problem}");
+        }
         Ok(format!(
             "ready to serve on {}: the models {} and {} calibrations can be used\n{}",
             self.settings.server.listen,
@@ -27,14 +38,14 @@ impl App {
     fn access_report(&self) -> String {
         let address = self.settings.server.listen;
         let mut report = match &self.keys {
-            None if address.ip().is_loopback() => format!(
+            None if !self.settings.access.open => format!(
                 "access: open, without API keys: every client on this machine may send frames, read \
                  and change everything at {address}"
             ),
             None => format!(
-                "access: open, without API keys: every client that reaches {address} may send frames \
-                 and read calibrations and reports; changes are refused; set access.keys_file to need \
-                 keys"
+                "access: open (access.open), without API keys: every client that reaches {address} \
+                 may send frames and read calibrations and reports; changes are refused; set \
+                 access.keys_file to need keys"
             ),
             Some(keys) => {
                 let keys = keys.known();

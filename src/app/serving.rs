@@ -19,6 +19,12 @@ use crate::{
 
 /// Longest time that the shutdown waits for the MQTT broker.
 const FAREWELL: Duration = Duration::from_secs(3);
+/// Longest time that the shutdown waits for a model that is being loaded.
+const LONGEST_LOAD: Duration = Duration::from_secs(10);
+/// Interval of the checks during that wait.
+const LOAD_CHECK: Duration = Duration::from_millis(20);
+/// Interval of the checks that the calibrations were read.
+const READ_CHECK: Duration = Duration::from_millis(50);
 /// Pause before a model is loaded again after a transient failure.
 const BEFORE_ANOTHER_LOAD: Duration = Duration::from_secs(1);
 
@@ -34,11 +40,10 @@ impl App {
         let address = sockets.main.local_addr()?;
         let scheme = if self.tls.is_some() { "https" } else { "http" };
         log_start(&self.settings, scheme, address);
-        if self.keys.is_none() && !address.ip().is_loopback() {
+        if self.keys.is_none() && self.settings.access.open {
             tracing::warn!(
-                "other machines can reach this server without a key: any client may send frames and \
-                 read calibrations and reports; set access.keys_file, or set server.listen to \
-                 127.0.0.1"
+                "access.open is true and no API keys are set: every client that reaches {address} may \
+                 send frames and read calibrations and reports; set access.keys_file to require keys"
             );
         }
         let _pollers = self.start_pollers()?;
@@ -83,7 +88,7 @@ impl App {
             }
             pending::<()>().await;
         };
-        tokio::select! {
+        let outcome = tokio::select! {
             biased;
             () = shutdown.requested_at_once() => {
                 tracing::warn!("stopped at once");
@@ -95,7 +100,20 @@ impl App {
                 tracing::warn!("stopped before all requests had ended");
                 Ok(())
             }
-        }
+        };
+        self.end_of_load().await;
+        outcome
+    }
+
+    /// Waits until no model is being loaded, within limits: ONNX Runtime crashes the process if it
+    /// ends during a load.
+    async fn end_of_load(&self) {
+        let ended = async {
+            while self.models.is_loading() {
+                sleep(LOAD_CHECK).await;
+            }
+        };
+        let _ = timeout(LONGEST_LOAD, ended).await;
     }
 
     /// Serves metrics and probes on their own port until the process ends.
@@ -159,7 +177,8 @@ impl App {
         }
     }
 
-    /// Loads the models until a stop is requested. The server is ready when all are loaded.
+    /// Loads the models until a stop is requested. The server is ready when all are loaded and the
+    /// calibrations were read.
     async fn load_models(
         &self,
         scheme: &str,
@@ -171,6 +190,9 @@ impl App {
                 break;
             }
             self.load(name, shutdown).await?;
+        }
+        while !self.calibrations.is_read() && !shutdown.is_requested() {
+            sleep(READ_CHECK).await;
         }
         // Each profile needs its model: a server with some of them would refuse the others' frames.
         if self.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {

@@ -4,17 +4,23 @@
 mod change;
 mod content;
 mod error;
+mod file_reader;
 mod load;
 mod named_file;
 mod scan;
 mod snapshot;
 
-use std::sync::{
-    Arc, Mutex, MutexGuard, PoisonError, RwLock,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError, RwLock,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+        mpsc::sync_channel,
+    },
+    thread,
+    time::Duration,
 };
 
-use self::snapshot::Snapshot;
+use self::{file_reader::FileReader, snapshot::Snapshot};
 use super::{Calibration, CalibrationError, CalibrationId, CalibrationStore, StoreError};
 
 pub use change::{Put, WriteCondition};
@@ -27,6 +33,9 @@ pub use snapshot::{CalibrationRow, CalibrationsHealth};
 pub struct Calibrations {
     store: Box<dyn CalibrationStore>,
     writable: bool,
+    reader: FileReader,
+    /// True when the store was read once, with or without success.
+    is_read: AtomicBool,
     now: RwLock<Arc<Snapshot>>,
     /// Held while the store is read or changed: one at a time.
     changing: Mutex<()>,
@@ -41,16 +50,77 @@ impl Calibrations {
     /// # Errors
     /// When the store cannot be listed. A file that cannot be used costs only its calibrations.
     pub fn open(store: Box<dyn CalibrationStore>, writable: bool) -> Result<Self, StoreError> {
-        let calibrations = Self {
+        let calibrations = Self::unread(store, writable, FileReader::default());
+        calibrations.scan(&calibrations.lock())?;
+        calibrations.is_read.store(true, Ordering::Relaxed);
+        Ok(calibrations)
+    }
+
+    /// Like [`Calibrations::open`], but waits for at most `patience`. After that, the rest is read
+    /// in the background ([`Calibrations::is_read`]), and a failure is reported by
+    /// [`Calibrations::health`].
+    ///
+    /// # Errors
+    /// Those of [`Calibrations::open`] within `patience`.
+    pub fn open_within(
+        store: Box<dyn CalibrationStore>,
+        writable: bool,
+        patience: Duration,
+    ) -> Result<Arc<Self>, StoreError> {
+        Self::open_with(store, writable, FileReader::default(), patience)
+    }
+
+    fn open_with(
+        store: Box<dyn CalibrationStore>,
+        writable: bool,
+        reader: FileReader,
+        patience: Duration,
+    ) -> Result<Arc<Self>, StoreError> {
+        let calibrations = Arc::new(Self::unread(store, writable, reader));
+        let (done, outcome) = sync_channel(0);
+        let reading = Arc::clone(&calibrations);
+        let read = move || {
+            let changing = reading.lock();
+            let outcome = reading.scan(&changing);
+            if let Err(Err(error)) = done.send(outcome).map_err(|unsent| unsent.0) {
+                reading.keep_all(&error);
+            }
+            reading.is_read.store(true, Ordering::Relaxed);
+        };
+        let thread = thread::Builder::new().name("calibration-reader".to_owned());
+        thread.spawn(read).map_err(|error| StoreError::Failed {
+            place: calibrations.store.place(),
+            problem: format!("the operating system gives no thread: {error}"),
+        })?;
+        if let Ok(outcome) = outcome.recv_timeout(patience) {
+            outcome?;
+        } else {
+            let place = calibrations.store.place();
+            tracing::warn!(
+                "reading the calibrations of {place} takes long: the rest is read in the background"
+            );
+        }
+        Ok(calibrations)
+    }
+
+    fn unread(store: Box<dyn CalibrationStore>, writable: bool, reader: FileReader) -> Self {
+        Self {
             store,
             writable,
+            reader,
+            is_read: AtomicBool::new(false),
             now: RwLock::default(),
             changing: Mutex::default(),
             succeeded: AtomicU64::new(0),
             failed: AtomicU64::new(0),
-        };
-        calibrations.scan(&calibrations.lock())?;
-        Ok(calibrations)
+        }
+    }
+
+    /// Returns true when the store was read once. Before that, calibrations are unknown that the
+    /// store has.
+    #[must_use]
+    pub fn is_read(&self) -> bool {
+        self.is_read.load(Ordering::Relaxed)
     }
 
     /// The calibration `id`; `None` when there is none. Does not block.

@@ -10,19 +10,25 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use tokio::{runtime, task::spawn_blocking};
+use tokio::{
+    runtime::{self, Runtime},
+    signal::unix::{Signal, SignalKind, signal},
+    spawn,
+    task::spawn_blocking,
+};
 
 use super::SettingsFile;
 use crate::{
-    app::{App, Sockets, assemble},
+    app::{App, Reloader, Sockets, assemble},
     settings::Settings,
     shutdown::Shutdown,
 };
 
 /// Most threads for sockets and JSON. Frames have separate threads.
 const MAX_RUNTIME_THREADS: usize = 2;
-/// Longest time that the shutdown waits for a model that is being loaded.
-const LONGEST_LOAD: Duration = Duration::from_secs(10);
+/// Longest time that the end of the process waits for tasks that block. They may take as long as
+/// workers that are stuck.
+const LAST_TASKS: Duration = Duration::from_secs(1);
 
 /// Arguments of `lookdown serve`.
 #[derive(Debug, Args)]
@@ -48,10 +54,13 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     } else {
         runtime.block_on(serve(settings, commit))
     };
-    // Remaining tasks were aborted. But ONNX Runtime crashes the process if it ends while a model
-    // is being loaded.
-    runtime.shutdown_timeout(LONGEST_LOAD);
+    end(runtime);
     outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// Ends the tasks that remain.
+fn end(runtime: Runtime) {
+    runtime.shutdown_timeout(LAST_TASKS);
 }
 
 /// One thread per two cores: an idle second thread is woken for each request, in case more arrive.
@@ -62,9 +71,12 @@ fn runtime_threads() -> usize {
 
 async fn serve(settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
     let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
+    // From now on SIGHUP does not end the process.
+    let hangups = signal(SignalKind::hangup()).context("signals cannot be handled")?;
     let sockets = Sockets::bind(&settings.server).await?;
     let app = start(settings).await?;
     app.metrics().show_build(commit);
+    spawn(reload_on(hangups, app.reloader()));
     let (tracer, at_once) = (app.tracer(), shutdown.clone());
     let outcome = app.serve(sockets, shutdown).await;
     let last_spans = spawn_blocking(move || tracer.shut_down());
@@ -74,6 +86,15 @@ async fn serve(settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
         _ = last_spans => {}
     }
     outcome
+}
+
+/// Reloads files on each signal. Signals that arrive during a reload cause one more.
+async fn reload_on(mut signals: Signal, reloader: Reloader) {
+    while signals.recv().await.is_some() {
+        let reloader = reloader.clone();
+        // A panic was already logged.
+        let _ = spawn_blocking(move || reloader.reload()).await;
+    }
 }
 
 async fn check(settings: Settings) -> anyhow::Result<()> {
@@ -86,4 +107,22 @@ async fn check(settings: Settings) -> anyhow::Result<()> {
 
 async fn start(settings: Settings) -> anyhow::Result<App> {
     spawn_blocking(move || App::start(assemble(&settings)?, settings)).await?
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{sync::mpsc::sync_channel, time::Instant};
+
+    use super::*;
+
+    #[test]
+    fn a_stuck_task_delays_the_end_by_at_most_3_s() {
+        let runtime = runtime::Builder::new_multi_thread().build().unwrap();
+        let (done, stuck) = sync_channel::<()>(0);
+        runtime.spawn_blocking(move || stuck.recv());
+        let began = Instant::now();
+        end(runtime);
+        assert!(began.elapsed() < Duration::from_secs(3));
+        drop(done);
+    }
 }

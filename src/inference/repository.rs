@@ -146,6 +146,12 @@ impl ModelRepository {
         self.replace(&mut memory, name, &path)
     }
 
+    /// Returns true while a model is being loaded, checked or unloaded.
+    #[must_use]
+    pub fn is_loading(&self) -> bool {
+        self.try_lock().is_err()
+    }
+
     /// Unloads a model. Frames in progress finish with it.
     ///
     /// # Errors

@@ -171,3 +171,76 @@ async fn in_time<T>(
         .await
         .map_err(|_| SessionError::Silent)?
 }
+
+#[cfg(test)]
+mod tests {
+    use tokio::{
+        io::{AsyncReadExt, AsyncWriteExt},
+        net::TcpListener,
+        spawn,
+        time::sleep,
+    };
+
+    use super::*;
+
+    /// The answer to CONNECT.
+    const CONN_ACK: [u8; 4] = [0x20, 2, 0, 0];
+
+    /// Connects to a broker that sends `start`, and then `rest` again and again with pauses.
+    /// Returns the first error, after the session began or before.
+    async fn failure(start: &[u8], rest: &[u8], pause: Duration) -> SessionError {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let (start, rest) = (start.to_vec(), rest.to_vec());
+        let broker = spawn(async move {
+            let (mut stream, _) = listener.accept().await.unwrap();
+            let _ = stream.read(&mut [0; 1024]).await;
+            let mut sent = stream.write_all(&start).await;
+            while sent.is_ok() {
+                sent = stream.write_all(&rest).await;
+                sleep(pause).await;
+            }
+        });
+        let address: Broker = format!("mqtt://127.0.0.1:{port}").parse().unwrap();
+        let will = Message {
+            topic: "lookdown/status".to_owned(),
+            payload: "offline".into(),
+            retained: true,
+        };
+        let opened = Session::open(&address, None, "lookdown", will).await;
+        let failure = async { opened?.next().await };
+        let failure = failure.await.unwrap_err();
+        broker.abort();
+        failure
+    }
+
+    #[tokio::test]
+    async fn packets_of_a_broker_are_bounded() {
+        // PUBLISH with a declared length of 256 MiB, without end.
+        let endless = [0x30, 0xFF, 0xFF, 0xFF, 0x7F];
+        let accepted = [&CONN_ACK[..], &endless].concat();
+        let filler = [b'x'; 4096];
+        for start in [
+            &endless[..],
+            &accepted,
+            &[0xFF; 8],
+            b"HTTP/1.1 400 Bad Request",
+        ] {
+            let error = failure(start, &filler, Duration::ZERO).await;
+            let is_refused = matches!(error, SessionError::Protocol(_) | SessionError::Closed);
+            assert!(is_refused, "{error:?}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_silent_or_slow_broker_is_left_in_time() {
+        // PUBLISH of 16 KiB, a byte each 100 ms.
+        let slow = [&CONN_ACK[..], &[0x30, 0x80, 0x80, 0x01]].concat();
+        for (start, rest) in [(&[][..], &[][..]), (&CONN_ACK, &[]), (&slow, &[0])] {
+            let began = Instant::now();
+            let error = failure(start, rest, Duration::from_millis(100)).await;
+            assert!(matches!(error, SessionError::Silent), "{error:?}");
+            assert!(began.elapsed() < PATIENCE + 2 * KEEP_ALIVE);
+        }
+    }
+}

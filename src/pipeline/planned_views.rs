@@ -4,7 +4,7 @@ use super::{Engine, PipelineError, Profile, outline::view_outline};
 use crate::{
     calibration::Calibration,
     geometry::{
-        Lens, Pixel, VirtualView,
+        Lens, Pixel, Polygon, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
         view_plan::Coverage,
     },
@@ -13,6 +13,10 @@ use crate::{
 
 /// Steps along each side of a view between the rays that test whether it covers the lens image.
 const SIGHT_STEPS: u32 = 64;
+/// Most products of rows and edges for which masks are computed. Five masks of ten corners are exact
+/// in frames of up to 20,000 rows. But a plan may be for 65,536 rows, which are never decoded, and
+/// 32 masks with 64 corners each would take seconds in so many.
+const MAX_MASK_WORK: usize = 1 << 20;
 
 /// The view plan of a camera and its cost.
 #[derive(Debug, Clone)]
@@ -83,8 +87,7 @@ impl Engine {
         let (model, options) = (self.default_model(profile)?, self.options());
         let input = model.input();
         let (lens, (image_width, image_height)) = (calibration.lens(), calibration.image_size());
-        let masks = &calibration.areas().masks;
-        let masked = MaskedPixels::new(masks, image_width, image_height);
+        let masked = CoarseMasks::new(&calibration.areas().masks, image_width, image_height);
         let plan = profile.view_plan(options.paper_field_of_view);
         let views = plan.as_ref().map(|plan| {
             let mut views = plan.views(calibration.mount(), input.width, input.height);
@@ -118,8 +121,37 @@ impl Engine {
     }
 }
 
+/// The masks of frames of any height, in fewer rows than the frame has if they have many edges.
+struct CoarseMasks {
+    masked: MaskedPixels,
+    rows_per_pixel: f64,
+}
+
+impl CoarseMasks {
+    fn new(masks: &[Polygon], width: u32, height: u32) -> Self {
+        let edges: usize = masks.iter().map(|mask| mask.edges().count()).sum();
+        let most = MAX_MASK_WORK / edges.max(1);
+        let rows = u32::try_from(most).map_or(height, |most| height.min(most));
+        let rows_per_pixel = f64::from(rows) / f64::from(height);
+        let masks: Vec<_> = masks
+            .iter()
+            .map(|mask| mask.scaled(1.0, rows_per_pixel))
+            .collect();
+        Self {
+            masked: MaskedPixels::new(&masks, width, rows),
+            rows_per_pixel,
+        }
+    }
+
+    /// Returns true if the row and the pixel that contain a position (pixel centres) are masked.
+    fn hides_position(&self, at: Pixel) -> bool {
+        let row = (at.y + 0.5) * self.rows_per_pixel - 0.5;
+        self.masked.hides_position(Pixel::new(at.x, row))
+    }
+}
+
 /// Returns true when the view covers some unmasked part of the lens image.
-fn sees(view: &VirtualView, lens: &Lens, masked: &MaskedPixels) -> bool {
+fn sees(view: &VirtualView, lens: &Lens, masked: &CoarseMasks) -> bool {
     let place =
         |index: u32, side: u32| f64::from(index) / f64::from(SIGHT_STEPS) * f64::from(side) - 0.5;
     (0..=SIGHT_STEPS).any(|row| {

@@ -6,15 +6,20 @@
 //! does not wait for them.
 
 mod address;
+mod connect;
 mod keys;
 mod link;
 mod outbox;
 mod reading;
+mod reply_limit;
 mod sender;
 mod session;
 mod shared;
+#[cfg(test)]
+mod tests;
 
 use std::{
+    io,
     num::NonZeroUsize,
     sync::{
         Arc,
@@ -29,17 +34,29 @@ use tokio::{task::JoinSet, time::timeout};
 
 pub use self::address::{RedisAddress, RedisAddressError};
 pub use self::shared::RedisOptions;
-use self::{keys::Keys, link::Link, outbox::Outbox, reading::Reader, shared::Shared};
+use self::{
+    connect::{Connector, TIMEOUT},
+    keys::Keys,
+    link::Link,
+    outbox::Outbox,
+    reading::Reader,
+    shared::Shared,
+};
 use super::{
     Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
     StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
+use crate::tls::TlsError;
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
+/// Most bytes that a report in a reply takes in addition to its size in the store: names of fields,
+/// IDs, times and the memory of their values.
+const ENTRY_BYTES: usize = 1 << 10;
+/// Most bytes of an image with its sketch: twice the largest frame that is stored.
+const MAX_IMAGE_BYTES: usize = 8 << 20;
 
 /// Keeps reports in a Redis, within limits.
-#[derive(Debug)]
 pub struct RedisResults {
     shared: Arc<Shared>,
     /// Background tasks, aborted when this is dropped.
@@ -48,12 +65,13 @@ pub struct RedisResults {
 
 impl RedisResults {
     /// Starts a store that connects, and reconnects, in the background. Needs a tokio runtime.
-    #[must_use]
-    pub fn start(options: RedisOptions, limits: ResultLimits) -> Self {
-        // Needed for TLS. Fails if a provider is already installed, which is equally good.
-        let _ = rustls::crypto::ring::default_provider().install_default();
+    ///
+    /// # Errors
+    /// [`TlsError`] if the address needs TLS and TLS cannot be used.
+    pub fn start(options: RedisOptions, limits: ResultLimits) -> Result<Self, TlsError> {
         let shared = Arc::new(Shared {
             keys: Keys::new(options.key_prefix.clone()),
+            connector: Connector::new(options.address.clone(), max_reply_bytes(&limits))?,
             options,
             link: Link::default(),
             outbox: Outbox::default(),
@@ -64,10 +82,10 @@ impl RedisResults {
         let mut tasks = JoinSet::new();
         tasks.spawn(session::keep(Arc::clone(&shared)));
         tasks.spawn(sender::run(Arc::clone(&shared)));
-        Self {
+        Ok(Self {
             shared,
             _tasks: tasks,
-        }
+        })
     }
 
     /// Sends a query if there is a connection.
@@ -80,9 +98,16 @@ impl RedisResults {
             connection: line.connection.clone(),
             keys: &self.shared.keys,
         };
-        let outcome = question(reader).await;
+        let outcome = timeout(TIMEOUT, question(reader)).await;
+        let outcome =
+            outcome.unwrap_or_else(|_| Err(io::Error::from(io::ErrorKind::TimedOut).into()));
         self.shared.link.outcome(&line, outcome)
     }
+}
+
+/// Most bytes of a reply. The largest replies are all reports, or the image of a camera.
+fn max_reply_bytes(limits: &ResultLimits) -> u64 {
+    (limits.max_bytes + limits.max_reports.get() * ENTRY_BYTES + MAX_IMAGE_BYTES) as u64
 }
 
 #[async_trait]

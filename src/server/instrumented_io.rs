@@ -27,7 +27,7 @@ impl<T: AsyncRead + Unpin> AsyncRead for InstrumentedStream<T> {
         let before = buffer.filled().len();
         let outcome = Pin::new(&mut self.stream).poll_read(context, buffer);
         if buffer.filled().len() > before {
-            self.timeouts.received();
+            self.timeouts.received(&buffer.filled()[before..]);
         }
         outcome
     }

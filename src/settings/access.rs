@@ -1,12 +1,13 @@
 //! API keys, and the web pages that may call the server.
 
-use std::{num::NonZeroU64, path::PathBuf};
+use std::{net::SocketAddr, num::NonZeroU64, path::PathBuf};
 
 use url::{Origin, Url};
 
 use super::{
+    SettingsError,
     declare::settings,
-    form::{Form, Refusal, given_path, list, poll_seconds},
+    form::{Form, Refusal, flag, given_path, list, poll_seconds},
 };
 use crate::access::{KeyError, KeyList};
 
@@ -16,8 +17,8 @@ settings! {
     pub struct AccessSettings in "access" {
         /// The file of API keys, one line each as `lookdown key new` prints it
         /// (docs/deployment.md). With keys, every request except health checks, metrics and the API
-        /// page needs one. Without keys, only clients on the same machine should reach the server.
-        /// Leave it out for none: an empty value is refused.
+        /// page needs one. Without keys, the server starts only on a loopback address or with
+        /// `access.open`. Leave it out for none: an empty value is refused.
         keys_file: Option<PathBuf> = None => given_path("/etc/lookdown/keys.toml");
         /// The interval in seconds at which that file is checked for changes. 0: never. An invalid
         /// new version leaves the old keys in use and shows in the log.
@@ -25,9 +26,40 @@ settings! {
         /// Keys in addition to those of the file, each as `name:scope+scope:sha256`, with
         /// `:highest_priority` behind it where that is not 5.
         keys: KeyList = KeyList::default() => keys();
+        /// Lets every client that reaches a server without keys detect and read; changes are refused.
+        /// Such a server needs it to start on an address that is not loopback. Has no effect when
+        /// there are keys.
+        open: bool = false => flag();
         /// Origins of web pages that may call the server from a browser, such as
         /// `https://dashboard.example`.
         cors_origins: Vec<String> = Vec::new() => origins();
+    }
+}
+
+impl AccessSettings {
+    /// Returns `true` if requests need an API key.
+    #[must_use]
+    pub fn needs_keys(&self) -> bool {
+        !self.keys.is_empty() || self.keys_file.is_some()
+    }
+
+    /// Checks that a server may listen on this address: other machines reach a server without keys
+    /// only if the operator says so.
+    ///
+    /// # Errors
+    /// One sentence with both remedies.
+    pub fn check_exposure(&self, listen: SocketAddr) -> Result<(), SettingsError> {
+        if listen.ip().is_loopback() || self.needs_keys() || self.open {
+            return Ok(());
+        }
+        Err(SettingsError::Value {
+            key: "server.listen",
+            value: listen.to_string(),
+            remedy: "other machines reach this address and no API keys are set: set \
+                     access.keys_file, or set access.open to true to let every client detect and \
+                     read"
+                .to_owned(),
+        })
     }
 }
 

@@ -274,7 +274,7 @@ async fn remote_and_disabled_changes_are_refused() {
     };
     let switched_off = Service::around(parts, folder, gate, &Bounds::default());
     for (service, part) in [
-        (afar, "own machine"),
+        (afar, "access.keys_file"),
         (switched_off, "calibrations.writable"),
     ] {
         for method in ["PUT", "DELETE"] {

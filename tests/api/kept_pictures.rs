@@ -2,13 +2,14 @@
 
 use std::collections::BTreeSet;
 
+use bytes::Bytes;
 use lookdown::{
     imaging::{
         Frame,
         annotate::encode_jpeg,
         decode::{DecodeLimits, decode},
     },
-    results::{PicturesOf, ResultStore},
+    results::{NewPicture, NewReport, PicturesOf, ResultStore},
 };
 use serde_json::json;
 
@@ -190,6 +191,33 @@ async fn a_jpeg_is_stored_unchanged_unless_it_is_masked() {
         .unwrap()
         .frame;
     assert!(masked.pixel(20, 20).iter().all(|value| *value < 16));
+}
+
+#[tokio::test]
+async fn stored_data_that_is_no_image_is_refused_with_404() {
+    let service = keeping();
+    service.detect_in("hall").await;
+    let good = service.results.picture("hall").await.unwrap().unwrap();
+    let garbage = Bytes::from_static(b"no\nimage");
+    for (frame, sketch) in [
+        (garbage.clone(), good.picture.sketch.clone()),
+        (good.picture.frame.clone(), garbage.clone()),
+    ] {
+        let report = NewReport {
+            camera: "hall".to_owned(),
+            received_at: "2026-11-22T09:30:00Z".parse().unwrap(),
+            persons: 0,
+            json: Bytes::from_static(b"{}"),
+        };
+        let picture = NewPicture { frame, sketch };
+        service.results.publish(report, Some(picture));
+        let answer = service.get(PATH).await;
+        assert_eq!(answer.status, 404, "{}", answer.text());
+        let problem = answer.problem();
+        assert_eq!(problem["type"], "/problems/picture-not-kept");
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains("cannot be used"), "{detail}");
+    }
 }
 
 #[tokio::test]

@@ -19,6 +19,7 @@ mod load;
 mod log;
 mod metrics_table;
 mod operation;
+mod peers;
 mod picture;
 mod problems;
 mod rate_limit;

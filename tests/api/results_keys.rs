@@ -1,9 +1,10 @@
 //! Keys that are removed during a stream or a wait.
 
-use std::{fs, sync::Arc};
+use std::{fs, sync::Arc, time::Duration};
 
 use lookdown::{access::AccessKeys, results::ResultStore};
 use tempfile::TempDir;
+use tokio::time::Instant;
 
 use crate::{
     access::{line, service_with},
@@ -84,12 +85,17 @@ async fn a_stream_ends_with_its_key_before_the_next_report() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_stream_whose_key_lost_its_scope_ends() {
-    let keyed = Keyed::start();
-    let mut stream = keyed.listen(STREAMS[0], GOING).await;
-    assert!(stream.next().await.is_some());
-    keyed.replace_key(&line("going", "\"detect\"", GOING));
-    assert_eq!(stream.next().await, None);
+async fn an_idle_stream_ends_within_2_s_of_its_key_or_scope() {
+    for by in [&*line("going", "\"detect\"", GOING), ""] {
+        let keyed = Keyed::start();
+        let mut stream = keyed.listen(STREAMS[0], GOING).await;
+        assert!(stream.next().await.is_some());
+        keyed.replace_key(by);
+        let began = Instant::now();
+        assert_eq!(stream.next().await, None);
+        // Much sooner than the next keep-alive comment.
+        assert!(began.elapsed() < Duration::from_secs(2));
+    }
 }
 
 #[tokio::test]

@@ -51,7 +51,7 @@ fn every_invalid_setting_ends_the_start_with_a_sentence() {
     );
     fs::write(Path::new(&other_sum).join("model.toml"), manifest).unwrap();
 
-    let cases: [(&str, &str, &[&str]); 17] = [
+    let cases: [(&str, &str, &[&str]); 18] = [
         ("SERVER__LISTN", "127.0.0.1:1", &["server", "`listn`"]),
         (
             "SERVER__LISTEN",
@@ -67,6 +67,11 @@ fn every_invalid_setting_ends_the_start_with_a_sentence() {
             "SERVER__LISTEN",
             "192.0.2.1:80",
             &["server.listen", "192.0.2.1:80"],
+        ),
+        (
+            "SERVER__LISTEN",
+            "0.0.0.0:0",
+            &["0.0.0.0:0", "access.keys_file", "access.open"],
         ),
         (
             "SERVER__METRICS_LISTEN",
@@ -164,16 +169,93 @@ fn a_check_reports_models_and_access_and_serves_no_client() {
     assert!(keyed.contains("\n  gate: detect, read\n"), "{keyed}");
 }
 
+#[test]
+fn only_keys_or_access_open_let_a_server_start_on_a_network() {
+    const NETWORK: (&str, &str) = ("LOOKDOWN__SERVER__LISTEN", "0.0.0.0:0");
+    const OPEN: (&str, &str) = ("LOOKDOWN__ACCESS__OPEN", "true");
+    let check = |variables: &[(&str, &str)]| {
+        let output = run(&["serve", "--check"], variables);
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let open = check(&[NETWORK, OPEN]);
+    assert!(
+        open.contains("access: open (access.open), without API keys"),
+        "{open}"
+    );
+    assert!(open.contains("changes are refused"), "{open}");
+    let keys = format!("gate:detect+read:{:064}", 7);
+    let keys = ("LOOKDOWN__ACCESS__KEYS", &*keys);
+    // With keys, `access.open` has no effect.
+    for variables in [&[NETWORK, keys][..], &[NETWORK, keys, OPEN]] {
+        let keyed = check(variables);
+        assert!(keyed.contains("needs an API key; 1 known"), "{keyed}");
+    }
+    // The address of metrics and probes needs neither.
+    check(&[("LOOKDOWN__SERVER__METRICS_LISTEN", "0.0.0.0:0")]);
+}
+
+#[test]
+fn an_open_server_refuses_changes_and_warns_at_the_start() {
+    let open = ("LOOKDOWN__ACCESS__OPEN", "true");
+    let server = Server::start("", &[NO_GRACE, open]);
+    assert!(server.get("/calibrations", "").contains(" 200 "));
+    let refused = server.ask("DELETE /calibrations/lobby", "");
+    assert!(
+        refused.contains(" 403 ") && refused.contains("access.keys_file"),
+        "{refused}"
+    );
+    let before = server.before_ready.join("\n");
+    assert_eq!(before.matches("access.open is true").count(), 1, "{before}");
+    server.signal("TERM");
+    server.has_ended();
+}
+
+#[test]
+fn a_silent_calibration_store_does_not_delay_livez() {
+    let bucket = TcpListener::bind("127.0.0.1:0").unwrap();
+    let endpoint = format!("http://{}", bucket.local_addr().unwrap());
+    let mut server = Server::listening(
+        "",
+        &[
+            NO_GRACE,
+            ("LOOKDOWN__CALIBRATIONS__PATH", "s3://cameras"),
+            ("AWS_ENDPOINT", &endpoint),
+            ("AWS_ALLOW_HTTP", "true"),
+            ("AWS_ACCESS_KEY_ID", "me"),
+            ("AWS_SECRET_ACCESS_KEY", "secret"),
+        ],
+    );
+    // The connection of the server waits in the backlog, so the store is still being read.
+    assert!(server.get("/livez", "").contains(" 200 "));
+    assert!(server.get("/readyz", "").contains(" 503 "));
+    drop(bucket);
+    server.becomes_ready();
+    let ready = server.get("/readyz", "");
+    assert!(ready.contains("store_problem"), "{ready}");
+    server.signal("TERM");
+    server.has_ended();
+}
+
 /// A running server.
 struct Server {
     process: Child,
     log: Lines<BufReader<ChildStderr>>,
     port: String,
+    /// The log lines between the start to listen and readiness.
+    before_ready: Vec<String>,
 }
 
 impl Server {
     /// Starts a server by a shell after `preparation`, and waits until it is ready.
     fn start(preparation: &str, environment: &[(&str, &str)]) -> Self {
+        let mut server = Self::listening(preparation, environment);
+        server.becomes_ready();
+        server
+    }
+
+    /// Starts a server by a shell after `preparation`, and waits until it listens.
+    fn listening(preparation: &str, environment: &[(&str, &str)]) -> Self {
         let mut process = Command::new("sh")
             .args(["-c", &format!("{preparation}\nexec {LOOKDOWN} serve")])
             .envs([FREE_ADDRESS])
@@ -186,12 +268,20 @@ impl Server {
             process,
             log,
             port: String::new(),
+            before_ready: Vec::new(),
         };
         let line = server.says("listening on http");
         let (_, rest) = line.split_once("://127.0.0.1:").unwrap();
         rest.split_once(',').unwrap().0.clone_into(&mut server.port);
-        server.says("ready: try curl");
         server
+    }
+
+    /// Waits until the server is ready.
+    fn becomes_ready(&mut self) {
+        let lines = self.log.by_ref().map(Result::unwrap);
+        self.before_ready = lines
+            .take_while(|line| !line.contains("ready: try curl"))
+            .collect();
     }
 
     /// The next log line that contains this text.
@@ -203,6 +293,21 @@ impl Server {
 
     fn connect(&self) -> TcpStream {
         TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap()
+    }
+
+    /// Sends a GET request with these header lines, and returns the response.
+    fn get(&self, path: &str, headers: &str) -> String {
+        self.ask(&format!("GET {path}"), headers)
+    }
+
+    fn ask(&self, request: &str, headers: &str) -> String {
+        let head =
+            format!("{request} HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n{headers}\r\n");
+        let mut connection = self.connect();
+        connection.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        connection.read_to_string(&mut answer).unwrap();
+        answer
     }
 
     fn signal(&self, name: &str) {
@@ -243,6 +348,48 @@ fn sigint_shuts_down_without_a_grace_period() {
 }
 
 #[test]
+fn sighup_reloads_the_keys_and_does_not_end_the_server() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.toml");
+    let (first, second) = (lookdown_key("first"), lookdown_key("second"));
+    fs::write(&file, &first.line).unwrap();
+    let keys_file = ("LOOKDOWN__ACCESS__KEYS_FILE", file.to_str().unwrap());
+    let never = ("LOOKDOWN__ACCESS__POLL_SECONDS", "0");
+    let mut server = Server::start("", &[NO_GRACE, keys_file, never]);
+    let status = |server: &Server, key: &str| {
+        let answer = server.get("/calibrations", &format!("X-API-Key: {key}\r\n"));
+        answer.split(' ').nth(1).unwrap().to_owned()
+    };
+    assert_eq!(status(&server, &first.key), "200");
+    fs::write(&file, &second.line).unwrap();
+    for _ in 0..2 {
+        server.signal("HUP");
+        server.says("SIGHUP");
+        assert_eq!(status(&server, &first.key), "401");
+        assert_eq!(status(&server, &second.key), "200");
+    }
+    server.signal("TERM");
+    server.has_ended();
+}
+
+/// A new API key, and its line for the file of keys.
+struct Key {
+    key: String,
+    line: String,
+}
+
+fn lookdown_key(name: &str) -> Key {
+    let output = run(&["key", "new", "--name", name, "--scope", "read"], &[]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let mut next = || lines.find(|line| !line.is_empty()).unwrap().to_owned();
+    Key {
+        key: next(),
+        line: next(),
+    }
+}
+
+#[test]
 fn a_second_signal_ends_the_server_at_once() {
     let mut server = Server::start("", &[LONG_GRACE]);
     server.signal("TERM");
@@ -262,12 +409,7 @@ fn lack_of_file_descriptors_is_logged_once_and_recovered_from() {
     let complaint = "connections cannot be accepted";
     server.says(complaint);
     drop(held);
-    let mut connection = server.connect();
-    connection
-        .write_all(b"GET /livez HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n\r\n")
-        .unwrap();
-    let mut answer = String::new();
-    connection.read_to_string(&mut answer).unwrap();
+    let answer = server.get("/livez", "");
     assert!(answer.contains("200 OK"), "{answer}");
     server.signal("TERM");
     let rest = server.has_ended();

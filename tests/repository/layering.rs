@@ -22,7 +22,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
     ("metrics", &[]),
     ("shutdown", &[]),
     ("poller", &[]),
-    ("results", &["fairness"]),
+    ("results", &["fairness", "quoted", "tls"]),
     ("open_inference", &[]),
     ("imaging", &["geometry"]),
     (
@@ -31,7 +31,13 @@ const MAY_USE: [(&str, &[&str]); 33] = [
     ),
     (
         "inference",
-        &["detection", "imaging", "open_inference", "revision"],
+        &[
+            "detection",
+            "imaging",
+            "open_inference",
+            "quoted",
+            "revision",
+        ],
     ),
     ("tls", &["metrics", "watched_file"]),
     ("server", &["metrics", "shutdown", "tls"]),

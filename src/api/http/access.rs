@@ -1,5 +1,6 @@
-//! Authorization. With API keys, a request needs a key with the required scope. Without keys, every
-//! client may detect and read, and only clients on the same machine may make changes.
+//! Authorization. With API keys, a request needs a key with the required scope. Without keys, a
+//! loopback server permits everything to clients on the same machine, and an open server
+//! (`access.open`) permits every client to detect and read.
 
 use std::sync::Arc;
 
@@ -18,6 +19,7 @@ pub enum Access {
     /// The server has no keys.
     Open {
         /// `true` if only clients on the same machine reach the server. They may then make changes.
+        /// `false` with `access.open`.
         own_machine_only: bool,
     },
     /// Every request needs a key.
@@ -86,9 +88,8 @@ impl Access {
             Self::Open {
                 own_machine_only: false,
             } => {
-                let detail = "without keys (access.keys_file), models and calibrations are \
-                              changed on the server's own machine only: this server listens on \
-                              others, too (server.listen)";
+                let detail = "without keys, clients of an open server (access.open) may only detect \
+                              and read: set access.keys_file and send a key with the scope admin";
                 Err(Problem::new(ProblemKind::Forbidden, detail))
             }
             _ => self.check(headers, wanted).map(drop),

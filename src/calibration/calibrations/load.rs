@@ -3,7 +3,8 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
-    content::{CalibrationEntry, cameras},
+    content::CalibrationEntry,
+    file_reader::{FileReader, Unread},
     named_file::NamedFile,
 };
 use crate::calibration::{CalibrationId, StoreError};
@@ -24,6 +25,7 @@ pub(super) struct LoadedFile {
 impl LoadedFile {
     /// The file of the ID `stem`; what cannot be used stays as it is in `before`.
     pub(super) fn new(
+        reader: &FileReader,
         stem: &CalibrationId,
         mut named: NamedFile,
         content: Result<Vec<u8>, StoreError>,
@@ -31,16 +33,22 @@ impl LoadedFile {
     ) -> Self {
         let name = &named.file.name;
         let found = match content {
-            Ok(content) => cameras(stem, name, &content).map_err(|error| error.to_string()),
-            Err(error) => {
-                // So that it is tried again, although it may never change.
-                named.file.stamp.clear();
-                Err(error.to_string())
-            }
+            Ok(content) => reader.read(stem, name, content),
+            Err(error) => Err(Unread {
+                problem: error.to_string(),
+                is_passing: true,
+            }),
         };
         let found = match found {
             Ok(found) => found,
-            Err(problem) => {
+            Err(Unread {
+                problem,
+                is_passing,
+            }) => {
+                if is_passing {
+                    // So that it is tried again, although it may never change.
+                    named.file.stamp.clear();
+                }
                 return Self {
                     named,
                     cameras: before.map(|file| file.cameras.clone()).unwrap_or_default(),

@@ -22,14 +22,17 @@ impl Calibrations {
     pub fn refresh(&self) {
         let changing = self.lock();
         if let Err(error) = self.scan(&changing) {
-            let problem = error.to_string();
-            let now = self.now();
-            if now.store_problem.as_ref() != Some(&problem) {
-                tracing::error!(
-                    "calibrations cannot be read, the loaded ones stay in use: {problem}"
-                );
-                self.replace(now.with_store_problem(problem));
-            }
+            self.keep_all(&error);
+        }
+    }
+
+    /// Logs and reports that the store cannot be read.
+    pub(super) fn keep_all(&self, error: &StoreError) {
+        let problem = error.to_string();
+        let now = self.now();
+        if now.store_problem.as_ref() != Some(&problem) {
+            tracing::error!("calibrations cannot be read, the loaded ones stay in use: {problem}");
+            self.replace(now.with_store_problem(problem));
         }
     }
 
@@ -79,7 +82,7 @@ impl Calibrations {
                     return Err(error);
                 }
                 let known = before.get(&id).map(Arc::as_ref);
-                let loaded = LoadedFile::new(&id, named, content, known);
+                let loaded = LoadedFile::new(&self.reader, &id, named, content, known);
                 self.tell(&loaded, known);
                 files.insert(id, Arc::new(loaded));
             }

@@ -1,3 +1,5 @@
+mod slow;
+
 use std::{
     fs,
     path::Path,

@@ -2,6 +2,7 @@
 //! Storage. An object's `ETag` is its stamp, so that one request per poll finds all changes.
 
 mod background;
+mod bounded;
 mod connection;
 mod failure;
 
@@ -16,6 +17,8 @@ use url::Url;
 use self::{background::Background, connection::Objects};
 use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
 
+/// Most pages of a listing: some may hold nothing but deeper levels.
+const MAX_PAGES: usize = 500;
 /// The separator of the levels of a bucket.
 const LEVEL: &str = "/";
 
@@ -152,7 +155,7 @@ impl CalibrationStore for BucketStore {
 async fn list(objects: Arc<dyn Objects>, level: Path) -> Result<Vec<ObjectMeta>, Error> {
     let prefix = (!level.is_root()).then(|| format!("{level}{LEVEL}"));
     let (mut found, mut page_token) = (Vec::new(), None);
-    loop {
+    for _ in 0..MAX_PAGES {
         let options = PaginatedListOptions {
             delimiter: Some(LEVEL.into()),
             page_token,
@@ -165,6 +168,10 @@ async fn list(objects: Arc<dyn Objects>, level: Path) -> Result<Vec<ObjectMeta>,
             return Ok(found);
         }
     }
+    Err(Error::Generic {
+        store: "bucket",
+        source: format!("the listing has more than {MAX_PAGES} pages").into(),
+    })
 }
 
 async fn read(objects: Arc<dyn Objects>, path: Path, at_most: u64) -> Result<Vec<u8>, Error> {

@@ -11,7 +11,10 @@ use reqwest::{
 use url::Url;
 
 use super::RemoteOptions;
-use crate::open_inference::{HEAD_LENGTH, message::Message};
+use crate::{
+    open_inference::{HEAD_LENGTH, message::Message},
+    quoted::one_line,
+};
 
 /// Connect timeout.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -19,6 +22,9 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 const IDLE_TIMEOUT: Duration = Duration::from_secs(20);
 /// Largest response, in bytes: the raw outputs of a large network for a large batch.
 const MAX_ANSWER_BYTES: u64 = 64 << 20;
+
+/// Longest pause that is passed on to clients.
+const MAX_RETRY_AFTER: Duration = Duration::from_mins(1);
 
 /// Connections to a server.
 pub(super) struct Connection {
@@ -130,12 +136,14 @@ fn read(response: Response) -> Result<Reply, String> {
         value.to_str().ok()?.parse::<u64>().ok()
     };
     let head_length = number(HEAD_LENGTH).and_then(|length| usize::try_from(length).ok());
-    let retry_after = number(RETRY_AFTER.as_str()).map(Duration::from_secs);
+    let retry_after = number(RETRY_AFTER.as_str());
+    let retry_after = retry_after.map(|seconds| Duration::from_secs(seconds).min(MAX_RETRY_AFTER));
     let status = response.status().as_u16();
     let mut body = Vec::new();
     let mut bounded = response.take(MAX_ANSWER_BYTES + 1);
     let length = bounded.read_to_end(&mut body);
-    let length = length.map_err(|error| format!("its response is incomplete: {error}"))?;
+    let length =
+        length.map_err(|error| format!("its response is incomplete: {}", one_line(&error)))?;
     if length as u64 > MAX_ANSWER_BYTES {
         return Err(format!(
             "its response is longer than {MAX_ANSWER_BYTES} bytes"
@@ -158,5 +166,5 @@ fn with_causes(error: reqwest::Error) -> String {
         message = format!("{message}: {error}");
         cause = error.source();
     }
-    message
+    one_line(&message)
 }

@@ -138,6 +138,20 @@ fn an_overloaded_server_is_busy_and_an_unready_one_unavailable() {
 }
 
 #[test]
+fn a_huge_retry_after_is_shortened_to_a_minute() {
+    let fake = FakeServer::start(true, -1);
+    let folder = manifest();
+    let mut detector = load(&server(&fake), folder.path()).unwrap();
+    let seconds = u64::MAX.to_string();
+    fake.queue(ScriptedReply::status(429).header("Retry-After", &seconds));
+    let error = detect(&mut detector, 1).unwrap_err();
+    assert!(
+        matches!(error, InferenceError::RemoteBusy { retry_after } if retry_after.as_secs() == 60),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_failing_server_gets_no_requests_until_it_is_ready() {
     let fake = FakeServer::start(true, -1);
     let folder = manifest();

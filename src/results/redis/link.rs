@@ -3,7 +3,7 @@
 use redis::{RedisError, RetryMethod, aio::MultiplexedConnection};
 use tokio::sync::watch;
 
-use crate::results::Unreachable;
+use crate::{quoted::one_line, results::Unreachable};
 
 /// The shared connection to Redis, if there is one now.
 #[derive(Debug)]
@@ -43,7 +43,7 @@ impl Link {
 
     /// Removes the connection and keeps the reason.
     pub(super) fn is_down(&self, problem: &RedisError) {
-        self.0.send_replace(State::Down(problem.to_string()));
+        self.0.send_replace(State::Down(one_line(problem)));
     }
 
     /// Returns the outcome of a query. A connection that has failed is removed.
@@ -58,12 +58,12 @@ impl Link {
                     // It may have been replaced in the meantime.
                     let is_it = matches!(state, State::Up(now) if now.number == line.number);
                     if is_it {
-                        *state = State::Down(error.to_string());
+                        *state = State::Down(one_line(&error));
                     }
                     is_it
                 });
             }
-            Unreachable(error.to_string())
+            Unreachable(one_line(&error))
         })
     }
 

@@ -39,7 +39,7 @@ impl Reader<'_> {
         let mut all = cmd("ZRANGE");
         all.arg(self.keys.cameras()).arg(0).arg(-1);
         let cameras: Vec<String> = all.query_async(&mut self.connection).await?;
-        let mut each = pipe();
+        let mut each = atomic();
         for camera in &cameras {
             let last = each.cmd("XREVRANGE").arg(self.keys.camera(camera));
             last.arg("+").arg("-").arg("COUNT").arg(1);
@@ -75,7 +75,7 @@ impl Reader<'_> {
         &mut self,
         entries: Vec<Entry>,
     ) -> RedisResult<Vec<Arc<StoredReport>>> {
-        let mut each = pipe();
+        let mut each = atomic();
         for entry in &entries {
             let id = format!("{}-0", entry.id);
             let one = each.cmd("XRANGE").arg(self.keys.camera(&entry.camera));
@@ -115,7 +115,7 @@ impl Reader<'_> {
     }
 
     pub(super) async fn usage(&mut self) -> RedisResult<ResultUse> {
-        let mut counts = pipe();
+        let mut counts = atomic();
         counts.cmd("ZCARD").arg(self.keys.cameras());
         counts.cmd("XLEN").arg(self.keys.reports());
         counts.cmd("HGET").arg(self.keys.totals()).arg("bytes");
@@ -162,6 +162,13 @@ impl Reader<'_> {
     }
 }
 
+/// A pipeline whose replies are one reply, so that the limit of one holds for all of them.
+fn atomic() -> Pipeline {
+    let mut pipeline = pipe();
+    pipeline.atomic();
+    pipeline
+}
+
 /// The entries of a range of the stream of all reports.
 pub(super) fn entries(found: Vec<StreamId>) -> Vec<Entry> {
     let entries = found.into_iter().filter_map(|entry| {
@@ -183,6 +190,10 @@ fn report(camera: &str, mut entry: StreamId) -> Option<Arc<StoredReport>> {
     let Value::BulkString(json) = entry.map.remove("json")? else {
         return None;
     };
+    // Lines of their own would be events of their own in an event stream.
+    if json.iter().any(|byte| matches!(byte, b'\r' | b'\n')) {
+        return None;
+    }
     Some(Arc::new(StoredReport {
         id,
         report: NewReport {

@@ -7,6 +7,7 @@ use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use uuid::Uuid;
 
 use super::{Shared, link::is_refusal, outbox::PendingReport};
+use crate::quoted::one_line;
 
 /// The script that stores a report in Redis.
 const RECORD: &str = include_str!("record.lua");
@@ -26,6 +27,7 @@ pub(super) async fn run(shared: Arc<Shared>) {
             && !last_was_refused
         {
             let address = &shared.options.address;
+            let refusal = one_line(refusal);
             tracing::warn!("Redis at {address} refuses reports: {refusal}");
         }
         last_was_refused = refusal.is_some();

@@ -3,19 +3,16 @@
 
 use std::{convert::Infallible, sync::Arc, time::Duration};
 
-use redis::{
-    AsyncConnectionConfig, RedisResult, aio::MultiplexedConnection, cmd, streams::StreamReadReply,
-};
+use redis::{RedisResult, aio::MultiplexedConnection, cmd, streams::StreamReadReply};
 use tokio::time::{Instant, sleep};
 
 use super::{
     Shared,
+    connect::TIMEOUT,
     reading::{Reader, entries},
 };
-use crate::results::ReportId;
+use crate::{quoted::one_line, results::ReportId};
 
-/// Longest time for the login, and for any answer of Redis.
-const TIMEOUT: Duration = Duration::from_secs(2);
 /// Time for which a blocking read waits for new reports.
 const NEWS_WAIT: Duration = Duration::from_secs(5);
 /// Most new reports per read.
@@ -41,7 +38,7 @@ pub(super) async fn keep(shared: Arc<Shared>) {
         let problem = match open(&shared).await {
             Err(error) => {
                 shared.link.is_down(&error);
-                error.to_string()
+                one_line(&error)
             }
             Ok(session) => {
                 let began = Instant::now();
@@ -57,7 +54,7 @@ pub(super) async fn keep(shared: Arc<Shared>) {
                 let problem = tokio::select! {
                     Err(error) = follow(&shared, session.news, &mut position) => {
                         shared.link.is_down(&error);
-                        error.to_string()
+                        one_line(&error)
                     }
                     problem = shared.link.lost() => problem,
                 };
@@ -81,23 +78,14 @@ pub(super) async fn keep(shared: Arc<Shared>) {
 }
 
 async fn open(shared: &Shared) -> RedisResult<Session> {
-    let client = shared.options.address.client();
-    let connect = async |timeout| {
-        let config = AsyncConnectionConfig::new()
-            .set_connection_timeout(Some(TIMEOUT))
-            .set_response_timeout(Some(timeout));
-        client
-            .get_multiplexed_async_connection_with_config(&config)
-            .await
-    };
-    let commands = connect(TIMEOUT).await?;
+    let commands = shared.connector.connect(TIMEOUT).await?;
     let mut reader = Reader {
         connection: commands.clone(),
         keys: &shared.keys,
     };
     Ok(Session {
         newest: reader.newest().await?,
-        news: connect(NEWS_WAIT + TIMEOUT).await?,
+        news: shared.connector.connect(NEWS_WAIT + TIMEOUT).await?,
         commands,
     })
 }

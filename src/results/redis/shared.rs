@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use super::{RedisAddress, keys::Keys, link::Link, outbox::Outbox};
+use super::{RedisAddress, connect::Connector, keys::Keys, link::Link, outbox::Outbox};
 use crate::results::{Listeners, ResultLimits};
 
 /// The Redis server and the part of it that this installation uses.
@@ -20,9 +20,9 @@ pub struct RedisOptions {
 }
 
 /// The state that the store shares with its background tasks.
-#[derive(Debug)]
 pub(super) struct Shared {
     pub(super) options: RedisOptions,
+    pub(super) connector: Connector,
     pub(super) limits: ResultLimits,
     pub(super) keys: Keys,
     pub(super) link: Link,

@@ -10,8 +10,12 @@ use std::{
     thread,
 };
 
-use lookdown::inference::{
-    InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
+use lookdown::{
+    inference::{
+        InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions,
+        RepositoryRow,
+    },
+    revision::sha256_of,
 };
 use tempfile::TempDir;
 
@@ -165,6 +169,27 @@ fn a_model_that_fails_its_check_does_not_replace_the_old_one() {
 }
 
 #[test]
+fn a_file_with_another_sum_is_refused_at_load_and_reload() {
+    let models = Models::new();
+    let sum = sha256_of(&fs::read(fixture("any_batch")).unwrap());
+    let wanted = format!("sha256 = \"{sum}\"\n");
+    models.write("a", &wanted, "any_batch");
+    models.repository.load("a").unwrap();
+    let before = models.revision("a");
+    // Another model, as someone with access to the file alone would put it there.
+    let file = models.folder.path().join("a/model.onnx");
+    fs::copy(fixture("pairs"), &file).unwrap();
+    models.repository.reload_changed();
+    models.repository.reload_changed();
+    assert_eq!(models.revision("a"), before);
+    let reason = models.row("a").reason.unwrap();
+    assert!(reason.contains("its SHA-256 is"), "{reason}");
+    assert!(!reason.contains('\n'), "{reason}");
+    let error = models.repository.load("a").err().unwrap().to_string();
+    assert!(error.contains("its SHA-256 is"), "{error}");
+}
+
+#[test]
 fn a_model_with_deleted_files_stays_loaded() {
     let models = Models::new();
     models.repository.load("a").unwrap();
@@ -205,9 +230,11 @@ fn nothing_is_unloaded_while_a_model_is_being_loaded() {
         steps.wait();
         let refused = repository.unload("b").unwrap_err();
         assert!(matches!(refused, RepositoryError::Busy), "{refused}");
+        assert!(repository.is_loading());
         steps.wait();
         loading.join().unwrap().unwrap();
     });
+    assert!(!repository.is_loading());
     repository.unload("b").unwrap();
 }
 

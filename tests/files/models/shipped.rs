@@ -80,3 +80,14 @@ fn every_fetched_model_finds_the_persons_of_a_sample() {
         );
     }
 }
+
+#[test]
+fn every_shipped_manifest_has_the_sum_of_its_file() {
+    let mut names = 0;
+    for entry in fs::read_dir(of_repository("models")).unwrap() {
+        let text = fs::read_to_string(entry.unwrap().path().join("model.toml")).unwrap();
+        assert!(text.contains("\nsha256 = \""), "{text}");
+        names += 1;
+    }
+    assert!(names >= 4, "{names}");
+}

@@ -1,6 +1,6 @@
 //! Streams of reports: server-sent events (HTML Living Standard, section 9.2).
 
-use std::{convert::Infallible, sync::Arc};
+use std::{convert::Infallible, future::pending, sync::Arc, time::Duration};
 
 use axum::{
     body::Body,
@@ -12,6 +12,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use futures_util::stream::unfold;
+use tokio::time::sleep;
 
 use super::{NO_CACHE, address::CameraAddress, feed::Feed};
 use crate::{
@@ -20,6 +21,8 @@ use crate::{
 };
 
 pub(in crate::api) const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
+/// Interval of the checks that the key of a stream is still valid.
+const KEY_CHECK: Duration = Duration::from_secs(1);
 /// Disables the response buffering of nginx and compatible proxies.
 const ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
 
@@ -93,7 +96,10 @@ async fn stream(
     .await?;
     let listener = (feed, state, headers);
     let events = unfold(listener, async |(mut feed, state, headers)| {
-        let event = feed.next().await?;
+        let event = tokio::select! {
+            event = feed.next() => event?,
+            () = key_removed(&state, &headers) => return None,
+        };
         // A stream must not outlive its key.
         RequireRead::check(&state, &headers).ok()?;
         Some((Ok::<_, Infallible>(event), (feed, state, headers)))
@@ -101,4 +107,14 @@ async fn stream(
     let headers = [(CONTENT_TYPE, "text/event-stream"), (ACCEL_BUFFERING, "no")];
     let cache = [(CACHE_CONTROL, NO_CACHE)];
     Ok((headers, cache, Body::from_stream(events)).into_response())
+}
+
+/// Waits until the key of a stream is removed.
+async fn key_removed(state: &ApiState, headers: &HeaderMap) {
+    if !state.options.access.needs_keys() {
+        return pending().await;
+    }
+    while RequireRead::check(state, headers).is_ok() {
+        sleep(KEY_CHECK).await;
+    }
 }

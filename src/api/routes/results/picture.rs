@@ -12,7 +12,7 @@ use bytes::Bytes;
 
 use super::{address::CameraAddress, unknown};
 use crate::{
-    annotated_image::{AnnotationOptions, StoredFrame},
+    annotated_image::{AnnotationOptions, StoredFrame, StoredFrameError},
     api::{
         ApiState,
         caller::Caller,
@@ -25,7 +25,7 @@ use crate::{
         openapi::{AnnotationQuery, RawBytes},
         require_scope::RequireRead,
     },
-    quoted::Quoted,
+    quoted::{Quoted, one_line},
 };
 
 /// Only the client may cache the image, and must revalidate it before use.
@@ -82,12 +82,29 @@ pub(in crate::api) async fn get_picture(
         frame.annotated(&options, &|| withdrawn.is_cancelled())
     });
     let drawn = deadline.wait("the image was not drawn", drawing).await?;
-    let picture = Bytes::from(drawn.map_err(Problem::internal)?);
+    let picture = Bytes::from(drawn.map_err(|error| undrawn(&camera, error))?);
     Ok((about(&id), [(CONTENT_TYPE, "image/jpeg")], picture).into_response())
 }
 
 fn about(id: &str) -> [(HeaderName, HeaderValue); 2] {
     [(ETAG, entity_tag(id)), (CACHE_CONTROL, PRIVATE)]
+}
+
+/// The stored data may be from another server or another program.
+fn undrawn(camera: &str, error: StoredFrameError) -> Problem {
+    if !matches!(
+        error,
+        StoredFrameError::Sketch(_) | StoredFrameError::Frame(_)
+    ) {
+        return Problem::internal(error);
+    }
+    let camera = Quoted(camera);
+    let error = one_line(&error);
+    let detail = format!(
+        "the stored image of the camera {camera} cannot be used ({error}): the next frame of the \
+         camera replaces it"
+    );
+    Problem::new(ProblemKind::PictureNotKept, detail)
 }
 
 fn none_kept(camera: &str) -> Problem {

@@ -12,6 +12,8 @@ use object_store::{
 };
 use url::Url;
 
+use super::bounded::BoundedConnector;
+
 /// Bounds of a request, whatever the provider's variables say.
 const BOUNDS: [(ClientConfigKey, &str); 2] = [
     (ClientConfigKey::ConnectTimeout, "3 seconds"),
@@ -44,7 +46,10 @@ macro_rules! client {
         let bounded = BOUNDS.iter().fold(builder, |builder, (key, value)| {
             builder.with_config($client_key(*key), *value)
         });
-        let client = bounded.with_retry(retries()).build();
+        let client = bounded
+            .with_retry(retries())
+            .with_http_connector(BoundedConnector::default())
+            .build();
         client.map(|client| Arc::new(client) as Arc<dyn Objects>)
     }};
 }

@@ -1,0 +1,92 @@
+//! An HTTP client for buckets that bounds the size of every response. The provider's client reads
+//! listings and error messages of any size into memory, and reserves the declared length at once.
+
+use std::{
+    io,
+    pin::Pin,
+    task::{Context, Poll, ready},
+};
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use http_body::{Body, Frame, SizeHint};
+use object_store::{
+    ClientOptions, Result,
+    client::{
+        HttpClient, HttpConnector, HttpError, HttpErrorKind, HttpRequest, HttpResponse,
+        HttpResponseBody, HttpService, ReqwestConnector,
+    },
+};
+
+/// Most bytes of a response: more than the largest page of a listing, 5000 objects with names of
+/// 1024 bytes.
+const MAX_RESPONSE_BYTES: u64 = 16 << 20;
+
+/// Creates clients with bounded responses.
+#[derive(Debug, Default)]
+pub(super) struct BoundedConnector(ReqwestConnector);
+
+impl HttpConnector for BoundedConnector {
+    fn connect(&self, options: &ClientOptions) -> Result<HttpClient> {
+        let client = self.0.connect(options)?;
+        Ok(HttpClient::new(BoundedClient(client)))
+    }
+}
+
+#[derive(Debug)]
+struct BoundedClient(HttpClient);
+
+#[async_trait]
+impl HttpService for BoundedClient {
+    async fn call(&self, request: HttpRequest) -> Result<HttpResponse, HttpError> {
+        let response = self.0.execute(request).await?;
+        if response.body().size_hint().lower() > MAX_RESPONSE_BYTES {
+            return Err(too_large());
+        }
+        Ok(response.map(|body| {
+            HttpResponseBody::new(BoundedBody {
+                body,
+                left: MAX_RESPONSE_BYTES,
+            })
+        }))
+    }
+}
+
+/// A body that fails when it is longer than the limit.
+struct BoundedBody {
+    body: HttpResponseBody,
+    left: u64,
+}
+
+impl Body for BoundedBody {
+    type Data = Bytes;
+    type Error = HttpError;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, HttpError>>> {
+        let frame = ready!(Pin::new(&mut self.body).poll_frame(context));
+        if let Some(Ok(frame)) = &frame {
+            let length = frame.data_ref().map_or(0, Bytes::len) as u64;
+            let Some(left) = self.left.checked_sub(length) else {
+                return Poll::Ready(Some(Err(too_large())));
+            };
+            self.left = left;
+        }
+        Poll::Ready(frame)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+fn too_large() -> HttpError {
+    let problem = format!("it sent a response of more than {MAX_RESPONSE_BYTES} bytes");
+    HttpError::new(HttpErrorKind::Decode, io::Error::other(problem))
+}

@@ -1,0 +1,195 @@
+//! Redis servers that misbehave, on real sockets.
+
+use std::{
+    io::{Read, Write},
+    net::{TcpListener, TcpStream},
+    sync::atomic::{AtomicU64, Ordering},
+    thread,
+    time::Instant,
+};
+
+use super::*;
+
+/// Bytes that kernel buffers may take in addition to what the client reads.
+const SOCKET_BYTES: u64 = 16 << 20;
+
+/// A Redis that logs clients in, and sends `evil` to every other query, the last part forever if
+/// `is_endless`.
+struct EvilRedis {
+    port: u16,
+    sent: Arc<AtomicU64>,
+}
+
+struct Evil {
+    reply: Vec<u8>,
+    is_endless: bool,
+    pause: Duration,
+}
+
+impl Evil {
+    fn once(reply: &str) -> Self {
+        Self {
+            reply: reply.as_bytes().to_vec(),
+            is_endless: false,
+            pause: Duration::ZERO,
+        }
+    }
+}
+
+impl EvilRedis {
+    fn start(evil: Evil) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        let sent = Arc::new(AtomicU64::new(0));
+        let (evil, counter) = (Arc::new(evil), Arc::clone(&sent));
+        named(move || {
+            for stream in listener.incoming().map_while(Result::ok) {
+                let (evil, counter) = (Arc::clone(&evil), Arc::clone(&counter));
+                // It ends when the client disconnects.
+                named(move || serve(stream, &evil, &counter));
+            }
+        });
+        Self { port, sent }
+    }
+
+    /// A store with a connection to this server.
+    async fn store(&self) -> RedisResults {
+        let limits = ResultLimits {
+            max_bytes: 1 << 20,
+            max_reports: NonZeroUsize::MIN,
+            ..ResultLimits::default()
+        };
+        let options = RedisOptions {
+            address: format!("redis://127.0.0.1:{}", self.port).parse().unwrap(),
+            key_prefix: "lookdown".to_owned(),
+            max_age: Duration::from_mins(1),
+        };
+        let store = RedisResults::start(options, limits).unwrap();
+        timeout(TIMEOUT, store.shared.link.next_line())
+            .await
+            .unwrap();
+        store
+    }
+}
+
+/// Starts a thread, which ends with its connection or its listener.
+fn named<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> thread::JoinHandle<T> {
+    let thread = thread::Builder::new().name("evil-peer".to_owned());
+    thread.spawn(work).unwrap()
+}
+
+fn serve(mut stream: TcpStream, evil: &Evil, sent: &AtomicU64) -> Option<()> {
+    let mut buffer = vec![0; 64 << 10];
+    loop {
+        let count = stream.read(&mut buffer).ok().filter(|count| *count > 0)?;
+        let text = String::from_utf8_lossy(&buffer[..count]);
+        // A test sends one query at a time, except at the login.
+        if text.contains("XREAD\r\n") {
+            continue;
+        }
+        if text.contains("SETINFO") {
+            let replies = "+OK\r\n".repeat(text.matches("SETINFO").count());
+            stream.write_all(replies.as_bytes()).ok()?;
+        } else if text.contains("HGET\r\n") && text.contains("last") {
+            stream.write_all(b"$-1\r\n").ok()?;
+        } else {
+            loop {
+                for part in evil.reply.chunks(64 << 10) {
+                    stream.write_all(part).ok()?;
+                    sent.fetch_add(part.len() as u64, Ordering::Relaxed);
+                    thread::sleep(evil.pause);
+                }
+                if !evil.is_endless {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_endless_reply_of_redis_is_cut_at_the_limit() {
+    let element = b"$1\r\nx\r\n".repeat(1 << 12);
+    let bytes = vec![b'x'; 1 << 20];
+    let large = format!("*1\r\n${}\r\n", 9 << 20);
+    for reply in [
+        [&b"*1000000000\r\n"[..], &element].concat(),
+        [&b"*130000\r\n"[..], &element].concat(),
+        [&b"$1500000000\r\n"[..], &bytes].concat(),
+        [large.as_bytes(), &bytes].concat(),
+        b"+".repeat(1 << 20),
+    ] {
+        let start = String::from_utf8_lossy(&reply[..16]).into_owned();
+        let redis = EvilRedis::start(Evil {
+            reply,
+            is_endless: true,
+            pause: Duration::ZERO,
+        });
+        let store = redis.store().await;
+        let began = Instant::now();
+        let error = store.latest("hall").await.unwrap_err();
+        assert!(began.elapsed() < 2 * TIMEOUT, "{start:?}");
+        let limit = max_reply_bytes(&store.shared.limits);
+        let sent = redis.sent.load(Ordering::Relaxed);
+        assert!(sent < limit + SOCKET_BYTES, "{start:?}: {sent}");
+        // The connection ends, and the failure has a reason in one line.
+        let problem = store.health().problem.unwrap_or_default();
+        assert!(error.0.contains("Redis sent"), "{start:?}: {error}");
+        assert!(problem.contains("Redis sent"), "{start:?}: {problem}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn silence_and_a_slow_reply_end_in_time() {
+    for reply in ["", "$100\r\n", "+"] {
+        let redis = EvilRedis::start(Evil {
+            reply: reply.as_bytes().to_vec(),
+            is_endless: !reply.is_empty(),
+            pause: Duration::from_millis(20),
+        });
+        let store = redis.store().await;
+        let began = Instant::now();
+        store.latest("hall").await.unwrap_err();
+        assert!(
+            began.elapsed() < TIMEOUT + Duration::from_secs(1),
+            "{reply:?}"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn garbage_of_redis_is_a_failure_in_one_line() {
+    for (reply, part) in [
+        ("HTTP/1.1 400 Bad Request\r\n", ""),
+        ("$x\r\n", ""),
+        ("-ERR no\n2026-11-22 ERROR forged\r\n", "forged"),
+        (":1\r\n", ""),
+    ] {
+        let redis = EvilRedis::start(Evil::once(reply));
+        let store = redis.store().await;
+        let Unreachable(problem) = store.latest("hall").await.unwrap_err();
+        assert!(!problem.contains(['\r', '\n']), "{problem:?}");
+        assert!(problem.contains(part), "{problem:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_report_with_line_ends_is_skipped() {
+    let entry = |json: &str| {
+        let fields = [
+            "received_at",
+            "2026-11-22T09:30:00Z",
+            "persons",
+            "1",
+            "json",
+            json,
+        ];
+        let fields = fields.map(|field| format!("${}\r\n{field}\r\n", field.len()));
+        format!("*1\r\n*2\r\n$3\r\n7-0\r\n*6\r\n{}", fields.concat())
+    };
+    for (json, is_report) in [("{}", true), ("{}\n\nevent: evil", false), ("{}\r", false)] {
+        let redis = EvilRedis::start(Evil::once(&entry(json)));
+        let found = redis.store().await.latest("hall").await.unwrap();
+        assert_eq!(found.is_some(), is_report, "{json:?}");
+    }
+}
