@@ -170,12 +170,14 @@ impl Metrics {
         metrics
             .process
             .register(Box::new(ProcessCollector::for_self()))?;
+        metrics.show_build(None);
         Ok(metrics)
     }
 
     /// Shows the version of the server, and the commit from which it was built, if known.
     pub fn show_build(&self, commit: Option<&str>) {
         let labels = [env!("CARGO_PKG_VERSION"), commit.unwrap_or_default()];
+        self.build_info.reset();
         self.build_info.with_label_values(&labels).set(1);
     }
 
