@@ -5,12 +5,9 @@
 mod kind;
 mod zone_persons;
 
-use std::{
-    collections::BTreeSet,
-    sync::{Mutex, MutexGuard, PoisonError},
-    time::Duration,
-};
+use std::{collections::BTreeSet, time::Duration};
 
+use parking_lot::{Mutex, MutexGuard};
 use prometheus::{
     Encoder, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Registry, TextEncoder,
     process_collector::ProcessCollector,
@@ -325,7 +322,7 @@ impl Metrics {
 
     fn one_scrape(&self) -> MutexGuard<'_, Shown> {
         // The next scrape corrects the rows.
-        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+        self.shown.lock()
     }
 }
 

@@ -9,13 +9,10 @@ mod identity;
 mod options;
 mod validity;
 
-use std::{
-    num::NonZeroU64,
-    sync::{Arc, Mutex, PoisonError, RwLock},
-    time::Duration,
-};
+use std::{num::NonZeroU64, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use parking_lot::{Mutex, RwLock};
 use tokio::{net::TcpStream, time::timeout};
 use tokio_rustls::server::TlsStream;
 
@@ -63,14 +60,14 @@ impl Tls {
     /// reason is logged once. Open connections are not affected.
     pub fn refresh(&self) {
         let complaint = self.complaint.lock();
-        let mut complaint = complaint.unwrap_or_else(PoisonError::into_inner);
+        let mut complaint = complaint;
         match self.newer() {
             Ok(None) => complaint.settle(),
             Ok(Some(identity)) => {
                 complaint.settle();
                 tracing::info!("the TLS certificate has changed: new connections get the new one");
                 show(&identity, &self.options, &self.metrics);
-                let mut serving = self.serving.write().unwrap_or_else(PoisonError::into_inner);
+                let mut serving = self.serving.write();
                 *serving = Arc::new(identity);
             }
             Err(error) => {
@@ -120,7 +117,7 @@ impl Tls {
     }
 
     fn serving(&self) -> Arc<Identity> {
-        let serving = self.serving.read().unwrap_or_else(PoisonError::into_inner);
+        let serving = self.serving.read();
         Arc::clone(&serving)
     }
 }

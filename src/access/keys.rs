@@ -3,8 +3,10 @@
 use std::{
     io,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError, RwLock},
+    sync::Arc,
 };
+
+use parking_lot::{Mutex, RwLock};
 
 use super::{Holder, KeyError, KeyList};
 use crate::watched_file::{self, LogOnce};
@@ -44,13 +46,13 @@ impl AccessKeys {
     pub fn refresh(&self) {
         let Some(file) = &self.file else { return };
         let complaint = self.complaint.lock();
-        let mut complaint = complaint.unwrap_or_else(PoisonError::into_inner);
+        let mut complaint = complaint;
         match read(file, &self.lasting) {
             Ok(list) => {
                 complaint.settle();
                 if *self.known() != list {
                     tracing::info!(keys = list.len(), "the keys have changed");
-                    let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
+                    let mut known = self.known.write();
                     *known = Arc::new(list);
                 }
             }
@@ -72,7 +74,7 @@ impl AccessKeys {
     /// The keys that are known now.
     #[must_use]
     pub fn known(&self) -> Arc<KeyList> {
-        let known = self.known.read().unwrap_or_else(PoisonError::into_inner);
+        let known = self.known.read();
         Arc::clone(&known)
     }
 }

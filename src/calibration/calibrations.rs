@@ -12,13 +12,15 @@ mod snapshot;
 
 use std::{
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError, RwLock,
+        Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
         mpsc::sync_channel,
     },
     thread,
     time::Duration,
 };
+
+use parking_lot::{Mutex, MutexGuard, RwLock};
 
 use self::{file_reader::FileReader, snapshot::Snapshot};
 use super::{Calibration, CalibrationError, CalibrationId, CalibrationStore, StoreError};
@@ -164,16 +166,16 @@ impl Calibrations {
     }
 
     fn now(&self) -> Arc<Snapshot> {
-        Arc::clone(&self.now.read().unwrap_or_else(PoisonError::into_inner))
+        Arc::clone(&self.now.read())
     }
 
     fn replace(&self, snapshot: Snapshot) {
-        *self.now.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
+        *self.now.write() = Arc::new(snapshot);
     }
 
     fn lock(&self) -> MutexGuard<'_, ()> {
         // Guards no data that a panic could leave half changed.
-        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
+        self.changing.lock()
     }
 }
 

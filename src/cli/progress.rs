@@ -2,11 +2,11 @@
 
 use std::{
     io::{self, IsTerminal, Write},
-    sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
+use parking_lot::Mutex;
 
 /// Approximate number of lines per run without a terminal.
 const LINES: usize = 10;
@@ -43,7 +43,7 @@ impl Progress {
         match self {
             Self::Bar(bar) => bar.inc(1),
             Self::Lines(lines) => {
-                let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut lines = lines.lock();
                 lines.done += 1;
                 if let Some(line) = lines.due(lines.started.elapsed()) {
                     // A failure to print the progress does not stop the run.

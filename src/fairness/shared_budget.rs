@@ -1,10 +1,9 @@
 //! A budget of permits for all clients together. One client may use at most half of it, so one
 //! client cannot take everything.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-};
+use std::{collections::HashMap, sync::Arc};
+
+use parking_lot::{Mutex, MutexGuard};
 
 use super::Client;
 
@@ -117,7 +116,7 @@ impl Shared {
 
     fn usage(&self) -> MutexGuard<'_, Usage> {
         // No change can panic half-way.
-        self.usage.lock().unwrap_or_else(PoisonError::into_inner)
+        self.usage.lock()
     }
 }
 

@@ -7,8 +7,9 @@
 use std::{
     mem,
     ops::{Deref, DerefMut},
-    sync::{Mutex, PoisonError},
 };
+
+use parking_lot::Mutex;
 
 /// Largest memory kept for reuse, bytes: a few frames of a common camera.
 const MOST_KEPT_BYTES: usize = 64 << 20;
@@ -32,14 +33,14 @@ pub(super) fn zeros(count: usize) -> Vec<u8> {
 }
 
 fn take() -> Option<Vec<u8>> {
-    KEPT.lock().unwrap_or_else(PoisonError::into_inner).pop()
+    KEPT.lock().pop()
 }
 
 fn keep(bytes: Vec<u8>) {
     if bytes.capacity() < LEAST_KEPT_BYTES {
         return;
     }
-    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut kept = KEPT.lock();
     let kept_bytes: usize = kept.iter().map(Vec::capacity).sum();
     if kept_bytes + bytes.capacity() <= MOST_KEPT_BYTES {
         kept.push(bytes);
@@ -92,7 +93,7 @@ mod tests {
     fn no_more_than_a_few_frames_are_kept() {
         for _ in 0..100 {
             keep(vec![1; 8 << 20]);
-            let kept = KEPT.lock().unwrap();
+            let kept = KEPT.lock();
             let bytes: usize = kept.iter().map(Vec::capacity).sum();
             assert!(bytes <= MOST_KEPT_BYTES, "{bytes}");
         }

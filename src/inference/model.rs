@@ -1,10 +1,8 @@
 //! A loaded model, shared by the frames that use it.
 
-use std::{
-    num::NonZeroUsize,
-    path::PathBuf,
-    sync::{Mutex, PoisonError},
-};
+use std::{num::NonZeroUsize, path::PathBuf};
+
+use parking_lot::Mutex;
 
 use super::{Detector, HeadOutput, InferenceError, repository::Stamp};
 use crate::imaging::{NetworkInput, ViewBatch};
@@ -98,7 +96,7 @@ impl Model {
     pub fn detect(&self, session: usize, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
         let session = &self.sessions[session % self.sessions.len()];
         // A panic in the runtime leaves no inconsistent state in the session's wrapper.
-        let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut session = session.lock();
         session.detect(batch)
     }
 

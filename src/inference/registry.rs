@@ -1,9 +1,8 @@
 //! The loaded models, by name.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, PoisonError, RwLock},
-};
+use std::{collections::BTreeMap, sync::Arc};
+
+use parking_lot::RwLock;
 
 use super::Model;
 
@@ -24,14 +23,14 @@ impl ModelRegistry {
     /// Returns the model with that name.
     #[must_use]
     pub fn get(&self, name: &str) -> Option<Arc<Model>> {
-        let models = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        let models = self.0.read();
         models.get(name).cloned()
     }
 
     /// Returns every model, sorted by name.
     #[must_use]
     pub fn all(&self) -> Vec<Arc<Model>> {
-        let models = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        let models = self.0.read();
         models.values().cloned().collect()
     }
 
@@ -40,7 +39,7 @@ impl ModelRegistry {
     /// # Errors
     /// [`RegistryFull`] when the limit is exceeded.
     pub fn put(&self, model: Arc<Model>) -> Result<Option<Arc<Model>>, RegistryFull> {
-        let mut models = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        let mut models = self.0.write();
         if models.len() >= MAX_MODELS && !models.contains_key(model.name()) {
             return Err(RegistryFull);
         }
@@ -49,7 +48,7 @@ impl ModelRegistry {
 
     /// Removes a model. Frames in progress finish with it.
     pub fn remove(&self, name: &str) -> Option<Arc<Model>> {
-        let mut models = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        let mut models = self.0.write();
         models.remove(name)
     }
 }

@@ -13,10 +13,12 @@ use std::{
     num::NonZeroUsize,
     path::Path,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError, TryLockError,
+        Arc,
         atomic::{AtomicU64, Ordering},
     },
 };
+
+use parking_lot::{Mutex, MutexGuard};
 
 use self::stamp::{files_of, stamp};
 use super::{InferenceError, Model, ModelRegistry, RemoteServer, model::ModelFiles};
@@ -278,14 +280,11 @@ impl ModelRepository {
 
     /// Locks the state, or returns [`RepositoryError::Busy`] while a model is being loaded.
     fn try_lock(&self) -> Result<MutexGuard<'_, Memory>, RepositoryError> {
-        self.memory.try_lock().or_else(|error| match error {
-            TryLockError::Poisoned(poisoned) => Ok(poisoned.into_inner()),
-            TryLockError::WouldBlock => Err(RepositoryError::Busy),
-        })
+        self.memory.try_lock().ok_or(RepositoryError::Busy)
     }
 
     fn lock(&self) -> MutexGuard<'_, Memory> {
         // After a panic the maps contain only complete entries.
-        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+        self.memory.lock()
     }
 }

@@ -4,9 +4,10 @@
 
 use std::{
     collections::{BTreeMap, HashMap},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::Arc,
 };
 
+use parking_lot::{Mutex, MutexGuard};
 use prometheus::{
     Error,
     core::{Collector, Desc},
@@ -46,7 +47,7 @@ impl ZonePersons {
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<(String, String), u32>> {
-        self.rows.lock().unwrap_or_else(PoisonError::into_inner)
+        self.rows.lock()
     }
 }
 

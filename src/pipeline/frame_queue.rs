@@ -1,9 +1,8 @@
 //! The queue of frames that wait for a worker.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Condvar, Mutex, MutexGuard, PoisonError},
-};
+use std::collections::BTreeMap;
+
+use parking_lot::{Condvar, Mutex, MutexGuard};
 
 use super::{
     Ticket,
@@ -51,12 +50,10 @@ impl<T> FrameQueue<T> {
 
     /// Waits for the next entry; `None` if the queue is closed and empty. Blocks.
     pub(super) fn pop(&self) -> Option<T> {
-        let mut state = self
-            .changed
-            .wait_while(self.lock(), |state| {
-                state.waiting.is_empty() && !state.closed
-            })
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.lock();
+        self.changed.wait_while(&mut state, |state| {
+            state.waiting.is_empty() && !state.closed
+        });
         let (turn, entry) = state.waiting.pop_first()?;
         state.turns.end(&turn);
         Some(entry)
@@ -69,8 +66,8 @@ impl<T> FrameQueue<T> {
     }
 
     fn lock(&self) -> MutexGuard<'_, State<T>> {
-        // No change can panic part-way, so a poisoned state is still consistent.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        // No change can panic part-way, so the state is consistent after a panic.
+        self.state.lock()
     }
 }
 

@@ -7,9 +7,11 @@
 use std::{
     collections::BTreeMap,
     fmt,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::Arc,
     time::{Duration, Instant},
 };
+
+use parking_lot::{Mutex, MutexGuard};
 
 use super::{Stage, Ticket};
 use crate::fairness::BudgetShare;
@@ -129,7 +131,7 @@ impl InFlight {
 
     fn state(&self) -> MutexGuard<'_, State> {
         // No change can panic half-way.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 }
 

@@ -4,10 +4,12 @@
 use std::{
     collections::VecDeque,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError, Weak,
+        Arc, Weak,
         atomic::{AtomicU64, Ordering},
     },
 };
+
+use parking_lot::{Mutex, MutexGuard};
 
 use super::{camera_rig::CameraRig, pass::Pass};
 use crate::inference::{Model, ViewDetection};
@@ -96,8 +98,8 @@ impl InferenceCache {
     }
 
     fn lock(&self) -> MutexGuard<'_, VecDeque<CachedFrame>> {
-        // No change leaves a partial frame, so a poisoned list is still consistent.
-        self.frames.lock().unwrap_or_else(PoisonError::into_inner)
+        // No change leaves a partial frame, so the list is consistent after a panic.
+        self.frames.lock()
     }
 }
 

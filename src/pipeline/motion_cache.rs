@@ -5,9 +5,11 @@
 
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
+    sync::{Arc, Weak},
     time::{Duration, Instant},
 };
+
+use parking_lot::{Mutex, MutexGuard};
 
 use super::camera_rig::CameraRig;
 use crate::{
@@ -63,7 +65,7 @@ impl MotionCache {
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
     ) -> Arc<CameraViews> {
-        let mut cameras = self.cameras.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cameras = self.cameras.lock();
         let now = Instant::now();
         if let Some(known) = cameras.get_mut(camera)
             && known.views.are_of(rig, model)
@@ -99,7 +101,7 @@ impl MotionCache {
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
     ) -> Option<Arc<CameraViews>> {
-        let mut cameras = self.cameras.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cameras = self.cameras.lock();
         let known = cameras.get_mut(camera)?;
         let before = known.crops.take();
         let before = before.filter(|before| before.views.are_of_model(model));
@@ -154,7 +156,7 @@ impl CameraViews {
     }
 
     fn lock(&self) -> MutexGuard<'_, Vec<Option<CachedView>>> {
-        // Every change is one assignment, so a poisoned state is still consistent.
-        self.views.lock().unwrap_or_else(PoisonError::into_inner)
+        // Every change is one assignment, so the state is consistent after a panic.
+        self.views.lock()
     }
 }

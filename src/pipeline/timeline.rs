@@ -2,10 +2,11 @@
 //! also after a failure.
 
 use std::{
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
+use parking_lot::{Mutex, MutexGuard};
 use strum::IntoStaticStr;
 
 use super::StageTimings;
@@ -136,7 +137,7 @@ impl Timeline {
 
     fn lock(&self) -> MutexGuard<'_, Stages> {
         // No update can panic half-way.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 }
 

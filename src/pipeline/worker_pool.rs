@@ -4,13 +4,14 @@ use std::{
     num::NonZeroUsize,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc,
         atomic::{AtomicU64, Ordering},
     },
     thread::JoinHandle,
     time::{Duration, Instant},
 };
 
+use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::oneshot;
 use tokio_util::sync::CancellationToken;
 
@@ -244,7 +245,7 @@ impl WorkerPool {
     /// Refuses new frames, finishes the queued frames and ends the threads. Blocks.
     pub fn shut_down(&self) {
         self.shared.queue.close();
-        let mut threads = self.threads.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut threads = self.threads.lock();
         for thread in threads.drain(..) {
             // A panic of a worker outside a job needs no further report.
             let _ = thread.join();
@@ -305,7 +306,7 @@ impl Shared {
 
     fn rate(&self) -> MutexGuard<'_, ServiceRate> {
         // The rate holds plain numbers only, so a panic cannot leave it inconsistent.
-        self.rate.lock().unwrap_or_else(PoisonError::into_inner)
+        self.rate.lock()
     }
 }
 

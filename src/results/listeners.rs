@@ -1,12 +1,9 @@
 //! The listeners to published reports. Each listener has its own bounded queue. A listener whose
 //! queue overflows gets no more reports, so the publisher never waits and memory stays bounded.
 
-use std::{
-    collections::HashMap,
-    num::NonZeroUsize,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-};
+use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
+use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::mpsc;
 
 use super::{Cameras, StoredReport};
@@ -149,7 +146,7 @@ impl Listeners {
 
     fn group(&self) -> MutexGuard<'_, Group> {
         // No change can panic before it is complete.
-        self.group.lock().unwrap_or_else(PoisonError::into_inner)
+        self.group.lock()
     }
 
     fn leave(&self, to: &Cameras, number: u64) {

@@ -3,13 +3,11 @@
 mod kept;
 mod pictures;
 
-use std::{
-    num::NonZeroUsize,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-};
+use std::{num::NonZeroUsize, sync::Arc};
 
 use async_trait::async_trait;
 use jiff::Timestamp;
+use parking_lot::{Mutex, MutexGuard};
 
 use self::kept::Kept;
 use super::{
@@ -45,7 +43,7 @@ impl MemoryResults {
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
         // No change can panic before it is complete.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        self.kept.lock()
     }
 }
 

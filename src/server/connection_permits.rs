@@ -1,12 +1,9 @@
 //! The connection limit: permits for regular connections, and short-lived permits for connections
 //! beyond it.
 
-use std::{
-    collections::VecDeque,
-    num::NonZeroUsize,
-    sync::{Arc, Mutex, PoisonError},
-};
+use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc};
 
+use parking_lot::Mutex;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::CancellationToken;
 
@@ -52,10 +49,7 @@ impl ConnectionPermits {
         let regular = Arc::clone(&self.regular).try_acquire_owned().ok();
         let closed = CancellationToken::new();
         if regular.is_none() {
-            let mut open = self
-                .beyond_limit
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner);
+            let mut open = self.beyond_limit.lock();
             open.push_back(closed.clone());
             if open.len() > MAX_BEYOND_LIMIT
                 && let Some(oldest) = open.pop_front()

@@ -1,10 +1,8 @@
 //! The timeouts of a connection.
 
-use std::{
-    sync::{Mutex, MutexGuard, PoisonError},
-    time::Duration,
-};
+use std::time::Duration;
 
+use parking_lot::{Mutex, MutexGuard};
 use tokio::time::{Instant, sleep_until};
 
 use super::ConnectionLimits;
@@ -160,7 +158,7 @@ impl ConnectionTimeouts {
 
     fn state(&self) -> MutexGuard<'_, State> {
         // No change can panic before it is complete.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock()
     }
 }
 

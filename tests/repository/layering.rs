@@ -80,6 +80,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
         &[
             "access",
             "calibration",
+            "fairness",
             "imaging",
             "metrics",
             "pipeline",
@@ -93,6 +94,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "api",
             "api::http",
             "calibration",
+            "fairness",
             "pipeline",
             "quoted",
             "results",
@@ -107,6 +109,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "api",
             "api::http",
             "calibration",
+            "fairness",
             "inference",
             "open_inference",
             "pipeline",

@@ -8,7 +8,7 @@ mod buckets;
 use std::{
     net::SocketAddr,
     num::NonZeroU32,
-    sync::{Arc, Mutex, PoisonError},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -18,6 +18,7 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use parking_lot::Mutex;
 
 use self::buckets::{Buckets, Standing};
 use super::{
@@ -85,7 +86,7 @@ impl RateLimiter {
 
     fn take(&self, client: Client) -> Standing {
         // The change under this lock cannot panic half-way.
-        let mut buckets = self.buckets.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buckets = self.buckets.lock();
         buckets.take(client, Instant::now())
     }
 }

@@ -1,9 +1,11 @@
-//! Looking at the store: which files have changed, and reading those.
+//! Scans the store for changed files and reads them.
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, MutexGuard, atomic::Ordering},
+    sync::{Arc, atomic::Ordering},
 };
+
+use parking_lot::MutexGuard;
 
 use super::{
     Calibrations,

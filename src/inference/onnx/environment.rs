@@ -1,11 +1,9 @@
 //! The ONNX Runtime environment of the process.
 
-use std::{
-    path::Path,
-    sync::{Mutex, OnceLock, PoisonError},
-};
+use std::{path::Path, sync::OnceLock};
 
 use ort::environment::Environment;
+use parking_lot::Mutex;
 
 use crate::inference::InferenceError;
 
@@ -15,7 +13,7 @@ static LOADING: Mutex<()> = Mutex::new(());
 
 /// Loads the library on the first call. Later calls return the same environment.
 pub(super) fn load(library: &Path) -> Result<&'static Environment, InferenceError> {
-    let _only_loader = LOADING.lock().unwrap_or_else(PoisonError::into_inner);
+    let _only_loader = LOADING.lock();
     if let Some(environment) = ENVIRONMENT.get() {
         return Ok(environment);
     }

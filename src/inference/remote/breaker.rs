@@ -4,7 +4,7 @@
 //! health check closes it when the server is ready again. The next failure then reopens it at once,
 //! and a response resets it completely.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use parking_lot::{Mutex, MutexGuard};
 
 /// Consecutive failures that open it.
 const FAILURES: u32 = 3;
@@ -51,7 +51,7 @@ impl Breaker {
 
     fn state(&self) -> MutexGuard<'_, State> {
         // The state contains only numbers, so a panic cannot leave it inconsistent.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 }
 

@@ -1,12 +1,11 @@
 //! An inference server, shared by all sessions and the health check.
 
 use std::{
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
-    },
+    sync::atomic::{AtomicU64, AtomicUsize, Ordering},
     time::{Duration, Instant},
 };
+
+use parking_lot::Mutex;
 
 use super::{
     breaker::Breaker,
@@ -158,10 +157,7 @@ impl RemoteServer {
         });
         if answer.is_ok() {
             self.breaker.succeeded();
-            *self
-                .answered_at
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
+            *self.answered_at.lock() = Some(Instant::now());
         }
         match answer {
             Ok(Ok(answer)) => {
@@ -192,10 +188,7 @@ impl RemoteServer {
     /// Returns true if a request is in flight or was answered recently. A computing server may have
     /// no time for a readiness probe.
     fn responded_recently(&self) -> bool {
-        let answered_at = self
-            .answered_at
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let answered_at = self.answered_at.lock();
         let recently = answered_at.is_some_and(|at| at.elapsed() < RECENT);
         recently || self.in_flight.load(Ordering::Relaxed) > 0
     }

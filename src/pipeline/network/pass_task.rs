@@ -1,10 +1,8 @@
 //! One pass over a frame while its views are queued for inference or being processed.
 
-use std::{
-    ops::Range,
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
-    time::Instant,
-};
+use std::{ops::Range, sync::Arc, time::Instant};
+
+use parking_lot::{Condvar, Mutex, MutexGuard};
 
 use super::Work;
 use crate::{
@@ -75,11 +73,9 @@ impl PassTask {
 
     /// Waits until every view is processed or the pass fails. Blocks.
     pub(in crate::pipeline) fn wait(&self) -> Result<PassOutput, PipelineError> {
-        let progress = self.lock();
-        let mut progress = self
-            .over
-            .wait_while(progress, |progress| !progress.is_over())
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut progress = self.lock();
+        self.over
+            .wait_while(&mut progress, |progress| !progress.is_over());
         if let Some(failure) = progress.failure.take() {
             return Err(failure);
         }
@@ -129,7 +125,7 @@ impl PassTask {
 
     fn lock(&self) -> MutexGuard<'_, Progress> {
         // The queue counts the views, so no update can panic half-way.
-        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+        self.progress.lock()
     }
 }
 

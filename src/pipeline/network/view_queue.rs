@@ -1,11 +1,9 @@
 //! The queue of views for inference. A batch holds views of the first frame and is filled up with
 //! views of the next frames for the same model.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
-    time::Instant,
-};
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
+
+use parking_lot::{Condvar, Mutex, MutexGuard};
 
 use super::{BatchOptions, Claim, PassTask};
 use crate::{
@@ -85,10 +83,7 @@ impl ViewQueue {
                 if state.closed {
                     return None;
                 }
-                state = self
-                    .changed
-                    .wait(state)
-                    .unwrap_or_else(PoisonError::into_inner);
+                self.changed.wait(&mut state);
                 continue;
             };
             let model = Arc::clone(&first.task.model);
@@ -98,17 +93,13 @@ impl ViewQueue {
             if to_wait.is_zero() || state.closed || state.views_for(&model) >= most {
                 return Some(state.claim(&model, most));
             }
-            state = self
-                .changed
-                .wait_timeout(state, to_wait)
-                .unwrap_or_else(PoisonError::into_inner)
-                .0;
+            self.changed.wait_for(&mut state, to_wait);
         }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
         // No update can panic half-way.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock()
     }
 }
 

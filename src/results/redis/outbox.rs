@@ -1,11 +1,9 @@
 //! A bounded queue of reports for Redis. Publishing never waits. When the queue is full, the oldest
 //! reports are dropped.
 
-use std::{
-    collections::VecDeque,
-    sync::{Mutex, MutexGuard, PoisonError},
-};
+use std::collections::VecDeque;
 
+use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::Notify;
 
 use crate::results::{NewPicture, NewReport};
@@ -110,7 +108,7 @@ impl Outbox {
 
     fn waiting(&self) -> MutexGuard<'_, Waiting> {
         // No change can panic before it is complete.
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+        self.waiting.lock()
     }
 }
 

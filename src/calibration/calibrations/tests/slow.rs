@@ -31,7 +31,7 @@ fn slow_files(time_limit: Duration) -> SlowFiles {
         if name.starts_with("slow") {
             count.fetch_add(1, Ordering::Relaxed);
             // Ends at the latest with the test.
-            let _ = released.lock().unwrap().recv();
+            let _ = released.lock().recv();
         }
         cameras(stem, name, content)
     });
@@ -135,7 +135,7 @@ fn a_store_that_fails_after_the_start_is_reported() {
             "late".to_owned()
         }
         fn list(&self) -> Result<Vec<StoredFile>, StoreError> {
-            let _ = self.0.lock().unwrap().recv();
+            let _ = self.0.lock().recv();
             let (place, problem) = (self.place(), "it is silent".to_owned());
             Err(StoreError::Unreachable { place, problem })
         }
