@@ -41,7 +41,7 @@ use self::{
         deepstack,
         open_inference::{self, repository},
     },
-    report_headers::{INFERENCE_TIME, PERSON_COUNT, QUEUE_TIME, SERVER_TIMING, TOTAL_TIME},
+    report_headers::{PERSON_COUNT, SERVER_TIMING},
     routes::{
         calibrations, detect, health,
         openapi::{self as document, DocumentSource},
@@ -198,14 +198,7 @@ fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
     let (body_limits, header_limits) = (options.body_limits(), options.header_limits());
     let head_length = HeaderName::from_static(HEAD_LENGTH);
     let sent = [LAST_EVENT_ID, head_length.clone()];
-    let read = [
-        SERVER_TIMING,
-        INFERENCE_TIME,
-        PERSON_COUNT,
-        QUEUE_TIME,
-        TOTAL_TIME,
-        head_length,
-    ];
+    let read = [SERVER_TIMING, PERSON_COUNT, head_length];
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(surroundings, envelope::wrap))
         .layer(option_layer(cors::layer(

@@ -34,8 +34,9 @@ pub(super) use parameters::{AnnotationQuery, DetectForm, DetectQuery, RawBytes, 
 )]
 pub(super) struct Common;
 
-/// Adds the failures to the document of the routes.
+/// Adds the failures, and the operations that need no key, to the document of the routes.
 pub(super) fn complete(mut document: openapi::OpenApi) -> openapi::OpenApi {
     failures::describe(&mut document);
+    security::state_public_operations(&mut document);
     document
 }

@@ -127,14 +127,6 @@ async fn the_stages_are_in_headers() {
             .unwrap();
         assert_eq!(report["timings_ms"][stage], millis);
     }
-    for (name, stage) in [
-        ("x-queue-time", "queue"),
-        ("x-inference-time", "inference"),
-        ("x-total-time", "total"),
-    ] {
-        let millis: f64 = answer.header(name).parse().unwrap();
-        assert_eq!(report["timings_ms"][stage], millis, "{name}");
-    }
 }
 
 #[tokio::test]

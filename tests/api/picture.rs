@@ -163,7 +163,6 @@ async fn every_response_has_the_report_headers() {
         let answer = accepting(&service, "*/*", &format!("format={format}")).await;
         assert_eq!(answer.header("x-person-count"), count, "{format}");
         assert!(answer.header("server-timing").contains("inference;dur="));
-        assert!(answer.header("x-total-time").parse::<f64>().unwrap() > 0.0);
         assert!(!answer.header("x-request-id").is_empty());
     }
 }

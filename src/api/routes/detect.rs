@@ -54,9 +54,6 @@ use crate::{
             ("X-Person-Count" = u64, description = "The number of detected persons."),
             ("X-Request-Id" = String, description = "The ID of the request, or a generated one."),
             ("Server-Timing" = String, description = "The stages, milliseconds."),
-            ("X-Queue-Time" = f64, description = "Time that views waited for the model, milliseconds."),
-            ("X-Inference-Time" = f64, description = "Time that the model ran, milliseconds."),
-            ("X-Total-Time" = f64, description = "Time from the arrival of the frame to its report, milliseconds."),
          )),
     )
 )]
