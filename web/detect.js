@@ -17,7 +17,8 @@ async function run() {
   const { frame } = shared;
   if (!frame) return;
   running?.abort();
-  const now = (running = new AbortController());
+  const now = new AbortController();
+  running = now;
   const path = `detect?${parameters.query()}`;
   const options = { method: "POST", body: frame.blob, signal: now.signal };
   const report = await withProgress(find("#stage"), "Detecting persons", () => askJson(path, options));

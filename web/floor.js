@@ -96,5 +96,7 @@ export function visible(is) {
 
 export function start() {
   whenChanged(["report"], showShown);
-  whenChanged(["person"], () => ["#map", "#places"].forEach((id) => pointOut(find(id))));
+  whenChanged(["person"], () => {
+    for (const id of ["#map", "#places"]) pointOut(find(id));
+  });
 }

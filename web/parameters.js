@@ -45,6 +45,11 @@ export function start(changed) {
     show();
     changed();
   });
-  form().addEventListener("reset", () => setTimeout(() => (show(), changed())));
+  form().addEventListener("reset", () =>
+    setTimeout(() => {
+      show();
+      changed();
+    }),
+  );
   show();
 }

@@ -63,7 +63,7 @@ function drawOutlines() {
   drawing.replaceChildren(...plan.views.map(outline));
 }
 
-function chip(person, index) {
+function chip(_person, index) {
   const toggle = () => change("person", shared.person === index ? null : index);
   return element("button", { type: "button", class: "chip", "data-person": index, onclick: toggle }, String(index + 1));
 }

@@ -20,12 +20,12 @@ test("a lens of the page equals the saved calibration of the same lens", async (
   const tried = await plan("calibrations/trial/views?profile=balanced", { method: "POST", body });
   const saved = await plan("calibrations/office/views?profile=balanced");
   assert.equal(tried.views.length, saved.views.length);
-  tried.views.forEach((view, index) =>
-    view.outline.forEach(([x, y], point) => {
+  for (const [index, view] of tried.views.entries()) {
+    for (const [point, [x, y]] of view.outline.entries()) {
       const [savedX, savedY] = saved.views[index].outline[point];
       assert.ok(Math.hypot(x - savedX, y - savedY) < 0.01, `view ${index}`);
-    }),
-  );
+    }
+  }
   const after = await fetch(`${SERVER}/calibrations/trial`);
   assert.equal(after.status, 404, "nothing is stored");
 });
