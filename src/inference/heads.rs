@@ -23,6 +23,7 @@ mod yolo_v8;
 mod yolox;
 
 use serde::Deserialize;
+use strum::IntoStaticStr;
 
 use self::{candidate_collector::CandidateCollector, decoder::Decoder, shape::Batch};
 use super::{HeadOutput, InferenceError};
@@ -43,27 +44,54 @@ pub use self::{
     yolox::YoloxHead,
 };
 
-/// Decoder of a model's outputs. In a manifest: `head = "yolox"` and the fields of that head.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(tag = "head", rename_all = "snake_case")]
-pub enum Head {
+/// Declares [`Head`]: for each head a description, a variant and the type of its fields.
+macro_rules! heads {
+    ($($(#[doc = $description:literal])+ $variant:ident($head:ty),)+) => {
+        /// Decoder of a model's outputs. In a manifest: `head = "yolox"` and the fields of that
+        /// head.
+        #[derive(Debug, Clone, PartialEq, Deserialize, IntoStaticStr)]
+        #[serde(tag = "head", rename_all = "snake_case")]
+        #[strum(serialize_all = "snake_case")]
+        pub enum Head {
+            $($(#[doc = $description])+ $variant($head),)+
+        }
+
+        impl Head {
+            /// Returns the outputs that the head expects, as a phrase.
+            #[must_use]
+            pub fn description(&self) -> &'static str {
+                match self {
+                    $(Self::$variant(_) => concat!($($description),+).trim_ascii_start(),)+
+                }
+            }
+
+            fn decoder(&self) -> &dyn Decoder {
+                match self {
+                    $(Self::$variant(head) => head,)+
+                }
+            }
+        }
+    };
+}
+
+heads! {
     /// Boxes and person scores decoded by the graph.
     BoxesScores(BoxesScoresHead),
     /// SSD: offsets to anchors, class scores.
     Ssd(SsdHead),
-    /// `YOLOv2`: one grid, softmax over classes.
+    /// YOLOv2: one grid of anchors, softmax over classes.
     YoloV2(YoloV2Head),
-    /// `YOLOv3`: a grid per scale, a sigmoid per class.
+    /// YOLOv3: a grid of anchors per scale, a sigmoid per class.
     YoloV3(YoloV3Head),
-    /// YOLOX: anchor-free, with objectness.
+    /// YOLOX: a grid per scale without anchors, with objectness.
     Yolox(YoloxHead),
-    /// `NanoDet`: distances to the sides as distributions.
+    /// Distances to the sides as distributions.
     Nanodet(NanodetHead),
-    /// `YOLOv8` and its successors: decoded boxes and class scores in one tensor.
+    /// Decoded boxes and class scores in one tensor, as of YOLOv8 and its successors.
     YoloV8(YoloV8Head),
     /// The DETR family: a set of queries.
     Detr(DetrHead),
-    /// `CenterNet`: peaks of a heat map.
+    /// Peaks of a heat map.
     Centernet(CenternetHead),
     /// Final detections with overlaps suppressed by the graph.
     EndToEnd(EndToEndHead),
@@ -79,6 +107,12 @@ pub struct CandidateOptions {
 }
 
 impl Head {
+    /// Returns the name, as in manifests.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.into()
+    }
+
     /// Checks that a model with these outputs and an input of `(width, height)` pixels can be
     /// decoded. Dimensions that the model leaves open are -1.
     ///
@@ -117,21 +151,6 @@ impl Head {
             .and_then(|()| self.decoder().decode(outputs, &batch, &mut finds))
             .and_then(|()| finds.finish())
             .map_err(InferenceError::Run)
-    }
-
-    fn decoder(&self) -> &dyn Decoder {
-        match self {
-            Self::BoxesScores(head) => head,
-            Self::Ssd(head) => head,
-            Self::YoloV2(head) => head,
-            Self::YoloV3(head) => head,
-            Self::Yolox(head) => head,
-            Self::Nanodet(head) => head,
-            Self::YoloV8(head) => head,
-            Self::Detr(head) => head,
-            Self::Centernet(head) => head,
-            Self::EndToEnd(head) => head,
-        }
     }
 }
 

@@ -14,8 +14,21 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 
 from harness.machine import made  # noqa: E402
 from harness.processes import BenchError  # noqa: E402
-from proofs import clock, contract, descriptors, disk, fairness, floods, kill, memory, overload, reload  # noqa: E402
-from proofs import rude, soak, stop  # noqa: E402
+from proofs import (  # noqa: E402
+    clock,
+    contract,
+    descriptors,
+    disk,
+    fairness,
+    floods,
+    kill,
+    memory,
+    overload,
+    reload,
+    rude,
+    soak,
+    stop,
+)
 from support.effort import LONG, SHORT  # noqa: E402
 from support.places import WORK  # noqa: E402
 from support.row import Row  # noqa: E402

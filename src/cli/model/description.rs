@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::{
     imaging::ChannelOrder,
-    inference::{ModelDescription, OnnxTensor, heads::Head},
+    inference::{ModelDescription, OnnxTensor},
 };
 
 /// One property per line.
@@ -58,23 +58,8 @@ impl fmt::Display for Lines<'_> {
             input.width, input.height, model.layout, input.scale, input.offset
         )?;
         writeln!(f, "views        {views}")?;
-        writeln!(f, "head         {}", head(&manifest.output))
-    }
-}
-
-/// The name of a head in manifests, and its interpretation of the outputs.
-fn head(head: &Head) -> &'static str {
-    match head {
-        Head::BoxesScores(_) => "boxes_scores: finished boxes and person scores",
-        Head::Ssd(_) => "ssd: offsets to anchors, class scores",
-        Head::YoloV2(_) => "yolo_v2: one grid of anchors, softmax over classes",
-        Head::YoloV3(_) => "yolo_v3: a grid of anchors per scale, a sigmoid per class",
-        Head::Yolox(_) => "yolox: a grid per scale without anchors, with objectness",
-        Head::Nanodet(_) => "nanodet: distances to the sides as distributions",
-        Head::YoloV8(_) => "yolo_v8: decoded boxes and class scores in one tensor",
-        Head::Detr(_) => "detr: a set of queries",
-        Head::Centernet(_) => "centernet: peaks of a heat map",
-        Head::EndToEnd(_) => "end_to_end: finished detections, overlaps suppressed",
+        let head = &manifest.output;
+        writeln!(f, "head         {}: {}", head.name(), head.description())
     }
 }
 

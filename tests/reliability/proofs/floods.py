@@ -71,11 +71,16 @@ def _with_tls(effort: Effort, settings: dict[str, str], folder: Path) -> list[Ro
     subprocess.run([*made.split(), "-keyout", key, "-out", certificate], check=True, capture_output=True)
     tls = {"SERVER__TLS__CERTIFICATE": str(certificate), "SERVER__TLS__PRIVATE_KEY": str(key)}
     port, probe_port = free_ports(2)
-    wanted = settings | AT_ONCE | tls | {
-        "SERVER__LISTEN": f"127.0.0.1:{port}",
-        "SERVER__METRICS_LISTEN": f"127.0.0.1:{probe_port}",
-        "CALIBRATIONS__PATH": str(SAMPLES / "calibrations"),
-    }
+    wanted = (
+        settings
+        | AT_ONCE
+        | tls
+        | {
+            "SERVER__LISTEN": f"127.0.0.1:{port}",
+            "SERVER__METRICS_LISTEN": f"127.0.0.1:{probe_port}",
+            "CALIBRATIONS__PATH": str(SAMPLES / "calibrations"),
+        }
+    )
     variables = {f"LOOKDOWN__{name}": value for name, value in wanted.items()}
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE

@@ -3,24 +3,26 @@
 use std::{convert::Infallible, future::pending, sync::Arc, time::Duration};
 
 use axum::{
-    body::Body,
     extract::State,
-    http::{
-        HeaderMap, HeaderName,
-        header::{CACHE_CONTROL, CONTENT_TYPE},
+    http::{HeaderMap, HeaderName},
+    response::{
+        IntoResponse, Response,
+        sse::{KeepAlive, Sse},
     },
-    response::{IntoResponse, Response},
 };
 use futures_util::stream::unfold;
 use tokio::time::sleep;
 
-use super::{NO_CACHE, address::CameraAddress, feed::Feed};
+use super::{address::CameraAddress, feed::Feed};
 use crate::{
     api::{ApiState, caller::Caller, http::problem::Problem, require_scope::RequireRead},
     results::Cameras,
 };
 
 pub(in crate::api) const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
+/// Interval without a report after which a keep-alive comment is sent. Proxies close silent
+/// connections, and the comment detects clients that have disconnected.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// Interval of the checks that the key of a stream is still valid.
 const KEY_CHECK: Duration = Duration::from_secs(1);
 /// Disables the response buffering of nginx and compatible proxies.
@@ -104,9 +106,9 @@ async fn stream(
         RequireRead::check(&state, &headers).ok()?;
         Some((Ok::<_, Infallible>(event), (feed, state, headers)))
     });
-    let headers = [(CONTENT_TYPE, "text/event-stream"), (ACCEL_BUFFERING, "no")];
-    let cache = [(CACHE_CONTROL, NO_CACHE)];
-    Ok((headers, cache, Body::from_stream(events)).into_response())
+    let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
+    let headers = [(ACCEL_BUFFERING, "no")];
+    Ok((headers, events).into_response())
 }
 
 /// Waits until the key of a stream is removed.

@@ -1,10 +1,9 @@
-//! The event source of a subscriber: missed reports, then new ones, with keep-alive comments in
-//! between.
+//! The event source of a subscriber: missed reports, then new ones.
 
 use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc, time::Duration};
 
-use bytes::{BufMut, Bytes, BytesMut};
-use tokio::time::{sleep, timeout};
+use axum::response::sse::Event;
+use tokio::time::sleep;
 
 use crate::{
     api::http::problem::Problem,
@@ -12,10 +11,6 @@ use crate::{
     results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
 };
 
-/// Interval without a report after which a keep-alive comment is sent. Proxies close silent
-/// connections, and the comment detects clients that have disconnected.
-const KEEP_ALIVE: Duration = Duration::from_secs(15);
-const SIGN_OF_LIFE: Bytes = Bytes::from_static(b": nothing new\n\n");
 /// Pause before a retry when the result store does not respond.
 const PAUSE: Duration = Duration::from_secs(1);
 /// Largest number of missed reports per read.
@@ -67,8 +62,8 @@ impl Feed {
         })
     }
 
-    /// Returns the next event or comment; `None` at the end of the stream.
-    pub(super) async fn next(&mut self) -> Option<Bytes> {
+    /// Returns the next event; `None` at the end of the stream.
+    pub(super) async fn next(&mut self) -> Option<Event> {
         loop {
             if let Some(missed) = self.missed.pop_front() {
                 return Some(self.event(&missed));
@@ -78,28 +73,24 @@ impl Feed {
                 let missed = self.results.since(&self.cameras, self.last, page).await;
                 let Ok(missed) = missed else {
                     sleep(PAUSE).await;
-                    return Some(SIGN_OF_LIFE);
+                    continue;
                 };
                 self.behind = !missed.is_empty();
                 self.missed = missed.into();
                 continue;
             }
-            match timeout(KEEP_ALIVE, self.listening.next()).await {
-                Err(_) => return Some(SIGN_OF_LIFE),
-                Ok(None) => return None,
-                Ok(Some(report)) if report.id > self.last => return Some(self.event(&report)),
-                // The report was already sent with the missed ones.
-                Ok(Some(_)) => {}
+            let report = self.listening.next().await?;
+            // Another one was already sent with the missed ones.
+            if report.id > self.last {
+                return Some(self.event(&report));
             }
         }
     }
 
-    fn event(&mut self, stored: &StoredReport) -> Bytes {
+    fn event(&mut self, stored: &StoredReport) -> Event {
         self.last = stored.id;
-        let mut text = BytesMut::with_capacity(stored.report.json.len() + 64);
-        text.put_slice(format!("id: {}\ndata: ", stored.id).as_bytes());
-        text.put_slice(&stored.report.json);
-        text.put_slice(b"\n\n");
-        text.freeze()
+        Event::default()
+            .id(stored.id.to_string())
+            .data(String::from_utf8_lossy(&stored.report.json))
     }
 }
