@@ -14,7 +14,7 @@ pub(super) trait Table: Sized {
 
 /// Declares settings of one table.
 ///
-/// ```ignore
+/// ```text
 /// settings! {
 ///     /// The documentation of the struct.
 ///     #[derive(Debug, Clone, PartialEq)]
