@@ -1,7 +1,8 @@
 //! The cost of a frame: the permits of `limits.max_frames_in_flight` that it takes.
 //!
 //! A frame of a usual size costs 1. Each 12 megapixels that are decoded, each 32 inputs of the
-//! network, and each 12 megapixels that are drawn add 1. No frame costs more than a client may use.
+//! network, and each 12 megapixels that are drawn add 1. A frame with more pixels than the limit also
+//! costs 1, because its header is enough to refuse it. No frame costs more than a client may use.
 
 use super::{DetectJob, ViewsJob};
 use crate::{geometry::FieldOfViewReading, imaging::decode::declared_size};
@@ -11,9 +12,13 @@ const PIXELS_PER_PERMIT: u64 = 12_000_000;
 /// Inputs of the network that add 1.
 const INPUTS_PER_PERMIT: usize = 32;
 
-/// Returns the cost of a frame by the size in its header, its profile and its drawing.
-pub(super) fn of_frame(job: &DetectJob) -> usize {
+/// Returns the cost of a frame by the size in its header, its profile and its drawing. A frame of
+/// more than `max_pixels` will be refused.
+pub(super) fn of_frame(job: &DetectJob, max_pixels: u64) -> usize {
     let size = declared_size(&job.image).unwrap_or((0, 0));
+    if u64::from(size.0) * u64::from(size.1) > max_pixels {
+        return 1;
+    }
     let profile = job.parameters.profile;
     let plan = profile.view_plan(FieldOfViewReading::default());
     let first_pass = plan.map_or(1, |plan| plan.directions().len());
@@ -54,6 +59,14 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_that_will_be_refused_costs_one_permit() {
+        let image = frame_with_disc(100, [30.0, 50.0], 8.0);
+        let job = job(image, &[("profile", "paper")]);
+        assert_eq!(of_frame(&job, 9_999), 1);
+        assert_eq!(of_frame(&job, 10_000), 5);
+    }
+
+    #[test]
     fn the_profile_counts_by_its_inputs_of_the_network() {
         for (profile, expected) in [
             ("direct", 1),
@@ -64,7 +77,7 @@ mod tests {
         ] {
             let image = frame_with_disc(100, [30.0, 50.0], 8.0);
             assert_eq!(
-                of_frame(&job(image, &[("profile", profile)])),
+                of_frame(&job(image, &[("profile", profile)]), u64::MAX),
                 expected,
                 "{profile}"
             );
