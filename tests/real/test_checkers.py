@@ -17,15 +17,15 @@ class Checkers(unittest.TestCase):
         subprocess.run(command, cwd=HERE, check=True)
 
     def test_the_openapi_document_follows_the_recommended_rules(self) -> None:
-        self.run_checker("redocly", "lint", "openapi/openapi.json")
+        self.run_checker(HERE / "node_modules/.bin/redocly", "lint", "openapi/openapi.json")
 
     def test_the_scripts_of_the_page_have_no_lint(self) -> None:
         scripts = [*sorted(ROOT.glob("web/*.js")), *sorted(ROOT.glob("tests/real/page/*.js"))]
-        self.run_checker("biome", "lint", "--error-on-warnings", *map(str, scripts))
+        (biome,) = HERE.glob("node_modules/@biomejs/cli-*/biome")
+        self.run_checker(biome, "lint", "--error-on-warnings", *map(str, scripts))
 
-    def run_checker(self, name: str, *arguments: str) -> None:
-        command = [str(HERE / "node_modules" / ".bin" / name), *arguments]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    def run_checker(self, program: Path, *arguments: str) -> None:
+        done = subprocess.run([program, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
 

@@ -73,8 +73,8 @@ pageTest("other files are refused with a message, and the next frame is accepted
 pageTest("every parameter runs a new detection at once", "", async (page) => {
   const first = await reportAfter(page, () => detectSample(page, "office", "office"));
   const all = first.persons.length;
-  const strict = await reportAfter(page, () => slide(page, "Score threshold", 0.6));
-  assert.equal(strict.refinement.score_threshold, 0.6);
+  const strict = await reportAfter(page, () => slide(page, "Score threshold", 0.95));
+  assert.equal(strict.refinement.score_threshold, 0.95);
   // The network has processed this frame before.
   const seen = first.views.inferred;
   assert.deepEqual([strict.views.inferred, strict.views.unchanged, strict.timings_ms.inference], [0, seen, 0]);
