@@ -47,7 +47,8 @@ def findings_in_rust(name, lines):
         if doc and not is_in_doc and FIRST_WORD.match(doc.group(1)):
             first = doc.group(1).split()[0]
             yield f"{name}:{number}: a doc comment begins with `{first}`: begin with a verb or a noun phrase"
-        is_in_doc = bool(doc)
+        # A section such as `# Errors` begins like the comment itself.
+        is_in_doc = bool(doc) and not doc.group(1).startswith("# ")
         is_test = is_test or bool(RUST_TEST.search(line))
         if is_test and (function := RUST_FUNCTION.search(line)):
             is_test = False

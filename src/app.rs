@@ -45,6 +45,8 @@ const CALIBRATIONS_WAIT: Duration = Duration::from_secs(3);
 /// Interval of the checks of the inference server, seconds.
 const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
+/// Interval of the checks that the calibrations were read.
+const CALIBRATIONS_CHECK: Duration = Duration::from_millis(50);
 /// Interval of the checks for workers without progress, seconds.
 const WATCHDOG_EVERY: NonZeroU64 = NonZeroU64::MIN;
 

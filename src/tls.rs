@@ -59,16 +59,14 @@ impl Tls {
     /// Reads the files again. If they cannot be used, the current certificate stays in use, and the
     /// reason is logged once. Open connections are not affected.
     pub fn refresh(&self) {
-        let complaint = self.complaint.lock();
-        let mut complaint = complaint;
+        let mut complaint = self.complaint.lock();
         match self.newer() {
             Ok(None) => complaint.settle(),
             Ok(Some(identity)) => {
                 complaint.settle();
                 tracing::info!("the TLS certificate has changed: new connections get the new one");
                 show(&identity, &self.options, &self.metrics);
-                let mut serving = self.serving.write();
-                *serving = Arc::new(identity);
+                *self.serving.write() = Arc::new(identity);
             }
             Err(error) => {
                 let problem = error.to_string();
@@ -117,8 +115,7 @@ impl Tls {
     }
 
     fn serving(&self) -> Arc<Identity> {
-        let serving = self.serving.read();
-        Arc::clone(&serving)
+        Arc::clone(&self.serving.read())
     }
 }
 

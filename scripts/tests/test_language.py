@@ -14,6 +14,11 @@ class Language(unittest.TestCase):
         found = [*language.findings_in_rust("a.rs", lines)]
         self.assertEqual([line.split(":")[1] for line in found], ["1"])
 
+    def test_first_words_of_sections_are_checked(self):
+        lines = ["/// Returns it.", "///", "/// # Errors", "/// When it is not there.", "fn a() {}"]
+        found = [*language.findings_in_rust("a.rs", lines)]
+        self.assertEqual([line.split(":")[1] for line in found], ["4"])
+
     def test_persons_for_things_are_found(self):
         found = [*language.findings_in_text("a.md", ["nobody waits", "the client waits", "Whoever asks"])]
         self.assertEqual([line.split(":")[1] for line in found], ["1", "3"])

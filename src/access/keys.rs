@@ -45,15 +45,13 @@ impl AccessKeys {
     /// logged once.
     pub fn refresh(&self) {
         let Some(file) = &self.file else { return };
-        let complaint = self.complaint.lock();
-        let mut complaint = complaint;
+        let mut complaint = self.complaint.lock();
         match read(file, &self.lasting) {
             Ok(list) => {
                 complaint.settle();
                 if *self.known() != list {
                     tracing::info!(keys = list.len(), "the keys have changed");
-                    let mut known = self.known.write();
-                    *known = Arc::new(list);
+                    *self.known.write() = Arc::new(list);
                 }
             }
             Err(error) => {
@@ -74,8 +72,7 @@ impl AccessKeys {
     /// The keys that are known now.
     #[must_use]
     pub fn known(&self) -> Arc<KeyList> {
-        let known = self.known.read();
-        Arc::clone(&known)
+        Arc::clone(&self.known.read())
     }
 }
 

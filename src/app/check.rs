@@ -1,13 +1,10 @@
 //! The report of `lookdown serve --check`.
 
-use std::{fmt::Write as _, thread, time::Duration};
+use std::{fmt::Write as _, thread};
 
 use anyhow::bail;
 
-use super::App;
-
-/// Interval of the checks that the calibrations were read.
-const READ_CHECK: Duration = Duration::from_millis(50);
+use super::{App, CALIBRATIONS_CHECK};
 
 impl App {
     /// Loads every model that is served, and describes the server that could start: a line on models
@@ -20,7 +17,7 @@ impl App {
             self.models.load(name)?;
         }
         while !self.calibrations.is_read() {
-            thread::sleep(READ_CHECK);
+            thread::sleep(CALIBRATIONS_CHECK);
         }
         let health = self.calibrations.health();
         if let Some(problem) = health.store_problem {

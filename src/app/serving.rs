@@ -9,7 +9,7 @@ use tokio::{
     time::{sleep, timeout},
 };
 
-use super::{App, Sockets};
+use super::{App, CALIBRATIONS_CHECK, Sockets};
 use crate::{
     api::{self, Phase},
     server::{self, Services},
@@ -23,8 +23,6 @@ const FAREWELL: Duration = Duration::from_secs(3);
 const LONGEST_LOAD: Duration = Duration::from_secs(10);
 /// Interval of the checks during that wait.
 const LOAD_CHECK: Duration = Duration::from_millis(20);
-/// Interval of the checks that the calibrations were read.
-const READ_CHECK: Duration = Duration::from_millis(50);
 /// Pause before a model is loaded again after a transient failure.
 const BEFORE_ANOTHER_LOAD: Duration = Duration::from_secs(1);
 
@@ -192,7 +190,7 @@ impl App {
             self.load(name, shutdown).await?;
         }
         while !self.calibrations.is_read() && !shutdown.is_requested() {
-            sleep(READ_CHECK).await;
+            sleep(CALIBRATIONS_CHECK).await;
         }
         // Each profile needs its model: a server with some of them would refuse the others' frames.
         if self.readiness.phase() == Phase::WarmingUp && !shutdown.is_requested() {

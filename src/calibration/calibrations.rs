@@ -50,7 +50,8 @@ impl Calibrations {
     /// [`Calibrations::delete`] may change it. Blocks.
     ///
     /// # Errors
-    /// When the store cannot be listed. A file that cannot be used costs only its calibrations.
+    /// Returns an error if the store cannot be listed. A file that cannot be used costs only its
+    /// calibrations.
     pub fn open(store: Box<dyn CalibrationStore>, writable: bool) -> Result<Self, StoreError> {
         let calibrations = Self::unread(store, writable, FileReader::default());
         calibrations.scan(&calibrations.lock())?;

@@ -43,7 +43,7 @@ impl Frame {
     /// Wraps row-major RGB bytes.
     ///
     /// # Errors
-    /// When a side is zero, or `pixels` is not `width * height * 3` bytes long.
+    /// Returns an error if a side is zero, or `pixels` is not `width * height * 3` bytes long.
     pub fn new(width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, FrameError> {
         if width == 0 || height == 0 {
             return Err(FrameError::NoPixels { width, height });
@@ -108,7 +108,7 @@ impl Frame {
     /// R, G and B of the pixel in column `x` and row `y`.
     ///
     /// # Panics
-    /// When the pixel lies outside the frame.
+    /// Panics if the pixel lies outside the frame.
     #[must_use]
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
         assert!(

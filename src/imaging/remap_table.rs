@@ -114,7 +114,7 @@ impl RemapTable {
     /// also beyond the frame's borders. `None` beyond the lens image.
     ///
     /// # Panics
-    /// When the pixel lies outside the view.
+    /// Panics if the pixel lies outside the view.
     #[must_use]
     pub fn position(&self, x: u32, y: u32) -> Option<Pixel> {
         let (x, y) = (x as usize, y as usize);

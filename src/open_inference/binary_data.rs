@@ -33,7 +33,7 @@ pub fn only_element(bytes: &Bytes) -> Result<Bytes, String> {
 /// Appends an element of `BYTES` after its length.
 ///
 /// # Errors
-/// When the length exceeds four bytes.
+/// Returns an error if the length exceeds four bytes.
 pub fn put_element(content: &[u8], bytes: &mut Vec<u8>) -> Result<(), TryFromIntError> {
     bytes.put_u32_le(content.len().try_into()?);
     bytes.put_slice(content);

@@ -114,7 +114,7 @@ impl Message {
     /// Writes JSON and the tensors that follow it as bytes, in their order.
     ///
     /// # Errors
-    /// When an element exceeds the length that the encoding has.
+    /// Returns an error if an element exceeds the length that the encoding has.
     pub fn write(head: &impl Serialize, tensors: &[TensorValues<'_>]) -> serde_json::Result<Self> {
         let mut body = serde_json::to_vec(head)?;
         let head_length = (!tensors.is_empty()).then_some(body.len());
@@ -140,7 +140,7 @@ impl Message {
 /// Parses the JSON of a request, which must be an object.
 ///
 /// # Errors
-/// When the JSON is malformed or is not a request.
+/// Returns an error if the JSON is malformed or is not a request.
 pub fn read_request<'a, D: Deserialize<'a>>(json: &'a [u8]) -> serde_json::Result<InferRequest<D>> {
     serde_json::from_slice(json).map(|Table(request)| request)
 }

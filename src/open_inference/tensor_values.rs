@@ -45,7 +45,7 @@ impl TensorValues<'_> {
     /// Appends the values as bytes.
     ///
     /// # Errors
-    /// When the length of an element exceeds four bytes.
+    /// Returns an error if the length of an element exceeds four bytes.
     pub fn put_bytes(&self, bytes: &mut Vec<u8>) -> Result<(), TryFromIntError> {
         match self {
             Self::Floats(values) => {

@@ -43,10 +43,10 @@ struct Work {
 
 /// The permits of some work. Dropping it ends the work.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct WorkGuard {
     in_flight: Arc<InFlight>,
     number: u64,
-    /// The end of the work, unless the place is just dropped.
+    /// The end of the work, unless the guard is just dropped.
     ended: Option<Instant>,
     _permits: BudgetShare,
 }
@@ -78,7 +78,7 @@ impl InFlight {
         ticket: &Ticket,
         permits: BudgetShare,
         now: Instant,
-    ) -> Place {
+    ) -> WorkGuard {
         let mut state = self.state();
         if state.work.is_empty() {
             state.progress(now);
@@ -91,7 +91,7 @@ impl InFlight {
             has_begun: false,
         };
         state.work.insert(number, work);
-        Place {
+        WorkGuard {
             in_flight: Arc::clone(self),
             number,
             ended: None,
@@ -179,7 +179,7 @@ impl Work {
     }
 }
 
-impl Place {
+impl WorkGuard {
     /// Records that a worker has taken the work.
     pub(super) fn begin(&self, now: Instant) {
         let mut state = self.in_flight.state();
@@ -195,7 +195,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for WorkGuard {
     fn drop(&mut self) {
         let mut state = self.in_flight.state();
         state.work.remove(&self.number);

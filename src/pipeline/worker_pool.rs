@@ -20,7 +20,7 @@ use super::{
     error::internal,
     frame_cost,
     frame_queue::FrameQueue,
-    in_flight::{InFlight, Place},
+    in_flight::{InFlight, WorkGuard},
     service_rate::ServiceRate,
 };
 use crate::{
@@ -45,7 +45,7 @@ struct Entry {
     /// The tracing span to which the log lines of the work belong.
     request: tracing::Span,
     /// The permits, held until the work has ended, even when its client has disconnected.
-    place: Place,
+    guard: WorkGuard,
 }
 
 /// Named threads that run the engine on a bounded number of frames.
@@ -170,7 +170,7 @@ impl WorkerPool {
         let cost = cost.min(self.shared.budget.share());
         let permits = self.shared.budget.take(&ticket.client, cost);
         let permits = permits.map_err(|error| self.refusal(error, &ticket.client))?;
-        let place = self.shared.in_flight.add(&ticket, permits, Instant::now());
+        let guard = self.shared.in_flight.add(&ticket, permits, Instant::now());
         let _withdrawal = ticket.withdrawn.clone().drop_guard();
         let (answer, waiting) = oneshot::channel();
         self.shared.rate().began(Instant::now());
@@ -187,7 +187,7 @@ impl WorkerPool {
                 }
             }),
             request: tracing::Span::current(),
-            place,
+            guard,
         };
         let queued = self.shared.queue.push(&ticket, cost, entry);
         queued.map_err(|_| PipelineError::ShuttingDown)?;
@@ -278,20 +278,20 @@ impl Shared {
                 ticket,
                 work,
                 request,
-                place,
+                guard,
             } = entry;
             let _in_request = request.enter();
             if ticket.withdrawn.is_cancelled() {
                 self.withdrawn.fetch_add(1, Ordering::Relaxed);
                 drop(work);
-                place.end(Instant::now());
+                guard.end(Instant::now());
                 self.rate().given_up(self.pending());
                 continue;
             }
-            place.begin(Instant::now());
+            guard.begin(Instant::now());
             let done = work(&self.engine);
             // A client that sends the next frame after this answer must find the permit free.
-            place.end(Instant::now());
+            guard.end(Instant::now());
             self.rate().ended(Instant::now(), self.pending());
             if done.withdrawn {
                 self.withdrawn.fetch_add(1, Ordering::Relaxed);

@@ -26,7 +26,7 @@ impl Labels {
     /// No annotations yet. Looking takes long, so that what would fail at the end fails now.
     ///
     /// # Errors
-    /// When two pictures would share a name or a file, or `folder` cannot be made.
+    /// Returns an error if two pictures would share a name or a file, or `folder` cannot be made.
     pub(super) fn start(
         format: AnnotationFormat,
         boxes: BoxKind,

@@ -19,7 +19,7 @@ pub struct EncodeError {
 /// Encodes the frame as JPEG. `quality` is clamped to 1 to 100.
 ///
 /// # Errors
-/// When a side is longer than the 65535 pixels that JPEG can hold.
+/// Returns an error if a side is longer than the 65535 pixels that JPEG can hold.
 pub fn encode_jpeg(frame: &Frame, quality: u8) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     encode(

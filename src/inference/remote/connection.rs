@@ -58,7 +58,7 @@ impl Connection {
     /// Creates the client. Sends nothing.
     ///
     /// # Errors
-    /// When the system's certificates cannot be used.
+    /// Returns an error if the system's certificates cannot be used.
     pub(super) fn new(options: &RemoteOptions) -> reqwest::Result<Self> {
         // Fails when a provider is already installed, which has the same effect.
         let _ = rustls::crypto::ring::default_provider().install_default();

@@ -16,7 +16,7 @@ impl Background {
     /// Starts the thread.
     ///
     /// # Errors
-    /// When the operating system gives no thread.
+    /// Returns an error if the operating system gives no thread.
     pub(super) fn start(name: &str) -> io::Result<Self> {
         let runtime = Builder::new_multi_thread()
             .worker_threads(1)
