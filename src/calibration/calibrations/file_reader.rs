@@ -15,7 +15,7 @@ use std::{
 use super::content::{Cameras, cameras};
 use crate::calibration::{CalibrationId, FormatError};
 
-/// Longest time for a file. The largest permitted file of any format takes less than a second.
+/// Longest time for a file.
 const TIME_LIMIT: Duration = Duration::from_secs(5);
 /// Most files beyond their time that may still be read: a thread cannot be stopped from outside.
 const MAX_OVERDUE: usize = 2;
