@@ -31,10 +31,10 @@ serve: setup ## set up, then run the server
 
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
 	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server checkers
-	cargo fmt --check
+	cargo fmt --all --check
 	@# cargo fmt does not find modules that a macro declares.
-	rustfmt --check --edition 2024 src/geometry/lens/models/*.rs
-	cargo clippy --all-targets --locked -- -D warnings
+	rustfmt --check --edition 2024 crates/lookdown-lens/src/geometry/lens/models/*.rs
+	cargo clippy --workspace --all-targets --locked -- -D warnings
 	@# Checks that the lock file of the fuzzers is current.
 	cargo tree --quiet --locked --manifest-path fuzz/Cargo.toml > /dev/null
 	$(CARGO_DENY) bans licenses sources
@@ -46,8 +46,8 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
 	$(PYTHON) -m unittest discover -s benches/tests -t benches
 	$(PYTHON) -m unittest discover -s tests/reliability/tests -t tests/reliability
-	cargo test --locked
-	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items --locked
+	cargo test --workspace --locked
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked
 
 audit: ## check the licences, sources and bans of all dependencies (deny.toml)
 	@$(PYTHON) scripts/setup.py checkers
@@ -107,7 +107,7 @@ bless: ## regenerate openapi/openapi.json, settings, tables of docs/ and snapsho
 	mkdir -p openapi
 	cargo run --release --locked -- openapi > openapi/openapi.json.new || { rm -f openapi/openapi.json.new; exit 1; }
 	mv openapi/openapi.json.new openapi/openapi.json
-	BLESS=1 INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --locked
+	BLESS=1 INSTA_UPDATE=always INSTA_FORCE_PASS=1 cargo test --workspace --locked
 
 bench-remap: ## time remap tables and rendering, and the same with OpenCV
 	@$(PYTHON) scripts/setup.py benches

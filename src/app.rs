@@ -17,7 +17,7 @@ use anyhow::Context;
 use crate::{
     access::AccessKeys,
     api::{Access, ApiOptions, ApiState, Readiness, RequestRate},
-    calibration::{BucketStore, CalibrationStore, Calibrations, FolderStore},
+    calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     geometry::FieldOfViewReading,
     imaging::decode::DecodeLimits,
     inference::ModelRepository,

@@ -19,7 +19,7 @@ use axum::{
 use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
-    calibration::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
+    calibration_store::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
     imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
     inference::{
         Detector, HeadOutput, InferenceError, Model, ModelFolder, ModelRepository,

@@ -22,7 +22,7 @@ use super::{
     readiness::{Phase, Readiness},
 };
 use crate::{
-    calibration::Calibrations,
+    calibration_store::Calibrations,
     fairness::Client,
     inference::ModelRepository,
     metrics::Metrics,

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use super::App;
-use crate::{access::AccessKeys, calibration::Calibrations, inference::ModelRepository, tls::Tls};
+use crate::{
+    access::AccessKeys, calibration_store::Calibrations, inference::ModelRepository, tls::Tls,
+};
 
 /// Reads again what may change while the server runs. Clones share it.
 #[derive(Clone)]

@@ -26,7 +26,7 @@ use super::{
     rig_cache::RigCache,
 };
 use crate::{
-    calibration::Calibrations,
+    calibration_store::Calibrations,
     detection::RefinementParameters,
     geometry::FieldOfViewReading,
     imaging::{

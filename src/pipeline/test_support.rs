@@ -12,7 +12,7 @@ use jiff::Timestamp;
 
 use super::{BatchOptions, DetectJob, DetectParameters, Engine, EngineOptions, Ticket};
 use crate::{
-    calibration::Calibrations,
+    calibration_store::Calibrations,
     detection::{BBox, ViewPixels},
     imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png},
     inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},

@@ -6,7 +6,7 @@ use axum::{body::Body, http::Request};
 use lookdown::{
     api::Access,
     app::Assembly,
-    calibration::{Calibrations, FolderStore},
+    calibration_store::{Calibrations, FolderStore},
 };
 use serde_json::json;
 use tokio::sync::watch;

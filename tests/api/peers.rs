@@ -15,7 +15,7 @@ use std::{
 };
 
 use lookdown::{
-    calibration::{BucketStore, CalibrationStore},
+    calibration_store::{BucketStore, CalibrationStore},
     inference::{CandidateOptions, InferenceError, RemoteDetector, RemoteOptions, RemoteServer},
     settings::TraceSettings,
     telemetry::{IncomingTrace, Tracer},

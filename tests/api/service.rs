@@ -18,7 +18,7 @@ use http_body_util::BodyExt;
 use lookdown::{
     api::{self, Access, ApiOptions, ApiState, Readiness, RequestRate},
     app::Assembly,
-    calibration::{Calibrations, FolderStore},
+    calibration_store::{Calibrations, FolderStore},
     imaging::{Frame, NetworkInput, annotate::encode_png},
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,

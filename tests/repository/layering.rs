@@ -9,7 +9,7 @@ use source_scan::{absolute, code, names_crate, sources, used_paths};
 
 /// Every module, and the modules of this crate it may use. A row for a part of a module replaces
 /// the row of the module for the files of that part.
-const MAY_USE: [(&str, &[&str]); 33] = [
+const MAY_USE: [(&str, &[&str]); 34] = [
     ("plain_name", &[]),
     ("quoted", &[]),
     ("watched_file", &[]),
@@ -28,6 +28,10 @@ const MAY_USE: [(&str, &[&str]); 33] = [
     (
         "calibration",
         &["geometry", "plain_name", "quoted", "revision", "warning"],
+    ),
+    (
+        "calibration_store",
+        &["calibration", "quoted", "plain_name", "revision", "warning"],
     ),
     (
         "inference",
@@ -56,6 +60,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "detection",
             "imaging",
             "calibration",
+            "calibration_store",
             "inference",
             "quoted",
             "revision",
@@ -69,6 +74,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "detection",
             "imaging",
             "calibration",
+            "calibration_store",
             "inference",
             "pipeline",
         ],
@@ -80,6 +86,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
         &[
             "access",
             "calibration",
+            "calibration_store",
             "fairness",
             "imaging",
             "metrics",
@@ -94,6 +101,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "api",
             "api::http",
             "calibration",
+            "calibration_store",
             "fairness",
             "pipeline",
             "quoted",
@@ -109,6 +117,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "api",
             "api::http",
             "calibration",
+            "calibration_store",
             "fairness",
             "inference",
             "open_inference",
@@ -129,6 +138,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "detection",
             "imaging",
             "calibration",
+            "calibration_store",
             "inference",
             "open_inference",
             "pipeline",
@@ -148,6 +158,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "detection",
             "imaging",
             "calibration",
+            "calibration_store",
             "inference",
             "pipeline",
             "metrics",
@@ -172,6 +183,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "detection",
             "imaging",
             "calibration",
+            "calibration_store",
             "inference",
             "pipeline",
             "evaluation",
@@ -206,6 +218,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
             "annotation_formats",
             "api",
             "calibration",
+            "calibration_store",
             "cli",
             "evaluation",
             "inference",
@@ -220,11 +233,12 @@ const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
     ("plotters", &["evaluation"]),
     ("rumqttc", &["mqtt"]),
     ("secrecy", &["settings"]),
-    ("object_store", &["calibration"]),
+    ("object_store", &["calibration_store"]),
     (
         "rustls",
         &[
             "calibration",
+            "calibration_store",
             "inference",
             "probe",
             "results",

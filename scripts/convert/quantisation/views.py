@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy
 from PIL import Image
 
-# Elevation in radians, number of views and field of view in degrees of each ring, as in src/geometry/view_plan.rs:
+# Elevation in radians, number of views and field of view in degrees of each ring, as in crates/lookdown-lens/src/geometry/view_plan.rs:
 # the plans of the profiles fast, balanced and quality.
 RINGS = (
     *((0, 1, 90), (0.8, 12, 90)),

@@ -33,7 +33,7 @@ use crate::{
         openapi::RawBytes,
         require_scope::{RequireAdmin, RequireRead},
     },
-    calibration::ChangeError,
+    calibration_store::ChangeError,
 };
 
 /// List calibrations

@@ -12,7 +12,8 @@ use utoipa::ToSchema;
 
 use crate::{
     api::{ApiState, http::problem::Problem, require_scope::RequireRead},
-    calibration::{CalibrationId, CalibrationsHealth},
+    calibration::CalibrationId,
+    calibration_store::CalibrationsHealth,
 };
 
 /// Largest number of invalid files in a response.

@@ -14,7 +14,8 @@ use serde::Deserialize;
 
 use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
 use crate::{
-    calibration::{CalibrationError, CalibrationId, Calibrations, FolderStore},
+    calibration::CalibrationId,
+    calibration_store::{Calibrations, FolderStore},
     detection::BBox,
     evaluation::{AnnotatedPerson, Outline, RotatedBox, Scoring},
 };
@@ -58,8 +59,7 @@ struct CocoCategory {
 /// Reads the annotations of a folder with `images/` and `calibrations/`.
 pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, DataSetError> {
     let calibrations = FolderStore::new(&folder.join("calibrations"));
-    let calibrations = Calibrations::open(Box::new(calibrations), false);
-    let calibrations = calibrations.map_err(CalibrationError::from)?;
+    let calibrations = Calibrations::open(Box::new(calibrations), false)?;
     let pictures = folder.join("images");
     let mut reader = Reader::default();
     reader.read(file, Some(&calibrations), |name| Ok(pictures.join(name)))?;

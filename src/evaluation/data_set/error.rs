@@ -2,7 +2,11 @@
 
 use std::path::PathBuf;
 
-use crate::{calibration::CalibrationError, evaluation::Scoring};
+use crate::{
+    calibration::CalibrationError,
+    calibration_store::{StoreError, UnusableCalibration},
+    evaluation::Scoring,
+};
 
 /// The path holds no usable data set.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +39,12 @@ pub enum DataSetError {
     /// A calibration cannot be used.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    /// A calibration of the data set cannot be used.
+    #[error(transparent)]
+    OwnCalibration(#[from] UnusableCalibration),
+    /// The calibrations of the data set cannot be read.
+    #[error(transparent)]
+    Calibrations(#[from] StoreError),
 }
 
 /// Ground truth of one shape cannot be scored as another.

@@ -4,7 +4,7 @@ use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 use super::Engine;
 use crate::{
-    calibration::{Areas, Calibration, CalibrationError, CalibrationId, CameraGeometry},
+    calibration::{Areas, Calibration, CalibrationId, CameraGeometry},
     geometry::{Lens, Mount},
     imaging::{
         Frame, NetworkInput,
@@ -91,13 +91,14 @@ impl Engine {
 
     fn find_calibration(&self, id: &CalibrationId) -> Result<Arc<Calibration>, PipelineError> {
         let found = match &self.calibrations {
-            Some(calibrations) => calibrations.get(id).map_err(|error| match error {
-                CalibrationError::Stored { problem, .. } => PipelineError::UnusableCalibration {
-                    id: id.to_string(),
-                    problem,
-                },
-                error => internal(anyhow::Error::new(error)),
-            })?,
+            Some(calibrations) => {
+                calibrations
+                    .get(id)
+                    .map_err(|unusable| PipelineError::UnusableCalibration {
+                        id: id.to_string(),
+                        problem: unusable.problem,
+                    })?
+            }
             None => None,
         };
         found.ok_or_else(|| PipelineError::UnknownCalibration { id: id.to_string() })

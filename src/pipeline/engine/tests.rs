@@ -1,5 +1,5 @@
 use super::*;
-use crate::calibration::FolderStore;
+use crate::calibration_store::FolderStore;
 use crate::inference::InferenceError;
 use crate::pipeline::test_support::{BlobDetector, engine, frame_with_disc, job};
 

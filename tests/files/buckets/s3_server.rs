@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown::calibration::{BucketStore, CalibrationStore, Replaces};
+use lookdown::calibration_store::{BucketStore, CalibrationStore, Replaces};
 use tempfile::TempDir;
 
 /// Must never appear in any output.

@@ -37,7 +37,8 @@ fn calibrations_are_read_again_only_when_they_change() {
     assert!(put.starts_with("HTTP/1.1 201"), "{put}");
     let stored = service.get("/calibrations/yard");
     let bucket = s3.store();
-    let content = lookdown::calibration::CalibrationStore::read(&bucket, &["yard.json"], 10_000);
+    let content =
+        lookdown::calibration_store::CalibrationStore::read(&bucket, &["yard.json"], 10_000);
     assert!(stored.ends_with(std::str::from_utf8(content[0].as_ref().unwrap()).unwrap()));
     let again = service.send(
         "PUT",

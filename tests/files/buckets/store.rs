@@ -2,7 +2,7 @@
 
 use std::net::TcpListener;
 
-use lookdown::calibration::{BucketStore, CalibrationStore, Replaces, StoreError};
+use lookdown::calibration_store::{BucketStore, CalibrationStore, Replaces, StoreError};
 
 use crate::buckets::s3_server::{S3Server, SECRET, store};
 

@@ -20,7 +20,7 @@ use axum::{
 use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
-    calibration::{Calibrations, FolderStore},
+    calibration_store::{Calibrations, FolderStore},
     inference::{ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
     pipeline::{Engine, EngineOptions, WorkerPool},

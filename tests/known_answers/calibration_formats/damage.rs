@@ -1,6 +1,9 @@
 //! Damaged files are refused or read, and never crash the program.
 
-use lookdown::calibration::{CalibrationFile, Calibrations, FolderStore, Reading, WriteCondition};
+use lookdown::{
+    calibration::CalibrationFile,
+    calibration_store::{Calibrations, FolderStore, Reading, WriteCondition},
+};
 use proptest::prelude::*;
 
 use crate::calibration_formats::refusal;

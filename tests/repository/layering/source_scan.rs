@@ -6,20 +6,27 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Every source file of the library with its module path, such as `api::http::csrf`.
+/// The folders of the sources whose modules begin with `crate::` in the server: its own and the
+/// geometry that it re-exports.
+const ROOTS: [&str; 2] = ["src", "crates/lookdown-lens/src"];
+
+/// Every source file of the libraries with its module path, such as `api::http::csrf`.
 pub fn sources() -> Vec<(String, PathBuf)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut folders = vec![root.clone()];
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|ending| ending == "rs") {
-                let below = path.strip_prefix(&root).unwrap().with_extension("");
-                let parts: Vec<_> = below.iter().map(|part| part.to_str().unwrap()).collect();
-                files.push((parts.join("::"), path));
+    for root in ROOTS {
+        let root = repository.join(root);
+        let mut folders = vec![root.clone()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|ending| ending == "rs") {
+                    let below = path.strip_prefix(&root).unwrap().with_extension("");
+                    let parts: Vec<_> = below.iter().map(|part| part.to_str().unwrap()).collect();
+                    files.push((parts.join("::"), path));
+                }
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Failed changes of calibrations as problems: the only place that decides their kind.
 
 use super::{Problem, ProblemKind};
-use crate::calibration::{ChangeError, StoreError};
+use crate::calibration_store::{ChangeError, StoreError};
 
 impl From<ChangeError> for Problem {
     fn from(error: ChangeError) -> Self {

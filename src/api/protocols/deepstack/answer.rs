@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::{
     api::report::{Report, ReportPerson},
-    calibration::CalibrationRow,
+    calibration_store::CalibrationRow,
 };
 
 const LABEL: &str = "person";

@@ -10,7 +10,7 @@ use crate::{
         entity_tags::{Named, named},
         problem::{Problem, ProblemKind},
     },
-    calibration::WriteCondition,
+    calibration_store::WriteCondition,
 };
 
 /// Returns the condition of a change.

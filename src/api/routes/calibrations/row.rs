@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::{
     api::report::ReportWarning,
-    calibration::{CalibrationEntry, CalibrationRow},
+    calibration_store::{CalibrationEntry, CalibrationRow},
 };
 
 /// A calibration.

@@ -16,7 +16,8 @@ use crate::{
             query::parameters_named,
         },
     },
-    calibration::{CalibrationFile, Reading, native::NotAFrameSize},
+    calibration::{CalibrationFile, native::NotAFrameSize},
+    calibration_store::Reading,
 };
 
 /// An uploaded calibration file with the options to read it.

@@ -24,7 +24,8 @@ use crate::{
         report::pixels,
         require_scope::RequireRead,
     },
-    calibration::{Calibration, Calibrations},
+    calibration::Calibration,
+    calibration_store::Calibrations,
     pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},
 };
 

@@ -45,10 +45,7 @@ impl FormatError {
     }
 
     /// A field that makes no camera.
-    pub(in crate::calibration) fn invalid(
-        field: impl Into<String>,
-        problem: impl Into<String>,
-    ) -> Self {
+    pub fn invalid(field: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Invalid {
             field: shortened(field.into()),
             problem: shortened(problem.into()),

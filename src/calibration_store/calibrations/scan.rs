@@ -13,7 +13,10 @@ use super::{
     named_file::{NamedFile, by_id},
     snapshot::Snapshot,
 };
-use crate::calibration::{CalibrationFile, CalibrationId, READ_AT_ONCE, StoreError};
+use crate::{
+    calibration::{CalibrationFile, CalibrationId},
+    calibration_store::{READ_AT_ONCE, StoreError},
+};
 
 /// The files of a store by the ID in their names.
 type Files = BTreeMap<CalibrationId, Arc<LoadedFile>>;

@@ -8,7 +8,7 @@ use object_store::{
     client::{HttpError, HttpErrorKind},
 };
 
-use crate::calibration::StoreError;
+use crate::calibration_store::StoreError;
 
 /// The text before the status in the client's message.
 const STATUS: &str = "status code: ";

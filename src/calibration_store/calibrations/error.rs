@@ -1,6 +1,19 @@
-//! Reasons for which a calibration was not changed, or for which the outcome is unknown.
+//! Reasons for which a calibration cannot be used or was not changed, or for which the outcome is unknown.
 
-use crate::calibration::{CalibrationId, FormatError, StoreError};
+use crate::{
+    calibration::{CalibrationId, FormatError},
+    calibration_store::StoreError,
+};
+
+/// A calibration whose file in the store has never held a usable one, or holds several.
+#[derive(Debug, thiserror::Error)]
+#[error("{place}: {problem}")]
+pub struct UnusableCalibration {
+    /// The file.
+    pub place: String,
+    /// The field, its value and what would be right.
+    pub problem: String,
+}
 
 /// A calibration that was not changed, or that could not be read back afterwards. Every message is
 /// one sentence with the remedy.

@@ -6,7 +6,10 @@ use super::{
     CalibrationEntry, Calibrations, ChangeError, Reading, content::import, load::LoadedFile,
     named_file::written_name,
 };
-use crate::calibration::{CalibrationId, Replaces, StoredFile};
+use crate::{
+    calibration::CalibrationId,
+    calibration_store::{Replaces, StoredFile},
+};
 
 /// The precondition of a change to a calibration.
 #[derive(Debug, Clone, PartialEq, Eq)]

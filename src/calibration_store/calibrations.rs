@@ -23,11 +23,12 @@ use std::{
 use parking_lot::{Mutex, MutexGuard, RwLock};
 
 use self::{file_reader::FileReader, snapshot::Snapshot};
-use super::{Calibration, CalibrationError, CalibrationId, CalibrationStore, StoreError};
+use super::{CalibrationStore, StoreError};
+use crate::calibration::{Calibration, CalibrationId};
 
 pub use change::{Put, WriteCondition};
 pub use content::{CalibrationEntry, Reading};
-pub use error::ChangeError;
+pub use error::{ChangeError, UnusableCalibration};
 pub use snapshot::{CalibrationRow, CalibrationsHealth};
 
 /// The calibrations of a store. Shared; lookups never wait for the store.
@@ -129,14 +130,14 @@ impl Calibrations {
     /// The calibration `id`; `None` when there is none. Does not block.
     ///
     /// # Errors
-    /// [`CalibrationError`] when its file has never held one that can be used, or several.
-    pub fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, CalibrationError> {
+    /// [`UnusableCalibration`] when its file has never held one that can be used, or several.
+    pub fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, UnusableCalibration> {
         let now = self.now();
         if let Some(entry) = now.entry(id) {
             return Ok(Some(Arc::clone(&entry.calibration)));
         }
         match now.why_unusable(id) {
-            Some((file, problem)) => Err(CalibrationError::Stored {
+            Some((file, problem)) => Err(UnusableCalibration {
                 place: format!("{}/{file}", self.store.place()),
                 problem,
             }),

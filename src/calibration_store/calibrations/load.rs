@@ -7,7 +7,7 @@ use super::{
     file_reader::{FileReader, Unread},
     named_file::NamedFile,
 };
-use crate::calibration::{CalibrationId, StoreError};
+use crate::{calibration::CalibrationId, calibration_store::StoreError};
 
 /// A file of the store.
 #[derive(Debug)]

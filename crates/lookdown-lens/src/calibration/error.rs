@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{FormatError, StoreError};
+use super::FormatError;
 
 /// A calibration that cannot be used. Every message is one sentence with the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -23,17 +23,6 @@ pub enum CalibrationError {
         /// The field, its value and what would be right.
         problem: FormatError,
     },
-    /// Its file in a store cannot be used.
-    #[error("{place}: {problem}")]
-    Stored {
-        /// The file.
-        place: String,
-        /// The field, its value and what would be right.
-        problem: String,
-    },
-    /// The store cannot be read.
-    #[error(transparent)]
-    Store(#[from] StoreError),
 }
 
 impl CalibrationError {

@@ -10,7 +10,7 @@ use std::{
 };
 
 use super::{content, revision};
-use crate::calibration::{
+use crate::calibration_store::{
     FolderStore, Replaces, StoredFile,
     calibrations::{content::cameras, *},
 };

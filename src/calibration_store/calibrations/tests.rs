@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::*;
-use crate::calibration::{FolderStore, Replaces, StoredFile};
+use crate::calibration_store::{FolderStore, Replaces, StoredFile};
 
 fn content(id: &str, focal: f64) -> String {
     format!(

@@ -53,7 +53,10 @@ impl Lens {
 
     /// Builds the lens with the curve of `model` and another image plane and end than its own.
     /// Without `max_theta` the lens reaches as far as its model is one-to-one.
-    pub(crate) fn on_plane(
+    ///
+    /// # Errors
+    /// [`LensError`], as [`Lens::new`].
+    pub fn on_plane(
         model: &LensModel,
         plane: ImagePlane,
         max_theta: Option<f64>,

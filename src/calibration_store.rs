@@ -1,0 +1,13 @@
+//! Stores of calibrations, and the calibrations that a server has read from them.
+
+mod calibrations;
+mod store;
+
+pub use calibrations::{
+    CalibrationEntry, CalibrationRow, Calibrations, CalibrationsHealth, ChangeError, Put, Reading,
+    UnusableCalibration, WriteCondition,
+};
+pub use store::{
+    BucketStore, CalibrationStore, FolderStore, MAX_FILES, READ_AT_ONCE, Replaces, StoreError,
+    StoredFile,
+};
