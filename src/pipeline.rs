@@ -37,7 +37,7 @@ pub use engine::{Engine, EngineOptions, Observation};
 pub use error::PipelineError;
 pub use given_parameters::GivenParameters;
 pub use in_flight::{Stall, StalledWork};
-pub use job::{DetectJob, Detected, ViewsJob};
+pub use job::{DetectJob, Detected, JobImage, ViewsJob};
 pub use network::BatchOptions;
 pub use parameter_error::{ParameterError, ParameterFault, whole_number};
 pub(crate) use parameter_spec::parameter_table;

@@ -9,12 +9,10 @@ use std::{
     path::{Path, PathBuf},
     process::ExitCode,
     sync::Arc,
-    time::Instant,
 };
 
 use anyhow::{Context, bail};
 use clap::Args;
-use jiff::Timestamp;
 
 use self::{
     labels::Labels,
@@ -30,7 +28,7 @@ use crate::{
     api::Report,
     app::engine_for,
     calibration::{Calibration, CalibrationId},
-    pipeline::{DetectJob, DetectParameters, Detected, Engine, Ticket},
+    pipeline::{DetectJob, DetectParameters, Detected, Engine, JobImage},
 };
 
 /// Arguments of `lookdown detect`.
@@ -159,17 +157,13 @@ fn detect(
     if bytes > max_bytes {
         bail!("the file has {bytes} bytes: server.max_body_bytes allows {max_bytes}");
     }
-    let received_at = Timestamp::now();
     let encoded = fs::read(image).context("the file cannot be read")?;
-    Ok(engine.detect(&DetectJob {
-        request_id: image.display().to_string(),
-        received_at,
-        arrived: Instant::now(),
-        ticket: Ticket::default(),
-        image: encoded.into(),
-        parameters: parameters.clone(),
+    Ok(engine.detect(&DetectJob::local(
+        image.display().to_string(),
+        JobImage::Encoded(encoded.into()),
+        parameters.clone(),
         calibration,
-    })?)
+    ))?)
 }
 
 fn print(detected: &Detected) -> anyhow::Result<()> {

@@ -11,7 +11,6 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use jiff::Timestamp;
 
 use super::{SettingsFile, annotate};
 use crate::{
@@ -19,7 +18,7 @@ use crate::{
     app::{engine_for, onnx_options},
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
-    pipeline::{DetectJob, DetectParameters, Detected, Ticket},
+    pipeline::{DetectJob, DetectParameters, Detected, JobImage},
     settings::{Settings, find_beside_executable},
 };
 
@@ -147,13 +146,10 @@ fn detect(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<D
     let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
     let image = std::fs::read(sample)
         .with_context(|| format!("--sample: {} cannot be read", sample.display()))?;
-    Ok(engine.detect(&DetectJob {
-        request_id: sample.display().to_string(),
-        received_at: Timestamp::now(),
-        arrived: Instant::now(),
-        ticket: Ticket::default(),
-        image: image.into(),
+    Ok(engine.detect(&DetectJob::local(
+        sample.display().to_string(),
+        JobImage::Encoded(image.into()),
         parameters,
-        calibration: None,
-    })?)
+        None,
+    ))?)
 }

@@ -6,12 +6,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use jiff::Timestamp;
-
 use super::{
     DataSet, DataSetImage, DetectedRow, FoundPerson, RowCost, RowName, in_order::in_order,
 };
-use crate::pipeline::{DetectJob, DetectParameters, Engine, PipelineError, Ticket};
+use crate::pipeline::{DetectJob, DetectParameters, Engine, JobImage, PipelineError};
 
 /// The reason why an image has no detections.
 #[derive(Debug, thiserror::Error)]
@@ -101,15 +99,12 @@ fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob,
         path: image.path.clone(),
         source,
     })?;
-    Ok(DetectJob {
-        request_id: String::new(),
-        received_at: Timestamp::now(),
-        arrived: Instant::now(),
-        ticket: Ticket::default(),
-        image: bytes.into(),
-        parameters: parameters.clone(),
-        calibration: image.calibration.clone(),
-    })
+    Ok(DetectJob::local(
+        String::new(),
+        JobImage::Encoded(bytes.into()),
+        parameters.clone(),
+        image.calibration.clone(),
+    ))
 }
 
 fn rows(seen: Vec<Seen>, variants: &[DetectParameters]) -> Vec<DetectedRow> {

@@ -16,8 +16,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use self::observation::Observation;
 use super::{
-    BatchOptions, DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, Person,
-    PipelineError, Profile, Stage, StageTimings,
+    BatchOptions, DefaultModels, DetectJob, DetectParameters, Detected, DetectionReport, JobImage,
+    Person, PipelineError, Profile, Stage, StageTimings,
     inference_cache::{FrameKey, InferenceCache},
     merge,
     motion_cache::{CameraViews, MotionCache},
@@ -34,7 +34,6 @@ use crate::{
         decode::{DecodeLimits, decode},
     },
     inference::{Model, ModelRegistry},
-    revision::sha256_of,
     warning::{Warning, WarningCode},
 };
 
@@ -183,7 +182,10 @@ impl Engine {
             withdrawn: job.ticket.withdrawn.clone(),
             report,
             frame: observation.frame,
-            encoded: has_no_masks.then(|| job.image.clone()),
+            encoded: match &job.image {
+                JobImage::Encoded(file) if has_no_masks => Some(file.clone()),
+                _ => None,
+            },
             rigs,
         })
     }
@@ -197,13 +199,18 @@ impl Engine {
         timeline.enter(Stage::Queue, job.arrived);
         timeline.enter(Stage::Decode, Instant::now());
         let model = self.model(&job.parameters)?;
-        let decoded = decode(&job.image, &self.options.decode_limits)?;
-        let mut frame = decoded.frame;
+        let (mut frame, orientation_applied) = match &job.image {
+            JobImage::Encoded(file) => {
+                let decoded = decode(file, &self.options.decode_limits)?;
+                (Arc::new(decoded.frame), decoded.orientation_applied)
+            }
+            JobImage::Decoded(frame) => (Arc::clone(frame), false),
+        };
         check_size(&frame)?;
         timeline.enter(Stage::Calibrate, Instant::now());
 
         let mut warnings = Vec::new();
-        if decoded.orientation_applied {
+        if orientation_applied {
             warnings.push(Warning::new(
                 WarningCode::FrameRotated,
                 "the frame was rotated according to its EXIF orientation; boxes are in pixels of the \
@@ -211,9 +218,11 @@ impl Engine {
             ));
         }
         let camera = self.camera(job, &frame, &model, &mut warnings)?;
-        camera.rig.blank(&mut frame);
+        if !camera.rig.has_no_masks() {
+            camera.rig.blank(Arc::make_mut(&mut frame));
+        }
         let key = job.parameters.remember.then(|| FrameKey {
-            digest: sha256_of(&job.image),
+            digest: job.image.digest(),
             is_model_named: job.parameters.model.is_some(),
             rig: Arc::clone(&camera.rig),
             model: Arc::clone(&model),
@@ -225,7 +234,7 @@ impl Engine {
             batch_count: 0,
             non_finite: 0,
             timeline: timeline.clone(),
-            frame: Arc::new(frame),
+            frame,
             camera,
             model,
             warnings,

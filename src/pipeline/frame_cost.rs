@@ -5,7 +5,7 @@
 //! costs 1, because its header is enough to refuse it. No frame costs more than a client may use.
 
 use super::{DetectJob, ViewsJob};
-use crate::{geometry::FieldOfViewReading, imaging::decode::declared_size};
+use crate::geometry::FieldOfViewReading;
 
 /// Pixels, decoded or drawn, that add 1.
 const PIXELS_PER_PERMIT: u64 = 12_000_000;
@@ -15,7 +15,7 @@ const INPUTS_PER_PERMIT: usize = 32;
 /// Returns the cost of a frame by the size in its header, its profile and its drawing. A frame of
 /// more than `max_pixels` will be refused.
 pub(super) fn of_frame(job: &DetectJob, max_pixels: u64) -> usize {
-    let size = declared_size(&job.image).unwrap_or((0, 0));
+    let size = job.image.size().unwrap_or((0, 0));
     if u64::from(size.0) * u64::from(size.1) > max_pixels {
         return 1;
     }

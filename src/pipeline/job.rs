@@ -10,9 +10,38 @@ use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
 use crate::{
     calibration::Calibration,
     geometry::Pixel,
-    imaging::{Frame, annotate::ZoneOutline},
+    imaging::{Frame, annotate::ZoneOutline, decode::declared_size},
     inference::Model,
+    revision::sha256_of,
 };
+
+/// The frame of a job.
+#[derive(Debug, Clone)]
+pub enum JobImage {
+    /// A JPEG, PNG or WebP file.
+    Encoded(Bytes),
+    /// Pixels.
+    Decoded(Arc<Frame>),
+}
+
+impl JobImage {
+    /// Returns the SHA-256 of the file or of the pixels, hexadecimal.
+    pub(super) fn digest(&self) -> String {
+        match self {
+            Self::Encoded(file) => sha256_of(file),
+            Self::Decoded(frame) => sha256_of(frame.pixels()),
+        }
+    }
+
+    /// Returns width and height in pixels, those of a file from its header. `None` without a
+    /// readable header.
+    pub(super) fn size(&self) -> Option<(u32, u32)> {
+        match self {
+            Self::Encoded(file) => declared_size(file),
+            Self::Decoded(frame) => Some((frame.width(), frame.height())),
+        }
+    }
+}
 
 /// One frame to process.
 #[derive(Debug, Clone)]
@@ -23,8 +52,8 @@ pub struct DetectJob {
     pub received_at: Timestamp,
     /// The time at which the whole request was in memory: the start of all stage timings.
     pub arrived: Instant,
-    /// The encoded frame.
-    pub image: Bytes,
+    /// The frame.
+    pub image: JobImage,
     /// The priority of the job and its cancellation state.
     pub ticket: Ticket,
     /// The validated parameters.
@@ -47,10 +76,30 @@ impl DetectJob {
             request_id: ticket.request_id.clone(),
             received_at,
             arrived,
-            image,
+            image: JobImage::Encoded(image),
             ticket,
             parameters,
             calibration: None,
+        }
+    }
+
+    /// Creates the job for a frame of this process, such as a file, named `name` in the report.
+    /// `calibration` replaces the lookup of the parameter.
+    #[must_use]
+    pub fn local(
+        name: String,
+        image: JobImage,
+        parameters: DetectParameters,
+        calibration: Option<Arc<Calibration>>,
+    ) -> Self {
+        Self {
+            request_id: name,
+            received_at: Timestamp::now(),
+            arrived: Instant::now(),
+            image,
+            ticket: Ticket::default(),
+            parameters,
+            calibration,
         }
     }
 }

@@ -10,7 +10,7 @@ use std::{
 use bytes::Bytes;
 use jiff::Timestamp;
 
-use super::{BatchOptions, DetectJob, DetectParameters, Engine, EngineOptions, Ticket};
+use super::{BatchOptions, DetectJob, DetectParameters, Engine, EngineOptions, JobImage, Ticket};
 use crate::{
     calibration_store::Calibrations,
     detection::{BBox, ViewPixels},
@@ -139,7 +139,7 @@ pub(super) fn job(image: Bytes, parameters: &[(&str, &str)]) -> DetectJob {
         received_at: Timestamp::UNIX_EPOCH,
         arrived: Instant::now(),
         ticket: Ticket::default(),
-        image,
+        image: JobImage::Encoded(image),
         parameters: DetectParameters::parse(parameters.iter().copied()).unwrap(),
         calibration: None,
     }

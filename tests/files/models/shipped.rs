@@ -1,14 +1,13 @@
 //! The models of `make setup` on the samples.
 
-use std::{fs, sync::Arc, time::Instant};
+use std::{fs, sync::Arc};
 
-use jiff::Timestamp;
 use lookdown::{
     app::engine_for,
     calibration::Calibration,
     detection::{BBox, FramePixels},
     inference::is_fetched,
-    pipeline::{DetectJob, DetectParameters, DetectionReport, Ticket},
+    pipeline::{DetectJob, DetectParameters, DetectionReport, JobImage},
     settings,
 };
 use serde_json::Value;
@@ -23,15 +22,13 @@ fn detect(model: &str) -> DetectionReport {
     let engine = engine_for(&settings, std::slice::from_ref(&parameters)).unwrap();
     let calibration = of_repository("samples/calibrations/office.json");
     let image = fs::read(of_repository("samples/office.jpg")).unwrap();
-    let job = DetectJob {
-        request_id: "test".to_owned(),
-        received_at: Timestamp::UNIX_EPOCH,
-        arrived: Instant::now(),
-        ticket: Ticket::default(),
-        image: image.into(),
+    let calibration = Arc::new(Calibration::read(&calibration).unwrap());
+    let job = DetectJob::local(
+        "test".to_owned(),
+        JobImage::Encoded(image.into()),
         parameters,
-        calibration: Some(Arc::new(Calibration::read(&calibration).unwrap())),
-    };
+        Some(calibration),
+    );
     engine.detect(&job).unwrap().report
 }
 
