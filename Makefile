@@ -11,7 +11,7 @@ SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2>/dev/null || echo 0)
 FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist wheel bench bench-full bench-remap ci fuzz bless
 
 help: ## list the targets
 	@echo "make TARGET, where TARGET is:"
@@ -65,6 +65,10 @@ dist: ## pack everything that Lookdown needs to run: target/dist
 	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) cargo build --release --locked --target-dir target
 	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) scripts/dist.py
 
+wheel: ## build the Python wheel: target/wheels
+	@$(PYTHON) scripts/setup.py toolchain model wheel
+	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py
+
 test-real: ## test with real services; as root on Debian it installs missing packages
 	@scripts/packages.sh libfaketime
 	@$(MAKE) --no-print-directory reliability FORM=short
@@ -75,8 +79,9 @@ real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/
 	@scripts/packages.sh $$(sed 's/#.*//' tests/real/packages.txt)
 	@# Node.js from other sources includes npm, which conflicts with Debian's package.
 	@command -v npm > /dev/null || scripts/packages.sh npm
-	@$(PYTHON) scripts/setup.py toolchain runtime model real-parts
+	@$(PYTHON) scripts/setup.py toolchain runtime model real-parts wheel
 	cargo build --release --locked --target-dir target
+	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py
 	$(PYTHON) tests/real/run.py $(PARTS)
 
 reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/reliability.md

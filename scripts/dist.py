@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
     """Makes the folder and the tarball."""
     binary = Path(arguments[0]) if arguments else ROOT / "target" / "release" / "lookdown"
     cpu = supported_cpu()
-    manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["package"]
+    manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
     place = ROOT / "target" / "dist"
     folder = place / "lookdown"
     shutil.rmtree(place, ignore_errors=True)

@@ -99,10 +99,11 @@ def reference(package: dict) -> str:
 
 
 def crate(package: dict, sums: dict[tuple[str, str], str]) -> dict:
-    """The component for a crate of a registry."""
+    """The component for a crate of a registry, or of this repository, which has no sum."""
     name, version = package["name"], package["version"]
+    sum_ = sums.get((name, version))
     return identity("library", reference(package), name, version) | {
-        "hashes": hashes(sums[name, version]),
+        **({"hashes": hashes(sum_)} if sum_ else {}),
         # Cargo's old form of OR.
         "licenses": licences((package["license"] or NOT_STATED).replace("/", " OR ")),
         "purl": reference(package),

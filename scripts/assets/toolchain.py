@@ -14,7 +14,7 @@ VERSION = re.compile(r"rustc (\d+)\.(\d+)")
 
 def check_toolchain(root: Path) -> None:
     """Checks for cargo, a recent Rust, and the C compiler, which compiles C code of crates and links."""
-    wanted = tomllib.loads((root / "Cargo.toml").read_text(encoding="utf-8"))["package"]["rust-version"]
+    wanted = tomllib.loads((root / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]["rust-version"]
     advice = f"install Rust {wanted} or newer, with rustup or from your distribution, and run the set-up again"
     for program in ("cargo", "rustc"):
         if shutil.which(program) is None:

@@ -26,9 +26,9 @@ class ShippedBill(unittest.TestCase):
             self.assertTrue(part["name"] and part["version"] and part["licenses"], part)
 
     def test_its_application_is_this_version_of_lookdown(self):
-        manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["package"]
+        manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
         own = self.bill["metadata"]["component"]
-        self.assertEqual((own["name"], own["version"]), (manifest["name"], manifest["version"]))
+        self.assertEqual((own["name"], own["version"]), ("lookdown", manifest["version"]))
         self.assertEqual(own["licenses"], [{"expression": manifest["license"]}])
 
     def test_no_name_is_given_twice_and_every_dependency_is_a_part(self):
@@ -38,8 +38,11 @@ class ShippedBill(unittest.TestCase):
         self.assertLessEqual({entry["ref"] for entry in entries}, known)
         self.assertEqual({needed for entry in entries for needed in entry["dependsOn"]}, {*self.components})
 
-    def test_every_component_has_a_sum_and_a_purl(self):
+    def test_every_component_from_elsewhere_has_a_sum_and_a_purl(self):
+        own = {f"pkg:cargo/{folder.name}@" for folder in (ROOT / "crates").iterdir()}
         for reference, part in self.components.items():
+            if reference.startswith(tuple(own)):
+                continue
             self.assertRegex(part["hashes"][0]["content"], r"^[0-9a-f]{64}$")
             if part["type"] == "library":
                 self.assertEqual(part["purl"], reference)

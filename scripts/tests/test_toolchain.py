@@ -11,7 +11,7 @@ from .support import InEmptyRepository
 class Toolchain(InEmptyRepository):
     def setUp(self):
         super().setUp()
-        self.write("Cargo.toml", b'[package]\nname = "lookdown"\nrust-version = "1.92"\n')
+        self.write("Cargo.toml", b'[workspace.package]\nrust-version = "1.92"\n')
         self.enterContext(mock.patch.dict("os.environ", {"PATH": str(self.places.root / "bin")}, clear=True))
 
     def check_with(self, *programs: str, rust: str = "rustc 1.95.0 (abc 2026-01-01)"):

@@ -1,6 +1,9 @@
 //! Locates the files that settings name, and those at their default paths.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
 
 use super::SettingsError;
 
@@ -10,6 +13,24 @@ pub(super) const DEFAULT_CALIBRATIONS: &str = "calibrations";
 pub(super) const DEFAULT_REPOSITORY: &str = "models";
 /// Default ONNX Runtime library, installed by `make setup`.
 pub(super) const DEFAULT_LIBRARY: &str = "runtime/libonnxruntime.so";
+
+/// The files of a package whose executable is not Lookdown's own, such as the Python package.
+#[derive(Debug)]
+pub struct PackagedFiles {
+    /// The ONNX Runtime library.
+    pub library: PathBuf,
+    /// The folder of models.
+    pub models: PathBuf,
+}
+
+static PACKAGED_FILES: OnceLock<PackagedFiles> = OnceLock::new();
+
+/// Uses these files in this process for settings that have their default paths. Only the first call
+/// has an effect.
+pub fn use_packaged_files(files: PackagedFiles) {
+    // A second import of the package has the same files.
+    let _ = PACKAGED_FILES.set(files);
+}
 
 /// Returns the folder of calibrations; `None` if none is set and the default folder does not exist.
 ///
@@ -42,12 +63,17 @@ pub fn find_beside_executable(path: &Path) -> Option<PathBuf> {
 
 /// Returns the existing file or folder for `path`.
 ///
-/// A given path is used unchanged. The default path is searched for in the current directory, then
-/// beside the executable and in the folders above it. So
+/// A given path is used unchanged. The default path is that of [`PackagedFiles`]. Without them it is
+/// searched for in the current directory, then beside the executable and in the folders above it. So
 /// `/anywhere/lookdown/target/release/lookdown` finds its files from any current directory.
 pub(super) fn locate(path: &Path, default: &str) -> Option<PathBuf> {
-    if path == Path::new(default) {
-        return find_beside_executable(path);
+    if path != Path::new(default) {
+        return path.exists().then(|| path.to_owned());
     }
-    path.exists().then(|| path.to_owned())
+    let packaged = PACKAGED_FILES.get().and_then(|files| match default {
+        DEFAULT_LIBRARY => Some(files.library.clone()),
+        DEFAULT_REPOSITORY => Some(files.models.clone()),
+        _ => None,
+    });
+    packaged.or_else(|| find_beside_executable(path))
 }

@@ -1,0 +1,14 @@
+"""Detects persons in images of ceiling-mounted fisheye cameras.
+
+>>> detector = lookdown.Detector(profile="fast")
+>>> calibration = lookdown.Calibration.read("lobby.json")
+>>> detections = detector.detect("frame.jpg", calibration)
+>>> detections.boxes  # (N, 4): x_min, y_min, x_max, y_max
+"""
+
+from lookdown._lookdown import Calibration, Lens, LookdownError
+from lookdown.detections import Detections
+from lookdown.detector import Detector
+from lookdown.evaluation import evaluate
+
+__all__ = ["Calibration", "Detections", "Detector", "Lens", "LookdownError", "evaluate"]

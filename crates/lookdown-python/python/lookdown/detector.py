@@ -1,0 +1,72 @@
+"""The detector: one model in memory, for any number of frames."""
+
+import os
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from lookdown import _lookdown
+from lookdown._files import use_packaged_files
+from lookdown._lookdown import Calibration, LookdownError
+from lookdown.detections import Detections
+
+Path = str | os.PathLike[str]
+
+
+class Detector:
+    """Detects persons in frames. Frames may be given by several threads at a time."""
+
+    def __init__(self, profile: str = "balanced", *, config: Path | None = None, **parameters: Any) -> None:
+        """Loads the models of the profile.
+
+        `parameters` are those of `POST /detect`, such as `score_threshold=0.5`. `config` is a settings file of the
+        server.
+        """
+        use_packaged_files()
+        given = {name: _text(value) for name, value in parameters.items() if value is not None}
+        self._detector = _lookdown.Detector({"profile": profile, **given}, config)
+
+    def detect(
+        self,
+        image: Path | bytes | npt.NDArray[np.uint8],
+        calibration: Calibration | Path | None = None,
+        *,
+        channel_order: Literal["RGB", "BGR"] = "RGB",
+    ) -> Detections:
+        """Detects the persons in an image file, its content, or pixels of shape (height, width, 3).
+
+        OpenCV reads images in the channel order "BGR". Without a calibration, an ideal lens of 180° on the circle in the
+        frame is assumed.
+        """
+        if calibration is not None and not isinstance(calibration, Calibration):
+            calibration = Calibration.read(calibration)
+        if isinstance(image, np.ndarray):
+            report = self._detect_pixels(image, calibration, channel_order)
+        elif isinstance(image, bytes):
+            report = self._detector.detect_file(image, "", calibration)
+        else:
+            try:
+                with open(image, "rb") as file:
+                    content = file.read()
+            except OSError as error:
+                raise LookdownError(f"image: {os.fspath(image)} cannot be read: {error.strerror}") from error
+            report = self._detector.detect_file(content, os.fspath(image), calibration)
+        return Detections.from_json(report)
+
+    def _detect_pixels(self, pixels: npt.NDArray[np.uint8], calibration: Calibration | None, channel_order: str) -> str:
+        if channel_order not in ("RGB", "BGR"):
+            raise LookdownError(f'channel_order: {channel_order!r}; give "RGB" or "BGR"')
+        if pixels.dtype != np.uint8 or pixels.ndim != 3:
+            raise LookdownError(
+                f"image: an array of {pixels.dtype} and shape {pixels.shape}; give uint8 of shape (height, width, 3)"
+            )
+        rgb = pixels if channel_order == "RGB" else pixels[..., ::-1]
+        return self._detector.detect_pixels(rgb, "", calibration)
+
+
+def _text(value: Any) -> str:
+    """Returns a parameter as a request has it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value)

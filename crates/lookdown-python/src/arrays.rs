@@ -1,0 +1,30 @@
+//! Points and directions as NumPy arrays of shape (N, 2) and (N, 3).
+
+use numpy::PyReadonlyArray2;
+use numpy::ndarray::{Array2, ArrayView1};
+use pyo3::PyResult;
+
+use crate::error::python_error;
+
+/// Copies the rows of an array with `N` columns, so that they can be read without the interpreter.
+pub(crate) fn rows<const N: usize>(
+    name: &str,
+    array: &PyReadonlyArray2<'_, f64>,
+) -> PyResult<Vec<[f64; N]>> {
+    let array = array.as_array();
+    if array.ncols() != N {
+        let (rows, columns) = array.dim();
+        return Err(python_error(format!(
+            "{name}: the shape is ({rows}, {columns}); give an array of shape (N, {N})"
+        )));
+    }
+    let row = |row: ArrayView1<'_, f64>| std::array::from_fn(|column| row[column]);
+    Ok(array.rows().into_iter().map(row).collect())
+}
+
+/// Converts rows to an array. Missing rows are NaN.
+pub(crate) fn array<const N: usize>(rows: &[Option<[f64; N]>]) -> Array2<f64> {
+    Array2::from_shape_fn((rows.len(), N), |(row, column)| {
+        rows[row].map_or(f64::NAN, |values| values[column])
+    })
+}

@@ -1,0 +1,43 @@
+//! The compiled part of the Python package `lookdown`: lenses and calibrations on NumPy arrays, the
+//! detector, and the command line. `python/lookdown/_lookdown.pyi` describes it for Python.
+
+// PyO3 passes arguments by value.
+#![allow(clippy::needless_pass_by_value)]
+
+mod arrays;
+mod calibration;
+mod detector;
+mod error;
+mod lens;
+
+use std::{ffi::OsString, path::PathBuf, process::ExitCode};
+
+use lookdown::settings::{PackagedFiles, use_packaged_files};
+use pyo3::prelude::*;
+
+/// Runs the command line. Returns true if it succeeded. Ends the process if a flag is invalid.
+#[pyfunction]
+fn run(py: Python<'_>, arguments: Vec<OsString>) -> bool {
+    let commit = option_env!("LOOKDOWN_COMMIT");
+    py.detach(|| lookdown::cli::run(arguments, commit)) == ExitCode::SUCCESS
+}
+
+/// Uses the files of the package where settings have their default paths.
+#[pyfunction]
+fn use_files(library: PathBuf, models: PathBuf) {
+    use_packaged_files(PackagedFiles { library, models });
+}
+
+#[pymodule]
+mod _lookdown {
+    #[pymodule_export]
+    use super::calibration::PyCalibration;
+    #[pymodule_export]
+    use super::detector::PyDetector;
+    #[pymodule_export]
+    use super::error::LookdownError;
+    #[pymodule_export]
+    use super::lens::PyLens;
+    #[pymodule_export]
+    use super::{run, use_files};
+}

@@ -1,0 +1,59 @@
+"""Builds the Python wheel into target/wheels: `wheel.py`, after the set-up with the steps `model` and `wheel`.
+
+The wheel has the default models inside and takes ONNX Runtime from its own package. It is linked for glibc 2.28 with
+zig, so that it runs on every distribution since 2018.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from assets.pins import read_pins
+
+ROOT = Path(__file__).resolve().parents[1]
+CRATE = ROOT / "crates" / "lookdown-python"
+TOOLS = ROOT / ".setup" / "wheel" / "bin"
+WHEELS = ROOT / "target" / "wheels"
+PLATFORM = "manylinux_2_28"
+
+
+def main() -> int:
+    """Collects the models, builds the wheel, and checks its platform."""
+    collect_models(CRATE / "python" / "lookdown" / "models")
+    for text in ("LICENSE", "NOTICE"):
+        shutil.copyfile(ROOT / text, CRATE / text)
+    shutil.rmtree(WHEELS, ignore_errors=True)
+    environment = os.environ | {"PATH": f"{TOOLS}:{os.environ['PATH']}"}
+    flags = ["--release", "--locked", "--zig", "--compatibility", PLATFORM, "--out", WHEELS]
+    built = subprocess.run([TOOLS / "maturin", "build", *flags], cwd=CRATE, env=environment, check=False)
+    if built.returncode != 0:
+        return built.returncode
+    (wheel,) = WHEELS.glob("*.whl")
+    shown = subprocess.run([TOOLS / "auditwheel", "show", wheel], stdout=subprocess.PIPE, text=True, check=True).stdout
+    if f'"{PLATFORM}_x86_64"' not in shown.replace("\n", " "):
+        print(f"{wheel.name}: auditwheel does not find it fit for {PLATFORM}:\n{shown}", file=sys.stderr)
+        return 1
+    print(f"{wheel.relative_to(ROOT)}: {wheel.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+def collect_models(folder: Path) -> None:
+    """Copies the default models with their manifests and licences into the package."""
+    shutil.rmtree(folder, ignore_errors=True)
+    pins = read_pins(ROOT / "scripts" / "pins.toml")
+    for model in pins.models + pins.quantised:
+        if not model.default:
+            continue
+        source = ROOT / "models" / model.name
+        target = folder / model.name
+        target.mkdir(parents=True)
+        for file in (source / "model.toml", source / "model.onnx", *sorted(source.glob("LICENSE-*"))):
+            if not file.is_file():
+                sys.exit(f"{file} is missing; run `make setup` first.")
+            shutil.copyfile(file, target / file.name)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
