@@ -8,7 +8,7 @@ from assets.pins import read_pins
 from dist import ROOT
 
 OWN = ("docker/Dockerfile", "docker/Dockerfile.cuda", "docker/compose.yaml", "k8s/base/kustomization.yaml")
-STATED = re.compile(r"(?:lookdown(?:-cuda)?:|image\.version=\"|newTag: )(\d[\w.-]*)")
+STATED = re.compile(r"(?:lookdown(?:-cuda)?:|image\.version=\"|newTag: |kubernetes\.io/version: )(\d[\w.-]*)")
 
 
 class OneVersion(unittest.TestCase):
