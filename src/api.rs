@@ -111,7 +111,13 @@ fn deepstack_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::new()
         .routes(routes!(deepstack::detect_as_deepstack))
         .routes(routes!(deepstack::detect_as_deepstack_with))
-        .routes(routes!(deepstack::list_as_deepstack))
+        .routes(routes!(
+            deepstack::list_as_deepstack,
+            deepstack::get_list_as_deepstack
+        ))
+        .routes(routes!(deepstack::status::ping))
+        .routes(routes!(deepstack::status::server_ping))
+        .routes(routes!(deepstack::status::update_available))
 }
 
 fn description() -> OpenApiRouter<ApiState> {

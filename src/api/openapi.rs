@@ -10,7 +10,10 @@ use utoipa::{OpenApi, openapi};
 use security::Keys;
 
 use crate::api::http::problem::ProblemBody;
-pub(super) use parameters::{AnnotationQuery, DetectForm, DetectQuery, RawBytes, fields};
+pub(super) use parameters::{
+    AnnotationQuery, CalibratedDetectionQuery, DetectForm, DetectQuery, DetectionQuery, RawBytes,
+    fields,
+};
 
 #[derive(OpenApi)]
 #[openapi(

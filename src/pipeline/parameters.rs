@@ -186,6 +186,10 @@ pub struct DetectParameters {
 impl DetectParameters {
     /// The specifications, in the order in which they are listed to users.
     pub const TABLE: &'static [ParameterSpec] = TABLE;
+    /// The parameter of the calibration.
+    pub const CALIBRATION: &'static str = CALIBRATION.name;
+    /// The parameter of the least score.
+    pub const SCORE_THRESHOLD: &'static str = SCORE_THRESHOLD.name;
 
     /// Checks `(name, value)` pairs.
     ///

@@ -19,11 +19,12 @@ const ADMINISTRATOR: &str = "lookdown_administrator";
 const BOTH: &str = "lookdown_both";
 
 /// All routes that need a scope.
-const GUARDED: [(&str, &str, &str); 24] = [
+const GUARDED: [(&str, &str, &str); 25] = [
     ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
     ("POST", "/v1/vision/detection", "detect"),
     ("POST", "/v1/vision/custom/lobby", "detect"),
     ("POST", "/v1/vision/custom/list", "read"),
+    ("GET", "/v1/vision/custom/list", "read"),
     ("GET", "/v2/models/eager", "detect"),
     ("GET", "/v2/models/eager/ready", "detect"),
     ("GET", "/v2/models/eager/versions/1", "detect"),

@@ -156,6 +156,73 @@ async fn a_min_confidence_of_zero_has_bounded_cost() {
 }
 
 #[tokio::test]
+async fn the_query_has_the_parameters_of_detect() {
+    let service = Service::start();
+    let path = format!("{LOBBY}?camera=hall&profile=fast&refine=nms&score_threshold=0.7");
+    let answer = post(&service, &path, &[("image", &frame())]).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    let report = service.get("/results/hall/latest").await.json();
+    assert_eq!(report["calibration"]["id"], "lobby");
+    assert_eq!(report["profile"], "fast");
+    assert_eq!(report["refinement"]["name"], "nms");
+    assert_eq!(report["refinement"]["score_threshold"], 0.7);
+}
+
+#[tokio::test]
+async fn unknown_or_repeated_query_parameters_are_refused() {
+    let service = Service::start();
+    for (query, name) in [
+        ("colour=red", "colour"),
+        ("draw=boxes", "draw"),
+        ("calibration=lobby", "calibration"),
+        ("profile=quick", "profile"),
+    ] {
+        let answer = post(
+            &service,
+            &format!("{LOBBY}?{query}"),
+            &[("image", &frame())],
+        )
+        .await;
+        assert_eq!(answer.status, 400, "{}", answer.text());
+        assert_eq!(answer.problem()["parameter"], name);
+    }
+    let image = frame();
+    let parts: [(&str, &[u8]); 2] = [("image", &image), ("min_confidence", b"0.5")];
+    let answer = post(&service, &format!("{LOBBY}?score_threshold=0.7"), &parts).await;
+    assert_eq!(answer.status, 400, "{}", answer.text());
+}
+
+#[tokio::test]
+async fn status_routes_of_code_project_ai_need_no_key() {
+    let service = guarded("detect");
+    for path in ["/v1/status/ping", "/v1/server/status/ping"] {
+        let answer = service.get(path).await;
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        assert_eq!(answer.json(), serde_json::json!({"success": true}));
+    }
+    let answer = service.get("/v1/status/updateavailable").await.json();
+    assert_eq!(answer["updateAvailable"], false);
+    assert_eq!(answer["version"], env!("CARGO_PKG_VERSION"));
+}
+
+#[tokio::test]
+async fn answers_have_the_fields_of_code_project_ai() {
+    let service = Service::start();
+    let answer = post(&service, LOBBY, &[("image", &frame())]).await.json();
+    let persons = answer["predictions"].as_array().unwrap().len();
+    assert!(persons > 0);
+    assert_eq!(answer["count"], persons);
+    assert_eq!(answer["message"], "Found person");
+    assert_eq!(answer["command"], "detect");
+    let millis = ["inferenceMs", "processMs", "analysisRoundTripMs"];
+    let millis = millis.map(|name| answer[name].as_i64().unwrap());
+    assert!(
+        millis[0] <= millis[1] && millis[1] == millis[2],
+        "{millis:?}"
+    );
+}
+
+#[tokio::test]
 async fn unknown_fields_are_ignored() {
     let service = Service::start();
     let image = frame();
@@ -369,8 +436,9 @@ async fn calibrations_in_use_are_listed_as_models() {
     let service = Service::start();
     std::fs::write(service.folder.path().join("broken.json"), "{").unwrap();
     service.calibrations.refresh();
-    let answer = service.post(LIST, "").await;
-    assert_eq!(answer.status, 200);
     let expected = serde_json::json!({"success": true, "models": ["lobby"]});
-    assert_eq!(answer.json(), expected);
+    for answer in [service.post(LIST, "").await, service.get(LIST).await] {
+        assert_eq!(answer.status, 200);
+        assert_eq!(answer.json(), expected);
+    }
 }

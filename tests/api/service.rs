@@ -38,7 +38,7 @@ const LOBBY: &str = r#"{ "id": "lobby", "image": {"width": 200, "height": 200},
   "lens": {"model": "equidistant", "focal": 63.66, "cx": 99.5, "cy": 99.5, "max_theta": 1.5707},
   "mount": {"world_up": [0, 0, -1], "height_m": 3} }"#;
 /// The routes that are always open to all clients.
-pub(crate) const OPEN_PATHS: [&str; 9] = [
+pub(crate) const OPEN_PATHS: [&str; 12] = [
     "/livez",
     "/readyz",
     "/metrics",
@@ -48,6 +48,9 @@ pub(crate) const OPEN_PATHS: [&str; 9] = [
     "/v2",
     "/v2/health/live",
     "/v2/health/ready",
+    "/v1/status/ping",
+    "/v1/server/status/ping",
+    "/v1/status/updateavailable",
 ];
 const BOUNDARY: &str = "edge-of-a-part";
 

@@ -1,4 +1,4 @@
-"""Lookdown as the server of DeepStack's clients: deepstack-python and deepstack-sdk, from PyPI."""
+"""Lookdown as the server of clients from PyPI: deepstack-python, deepstack-sdk and codeproject-ai-api."""
 
 import hashlib
 import json
@@ -13,6 +13,8 @@ from support.lookdown import lookdown
 HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "deepstack" / "bin" / "python"
 CLIENTS = ("python", "sdk")
+EVERY_CLIENT = (*CLIENTS, "codeproject")
+"""Also the one that sends no key."""
 OFFICE = SAMPLES / "office.jpg"
 KEY = "lookdown_of_home_assistant"
 
@@ -34,9 +36,9 @@ class DeepStackClients(unittest.TestCase):
         report = json.loads(cls.server.post("/detect?calibration=office&score_threshold=0.4", OFFICE.read_bytes()))
         cls.persons = len(report["persons"])
 
-    def test_both_detect_persons_with_and_without_a_calibration(self):
+    def test_all_detect_persons_with_and_without_a_calibration(self):
         self.assertGreater(self.persons, 3)
-        for client in CLIENTS:
+        for client in EVERY_CLIENT:
             for model in ("", "office"):
                 with self.subTest(client=client, model=model):
                     predictions = ask(client, self.server, model=model)["predictions"]
@@ -50,7 +52,7 @@ class DeepStackClients(unittest.TestCase):
                         self.assertLess(edges[1], edges[3])
 
     def test_confidence_filters_and_may_give_no_persons(self):
-        for client in CLIENTS:
+        for client in EVERY_CLIENT:
             found = {least: ask(client, self.server, confidence=least)["predictions"] for least in (0.0, 0.6, 1.0)}
             counts = {least: len(predictions) for least, predictions in found.items()}
             self.assertGreaterEqual(counts[0.0], self.persons)

@@ -15,7 +15,9 @@ use utoipa::{
 use crate::{
     annotated_image::AnnotationOptions,
     api::parameters,
-    pipeline::{Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec},
+    pipeline::{
+        DetectParameters, Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec,
+    },
 };
 
 /// The parameters of `POST /detect` in the query.
@@ -24,6 +26,26 @@ pub(in crate::api) struct DetectQuery;
 impl IntoParams for DetectQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         parameters::all().map(in_query).collect()
+    }
+}
+
+/// The parameters of a detection without those of the response, in the query.
+pub(in crate::api) struct DetectionQuery;
+
+impl IntoParams for DetectionQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        DetectParameters::TABLE.iter().map(in_query).collect()
+    }
+}
+
+/// [`DetectionQuery`] without the calibration, which the path names.
+pub(in crate::api) struct CalibratedDetectionQuery;
+
+impl IntoParams for CalibratedDetectionQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let table = DetectParameters::TABLE.iter();
+        let table = table.filter(|spec| spec.name != DetectParameters::CALIBRATION);
+        table.map(in_query).collect()
     }
 }
 

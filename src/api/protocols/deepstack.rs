@@ -5,6 +5,7 @@
 mod answer;
 mod failures;
 mod form;
+pub(in crate::api) mod status;
 
 use axum::{
     Extension, Json,
@@ -19,6 +20,7 @@ use crate::{
     api::{
         ApiState,
         http::problem::{Problem, ProblemKind},
+        openapi::{CalibratedDetectionQuery, DetectionQuery},
         require_scope::RequireRead,
         run_detection::run_detection,
     },
@@ -31,9 +33,11 @@ pub(in crate::api) use failures::with_failures;
 /// Detect persons (DeepStack)
 ///
 /// Without a calibration, the lens circle is detected in the frame. An ideal 180° equidistant lens
-/// that points straight down is assumed. Unknown fields are ignored.
+/// that points straight down is assumed. Unknown fields are ignored. The query may have the parameters
+/// of `POST /detect`, such as `profile` and `camera`; unknown ones are refused.
 #[utoipa::path(
     post, path = "/v1/vision/detection", tag = "deepstack", operation_id = "detect_as_deepstack",
+    params(DetectionQuery),
     request_body(content = DeepStackForm, content_type = "multipart/form-data"),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
@@ -54,7 +58,10 @@ pub(in crate::api) async fn detect_as_deepstack(
 #[utoipa::path(
     post, path = "/v1/vision/custom/{calibration}", tag = "deepstack",
     operation_id = "detect_as_deepstack_with",
-    params(("calibration" = String, Path, description = "The calibration's ID.")),
+    params(
+        ("calibration" = String, Path, description = "The calibration's ID."),
+        CalibratedDetectionQuery,
+    ),
     request_body(content = DeepStackForm, content_type = "multipart/form-data"),
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
@@ -77,12 +84,12 @@ pub(in crate::api) async fn detect_as_deepstack_with(
 async fn answer(
     state: &ApiState,
     trace: &RequestTrace,
-    DeepStackUpload(upload): DeepStackUpload,
+    sent: DeepStackUpload,
     calibration: Option<CalibrationId>,
 ) -> Result<Json<DeepStackAnswer>, Problem> {
-    let limit = upload.deadline;
-    trace.stage("upload", limit.began().into_std(), upload.arrived);
-    let job = form::job(upload, calibration)?;
+    let (limit, arrived) = (sent.upload.deadline, sent.upload.arrived);
+    trace.stage("upload", limit.began().into_std(), arrived);
+    let job = sent.job(calibration.as_ref().map(CalibrationId::as_str))?;
     let written = run_detection(state, trace, limit, job, |found| {
         Ok(DeepStackAnswer::from(found.report))
     });
@@ -105,4 +112,21 @@ pub(in crate::api) async fn list_as_deepstack(
     _reader: RequireRead,
 ) -> Json<DeepStackModels> {
     Json(state.calibrations.rows().into_iter().collect())
+}
+
+/// Get the calibrations (DeepStack)
+///
+/// The same as with `POST`, for clients of CodeProject.AI.
+#[utoipa::path(
+    get, path = "/v1/vision/custom/list", tag = "deepstack", operation_id = "get_list_as_deepstack",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses(
+        (status = OK, description = "The IDs of the calibrations in use.", body = DeepStackModels),
+    )
+)]
+pub(in crate::api) async fn get_list_as_deepstack(
+    state: State<ApiState>,
+    reader: RequireRead,
+) -> Json<DeepStackModels> {
+    list_as_deepstack(state, reader).await
 }

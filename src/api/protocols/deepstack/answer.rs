@@ -19,8 +19,17 @@ const MILLIS_PER_SECOND: f64 = 1000.0;
         "label": "person", "confidence": 0.8731,
         "x_min": 1102, "y_min": 700, "x_max": 1342, "y_max": 843
     }],
-    "duration": 0.614
+    "duration": 0.614,
+    "message": "Found person",
+    "count": 1,
+    "code": 200,
+    "command": "detect",
+    "moduleId": "Lookdown",
+    "inferenceMs": 581,
+    "processMs": 614,
+    "analysisRoundTripMs": 614
 }))]
+#[serde(rename_all = "camelCase")]
 pub(in crate::api) struct DeepStackAnswer {
     /// Always true; failures have false.
     success: bool,
@@ -28,6 +37,22 @@ pub(in crate::api) struct DeepStackAnswer {
     predictions: Vec<DeepStackPrediction>,
     /// Time from the arrival of the frame to its report, seconds.
     duration: f64,
+    /// The result in words, of CodeProject.AI as the fields below.
+    message: &'static str,
+    /// The number of persons.
+    count: usize,
+    /// Always 200.
+    code: u16,
+    /// Always `detect`.
+    command: &'static str,
+    /// Always `Lookdown`.
+    module_id: &'static str,
+    /// Time of the inference, whole milliseconds.
+    inference_ms: i64,
+    /// Time from the arrival of the frame to its report, whole milliseconds.
+    process_ms: i64,
+    /// The same as `processMs`: no other process is involved.
+    analysis_round_trip_ms: i64,
 }
 
 /// A person.
@@ -49,10 +74,22 @@ pub(in crate::api) struct DeepStackPrediction {
 
 impl From<&Report> for DeepStackAnswer {
     fn from(report: &Report) -> Self {
+        let total_ms = whole(report.timings_ms.total.round());
         Self {
             success: true,
             predictions: report.persons.iter().map(Into::into).collect(),
             duration: report.timings_ms.total / MILLIS_PER_SECOND,
+            message: match report.persons.len() {
+                0 => "No objects found",
+                _ => "Found person",
+            },
+            count: report.persons.len(),
+            code: 200,
+            command: "detect",
+            module_id: "Lookdown",
+            inference_ms: whole(report.timings_ms.inference.round()),
+            process_ms: total_ms,
+            analysis_round_trip_ms: total_ms,
         }
     }
 }
@@ -74,10 +111,10 @@ impl From<&ReportPerson> for DeepStackPrediction {
 
 #[expect(
     clippy::cast_possible_truncation,
-    reason = "boxes lie within the frame"
+    reason = "boxes lie within the frame, and times within deadlines"
 )]
-fn whole(pixels: f64) -> i64 {
-    pixels as i64
+fn whole(number: f64) -> i64 {
+    number as i64
 }
 
 /// The calibrations, in place of custom models.

@@ -1,4 +1,5 @@
-//! The form that DeepStack's clients send: the frame in `image`, `min_confidence` and `api_key`.
+//! The form that DeepStack's clients send: the frame in `image`, `min_confidence` and `api_key`. The
+//! query may have the parameters of `POST /detect`.
 
 use axum::extract::{FromRequest, Request};
 use utoipa::ToSchema;
@@ -10,10 +11,10 @@ use crate::{
         http::{
             access,
             problem::{Problem, ProblemKind},
+            query::query_parameters,
         },
         upload::{FieldUse, Upload, is_multipart},
     },
-    calibration::CalibrationId,
     pipeline::{DetectJob, DetectParameters, ParameterError},
 };
 
@@ -22,7 +23,7 @@ const API_KEY: &str = "api_key";
 /// The default of DeepStack's server.
 const DEFAULT_MIN_CONFIDENCE: &str = "0.4";
 /// The name of `min_confidence` in this API.
-const SCORE_THRESHOLD: &str = "score_threshold";
+const SCORE_THRESHOLD: &str = DetectParameters::SCORE_THRESHOLD;
 
 /// A frame in DeepStack's form.
 #[derive(ToSchema)]
@@ -41,7 +42,11 @@ pub(in crate::api) struct DeepStackForm {
 }
 
 /// A frame in DeepStack's form, whose key has been checked.
-pub(in crate::api) struct DeepStackUpload(pub(super) Upload);
+pub(in crate::api) struct DeepStackUpload {
+    pub(super) upload: Upload,
+    /// The parameters of the query, by name. Neither names nor values are checked.
+    query: Vec<(String, String)>,
+}
 
 impl FromRequest<ApiState> for DeepStackUpload {
     type Rejection = Problem;
@@ -62,6 +67,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         if !is_form {
             return Err(no_form());
         }
+        let query = query_parameters(request.uri())?;
         let mut upload = Upload::receive(request, state, budget, use_of).await?;
         let mut keys = upload
             .parameters
@@ -75,7 +81,7 @@ impl FromRequest<ApiState> for DeepStackUpload {
         let key = key.as_ref().map(|(_, key)| key.as_str());
         let holder = known.check_with(&upload.headers, key, Scope::Detect)?;
         upload.caller = upload.caller.with_holder(known, holder.as_ref());
-        Ok(Self(upload))
+        Ok(Self { upload, query })
     }
 }
 
@@ -98,28 +104,27 @@ fn no_form() -> Problem {
     Problem::of_parameter(ProblemKind::MissingImage, "image", fault)
 }
 
-/// Returns the detection job of this form.
-pub(super) fn job(
-    upload: Upload,
-    calibration: Option<CalibrationId>,
-) -> Result<DetectJob, Problem> {
-    // All remaining fields have this name.
-    let thresholds = upload
-        .parameters
-        .iter()
-        .filter(|(_, value)| !value.is_empty());
-    let mut thresholds: Vec<_> = thresholds
-        .map(|(_, value)| (SCORE_THRESHOLD, value.as_str()))
-        .collect();
-    if thresholds.is_empty() {
-        thresholds.push((SCORE_THRESHOLD, DEFAULT_MIN_CONFIDENCE));
+impl DeepStackUpload {
+    /// Returns the detection job of this form. `calibration` is that of the path.
+    pub(super) fn job(self, calibration: Option<&str>) -> Result<DetectJob, Problem> {
+        let Self { upload, query } = self;
+        let query = query.iter();
+        let mut given: Vec<_> = query.map(|(name, value)| (&**name, &**value)).collect();
+        given.extend(calibration.map(|id| (DetectParameters::CALIBRATION, id)));
+        let is_in_query = given.iter().any(|(name, _)| *name == SCORE_THRESHOLD);
+        // All remaining fields have this name. Clients without a threshold send an empty field.
+        let confidences = upload.parameters.iter().map(|(_, value)| &**value);
+        let confidences = confidences.filter(|value| !value.is_empty());
+        given.extend(confidences.map(|value| (SCORE_THRESHOLD, value)));
+        if !given.iter().any(|(name, _)| *name == SCORE_THRESHOLD) {
+            given.push((SCORE_THRESHOLD, DEFAULT_MIN_CONFIDENCE));
+        }
+        let parameters = DetectParameters::parse(given).map_err(|error| match &*error.name {
+            SCORE_THRESHOLD if !is_in_query => renamed(error),
+            _ => error,
+        })?;
+        upload.job(parameters)
     }
-    let parameters = DetectParameters::parse(thresholds).map_err(renamed)?;
-    let parameters = DetectParameters {
-        calibration,
-        ..parameters
-    };
-    upload.job(parameters)
 }
 
 /// Replaces the parameter name in an error by the name that the client sent.
