@@ -8,6 +8,7 @@ use std::{
 use parking_lot::Mutex;
 
 use super::{Profile, camera_rig::CameraRig};
+use crate::metrics::{Metrics, gauge_value};
 
 /// The cache key of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -28,10 +29,10 @@ pub(super) enum RigCamera {
 }
 
 /// A bounded cache of rigs.
-#[derive(Debug)]
 pub(super) struct RigCache {
     budget_bytes: usize,
     entries: Mutex<Entries>,
+    metrics: Arc<Metrics>,
 }
 
 #[derive(Debug, Default)]
@@ -40,8 +41,6 @@ struct Entries {
     clock: u64,
     /// The size of all built rigs.
     bytes: usize,
-    builds: u64,
-    evictions: u64,
 }
 
 #[derive(Debug, Default)]
@@ -53,24 +52,12 @@ struct Entry {
     bytes: Option<usize>,
 }
 
-/// The usage and the counters of a cache of camera rigs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RigCacheUse {
-    /// Rigs in memory.
-    pub rigs: usize,
-    /// Memory that their tables hold, bytes.
-    pub bytes: usize,
-    /// Rigs built since the start.
-    pub builds: u64,
-    /// Rigs dropped to make room since the start.
-    pub evictions: u64,
-}
-
 impl RigCache {
-    pub(super) fn new(budget_bytes: usize) -> Self {
+    pub(super) fn new(budget_bytes: usize, metrics: Arc<Metrics>) -> Self {
         Self {
             budget_bytes,
             entries: Mutex::default(),
+            metrics,
         }
     }
 
@@ -96,24 +83,17 @@ impl RigCache {
         if is_new {
             let mut entries = self.lock();
             entries.count(key, rig.bytes());
-            entries.evict_beyond(self.budget_bytes, key);
+            let evicted = entries.evict_beyond(self.budget_bytes, key);
+            self.metrics.rig_cache_builds.inc();
+            self.metrics.rig_cache_evictions.inc_by(evicted);
+            let rigs = entries
+                .by_key
+                .values()
+                .filter(|entry| entry.bytes.is_some());
+            self.metrics.rig_cache_rigs.set(gauge_value(rigs.count()));
+            self.metrics.rig_cache_bytes.set(gauge_value(entries.bytes));
         }
         rig
-    }
-
-    /// Returns the usage and the counters of the cache.
-    pub(super) fn usage(&self) -> RigCacheUse {
-        let entries = self.lock();
-        let built = entries
-            .by_key
-            .values()
-            .filter(|entry| entry.bytes.is_some());
-        RigCacheUse {
-            rigs: built.count(),
-            bytes: entries.bytes,
-            builds: entries.builds,
-            evictions: entries.evictions,
-        }
     }
 
     fn lock(&self) -> parking_lot::MutexGuard<'_, Entries> {
@@ -126,7 +106,6 @@ impl Entries {
     /// Counts the rig that was just built for `key`. Only counted rigs are evicted, so its entry
     /// exists.
     fn count(&mut self, key: &RigKey, bytes: usize) {
-        self.builds += 1;
         if let Some(entry) = self.by_key.get_mut(key) {
             entry.bytes = Some(bytes);
             self.bytes += bytes;
@@ -134,7 +113,9 @@ impl Entries {
     }
 
     /// Evicts the least recently used rigs until the rest fits. `newest` is never evicted.
-    fn evict_beyond(&mut self, budget_bytes: usize, newest: &RigKey) {
+    /// Returns the number of evicted rigs.
+    fn evict_beyond(&mut self, budget_bytes: usize, newest: &RigKey) -> u64 {
+        let mut evicted = 0;
         while self.bytes > budget_bytes {
             let oldest = self
                 .by_key
@@ -145,9 +126,10 @@ impl Entries {
             let Some(oldest) = oldest else { break };
             if let Some(entry) = self.by_key.remove(&oldest) {
                 self.bytes -= entry.bytes.unwrap_or(0);
-                self.evictions += 1;
+                evicted += 1;
             }
         }
+        evicted
     }
 }
 
