@@ -160,8 +160,7 @@ async fn read_gauges(state: &ApiState) {
     let (metrics, workers) = (&state.metrics, &state.workers);
     metrics.pending_frames.set(gauge_value(workers.pending()));
     let quiet = workers.quiet_for(Instant::now()).as_secs();
-    let quiet = i64::try_from(quiet).unwrap_or(i64::MAX);
-    metrics.seconds_without_progress.set(quiet);
+    metrics.seconds_without_progress.set(gauge_value(quiet));
     let waiting = state.results.health().waiting;
     metrics.results_waiting.set(gauge_value(waiting));
     if let Ok(usage) = state.results.usage().await {

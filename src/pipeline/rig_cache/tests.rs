@@ -78,6 +78,32 @@ fn the_least_recently_used_rig_is_evicted_beyond_the_budget() {
 }
 
 #[test]
+fn the_memory_of_evicted_rigs_is_freed_soon() {
+    const BUILDS: i64 = 300;
+    let cache = cache(2 * rig().bytes());
+    let built = (0..BUILDS).map(|radius| Arc::downgrade(&cache.get_or_build(&key(radius), rig)));
+    let built: Vec<_> = built.collect();
+    let alive = built.iter().filter(|rig| rig.strong_count() > 0).count();
+    // The cache frees an entry a few operations after its eviction.
+    assert!((2..30).contains(&alive), "{alive}");
+}
+
+#[test]
+fn callers_wait_for_one_build() {
+    let cache = cache(usize::MAX);
+    let slow = || {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        rig()
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| cache.get_or_build(&key(1), slow));
+        }
+    });
+    assert_eq!(usage(&cache)[2], 1);
+}
+
+#[test]
 fn a_rig_larger_than_the_budget_still_serves_its_frame() {
     let cache = cache(1);
     assert!(cache.get_or_build(&key(1), rig).bytes() > 1);
