@@ -14,7 +14,7 @@ mod yolo;
 use strum::{Display, EnumString, VariantArray};
 
 pub use self::content::{AnnotatedBox, AnnotatedImage, AnnotationFile, BoxKind};
-use self::content::{LABEL, file, per_image, pixels, rounded, share, stem};
+use self::content::{LABEL, file, per_image, stem};
 
 /// A file format of annotation tools.
 #[derive(

@@ -28,6 +28,7 @@ pub mod probe;
 pub mod quoted;
 pub mod results;
 pub mod revision;
+mod rounding;
 pub mod server;
 pub mod settings;
 pub mod shutdown;

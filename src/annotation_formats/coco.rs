@@ -3,7 +3,8 @@
 
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, LABEL, pixels, share};
+use super::{AnnotatedBox, AnnotatedImage, LABEL};
+use crate::rounding::{degrees, pixels, share};
 
 /// The category ID of `person` in COCO.
 const PERSON: u64 = 1;
@@ -105,7 +106,7 @@ fn annotation(
             cy: pixels(oriented.center.y),
             width: pixels(oriented.width),
             height: pixels(oriented.height),
-            angle_deg: pixels(oriented.angle.to_degrees()),
+            angle_deg: degrees(oriented.angle),
         },
     }
 }

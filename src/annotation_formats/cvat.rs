@@ -4,10 +4,13 @@
 use serde::Serialize;
 
 use super::{
-    AnnotatedImage, BoxKind, LABEL, pixels, share,
+    AnnotatedImage, BoxKind, LABEL,
     xml::{self, Text},
 };
-use crate::geometry::OrientedBox;
+use crate::{
+    geometry::OrientedBox,
+    rounding::{pixels, share},
+};
 
 #[derive(Serialize)]
 struct Annotations {

@@ -5,8 +5,11 @@
 
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, LABEL, pixels, rounded, share, stem};
-use crate::geometry::OrientedBox;
+use super::{AnnotatedBox, AnnotatedImage, LABEL, stem};
+use crate::{
+    geometry::OrientedBox,
+    rounding::{degrees, metres, pixels, share},
+};
 
 #[derive(Serialize)]
 struct FeatureCollection<'a> {
@@ -93,11 +96,11 @@ fn feature(id: usize, corners: [f64; 4], person: &AnnotatedBox) -> Feature {
             label: LABEL,
             score: share(person.score),
             r#box: corners,
-            angle_deg: pixels(oriented.angle.to_degrees()),
+            angle_deg: degrees(oriented.angle),
             foot: [pixels(foot.x), pixels(foot.y)],
             floor: person.floor.map(|floor| Floor {
-                x_m: rounded(floor.x_m, 1_000.0),
-                y_m: rounded(floor.y_m, 1_000.0),
+                x_m: metres(floor.x_m),
+                y_m: metres(floor.y_m),
             }),
         },
     }

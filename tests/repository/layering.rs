@@ -9,12 +9,13 @@ use source_scan::{absolute, code, names_crate, sources, used_paths};
 
 /// Every module, and the modules of this crate it may use. A row for a part of a module replaces
 /// the row of the module for the files of that part.
-const MAY_USE: [(&str, &[&str]); 33] = [
+const MAY_USE: [(&str, &[&str]); 34] = [
     ("plain_name", &[]),
     ("quoted", &[]),
     ("watched_file", &[]),
-    ("access", &["plain_name", "watched_file"]),
+    ("access", &["fairness", "plain_name", "watched_file"]),
     ("revision", &[]),
+    ("rounding", &[]),
     ("warning", &[]),
     ("fairness", &[]),
     ("geometry", &[]),
@@ -82,7 +83,10 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "pipeline",
         ],
     ),
-    ("annotation_formats", &["geometry", "detection", "pipeline"]),
+    (
+        "annotation_formats",
+        &["geometry", "detection", "pipeline", "rounding"],
+    ),
     ("annotated_image", &["geometry", "imaging", "pipeline"]),
     (
         "api::http",
@@ -109,6 +113,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "quoted",
             "results",
             "revision",
+            "rounding",
             "telemetry",
         ],
     ),
@@ -146,6 +151,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
             "quoted",
             "results",
             "revision",
+            "rounding",
             "telemetry",
             "warning",
         ],
