@@ -68,18 +68,6 @@ pub struct AnnotationFile {
     pub content: String,
 }
 
-pub(super) fn per_image(
-    images: &[AnnotatedImage],
-    path: fn(&str) -> String,
-    document: fn(&AnnotatedImage) -> String,
-) -> Vec<AnnotationFile> {
-    let files = images.iter().map(|image| AnnotationFile {
-        path: path(&image.file_name),
-        content: document(image),
-    });
-    files.collect()
-}
-
 pub(super) fn file(path: &str, content: String) -> AnnotationFile {
     AnnotationFile {
         path: path.to_owned(),

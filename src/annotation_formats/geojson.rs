@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, LABEL, stem};
+use super::{AnnotatedBox, AnnotatedImage, FormatSpec, LABEL, Layout, stem};
 use crate::{
     geometry::OrientedBox,
     rounding::{degrees, metres, pixels, share},
@@ -59,12 +59,23 @@ struct Floor {
     y_m: f64,
 }
 
+/// The format.
+pub(super) const FORMAT: FormatSpec = FormatSpec {
+    media_type: "application/geo+json",
+    has_oriented_boxes: false,
+    layout: Layout::FilePerImage {
+        path,
+        document,
+        others: Vec::new,
+    },
+};
+
 /// The path of an image's file.
-pub(super) fn path(image_file_name: &str) -> String {
+fn path(image_file_name: &str) -> String {
     format!("features/{}.geojson", stem(image_file_name))
 }
 
-pub(super) fn document(image: &AnnotatedImage) -> String {
+fn document(image: &AnnotatedImage) -> String {
     let features = image.boxes().zip(1..);
     let document = FeatureCollection {
         r#type: "FeatureCollection",
