@@ -71,8 +71,8 @@ impl RedisResults {
             options,
             link: Link::new(metrics.results_store_up.clone()),
             outbox: Outbox::new(metrics.results_dropped.clone()),
-            listeners: Arc::new(Listeners::new(limits.max_listeners, Arc::clone(&metrics))),
             stored: metrics.results_stored.clone(),
+            listeners: Arc::new(Listeners::new(limits.max_listeners, metrics)),
             limits,
         });
         let mut tasks = JoinSet::new();

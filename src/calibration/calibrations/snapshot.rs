@@ -153,7 +153,6 @@ impl Snapshot {
             revision: self.revision.clone(),
             problems: problems.collect(),
             store_problem: self.store_problem.clone(),
-            ..CalibrationsHealth::default()
         }
     }
 }
