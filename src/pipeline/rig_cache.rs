@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use moka::{policy::EvictionPolicy, sync::Cache};
+use moka::{notification::RemovalCause, policy::EvictionPolicy, sync::Cache};
 
 use super::{Profile, camera_rig::CameraRig};
 use crate::metrics::{Metrics, gauge_value};
@@ -33,7 +33,12 @@ pub(super) struct RigCache {
 
 impl RigCache {
     pub(super) fn new(budget_bytes: usize, metrics: Arc<Metrics>) -> Self {
-        let evictions = metrics.rig_cache_evictions.clone();
+        let counted = Arc::clone(&metrics);
+        let evicted = move |_: Arc<RigKey>, rig: Arc<CameraRig>, _: RemovalCause| {
+            counted.rig_cache_evictions.inc();
+            counted.rig_cache_rigs.dec();
+            counted.rig_cache_bytes.sub(gauge_value(rig.bytes()));
+        };
         // A rig larger than the budget is kept alone: it would be built for each frame otherwise.
         let weight = move |_: &RigKey, rig: &Arc<CameraRig>| {
             u32::try_from(rig.bytes().min(budget_bytes)).unwrap_or(u32::MAX)
@@ -42,7 +47,7 @@ impl RigCache {
             .max_capacity(budget_bytes as u64)
             .weigher(weight)
             .eviction_policy(EvictionPolicy::lru())
-            .eviction_listener(move |_, _, _| evictions.inc())
+            .eviction_listener(evicted)
             .build();
         Self { rigs, metrics }
     }
@@ -57,17 +62,12 @@ impl RigCache {
         let entry = self.rigs.entry_by_ref(key);
         let entry = entry.or_insert_with(|| Arc::new(build()));
         if entry.is_fresh() {
+            let bytes = gauge_value(entry.value().bytes());
+            self.metrics.rig_cache_builds.inc();
+            self.metrics.rig_cache_rigs.inc();
+            self.metrics.rig_cache_bytes.add(bytes);
             // Evicts now: the cache would do it some time later.
             self.rigs.run_pending_tasks();
-            let Metrics {
-                rig_cache_builds,
-                rig_cache_rigs,
-                rig_cache_bytes,
-                ..
-            } = &*self.metrics;
-            rig_cache_builds.inc();
-            rig_cache_rigs.set(gauge_value(self.rigs.entry_count()));
-            rig_cache_bytes.set(gauge_value(self.rigs.weighted_size()));
         }
         entry.into_value()
     }

@@ -78,19 +78,19 @@ impl RemoteServer {
     /// if requests are sent to it from now on. A periodic call, about every second, lets the server
     /// recover automatically.
     pub fn check_health(&self) -> bool {
-        if self.is_available() && self.responded_recently() {
-            return true;
-        }
-        match self.ready() {
-            Ok(()) => {
-                if self.breaker.close() {
-                    self.publish_availability();
-                    let url = self.connection.address();
-                    tracing::info!(%url, "the inference server is available again");
+        if !(self.is_available() && self.responded_recently()) {
+            match self.ready() {
+                Ok(()) => {
+                    if self.breaker.close() {
+                        let url = self.connection.address();
+                        tracing::info!(%url, "the inference server is available again");
+                    }
                 }
+                Err(detail) => self.note_failure(&detail),
             }
-            Err(detail) => self.note_failure(&detail),
         }
+        // Each time, so that a concurrent failure cannot leave an outdated value.
+        self.publish_availability();
         self.is_available()
     }
 
