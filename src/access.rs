@@ -5,7 +5,6 @@ mod error;
 mod key_list;
 mod key_name;
 mod keys;
-mod priority_level;
 mod scope;
 
 pub use digest::{KeyDigest, new_key};
@@ -13,5 +12,4 @@ pub use error::KeyError;
 pub use key_list::{Holder, KeyList};
 pub use key_name::{InvalidKeyName, KeyName};
 pub use keys::AccessKeys;
-pub use priority_level::PriorityLevel;
 pub use scope::{Scope, Scopes};

@@ -1,10 +1,11 @@
-//! Exports detected persons in the file formats of annotation tools, for correction there: COCO,
-//! CVAT, YOLO, Pascal VOC, and GeoJSON. The output is text in memory, which the caller writes or
-//! sends.
+//! Exports detected persons in the file formats of annotation tools, for correction there. The output
+//! is text in memory, which the caller writes or sends. A new format needs a file with its
+//! [`FormatSpec`] and a row of the table here.
 
 mod coco;
 mod content;
 mod cvat;
+mod format_spec;
 mod geojson;
 mod report;
 mod voc;
@@ -14,31 +15,65 @@ mod yolo;
 use strum::{Display, EnumString, VariantArray};
 
 pub use self::content::{AnnotatedBox, AnnotatedImage, AnnotationFile, BoxKind};
-use self::content::{LABEL, file, per_image, pixels, rounded, share, stem};
+use self::{
+    content::{LABEL, file, stem},
+    format_spec::{FormatSpec, Layout},
+};
 
-/// A file format of annotation tools.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Display, EnumString, VariantArray, strum::VariantNames,
-)]
-#[strum(serialize_all = "lowercase")]
-pub enum AnnotationFormat {
-    /// COCO detection: one JSON file.
-    Coco,
-    /// CVAT for images 1.1: one XML file.
-    Cvat,
-    /// YOLO as Ultralytics reads it: a text file per image, `data.yaml` and `classes.txt`.
-    Yolo,
-    /// Pascal VOC: an XML file per image.
-    Voc,
-    /// GeoJSON: a JSON file per image, with the oriented boxes as polygons in pixels.
-    GeoJson,
+/// Declares [`AnnotationFormat`]: for each format a description, a variant and its module.
+macro_rules! annotation_formats {
+    ($($(#[doc = $description:literal])+ $variant:ident = $module:ident,)+) => {
+        /// A file format of annotation tools.
+        #[derive(
+            Debug, Clone, Copy, PartialEq, Eq, Display, EnumString, VariantArray, strum::VariantNames,
+        )]
+        #[strum(serialize_all = "lowercase")]
+        pub enum AnnotationFormat {
+            $($(#[doc = $description])+ $variant,)+
+        }
+
+        impl AnnotationFormat {
+            /// Returns the name of the tools or the standard, and the files.
+            #[must_use]
+            pub fn description(self) -> &'static str {
+                match self {
+                    $(Self::$variant => concat!($($description),+).trim_ascii(),)+
+                }
+            }
+
+            const fn spec(self) -> &'static FormatSpec {
+                match self {
+                    $(Self::$variant => &$module::FORMAT,)+
+                }
+            }
+        }
+    };
+}
+
+annotation_formats! {
+    /// COCO detection: annotations.json.
+    Coco = coco,
+    /// CVAT for images 1.1: annotations.xml.
+    Cvat = cvat,
+    /// YOLO as Ultralytics reads it: labels/, data.yaml, classes.txt.
+    Yolo = yolo,
+    /// Pascal VOC: Annotations/.
+    Voc = voc,
+    /// GeoJSON with the oriented boxes as polygons in pixels: features/.
+    GeoJson = geojson,
 }
 
 impl AnnotationFormat {
     /// Returns whether the format offers oriented boxes beside axis-parallel ones.
     #[must_use]
     pub fn has_oriented_boxes(self) -> bool {
-        self == Self::Cvat
+        self.spec().has_oriented_boxes
+    }
+
+    /// Returns the media type of a document.
+    #[must_use]
+    pub const fn media_type(self) -> &'static str {
+        self.spec().media_type
     }
 
     /// Returns the files that describe `images`. `boxes` applies only if the format [has oriented
@@ -46,35 +81,36 @@ impl AnnotationFormat {
     /// file in YOLO and VOC: the last one is written.
     #[must_use]
     pub fn files(self, images: &[AnnotatedImage], boxes: BoxKind) -> Vec<AnnotationFile> {
-        match self {
-            Self::Coco => vec![file("annotations.json", coco::document(images))],
-            Self::Cvat => vec![file("annotations.xml", cvat::document(images, boxes))],
-            Self::Yolo => yolo::files(images),
-            Self::Voc => per_image(images, voc::path, voc::document),
-            Self::GeoJson => per_image(images, geojson::path, geojson::document),
+        match self.spec().layout {
+            Layout::OneFile { path, document } => vec![file(path, document(images, boxes))],
+            Layout::FilePerImage {
+                path,
+                document,
+                others,
+            } => {
+                let own = images
+                    .iter()
+                    .map(|image| file(&path(&image.file_name), document(image)));
+                others().into_iter().chain(own).collect()
+            }
         }
     }
 
     /// Returns the document of one image: its own file, or that of a folder with this image only.
     #[must_use]
     pub fn document(self, image: &AnnotatedImage, boxes: BoxKind) -> String {
-        match self {
-            Self::Coco => coco::document(std::slice::from_ref(image)),
-            Self::Cvat => cvat::document(std::slice::from_ref(image), boxes),
-            Self::Yolo => yolo::document(image),
-            Self::Voc => voc::document(image),
-            Self::GeoJson => geojson::document(image),
+        match self.spec().layout {
+            Layout::OneFile { document, .. } => document(std::slice::from_ref(image), boxes),
+            Layout::FilePerImage { document, .. } => document(image),
         }
     }
 
     /// The path of the image's own file, if the format has one.
     #[must_use]
     pub fn own_file(self, image_file_name: &str) -> Option<String> {
-        match self {
-            Self::Coco | Self::Cvat => None,
-            Self::Yolo => Some(yolo::path(image_file_name)),
-            Self::Voc => Some(voc::path(image_file_name)),
-            Self::GeoJson => Some(geojson::path(image_file_name)),
+        match self.spec().layout {
+            Layout::OneFile { .. } => None,
+            Layout::FilePerImage { path, .. } => Some(path(image_file_name)),
         }
     }
 }

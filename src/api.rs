@@ -43,10 +43,10 @@ use self::{
     },
     report_headers::{PERSON_COUNT, SERVER_TIMING},
     routes::{
-        calibrations, detect, health,
+        health,
         openapi::{self as document, DocumentSource},
         problems,
-        results::{self, events::LAST_EVENT_ID},
+        results::events::LAST_EVENT_ID,
         web_page,
     },
 };
@@ -75,26 +75,10 @@ pub fn openapi_document() -> utoipa::openapi::OpenApi {
     openapi::complete(routes().into_openapi())
 }
 
-/// The routes of the native API.
+/// The routes of the native API and of the Open Inference Protocol.
 fn client_routes() -> OpenApiRouter<ApiState> {
     OpenApiRouter::with_openapi(<openapi::Common as utoipa::OpenApi>::openapi())
-        .routes(routes!(detect::detect_persons))
-        .routes(routes!(calibrations::list))
-        .routes(routes!(
-            calibrations::get,
-            calibrations::put,
-            calibrations::delete
-        ))
-        .routes(routes!(
-            calibrations::views::get_views,
-            calibrations::views::try_views
-        ))
-        .routes(routes!(results::list))
-        .routes(routes!(results::latest::get_latest))
-        .routes(routes!(results::picture::get_picture))
-        .routes(routes!(results::history::get_history))
-        .routes(routes!(results::events::of_camera))
-        .routes(routes!(results::events::of_all))
+        .merge(routes::of_clients())
         .routes(routes!(open_inference::describe::model))
         .routes(routes!(open_inference::describe::model_version))
         .routes(routes!(open_inference::describe::model_ready))

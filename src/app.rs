@@ -58,6 +58,8 @@ pub struct Assembly {
     pub calibrations: Arc<Calibrations>,
     /// Its models.
     pub models: Arc<ModelRepository>,
+    /// The metrics of all of these.
+    pub metrics: Arc<Metrics>,
 }
 
 /// Creates the engine that the settings describe, with no model loaded yet.
@@ -67,17 +69,25 @@ pub struct Assembly {
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
     let (store, writable) = calibration_store(settings)?;
-    let calibrations = Calibrations::open_within(store, writable, CALIBRATIONS_WAIT);
+    let metrics = Arc::<Metrics>::default();
+    let calibrations =
+        Calibrations::open_within(store, writable, CALIBRATIONS_WAIT, Arc::clone(&metrics));
     let calibrations = calibrations.context("calibrations.path")?;
-    assemble_with(settings, calibrations, FieldOfViewReading::default())
+    assemble_with(
+        settings,
+        calibrations,
+        metrics,
+        FieldOfViewReading::default(),
+    )
 }
 
 fn assemble_with(
     settings: &Settings,
     calibrations: Arc<Calibrations>,
+    metrics: Arc<Metrics>,
     paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Assembly> {
-    let (models, default_models) = models::open(settings)?;
+    let (models, default_models) = models::open(settings, &metrics)?;
     let options = EngineOptions {
         decode_limits: decode_limits(&settings.limits),
         default_models,
@@ -92,12 +102,14 @@ fn assemble_with(
         inference_cache_frames: settings.inference.inference_cache_frames,
     };
     let known = Some(Arc::clone(&calibrations));
-    let engine = Engine::new(Arc::clone(models.registry()), known, options)
+    let registry = Arc::clone(models.registry());
+    let engine = Engine::new(registry, known, options, Arc::clone(&metrics))
         .context("the operating system gives no threads")?;
     Ok(Assembly {
         engine,
         calibrations,
         models: Arc::new(models),
+        metrics,
     })
 }
 
@@ -131,7 +143,7 @@ pub fn evaluation_engine(
     paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Engine> {
     let calibrations = Arc::new(open_calibrations(settings)?);
-    let assembly = assemble_with(settings, calibrations, paper_field_of_view)?;
+    let assembly = assemble_with(settings, calibrations, Arc::default(), paper_field_of_view)?;
     let Assembly { engine, models, .. } = assembly;
     for request in requests {
         let defaults = engine.default_models();
@@ -193,6 +205,7 @@ impl App {
             engine,
             calibrations,
             models,
+            metrics,
         } = assembly;
         settings.access.check_exposure(settings.server.listen)?;
         let keys = open_keys(&settings.access)?;
@@ -204,8 +217,7 @@ impl App {
         let workers = WorkerPool::start(&Arc::new(engine), workers, capacity)
             .context("the operating system creates no thread for a worker")?;
         let workers = Arc::new(workers);
-        let metrics = Arc::new(Metrics::new()?);
-        let results = open_results(&settings.results)?;
+        let results = open_results(&settings.results, Arc::clone(&metrics))?;
         let readiness = Readiness::default();
         let tls = match settings.tls.clone() {
             Some(options) => Some(Arc::new(Tls::open(options, Arc::clone(&metrics))?)),
@@ -340,7 +352,7 @@ fn models_to_load(defaults: &DefaultModels, also: &[String]) -> Vec<String> {
 
 pub(crate) fn open_calibrations(settings: &Settings) -> anyhow::Result<Calibrations> {
     let (store, writable) = calibration_store(settings)?;
-    Calibrations::open(store, writable).context("calibrations.path")
+    Calibrations::open(store, writable, Arc::default()).context("calibrations.path")
 }
 
 /// The calibration store of the settings, and true if it may be changed.
@@ -364,10 +376,13 @@ fn calibration_store(settings: &Settings) -> anyhow::Result<(Box<dyn Calibration
 }
 
 /// Opens the result store of the settings. It connects to a Redis in the background.
-fn open_results(settings: &ResultSettings) -> anyhow::Result<Arc<dyn ResultStore>> {
+fn open_results(
+    settings: &ResultSettings,
+    metrics: Arc<Metrics>,
+) -> anyhow::Result<Arc<dyn ResultStore>> {
     Ok(match settings.redis.clone() {
-        Some(redis) => Arc::new(RedisResults::start(redis, settings.limits)?),
-        None => Arc::new(MemoryResults::new(settings.limits)),
+        Some(redis) => Arc::new(RedisResults::start(redis, settings.limits, metrics)?),
+        None => Arc::new(MemoryResults::new(settings.limits, metrics)),
     })
 }
 

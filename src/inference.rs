@@ -24,10 +24,8 @@ pub use manifest::{Layout, ManifestInput, ModelManifest};
 pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor};
 pub use registry::{ModelRegistry, RegistryFull};
-pub use remote::{
-    BearerToken, InvalidToken, RemoteCounts, RemoteDetector, RemoteOptions, RemoteServer,
-};
+pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{
-    LoadCounts, ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions,
-    RepositoryRow, is_fetched,
+    ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
+    is_fetched,
 };

@@ -24,6 +24,7 @@ pub mod pipeline;
 pub mod poller;
 pub mod probe;
 pub mod results;
+mod rounding;
 pub mod server;
 pub mod settings;
 pub mod shutdown;

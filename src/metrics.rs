@@ -1,17 +1,15 @@
 //! Every metric of the server: one struct with its own registry. The doc comment of a field is its
-//! help text. Label values come from short fixed lists, never from clients. The labels of zones,
+//! help text. Each subsystem shares the struct and counts its own events in it. Label values come from short fixed lists, never from clients. The labels of zones,
 //! which administrators name, are optional and limited to a thousand.
 
 mod kind;
 mod zone_persons;
 
-use std::{collections::BTreeSet, time::Duration};
-
-use parking_lot::{Mutex, MutexGuard};
 use prometheus::{
-    Encoder, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Registry, TextEncoder,
+    Encoder, HistogramVec, IntCounterVec, IntGaugeVec, Registry, TextEncoder,
     process_collector::ProcessCollector,
 };
+pub use prometheus::{IntCounter, IntGauge};
 
 use kind::Kind;
 use zone_persons::ZonePersons;
@@ -20,11 +18,11 @@ use zone_persons::ZonePersons;
 macro_rules! metrics {
     ($($(#[doc = $help:literal])+ $field:ident: $kind:ty = $name:literal [$($label:literal),*];)+) => {
         /// The metrics of one server.
+        #[derive(Debug)]
         pub struct Metrics {
             registry: Registry,
             /// Separate, as its names have no prefix.
             process: Registry,
-            shown: Mutex<Shown>,
             $($(#[doc = $help])+ pub $field: $kind,)+
         }
 
@@ -36,8 +34,9 @@ macro_rules! metrics {
                     let $field = <$kind as Kind>::create($name, help, &[$($label),*])?;
                     registry.register(Box::new($field.clone()))?;
                 )+
-                let (process, shown) = (Registry::new(), Mutex::default());
-                Ok(Self { registry, process, shown, $($field,)+ })
+                let process = Registry::new();
+                process.register(Box::new(ProcessCollector::for_self()))?;
+                Ok(Self { registry, process, $($field,)+ })
             }
         }
     };
@@ -148,110 +147,30 @@ metrics! {
     build_info: IntGaugeVec = "build_info" ["version", "commit"];
 }
 
-/// The rows of info metrics, which are removed when they are no longer true. The lock is held while
-/// a scrape updates them: a concurrent one would add the same.
-#[derive(Default)]
-struct Shown {
-    /// Model name and revision.
-    models: BTreeSet<(String, String)>,
-    calibrations: String,
+impl Default for Metrics {
+    /// Creates metrics that are all zero.
+    ///
+    /// # Panics
+    /// Never: names and labels are constants, which the tests register.
+    #[expect(clippy::expect_used, reason = "names and labels are constants")]
+    fn default() -> Self {
+        let metrics = Self::registered().expect("valid names and labels");
+        metrics.set_build(None);
+        metrics
+    }
 }
 
 impl Metrics {
-    /// Creates metrics that are all zero.
-    ///
-    /// # Errors
-    /// If Prometheus does not accept a name or a label.
-    pub fn new() -> Result<Self, prometheus::Error> {
-        let metrics = Self::registered()?;
-        metrics
-            .process
-            .register(Box::new(ProcessCollector::for_self()))?;
-        metrics.show_build(None);
-        Ok(metrics)
-    }
-
-    /// Shows the version of the server, and the commit from which it was built, if known.
-    pub fn show_build(&self, commit: Option<&str>) {
+    /// Sets the version of the server, and the commit from which it was built, if known.
+    pub fn set_build(&self, commit: Option<&str>) {
         let labels = [env!("CARGO_PKG_VERSION"), commit.unwrap_or_default()];
         self.build_info.reset();
         self.build_info.with_label_values(&labels).set(1);
     }
 
-    /// Sets the number of frames that wait or are processed, and the number dropped since the
-    /// start.
-    pub fn show_frames(&self, pending: usize, withdrawn: u64) {
-        let _one_scrape = self.one_scrape();
-        self.pending_frames.set(count(pending));
-        raise_to(&self.withdrawn_frames, withdrawn);
-    }
-
-    /// Sets the time since the last progress of a frame, and the number of stalls since the start.
-    pub fn show_progress(&self, quiet_for: Duration, stalls: u64) {
-        let _one_scrape = self.one_scrape();
-        let seconds = i64::try_from(quiet_for.as_secs()).unwrap_or(i64::MAX);
-        self.seconds_without_progress.set(seconds);
-        raise_to(&self.worker_stalls, stalls);
-    }
-
-    /// Sets the loaded models, each by name and revision, and the number of loads since the start,
-    /// by result.
-    pub fn show_models(&self, models: &[(&str, &str)], loads: &[(&str, u64)]) {
-        let mut shown = self.one_scrape();
-        shown.models.retain(|(name, revision)| {
-            let stays = models.contains(&(name, revision));
-            if !stays {
-                // The row exists, so it can be removed.
-                let _ = self.model_info.remove_label_values(&[name, revision]);
-            }
-            stays
-        });
-        for (name, revision) in models {
-            self.model_info.with_label_values(&[name, revision]).set(1);
-            shown
-                .models
-                .insert(((*name).to_owned(), (*revision).to_owned()));
-        }
-        raise(&self.model_loads, loads);
-    }
-
-    /// Sets the state of the inference server, and the number of requests since the start, by
-    /// result.
-    pub fn show_remote(&self, up: bool, requests: &[(&str, u64)]) {
-        let _one_scrape = self.one_scrape();
-        let none: [&str; 0] = [];
-        self.remote_up.with_label_values(&none).set(i64::from(up));
-        raise(&self.remote_requests, requests);
-    }
-
-    /// Sets the number of calibrations in use, the revision of all of them, the number of invalid
-    /// files, the state of their store, and the number of loads since the start, by result.
-    pub fn show_calibrations(
-        &self,
-        serving: usize,
-        revision: &str,
-        broken: usize,
-        up: bool,
-        loads: &[(&str, u64)],
-    ) {
-        let mut shown = self.one_scrape();
-        if shown.calibrations != revision {
-            // There is no row before the first scrape.
-            let _ = self
-                .calibrations_info
-                .remove_label_values(&[&shown.calibrations]);
-            revision.clone_into(&mut shown.calibrations);
-        }
-        self.calibrations_info.with_label_values(&[revision]).set(1);
-        self.calibrations.set(count(serving));
-        self.calibration_files_broken.set(count(broken));
-        self.calibration_store_up.set(i64::from(up));
-        raise(&self.calibration_loads, loads);
-    }
-
     /// Sets the number of persons in the zones (each by its name) of a calibration's latest frame.
     /// At most a thousand zones are published.
-    pub fn show_zones<'a>(
+    pub fn set_zones<'a>(
         &self,
         calibration: &str,
         zones: impl IntoIterator<Item = (&'a str, usize)>,
@@ -266,48 +185,6 @@ impl Metrics {
         self.zone_persons.retain(is_kept);
     }
 
-    /// Sets the number and the bytes of rigs in memory, and the numbers built and evicted since the
-    /// start.
-    pub fn show_rig_cache(&self, rigs: usize, bytes: usize, builds: u64, evictions: u64) {
-        let _one_scrape = self.one_scrape();
-        self.rig_cache_rigs.set(count(rigs));
-        self.rig_cache_bytes.set(count(bytes));
-        raise_to(&self.rig_cache_builds, builds);
-        raise_to(&self.rig_cache_evictions, evictions);
-    }
-
-    /// Sets the number of frames answered from the inference cache since the start.
-    pub fn show_recalled(&self, frames: u64) {
-        let _one_scrape = self.one_scrape();
-        raise_to(&self.inference_cache_hits, frames);
-    }
-
-    /// Sets the numbers of stored cameras, reports, bytes and images.
-    pub fn show_results(&self, cameras: usize, reports: usize, bytes: usize, pictures: usize) {
-        let _one_scrape = self.one_scrape();
-        self.results_cameras.set(count(cameras));
-        self.results_reports.set(count(reports));
-        self.results_bytes.set(count(bytes));
-        self.results_pictures.set(count(pictures));
-    }
-
-    /// Sets the state of the result store, the number of reports that wait, and the numbers stored
-    /// and dropped since the start.
-    pub fn show_result_store(&self, up: bool, waiting: usize, stored: u64, dropped: u64) {
-        let _one_scrape = self.one_scrape();
-        self.results_store_up.set(i64::from(up));
-        self.results_waiting.set(count(waiting));
-        raise_to(&self.results_stored, stored);
-        raise_to(&self.results_dropped, dropped);
-    }
-
-    /// Sets the number of listeners, and the number dropped since the start.
-    pub fn show_listeners(&self, listeners: usize, dropped: u64) {
-        let _one_scrape = self.one_scrape();
-        self.results_listeners.set(count(listeners));
-        raise_to(&self.results_listeners_dropped, dropped);
-    }
-
     /// Returns all metrics in the Prometheus text format.
     ///
     /// # Errors
@@ -319,26 +196,28 @@ impl Metrics {
         }
         Ok(String::from_utf8_lossy(&text).into_owned())
     }
+}
 
-    fn one_scrape(&self) -> MutexGuard<'_, Shown> {
-        // The next scrape corrects the rows.
-        self.shown.lock()
+/// Creates the rows of these results, at zero: an alert must see the first of each.
+pub fn start_at_zero(counters: &IntCounterVec, results: &[&str]) {
+    for result in results {
+        counters.with_label_values(&[result]);
     }
 }
 
-/// Raises counters to these counts.
-fn raise(counters: &IntCounterVec, counts: &[(&str, u64)]) {
-    for (result, count) in counts {
-        raise_to(&counters.with_label_values(&[result]), *count);
+/// Replaces the row of an info metric. A concurrent scrape sees one of them at least.
+pub fn replace_info(info: &IntGaugeVec, before: Option<&[&str]>, now: &[&str]) {
+    info.with_label_values(now).set(1);
+    if let Some(before) = before.filter(|before| *before != now) {
+        // There may be no such row yet.
+        let _ = info.remove_label_values(before);
     }
 }
 
-fn raise_to(counter: &IntCounter, count: u64) {
-    counter.inc_by(count.saturating_sub(counter.get()));
-}
-
-fn count(count: usize) -> i64 {
-    i64::try_from(count).unwrap_or(i64::MAX)
+/// Returns the value of a gauge that counts things.
+#[must_use]
+pub fn gauge_value(count: impl TryInto<i64>) -> i64 {
+    count.try_into().unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

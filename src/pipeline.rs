@@ -48,7 +48,6 @@ pub use profile::Profile;
 pub use report::{
     CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts, ZoneCount,
 };
-pub use rig_cache::RigCacheUse;
 pub use ticket::{Priority, Ticket};
 pub use timeline::{Stage, StageSpan, Timeline};
 pub use worker_pool::WorkerPool;

@@ -104,6 +104,7 @@ fn line(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
 
 fn router() -> Router {
     let one = NonZeroUsize::MIN;
+    let metrics = Arc::<Metrics>::default();
     let models = ModelRepository::new(
         RepositoryOptions {
             folder: ModelFolder {
@@ -114,9 +115,12 @@ fn router() -> Router {
             kept: vec![MODEL.to_owned()],
         },
         Box::new(|_| Ok(Model::new(Box::new(Silent(NetworkInput::plain(16, 16)))))),
+        Arc::clone(&metrics),
     );
     models.load(MODEL).unwrap();
-    let calibrations = Arc::new(Calibrations::open(Box::new(DiscardingStore), true).unwrap());
+    let calibrations = Arc::new(
+        Calibrations::open(Box::new(DiscardingStore), true, Arc::clone(&metrics)).unwrap(),
+    );
     let options = EngineOptions {
         decode_limits: DecodeLimits {
             max_width: MAX_IMAGE_SIDE,
@@ -127,11 +131,17 @@ fn router() -> Router {
         ..EngineOptions::for_testing(MODEL)
     };
     let registry = Arc::clone(models.registry());
-    let engine = Engine::new(registry, Some(Arc::clone(&calibrations)), options).unwrap();
+    let engine = Engine::new(
+        registry,
+        Some(Arc::clone(&calibrations)),
+        options,
+        Arc::clone(&metrics),
+    )
+    .unwrap();
     let workers = WorkerPool::start(&Arc::new(engine), one, one).unwrap();
     let readiness = Readiness::default();
     readiness.warmed_up();
-    let results = MemoryResults::new(ResultLimits::default());
+    let results = MemoryResults::new(ResultLimits::default(), Arc::clone(&metrics));
     // Ends event streams and waits for reports at once.
     results.listeners().end();
     api::router(ApiState::new(
@@ -139,7 +149,7 @@ fn router() -> Router {
         Arc::new(models),
         calibrations,
         Arc::new(results),
-        Arc::new(Metrics::new().unwrap()),
+        metrics,
         readiness,
         ApiOptions {
             max_body_bytes: 1 << 16,

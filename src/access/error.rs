@@ -2,6 +2,8 @@
 
 use std::{io, path::PathBuf};
 
+use crate::fairness::PriorityLevel;
+
 /// Keys that cannot be used. No message repeats the input: it may be a key in the wrong position.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
@@ -60,7 +62,12 @@ pub enum KeyError {
         position: usize,
     },
     /// The priority is not a level.
-    #[error("key {position}: highest_priority must be 1 (highest) to 9; without it, it is 5")]
+    #[error(
+        "key {position}: highest_priority must be {} (highest) to {}; without it, it is {}",
+        PriorityLevel::HIGHEST,
+        PriorityLevel::LOWEST,
+        PriorityLevel::DEFAULT
+    )]
     Priority {
         /// The position of the key, from 1.
         position: usize,

@@ -3,7 +3,18 @@
 
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, LABEL, pixels, share};
+use super::{AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout};
+use crate::rounding::{degrees, pixels, share};
+
+/// The format.
+pub(super) const FORMAT: FormatSpec = FormatSpec {
+    media_type: "application/x.coco+json",
+    has_oriented_boxes: false,
+    layout: Layout::OneFile {
+        path: "annotations.json",
+        document,
+    },
+};
 
 /// The category ID of `person` in COCO.
 const PERSON: u64 = 1;
@@ -55,7 +66,7 @@ struct Category {
     supercategory: &'static str,
 }
 
-pub(super) fn document(images: &[AnnotatedImage]) -> String {
+fn document(images: &[AnnotatedImage], _boxes: BoxKind) -> String {
     let mut document = Document {
         images: Vec::with_capacity(images.len()),
         annotations: Vec::new(),
@@ -105,7 +116,7 @@ fn annotation(
             cy: pixels(oriented.center.y),
             width: pixels(oriented.width),
             height: pixels(oriented.height),
-            angle_deg: pixels(oriented.angle.to_degrees()),
+            angle_deg: degrees(oriented.angle),
         },
     }
 }

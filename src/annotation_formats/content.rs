@@ -3,6 +3,7 @@
 use crate::{
     detection::{BBox, FramePixels},
     geometry::{OrientedBox, floor::FloorPosition},
+    rounding::pixels,
 };
 
 /// The class of every box.
@@ -67,18 +68,6 @@ pub struct AnnotationFile {
     pub content: String,
 }
 
-pub(super) fn per_image(
-    images: &[AnnotatedImage],
-    path: fn(&str) -> String,
-    document: fn(&AnnotatedImage) -> String,
-) -> Vec<AnnotationFile> {
-    let files = images.iter().map(|image| AnnotationFile {
-        path: path(&image.file_name),
-        content: document(image),
-    });
-    files.collect()
-}
-
 pub(super) fn file(path: &str, content: String) -> AnnotationFile {
     AnnotationFile {
         path: path.to_owned(),
@@ -92,19 +81,4 @@ pub(super) fn stem(file_name: &str) -> &str {
         Some((stem, ending)) if !stem.is_empty() && !ending.contains('/') => stem,
         _ => file_name,
     }
-}
-
-/// Rounds to two decimals: far below the accuracy of a detector.
-pub(super) fn pixels(value: f64) -> f64 {
-    rounded(value, 100.0)
-}
-
-/// Rounds a fraction of 1 to four decimals.
-pub(super) fn share(value: f64) -> f64 {
-    rounded(value, 10_000.0)
-}
-
-pub(super) fn rounded(value: f64, per_unit: f64) -> f64 {
-    // Adding zero turns −0 into 0.
-    (value * per_unit).round() / per_unit + 0.0
 }

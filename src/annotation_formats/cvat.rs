@@ -4,10 +4,13 @@
 use serde::Serialize;
 
 use super::{
-    AnnotatedImage, BoxKind, LABEL, pixels, share,
+    AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout,
     xml::{self, Text},
 };
-use crate::geometry::OrientedBox;
+use crate::{
+    geometry::OrientedBox,
+    rounding::{pixels, share},
+};
 
 #[derive(Serialize)]
 struct Annotations {
@@ -15,6 +18,16 @@ struct Annotations {
     meta: Meta,
     image: Vec<Image>,
 }
+
+/// The format.
+pub(super) const FORMAT: FormatSpec = FormatSpec {
+    media_type: "application/xml",
+    has_oriented_boxes: true,
+    layout: Layout::OneFile {
+        path: "annotations.xml",
+        document,
+    },
+};
 
 /// The label, which makes the classes of the file explicit.
 #[derive(Serialize)]
@@ -97,7 +110,7 @@ struct Attribute {
     value: f64,
 }
 
-pub(super) fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
+fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
     let images = images.iter().enumerate().map(|(id, image)| {
         let shapes = image.boxes().map(|(corners, person)| {
             let (corners, rotation) = match boxes {

@@ -5,8 +5,11 @@
 
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, LABEL, pixels, rounded, share, stem};
-use crate::geometry::OrientedBox;
+use super::{AnnotatedBox, AnnotatedImage, FormatSpec, LABEL, Layout, stem};
+use crate::{
+    geometry::OrientedBox,
+    rounding::{degrees, metres, pixels, share},
+};
 
 #[derive(Serialize)]
 struct FeatureCollection<'a> {
@@ -56,12 +59,23 @@ struct Floor {
     y_m: f64,
 }
 
+/// The format.
+pub(super) const FORMAT: FormatSpec = FormatSpec {
+    media_type: "application/geo+json",
+    has_oriented_boxes: false,
+    layout: Layout::FilePerImage {
+        path,
+        document,
+        others: Vec::new,
+    },
+};
+
 /// The path of an image's file.
-pub(super) fn path(image_file_name: &str) -> String {
+fn path(image_file_name: &str) -> String {
     format!("features/{}.geojson", stem(image_file_name))
 }
 
-pub(super) fn document(image: &AnnotatedImage) -> String {
+fn document(image: &AnnotatedImage) -> String {
     let features = image.boxes().zip(1..);
     let document = FeatureCollection {
         r#type: "FeatureCollection",
@@ -93,11 +107,11 @@ fn feature(id: usize, corners: [f64; 4], person: &AnnotatedBox) -> Feature {
             label: LABEL,
             score: share(person.score),
             r#box: corners,
-            angle_deg: pixels(oriented.angle.to_degrees()),
+            angle_deg: degrees(oriented.angle),
             foot: [pixels(foot.x), pixels(foot.y)],
             floor: person.floor.map(|floor| Floor {
-                x_m: rounded(floor.x_m, 1_000.0),
-                y_m: rounded(floor.y_m, 1_000.0),
+                x_m: metres(floor.x_m),
+                y_m: metres(floor.y_m),
             }),
         },
     }

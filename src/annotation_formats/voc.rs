@@ -4,8 +4,19 @@
 use serde::Serialize;
 
 use super::{
-    AnnotatedImage, LABEL, stem,
+    AnnotatedImage, FormatSpec, LABEL, Layout, stem,
     xml::{self, Text},
+};
+
+/// The format.
+pub(super) const FORMAT: FormatSpec = FormatSpec {
+    media_type: "application/xml",
+    has_oriented_boxes: false,
+    layout: Layout::FilePerImage {
+        path,
+        document,
+        others: Vec::new,
+    },
 };
 
 /// The number of channels of every image.
@@ -45,11 +56,11 @@ struct Bndbox {
 }
 
 /// The path of an image's file.
-pub(super) fn path(image_file_name: &str) -> String {
+fn path(image_file_name: &str) -> String {
     format!("Annotations/{}.xml", stem(image_file_name))
 }
 
-pub(super) fn document(image: &AnnotatedImage) -> String {
+fn document(image: &AnnotatedImage) -> String {
     let (folder, name) = image
         .file_name
         .rsplit_once('/')

@@ -4,24 +4,31 @@
 
 use std::fmt::Write;
 
-use super::{AnnotatedImage, AnnotationFile, LABEL, file, per_image, stem};
+use super::{AnnotatedImage, AnnotationFile, FormatSpec, LABEL, Layout, file, stem};
+
+/// The format.
+pub(super) const FORMAT: FormatSpec = FormatSpec {
+    media_type: "text/plain; charset=utf-8",
+    has_oriented_boxes: false,
+    layout: Layout::FilePerImage {
+        path,
+        document,
+        others,
+    },
+};
 
 /// The path of an image's file.
-pub(super) fn path(image_file_name: &str) -> String {
+fn path(image_file_name: &str) -> String {
     format!("labels/{}.txt", stem(image_file_name))
 }
 
-pub(super) fn files(images: &[AnnotatedImage]) -> Vec<AnnotationFile> {
+fn others() -> Vec<AnnotationFile> {
     let data = format!("path: .\ntrain: images\nval: images\nnames:\n  0: {LABEL}\n");
-    let mut files = vec![
-        file("data.yaml", data),
-        file("classes.txt", format!("{LABEL}\n")),
-    ];
-    files.extend(per_image(images, path, document));
-    files
+    let classes = format!("{LABEL}\n");
+    vec![file("data.yaml", data), file("classes.txt", classes)]
 }
 
-pub(super) fn document(image: &AnnotatedImage) -> String {
+fn document(image: &AnnotatedImage) -> String {
     let (width, height) = (f64::from(image.width), f64::from(image.height));
     let mut lines = String::new();
     for ([left, top, right, bottom], _) in image.boxes() {

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     access::Holder,
-    fairness::Client,
+    fairness::{Client, PriorityLevel},
     pipeline::{Priority, Ticket},
 };
 
@@ -75,8 +75,9 @@ impl Caller {
     pub(super) fn ticket_at(&self, priority: Priority) -> Result<Ticket, Problem> {
         if priority < self.highest_priority {
             let (client, highest) = (&self.client, self.highest_priority.highest_level());
+            let lowest = PriorityLevel::LOWEST;
             let detail = format!(
-                "priority: {client} may use {highest} to 9: send a larger number, or give the key a \
+                "priority: {client} may use {highest} to {lowest}: send a larger number, or give the key a \
                  smaller one in access.keys_file, as highest_priority"
             );
             let problem = Problem::new(ProblemKind::Forbidden, detail);

@@ -1,9 +1,6 @@
 //! The report in the format of the API: degrees, milliseconds and rounded numbers.
 
 mod conversion;
-mod rounding;
-
-pub(super) use rounding::pixels;
 
 use serde::Serialize;
 use utoipa::ToSchema;

@@ -1,4 +1,5 @@
-//! The native API: one module for each resource. No route depends on another or on a protocol.
+//! The native API: one module for each resource. No route depends on another or on a protocol. A new
+//! endpoint needs its handler and a row of the table here.
 
 pub(super) mod calibrations;
 pub(super) mod detect;
@@ -7,3 +8,29 @@ pub(super) mod openapi;
 pub(super) mod problems;
 pub(super) mod results;
 pub(super) mod web_page;
+
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::ApiState;
+
+/// Returns the routes of clients, with their entries in the OpenAPI document.
+pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
+    OpenApiRouter::new()
+        .routes(routes!(detect::detect_persons))
+        .routes(routes!(calibrations::list))
+        .routes(routes!(
+            calibrations::get,
+            calibrations::put,
+            calibrations::delete
+        ))
+        .routes(routes!(
+            calibrations::views::get_views,
+            calibrations::views::try_views
+        ))
+        .routes(routes!(results::list))
+        .routes(routes!(results::latest::get_latest))
+        .routes(routes!(results::picture::get_picture))
+        .routes(routes!(results::history::get_history))
+        .routes(routes!(results::events::of_camera))
+        .routes(routes!(results::events::of_all))
+}

@@ -54,7 +54,7 @@ pub(super) async fn run_detection<T: Send + 'static>(
     if state.options.zone_metrics {
         let zones = report.zones.iter();
         let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
-        state.metrics.show_zones(&report.calibration.id, zones);
+        state.metrics.set_zones(&report.calibration.id, zones);
     }
     let (json, answer) = written?;
     let kept = NewReport {

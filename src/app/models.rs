@@ -8,6 +8,7 @@ use crate::{
         ModelRepository, OnnxDetector, OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer,
         RepositoryOptions, is_fetched,
     },
+    metrics::Metrics,
     pipeline::{DefaultModels, Profile},
     settings::{RemoteSettings, Settings, SettingsError},
 };
@@ -17,7 +18,10 @@ use crate::{
 ///
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
-pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, DefaultModels)> {
+pub(super) fn open(
+    settings: &Settings,
+    metrics: &Arc<Metrics>,
+) -> anyhow::Result<(ModelRepository, DefaultModels)> {
     let path = settings.model.find_repository()?;
     let mut one = settings.model.find_one()?;
     let remote = settings.remote.as_ref();
@@ -44,11 +48,12 @@ pub(super) fn open(settings: &Settings) -> anyhow::Result<(ModelRepository, Defa
     };
     let repository = match remote {
         Some(remote) => {
-            let server = Arc::new(RemoteServer::new(remote_options(remote, called))?);
+            let remote = remote_options(remote, called);
+            let server = Arc::new(RemoteServer::new(remote, Arc::clone(metrics))?);
             let loader = remote_loader(settings, Arc::clone(&server));
-            ModelRepository::new(options, loader).on(server)
+            ModelRepository::new(options, loader, Arc::clone(metrics)).on(server)
         }
-        None => ModelRepository::new(options, onnx_loader(settings)?),
+        None => ModelRepository::new(options, onnx_loader(settings)?, Arc::clone(metrics)),
     };
     Ok((repository, defaults))
 }

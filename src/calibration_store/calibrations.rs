@@ -13,7 +13,7 @@ mod snapshot;
 use std::{
     sync::{
         Arc,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        atomic::{AtomicBool, Ordering},
         mpsc::sync_channel,
     },
     thread,
@@ -24,7 +24,10 @@ use parking_lot::{Mutex, MutexGuard, RwLock};
 
 use self::{file_reader::FileReader, snapshot::Snapshot};
 use super::{CalibrationStore, StoreError};
-use crate::calibration::{Calibration, CalibrationId};
+use crate::{
+    calibration::{Calibration, CalibrationId},
+    metrics::{Metrics, start_at_zero},
+};
 
 pub use change::{Put, WriteCondition};
 pub use content::{CalibrationEntry, Reading};
@@ -42,8 +45,7 @@ pub struct Calibrations {
     now: RwLock<Arc<Snapshot>>,
     /// Held while the store is read or changed: one at a time.
     changing: Mutex<()>,
-    succeeded: AtomicU64,
-    failed: AtomicU64,
+    metrics: Arc<Metrics>,
 }
 
 impl Calibrations {
@@ -53,8 +55,12 @@ impl Calibrations {
     /// # Errors
     /// Returns an error if the store cannot be listed. A file that cannot be used costs only its
     /// calibrations.
-    pub fn open(store: Box<dyn CalibrationStore>, writable: bool) -> Result<Self, StoreError> {
-        let calibrations = Self::unread(store, writable, FileReader::default());
+    pub fn open(
+        store: Box<dyn CalibrationStore>,
+        writable: bool,
+        metrics: Arc<Metrics>,
+    ) -> Result<Self, StoreError> {
+        let calibrations = Self::unread(store, writable, FileReader::default(), metrics);
         calibrations.scan(&calibrations.lock())?;
         calibrations.is_read.store(true, Ordering::Relaxed);
         Ok(calibrations)
@@ -70,8 +76,9 @@ impl Calibrations {
         store: Box<dyn CalibrationStore>,
         writable: bool,
         patience: Duration,
+        metrics: Arc<Metrics>,
     ) -> Result<Arc<Self>, StoreError> {
-        Self::open_with(store, writable, FileReader::default(), patience)
+        Self::open_with(store, writable, FileReader::default(), patience, metrics)
     }
 
     fn open_with(
@@ -79,8 +86,9 @@ impl Calibrations {
         writable: bool,
         reader: FileReader,
         patience: Duration,
+        metrics: Arc<Metrics>,
     ) -> Result<Arc<Self>, StoreError> {
-        let calibrations = Arc::new(Self::unread(store, writable, reader));
+        let calibrations = Arc::new(Self::unread(store, writable, reader, metrics));
         let (done, outcome) = sync_channel(0);
         let reading = Arc::clone(&calibrations);
         let read = move || {
@@ -107,7 +115,14 @@ impl Calibrations {
         Ok(calibrations)
     }
 
-    fn unread(store: Box<dyn CalibrationStore>, writable: bool, reader: FileReader) -> Self {
+    fn unread(
+        store: Box<dyn CalibrationStore>,
+        writable: bool,
+        reader: FileReader,
+        metrics: Arc<Metrics>,
+    ) -> Self {
+        start_at_zero(&metrics.calibration_loads, &["success", "failure"]);
+        Snapshot::default().publish(&metrics, None);
         Self {
             store,
             writable,
@@ -115,8 +130,7 @@ impl Calibrations {
             is_read: AtomicBool::new(false),
             now: RwLock::default(),
             changing: Mutex::default(),
-            succeeded: AtomicU64::new(0),
-            failed: AtomicU64::new(0),
+            metrics,
         }
     }
 
@@ -160,11 +174,7 @@ impl Calibrations {
     /// Returns the health of the calibrations. Does not block.
     #[must_use]
     pub fn health(&self) -> CalibrationsHealth {
-        CalibrationsHealth {
-            loads_succeeded: self.succeeded.load(Ordering::Relaxed),
-            loads_failed: self.failed.load(Ordering::Relaxed),
-            ..self.now().health()
-        }
+        self.now().health()
     }
 
     fn now(&self) -> Arc<Snapshot> {
@@ -172,6 +182,7 @@ impl Calibrations {
     }
 
     fn replace(&self, snapshot: Snapshot) {
+        snapshot.publish(&self.metrics, Some(&self.now()));
         *self.now.write() = Arc::new(snapshot);
     }
 

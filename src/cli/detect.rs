@@ -12,7 +12,11 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use clap::Args;
+use clap::{
+    Args,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+};
+use strum::VariantArray;
 
 use self::{
     labels::Labels,
@@ -20,7 +24,7 @@ use self::{
 };
 use super::{
     SettingsFile, annotate,
-    parameters::{ParameterFlags, PictureFlags, one_of},
+    parameters::{ParameterFlags, PictureFlags},
     progress::Progress,
 };
 use crate::{
@@ -50,9 +54,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     picture: PictureFlags,
     /// Write annotations to be corrected in the usual tools, into the folder --out, instead of
-    /// reports: `coco` (annotations.json), `cvat` (annotations.xml, CVAT for images 1.1), `yolo`
-    /// (labels/, data.yaml, classes.txt), `voc` (Annotations/) or `geojson` (features/)
-    #[arg(long, value_name = "FORMAT", requires = "out", value_parser = one_of::<AnnotationFormat>())]
+    /// reports
+    #[arg(long, value_name = "FORMAT", requires = "out", value_parser = annotation_format())]
     format: Option<AnnotationFormat>,
     /// The folder for --format
     #[arg(long, value_name = "FOLDER", requires = "format")]
@@ -62,6 +65,16 @@ pub(super) struct Arguments {
     oriented: bool,
     #[command(flatten)]
     settings_file: SettingsFile,
+}
+
+/// Parses the name of an annotation format. The help describes each of them.
+fn annotation_format() -> impl TypedValueParser<Value = AnnotationFormat> {
+    let formats = AnnotationFormat::VARIANTS.iter();
+    let values = formats.map(|format| {
+        let description = format.description().trim_end_matches('.');
+        PossibleValue::new(format.to_string()).help(description)
+    });
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<AnnotationFormat>())
 }
 
 /// Reports on every picture; those that cannot be used cost the exit code, not the others.

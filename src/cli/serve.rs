@@ -75,7 +75,7 @@ async fn serve(settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
     let hangups = signal(SignalKind::hangup()).context("signals cannot be handled")?;
     let sockets = Sockets::bind(&settings.server).await?;
     let app = start(settings).await?;
-    app.metrics().show_build(commit);
+    app.metrics().set_build(commit);
     spawn(reload_on(hangups, app.reloader()));
     let (tracer, at_once) = (app.tracer(), shutdown.clone());
     let outcome = app.serve(sockets, shutdown).await;

@@ -96,8 +96,8 @@ impl SharedBudget {
     }
 
     /// The number of permits in use.
-    #[must_use]
-    pub fn used(&self) -> usize {
+    #[cfg(test)]
+    fn used(&self) -> usize {
         self.0.usage().used
     }
 }

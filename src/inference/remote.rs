@@ -25,7 +25,7 @@ use super::{
 use crate::imaging::{NetworkInput, ViewBatch};
 
 pub use options::RemoteOptions;
-pub use server::{RemoteCounts, RemoteServer};
+pub use server::RemoteServer;
 pub use token::{BearerToken, InvalidToken};
 
 /// A model on an inference server.

@@ -8,20 +8,13 @@ mod error;
 mod folder;
 mod stamp;
 
-use std::{
-    collections::BTreeMap,
-    num::NonZeroUsize,
-    path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
-};
+use std::{collections::BTreeMap, num::NonZeroUsize, path::Path, sync::Arc};
 
 use parking_lot::{Mutex, MutexGuard};
 
 use self::stamp::{files_of, stamp};
 use super::{InferenceError, Model, ModelRegistry, RemoteServer, model::ModelFiles};
+use crate::metrics::{Metrics, replace_info, start_at_zero};
 
 pub use error::RepositoryError;
 pub use folder::{ModelFolder, is_fetched};
@@ -49,8 +42,7 @@ pub struct ModelRepository {
     remote: Option<Arc<RemoteServer>>,
     /// Locked while a model is loaded, so that only one is loaded at a time.
     memory: Mutex<Memory>,
-    succeeded: AtomicU64,
-    failed: AtomicU64,
+    metrics: Arc<Metrics>,
 }
 
 /// State of models in addition to the loaded ones.
@@ -75,27 +67,18 @@ pub struct RepositoryRow {
     pub reason: Option<String>,
 }
 
-/// Numbers of successful and failed loads since the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LoadCounts {
-    /// Loads whose model was put into service.
-    pub succeeded: u64,
-    /// Loads whose model was refused.
-    pub failed: u64,
-}
-
 impl ModelRepository {
     /// A repository with these options, without any loaded model.
     #[must_use]
-    pub fn new(options: RepositoryOptions, loader: ModelLoader) -> Self {
+    pub fn new(options: RepositoryOptions, loader: ModelLoader, metrics: Arc<Metrics>) -> Self {
+        start_at_zero(&metrics.model_loads, &["success", "failure"]);
         Self {
             options,
             registry: Arc::default(),
             loader,
             remote: None,
             memory: Mutex::default(),
-            succeeded: AtomicU64::new(0),
-            failed: AtomicU64::new(0),
+            metrics,
         }
     }
 
@@ -126,15 +109,6 @@ impl ModelRepository {
     #[must_use]
     pub fn registry(&self) -> &Arc<ModelRegistry> {
         &self.registry
-    }
-
-    /// Numbers of successful and failed loads.
-    #[must_use]
-    pub fn load_counts(&self) -> LoadCounts {
-        LoadCounts {
-            succeeded: self.succeeded.load(Ordering::Relaxed),
-            failed: self.failed.load(Ordering::Relaxed),
-        }
     }
 
     /// Loads or reloads the model with that name. Blocks.
@@ -170,6 +144,9 @@ impl ModelRepository {
         let removed = removed.ok_or_else(|| RepositoryError::NotLoaded {
             name: name.to_owned(),
         })?;
+        let row = [removed.name(), removed.revision()];
+        // It was added when the model was put into service.
+        let _ = self.metrics.model_info.remove_label_values(&row);
         tracing::info!(model = name, revision = removed.revision(), "unloaded");
         Ok(())
     }
@@ -237,10 +214,16 @@ impl ModelRepository {
         });
         match outcome {
             Ok((model, replaced)) => {
-                self.succeeded.fetch_add(1, Ordering::Relaxed);
+                self.count_load("success");
                 memory.failures.remove(name);
                 memory.refused.remove(name);
                 let replaced = replaced.as_ref().map(|replaced| replaced.revision());
+                let before = replaced.map(|revision| [name, revision]);
+                replace_info(
+                    &self.metrics.model_info,
+                    before.as_ref().map(<[_; 2]>::as_slice),
+                    &[name, model.revision()],
+                );
                 tracing::info!(
                     model = name,
                     revision = model.revision(),
@@ -250,7 +233,7 @@ impl ModelRepository {
                 Ok(model)
             }
             Err(error) => {
-                self.failed.fetch_add(1, Ordering::Relaxed);
+                self.count_load("failure");
                 memory.failures.insert(name.to_owned(), error.to_string());
                 if error.is_of_model() {
                     memory.refused.insert(name.to_owned(), stamp);
@@ -276,6 +259,11 @@ impl ModelRepository {
         });
         model.warm_up(self.options.warm_up_views)?;
         Ok(model)
+    }
+
+    fn count_load(&self, result: &str) {
+        let loads = &self.metrics.model_loads;
+        loads.with_label_values(&[result]).inc();
     }
 
     /// Locks the state, or returns [`RepositoryError::Busy`] while a model is being loaded.

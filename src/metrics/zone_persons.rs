@@ -20,7 +20,7 @@ use super::kind::Kind;
 pub(super) const MAX_ROWS: usize = 1000;
 
 /// The number of persons in each zone of a calibration. Clones share the rows.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct ZonePersons {
     desc: Desc,
     labels: [String; 2],

@@ -34,6 +34,7 @@ use crate::{
         decode::{DecodeLimits, decode},
     },
     inference::{Model, ModelRegistry},
+    metrics::Metrics,
     warning::{Warning, WarningCode},
 };
 
@@ -93,6 +94,7 @@ pub struct Engine {
     next_session: AtomicUsize,
     inference_cache: InferenceCache,
     options: EngineOptions,
+    metrics: Arc<Metrics>,
 }
 
 impl Engine {
@@ -104,6 +106,7 @@ impl Engine {
         models: Arc<ModelRegistry>,
         calibrations: Option<Arc<Calibrations>>,
         options: EngineOptions,
+        metrics: Arc<Metrics>,
     ) -> std::io::Result<Self> {
         let remappers = ThreadPoolBuilder::new()
             .num_threads(options.remap_threads.get())
@@ -116,11 +119,15 @@ impl Engine {
             network: Network::start(options.sessions, options.batches, &remappers)?,
             remappers,
             calibrations,
-            rigs: RigCache::new(options.rig_cache_bytes),
+            rigs: RigCache::new(options.rig_cache_bytes, Arc::clone(&metrics)),
             motion_cache: MotionCache::default(),
             next_session: AtomicUsize::new(0),
-            inference_cache: InferenceCache::new(options.inference_cache_frames),
+            inference_cache: InferenceCache::new(
+                options.inference_cache_frames,
+                metrics.inference_cache_hits.clone(),
+            ),
             options,
+            metrics,
         })
     }
 
@@ -286,10 +293,8 @@ impl Engine {
         &self.options
     }
 
-    /// Returns the number of frames served from the inference cache since the start.
-    #[must_use]
-    pub fn inference_cache_hits(&self) -> u64 {
-        self.inference_cache.hits()
+    pub(super) fn metrics(&self) -> &Arc<Metrics> {
+        &self.metrics
     }
 
     /// Returns true if the registry still has this instance of the model under its name.

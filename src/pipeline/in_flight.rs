@@ -31,7 +31,6 @@ struct State {
     progressed: Option<Instant>,
     /// `true` if the current stall has been reported.
     is_reported: bool,
-    stalls: u64,
 }
 
 #[derive(Debug)]
@@ -120,13 +119,7 @@ impl InFlight {
         let stall = state.stall(now, limit);
         let is_new = stall.is_some() && !state.is_reported;
         state.is_reported = stall.is_some();
-        state.stalls += u64::from(is_new);
         stall.filter(|_| is_new)
-    }
-
-    /// Returns the number of stalls reported since the start.
-    pub(super) fn stalls(&self) -> u64 {
-        self.state().stalls
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

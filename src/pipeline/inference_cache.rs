@@ -3,16 +3,16 @@
 
 use std::{
     collections::VecDeque,
-    sync::{
-        Arc, Weak,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::{Arc, Weak},
 };
 
 use parking_lot::{Mutex, MutexGuard};
 
 use super::{camera_rig::CameraRig, pass::Pass};
-use crate::inference::{Model, ViewDetection};
+use crate::{
+    inference::{Model, ViewDetection},
+    metrics::IntCounter,
+};
 
 /// Maximum memory of all cached frames: detections and the remap tables of second passes.
 const MAX_BYTES: usize = 32 << 20;
@@ -35,7 +35,7 @@ pub(super) struct InferenceCache {
     max_frames: usize,
     /// The least recently used first.
     frames: Mutex<VecDeque<CachedFrame>>,
-    hits: AtomicU64,
+    hits: IntCounter,
 }
 
 struct CachedFrame {
@@ -55,18 +55,13 @@ struct CachedPass {
 }
 
 impl InferenceCache {
-    /// Creates a cache of up to `max_frames` frames; 0 disables it.
-    pub(super) fn new(max_frames: usize) -> Self {
+    /// Creates a cache of up to `max_frames` frames; 0 disables it. Counts the answers in `hits`.
+    pub(super) fn new(max_frames: usize, hits: IntCounter) -> Self {
         Self {
             max_frames,
             frames: Mutex::default(),
-            hits: AtomicU64::new(0),
+            hits,
         }
-    }
-
-    /// Returns the number of cache hits since the start.
-    pub(super) fn hits(&self) -> u64 {
-        self.hits.load(Ordering::Relaxed)
     }
 
     /// Returns the passes of a cached frame, if all models of these passes are still `serving`.
@@ -80,7 +75,7 @@ impl InferenceCache {
         let frame = frames.remove(index)?;
         let passes = frame.passes(&key.rig, serving)?;
         frames.push_back(frame);
-        self.hits.fetch_add(1, Ordering::Relaxed);
+        self.hits.inc();
         Some(passes)
     }
 

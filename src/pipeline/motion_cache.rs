@@ -4,11 +4,11 @@
 //! slow changes add up. After [`MAX_AGE`] inference always runs again.
 
 use std::{
-    collections::HashMap,
     sync::{Arc, Weak},
     time::{Duration, Instant},
 };
 
+use moka::{policy::EvictionPolicy, sync::Cache};
 use parking_lot::{Mutex, MutexGuard};
 
 use super::camera_rig::CameraRig;
@@ -19,21 +19,17 @@ use crate::{
 };
 
 /// Maximum number of cached cameras. The least recently used camera is evicted first.
-const MAX_CAMERAS: usize = 256;
+const MAX_CAMERAS: u64 = 256;
 /// Maximum age of cached detections, with or without motion.
 const MAX_AGE: Duration = Duration::from_secs(10);
 
 /// The latest detections of each camera.
-#[derive(Default)]
-pub(super) struct MotionCache {
-    cameras: Mutex<HashMap<String, CachedCamera>>,
-}
+pub(super) struct MotionCache(Cache<String, Arc<CachedCamera>>);
 
 struct CachedCamera {
     views: Arc<CameraViews>,
     /// The crops of the last second pass.
-    crops: Option<CameraCrops>,
-    last_used: Instant,
+    crops: Mutex<Option<CameraCrops>>,
 }
 
 struct CameraCrops {
@@ -56,6 +52,13 @@ struct CachedView {
     inferred_at: Instant,
 }
 
+impl Default for MotionCache {
+    fn default() -> Self {
+        let cameras = Cache::builder().max_capacity(MAX_CAMERAS);
+        Self(cameras.eviction_policy(EvictionPolicy::lru()).build())
+    }
+}
+
 impl MotionCache {
     /// Returns the cached views of a camera. They are empty if the camera is new or if its rig or
     /// its model has changed.
@@ -65,32 +68,16 @@ impl MotionCache {
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
     ) -> Arc<CameraViews> {
-        let mut cameras = self.cameras.lock();
-        let now = Instant::now();
-        if let Some(known) = cameras.get_mut(camera)
-            && known.views.are_of(rig, model)
-        {
-            known.last_used = now;
-            return Arc::clone(&known.views);
-        }
-        if cameras.len() >= MAX_CAMERAS && !cameras.contains_key(camera) {
-            let oldest = cameras.iter().min_by_key(|(_, known)| known.last_used);
-            if let Some(oldest) = oldest.map(|(name, _)| name.clone()) {
-                cameras.remove(&oldest);
-            }
-        }
-        let views = Arc::new(CameraViews {
-            rig: Arc::downgrade(rig),
-            model: Arc::downgrade(model),
-            views: Mutex::new((0..rig.view_count()).map(|_| None).collect()),
-        });
-        let entry = CachedCamera {
-            views: Arc::clone(&views),
-            crops: None,
-            last_used: now,
+        let no_views = || CachedCamera {
+            views: CameraViews::new(rig, model, vec![None; rig.view_count()]),
+            crops: Mutex::default(),
         };
-        cameras.insert(camera.to_owned(), entry);
-        views
+        let entry = self.0.entry_by_ref(camera);
+        let entry = entry.or_insert_with_if(
+            || Arc::new(no_views()),
+            |known| !known.views.are_of(rig, model),
+        );
+        Arc::clone(&entry.value().views)
     }
 
     /// Returns the cached crops of a camera, filled where the last second pass had the same crop.
@@ -101,9 +88,9 @@ impl MotionCache {
         rig: &Arc<CameraRig>,
         model: &Arc<Model>,
     ) -> Option<Arc<CameraViews>> {
-        let mut cameras = self.cameras.lock();
-        let known = cameras.get_mut(camera)?;
-        let before = known.crops.take();
+        let known = self.0.get(camera)?;
+        let mut last = known.crops.lock();
+        let before = last.take();
         let before = before.filter(|before| before.views.are_of_model(model));
         let crops: Vec<FrameCrop> = rig.crops().copied().collect();
         let cached = crops.iter().map(|crop| {
@@ -111,12 +98,8 @@ impl MotionCache {
             let same = before.crops.iter().position(|other| other == crop)?;
             before.views.lock()[same].clone()
         });
-        let views = Arc::new(CameraViews {
-            rig: Arc::downgrade(rig),
-            model: Arc::downgrade(model),
-            views: Mutex::new(cached.collect()),
-        });
-        known.crops = Some(CameraCrops {
+        let views = CameraViews::new(rig, model, cached.collect());
+        *last = Some(CameraCrops {
             crops,
             views: Arc::clone(&views),
         });
@@ -125,6 +108,14 @@ impl MotionCache {
 }
 
 impl CameraViews {
+    fn new(rig: &Arc<CameraRig>, model: &Arc<Model>, views: Vec<Option<CachedView>>) -> Arc<Self> {
+        Arc::new(Self {
+            rig: Arc::downgrade(rig),
+            model: Arc::downgrade(model),
+            views: Mutex::new(views),
+        })
+    }
+
     fn are_of(&self, rig: &Arc<CameraRig>, model: &Arc<Model>) -> bool {
         std::ptr::eq(self.rig.as_ptr(), Arc::as_ptr(rig)) && self.are_of_model(model)
     }

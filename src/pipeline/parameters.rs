@@ -14,6 +14,7 @@ use super::{
 use crate::{
     calibration::CalibrationId,
     detection::{Refinement, RefinementParameters},
+    fairness::PriorityLevel,
 };
 
 /// The interfaces of every protocol. `lookdown detect` has its own `--calibration FILE|ID` for the
@@ -140,8 +141,11 @@ parameter_table! {
     };
     PRIORITY = ParameterSpec {
         name: "priority",
-        kind: ParameterKind::Whole { min: 1, max: 9 },
-        default: ParameterDefault::Value("5"),
+        kind: ParameterKind::Whole {
+            min: PriorityLevel::HIGHEST,
+            max: PriorityLevel::LOWEST,
+        },
+        default: ParameterDefault::Value(PriorityLevel::DEFAULT),
         help: "Priority among queued frames: 1 to 3 are high, 4 to 6 normal, 7 to 9 low. Clients of \
                the same priority take turns. A key may limit the priority (`highest_priority`).",
         example: None,

@@ -1,13 +1,11 @@
 //! The cache of rigs: built once, shared, bounded in bytes, with least-recently-used eviction.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, OnceLock},
-};
+use std::sync::Arc;
 
-use parking_lot::Mutex;
+use moka::{notification::RemovalCause, policy::EvictionPolicy, sync::Cache};
 
 use super::{Profile, camera_rig::CameraRig};
+use crate::metrics::{Metrics, gauge_value};
 
 /// The cache key of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -28,126 +26,50 @@ pub(super) enum RigCamera {
 }
 
 /// A bounded cache of rigs.
-#[derive(Debug)]
 pub(super) struct RigCache {
-    budget_bytes: usize,
-    entries: Mutex<Entries>,
-}
-
-#[derive(Debug, Default)]
-struct Entries {
-    by_key: HashMap<RigKey, Entry>,
-    clock: u64,
-    /// The size of all built rigs.
-    bytes: usize,
-    builds: u64,
-    evictions: u64,
-}
-
-#[derive(Debug, Default)]
-struct Entry {
-    /// Filled by the first caller. Other callers with the same key wait for that build.
-    rig: Arc<OnceLock<Arc<CameraRig>>>,
-    last_used: u64,
-    /// The size of the rig, once it is built and counted.
-    bytes: Option<usize>,
-}
-
-/// The usage and the counters of a cache of camera rigs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RigCacheUse {
-    /// Rigs in memory.
-    pub rigs: usize,
-    /// Memory that their tables hold, bytes.
-    pub bytes: usize,
-    /// Rigs built since the start.
-    pub builds: u64,
-    /// Rigs dropped to make room since the start.
-    pub evictions: u64,
+    rigs: Cache<RigKey, Arc<CameraRig>>,
+    metrics: Arc<Metrics>,
 }
 
 impl RigCache {
-    pub(super) fn new(budget_bytes: usize) -> Self {
-        Self {
-            budget_bytes,
-            entries: Mutex::default(),
-        }
+    pub(super) fn new(budget_bytes: usize, metrics: Arc<Metrics>) -> Self {
+        let counted = Arc::clone(&metrics);
+        let evicted = move |_: Arc<RigKey>, rig: Arc<CameraRig>, _: RemovalCause| {
+            counted.rig_cache_evictions.inc();
+            counted.rig_cache_rigs.dec();
+            counted.rig_cache_bytes.sub(gauge_value(rig.bytes()));
+        };
+        // A rig larger than the budget is kept alone: it would be built for each frame otherwise.
+        let weight = move |_: &RigKey, rig: &Arc<CameraRig>| {
+            u32::try_from(rig.bytes().min(budget_bytes)).unwrap_or(u32::MAX)
+        };
+        let rigs = Cache::builder()
+            .max_capacity(budget_bytes as u64)
+            .weigher(weight)
+            .eviction_policy(EvictionPolicy::lru())
+            .eviction_listener(evicted)
+            .build();
+        Self { rigs, metrics }
     }
 
-    /// Returns the rig for `key`, built by `build` unless it is cached.
+    /// Returns the rig for `key`, built by `build` unless it is cached. Other callers with the same
+    /// key wait for that build.
     pub(super) fn get_or_build(
         &self,
         key: &RigKey,
         build: impl FnOnce() -> CameraRig,
     ) -> Arc<CameraRig> {
-        let slot = {
-            let mut entries = self.lock();
-            entries.clock += 1;
-            let now = entries.clock;
-            let entry = entries.by_key.entry(key.clone()).or_default();
-            entry.last_used = now;
-            Arc::clone(&entry.rig)
-        };
-        let mut is_new = false;
-        let rig = Arc::clone(slot.get_or_init(|| {
-            is_new = true;
-            Arc::new(build())
-        }));
-        if is_new {
-            let mut entries = self.lock();
-            entries.count(key, rig.bytes());
-            entries.evict_beyond(self.budget_bytes, key);
+        let entry = self.rigs.entry_by_ref(key);
+        let entry = entry.or_insert_with(|| Arc::new(build()));
+        if entry.is_fresh() {
+            let bytes = gauge_value(entry.value().bytes());
+            self.metrics.rig_cache_builds.inc();
+            self.metrics.rig_cache_rigs.inc();
+            self.metrics.rig_cache_bytes.add(bytes);
+            // Evicts now: the cache would do it some time later.
+            self.rigs.run_pending_tasks();
         }
-        rig
-    }
-
-    /// Returns the usage and the counters of the cache.
-    pub(super) fn usage(&self) -> RigCacheUse {
-        let entries = self.lock();
-        let built = entries
-            .by_key
-            .values()
-            .filter(|entry| entry.bytes.is_some());
-        RigCacheUse {
-            rigs: built.count(),
-            bytes: entries.bytes,
-            builds: entries.builds,
-            evictions: entries.evictions,
-        }
-    }
-
-    fn lock(&self) -> parking_lot::MutexGuard<'_, Entries> {
-        // Every update of the entries is a single step, so a panic cannot leave them inconsistent.
-        self.entries.lock()
-    }
-}
-
-impl Entries {
-    /// Counts the rig that was just built for `key`. Only counted rigs are evicted, so its entry
-    /// exists.
-    fn count(&mut self, key: &RigKey, bytes: usize) {
-        self.builds += 1;
-        if let Some(entry) = self.by_key.get_mut(key) {
-            entry.bytes = Some(bytes);
-            self.bytes += bytes;
-        }
-    }
-
-    /// Evicts the least recently used rigs until the rest fits. `newest` is never evicted.
-    fn evict_beyond(&mut self, budget_bytes: usize, newest: &RigKey) {
-        while self.bytes > budget_bytes {
-            let oldest = self
-                .by_key
-                .iter()
-                .filter(|(key, entry)| *key != newest && entry.bytes.is_some())
-                .min_by_key(|(_, entry)| entry.last_used)
-                .map(|(key, _)| key.clone());
-            let Some(oldest) = oldest else { break };
-            if let Some(entry) = self.by_key.remove(&oldest) {
-                self.bytes -= entry.bytes.unwrap_or(0);
-                self.evictions += 1;
-            }
-        }
+        entry.into_value()
     }
 }
 

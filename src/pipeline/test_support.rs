@@ -107,7 +107,7 @@ pub(super) fn engine(detector: BlobDetector, calibrations: Option<Arc<Calibratio
     models
         .put(Arc::new(Model::new(Box::new(detector))))
         .unwrap();
-    Engine::new(Arc::new(models), calibrations, options).unwrap()
+    Engine::new(Arc::new(models), calibrations, options, Arc::default()).unwrap()
 }
 
 /// A grey lens image on black, `side` pixels wide, with a white disc.

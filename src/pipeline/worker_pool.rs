@@ -3,10 +3,7 @@
 use std::{
     num::NonZeroUsize,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::Arc,
     thread::JoinHandle,
     time::{Duration, Instant},
 };
@@ -26,6 +23,7 @@ use super::{
 use crate::{
     fairness::{BudgetError, Client, SharedBudget},
     inference::HeadOutput,
+    metrics::Metrics,
 };
 
 /// The whole work on a frame, including the channel that returns the result to the caller.
@@ -60,7 +58,7 @@ struct Shared {
     budget: SharedBudget,
     in_flight: Arc<InFlight>,
     rate: Mutex<ServiceRate>,
-    withdrawn: AtomicU64,
+    metrics: Arc<Metrics>,
 }
 
 impl WorkerPool {
@@ -80,7 +78,7 @@ impl WorkerPool {
             budget: SharedBudget::new(capacity.get()),
             in_flight: Arc::default(),
             rate: Mutex::default(),
-            withdrawn: AtomicU64::new(0),
+            metrics: Arc::clone(engine.metrics()),
         });
         let threads = (0..workers.get()).map(|index| {
             let shared = Arc::clone(&shared);
@@ -212,12 +210,6 @@ impl WorkerPool {
         self.shared.pending()
     }
 
-    /// Returns the number of frames withdrawn since the start because their client disconnected.
-    #[must_use]
-    pub fn withdrawn(&self) -> u64 {
-        self.shared.withdrawn.load(Ordering::Relaxed)
-    }
-
     /// Returns the stall of the pool: there is work, and for at least `limit` none has progressed.
     #[must_use]
     pub fn stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
@@ -227,13 +219,9 @@ impl WorkerPool {
     /// Returns a stall like [`WorkerPool::stall`], but each only once, for the log.
     #[must_use]
     pub fn new_stall(&self, now: Instant, limit: Duration) -> Option<Stall> {
-        self.shared.in_flight.new_stall(now, limit)
-    }
-
-    /// Returns the number of stalls that [`WorkerPool::new_stall`] has returned.
-    #[must_use]
-    pub fn stalls(&self) -> u64 {
-        self.shared.in_flight.stalls()
+        let stall = self.shared.in_flight.new_stall(now, limit)?;
+        self.shared.metrics.worker_stalls.inc();
+        Some(stall)
     }
 
     /// Returns the time since the last progress. Zero without work.
@@ -282,7 +270,7 @@ impl Shared {
             } = entry;
             let _in_request = request.enter();
             if ticket.withdrawn.is_cancelled() {
-                self.withdrawn.fetch_add(1, Ordering::Relaxed);
+                self.metrics.withdrawn_frames.inc();
                 drop(work);
                 guard.end(Instant::now());
                 self.rate().given_up(self.pending());
@@ -294,7 +282,7 @@ impl Shared {
             guard.end(Instant::now());
             self.rate().ended(Instant::now(), self.pending());
             if done.withdrawn {
-                self.withdrawn.fetch_add(1, Ordering::Relaxed);
+                self.metrics.withdrawn_frames.inc();
             }
             (done.deliver)();
         }

@@ -7,7 +7,10 @@ use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::mpsc;
 
 use super::{Cameras, StoredReport};
-use crate::fairness::{BudgetError, BudgetShare, Client, SharedBudget};
+use crate::{
+    fairness::{BudgetError, BudgetShare, Client, SharedBudget},
+    metrics::Metrics,
+};
 
 /// Most reports that wait for a listener.
 const QUEUE: usize = 64;
@@ -45,12 +48,12 @@ pub struct Listeners {
     /// The permits, including those of dropped listeners that have not noticed yet.
     budget: SharedBudget,
     group: Mutex<Group>,
+    metrics: Arc<Metrics>,
 }
 
 #[derive(Debug, Default)]
 struct Group {
     ended: bool,
-    dropped: u64,
     last_number: u64,
     queues: HashMap<Cameras, HashMap<u64, mpsc::Sender<Arc<StoredReport>>>>,
 }
@@ -58,10 +61,11 @@ struct Group {
 impl Listeners {
     /// Creates a group of at most `most` listeners, of which half may be of one client.
     #[must_use]
-    pub fn new(most: NonZeroUsize) -> Self {
+    pub fn new(most: NonZeroUsize, metrics: Arc<Metrics>) -> Self {
         Self {
             budget: SharedBudget::new(most.get()),
             group: Mutex::default(),
+            metrics,
         }
     }
 
@@ -93,6 +97,7 @@ impl Listeners {
         let (sender, queue) = mpsc::channel(QUEUE);
         let queues = group.queues.entry(to.clone()).or_default();
         queues.insert(number, sender);
+        self.metrics.results_listeners.inc();
         Ok(Listening {
             queue,
             to,
@@ -117,7 +122,8 @@ impl Listeners {
             if let Some(queues) = group.queues.get_mut(&to) {
                 let before = queues.len();
                 queues.retain(|_, queue| queue.try_send(Arc::clone(report)).is_ok());
-                group.dropped += (before - queues.len()) as u64;
+                let dropped = (before - queues.len()) as u64;
+                self.metrics.results_listeners_dropped.inc_by(dropped);
                 if queues.is_empty() {
                     group.queues.remove(&to);
                 }
@@ -132,24 +138,13 @@ impl Listeners {
         group.queues.clear();
     }
 
-    /// The number of permits in use.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.budget.used()
-    }
-
-    /// The number of listeners that were dropped because they did not keep up.
-    #[must_use]
-    pub fn dropped(&self) -> u64 {
-        self.group().dropped
-    }
-
     fn group(&self) -> MutexGuard<'_, Group> {
         // No change can panic before it is complete.
         self.group.lock()
     }
 
     fn leave(&self, to: &Cameras, number: u64) {
+        self.metrics.results_listeners.dec();
         let mut group = self.group();
         if let Some(queues) = group.queues.get_mut(to) {
             queues.remove(&number);

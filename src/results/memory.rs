@@ -14,21 +14,25 @@ use super::{
     Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
     StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
+use crate::metrics::Metrics;
 
 /// Keeps reports in memory, within limits. They are lost when the process ends.
 #[derive(Debug)]
 pub struct MemoryResults {
     kept: Mutex<Kept>,
     listeners: Arc<Listeners>,
+    metrics: Arc<Metrics>,
 }
 
 impl MemoryResults {
     /// Creates an empty store.
     #[must_use]
-    pub fn new(limits: ResultLimits) -> Self {
+    pub fn new(limits: ResultLimits, metrics: Arc<Metrics>) -> Self {
+        metrics.results_store_up.set(1);
         Self {
-            listeners: Arc::new(Listeners::new(limits.max_listeners)),
+            listeners: Arc::new(Listeners::new(limits.max_listeners, Arc::clone(&metrics))),
             kept: Mutex::new(Kept::new(limits)),
+            metrics,
         }
     }
 
@@ -37,6 +41,7 @@ impl MemoryResults {
         // Published while the lock is held: listeners rely on the order.
         let mut kept = self.kept();
         let stored = kept.add(report, picture, Timestamp::now());
+        self.metrics.results_stored.inc();
         self.listeners.tell(&stored);
         stored
     }
@@ -83,10 +88,7 @@ impl ResultStore for MemoryResults {
     }
 
     fn health(&self) -> StoreHealth {
-        StoreHealth {
-            stored: self.kept().stored(),
-            ..StoreHealth::default()
-        }
+        StoreHealth::default()
     }
 
     async fn flush(&self) {}

@@ -18,15 +18,7 @@ mod shared;
 #[cfg(test)]
 mod tests;
 
-use std::{
-    io,
-    num::NonZeroUsize,
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
-    time::Duration,
-};
+use std::{io, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
 use redis::RedisResult;
@@ -46,7 +38,7 @@ use super::{
     Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
     StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
-use crate::tls::TlsError;
+use crate::{metrics::Metrics, tls::TlsError};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
@@ -68,15 +60,19 @@ impl RedisResults {
     ///
     /// # Errors
     /// [`TlsError`] if the address needs TLS and TLS cannot be used.
-    pub fn start(options: RedisOptions, limits: ResultLimits) -> Result<Self, TlsError> {
+    pub fn start(
+        options: RedisOptions,
+        limits: ResultLimits,
+        metrics: Arc<Metrics>,
+    ) -> Result<Self, TlsError> {
         let shared = Arc::new(Shared {
             keys: Keys::new(options.key_prefix.clone()),
             connector: Connector::new(options.address.clone(), max_reply_bytes(&limits))?,
             options,
-            link: Link::default(),
-            outbox: Outbox::default(),
-            listeners: Arc::new(Listeners::new(limits.max_listeners)),
-            stored: AtomicU64::new(0),
+            link: Link::new(metrics.results_store_up.clone()),
+            outbox: Outbox::new(metrics.results_dropped.clone()),
+            stored: metrics.results_stored.clone(),
+            listeners: Arc::new(Listeners::new(limits.max_listeners, metrics)),
             limits,
         });
         let mut tasks = JoinSet::new();
@@ -156,8 +152,6 @@ impl ResultStore for RedisResults {
         let Shared { link, outbox, .. } = &*self.shared;
         StoreHealth {
             problem: link.problem(),
-            stored: self.shared.stored.load(Ordering::Relaxed),
-            dropped: outbox.dropped(),
             waiting: outbox.count(),
         }
     }

@@ -54,7 +54,7 @@ pub trait ResultStore: Send + Sync {
     /// [`Unreachable`].
     async fn usage(&self) -> Result<ResultUse, Unreachable>;
 
-    /// The outcome of what was published here.
+    /// Returns the health of the store.
     fn health(&self) -> StoreHealth;
 
     /// Waits until everything published here is stored. Does not wait for a store that does not
@@ -108,15 +108,11 @@ pub struct ResultUse {
     pub pictures: usize,
 }
 
-/// The outcome of the reports that were published here.
+/// The health of a store.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct StoreHealth {
     /// The reason why the store cannot be reached, if it cannot.
     pub problem: Option<String>,
-    /// The number of reports that were ever stored.
-    pub stored: u64,
-    /// The number of reports that were lost: too many waited, or the store refused them.
-    pub dropped: u64,
     /// The number of reports that wait to be stored.
     pub waiting: usize,
 }

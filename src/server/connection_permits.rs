@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn oldest_connection_beyond_the_limit_makes_room() {
-        let metrics = Arc::new(Metrics::new().unwrap());
+        let metrics = Arc::default();
         let permits = ConnectionPermits::new(NonZeroUsize::MIN, &metrics);
         let regular = permits.take();
         let beyond: Vec<_> = (0..=MAX_BEYOND_LIMIT).map(|_| permits.take()).collect();

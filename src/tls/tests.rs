@@ -24,14 +24,12 @@ use self::{
 use super::*;
 
 fn open(files: &Files) -> Arc<Tls> {
-    let metrics = Arc::new(Metrics::new().unwrap());
-    Arc::new(Tls::open(files.options.clone(), metrics).unwrap())
+    Arc::new(Tls::open(files.options.clone(), Arc::default()).unwrap())
 }
 
 /// The error of files that are refused at the start: one line without any of the private key.
 fn refusal(files: &Files) -> String {
-    let metrics = Arc::new(Metrics::new().unwrap());
-    let refused = Tls::open(files.options.clone(), metrics).err();
+    let refused = Tls::open(files.options.clone(), Arc::default()).err();
     let message = refused.expect("the files are taken").to_string();
     assert!(!message.contains('\n'), "{message}");
     let key = fs::read_to_string(&files.options.private_key).unwrap_or_default();

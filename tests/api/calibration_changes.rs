@@ -267,7 +267,7 @@ async fn remote_and_disabled_changes_are_refused() {
     let gate = Arc::new(Gate::default());
     let (parts, folder) = assembly(&gate);
     let store = Box::new(FolderStore::new(folder.path()));
-    let calibrations = Arc::new(Calibrations::open(store, false).unwrap());
+    let calibrations = Arc::new(Calibrations::open(store, false, Arc::default()).unwrap());
     let parts = Assembly {
         calibrations,
         ..parts

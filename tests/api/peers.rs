@@ -142,7 +142,7 @@ fn responses_of_an_inference_server_are_bounded() {
             called: "here".to_owned(),
             patience,
         };
-        let server = Arc::new(RemoteServer::new(options).unwrap());
+        let server = Arc::new(RemoteServer::new(options, Arc::default()).unwrap());
         let began = Instant::now();
         let model = folder.path();
         let loaded = RemoteDetector::load_sessions(&server, model, candidates, NonZeroUsize::MIN);

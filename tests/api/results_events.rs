@@ -4,7 +4,6 @@ use std::{io::Read, time::Duration};
 
 use axum::{body::Body, http::Request, response::Response};
 use http_body_util::BodyExt;
-use lookdown::results::ResultStore;
 use tokio::time::{Instant, timeout};
 use tower::ServiceExt;
 
@@ -155,9 +154,9 @@ async fn a_silent_stream_sends_keep_alive_comments() {
 async fn a_disconnected_subscriber_frees_its_permit() {
     let service = Service::start();
     let stream = Stream::open(&service, EVENTS, None).await;
-    assert_eq!(service.results.listeners().count(), 1);
+    assert_eq!(service.metrics.results_listeners.get(), 1);
     drop(stream);
-    assert_eq!(service.results.listeners().count(), 0);
+    assert_eq!(service.metrics.results_listeners.get(), 0);
 }
 
 #[tokio::test]
@@ -174,7 +173,7 @@ async fn a_slow_subscriber_is_disconnected_and_can_resume() {
         heard += 1;
     }
     assert!((1..MANY).contains(&heard), "{heard}");
-    assert_eq!(service.results.listeners().dropped(), 1);
+    assert_eq!(service.metrics.results_listeners_dropped.get(), 1);
     let metrics = service.get("/metrics").await.text();
     let told = "lookdown_results_listeners_dropped_total 1";
     assert!(metrics.lines().any(|line| line == told), "{metrics}");

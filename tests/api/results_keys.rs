@@ -2,7 +2,7 @@
 
 use std::{fs, sync::Arc, time::Duration};
 
-use lookdown::{access::AccessKeys, results::ResultStore};
+use lookdown::access::AccessKeys;
 use tempfile::TempDir;
 use tokio::time::Instant;
 
@@ -80,7 +80,7 @@ async fn a_stream_ends_with_its_key_before_the_next_report() {
         keyed.service.publish("lobby", 2);
         assert_eq!(going.next().await, None, "{path}");
         assert_eq!(staying.number().await, 2, "{path}");
-        assert_eq!(keyed.service.results.listeners().count(), 1, "{path}");
+        assert_eq!(keyed.service.metrics.results_listeners.get(), 1, "{path}");
     }
 }
 

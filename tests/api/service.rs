@@ -61,6 +61,7 @@ pub(crate) struct Service {
     pub(crate) readiness: Readiness,
     pub(crate) calibrations: Arc<Calibrations>,
     pub(crate) results: Arc<MemoryResults>,
+    pub(crate) metrics: Arc<Metrics>,
     /// The calibration `lobby`, and models in `models/`. Removed at the end of the test.
     pub(crate) folder: TempDir,
 }
@@ -144,6 +145,7 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
     std::fs::write(folder.path().join("lobby.json"), LOBBY).unwrap();
     let gate = Arc::clone(gate);
     let one_view = NonZeroUsize::MIN;
+    let metrics = Arc::<Metrics>::default();
     let models = ModelRepository::new(
         RepositoryOptions {
             folder: ModelFolder {
@@ -168,17 +170,20 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
             };
             Ok(Model::new(Box::new(detector)))
         }),
+        Arc::clone(&metrics),
     );
     let options = EngineOptions::for_testing("eager");
     let store = Box::new(FolderStore::new(folder.path()));
-    let calibrations = Arc::new(Calibrations::open(store, true).unwrap());
+    let calibrations = Arc::new(Calibrations::open(store, true, Arc::clone(&metrics)).unwrap());
     let registry = Arc::clone(models.registry());
-    let engine = Engine::new(registry, Some(Arc::clone(&calibrations)), options).unwrap();
+    let known = Some(Arc::clone(&calibrations));
+    let engine = Engine::new(registry, known, options, Arc::clone(&metrics)).unwrap();
     let models = Arc::new(models);
     let assembly = Assembly {
         engine,
         calibrations,
         models,
+        metrics,
     };
     (assembly, folder)
 }
@@ -206,6 +211,7 @@ impl Service {
             engine,
             calibrations,
             models,
+            metrics,
         } = assembly;
         models.load("eager").unwrap();
         gate.forget_runs();
@@ -213,13 +219,13 @@ impl Service {
         let workers = WorkerPool::start(&Arc::new(engine), NonZeroUsize::MIN, capacity).unwrap();
         let readiness = Readiness::default();
         readiness.warmed_up();
-        let results = Arc::new(MemoryResults::new(bounds.results));
+        let results = Arc::new(MemoryResults::new(bounds.results, Arc::clone(&metrics)));
         let state = ApiState::new(
             Arc::new(workers),
             models,
             Arc::clone(&calibrations),
             Arc::clone(&results) as Arc<dyn ResultStore>,
-            Arc::new(Metrics::new().unwrap()),
+            Arc::clone(&metrics),
             readiness.clone(),
             ApiOptions {
                 max_body_bytes: bounds.max_body_bytes,
@@ -243,6 +249,7 @@ impl Service {
             readiness,
             calibrations,
             results,
+            metrics,
             folder,
         }
     }

@@ -9,12 +9,13 @@ use source_scan::{absolute, code, names_crate, sources, used_paths};
 
 /// Every module, and the modules of this crate it may use. A row for a part of a module replaces
 /// the row of the module for the files of that part.
-const MAY_USE: [(&str, &[&str]); 34] = [
+const MAY_USE: [(&str, &[&str]); 35] = [
     ("plain_name", &[]),
     ("quoted", &[]),
     ("watched_file", &[]),
-    ("access", &["plain_name", "watched_file"]),
+    ("access", &["fairness", "plain_name", "watched_file"]),
     ("revision", &[]),
+    ("rounding", &[]),
     ("warning", &[]),
     ("fairness", &[]),
     ("geometry", &[]),
@@ -22,7 +23,7 @@ const MAY_USE: [(&str, &[&str]); 34] = [
     ("metrics", &[]),
     ("shutdown", &[]),
     ("poller", &[]),
-    ("results", &["fairness", "quoted", "tls"]),
+    ("results", &["fairness", "metrics", "quoted", "tls"]),
     ("open_inference", &[]),
     ("imaging", &["geometry"]),
     (
@@ -31,13 +32,21 @@ const MAY_USE: [(&str, &[&str]); 34] = [
     ),
     (
         "calibration_store",
-        &["calibration", "quoted", "plain_name", "revision", "warning"],
+        &[
+            "calibration",
+            "metrics",
+            "plain_name",
+            "quoted",
+            "revision",
+            "warning",
+        ],
     ),
     (
         "inference",
         &[
             "detection",
             "imaging",
+            "metrics",
             "open_inference",
             "quoted",
             "revision",
@@ -62,6 +71,7 @@ const MAY_USE: [(&str, &[&str]); 34] = [
             "calibration",
             "calibration_store",
             "inference",
+            "metrics",
             "quoted",
             "revision",
             "warning",
@@ -79,7 +89,10 @@ const MAY_USE: [(&str, &[&str]); 34] = [
             "pipeline",
         ],
     ),
-    ("annotation_formats", &["geometry", "detection", "pipeline"]),
+    (
+        "annotation_formats",
+        &["geometry", "detection", "pipeline", "rounding"],
+    ),
     ("annotated_image", &["geometry", "imaging", "pipeline"]),
     (
         "api::http",
@@ -103,10 +116,12 @@ const MAY_USE: [(&str, &[&str]); 34] = [
             "calibration",
             "calibration_store",
             "fairness",
+            "metrics",
             "pipeline",
             "quoted",
             "results",
             "revision",
+            "rounding",
             "telemetry",
         ],
     ),
@@ -146,6 +161,7 @@ const MAY_USE: [(&str, &[&str]); 34] = [
             "quoted",
             "results",
             "revision",
+            "rounding",
             "telemetry",
             "warning",
         ],
@@ -201,7 +217,7 @@ const MAY_USE: [(&str, &[&str]); 34] = [
 const WITH_INDEPENDENT_PARTS: [&str; 2] = ["api::routes", "api::protocols"];
 
 /// Crates for external systems, and the only modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 28] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -230,6 +246,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("indicatif", &["cli"]),
+    ("moka", &["pipeline"]),
     ("plotters", &["evaluation"]),
     ("rumqttc", &["mqtt"]),
     ("secrecy", &["settings"]),

@@ -96,11 +96,7 @@ impl AnswerFormat {
             Self::Report => "application/json",
             Self::Picture(ImageFormat::Jpeg) => "image/jpeg",
             Self::Picture(ImageFormat::Png) => "image/png",
-            // None is registered, and it must not be taken for the report.
-            Self::Annotations(AnnotationFormat::Coco) => "application/x.coco+json",
-            Self::Annotations(AnnotationFormat::Cvat | AnnotationFormat::Voc) => "application/xml",
-            Self::Annotations(AnnotationFormat::Yolo) => "text/plain; charset=utf-8",
-            Self::Annotations(AnnotationFormat::GeoJson) => "application/geo+json",
+            Self::Annotations(format) => format.media_type(),
         }
     }
 }

@@ -4,11 +4,11 @@ use super::{
     Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportFloor, ReportImage,
     ReportModel, ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews,
     ReportWarning, ReportZone,
-    rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
 };
 use crate::{
     imaging::lens_circle::LensCircle,
     pipeline::{self, DetectionReport, ModelUsed},
+    rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
     warning::Warning,
 };
 

@@ -1,6 +1,6 @@
 //! Health checks and metrics.
 
-use std::{collections::BTreeSet, time::Instant};
+use std::time::Instant;
 
 use axum::{
     Json,
@@ -14,6 +14,7 @@ use crate::{
     api::{ApiState, http::problem::Problem, require_scope::RequireRead},
     calibration::CalibrationId,
     calibration_store::CalibrationsHealth,
+    metrics::gauge_value,
 };
 
 /// Largest number of invalid files in a response.
@@ -148,68 +149,35 @@ pub(in crate::api) async fn readyz(
 pub(in crate::api) async fn metrics(
     State(state): State<ApiState>,
 ) -> Result<impl IntoResponse, Problem> {
-    let workers = &state.workers;
-    state
-        .metrics
-        .show_frames(workers.pending(), workers.withdrawn());
-    let quiet = workers.quiet_for(Instant::now());
-    state.metrics.show_progress(quiet, workers.stalls());
-    show_models(&state);
-    show_remote(&state);
-    show_calibrations(&state);
+    read_gauges(&state).await;
     forget_zones(&state);
-    let rigs = state.workers.engine().rig_cache_use();
-    state
-        .metrics
-        .show_rig_cache(rigs.rigs, rigs.bytes, rigs.builds, rigs.evictions);
-    let recalled = state.workers.engine().inference_cache_hits();
-    state.metrics.show_recalled(recalled);
-    show_results(&state).await;
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
 
-/// Updates the metrics of the result store and of its subscribers.
-async fn show_results(state: &ApiState) {
-    let metrics = &state.metrics;
-    if let Ok(kept) = state.results.usage().await {
-        metrics.show_results(kept.cameras, kept.reports, kept.bytes, kept.pictures);
+/// Sets the gauges that are read and not counted: an age, lengths of queues, and the use of a result
+/// store that other servers change, too.
+async fn read_gauges(state: &ApiState) {
+    let (metrics, workers) = (&state.metrics, &state.workers);
+    metrics.pending_frames.set(gauge_value(workers.pending()));
+    let quiet = workers.quiet_for(Instant::now()).as_secs();
+    metrics.seconds_without_progress.set(gauge_value(quiet));
+    let waiting = state.results.health().waiting;
+    metrics.results_waiting.set(gauge_value(waiting));
+    if let Ok(usage) = state.results.usage().await {
+        for (gauge, count) in [
+            (&metrics.results_cameras, usage.cameras),
+            (&metrics.results_reports, usage.reports),
+            (&metrics.results_bytes, usage.bytes),
+            (&metrics.results_pictures, usage.pictures),
+        ] {
+            gauge.set(gauge_value(count));
+        }
     }
-    let health = state.results.health();
-    let up = health.problem.is_none();
-    metrics.show_result_store(up, health.waiting, health.stored, health.dropped);
-    let listeners = state.results.listeners();
-    metrics.show_listeners(listeners.count(), listeners.dropped());
 }
 
-/// Updates the metrics of the models.
-fn show_models(state: &ApiState) {
-    let models = state.models.registry().all();
-    let rows: Vec<_> = models
-        .iter()
-        .map(|model| (model.name(), model.revision()))
-        .collect();
-    let counts = state.models.load_counts();
-    let loads = [("success", counts.succeeded), ("failure", counts.failed)];
-    state.metrics.show_models(&rows, &loads);
-}
-
-/// Updates the metrics of the inference server, if there is one.
-fn show_remote(state: &ApiState) {
-    let Some(remote) = state.models.remote() else {
-        return;
-    };
-    let counts = remote.counts();
-    let requests = [
-        ("answered", counts.answered),
-        ("busy", counts.busy),
-        ("failed", counts.failed),
-        ("not_sent", counts.not_sent),
-    ];
-    state.metrics.show_remote(remote.is_available(), &requests);
-}
-
-/// Removes the metrics of zones that no calibration has any longer.
+/// Removes the metrics of zones that no calibration has any longer. A frame that used the calibration
+/// before the change may set them later than the change, so the scrape does it.
 fn forget_zones(state: &ApiState) {
     state.metrics.retain_zones(|calibration, zone| {
         let entry = calibration.parse::<CalibrationId>().ok();
@@ -219,18 +187,4 @@ fn forget_zones(state: &ApiState) {
             zones.any(|known| known.name == zone)
         })
     });
-}
-
-/// Updates the metrics of the calibrations.
-fn show_calibrations(state: &ApiState) {
-    let health = state.calibrations.health();
-    let files: BTreeSet<_> = health.problems.iter().map(|(file, _)| file).collect();
-    let loads = [
-        ("success", health.loads_succeeded),
-        ("failure", health.loads_failed),
-    ];
-    let up = health.store_problem.is_none();
-    state
-        .metrics
-        .show_calibrations(health.serving, &health.revision, files.len(), up, &loads);
 }

@@ -1,9 +1,6 @@
 //! Scans the store for changed files and reads them.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, atomic::Ordering},
-};
+use std::{collections::BTreeMap, sync::Arc};
 
 use parking_lot::MutexGuard;
 
@@ -100,12 +97,13 @@ impl Calibrations {
         if !loaded.is_changed(known) {
             return;
         }
-        let counter = if loaded.problems.is_empty() {
-            &self.succeeded
+        let result = if loaded.problems.is_empty() {
+            "success"
         } else {
-            &self.failed
+            "failure"
         };
-        counter.fetch_add(1, Ordering::Relaxed);
+        let loads = &self.metrics.calibration_loads;
+        loads.with_label_values(&[result]).inc();
         loaded.log(known);
     }
 }

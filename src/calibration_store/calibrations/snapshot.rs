@@ -6,7 +6,11 @@ use std::{
 };
 
 use super::{CalibrationEntry, load::LoadedFile};
-use crate::{calibration::CalibrationId, revision::revision_of};
+use crate::{
+    calibration::CalibrationId,
+    metrics::{Metrics, gauge_value, replace_info},
+    revision::revision_of,
+};
 
 /// All calibrations at one moment; never changed, only replaced.
 #[derive(Debug, Default)]
@@ -43,10 +47,6 @@ pub struct CalibrationsHealth {
     pub problems: Vec<(String, String)>,
     /// The reason why the store could not be read, if it could not.
     pub store_problem: Option<String>,
-    /// Files read and used since the start.
-    pub loads_succeeded: u64,
-    /// Files of which something could not be used since the start.
-    pub loads_failed: u64,
 }
 
 impl Snapshot {
@@ -126,7 +126,23 @@ impl Snapshot {
         rows.into_values().collect()
     }
 
-    /// All but the counts of loads.
+    /// Publishes this snapshot, which replaces `before`, in the metrics.
+    pub(super) fn publish(&self, metrics: &Metrics, before: Option<&Self>) {
+        let broken = self.files.values().filter(|file| !file.problems.is_empty());
+        let before = before.map(|before| [&*before.revision]);
+        replace_info(
+            &metrics.calibrations_info,
+            before.as_ref().map(<[_; 1]>::as_slice),
+            &[&self.revision],
+        );
+        metrics.calibrations.set(gauge_value(self.by_id.len()));
+        let up = i64::from(self.store_problem.is_none());
+        metrics.calibration_store_up.set(up);
+        let broken = gauge_value(broken.count());
+        metrics.calibration_files_broken.set(broken);
+    }
+
+    /// Returns the health of the calibrations.
     pub(super) fn health(&self) -> CalibrationsHealth {
         let problems = self.files.values().flat_map(|file| {
             let name = &file.named.file.name;
@@ -137,7 +153,6 @@ impl Snapshot {
             revision: self.revision.clone(),
             problems: problems.collect(),
             store_problem: self.store_problem.clone(),
-            ..CalibrationsHealth::default()
         }
     }
 }

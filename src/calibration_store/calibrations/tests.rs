@@ -17,7 +17,12 @@ fn content(id: &str, focal: f64) -> String {
 }
 
 fn open(folder: &Path) -> Calibrations {
-    Calibrations::open(Box::new(FolderStore::new(folder)), true).unwrap()
+    Calibrations::open(Box::new(FolderStore::new(folder)), true, Arc::default()).unwrap()
+}
+
+fn failed_loads(calibrations: &Calibrations) -> u64 {
+    let loads = &calibrations.metrics.calibration_loads;
+    loads.with_label_values(&["failure"]).get()
 }
 
 fn id(id: &str) -> CalibrationId {
@@ -99,9 +104,9 @@ fn invalid_new_version_leaves_the_old_one_serving() {
         assert_eq!(health.revision, all_good, "{broken}");
         assert_eq!(health.problems[0].0, "lobby.json");
     }
-    let failed = calibrations.health().loads_failed;
+    let failed = failed_loads(&calibrations);
     calibrations.refresh();
-    assert_eq!((failed, calibrations.health().loads_failed), (3, 3));
+    assert_eq!((failed, failed_loads(&calibrations)), (3, 3));
     fs::write(&file, content("lobby", 201.125)).unwrap();
     calibrations.refresh();
     assert_ne!(revision(&calibrations, "lobby"), good);
@@ -168,9 +173,9 @@ fn an_unreadable_file_is_retried_and_reported_once() {
             Ok(())
         }
     }
-    let calibrations = Calibrations::open(Box::new(Liar), true).unwrap();
+    let calibrations = Calibrations::open(Box::new(Liar), true, Arc::default()).unwrap();
     calibrations.refresh();
-    assert_eq!(calibrations.health().loads_failed, 1);
+    assert_eq!(failed_loads(&calibrations), 1);
     let error = calibrations.get(&id("lobby")).unwrap_err().to_string();
     assert_eq!(error, "liar/lobby.json: liar: it is gone");
 }
@@ -202,7 +207,7 @@ fn a_change_that_cannot_be_looked_at_is_not_said_to_have_failed() {
             Ok(())
         }
     }
-    let calibrations = Calibrations::open(Box::new(Mute::default()), true).unwrap();
+    let calibrations = Calibrations::open(Box::new(Mute::default()), true, Arc::default()).unwrap();
     let put = || {
         let content = content("lobby", 190.0);
         let always = WriteCondition::Always;
@@ -239,7 +244,7 @@ fn a_file_whose_name_and_id_differ_is_refused() {
 #[test]
 fn a_missing_folder_is_refused_by_name() {
     let store = FolderStore::new(Path::new("/nowhere/at/all"));
-    let error = Calibrations::open(Box::new(store), true).unwrap_err();
+    let error = Calibrations::open(Box::new(store), true, Arc::default()).unwrap_err();
     assert!(
         error.to_string().starts_with("/nowhere/at/all: "),
         "{error}"

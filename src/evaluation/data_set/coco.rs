@@ -8,6 +8,7 @@
 use std::{
     collections::HashMap,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use serde::Deserialize;
@@ -59,7 +60,7 @@ struct CocoCategory {
 /// Reads the annotations of a folder with `images/` and `calibrations/`.
 pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, DataSetError> {
     let calibrations = FolderStore::new(&folder.join("calibrations"));
-    let calibrations = Calibrations::open(Box::new(calibrations), false)?;
+    let calibrations = Calibrations::open(Box::new(calibrations), false, Arc::default())?;
     let pictures = folder.join("images");
     let mut reader = Reader::default();
     reader.read(file, Some(&calibrations), |name| Ok(pictures.join(name)))?;

@@ -1,7 +1,10 @@
 //! An inference server, shared by all sessions and the health check.
 
 use std::{
-    sync::atomic::{AtomicU64, AtomicUsize, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -13,7 +16,10 @@ use super::{
     exchange::{Answer, Question},
     options::RemoteOptions,
 };
-use crate::inference::InferenceError;
+use crate::{
+    inference::InferenceError,
+    metrics::{Metrics, start_at_zero},
+};
 
 /// Timeout of the readiness probe.
 const PROBE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -24,18 +30,9 @@ const RETRY_AFTER: Duration = Duration::from_secs(1);
 /// Most characters of the server's error message that are reported.
 const MAX_MESSAGE_CHARS: usize = 300;
 
-/// Numbers of inference requests by result since the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct RemoteCounts {
-    /// Requests with a valid response.
-    pub answered: u64,
-    /// Requests refused by a busy server.
-    pub busy: u64,
-    /// Requests without a valid response.
-    pub failed: u64,
-    /// Requests that were not sent because the breaker was open.
-    pub not_sent: u64,
-}
+/// The results of requests: a valid response, a refusal of a busy server, no valid response, and
+/// none sent because the breaker was open.
+const RESULTS: [&str; 4] = ["answered", "busy", "failed", "not_sent"];
 
 /// An inference server. Its methods block and must not run on the async runtime.
 pub struct RemoteServer {
@@ -44,10 +41,7 @@ pub struct RemoteServer {
     breaker: Breaker,
     in_flight: AtomicUsize,
     answered_at: Mutex<Option<Instant>>,
-    answered: AtomicU64,
-    busy: AtomicU64,
-    failed: AtomicU64,
-    not_sent: AtomicU64,
+    metrics: Arc<Metrics>,
 }
 
 impl RemoteServer {
@@ -55,23 +49,23 @@ impl RemoteServer {
     ///
     /// # Errors
     /// [`InferenceError::Remote`] when the system's certificates cannot be used.
-    pub fn new(options: RemoteOptions) -> Result<Self, InferenceError> {
+    pub fn new(options: RemoteOptions, metrics: Arc<Metrics>) -> Result<Self, InferenceError> {
         let connection = Connection::new(&options);
         let connection = connection.map_err(|error| InferenceError::Remote {
             url: options.url.to_string(),
             detail: error.to_string(),
         })?;
-        Ok(Self {
+        start_at_zero(&metrics.remote_requests, &RESULTS);
+        let server = Self {
             connection,
             options,
             breaker: Breaker::default(),
             in_flight: AtomicUsize::new(0),
             answered_at: Mutex::default(),
-            answered: AtomicU64::new(0),
-            busy: AtomicU64::new(0),
-            failed: AtomicU64::new(0),
-            not_sent: AtomicU64::new(0),
-        })
+            metrics,
+        };
+        server.publish_availability();
+        Ok(server)
     }
 
     /// Returns true if requests are sent to the server, that is, the breaker is closed.
@@ -80,34 +74,23 @@ impl RemoteServer {
         !self.breaker.is_open()
     }
 
-    /// Numbers of inference requests by result.
-    #[must_use]
-    pub fn counts(&self) -> RemoteCounts {
-        let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        RemoteCounts {
-            answered: count(&self.answered),
-            busy: count(&self.busy),
-            failed: count(&self.failed),
-            not_sent: count(&self.not_sent),
-        }
-    }
-
     /// Probes the server's readiness, unless recent responses make that unnecessary. Returns true
     /// if requests are sent to it from now on. A periodic call, about every second, lets the server
     /// recover automatically.
     pub fn check_health(&self) -> bool {
-        if self.is_available() && self.responded_recently() {
-            return true;
-        }
-        match self.ready() {
-            Ok(()) => {
-                if self.breaker.close() {
-                    let url = self.connection.address();
-                    tracing::info!(%url, "the inference server is available again");
+        if !(self.is_available() && self.responded_recently()) {
+            match self.ready() {
+                Ok(()) => {
+                    if self.breaker.close() {
+                        let url = self.connection.address();
+                        tracing::info!(%url, "the inference server is available again");
+                    }
                 }
+                Err(detail) => self.note_failure(&detail),
             }
-            Err(detail) => self.note_failure(&detail),
         }
+        // Each time, so that a concurrent failure cannot leave an outdated value.
+        self.publish_availability();
         self.is_available()
     }
 
@@ -134,7 +117,7 @@ impl RemoteServer {
         question: &Question<'_>,
     ) -> Result<Answer, InferenceError> {
         if self.breaker.is_open() {
-            self.not_sent.fetch_add(1, Ordering::Relaxed);
+            self.count("not_sent");
             return Err(self.unavailable(
                 "it failed repeatedly, so no requests are sent until it is ready".to_owned(),
             ));
@@ -161,15 +144,15 @@ impl RemoteServer {
         }
         match answer {
             Ok(Ok(answer)) => {
-                self.answered.fetch_add(1, Ordering::Relaxed);
+                self.count("answered");
                 Ok(answer)
             }
             Ok(Err(retry_after)) => {
-                self.busy.fetch_add(1, Ordering::Relaxed);
+                self.count("busy");
                 Err(InferenceError::RemoteBusy { retry_after })
             }
             Err(detail) => {
-                self.failed.fetch_add(1, Ordering::Relaxed);
+                self.count("failed");
                 self.note_failure(&detail);
                 Err(self.unavailable(detail))
             }
@@ -193,8 +176,27 @@ impl RemoteServer {
         recently || self.in_flight.load(Ordering::Relaxed) > 0
     }
 
+    fn count(&self, result: &str) {
+        let requests = &self.metrics.remote_requests;
+        requests.with_label_values(&[result]).inc();
+    }
+
+    /// The number of requests with this result since the start.
+    #[cfg(test)]
+    pub(super) fn count_of(&self, result: &str) -> u64 {
+        let requests = &self.metrics.remote_requests;
+        requests.with_label_values(&[result]).get()
+    }
+
+    fn publish_availability(&self) {
+        let no_labels: &[&str] = &[];
+        let up = self.metrics.remote_up.with_label_values(no_labels);
+        up.set(i64::from(self.is_available()));
+    }
+
     fn note_failure(&self, detail: &str) {
         if self.breaker.failed() {
+            self.publish_availability();
             let url = self.connection.address();
             tracing::warn!(%url, "the inference server is unavailable: {detail}");
         }

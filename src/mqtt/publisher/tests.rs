@@ -20,8 +20,8 @@ struct Setup {
 async fn setup() -> Setup {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let port = listener.local_addr().unwrap().port();
-    let results = Arc::new(MemoryResults::new(ResultLimits::default()));
-    let metrics = Arc::new(Metrics::new().unwrap());
+    let results = Arc::new(MemoryResults::new(ResultLimits::default(), Arc::default()));
+    let metrics = Arc::<Metrics>::default();
     let options = MqttOptions {
         broker: format!("mqtt://home:secret@127.0.0.1:{port}")
             .parse()

@@ -16,7 +16,7 @@ use crate::{
         camera_rig::CameraRig,
         error::internal,
         report::CalibrationUsed,
-        rig_cache::{RigCacheUse, RigCamera, RigKey},
+        rig_cache::{RigCamera, RigKey},
     },
     warning::{Warning, WarningCode},
 };
@@ -48,12 +48,6 @@ pub(super) struct FrameCamera {
 }
 
 impl Engine {
-    /// Returns the use of the rig cache: memory, builds and evictions.
-    #[must_use]
-    pub fn rig_cache_use(&self) -> RigCacheUse {
-        self.rigs.usage()
-    }
-
     pub(super) fn camera(
         &self,
         job: &DetectJob,

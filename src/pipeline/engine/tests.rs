@@ -11,7 +11,7 @@ fn engine_with_lobby() -> (Engine, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("lobby.json"), LOBBY).unwrap();
     let store = Box::new(FolderStore::new(folder.path()));
-    let calibrations = Arc::new(Calibrations::open(store, false).unwrap());
+    let calibrations = Arc::new(Calibrations::open(store, false, Arc::default()).unwrap());
     (engine(BlobDetector::default(), Some(calibrations)), folder)
 }
 
@@ -179,7 +179,7 @@ fn a_cached_frame_is_refined_without_inference() {
         (again.batch_count, again.timings.inference.as_nanos()),
         (0, 0)
     );
-    assert_eq!(engine.inference_cache_hits(), 1);
+    assert_eq!(engine.metrics().inference_cache_hits.get(), 1);
     // Inference without the cache gives the same result.
     let parameters = [("calibration", "lobby"), ("refine", "nms")];
     let image = frame_with_disc(600, [420.0, 300.0], 20.0);

@@ -5,6 +5,7 @@ use crate::{
     calibration::{Areas, CameraGeometry},
     geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
     imaging::NetworkInput,
+    metrics::IntGauge,
 };
 
 fn key(radius: i64) -> RigKey {
@@ -39,9 +40,22 @@ fn rig() -> CameraRig {
     )
 }
 
+fn cache(budget_bytes: usize) -> RigCache {
+    RigCache::new(budget_bytes, Arc::default())
+}
+
+/// Rigs, bytes, builds and evictions.
+fn usage(cache: &RigCache) -> [i64; 4] {
+    let metrics = &cache.metrics;
+    let [builds, evictions] = [&metrics.rig_cache_builds, &metrics.rig_cache_evictions]
+        .map(|counter| i64::try_from(counter.get()).unwrap());
+    let [rigs, bytes] = [&metrics.rig_cache_rigs, &metrics.rig_cache_bytes].map(IntGauge::get);
+    [rigs, bytes, builds, evictions]
+}
+
 #[test]
 fn a_rig_is_built_once_and_shared() {
-    let cache = RigCache::new(usize::MAX);
+    let cache = cache(usize::MAX);
     let first = cache.get_or_build(&key(1), rig);
     let second = cache.get_or_build(&key(1), || unreachable!("the rig is cached"));
     assert!(Arc::ptr_eq(&first, &second));
@@ -49,7 +63,7 @@ fn a_rig_is_built_once_and_shared() {
 
 #[test]
 fn the_least_recently_used_rig_is_evicted_beyond_the_budget() {
-    let cache = RigCache::new(2 * rig().bytes());
+    let cache = cache(2 * rig().bytes());
     cache.get_or_build(&key(1), rig);
     cache.get_or_build(&key(2), rig);
     cache.get_or_build(&key(1), || unreachable!("the rig is cached"));
@@ -64,8 +78,34 @@ fn the_least_recently_used_rig_is_evicted_beyond_the_budget() {
 }
 
 #[test]
+fn the_memory_of_evicted_rigs_is_freed_soon() {
+    const BUILDS: i64 = 300;
+    let cache = cache(2 * rig().bytes());
+    let built = (0..BUILDS).map(|radius| Arc::downgrade(&cache.get_or_build(&key(radius), rig)));
+    let built: Vec<_> = built.collect();
+    let alive = built.iter().filter(|rig| rig.strong_count() > 0).count();
+    // The cache frees an entry a few operations after its eviction.
+    assert!((2..30).contains(&alive), "{alive}");
+}
+
+#[test]
+fn callers_wait_for_one_build() {
+    let cache = cache(usize::MAX);
+    let slow = || {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        rig()
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| cache.get_or_build(&key(1), slow));
+        }
+    });
+    assert_eq!(usage(&cache)[2], 1);
+}
+
+#[test]
 fn a_rig_larger_than_the_budget_still_serves_its_frame() {
-    let cache = RigCache::new(1);
+    let cache = cache(1);
     assert!(cache.get_or_build(&key(1), rig).bytes() > 1);
     let kept = cache.get_or_build(&key(1), || unreachable!("the newest rig is not evicted"));
     assert_eq!(kept.view_count(), 18);
@@ -74,35 +114,25 @@ fn a_rig_larger_than_the_budget_still_serves_its_frame() {
 #[test]
 fn usage_reports_contents_builds_and_evictions() {
     let bytes = rig().bytes();
-    let cache = RigCache::new(2 * bytes);
-    let [empty, full] = [0, 2].map(|rigs| RigCacheUse {
-        rigs,
-        bytes: rigs * bytes,
-        builds: rigs as u64,
-        evictions: 0,
-    });
-    assert_eq!(cache.usage(), empty);
+    let cache = cache(2 * bytes);
+    assert_eq!(usage(&cache), [0; 4]);
     for radius in [1, 2, 1] {
         cache.get_or_build(&key(radius), rig);
     }
-    assert_eq!(cache.usage(), full);
+    let full = gauge_value(2 * bytes);
+    assert_eq!(usage(&cache), [2, full, 2, 0]);
     cache.get_or_build(&key(3), rig);
-    let turned_over = RigCacheUse {
-        builds: 3,
-        evictions: 1,
-        ..full
-    };
-    assert_eq!(cache.usage(), turned_over);
+    assert_eq!(usage(&cache), [2, full, 3, 1]);
 }
 
 #[test]
 fn a_thousand_cameras_used_once_each_fit_the_default_budget() {
-    let cache = RigCache::new(1 << 30);
+    let cache = cache(1 << 30);
     for radius in 0..1000 {
         cache.get_or_build(&key(radius), rig);
     }
-    let usage = cache.usage();
-    assert_eq!((usage.rigs, usage.builds, usage.evictions), (1000, 1000, 0));
+    let [rigs, _, builds, evictions] = usage(&cache);
+    assert_eq!([rigs, builds, evictions], [1000, 1000, 0]);
     // The same holds for views as large as those of the default model.
     let plan = ViewPlan::balanced();
     let input = NetworkInput::plain(416, 416);

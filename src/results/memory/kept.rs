@@ -26,7 +26,6 @@ pub(super) struct Kept {
     pictures: Pictures,
     bytes: usize,
     newest: ReportId,
-    stored: u64,
 }
 
 impl Kept {
@@ -39,7 +38,6 @@ impl Kept {
             earlier: BTreeMap::new(),
             bytes: 0,
             newest: ReportId::default(),
-            stored: 0,
         }
     }
 
@@ -53,7 +51,6 @@ impl Kept {
         let id = ReportId::next(self.newest, now);
         let stored = Arc::new(StoredReport { id, report });
         self.newest = id;
-        self.stored += 1;
         self.bytes += stored.report.bytes();
         let camera = &stored.report.camera;
         self.pictures.replace(camera, id, picture);
@@ -149,11 +146,6 @@ impl Kept {
 
     pub(super) fn picture(&self, camera: &str) -> Option<Arc<StoredPicture>> {
         self.pictures.of(camera)
-    }
-
-    /// The number of reports that were ever kept.
-    pub(super) fn stored(&self) -> u64 {
-        self.stored
     }
 
     pub(super) fn usage(&self) -> ResultUse {

@@ -3,11 +3,15 @@
 use redis::{RedisError, RetryMethod, aio::MultiplexedConnection};
 use tokio::sync::watch;
 
-use crate::{quoted::one_line, results::Unreachable};
+use crate::{metrics::IntGauge, quoted::one_line, results::Unreachable};
 
 /// The shared connection to Redis, if there is one now.
 #[derive(Debug)]
-pub(super) struct Link(watch::Sender<State>);
+pub(super) struct Link {
+    state: watch::Sender<State>,
+    /// 1 while there is a connection.
+    up: IntGauge,
+}
 
 enum State {
     Up(Line),
@@ -27,23 +31,30 @@ impl std::fmt::Debug for State {
     }
 }
 
-impl Default for Link {
-    fn default() -> Self {
-        Self(watch::Sender::new(State::Down(
-            "not connected yet".to_owned(),
-        )))
-    }
-}
-
 impl Link {
+    pub(super) fn new(up: IntGauge) -> Self {
+        let state = State::Down("not connected yet".to_owned());
+        Self {
+            state: watch::Sender::new(state),
+            up,
+        }
+    }
+
     /// Sets the current connection.
     pub(super) fn is_up(&self, connection: MultiplexedConnection, number: u64) {
-        self.0.send_replace(State::Up(Line { connection, number }));
+        let state = State::Up(Line { connection, number });
+        self.change(|now| {
+            *now = state;
+            true
+        });
     }
 
     /// Removes the connection and keeps the reason.
     pub(super) fn is_down(&self, problem: &RedisError) {
-        self.0.send_replace(State::Down(one_line(problem)));
+        self.change(|now| {
+            *now = State::Down(one_line(problem));
+            true
+        });
     }
 
     /// Returns the outcome of a query. A connection that has failed is removed.
@@ -54,7 +65,7 @@ impl Link {
     ) -> Result<T, Unreachable> {
         outcome.map_err(|error| {
             if !is_refusal(&error) {
-                self.0.send_if_modified(|state| {
+                self.change(|state| {
                     // It may have been replaced in the meantime.
                     let is_it = matches!(state, State::Up(now) if now.number == line.number);
                     if is_it {
@@ -67,9 +78,18 @@ impl Link {
         })
     }
 
+    /// Changes the state, unless `change` returns false.
+    fn change(&self, change: impl FnOnce(&mut State) -> bool) {
+        self.state.send_if_modified(|state| {
+            let is_changed = change(state);
+            self.up.set(i64::from(state.problem().is_none()));
+            is_changed
+        });
+    }
+
     /// The connection, or an error with the reason why there is none.
     pub(super) fn line(&self) -> Result<Line, Unreachable> {
-        match &*self.0.borrow() {
+        match &*self.state.borrow() {
             State::Up(line) => Ok(line.clone()),
             State::Down(problem) => Err(Unreachable(problem.clone())),
         }
@@ -78,7 +98,7 @@ impl Link {
     /// Waits until there is a connection.
     pub(super) async fn next_line(&self) -> Line {
         loop {
-            let mut state = self.0.subscribe();
+            let mut state = self.state.subscribe();
             // The sender is `self`, so the channel cannot close during the wait.
             if let Ok(state) = state.wait_for(|state| state.problem().is_none()).await
                 && let State::Up(line) = &*state
@@ -90,7 +110,7 @@ impl Link {
 
     /// Waits until there is no connection, and returns the reason.
     pub(super) async fn lost(&self) -> String {
-        let mut state = self.0.subscribe();
+        let mut state = self.state.subscribe();
         let down = state.wait_for(|state| state.problem().is_some()).await;
         down.ok()
             .and_then(|state| state.problem().map(ToOwned::to_owned))
@@ -99,7 +119,7 @@ impl Link {
 
     /// The reason why there is no connection.
     pub(super) fn problem(&self) -> Option<String> {
-        self.0.borrow().problem().map(ToOwned::to_owned)
+        self.state.borrow().problem().map(ToOwned::to_owned)
     }
 }
 

@@ -6,7 +6,10 @@ use std::collections::VecDeque;
 use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::Notify;
 
-use crate::results::{NewPicture, NewReport};
+use crate::{
+    metrics::IntCounter,
+    results::{NewPicture, NewReport},
+};
 
 /// Most reports that wait: minutes of a few cameras.
 const MOST_REPORTS: usize = 1000;
@@ -20,10 +23,12 @@ pub(super) struct PendingReport {
 }
 
 /// The queue, oldest first.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Outbox {
     waiting: Mutex<Waiting>,
     changed: Notify,
+    /// Reports that were dropped or refused.
+    dropped: IntCounter,
 }
 
 #[derive(Debug, Default)]
@@ -32,10 +37,18 @@ struct Waiting {
     bytes: usize,
     /// True while a report was taken and is not done.
     one_is_taken: bool,
-    dropped: u64,
 }
 
 impl Outbox {
+    /// Creates an empty queue that counts dropped and refused reports in `dropped`.
+    pub(super) fn new(dropped: IntCounter) -> Self {
+        Self {
+            waiting: Mutex::default(),
+            changed: Notify::new(),
+            dropped,
+        }
+    }
+
     /// Appends a report. Never waits.
     pub(super) fn push(&self, report: NewReport, picture: Option<NewPicture>) {
         let parcel = PendingReport { report, picture };
@@ -45,7 +58,7 @@ impl Outbox {
         waiting.parcels.push_back(parcel);
         while waiting.parcels.len() > MOST_REPORTS || waiting.bytes > MOST_BYTES {
             waiting.take_first();
-            waiting.dropped += 1;
+            self.dropped.inc();
         }
         drop(waiting);
         self.changed.notify_waiters();
@@ -70,8 +83,8 @@ impl Outbox {
     pub(super) fn done(&self, refused: bool) {
         let mut waiting = self.waiting();
         waiting.one_is_taken = false;
-        waiting.dropped += u64::from(refused);
         drop(waiting);
+        self.dropped.inc_by(u64::from(refused));
         self.changed.notify_waiters();
     }
 
@@ -92,11 +105,6 @@ impl Outbox {
     pub(super) fn count(&self) -> usize {
         let waiting = self.waiting();
         waiting.parcels.len() + usize::from(waiting.one_is_taken)
-    }
-
-    /// The number of reports that were dropped or refused.
-    pub(super) fn dropped(&self) -> u64 {
-        self.waiting().dropped
     }
 
     fn take(&self) -> Option<PendingReport> {
@@ -142,6 +150,10 @@ mod tests {
 
     use super::*;
 
+    fn outbox() -> Outbox {
+        Outbox::new(IntCounter::new("dropped", "Dropped reports.").unwrap())
+    }
+
     fn report(persons: usize, length: usize) -> NewReport {
         NewReport {
             camera: "lobby".to_owned(),
@@ -153,7 +165,7 @@ mod tests {
 
     #[tokio::test]
     async fn reports_are_taken_in_arrival_order() {
-        let outbox = Outbox::default();
+        let outbox = outbox();
         let (taken, ()) = tokio::join!(
             async {
                 [outbox.first().await, outbox.first().await].map(|parcel| parcel.report.persons)
@@ -169,21 +181,21 @@ mod tests {
     #[tokio::test]
     async fn a_full_outbox_drops_and_counts_the_oldest_reports() {
         for length in [1, MOST_BYTES / 10] {
-            let outbox = Outbox::default();
+            let outbox = outbox();
             for number in 0..2 * MOST_REPORTS {
                 outbox.push(report(number, length), None);
             }
             let kept = outbox.count();
             assert!((1..=MOST_REPORTS).contains(&kept), "{kept}");
             assert!(kept * length <= MOST_BYTES);
-            assert_eq!(outbox.dropped(), (2 * MOST_REPORTS - kept) as u64);
+            assert_eq!(outbox.dropped.get(), (2 * MOST_REPORTS - kept) as u64);
             assert_eq!(outbox.first().await.report.persons, 2 * MOST_REPORTS - kept);
         }
     }
 
     #[tokio::test]
     async fn the_outbox_is_empty_when_the_last_report_is_done() {
-        let outbox = Outbox::default();
+        let outbox = outbox();
         outbox.is_empty().await;
         outbox.push(report(1, 1), None);
         tokio::join!(outbox.is_empty(), async {
@@ -191,12 +203,12 @@ mod tests {
             assert_eq!(outbox.count(), 1);
             outbox.done(true);
         });
-        assert_eq!((outbox.count(), outbox.dropped()), (0, 1));
+        assert_eq!((outbox.count(), outbox.dropped.get()), (0, 1));
     }
 
     #[tokio::test]
     async fn only_the_latest_image_of_a_camera_waits() {
-        let outbox = Outbox::default();
+        let outbox = outbox();
         let picture = |length| NewPicture {
             frame: Bytes::from(vec![0; length]),
             sketch: Bytes::new(),
@@ -204,7 +216,7 @@ mod tests {
         for number in 1..=9 {
             outbox.push(report(number, 1), Some(picture(MOST_BYTES / 2)));
         }
-        assert_eq!((outbox.count(), outbox.dropped()), (9, 0));
+        assert_eq!((outbox.count(), outbox.dropped.get()), (9, 0));
         for number in 1..=9 {
             let parcel = outbox.first().await;
             assert_eq!(parcel.report.persons, number);

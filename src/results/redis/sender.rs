@@ -1,7 +1,7 @@
 //! Sends reports from the outbox to Redis, one after the other. Each report is stored atomically
 //! and exactly once: after a lost answer, Redis recognises the report by its number.
 
-use std::sync::{Arc, atomic::Ordering};
+use std::sync::Arc;
 
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use uuid::Uuid;
@@ -32,7 +32,7 @@ pub(super) async fn run(shared: Arc<Shared>) {
         }
         last_was_refused = refusal.is_some();
         if !last_was_refused {
-            shared.stored.fetch_add(1, Ordering::Relaxed);
+            shared.stored.inc();
         }
         shared.outbox.done(last_was_refused);
     }

@@ -1,12 +1,12 @@
 //! The options and the state that the store shares with its background tasks.
 
-use std::{
-    sync::{Arc, atomic::AtomicU64},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use super::{RedisAddress, connect::Connector, keys::Keys, link::Link, outbox::Outbox};
-use crate::results::{Listeners, ResultLimits};
+use crate::{
+    metrics::IntCounter,
+    results::{Listeners, ResultLimits},
+};
 
 /// The Redis server and the part of it that this installation uses.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,5 +28,5 @@ pub(super) struct Shared {
     pub(super) link: Link,
     pub(super) outbox: Outbox,
     pub(super) listeners: Arc<Listeners>,
-    pub(super) stored: AtomicU64,
+    pub(super) stored: IntCounter,
 }

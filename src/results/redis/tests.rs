@@ -64,7 +64,7 @@ impl EvilRedis {
             key_prefix: "lookdown".to_owned(),
             max_age: Duration::from_mins(1),
         };
-        let store = RedisResults::start(options, limits).unwrap();
+        let store = RedisResults::start(options, limits, Arc::default()).unwrap();
         timeout(TIMEOUT, store.shared.link.next_line())
             .await
             .unwrap();

@@ -15,6 +15,7 @@ use lookdown::{
         InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions,
         RepositoryRow,
     },
+    metrics::Metrics,
     revision::sha256_of,
 };
 use tempfile::TempDir;
@@ -37,6 +38,7 @@ fn options_of(folder: &TempDir) -> RepositoryOptions {
 
 struct Models {
     repository: ModelRepository,
+    metrics: Arc<Metrics>,
     folder: TempDir,
 }
 
@@ -47,8 +49,11 @@ impl Models {
         for name in ["a", "b"] {
             write(&folder.path().join(name), name, "", &fixture("any_batch"));
         }
+        let metrics = Arc::<Metrics>::default();
+        let (options, loader) = (options_of(&folder), Box::new(model_of_two_sessions));
         Self {
-            repository: ModelRepository::new(options_of(&folder), Box::new(model_of_two_sessions)),
+            repository: ModelRepository::new(options, loader, Arc::clone(&metrics)),
+            metrics,
             folder,
         }
     }
@@ -68,8 +73,10 @@ impl Models {
     }
 
     fn counts(&self) -> (u64, u64) {
-        let counts = self.repository.load_counts();
-        (counts.succeeded, counts.failed)
+        let loads = &self.metrics.model_loads;
+        let [succeeded, failed] =
+            ["success", "failure"].map(|result| loads.with_label_values(&[result]).get());
+        (succeeded, failed)
     }
 }
 
@@ -224,6 +231,7 @@ fn nothing_is_unloaded_while_a_model_is_being_loaded() {
             steps_of_load.wait();
             model_of_two_sessions(path)
         }),
+        Arc::default(),
     );
     thread::scope(|scope| {
         let loading = scope.spawn(|| repository.load("b"));
@@ -253,13 +261,14 @@ fn changed_files_are_retried_after_a_server_outage() {
             }
             model_of_two_sessions(path)
         }),
+        Arc::clone(&models.metrics),
     );
     let before = repository.load("a").unwrap().revision().to_owned();
     models.write("a", OTHER_ORDER, "any_batch");
     is_unavailable.store(true, Ordering::Relaxed);
     repository.reload_changed();
     repository.reload_changed();
-    assert_eq!(repository.load_counts().failed, 1);
+    assert_eq!(models.counts().1, 1);
     is_unavailable.store(false, Ordering::Relaxed);
     repository.reload_changed();
     repository.reload_changed();

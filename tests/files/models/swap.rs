@@ -38,6 +38,7 @@ const SWAPS: usize = 6;
 /// A service whose only model is called `person`.
 fn service(folder: &Path) -> Router {
     let two = NonZeroUsize::new(2).unwrap();
+    let metrics = Arc::<Metrics>::default();
     let models = ModelRepository::new(
         RepositoryOptions {
             folder: ModelFolder {
@@ -48,6 +49,7 @@ fn service(folder: &Path) -> Router {
             kept: vec!["person".to_owned()],
         },
         Box::new(model_of_two_sessions),
+        Arc::clone(&metrics),
     );
     models.load("person").unwrap();
     let engine = EngineOptions {
@@ -55,7 +57,13 @@ fn service(folder: &Path) -> Router {
         remap_threads: two,
         ..EngineOptions::for_testing("person")
     };
-    let engine = Engine::new(Arc::clone(models.registry()), None, engine).unwrap();
+    let engine = Engine::new(
+        Arc::clone(models.registry()),
+        None,
+        engine,
+        Arc::clone(&metrics),
+    )
+    .unwrap();
     let workers = WorkerPool::start(&Arc::new(engine), two, NonZeroUsize::new(16).unwrap());
     let readiness = Readiness::default();
     readiness.warmed_up();
@@ -66,14 +74,16 @@ fn service(folder: &Path) -> Router {
         ..ApiOptions::for_testing()
     };
     let store = FolderStore::that_may_be_missing(&folder.join("calibrations"));
-    let calibrations = Calibrations::open(Box::new(store), false).unwrap();
-    let metrics = Arc::new(Metrics::new().unwrap());
+    let calibrations = Calibrations::open(Box::new(store), false, Arc::clone(&metrics)).unwrap();
     let workers = Arc::new(workers.unwrap());
     api::router(ApiState::new(
         workers,
         Arc::new(models),
         Arc::new(calibrations),
-        Arc::new(MemoryResults::new(ResultLimits::default())),
+        Arc::new(MemoryResults::new(
+            ResultLimits::default(),
+            Arc::clone(&metrics),
+        )),
         metrics,
         readiness,
         options,

@@ -1,5 +1,7 @@
 //! Damaged files are refused or read, and never crash the program.
 
+use std::sync::Arc;
+
 use lookdown::{
     calibration::CalibrationFile,
     calibration_store::{Calibrations, FolderStore, Reading, WriteCondition},
@@ -76,7 +78,7 @@ fn a_refusal_quotes_little_of_a_large_file() {
 fn an_error_about_ambiguous_cameras_truncates_their_names() {
     let folder = tempfile::tempdir().unwrap();
     let store = Box::new(FolderStore::new(folder.path()));
-    let calibrations = Calibrations::open(store, true).unwrap();
+    let calibrations = Calibrations::open(store, true, Arc::default()).unwrap();
     let long = "x".repeat(400_000);
     let camera = r#"{"camera_model":"ds","intrinsics":[]}"#;
     let content = format!(r#"{{"a{long}":{camera},"b{long}":{camera}}}"#);

@@ -21,12 +21,12 @@ use crate::{
         caller::Caller,
         http::{deadline::Deadline, problem::Problem, query::parameters_named},
         openapi::RawBytes,
-        report::pixels,
         require_scope::RequireRead,
     },
     calibration::Calibration,
     calibration_store::Calibrations,
     pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},
+    rounding::pixels,
 };
 
 /// Largest number of cells along each side of a grid.

@@ -47,7 +47,7 @@ const SHORT: Duration = Duration::from_millis(400);
 
 fn open_slow(folder: &Path, reader: FileReader, patience: Duration) -> Arc<Calibrations> {
     let store = Box::new(FolderStore::new(folder));
-    Calibrations::open_with(store, true, reader, patience).unwrap()
+    Calibrations::open_with(store, true, reader, patience, Arc::default()).unwrap()
 }
 
 #[test]
@@ -151,7 +151,8 @@ fn a_store_that_fails_after_the_start_is_reported() {
     }
     let (release, released) = sync_channel(0);
     let store = Box::new(Late(Mutex::new(released)));
-    let calibrations = Calibrations::open_within(store, true, Duration::ZERO).unwrap();
+    let calibrations =
+        Calibrations::open_within(store, true, Duration::ZERO, Arc::default()).unwrap();
     assert_eq!(calibrations.health().store_problem, None);
     drop(release);
     while !calibrations.is_read() {

@@ -1,35 +1,35 @@
-//! Rounding to the significant decimals.
+//! Rounding of published numbers to the significant decimals.
 
 use std::time::Duration;
 
 /// Rounds to two decimals, far below the precision of a detector.
-pub(in crate::api) fn pixels(value: f64) -> f64 {
+pub(crate) fn pixels(value: f64) -> f64 {
     rounded(value, 100.0)
 }
 
 /// Rounds a fraction to four decimals.
-pub(super) fn share(value: f64) -> f64 {
+pub(crate) fn share(value: f64) -> f64 {
     rounded(value, 10_000.0)
 }
 
 /// Rounds to three decimals: millimetres.
-pub(super) fn metres(value: f64) -> f64 {
+pub(crate) fn metres(value: f64) -> f64 {
     rounded(value, 1_000.0)
 }
 
 /// Converts radians to degrees with two decimals.
-pub(super) fn degrees(radians: f64) -> f64 {
+pub(crate) fn degrees(radians: f64) -> f64 {
     rounded(radians.to_degrees(), 100.0)
 }
 
 /// Converts radians to degrees from 0 to below 360, with two decimals.
-pub(super) fn azimuth_degrees(radians: f64) -> f64 {
+pub(crate) fn azimuth_degrees(radians: f64) -> f64 {
     let rounded = degrees(radians);
     if rounded < 360.0 { rounded } else { 0.0 }
 }
 
 /// Rounds to three decimals: microseconds.
-pub(super) fn milliseconds(span: Duration) -> f64 {
+pub(crate) fn milliseconds(span: Duration) -> f64 {
     rounded(span.as_secs_f64() * 1_000.0, 1_000.0)
 }
 
