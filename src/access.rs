@@ -13,5 +13,5 @@ pub use error::KeyError;
 pub use key_list::{Holder, KeyList};
 pub use key_name::{InvalidKeyName, KeyName};
 pub use keys::AccessKeys;
-pub use priority_level::PriorityLevel;
+pub use priority_level::{InvalidPriorityLevel, PriorityLevel};
 pub use scope::{Scope, Scopes};
