@@ -3,6 +3,7 @@
 import threading
 from collections import Counter
 
+from proofs import default_limits
 from support.effort import Effort
 from support.exchange import Lost, ask
 from support.frames import png
@@ -34,7 +35,11 @@ def frames() -> dict[str, tuple[bytes, set[int]]]:
 
 
 def prove(effort: Effort) -> list[Row]:
-    """Sends all kinds, many at a time."""
+    """Sends huge frames to a small server, and the largest permitted ones to one with the defaults."""
+    return [*_refused(effort), default_limits.prove(effort)]
+
+
+def _refused(effort: Effort) -> list[Row]:
     made = frames()
     row = Row(
         "memory limit", f"{LIMIT_MIB} MiB; {len(made)} kinds of huge frames, {effort.huge_frames} × {AT_ONCE} of each"
