@@ -17,7 +17,7 @@ use super::{
         request_body::Held,
     },
 };
-use crate::fairness::BudgetError;
+use crate::fairness::{BudgetError, Client};
 
 /// Responses of at most this size, in bytes, take no share: all connections together hold 32 MiB
 /// of them at the default limit.
@@ -35,7 +35,11 @@ pub(super) async fn bound(State(state): State<ApiState>, request: Request, next:
     };
     // A response larger than a share takes all of it.
     let size = usize::try_from(size).unwrap_or(usize::MAX);
-    let amount = size.min(state.responses.share());
+    let largest = match caller.client {
+        Client::Only => state.responses.total(),
+        _ => state.responses.share(),
+    };
+    let amount = size.min(largest);
     let share = match state.responses.take(&caller.client, amount) {
         Ok(share) => share,
         Err(error) => return refusal(&caller, error).into_response(),

@@ -25,7 +25,7 @@ RESULTS_MIB = 64
 """The default of `results.max_bytes`."""
 UPLOADS, UPLOAD_BYTES, UPLOADED = 8, 32 << 20, 31 << 20
 """Bodies that never end: together as large as `limits.max_upload_bytes`."""
-CAMERAS = 40
+CAMERAS = 20
 SIDES = (8192, 6100)
 """Just below `limits.max_image_side` and `limits.max_image_pixels`."""
 IMAGE = "/detect?profile=fast&format=image"
@@ -34,10 +34,11 @@ IMAGE = "/detect?profile=fast&format=image"
 def prove(effort: Effort) -> Row:
     """Holds uploads, and sends the largest frames whose large responses are not read."""
     deep, noise = png(*SIDES, bits=16), noise_png(*SIDES)
+    # The unread responses to the first are still there when the others are decoded.
     kinds = [
-        ("/detect?profile=fast", "application/json", deep),
-        (IMAGE, "image/jpeg", deep),
         (f"{IMAGE}&width=8192", "image/png", noise),
+        (IMAGE, "image/jpeg", deep),
+        ("/detect?profile=fast", "application/json", deep),
     ]
     row = Row(
         "memory at the default limits",
@@ -59,7 +60,11 @@ def prove(effort: Effort) -> Row:
             uploads = [_begin_upload(address, held) for _ in range(UPLOADS)]
             dripping = threading.Thread(target=_drip, args=(uploads, finished))
             dripping.start()
-            answers = _send_all(address, kinds, effort.default_limit_seconds, held)
+            seconds = effort.default_limit_seconds / 2
+            answers = [
+                *_send_all(address, kinds[:1], 6, seconds, held),
+                *_send_all(address, kinds[1:], 3, seconds, held),
+            ]
             finished.set()
             dripping.join()
             alive = server.process.poll() is None
@@ -69,11 +74,12 @@ def prove(effort: Effort) -> Row:
     unused = CACHE_MIB - tables + RESULTS_MIB
     for (path, media_type, _), counted in zip(kinds, answers, strict=True):
         others = {status: count for status, count in counted.items() if status not in (200, 429)}
-        row.require(not others and counted[200], f"{path} as {media_type} was answered {dict(counted)}")
+        row.require(not others, f"{path} as {media_type} was answered {dict(counted)}")
     row.require(alive and not kills, f"the server was killed ({kills} times)")
     row.require(peak + unused <= LIMIT_MIB, f"{peak:.0f} MiB, and {unused:.0f} MiB of caches that may still fill")
     row.require(good == 200, f"a good frame afterwards was answered {good}")
     total = dict(sorted(sum(answers, Counter()).items(), key=str))
+    row.require(200 in total, "no frame was answered")
     row.seen = (
         f"answered {total}; at most {peak:.0f} MiB, with full remap tables and reports {peak + unused:.0f} MiB; "
         f"a good frame afterwards: {good}"
@@ -116,8 +122,8 @@ def _drip(uploads: list[socket.socket], finished: threading.Event) -> None:
                 upload.sendall(bytes(4096))
 
 
-def _send_all(address: str, kinds: list, seconds: float, held: contextlib.ExitStack) -> list[Counter]:
-    """Sends frames of each kind from three clients, and reads only the status of each response."""
+def _send_all(address: str, kinds: list, clients: int, seconds: float, held: contextlib.ExitStack) -> list[Counter]:
+    """Sends frames of each kind from some clients, and reads only the status of each response."""
     answers = [Counter() for _ in kinds]
     until = time.monotonic() + seconds
     lock = threading.Lock()
@@ -140,7 +146,7 @@ def _send_all(address: str, kinds: list, seconds: float, held: contextlib.ExitSt
                 client.close()
                 time.sleep(0.2)
 
-    threads = [threading.Thread(target=send, args=(kind,)) for kind in range(len(kinds)) for _ in range(3)]
+    threads = [threading.Thread(target=send, args=(kind,)) for kind in range(len(kinds)) for _ in range(clients)]
     for thread in threads:
         thread.start()
     for thread in threads:
