@@ -3,7 +3,6 @@
 import threading
 from collections import Counter
 
-from proofs import default_limits
 from support.effort import Effort
 from support.exchange import Lost, ask
 from support.frames import png
@@ -11,6 +10,8 @@ from support.lookdown import DETECT, TINY, lookdown
 from support.memory_group import memory_group
 from support.places import OFFICE
 from support.row import Row
+
+from proofs import default_limits
 
 LIMIT_MIB = 384
 SETTINGS = TINY | {
