@@ -51,7 +51,7 @@ impl LogOnce {
 
 #[cfg(test)]
 mod tests {
-    use std::{process::Command, sync::mpsc::channel, thread, time::Duration};
+    use std::{process::Command, sync::mpsc::sync_channel, thread, time::Duration};
 
     use super::*;
 
@@ -67,7 +67,7 @@ mod tests {
                 .success()
         );
         for path in [pipe.as_path(), folder.path(), Path::new("/dev/zero")] {
-            let (done, outcome) = channel();
+            let (done, outcome) = sync_channel(1);
             let own = path.to_owned();
             let reading = thread::Builder::new().name("reading".to_owned());
             reading.spawn(move || done.send(read(&own))).unwrap();

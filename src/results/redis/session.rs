@@ -102,10 +102,10 @@ async fn follow(
         connection: connection.clone(),
         keys: &shared.keys,
     };
-    let mut pace = interval(BETWEEN_READS);
-    pace.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut ticks = interval(BETWEEN_READS);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
-        pace.tick().await;
+        ticks.tick().await;
         let mut read = cmd("XREAD");
         read.arg("COUNT").arg(PAGE);
         read.arg("BLOCK").arg(NEWS_WAIT.as_secs() * 1000);
