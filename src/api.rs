@@ -12,6 +12,7 @@ mod readiness;
 mod report;
 mod report_headers;
 mod require_scope;
+mod response_memory;
 mod routes;
 mod run_detection;
 mod state;
@@ -134,7 +135,9 @@ pub fn router(state: ApiState) -> Router {
         .request_rate
         .map(|rate| RateLimiter::new(rate, access));
     let limiter = limiter.map(|all| from_fn_with_state(all, rate_limit::apply));
+    let responses = from_fn_with_state(state.clone(), response_memory::bound);
     let guards = ServiceBuilder::new()
+        .layer(responses)
         .layer(option_layer(own_pages))
         .layer(option_layer(limiter));
     // Some clients ask for the metadata with a slash at the end.

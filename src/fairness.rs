@@ -6,5 +6,5 @@ mod priority_level;
 mod shared_budget;
 
 pub use client::Client;
-pub use priority_level::PriorityLevel;
+pub use priority_level::{InvalidPriorityLevel, PriorityLevel};
 pub use shared_budget::{BudgetError, BudgetShare, SharedBudget};

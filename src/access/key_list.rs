@@ -51,7 +51,11 @@ impl KeyList {
         let mut list = Self::default();
         for (name, row) in rows {
             let scopes: Vec<_> = row.scopes.iter().map(String::as_str).collect();
-            list.add(&name, &scopes, &row.sha256, row.highest_priority)?;
+            let position = list.0.len() + 1;
+            let level = row.highest_priority;
+            let level =
+                level.map(|level| PriorityLevel::new(level).ok_or(KeyError::Priority { position }));
+            list.add(&name, &scopes, &row.sha256, level.transpose()?)?;
         }
         Ok(list)
     }
@@ -104,7 +108,7 @@ impl KeyList {
         name: &str,
         scopes: &[&str],
         sha256: &str,
-        highest_priority: Option<u32>,
+        highest_priority: Option<PriorityLevel>,
     ) -> Result<(), KeyError> {
         let position = self.0.len() + 1;
         let name = name.parse().map_err(|_| KeyError::Name { position })?;
@@ -112,14 +116,10 @@ impl KeyList {
         let scopes = scopes.ok().and_then(|scopes| Scopes::new(&scopes));
         let scopes = scopes.ok_or(KeyError::Scopes { position })?;
         let digest = KeyDigest::parse(sha256).ok_or(KeyError::Digest { position })?;
-        let highest_priority = match highest_priority {
-            Some(level) => PriorityLevel::new(level).ok_or(KeyError::Priority { position })?,
-            None => PriorityLevel::default(),
-        };
         let holder = Holder {
             name,
             scopes,
-            highest_priority,
+            highest_priority: highest_priority.unwrap_or_default(),
         };
         self.push(digest, holder)
     }
@@ -153,7 +153,7 @@ impl FromStr for KeyList {
                 [name, scopes, sha256, level] => (name, scopes, sha256, Some(level)),
                 _ => return Err(KeyError::Entry { position }),
             };
-            let level = level.map(str::parse).transpose();
+            let level = level.map(str::parse::<PriorityLevel>).transpose();
             let level = level.map_err(|_| KeyError::Priority { position })?;
             list.add(name, &scopes.split('+').collect::<Vec<_>>(), sha256, level)?;
         }

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     calibration_store::Calibrations,
-    fairness::Client,
+    fairness::{Client, SharedBudget},
     inference::ModelRepository,
     metrics::Metrics,
     pipeline::{PipelineError, WorkerPool},
@@ -129,6 +129,8 @@ pub struct Shared {
     pub(super) uploads: UploadBudget,
     /// The memory for bodies whose key has not been checked, apart from that of the others.
     pub(super) unauthenticated_uploads: UploadBudget,
+    /// The memory for large responses that clients have not read yet.
+    pub(super) responses: SharedBudget,
     pub(super) options: ApiOptions,
 }
 
@@ -165,6 +167,7 @@ impl ApiState {
                 1,
                 "send the key in a header, X-API-Key: KEY, or retry",
             ),
+            responses: SharedBudget::new(options.max_upload_bytes),
             options,
         }))
     }

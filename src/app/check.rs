@@ -5,6 +5,7 @@ use std::{fmt::Write as _, thread};
 use anyhow::bail;
 
 use super::{App, CALIBRATIONS_CHECK};
+use crate::{access::Scope, pipeline::Priority};
 
 impl App {
     /// Loads every model that is served, and describes the server that could start: a line on models
@@ -51,6 +52,10 @@ impl App {
                 for holder in keys.holders() {
                     let scopes = holder.scopes.joined(", ");
                     let _ = write!(report, "\n  {}: {scopes}", holder.name);
+                    if holder.scopes.allow(Scope::Detect) {
+                        let highest = Priority::of_level(holder.highest_priority.get());
+                        let _ = write!(report, "; priorities {} to 9", highest.highest_level());
+                    }
                 }
                 report
             }

@@ -1,5 +1,7 @@
 //! The priority levels of requests.
 
+use std::{fmt, str::FromStr};
+
 /// A priority level of requests: [`PriorityLevel::HIGHEST`] is served first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PriorityLevel(u32);
@@ -27,9 +29,33 @@ impl PriorityLevel {
     }
 }
 
+impl FromStr for PriorityLevel {
+    type Err = InvalidPriorityLevel;
+
+    fn from_str(text: &str) -> Result<Self, InvalidPriorityLevel> {
+        let level = text.parse().ok().and_then(Self::new);
+        level.ok_or(InvalidPriorityLevel)
+    }
+}
+
+impl fmt::Display for PriorityLevel {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(formatter)
+    }
+}
+
+/// The text is not a level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "a priority is {} (highest) to {}",
+    PriorityLevel::HIGHEST,
+    PriorityLevel::LOWEST
+)]
+pub struct InvalidPriorityLevel;
+
 impl Default for PriorityLevel {
     /// The level of requests that name none.
     fn default() -> Self {
-        Self(Self::DEFAULT.parse().unwrap_or(Self::LOWEST))
+        Self::DEFAULT.parse().unwrap_or(Self(Self::LOWEST))
     }
 }

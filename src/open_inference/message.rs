@@ -72,7 +72,7 @@ pub struct InferResponse<D> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
     /// The output tensors.
-    pub outputs: Vec<OutputTensor<D>>,
+    pub outputs: Entries<OutputTensor<D>>,
 }
 
 /// An output tensor.
@@ -83,7 +83,7 @@ pub struct OutputTensor<D> {
     /// The name of the datatype.
     pub datatype: String,
     /// The size of each axis.
-    pub shape: Vec<usize>,
+    pub shape: Entries<usize>,
     /// The parameters of an output whose bytes follow the JSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameters: Option<OutputParameters>,
@@ -160,7 +160,7 @@ mod tests {
             let output = OutputTensor {
                 name: "scores".to_owned(),
                 datatype: tensor.datatype().to_string(),
-                shape: vec![2],
+                shape: Entries(vec![2]),
                 parameters: as_bytes.then(|| OutputParameters {
                     binary_data_size: Some(tensor.byte_count()),
                 }),
@@ -170,7 +170,7 @@ mod tests {
                 model_name: "model".to_owned(),
                 model_version: None,
                 id: None,
-                outputs: vec![output],
+                outputs: Entries(vec![output]),
             };
             let behind = [tensor];
             let behind = if as_bytes { &behind[..] } else { &[] };
@@ -179,7 +179,7 @@ mod tests {
 
             let (json, mut behind) = message.split().unwrap();
             let read: InferResponse<&RawValue> = serde_json::from_slice(&json).unwrap();
-            let output = &read.outputs[0];
+            let output = &read.outputs.0[0];
             assert_eq!(output.datatype, Datatype::Fp32.name());
             let size = output.parameters.as_ref();
             let size = size.and_then(|parameters| parameters.binary_data_size);

@@ -1,14 +1,15 @@
 //! The cost of a frame: the permits of `limits.max_frames_in_flight` that it takes.
 //!
-//! A frame of a usual size costs 1. Each 12 megapixels that are decoded, each 32 inputs of the
-//! network, and each 12 megapixels that are drawn add 1. A frame with more pixels than the limit also
+//! A frame of a usual size costs 1. Each 8 megapixels that are decoded, each 32 inputs of the
+//! network, and each 8 megapixels that are drawn add 1. A frame with more pixels than the limit also
 //! costs 1, because its header is enough to refuse it. No frame costs more than a client may use.
 
 use super::{DetectJob, ViewsJob};
 use crate::geometry::FieldOfViewReading;
 
-/// Pixels, decoded or drawn, that add 1.
-const PIXELS_PER_PERMIT: u64 = 12_000_000;
+/// Pixels, decoded or drawn, that add 1. With the default limits, two of the largest frames are
+/// decoded side by side, which keeps the memory below 2 GiB.
+const PIXELS_PER_PERMIT: u64 = 8_000_000;
 /// Inputs of the network that add 1.
 const INPUTS_PER_PERMIT: usize = 32;
 
@@ -52,10 +53,10 @@ mod tests {
     #[test]
     fn usual_frames_cost_one_permit_and_larger_ones_more() {
         assert_eq!(cost((2048, 2048), 2048, 24), 1);
-        assert_eq!(cost((8192, 6100), 0, 24), 5);
-        assert_eq!(cost((8192, 6100), 8192, 24), 9);
-        assert_eq!(cost((8192, 6100), 2048, 24), 5);
-        assert_eq!(cost((8192, 6100), 8192, 128), 13);
+        assert_eq!(cost((8192, 6100), 0, 24), 7);
+        assert_eq!(cost((8192, 6100), 8192, 24), 13);
+        assert_eq!(cost((8192, 6100), 2048, 24), 7);
+        assert_eq!(cost((8192, 6100), 8192, 128), 17);
     }
 
     #[test]

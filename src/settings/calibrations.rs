@@ -31,7 +31,7 @@ settings! {
         zone_metrics: bool = false => flag();
         /// The most memory for the remap tables of cameras, in bytes. The least recently used go
         /// first.
-        cache_bytes: usize = 1 << 30 => whole(0..=MAX_BYTES);
+        cache_bytes: usize = 256 << 20 => whole(0..=MAX_BYTES);
     }
 }
 

@@ -22,13 +22,14 @@ settings! {
         /// The most memory for decoding one frame, in bytes.
         max_decode_bytes: u64 = 512 << 20 => whole(1..=MAX_BYTES);
         /// The most frames that wait for a worker or are processed. Further ones are answered with
-        /// 429. One of several clients may have half of them. A frame counts 1 more for each 12
+        /// 429. One of several clients may have half of them. A frame counts 1 more for each 8
         /// megapixels that are decoded or drawn, and for each 32 inputs of the network, half of
         /// the limit at most.
         max_frames_in_flight: NonZeroUsize = NonZeroUsize::new(16).unwrap_or(NonZeroUsize::MIN)
             => count();
         /// The most memory for all request bodies together, and for the tensors that are unpacked
-        /// from them (four bytes a number), in bytes. Further ones are answered with 429. At least
+        /// from them (four bytes a number), in bytes. Further ones are answered with 429. Responses
+        /// of more than 64 KiB that clients have not read yet may use as much again. At least
         /// `server.max_body_bytes`. One of several clients may use half of it.
         max_upload_bytes: usize = 256 << 20 => whole(1024..=MAX_BYTES);
         /// The least bytes a second of a request body, over five seconds. A slower one is answered

@@ -1,4 +1,5 @@
-//! A search for request bodies whose parsing takes more than linear time: forms and tensors.
+//! A search for request bodies whose parsing takes more than linear time: forms, and tensors in JSON
+//! and as bytes.
 //!
 //! Each filler is inserted into a valid body at its place, at two sizes. The larger body is eight
 //! times as large, and so may be its time, with a margin for noise.
@@ -69,8 +70,42 @@ const TENSOR_FILLERS: [&str; 14] = [
     "{\"name\":\"image\",\"shape\":[1],\"datatype\":\"BYTES\",\"data\":[\"YQ==\"]},",
 ];
 
+/// The end of the JSON in a body whose tensors are bytes.
+const HEAD_END: &str = "|";
+const BINARY_TENSORS: [&str; 8] = [
+    "<>|",
+    "{\"inputs\":[{\"name\":\"image\",\"shape\":[1],\"datatype\":\"BYTES\",\
+     \"parameters\":{\"binary_data_size\":9}}]}|<>",
+    "{\"inputs\":[{\"name\":\"image\",\"shape\":[1],\"datatype\":\"BYTES\",\
+     \"parameters\":{\"binary_data_size\":<>9}}]}|",
+    "{\"inputs\":[{\"name\":\"image\",\"shape\":[<>1],\"datatype\":\"FP32\",\
+     \"parameters\":{\"binary_data_size\":9}}]}|123456789",
+    "{\"inputs\":[{\"name\":\"<>\",\"shape\":[1],\"datatype\":\"<>\",\
+     \"parameters\":{\"binary_data_size\":9}}]}|123456789",
+    "{\"inputs\":[{\"name\":\"image\",\"shape\":[1],\"datatype\":\"BYTES\",\
+     \"parameters\":{<>\"binary_data_size\":9}}]}|123456789",
+    "{\"inputs\":[<>1]}|<>",
+    "{\"outputs\":[<>1],\"inputs\":[]}|",
+];
+const BINARY_FILLERS: [&str; 9] = [
+    "a",
+    "1",
+    "1,",
+    "[",
+    "\"b#\":1,",
+    "\"binary_data_size\":9,",
+    "{\"name\":\"image\",\"shape\":[1],\"datatype\":\"BYTES\",\"parameters\":{\"binary_data_size\":1}},",
+    "{\"name\":\"boxes\",\"parameters\":{\"binary_data\":true}},",
+    "\\u0041",
+];
+
 async fn time(service: &Service, path: &str, content_type: &str, body: String) -> Duration {
-    let request = Request::post(path).header("content-type", content_type);
+    let mut request = Request::post(path).header("content-type", content_type);
+    let mut body = body;
+    if let Some(length) = body.find(HEAD_END) {
+        body.remove(length);
+        request = request.header("inference-header-content-length", length);
+    }
     let request = with_host(request.body(Body::from(body)).unwrap());
     let began = Instant::now();
     let answer = service.send(request).await;
@@ -117,4 +152,11 @@ async fn reading_time_grows_linearly_with_a_form() {
 async fn reading_time_grows_linearly_with_tensors() {
     let path = "/v2/models/lookdown/infer";
     grows_linearly(path, "application/json", &TENSORS, &TENSOR_FILLERS).await;
+}
+
+#[tokio::test]
+async fn reading_time_grows_linearly_with_binary_tensors() {
+    let path = "/v2/models/lookdown/infer";
+    let content_type = "application/octet-stream";
+    grows_linearly(path, content_type, &BINARY_TENSORS, &BINARY_FILLERS).await;
 }

@@ -2,7 +2,10 @@
 
 use std::{fs, sync::Arc};
 
-use axum::{body::Body, http::Request};
+use axum::{
+    body::{Body, to_bytes},
+    http::Request,
+};
 use lookdown::{access::AccessKeys, api::Access};
 use tokio::task::JoinHandle;
 use tower::ServiceExt;
@@ -150,4 +153,38 @@ async fn a_key_uses_only_its_permitted_priorities() {
             assert_eq!(answer.problem()["parameter"], "priority");
         }
     }
+}
+
+#[tokio::test]
+async fn unread_large_responses_take_the_share_of_their_client() {
+    let service = service(Bounds {
+        max_body_bytes: 300_000,
+        max_upload_bytes: 400_000,
+        ..Bounds::default()
+    });
+    let path = format!("{FAST}&format=image");
+    let image = |key: &str| {
+        let mut request = request("POST", &path, key, incompressible_frame());
+        let accept = "image/png".parse().unwrap();
+        request.headers_mut().insert("accept", accept);
+        service.router.clone().oneshot(request)
+    };
+    let unread = image(GREEDY).await.unwrap();
+    assert_eq!(unread.status(), 200);
+    let refused = image(GREEDY).await.unwrap();
+    assert_eq!(refused.status(), 429);
+    let refused = to_bytes(refused.into_body(), usize::MAX).await.unwrap();
+    let refused = String::from_utf8(refused.to_vec()).unwrap();
+    assert!(
+        refused.contains("responses that the key greedy has not read"),
+        "{refused}"
+    );
+    // Small responses and other keys are served.
+    assert_eq!(ask(&service, FAST, GREEDY, frame()).await.status, 200);
+    assert_eq!(image(MODEST).await.unwrap().status(), 200);
+    drop(unread);
+    let read = image(GREEDY).await.unwrap();
+    assert_eq!(read.status(), 200);
+    let read = to_bytes(read.into_body(), usize::MAX).await.unwrap();
+    assert!(read.starts_with(b"\x89PNG"));
 }

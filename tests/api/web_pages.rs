@@ -71,6 +71,12 @@ async fn forwarded_requests_are_refused_on_loopback() {
         "X-Forwarded-For",
         "X-Forwarded-Proto",
         "X-Real-IP",
+        "X-Forwarded",
+        "X-Client-IP",
+        "X-Cluster-Client-IP",
+        "True-Client-IP",
+        "CF-Connecting-IP",
+        "CDN-Loop",
     ] {
         for (method, path) in [("GET", "/calibrations"), CHANGING[0], CHANGING[1]] {
             let answer = service.ask(method, path, &[(header, "203.0.113.9")]).await;

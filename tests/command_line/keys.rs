@@ -29,6 +29,33 @@ fn a_new_key_is_printed_with_its_line_for_the_keys_file() {
 }
 
 #[test]
+fn a_new_key_states_its_highest_priority_if_one_is_given() {
+    let arguments = ["key", "new", "--name", "alarm", "--scope", "detect"];
+    for (flags, expected) in [
+        (&[][..], 5),
+        (&["--priority", "1"], 1),
+        (&["--priority", "9"], 9),
+    ] {
+        let output = lookdown(&[&arguments, flags].concat(), &[]);
+        let text = String::from_utf8(output.stdout).unwrap();
+        let lines: Vec<_> = text.lines().filter(|line| !line.starts_with('#')).collect();
+        let [key, file_line, entry] = lines[..] else {
+            panic!("{text}");
+        };
+        let file = KeyList::from_toml(file_line).unwrap();
+        assert_eq!(file, entry.parse().unwrap());
+        let holder = file.holder_of(key.as_bytes()).unwrap();
+        assert_eq!(holder.highest_priority.get(), expected);
+    }
+    for wrong in ["0", "10", "high"] {
+        let output = lookdown(&[&arguments[..], &["--priority", wrong]].concat(), &[]);
+        assert_eq!(output.status.code(), Some(2));
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(message.contains("1 (highest) to 9"), "{message}");
+    }
+}
+
+#[test]
 fn a_key_without_a_scope_or_with_an_invalid_name_is_refused() {
     for arguments in [
         &["key", "new", "--name", "gate"][..],

@@ -160,13 +160,16 @@ fn a_check_reports_models_and_access_and_serves_no_client() {
     );
     assert!(open.contains("ssdlite_mobilenet_v2"), "{open}");
     assert!(open.contains("access: open, without API keys"), "{open}");
-    let keys = format!("gate:detect+read:{:064}", 7);
-    let keyed = check(&[("LOOKDOWN__ACCESS__KEYS", &keys)]);
-    assert!(
-        keyed.contains(&format!("access: {listen} needs an API key; 1 known")),
-        "{keyed}"
+    let keys = format!(
+        "gate:detect+read:{:064},alarm:detect:{:064}:1,batch:admin:{:064}:8,dash:read:{:064}",
+        7, 8, 9, 10
     );
-    assert!(keyed.contains("\n  gate: detect, read\n"), "{keyed}");
+    let keyed = check(&[("LOOKDOWN__ACCESS__KEYS", &keys)]);
+    let expected = format!(
+        "access: {listen} needs an API key; 4 known\n  gate: detect, read; priorities 4 to 9\n  \
+         alarm: detect; priorities 1 to 9\n  batch: admin; priorities 7 to 9\n  dash: read\n"
+    );
+    assert!(keyed.contains(&expected), "{keyed}");
 }
 
 #[test]

@@ -25,8 +25,18 @@ use super::{
 };
 
 /// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` and
-/// `X-Forwarded-…` by convention).
-const FORWARDING_HEADERS: [&str; 3] = ["forwarded", "via", "x-real-ip"];
+/// `X-Forwarded-…` by convention; RFC 8586; the names of some content networks and load balancers).
+const FORWARDING_HEADERS: [&str; 9] = [
+    "cdn-loop",
+    "cf-connecting-ip",
+    "forwarded",
+    "true-client-ip",
+    "via",
+    "x-client-ip",
+    "x-cluster-client-ip",
+    "x-forwarded",
+    "x-real-ip",
+];
 const FORWARDING_PREFIX: &str = "x-forwarded-";
 /// Largest number of characters of a header that an error message repeats.
 const MAX_SHOWN_CHARS: usize = 128;

@@ -38,7 +38,12 @@ fn only_host(headers: &HeaderMap) -> Option<Authority> {
     let text = value.to_str().ok()?;
     let is_host_character = |c: char| c.is_ascii_alphanumeric() || "-._~!$&'()*+,;=:[]".contains(c);
     let authority: Authority = text.parse().ok()?;
-    let is_valid = !authority.host().is_empty() && text.chars().all(is_host_character);
+    // The parser accepts text behind the bracket of an address, and any number as a port.
+    let rest = text.strip_prefix(authority.host())?;
+    let is_port = |port: &str| port.is_empty() || port.parse::<u16>().is_ok();
+    let is_valid = !authority.host().is_empty()
+        && text.chars().all(is_host_character)
+        && (rest.is_empty() || rest.strip_prefix(':').is_some_and(is_port));
     is_valid.then_some(authority)
 }
 
@@ -84,6 +89,8 @@ mod tests {
             b"evil.example, localhost",
             b"user@localhost",
             b"localhost/path",
+            b"[::1]evil.example",
+            b"localhost:65536",
         ] {
             assert!(!is_valid(&[host]), "{}", String::from_utf8_lossy(host));
         }

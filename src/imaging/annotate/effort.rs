@@ -5,6 +5,9 @@
 const MAX_PAINTED_PER_PIXEL: u64 = 2;
 /// Most painted pixels of small frames, which cost little.
 const MIN_BUDGET_PIXELS: u64 = 2_000_000;
+/// Most painted pixels of any frame, so that drawing takes less time than decoding. The outlines of
+/// a hundred persons in a frame of 50 megapixels are fewer.
+const MAX_BUDGET_PIXELS: u64 = 16_000_000;
 
 /// A drawing was cancelled because its result is no longer needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -23,7 +26,8 @@ impl<'a> Effort<'a> {
         let pixels = u64::from(width) * u64::from(height);
         Self {
             is_cancelled,
-            pixels_left: (MAX_PAINTED_PER_PIXEL * pixels).max(MIN_BUDGET_PIXELS),
+            pixels_left: (MAX_PAINTED_PER_PIXEL * pixels)
+                .clamp(MIN_BUDGET_PIXELS, MAX_BUDGET_PIXELS),
         }
     }
 
@@ -41,5 +45,18 @@ impl<'a> Effort<'a> {
     /// Subtracts the painted pixels of a shape from the budget.
     pub(super) fn spend(&mut self, painted_pixels: u64) {
         self.pixels_left = self.pixels_left.saturating_sub(painted_pixels);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_frames_have_no_larger_budget_than_16_million_pixels() {
+        let budget = |width, height| Effort::new(width, height, &|| false).pixels_left;
+        assert_eq!(budget(100, 100), 2_000_000);
+        assert_eq!(budget(2000, 2000), 8_000_000);
+        assert_eq!(budget(8192, 6100), 16_000_000);
     }
 }

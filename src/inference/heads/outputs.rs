@@ -1,6 +1,10 @@
 //! Selection of a head's outputs among all outputs of a model.
 
 use super::tensor::Output;
+use crate::quoted::Quoted;
+
+/// Most names of outputs in a message.
+const MAX_NAMES: usize = 16;
 
 /// Returns the output with that name.
 pub(super) fn named<'o, T: Output>(outputs: &'o [T], name: &str) -> Result<&'o T, String> {
@@ -58,7 +62,12 @@ pub(super) fn boxes_and_scores<'o, T: Output>(
     ))
 }
 
+/// Lists the first names of the outputs.
 pub(super) fn names<T: Output>(outputs: &[T]) -> String {
-    let names: Vec<_> = outputs.iter().map(|o| format!("{:?}", o.name())).collect();
+    let names = outputs.iter().take(MAX_NAMES);
+    let mut names: Vec<_> = names.map(|o| Quoted(o.name()).to_string()).collect();
+    if outputs.len() > MAX_NAMES {
+        names.push("…".to_owned());
+    }
     names.join(", ")
 }

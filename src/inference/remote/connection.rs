@@ -20,9 +20,11 @@ use crate::{
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest idle time of a connection: less than the keep-alive of common servers and proxies.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(20);
-/// Largest response, in bytes: the raw outputs of a large network for a large batch.
+/// Largest response to an inference request, in bytes: the raw outputs of a large network for a
+/// large batch.
 const MAX_ANSWER_BYTES: u64 = 64 << 20;
-
+/// Largest metadata, in bytes. Parsed, they take several times the memory.
+const MAX_METADATA_BYTES: u64 = 1 << 20;
 /// Longest pause that is passed on to clients.
 const MAX_RETRY_AFTER: Duration = Duration::from_mins(1);
 
@@ -84,7 +86,8 @@ impl Connection {
 
     /// Sends a GET request to the path with the given segments.
     pub(super) fn get(&self, path: &[&str], patience: Duration) -> Result<Reply, String> {
-        reply(|| self.client.get(self.at(path)).timeout(patience))
+        let request = || self.client.get(self.at(path)).timeout(patience);
+        reply(request, MAX_METADATA_BYTES)
     }
 
     /// Sends a POST request with JSON, or, with the length of the JSON, JSON followed by bytes.
@@ -94,7 +97,7 @@ impl Connection {
         body: &Bytes,
         head_length: Option<usize>,
     ) -> Result<Reply, String> {
-        reply(|| {
+        let request = || {
             let request = self.client.post(self.at(path)).timeout(self.patience);
             let request = match head_length {
                 Some(length) => request
@@ -103,7 +106,8 @@ impl Connection {
                 None => request.header(CONTENT_TYPE, "application/json"),
             };
             request.body(body.clone())
-        })
+        };
+        reply(request, MAX_ANSWER_BYTES)
     }
 
     /// The URL of a path below the server's base URL.
@@ -120,17 +124,18 @@ impl Connection {
 /// Sends a request. Retries once when the connection fails or an idle connection was closed before
 /// the response, for example by a restarted server. Inference has no side effects, so a repeated
 /// request is safe. A timeout is not retried, to avoid more load on a slow server.
-fn reply(request: impl Fn() -> RequestBuilder) -> Result<Reply, String> {
+fn reply(request: impl Fn() -> RequestBuilder, max_bytes: u64) -> Result<Reply, String> {
     let sent = match request().send() {
         Err(error) if (error.is_connect() || error.is_request()) && !error.is_timeout() => {
             request().send()
         }
         sent => sent,
     };
-    sent.map_err(with_causes).and_then(read)
+    sent.map_err(with_causes)
+        .and_then(|response| read(response, max_bytes))
 }
 
-fn read(response: Response) -> Result<Reply, String> {
+fn read(response: Response, max_bytes: u64) -> Result<Reply, String> {
     let number = |name: &str| {
         let value = response.headers().get(name)?;
         value.to_str().ok()?.parse::<u64>().ok()
@@ -140,14 +145,12 @@ fn read(response: Response) -> Result<Reply, String> {
     let retry_after = retry_after.map(|seconds| Duration::from_secs(seconds).min(MAX_RETRY_AFTER));
     let status = response.status().as_u16();
     let mut body = Vec::new();
-    let mut bounded = response.take(MAX_ANSWER_BYTES + 1);
+    let mut bounded = response.take(max_bytes + 1);
     let length = bounded.read_to_end(&mut body);
     let length =
         length.map_err(|error| format!("its response is incomplete: {}", one_line(&error)))?;
-    if length as u64 > MAX_ANSWER_BYTES {
-        return Err(format!(
-            "its response is longer than {MAX_ANSWER_BYTES} bytes"
-        ));
+    if length as u64 > max_bytes {
+        return Err(format!("its response is longer than {max_bytes} bytes"));
     }
     Ok(Reply {
         status,

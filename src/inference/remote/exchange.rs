@@ -3,12 +3,15 @@
 use serde::ser::Error;
 use serde_json::value::RawValue;
 
-use crate::open_inference::{
-    BINARY_OUTPUT, BINARY_SIZE, Datatype, TensorData, TensorValues,
-    bounded_json::{Entries, Table},
-    element_count,
-    message::{InferRequest, InferResponse, InputTensor, Message, RequestedOutput},
-    parameters::{Parameter, Parameters},
+use crate::{
+    open_inference::{
+        BINARY_OUTPUT, BINARY_SIZE, Datatype, TensorData, TensorValues,
+        bounded_json::{Entries, Table},
+        element_count,
+        message::{InferRequest, InferResponse, InputTensor, Message, RequestedOutput},
+        parameters::{Parameter, Parameters},
+    },
+    quoted::{Quoted, one_line},
 };
 
 /// An inference request with views for a model.
@@ -74,11 +77,11 @@ impl Answer {
             .split()
             .ok_or("its response is shorter than its declared length")?;
         let head: InferResponse<&RawValue> = serde_json::from_slice(&json)
-            .map_err(|error| format!("its response cannot be read: {error}"))?;
+            .map_err(|error| format!("its response cannot be read: {}", one_line(&error)))?;
         let mut outputs = Vec::new();
-        for output in head.outputs {
+        for output in head.outputs.0 {
             let name = output.name;
-            let wrong = |wrong| format!("its output {name:?}: {wrong}");
+            let wrong = |wrong| format!("its output {}: {wrong}", Quoted(&name));
             let size = output
                 .parameters
                 .and_then(|parameters| parameters.binary_data_size);
@@ -92,12 +95,12 @@ impl Answer {
                 }
                 continue;
             }
-            let count = element_count(output.shape.iter().copied());
+            let count = element_count(output.shape.0.iter().copied());
             let count = count.ok_or("its response contains an impossible shape")?;
             let values = data.and_then(|data| data.floats(count)).map_err(wrong)?;
             outputs.push(Output {
                 name,
-                shape: output.shape,
+                shape: output.shape.0,
                 values,
             });
         }
@@ -107,10 +110,17 @@ impl Answer {
 
 #[cfg(test)]
 mod tests {
+    use std::time::{Duration, Instant};
+
     use bytes::Bytes;
     use serde_json::{Value, json};
 
     use super::*;
+
+    /// The largest permitted factor between the times of a response and of one of an eighth of it.
+    const MAX_RATIO: f64 = 16.0;
+    /// Shorter times are noise.
+    const LEAST: Duration = Duration::from_millis(1);
 
     fn question(as_bytes: bool) -> (Bytes, Option<usize>) {
         let question = Question {
@@ -207,5 +217,52 @@ mod tests {
             assert!(message.contains(part), "{message}");
         }
         assert!(read(b"{}".to_vec(), 3).unwrap_err().contains("shorter"));
+    }
+
+    #[test]
+    fn reading_time_grows_linearly_with_a_response() {
+        let heads = [
+            "<>",
+            r#"{"outputs":[<>1]}"#,
+            r#"{"<>":1,"outputs":[]}"#,
+            r#"{"outputs":[{"name":"<>","datatype":"FP32","shape":[1],"data":[1,2]}]}"#,
+            r#"{"outputs":[{"name":"a","datatype":"FP32","shape":[<>1],"data":[1]}]}"#,
+            r#"{"outputs":[{"name":"a","datatype":"FP32","shape":[9],"data":[<>1]}]}"#,
+            r#"{"outputs":[{"name":"a","datatype":"FP32","shape":[100000],"data":[<>1]}]}"#,
+            r#"{"outputs":[{"name":"a","datatype":"FP32","shape":[1],"parameters":{<>"a":1}}]}"#,
+        ];
+        let fillers = [
+            "a",
+            "1",
+            "1,",
+            "[",
+            "[1],",
+            "{\"a\":",
+            "\"a\":1,",
+            "{},",
+            "\\u0041",
+            "{\"name\":\"a\",\"datatype\":\"X\",\"shape\":[]},",
+            "\"binary_data_size\":1,",
+        ];
+        for (head, filler) in heads
+            .iter()
+            .flat_map(|head| fillers.map(|filler| (head, filler)))
+        {
+            let time = |bytes: usize| {
+                let head = head.replace("<>", &filler.repeat(bytes / filler.len()));
+                let length = head.len();
+                let body = [head.as_bytes(), &vec![0; bytes]].concat();
+                let began = Instant::now();
+                // Most are invalid.
+                let _ = read(body, length);
+                began.elapsed()
+            };
+            let ratio = || {
+                let (small, large) = (time(1 << 15).max(LEAST), time(1 << 18));
+                large.as_secs_f64() / small.as_secs_f64()
+            };
+            let least = (0..8).map(|_| ratio()).find(|ratio| *ratio <= MAX_RATIO);
+            assert!(least.is_some(), "{filler:?} in {head:?}");
+        }
     }
 }

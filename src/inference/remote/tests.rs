@@ -1,6 +1,7 @@
 //! Tests against a fake server with scripted responses on a real socket.
 
 mod fake;
+mod hostile;
 
 use std::{fs, path::Path, time::Duration};
 

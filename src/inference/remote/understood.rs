@@ -12,10 +12,15 @@ use crate::{
     },
     open_inference::{
         BINARY_EXTENSION, Datatype,
+        bounded_json::MAX_ENTRIES,
         metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
     },
+    quoted::{Quoted, one_line},
     revision::revision_of,
 };
+
+/// Longest name of a tensor or a datatype.
+const MAX_NAME_BYTES: usize = 256;
 
 /// Metadata of a model on a server, checked against its manifest.
 pub(super) struct RemoteModel {
@@ -49,6 +54,9 @@ impl RemoteModel {
             return Err(unusable(
                 "its metadata lacks inputs and outputs: declare them on the server".to_owned(),
             ));
+        }
+        for tensor in model.inputs.iter().chain(&model.outputs) {
+            check_tensor(tensor).map_err(unusable)?;
         }
         let (inputs, outputs) = (tensors(&model.inputs), tensors(&model.outputs));
         let signature = Signature::of(&inputs, &manifest.input, &Metadata::default());
@@ -93,7 +101,36 @@ fn fetch<T: for<'de> Deserialize<'de>>(
         _ => return Err(server.unavailable(refusal(&reply))),
     }
     let read = serde_json::from_slice(&reply.body);
-    read.map_err(|error| server.unavailable(format!("its metadata cannot be read: {error}")))
+    read.map_err(|error| {
+        let error = one_line(&error);
+        server.unavailable(format!("its metadata cannot be read: {error}"))
+    })
+}
+
+/// Checks that messages can repeat the name and the shape of a tensor.
+fn check_tensor(tensor: &TensorMetadata) -> Result<(), String> {
+    let TensorMetadata {
+        name,
+        datatype,
+        shape,
+    } = tensor;
+    let axes = shape.len();
+    if axes > MAX_ENTRIES {
+        let name = Quoted(name);
+        return Err(format!(
+            "its tensor {name} has {axes} axes: at most {MAX_ENTRIES} are supported"
+        ));
+    }
+    if let Some(text) = [name, datatype]
+        .into_iter()
+        .find(|it| it.len() > MAX_NAME_BYTES)
+    {
+        let text = Quoted(text);
+        return Err(format!(
+            "the name {text} in its metadata is too long: at most {MAX_NAME_BYTES} bytes are supported"
+        ));
+    }
+    Ok(())
 }
 
 fn tensors(declared: &[TensorMetadata]) -> Vec<OnnxTensor> {

@@ -4,7 +4,7 @@
 use std::{convert::Infallible, sync::Arc, time::Duration};
 
 use redis::{RedisResult, aio::MultiplexedConnection, cmd, streams::StreamReadReply};
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep};
 
 use super::{
     Shared,
@@ -17,6 +17,8 @@ use crate::{quoted::one_line, results::ReportId};
 const NEWS_WAIT: Duration = Duration::from_secs(5);
 /// Most new reports per read.
 const PAGE: usize = 32;
+/// Least time between two reads. A Redis that does not wait cannot keep the thread busy.
+const BETWEEN_READS: Duration = Duration::from_millis(10);
 /// Pause before the second attempt to connect. Each pause is twice as long as the one before.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
@@ -100,7 +102,10 @@ async fn follow(
         connection: connection.clone(),
         keys: &shared.keys,
     };
+    let mut ticks = interval(BETWEEN_READS);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
+        ticks.tick().await;
         let mut read = cmd("XREAD");
         read.arg("COUNT").arg(PAGE);
         read.arg("BLOCK").arg(NEWS_WAIT.as_secs() * 1000);

@@ -24,6 +24,8 @@ struct Evil {
     reply: Vec<u8>,
     is_endless: bool,
     pause: Duration,
+    /// True to answer reads of new reports at once, instead of never.
+    is_hasty: bool,
 }
 
 impl Evil {
@@ -32,6 +34,7 @@ impl Evil {
             reply: reply.as_bytes().to_vec(),
             is_endless: false,
             pause: Duration::ZERO,
+            is_hasty: false,
         }
     }
 }
@@ -84,7 +87,7 @@ fn serve(mut stream: TcpStream, evil: &Evil, sent: &AtomicU64) -> Option<()> {
         let count = stream.read(&mut buffer).ok().filter(|count| *count > 0)?;
         let text = String::from_utf8_lossy(&buffer[..count]);
         // A test sends one query at a time, except at the login.
-        if text.contains("XREAD\r\n") {
+        if text.contains("XREAD\r\n") && !evil.is_hasty {
             continue;
         }
         if text.contains("SETINFO") {
@@ -124,6 +127,7 @@ async fn an_endless_reply_of_redis_is_cut_at_the_limit() {
             reply,
             is_endless: true,
             pause: Duration::ZERO,
+            is_hasty: false,
         });
         let store = redis.store().await;
         let began = Instant::now();
@@ -146,6 +150,7 @@ async fn silence_and_a_slow_reply_end_in_time() {
             reply: reply.as_bytes().to_vec(),
             is_endless: !reply.is_empty(),
             pause: Duration::from_millis(20),
+            is_hasty: false,
         });
         let store = redis.store().await;
         let began = Instant::now();
@@ -171,6 +176,21 @@ async fn garbage_of_redis_is_a_failure_in_one_line() {
         assert!(!problem.contains(['\r', '\n']), "{problem:?}");
         assert!(problem.contains(part), "{problem:?}");
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn reads_of_new_reports_are_paced_if_redis_never_waits() {
+    let reply = b"*-1\r\n";
+    let redis = EvilRedis::start(Evil {
+        reply: reply.to_vec(),
+        is_endless: false,
+        pause: Duration::ZERO,
+        is_hasty: true,
+    });
+    let _store = redis.store().await;
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let reads = redis.sent.load(Ordering::Relaxed) / reply.len() as u64;
+    assert!((1..=150).contains(&reads), "{reads} reads in a second");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -11,6 +11,8 @@ from support.memory_group import memory_group
 from support.places import OFFICE
 from support.row import Row
 
+from proofs import default_limits
+
 LIMIT_MIB = 384
 SETTINGS = TINY | {
     "LOG__FILTER": "error",
@@ -34,7 +36,11 @@ def frames() -> dict[str, tuple[bytes, set[int]]]:
 
 
 def prove(effort: Effort) -> list[Row]:
-    """Sends all kinds, many at a time."""
+    """Sends huge frames to a small server, and the largest permitted ones to one with the defaults."""
+    return [*_refused(effort), default_limits.prove(effort)]
+
+
+def _refused(effort: Effort) -> list[Row]:
     made = frames()
     row = Row(
         "memory limit", f"{LIMIT_MIB} MiB; {len(made)} kinds of huge frames, {effort.huge_frames} × {AT_ONCE} of each"

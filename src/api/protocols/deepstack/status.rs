@@ -27,7 +27,7 @@ pub(in crate::api) struct UpdateAvailable {
 
 /// Check that the server responds (CodeProject.AI)
 #[utoipa::path(
-    get, path = "/v1/status/ping", tag = "deepstack", operation_id = "ping_as_code_project_ai",
+    get, path = "/v1/status/ping", tag = "operation", operation_id = "ping_as_code_project_ai",
     security(()),
     responses((status = OK, description = "The server responds.", body = Pong))
 )]
@@ -37,7 +37,7 @@ pub(in crate::api) async fn ping() -> Json<Pong> {
 
 /// Check that the server responds (CodeProject.AI, later versions)
 #[utoipa::path(
-    get, path = "/v1/server/status/ping", tag = "deepstack",
+    get, path = "/v1/server/status/ping", tag = "operation",
     operation_id = "ping_server_as_code_project_ai",
     security(()),
     responses((status = OK, description = "The server responds.", body = Pong))
@@ -50,7 +50,7 @@ pub(in crate::api) async fn server_ping() -> Json<Pong> {
 ///
 /// Lookdown opens no connection to look for updates, so none is ever reported.
 #[utoipa::path(
-    get, path = "/v1/status/updateavailable", tag = "deepstack",
+    get, path = "/v1/status/updateavailable", tag = "operation",
     operation_id = "get_update_as_code_project_ai",
     security(()),
     responses((status = OK, description = "The version that runs.", body = UpdateAvailable))

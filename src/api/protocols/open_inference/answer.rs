@@ -11,6 +11,7 @@ use crate::{
     api::http::problem::Problem,
     open_inference::{
         HEAD_LENGTH, TensorValues,
+        bounded_json::Entries,
         message::{InferResponse, Message, OutputParameters, OutputTensor},
     },
 };
@@ -76,7 +77,7 @@ impl InferAnswer {
             written.push(OutputTensor {
                 name: output.name.to_owned(),
                 datatype: values.datatype().to_string(),
-                shape: output.shape.clone(),
+                shape: Entries(output.shape.clone()),
                 parameters: binary.then(|| OutputParameters {
                     binary_data_size: Some(values.byte_count()),
                 }),
@@ -87,7 +88,7 @@ impl InferAnswer {
             model_name: answerer.model.to_owned(),
             model_version: Some(answerer.version.to_owned()),
             id: answerer.id.map(ToOwned::to_owned),
-            outputs: written,
+            outputs: Entries(written),
         };
         let message = Message::write(&response, &behind).map_err(Problem::internal)?;
         Ok(Self {

@@ -22,6 +22,8 @@ struct State {
     /// Status of every response, instead of the regular response.
     refusal: Option<u16>,
     has_ended: bool,
+    /// Metadata of the model, instead of the regular ones.
+    metadata: Option<String>,
     /// Scripted responses to the next inference requests.
     replies: VecDeque<ScriptedReply>,
     inferred: Vec<Inferred>,
@@ -89,6 +91,7 @@ impl FakeServer {
             is_ready: true,
             refusal: None,
             has_ended: false,
+            metadata: None,
             replies: VecDeque::new(),
             inferred: Vec::new(),
             authorizations: Vec::new(),
@@ -120,6 +123,10 @@ impl FakeServer {
 
     pub(super) fn queue(&self, reply: ScriptedReply) {
         self.state.lock().unwrap().replies.push_back(reply);
+    }
+
+    pub(super) fn describe(&self, metadata: String) {
+        self.state.lock().unwrap().metadata = Some(metadata);
     }
 
     pub(super) fn be_ready(&self, is_ready: bool) {
@@ -218,6 +225,11 @@ fn answer(
     let json = |value: &Value| ScriptedReply::status(200).body(value.to_string());
     if let Some(status) = state.refusal {
         return ScriptedReply::status(status);
+    }
+    if path == "/v2/models/there"
+        && let Some(metadata) = &state.metadata
+    {
+        return ScriptedReply::status(200).body(metadata.as_str());
     }
     match path {
         "/v2" => json(
