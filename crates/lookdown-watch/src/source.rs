@@ -1,0 +1,4 @@
+//! The sources of frames.
+
+mod jpeg_splitter;
+mod multipart;
