@@ -120,7 +120,10 @@ impl WatchOptions {
         }
         let mut readers = 0;
         for (index, camera) in cameras.iter().enumerate() {
-            if cameras[..index].iter().any(|other| other.name == camera.name) {
+            if cameras[..index]
+                .iter()
+                .any(|other| other.name == camera.name)
+            {
                 let field = format!("cameras[{index}].name");
                 let remedy = "is the name of an earlier camera: give each camera its own";
                 return Err(ConfigError::value(&field, &camera.name, remedy));

@@ -118,7 +118,10 @@ mod tests {
     fn whole_images_are_recognised() {
         let webp = b"RIFF\x04\0\0\0WEBP";
         assert_eq!(check(b"\xff\xd8\xff\xe0..\xff\xd9"), Ok(ImageFormat::Jpeg));
-        assert_eq!(check(b"\xff\xd8\xff..\xff\xd9\0\0\r\n"), Ok(ImageFormat::Jpeg));
+        assert_eq!(
+            check(b"\xff\xd8\xff..\xff\xd9\0\0\r\n"),
+            Ok(ImageFormat::Jpeg)
+        );
         assert_eq!(
             check(b"\x89PNG\r\n\x1a\n..IEND\xaeB`\x82"),
             Ok(ImageFormat::Png)

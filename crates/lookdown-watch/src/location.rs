@@ -26,13 +26,19 @@ pub enum Location {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidLocation {
     /// Not a URL.
-    #[error("it is no valid URL: give it as scheme://host/path, with special characters percent-encoded")]
+    #[error(
+        "it is no valid URL: give it as scheme://host/path, with special characters percent-encoded"
+    )]
     InvalidUrl,
     /// An unknown scheme.
-    #[error("its scheme is unknown: use http, https, rtsp or rtsps, a folder, a video file, or - for standard input")]
+    #[error(
+        "its scheme is unknown: use http, https, rtsp or rtsps, a folder, a video file, or - for standard input"
+    )]
     UnknownScheme,
     /// No such file.
-    #[error("there is no such file or folder: give a URL with its scheme, an existing path, or - for standard input")]
+    #[error(
+        "there is no such file or folder: give a URL with its scheme, an existing path, or - for standard input"
+    )]
     NoSuchFile,
 }
 
@@ -127,11 +133,17 @@ mod tests {
         std::fs::write(&file, "").unwrap();
         let parse = |text: &str| Location::parse(text).map(|(location, _)| location);
         assert_eq!(parse("-"), Ok(Location::StandardInput));
-        assert!(matches!(parse("http://camera/snap.jpg"), Ok(Location::Http(_))));
+        assert!(matches!(
+            parse("http://camera/snap.jpg"),
+            Ok(Location::Http(_))
+        ));
         assert!(matches!(parse("rtsps://camera/s"), Ok(Location::Rtsp(_))));
         let folder = folder.path().to_str().unwrap();
         assert!(matches!(parse(folder), Ok(Location::Folder(_))));
-        assert!(matches!(parse(file.to_str().unwrap()), Ok(Location::Video(_))));
+        assert!(matches!(
+            parse(file.to_str().unwrap()),
+            Ok(Location::Video(_))
+        ));
         assert_eq!(parse("/nowhere"), Err(InvalidLocation::NoSuchFile));
         assert_eq!(parse("ftp://camera/x"), Err(InvalidLocation::UnknownScheme));
         assert_eq!(parse("rtsp://"), Err(InvalidLocation::InvalidUrl));

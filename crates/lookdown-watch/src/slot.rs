@@ -37,6 +37,11 @@ impl<T> Slot<T> {
         replaced
     }
 
+    /// Drops the value.
+    pub(crate) fn clear(&self) {
+        self.content.lock().value = None;
+    }
+
     /// Announces that no value follows.
     pub(crate) fn close(&self) {
         self.content.lock().is_closed = true;

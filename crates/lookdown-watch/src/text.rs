@@ -27,7 +27,10 @@ mod tests {
 
     #[test]
     fn a_text_is_one_line_of_limited_length() {
-        assert_eq!(one_line("refused\r\n2026 WARN forged\n"), "refused  2026 WARN forged");
+        assert_eq!(
+            one_line("refused\r\n2026 WARN forged\n"),
+            "refused  2026 WARN forged"
+        );
         assert_eq!(one_line(&"x".repeat(1000)).len(), MAX_CHARS);
     }
 }

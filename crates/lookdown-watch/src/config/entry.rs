@@ -102,7 +102,9 @@ impl CameraEntry {
             name: self.name,
             url: self.url,
             user: self.user.or_else(|| defaults.user.clone()),
-            password_file: self.password_file.or_else(|| defaults.password_file.clone()),
+            password_file: self
+                .password_file
+                .or_else(|| defaults.password_file.clone()),
             every: self.every.or_else(|| defaults.every.clone()),
             stall_after: self.stall_after.or_else(|| defaults.stall_after.clone()),
             calibration: self.calibration.or_else(|| defaults.calibration.clone()),
@@ -126,12 +128,16 @@ impl CameraEntry {
             let problem = "the source of the frames is missing: give a URL, a folder or a file";
             return Err(ConfigError::problem(&field("url"), problem));
         };
-        let (location, in_url) = Location::parse(url)
-            .map_err(|error| ConfigError::problem(&field("url"), error))?;
+        let (location, in_url) =
+            Location::parse(url).map_err(|error| ConfigError::problem(&field("url"), error))?;
         let name = self.checked_name(&field("name"))?;
         let every = duration(&field("every"), self.every.as_deref(), MIN_EVERY)?;
         let every = every.unwrap_or(DEFAULT_EVERY);
-        let stall_after = duration(&field("stall_after"), self.stall_after.as_deref(), MIN_STALL)?;
+        let stall_after = duration(
+            &field("stall_after"),
+            self.stall_after.as_deref(),
+            MIN_STALL,
+        )?;
         let (least, intervals) = DEFAULT_STALL;
         let stall_after = stall_after.unwrap_or(least.max(every * intervals));
         if stall_after <= every {
@@ -175,7 +181,10 @@ impl CameraEntry {
         camera: &str,
     ) -> Result<Vec<(String, String)>, ConfigError> {
         let mut parameters = vec![("camera".to_owned(), camera.to_owned())];
-        for (key, value) in [("calibration", &self.calibration), ("profile", &self.profile)] {
+        for (key, value) in [
+            ("calibration", &self.calibration),
+            ("profile", &self.profile),
+        ] {
             parameters.extend(value.clone().map(|value| (key.to_owned(), value)));
         }
         if let Some(motion) = self.motion {
@@ -183,7 +192,8 @@ impl CameraEntry {
         }
         for (key, value) in &self.parameters {
             if OWN_PARAMETERS.contains(&key.as_str()) {
-                let remedy = "does not belong here: it is a key of the camera, or is set for each frame";
+                let remedy =
+                    "does not belong here: it is a key of the camera, or is set for each frame";
                 return Err(ConfigError::value(field, key, remedy));
             }
             parameters.push((key.clone(), value.written()));
@@ -222,7 +232,8 @@ fn duration(
         Some(parsed) if (least..=MAX_EVERY).contains(&parsed) => Ok(Some(parsed)),
         _ => {
             let least = least.as_secs_f64();
-            let remedy = format!("is no duration from {least} s to 1 h: write it like 1s, 500ms or 2m");
+            let remedy =
+                format!("is no duration from {least} s to 1 h: write it like 1s, 500ms or 2m");
             Err(ConfigError::value(field, text, &remedy))
         }
     }

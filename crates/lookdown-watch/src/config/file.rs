@@ -108,11 +108,13 @@ fn parse(text: &str) -> Result<WatchFile, ConfigError> {
         let message = error.message().trim();
         ConfigError::Malformed {
             field,
-            problem: format!("{message} (line {line}): correct the file as docs/watch.md describes"),
+            problem: format!(
+                "{message} (line {line}): correct the file as docs/watch.md describes"
+            ),
         }
     };
-    let deserializer = toml::Deserializer::parse(text)
-        .map_err(|error| malformed("cameras".to_owned(), &error))?;
+    let deserializer =
+        toml::Deserializer::parse(text).map_err(|error| malformed("cameras".to_owned(), &error))?;
     serde_path_to_error::deserialize(deserializer)
         .map_err(|error| malformed(error.path().to_string(), error.inner()))
 }
@@ -121,7 +123,9 @@ fn parse(text: &str) -> Result<WatchFile, ConfigError> {
 fn read(field: &str, path: &Path) -> Result<Vec<u8>, ConfigError> {
     let limited = || {
         let mut content = Vec::new();
-        let length = File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut content)?;
+        let length = File::open(path)?
+            .take(MAX_BYTES + 1)
+            .read_to_end(&mut content)?;
         if length as u64 > MAX_BYTES {
             return Err(io::Error::other("it has more than 1 MiB"));
         }

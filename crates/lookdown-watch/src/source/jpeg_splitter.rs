@@ -5,6 +5,8 @@
 
 use bytes::{Bytes, BytesMut};
 
+/// Bytes that are read at once.
+const CHUNK_BYTES: usize = 64 << 10;
 /// First bytes of a file.
 const START: &[u8] = &[0xff, 0xd8, 0xff];
 
@@ -16,7 +18,6 @@ pub(crate) struct JpegSplitter {
     state: State,
     /// Number of bytes of the buffer that were parsed.
     parsed: usize,
-    skipped_bytes: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -44,18 +45,13 @@ impl JpegSplitter {
             max_bytes,
             state: State::Start,
             parsed: 0,
-            skipped_bytes: 0,
         }
     }
 
-    /// The buffer that received bytes are appended to.
+    /// The buffer that received bytes are appended to, with room for a chunk.
     pub(crate) fn buffer(&mut self) -> &mut BytesMut {
+        self.buffer.reserve(CHUNK_BYTES);
         &mut self.buffer
-    }
-
-    /// The number of bytes that belong to no file.
-    pub(crate) fn skipped_bytes(&self) -> u64 {
-        self.skipped_bytes
     }
 
     /// Returns the next whole file, or `None` if more bytes are needed.
@@ -86,7 +82,6 @@ impl JpegSplitter {
     /// Drops the first bytes, and searches for the next file after them.
     fn skip(&mut self, count: usize) {
         let _ = self.buffer.split_to(count.min(self.buffer.len()));
-        self.skipped_bytes += count as u64;
         self.restart();
     }
 
@@ -182,10 +177,11 @@ mod tests {
     use super::*;
 
     /// A JPEG with a thumbnail in a segment, and a scan with a stuffed byte and a restart marker.
-    const WHOLE: &[u8] = b"\xff\xd8\xff\xe1\x00\x08\xff\xd8\xff\xd9..\xff\xda\x00\x02ab\xff\x00c\xff\xd0d\xff\xd9";
+    const WHOLE: &[u8] =
+        b"\xff\xd8\xff\xe1\x00\x08\xff\xd8\xff\xd9..\xff\xda\x00\x02ab\xff\x00c\xff\xd0d\xff\xd9";
     const SMALL: &[u8] = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9";
 
-    fn files(stream: &[u8], chunk: usize) -> (Vec<Bytes>, u64) {
+    fn files(stream: &[u8], chunk: usize) -> Vec<Bytes> {
         let mut splitter = JpegSplitter::new(1000);
         let mut files = Vec::new();
         for bytes in stream.chunks(chunk) {
@@ -194,28 +190,30 @@ mod tests {
                 files.push(file);
             }
         }
-        (files, splitter.skipped_bytes())
+        files
     }
 
     #[test]
     fn concatenated_files_are_split_at_any_chunk_size() {
         let stream = [WHOLE, SMALL, WHOLE].concat();
         for chunk in [1, 2, 3, 7, 1000] {
-            let (files, skipped) = files(&stream, chunk);
-            assert_eq!(files, [WHOLE, SMALL, WHOLE], "{chunk}");
-            assert_eq!(skipped, 0);
+            assert_eq!(files(&stream, chunk), [WHOLE, SMALL, WHOLE], "{chunk}");
         }
     }
 
     #[test]
     fn damaged_bytes_are_skipped_up_to_the_next_file() {
         let cut = &WHOLE[..WHOLE.len() - 2];
-        for damaged in [b"noise\xff".as_slice(), cut, b"\xff\xd8\xff\x00", b"\xff\xd8\xff\xe0\x00\x01"] {
+        for damaged in [
+            b"noise\xff".as_slice(),
+            cut,
+            b"\xff\xd8\xff\x00",
+            b"\xff\xd8\xff\xe0\x00\x01",
+        ] {
             let stream = [SMALL, damaged, SMALL].concat();
             for chunk in [1, 5, 1000] {
-                let (files, skipped) = files(&stream, chunk);
-                assert_eq!(files, [SMALL, SMALL], "{damaged:x?} in chunks of {chunk}");
-                assert_eq!(skipped, damaged.len() as u64);
+                let found = files(&stream, chunk);
+                assert_eq!(found, [SMALL, SMALL], "{damaged:x?} in chunks of {chunk}");
             }
         }
     }
@@ -223,7 +221,9 @@ mod tests {
     #[test]
     fn a_file_without_an_end_is_bounded() {
         let mut splitter = JpegSplitter::new(1000);
-        splitter.buffer().extend_from_slice(b"\xff\xd8\xff\xda\x00\x02");
+        splitter
+            .buffer()
+            .extend_from_slice(b"\xff\xd8\xff\xda\x00\x02");
         for _ in 0..100 {
             splitter.buffer().extend_from_slice(&[b'x'; 100]);
             assert_eq!(splitter.next_file(), None);

@@ -38,7 +38,9 @@ enum State {
 pub(crate) enum PartError {
     #[error("the camera's multipart stream names no boundary")]
     NoBoundary,
-    #[error("a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of headers")]
+    #[error(
+        "a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of headers"
+    )]
     LongHeaders,
     #[error("the camera's multipart stream does not contain its boundary")]
     BoundaryNotFound,
@@ -241,7 +243,8 @@ mod tests {
 
     #[test]
     fn a_wrong_length_costs_one_part_only() {
-        let stream = b"--frame\r\nContent-Length: 2\r\n\r\nwrong\r\n--frame\r\n\r\nright\r\n--frame\r\n";
+        let stream =
+            b"--frame\r\nContent-Length: 2\r\n\r\nwrong\r\n--frame\r\n\r\nright\r\n--frame\r\n";
         assert_eq!(parts(TYPE, stream, 4).unwrap(), ["wr", "right"]);
     }
 
@@ -259,7 +262,11 @@ mod tests {
 
     #[test]
     fn a_stream_without_a_boundary_is_refused() {
-        for content_type in ["multipart/x-mixed-replace", "a/b; boundary=", "a/b; boundary=--"] {
+        for content_type in [
+            "multipart/x-mixed-replace",
+            "a/b; boundary=",
+            "a/b; boundary=--",
+        ] {
             assert_eq!(parts(content_type, b"", 1), Err(PartError::NoBoundary));
         }
     }

@@ -47,7 +47,10 @@ fn defaults_apply_to_every_camera() {
         query(hall),
         "camera=hall&calibration=ceiling&profile=fast&score_threshold=0.4"
     );
-    assert_eq!(query(gate), "camera=gate&profile=fast&motion=true&score_threshold=0.4");
+    assert_eq!(
+        query(gate),
+        "camera=gate&profile=fast&motion=true&score_threshold=0.4"
+    );
     assert_eq!(gate.every.as_secs(), 2);
     assert!(matches!(&gate.location, Location::Rtsp(url) if url.username().is_empty()));
     assert_eq!(gate.credentials.as_ref().unwrap().user, "viewer");
@@ -56,7 +59,10 @@ fn defaults_apply_to_every_camera() {
 #[test]
 fn errors_name_the_field_the_value_and_the_remedy() {
     for (text, expected) in [
-        ("", "cameras: there is no camera: add a [[cameras]] table with a url"),
+        (
+            "",
+            "cameras: there is no camera: add a [[cameras]] table with a url",
+        ),
         (
             "[[cameras]]\nname='a'",
             "cameras[0].url: the source of the frames is missing: give a URL, a folder or a file",
