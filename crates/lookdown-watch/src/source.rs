@@ -1,14 +1,13 @@
 //! The sources of frames, and their supervision: a source that fails or stalls is started again.
 
-mod ffmpeg;
 mod folder;
 mod http;
 mod jpeg_splitter;
 mod multipart;
 mod standard_input;
-mod stderr_line;
+mod video;
 
-pub use ffmpeg::VideoFrames;
+pub(crate) use jpeg_splitter::JpegSplitter;
 pub use standard_input::ImageReader;
 
 use std::{
@@ -217,9 +216,9 @@ pub(crate) async fn supervise(
 async fn run(camera: &Camera, client: &Client, sink: &Sink<'_>) -> Result<(), SourceError> {
     let ended: Infallible = match &camera.location {
         Location::Http(url) => http::run(camera, url, client, sink).await?,
-        Location::Rtsp(url) => ffmpeg::run_stream(camera, url, sink).await?,
+        Location::Rtsp(url) => video::run_stream(camera, url, sink).await?,
         Location::Folder(path) => folder::run(camera, path, sink).await?,
-        Location::Video(path) => return ffmpeg::run_file(camera, path, sink).await,
+        Location::Video(path) => return video::run_file(camera, path, sink).await,
         Location::StandardInput => return standard_input::run(sink).await,
     };
     match ended {}

@@ -14,7 +14,7 @@ const MAX_BYTES: usize = 1000;
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
 /// The last line of standard error, as far as it was read.
-pub(super) struct LastLine {
+pub(crate) struct LastLine {
     stderr: ChildStderr,
     line: Vec<u8>,
     is_ended: bool,
@@ -22,7 +22,7 @@ pub(super) struct LastLine {
 }
 
 impl LastLine {
-    pub(super) fn new(stderr: ChildStderr) -> Self {
+    pub(crate) fn new(stderr: ChildStderr) -> Self {
         Self {
             stderr,
             line: Vec::new(),
@@ -32,7 +32,7 @@ impl LastLine {
     }
 
     /// Reads further text. Never ends after the end of the text. May be cancelled.
-    pub(super) async fn read(&mut self) {
+    pub(crate) async fn read(&mut self) {
         if self.is_ended {
             std::future::pending::<()>().await;
         }
@@ -58,8 +58,9 @@ impl LastLine {
         }
     }
 
-    /// Reads the rest, and returns the last line.
-    pub(super) async fn last(&mut self) -> String {
+    /// Reads the rest, and returns the last line. The wait for the rest is bounded, so a child that
+    /// still runs is not waited for.
+    pub(crate) async fn last(&mut self) -> String {
         let rest = async {
             while !self.is_ended {
                 self.read().await;
