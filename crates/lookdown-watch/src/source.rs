@@ -31,8 +31,10 @@ use crate::{
 
 /// First and longest pause before a source is started again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(30));
-/// Most checks for a stalled source per limit.
+/// Number of checks for a stalled source within its limit.
 const STALL_CHECKS: u32 = 4;
+/// Shortest time for the first frame: streams begin with a key frame.
+const FIRST_FRAME: Duration = Duration::from_secs(10);
 
 /// The reason why a source ended. Its text holds no credentials.
 #[derive(Debug, thiserror::Error)]
@@ -124,8 +126,9 @@ impl SourceError {
 pub(crate) struct Sink<'a> {
     slot: &'a Slot<Frame>,
     metrics: &'a CameraMetrics,
+    started: Instant,
     /// The time of the last sign that the camera works.
-    alive: Mutex<Instant>,
+    alive: Mutex<Option<Instant>>,
     is_failing: &'a Mutex<LogOnce>,
 }
 
@@ -153,14 +156,18 @@ impl Sink<'_> {
 
     /// Notes that the camera works, although it sent no new frame.
     fn alive(&self) {
-        *self.alive.lock() = Instant::now();
+        *self.alive.lock() = Some(Instant::now());
     }
 
     /// Waits until the camera showed no sign of work for this time.
     async fn stalled(&self, limit: Duration) -> SourceError {
         loop {
             sleep(limit / STALL_CHECKS).await;
-            if self.alive.lock().elapsed() >= limit {
+            let (since, limit) = match *self.alive.lock() {
+                Some(alive) => (alive, limit),
+                None => (self.started, limit.max(FIRST_FRAME)),
+            };
+            if since.elapsed() >= limit {
                 return SourceError::Stalled(limit);
             }
         }
@@ -182,10 +189,10 @@ pub(crate) async fn supervise(
         let sink = Sink {
             slot,
             metrics,
-            alive: Mutex::new(Instant::now()),
+            started: Instant::now(),
+            alive: Mutex::default(),
             is_failing: &log,
         };
-        let started = Instant::now();
         let outcome = tokio::select! {
             outcome = run(camera, client, &sink) => outcome,
             error = stalled(camera, &sink) => Err(error),
@@ -199,7 +206,7 @@ pub(crate) async fn supervise(
                 if error.needs_operator() {
                     backoff.longest_pause()
                 } else {
-                    backoff.reset_if_stable(started.elapsed());
+                    backoff.reset_if_stable(sink.started.elapsed());
                     backoff.next_pause()
                 }
             }
