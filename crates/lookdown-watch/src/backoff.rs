@@ -31,11 +31,6 @@ impl Backoff {
         jittered(limit.min(self.longest))
     }
 
-    /// Returns a pause of about the longest time, for failures that a retry does not fix.
-    pub(crate) fn longest_pause(&self) -> Duration {
-        jittered(self.longest)
-    }
-
     /// Starts again with the first pause.
     pub(crate) fn reset(&mut self) {
         self.attempts = 0;

@@ -31,6 +31,8 @@ use crate::{
 
 /// First and longest pause before a source is started again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(30));
+/// First and longest pause after wrong credentials: cameras lock accounts after a few attempts.
+const LOGIN_PAUSES: (Duration, Duration) = (Duration::from_secs(10), Duration::from_mins(5));
 /// Number of checks for a stalled source within its limit.
 const STALL_CHECKS: u32 = 4;
 /// Shortest time for the first frame: streams begin with a key frame.
@@ -107,17 +109,13 @@ pub enum SourceError {
 }
 
 impl SourceError {
-    /// Returns true if another attempt soon cannot succeed. Cameras lock accounts after wrong
-    /// passwords.
-    fn needs_operator(&self) -> bool {
+    /// Returns true if the camera refuses the credentials.
+    fn is_refused_login(&self) -> bool {
         matches!(
             self,
             Self::CredentialsRefused { .. }
                 | Self::CredentialsMissing
                 | Self::UnknownAuthentication
-                | Self::Redirect
-                | Self::ContentType(_)
-                | Self::NoFfmpeg { .. }
         )
     }
 }
@@ -184,6 +182,8 @@ pub(crate) async fn supervise(
 ) {
     let (first, longest) = PAUSES;
     let mut backoff = Backoff::new(first, longest);
+    let (first, longest) = LOGIN_PAUSES;
+    let mut login_backoff = Backoff::new(first, longest);
     let log = Mutex::new(LogOnce::default());
     loop {
         let sink = Sink {
@@ -203,9 +203,10 @@ pub(crate) async fn supervise(
                 if log.lock().is_changed(&error.to_string()) {
                     tracing::warn!("{error}");
                 }
-                if error.needs_operator() {
-                    backoff.longest_pause()
+                if error.is_refused_login() {
+                    login_backoff.next_pause()
                 } else {
+                    login_backoff.reset();
                     backoff.reset_if_stable(sink.started.elapsed());
                     backoff.next_pause()
                 }
