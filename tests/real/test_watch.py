@@ -219,8 +219,8 @@ class Cameras(unittest.TestCase):
             watch.wait_for("c", 2)
             self.assertGreaterEqual(watch.sent("a"), before)
             wait_until(lambda: watch.sent("b") == 0, "b is gone")
-            path.write_text("[[cameras]]\nnam = 1\n", encoding="utf-8")
-            wait_until(lambda: "unknown field `nam`" in watch.text, "the problem is logged")
+            path.write_text("[[cameras]]\nwidht = 1\n", encoding="utf-8")
+            wait_until(lambda: "unknown field `widht`" in watch.text, "the problem is logged")
             watch.wait_for("a", 2)
             self.assertEqual(watch.text.count("unknown field"), 1)
 

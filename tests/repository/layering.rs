@@ -189,7 +189,7 @@ const MAY_USE: [(&str, &[&str]); 33] = [
 const WITH_INDEPENDENT_PARTS: [&str; 2] = ["api::routes", "api::protocols"];
 
 /// Crates for external systems, and the only modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 28] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -213,6 +213,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
             "mqtt",
         ],
     ),
+    ("lookdown_watch", &["cli"]),
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),

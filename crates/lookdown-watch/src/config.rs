@@ -88,7 +88,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    pub(crate) fn value(field: &str, value: impl ToString, remedy: &str) -> Self {
+    pub(crate) fn value(field: &str, value: &impl ToString, remedy: &str) -> Self {
         Self::Value {
             field: field.to_owned(),
             value: value.to_string(),
@@ -96,7 +96,7 @@ impl ConfigError {
         }
     }
 
-    pub(crate) fn problem(field: &str, problem: impl ToString) -> Self {
+    pub(crate) fn problem(field: &str, problem: &impl ToString) -> Self {
         Self::Problem {
             field: field.to_owned(),
             problem: problem.to_string(),
@@ -112,11 +112,11 @@ impl WatchOptions {
     pub fn new(server: ServerOptions, cameras: Vec<Camera>) -> Result<Self, ConfigError> {
         if cameras.is_empty() {
             let problem = "there is no camera: add a [[cameras]] table with a url";
-            return Err(ConfigError::problem("cameras", problem));
+            return Err(ConfigError::problem("cameras", &problem));
         }
         if cameras.len() > MAX_CAMERAS {
             let remedy = "cameras are too many: start another process for those beyond 256";
-            return Err(ConfigError::value("cameras", cameras.len(), remedy));
+            return Err(ConfigError::value("cameras", &cameras.len(), remedy));
         }
         let mut readers = 0;
         for (index, camera) in cameras.iter().enumerate() {
@@ -132,7 +132,7 @@ impl WatchOptions {
             if readers > 1 {
                 let field = format!("cameras[{index}].url");
                 let remedy = "is read by an earlier camera: only one can read standard input";
-                return Err(ConfigError::value(&field, "-", remedy));
+                return Err(ConfigError::value(&field, &"-", remedy));
             }
         }
         Ok(Self { server, cameras })

@@ -73,7 +73,7 @@ pub async fn watch(
         ),
         None => None,
     };
-    let served = listener.map(|listener| {
+    let metrics_task = listener.map(|listener| {
         if let Ok(address) = listener.local_addr() {
             tracing::info!("metrics at http://{address}/metrics");
         }
@@ -91,7 +91,7 @@ pub async fn watch(
         outcome = watcher.run(&origin) => outcome,
     };
     watcher.end().await;
-    drop(served);
+    drop(metrics_task);
     outcome
 }
 
@@ -99,7 +99,7 @@ pub async fn watch(
 async fn read(path: &std::path::Path, server: &ServerEntry) -> Result<WatchOptions, ConfigError> {
     let (path, server) = (path.to_owned(), server.clone());
     let read = spawn_blocking(move || load(&path, &server)).await;
-    read.unwrap_or_else(|error| Err(ConfigError::problem("cameras", error)))
+    read.unwrap_or_else(|error| Err(ConfigError::problem("cameras", &error)))
 }
 
 /// A task that ends when it is dropped.

@@ -126,10 +126,10 @@ impl CameraEntry {
         let field = |key: &str| format!("{prefix}{key}");
         let Some(url) = &self.url else {
             let problem = "the source of the frames is missing: give a URL, a folder or a file";
-            return Err(ConfigError::problem(&field("url"), problem));
+            return Err(ConfigError::problem(&field("url"), &problem));
         };
         let (location, in_url) =
-            Location::parse(url).map_err(|error| ConfigError::problem(&field("url"), error))?;
+            Location::parse(url).map_err(|error| ConfigError::problem(&field("url"), &error))?;
         let name = self.checked_name(&field("name"))?;
         let every = duration(&field("every"), self.every.as_deref(), MIN_EVERY)?;
         let every = every.unwrap_or(DEFAULT_EVERY);
@@ -143,7 +143,7 @@ impl CameraEntry {
         if stall_after <= every {
             let remedy = "is not longer than the interval between two frames: raise it";
             let written = self.stall_after.unwrap_or_default();
-            return Err(ConfigError::value(&field("stall_after"), written, remedy));
+            return Err(ConfigError::value(&field("stall_after"), &written, remedy));
         }
         let credentials = credentials(
             &field(""),
@@ -165,7 +165,7 @@ impl CameraEntry {
     fn checked_name(&self, field: &str) -> Result<String, ConfigError> {
         let Some(name) = self.name.as_ref().or(self.calibration.as_ref()) else {
             let problem = "a name is missing: give a name or a calibration";
-            return Err(ConfigError::problem(field, problem));
+            return Err(ConfigError::problem(field, &problem));
         };
         let length = name.chars().count();
         if length == 0 || length > MAX_NAME_CHARS || name.chars().any(char::is_control) {
@@ -234,7 +234,7 @@ fn duration(
             let least = least.as_secs_f64();
             let remedy =
                 format!("is no duration from {least} s to 1 h: write it like 1s, 500ms or 2m");
-            Err(ConfigError::value(field, text, &remedy))
+            Err(ConfigError::value(field, &text, &remedy))
         }
     }
 }
@@ -257,11 +257,11 @@ fn credentials(
         })),
         (Some(_), _, _) => Err(ConfigError::problem(
             &format!("{prefix}user"),
-            "the URL has credentials as well: remove them there, or remove user and password_file",
+            &"the URL has credentials as well: remove them there, or remove user and password_file",
         )),
         (None, None, Some(_)) => Err(ConfigError::problem(
             &format!("{prefix}user"),
-            "it is missing: give the user name for the password_file",
+            &"it is missing: give the user name for the password_file",
         )),
     }
 }

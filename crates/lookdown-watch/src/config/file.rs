@@ -66,7 +66,7 @@ impl ServerEntry {
             let remedy = "is no URL of a server: write it like http://127.0.0.1:8080";
             // It may hold a password.
             let shown = text.rsplit('@').next().unwrap_or_default();
-            return Err(ConfigError::value("server.url", shown, remedy));
+            return Err(ConfigError::value("server.url", &shown, remedy));
         };
         let key = self.api_key_file.as_deref();
         let key = key.map(|path| read_secret("server.api_key_file", path));
@@ -145,7 +145,7 @@ pub(super) fn read_secret(field: &str, path: &Path) -> Result<SecretString, Conf
     let line = text.lines().next().unwrap_or_default().trim_end();
     if line.is_empty() {
         let remedy = "is an empty file: write the secret on its first line";
-        return Err(ConfigError::value(field, path.display(), remedy));
+        return Err(ConfigError::value(field, &path.display(), remedy));
     }
     Ok(line.into())
 }

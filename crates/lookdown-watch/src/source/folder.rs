@@ -29,8 +29,8 @@ pub(super) async fn run(
     folder: &Path,
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
-    let (least, most) = CHECKS;
-    let pause = camera.every.clamp(least, most);
+    let (shortest, longest) = CHECKS;
+    let pause = camera.every.clamp(shortest, longest);
     let mut last: Option<Stamp> = None;
     loop {
         let (folder, after) = (folder.to_owned(), last.clone());

@@ -13,7 +13,7 @@ const JPEG_START: &[u8] = &[0xff, 0xd8];
 pub struct ImageReader<R> {
     input: R,
     splitter: JpegSplitter,
-    /// Whether the stream is of JPEG files, once its first bytes have arrived.
+    /// True for a stream of JPEG files. `None` until its first bytes arrive.
     is_jpeg: Option<bool>,
 }
 

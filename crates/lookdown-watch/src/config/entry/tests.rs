@@ -106,9 +106,9 @@ fn errors_name_the_field_the_value_and_the_remedy() {
 
 #[test]
 fn unknown_keys_are_refused_with_their_line() {
-    let error = error_of("[[cameras]]\nname='a'\nurl='http://c/'\nevry='1s'");
+    let error = error_of("[[cameras]]\nname='a'\nurl='http://c/'\nwidht='1s'");
     assert!(error.starts_with("cameras[0]"), "{error}");
-    assert!(error.contains("unknown field `evry`"), "{error}");
+    assert!(error.contains("unknown field `widht`"), "{error}");
     assert!(error.contains("(line 4)"), "{error}");
 }
 
