@@ -80,12 +80,13 @@ async fn snapshots_reach_the_server_with_their_parameters() {
 
 #[tokio::test]
 async fn an_unchanged_snapshot_is_not_sent_again() {
-    let camera = serve(
-        |request| match request.head.contains("if-none-match: \"1\"") {
-            true => Reply::status(304),
-            false => snapshot().with("ETag", "\"1\""),
-        },
-    )
+    let camera = serve(|request| {
+        if request.head.contains("if-none-match: \"1\"") {
+            Reply::status(304)
+        } else {
+            snapshot().with("ETag", "\"1\"")
+        }
+    })
     .await;
     let server = serve(|_| report()).await;
     watch_until(entry(&camera.url("")), &server, || camera.count() >= 10).await;
@@ -100,12 +101,13 @@ async fn a_challenge_is_answered_and_a_refusal_ends_the_attempts() {
             "Digest realm=\"c\", nonce=\"n\", qop=\"auth\"",
         )
     };
-    let camera = serve(
-        move |request| match request.head.contains("authorization: Digest") {
-            true => snapshot(),
-            false => challenge(),
-        },
-    )
+    let camera = serve(move |request| {
+        if request.head.contains("authorization: Digest") {
+            snapshot()
+        } else {
+            challenge()
+        }
+    })
     .await;
     let server = serve(|_| report()).await;
     let mut login = entry(&camera.url("").replace("//", "//user:secret@"));

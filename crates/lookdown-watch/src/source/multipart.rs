@@ -256,7 +256,7 @@ mod tests {
         assert_eq!(parts(TYPE, &endless, 10), Err(PartError::TooLarge));
         let headers = [b"--frame\r\n".as_slice(), &[b'x'; 9000]].concat();
         assert_eq!(parts(TYPE, &headers, 1000), Err(PartError::LongHeaders));
-        let noise = [b'x'; 70_000];
+        let noise = vec![b'x'; 70_000];
         assert_eq!(parts(TYPE, &noise, 1000), Err(PartError::BoundaryNotFound));
     }
 
