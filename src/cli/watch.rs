@@ -174,7 +174,7 @@ async fn watch_and_serve(
     commit: Option<&str>,
     shutdown: Shutdown,
 ) -> anyhow::Result<()> {
-    let server = serve::serve(settings.clone(), commit, shutdown.clone());
+    let serving = serve::serve(settings.clone(), commit, shutdown.clone());
     let watching = async {
         let ready = async {
             while probe::ask(&settings, Probe::Readiness).await.is_err() {
@@ -193,18 +193,16 @@ async fn watch_and_serve(
         }
         anyhow::Ok(outcome?)
     };
-    let (served, watched) = tokio::join!(
-        async {
-            let served = server.await;
-            if !shutdown.is_requested() {
-                // The server has failed.
-                shutdown.request();
-            }
-            served
-        },
-        watching
-    );
-    served.and(watched)
+    let serving = async {
+        let outcome = serving.await;
+        if !shutdown.is_requested() {
+            // The server has failed.
+            shutdown.request();
+        }
+        outcome
+    };
+    let (first, second) = tokio::join!(serving, watching);
+    first.and(second)
 }
 
 /// The cameras, and the server that receives their frames.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// The time after which a connection counts as stable, and the backoff starts again.
-const STABLE: Duration = Duration::from_secs(10);
+const STABLE: Duration = Duration::from_secs(3);
 
 /// The pauses between attempts. Each is a random time between half of the current limit and the
 /// limit, which doubles with every attempt.

@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// First and longest pause before a source is started again.
-const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(30));
+const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));
 /// First and longest pause after wrong credentials: cameras lock accounts after a few attempts.
 const LOGIN_PAUSES: (Duration, Duration) = (Duration::from_secs(10), Duration::from_mins(5));
 /// Number of checks for a stalled source within its limit.
@@ -157,6 +157,12 @@ impl Sink<'_> {
         *self.alive.lock() = Some(Instant::now());
     }
 
+    /// The time from the start to the last sign that the camera works.
+    fn lifetime(&self) -> Duration {
+        let alive = *self.alive.lock();
+        alive.map_or(Duration::ZERO, |alive| alive - self.started)
+    }
+
     /// Waits until the camera showed no sign of work for this time.
     async fn stalled(&self, limit: Duration) -> SourceError {
         loop {
@@ -207,7 +213,7 @@ pub(crate) async fn supervise(
                     login_backoff.next_pause()
                 } else {
                     login_backoff.reset();
-                    backoff.reset_if_stable(sink.started.elapsed());
+                    backoff.reset_if_stable(sink.lifetime());
                     backoff.next_pause()
                 }
             }
