@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     source: String,
     #[command(flatten)]
     camera: CameraFlags,
-    /// The URL of the server [default: http://127.0.0.1:8080]
+    /// The URL of the server [default: port 8080 on this machine]
     #[arg(long, value_name = "URL")]
     server: Option<String>,
     /// A file with the API key for the server
@@ -156,7 +156,7 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
         let listen = arguments.metrics_listen;
         if arguments.serve {
-            watch_and_serve(origin, listen, settings, commit, shutdown).await
+            Box::pin(watch_and_serve(origin, listen, settings, commit, shutdown)).await
         } else {
             Ok(watch(origin, listen, shutdown.requested()).await?)
         }
