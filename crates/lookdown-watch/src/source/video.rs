@@ -146,7 +146,7 @@ mod tests {
         };
         let script = script(&camera, url);
         assert!(
-            script.contains("it%27s%40p@10.0.0.8/s'\\''1'\n"),
+            script.contains("it'\\''s%40p@10.0.0.8/s'\\''1'\n"),
             "{script}"
         );
         assert!(script.contains("option timeout 4000000\n"), "{script}");
