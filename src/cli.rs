@@ -13,6 +13,7 @@ mod serve;
 mod settings_file;
 mod shell;
 mod tune;
+mod watch;
 
 use std::{
     ffi::OsString,
@@ -38,6 +39,8 @@ struct CommandLine {
 enum Command {
     /// Start the HTTP server
     Serve(serve::Arguments),
+    /// Send frames of cameras to a server: snapshots, MJPEG, RTSP, folders, video files
+    Watch(Box<watch::Arguments>),
     /// Check that the server with these settings on this machine is ready: exits with 0 or 1
     Health(health::Arguments),
     /// Detect the persons in images: one JSON report per line on standard output
@@ -72,6 +75,7 @@ enum Command {
 pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) -> ExitCode {
     let outcome = match parse(arguments, commit).command {
         Command::Serve(arguments) => serve::run(&arguments, commit),
+        Command::Watch(arguments) => watch::run(&arguments, commit),
         Command::Health(arguments) => health::run(&arguments),
         Command::Detect(arguments) => detect::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),

@@ -9,6 +9,11 @@ use crate::{
     pipeline::Detected,
 };
 
+/// Draws the persons, and returns a JPEG.
+pub(super) fn jpeg(detected: Detected, options: &AnnotationOptions) -> anyhow::Result<Vec<u8>> {
+    Ok(annotated_image(detected, ImageFormat::Jpeg, options)?)
+}
+
 /// Draws the persons and writes a file: PNG if its name ends so, else JPEG.
 pub(super) fn write(
     detected: Detected,

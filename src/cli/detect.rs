@@ -2,6 +2,7 @@
 
 mod labels;
 mod pictures;
+mod stream;
 
 use std::{
     fs,
@@ -9,9 +10,11 @@ use std::{
     path::{Path, PathBuf},
     process::ExitCode,
     sync::Arc,
+    time::Duration,
 };
 
 use anyhow::{Context, bail};
+use bytes::Bytes;
 use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
@@ -21,6 +24,7 @@ use strum::VariantArray;
 use self::{
     labels::Labels,
     pictures::{Picture, pictures},
+    stream::{Stream, StreamReader, interval},
 };
 use super::{
     SettingsFile, annotate,
@@ -38,18 +42,23 @@ use crate::{
 /// Arguments of `lookdown detect`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Pictures (JPEG, PNG or WebP), and folders with pictures in them. A report's `request_id`
-    /// is the path as given here
-    #[arg(required = true, value_name = "IMAGE|FOLDER")]
+    /// Images (JPEG, PNG or WebP), and folders with images in them; or a video; or `-` for an image
+    /// or JPEG files on standard input. A report's `request_id` is the path as given here, for a
+    /// video with the position, such as `clip.mp4#t=2.000`
+    #[arg(required = true, value_name = "IMAGE|FOLDER|VIDEO|-")]
     images: Vec<PathBuf>,
+    /// The interval between two frames of a video, such as 500ms [default: 1s]
+    #[arg(long, value_name = "DURATION", value_parser = interval)]
+    every: Option<Duration>,
     /// A calibration file, or the ID of one in the calibration folder [default: the lens circle
     /// is found and an ideal lens assumed]
     #[arg(long, value_name = "FILE|ID")]
     calibration: Option<String>,
     #[command(flatten)]
     parameters: ParameterFlags,
-    /// Also draw the persons into the picture; takes a single IMAGE
-    #[arg(long, value_name = "OUT.jpg|OUT.png")]
+    /// Also draw the persons into the image, or into the frames of a video; takes a single IMAGE or
+    /// VIDEO
+    #[arg(long, value_name = "OUT.jpg|OUT.png|OUT.mp4")]
     annotate: Option<PathBuf>,
     #[command(flatten)]
     picture: PictureFlags,
@@ -79,6 +88,12 @@ fn annotation_format() -> impl TypedValueParser<Value = AnnotationFormat> {
 
 /// Reports on every picture; those that cannot be used cost the exit code, not the others.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    if let Some(stream) = Stream::among(&arguments.images)? {
+        return run_stream(arguments, &stream);
+    }
+    if arguments.every.is_some() {
+        bail!("--every is the interval of a video: leave it out, or give a single video");
+    }
     let pictures = pictures(&arguments.images)?;
     if arguments.annotate.is_some() && pictures.len() > 1 {
         bail!("--annotate draws one picture: give a single IMAGE, or leave it out");
@@ -96,7 +111,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut code = ExitCode::SUCCESS;
     for picture in &pictures {
         let path = &picture.path;
-        match detect(&engine, path, max_bytes, &parameters, calibration.clone()) {
+        let found = read(path, max_bytes).and_then(|image| {
+            let name = path.display().to_string();
+            detect(&engine, name, image, &parameters, calibration.clone())
+        });
+        match found {
             Ok(detected) => {
                 match &mut labels {
                     Some(labels) => labels.add(picture, &detected.report),
@@ -121,6 +140,73 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if let Some(labels) = labels {
         labels.write()?;
     }
+    Ok(code)
+}
+
+/// Reports on every frame of a video or of standard input, in order. A frame that cannot be used
+/// costs the exit code, not the others.
+fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode> {
+    let is_video = matches!(stream, Stream::Video(_));
+    if arguments.format.is_some() {
+        bail!("--format takes images: leave it out for a video and for standard input");
+    }
+    if arguments.every.is_some() && !is_video {
+        bail!("--every is the interval of a video: leave it out for standard input");
+    }
+    let (parameters, calibration) = parameters(arguments)?;
+    let options = arguments.picture.check()?;
+    let settings = arguments.settings_file.load()?;
+    let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
+    let mut reader = StreamReader::open(stream, arguments.every)?;
+    let mut video = match &arguments.annotate {
+        Some(path) if is_video => Some((reader.writer(path)?, path)),
+        _ => None,
+    };
+    let mut code = ExitCode::SUCCESS;
+    let mut frames = 0_u64;
+    while let Some(frame) = reader.next_frame()? {
+        frames += 1;
+        let name = frame.name;
+        let found = detect(
+            &engine,
+            name.clone(),
+            frame.image,
+            &parameters,
+            calibration.clone(),
+        );
+        match found {
+            Ok(detected) => {
+                print(&detected)?;
+                match (&mut video, &arguments.annotate) {
+                    (Some((writer, path)), _) => {
+                        let jpeg = annotate::jpeg(detected, &options)?;
+                        reader.write(writer, path, &jpeg)?;
+                    }
+                    (None, Some(_)) if frames > 1 => {
+                        bail!(
+                            "--annotate: standard input has several images: give one, or a video"
+                        );
+                    }
+                    (None, Some(path)) => annotate::write(detected, &options, path)?,
+                    (None, None) => {}
+                }
+            }
+            Err(error) => {
+                eprintln!("lookdown: {name}: {error:#}");
+                code = ExitCode::FAILURE;
+            }
+        }
+        if let Some(progress) = &reader.progress {
+            progress.advance();
+        }
+    }
+    if frames == 0 {
+        bail!("there is no image: give a JPEG, PNG or WebP image, or a video");
+    }
+    if let Some((writer, path)) = video {
+        reader.finish(writer, path)?;
+    }
+    reader.end();
     Ok(code)
 }
 
@@ -157,13 +243,8 @@ fn parameters(
     Ok((check(Some(named))?, None))
 }
 
-fn detect(
-    engine: &Engine,
-    image: &Path,
-    max_bytes: u64,
-    parameters: &DetectParameters,
-    calibration: Option<Arc<Calibration>>,
-) -> anyhow::Result<Detected> {
+/// Reads an image file within the limit.
+fn read(image: &Path, max_bytes: u64) -> anyhow::Result<Bytes> {
     let bytes = fs::metadata(image)
         .context("the file cannot be read")?
         .len();
@@ -171,9 +252,19 @@ fn detect(
         bail!("the file has {bytes} bytes: server.max_body_bytes allows {max_bytes}");
     }
     let encoded = fs::read(image).context("the file cannot be read")?;
+    Ok(encoded.into())
+}
+
+fn detect(
+    engine: &Engine,
+    name: String,
+    image: Bytes,
+    parameters: &DetectParameters,
+    calibration: Option<Arc<Calibration>>,
+) -> anyhow::Result<Detected> {
     Ok(engine.detect(&DetectJob::local(
-        image.display().to_string(),
-        JobImage::Encoded(encoded.into()),
+        name,
+        JobImage::Encoded(image),
         parameters.clone(),
         calibration,
     ))?)

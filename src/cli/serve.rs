@@ -52,14 +52,17 @@ pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result
     let outcome = if arguments.check {
         runtime.block_on(check(settings))
     } else {
-        runtime.block_on(serve(settings, commit))
+        runtime.block_on(async {
+            let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
+            serve(settings, commit, shutdown).await
+        })
     };
     end(runtime);
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
 /// Ends the tasks that remain.
-fn end(runtime: Runtime) {
+pub(super) fn end(runtime: Runtime) {
     runtime.shutdown_timeout(LAST_TASKS);
 }
 
@@ -69,8 +72,12 @@ fn runtime_threads() -> usize {
     (cores / 2).clamp(1, MAX_RUNTIME_THREADS)
 }
 
-async fn serve(settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
-    let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
+/// Runs the server with these settings until a stop is requested.
+pub(super) async fn serve(
+    settings: Settings,
+    commit: Option<&str>,
+    shutdown: Shutdown,
+) -> anyhow::Result<()> {
     // From now on SIGHUP does not end the process.
     let hangups = signal(SignalKind::hangup()).context("signals cannot be handled")?;
     let sockets = Sockets::bind(&settings.server).await?;

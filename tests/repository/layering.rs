@@ -217,7 +217,7 @@ const MAY_USE: [(&str, &[&str]); 35] = [
 const WITH_INDEPENDENT_PARTS: [&str; 2] = ["api::routes", "api::protocols"];
 
 /// Crates for external systems, and the only modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 28] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 29] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
@@ -242,6 +242,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 28] = [
             "mqtt",
         ],
     ),
+    ("lookdown_watch", &["cli"]),
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),

@@ -1,0 +1,71 @@
+//! The checked settings of one camera.
+
+use std::{path::PathBuf, time::Duration};
+
+use crate::{Credentials, Location};
+
+/// The settings of one camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// The name under which the server keeps the results.
+    pub name: String,
+    /// The source of the frames.
+    pub location: Location,
+    /// The user name and the password of the source.
+    pub credentials: Option<Credentials>,
+    /// The interval between two frames that are sent.
+    pub every: Duration,
+    /// The longest time without a frame, after which the source is started again.
+    pub stall_after: Duration,
+    /// The parameters of `/detect` except the time of capture.
+    pub parameters: Vec<(String, String)>,
+    /// Options of `ffmpeg`.
+    pub video: VideoOptions,
+}
+
+/// Options of `ffmpeg`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct VideoOptions {
+    /// The program.
+    pub ffmpeg: PathBuf,
+    /// The method of hardware decoding, such as `auto`, `vaapi` or `cuda`.
+    pub hwaccel: Option<String>,
+    /// The transport of RTSP.
+    pub transport: Transport,
+    /// Decodes key frames only. That saves most of the decoding, but frames are as far apart as the
+    /// key frames of the camera.
+    pub keyframes_only: bool,
+}
+
+impl Default for VideoOptions {
+    fn default() -> Self {
+        Self {
+            ffmpeg: "ffmpeg".into(),
+            hwaccel: None,
+            transport: Transport::default(),
+            keyframes_only: false,
+        }
+    }
+}
+
+/// The transport of RTSP.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Transport {
+    /// Over the connection of RTSP: works through firewalls, and loses no packets.
+    #[default]
+    Tcp,
+    /// Separate datagrams.
+    Udp,
+}
+
+impl Transport {
+    /// The name of the transport.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tcp => "tcp",
+            Self::Udp => "udp",
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The place of a camera's frames: a URL, a folder, a video file or standard input.
+
+use std::{fmt, path::PathBuf};
+
+use percent_encoding::percent_decode_str;
+use reqwest::Url;
+
+use crate::Credentials;
+
+/// The source of frames.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Location {
+    /// A snapshot or a stream of JPEG files over HTTP, without credentials in the URL.
+    Http(Url),
+    /// A stream over RTSP, without credentials in the URL.
+    Rtsp(Url),
+    /// A folder into which image files are dropped.
+    Folder(PathBuf),
+    /// A video file.
+    Video(PathBuf),
+    /// Standard input.
+    StandardInput,
+}
+
+/// The reason why a text is no location. The text is not repeated: it may hold a password.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidLocation {
+    /// Not a URL.
+    #[error(
+        "it is no valid URL: give it as scheme://host/path, with special characters percent-encoded"
+    )]
+    InvalidUrl,
+    /// An unknown scheme.
+    #[error(
+        "its scheme is unknown: use http, https, rtsp or rtsps, a folder, a video file, or - for standard input"
+    )]
+    UnknownScheme,
+    /// No such file.
+    #[error(
+        "there is no such file or folder: give a URL with its scheme, an existing path, or - for standard input"
+    )]
+    NoSuchFile,
+}
+
+impl Location {
+    /// Parses a location, and separates the credentials of a URL.
+    ///
+    /// # Errors
+    /// [`InvalidLocation`].
+    pub fn parse(text: &str) -> Result<(Self, Option<Credentials>), InvalidLocation> {
+        if text == "-" {
+            return Ok((Self::StandardInput, None));
+        }
+        if text.contains("://") {
+            let url = Url::parse(text).map_err(|_| InvalidLocation::InvalidUrl)?;
+            return Self::from_url(url);
+        }
+        let path = PathBuf::from(text);
+        if path.is_dir() {
+            Ok((Self::Folder(path), None))
+        } else if path.exists() {
+            Ok((Self::Video(path), None))
+        } else {
+            Err(InvalidLocation::NoSuchFile)
+        }
+    }
+
+    fn from_url(mut url: Url) -> Result<(Self, Option<Credentials>), InvalidLocation> {
+        let decoded = |text: &str| percent_decode_str(text).decode_utf8_lossy().into_owned();
+        let credentials = match (url.username(), url.password()) {
+            ("", None) => None,
+            (user, password) => Some(Credentials {
+                user: decoded(user),
+                password: decoded(password.unwrap_or_default()).into(),
+            }),
+        };
+        if url.host().is_none() {
+            return Err(InvalidLocation::InvalidUrl);
+        }
+        // A URL with a host can have or lose both.
+        let _ = (url.set_username(""), url.set_password(None));
+        let location = match url.scheme() {
+            "http" | "https" => Self::Http(url),
+            "rtsp" | "rtsps" => Self::Rtsp(url),
+            _ => return Err(InvalidLocation::UnknownScheme),
+        };
+        Ok((location, credentials))
+    }
+
+    /// Returns true if the frames end, so that the source is not started again after its end.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        matches!(self, Self::Video(_) | Self::StandardInput)
+    }
+}
+
+/// Displays the location without credentials and without the query, which may hold a token.
+impl fmt::Display for Location {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Http(url) | Self::Rtsp(url) => {
+                let mut shown = url.clone();
+                shown.set_query(None);
+                shown.fmt(formatter)
+            }
+            Self::Folder(path) | Self::Video(path) => path.display().fmt(formatter),
+            Self::StandardInput => formatter.write_str("standard input"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use secrecy::ExposeSecret;
+
+    use super::*;
+
+    #[test]
+    fn credentials_are_separated_from_the_url() {
+        let (location, credentials) =
+            Location::parse("rtsp://viewer:p%40ss%2F@10.0.0.8:554/s1?token=t").unwrap();
+        let credentials = credentials.unwrap();
+        assert_eq!(credentials.user, "viewer");
+        assert_eq!(credentials.password.expose_secret(), "p@ss/");
+        assert_eq!(location.to_string(), "rtsp://10.0.0.8:554/s1");
+        assert!(!format!("{location:?} {credentials:?}").contains("p@ss"));
+    }
+
+    #[test]
+    fn kinds_are_recognised() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("clip.mp4");
+        std::fs::write(&file, "").unwrap();
+        let parse = |text: &str| Location::parse(text).map(|(location, _)| location);
+        assert_eq!(parse("-"), Ok(Location::StandardInput));
+        assert!(matches!(
+            parse("http://camera/snap.jpg"),
+            Ok(Location::Http(_))
+        ));
+        assert!(matches!(parse("rtsps://camera/s"), Ok(Location::Rtsp(_))));
+        let folder = folder.path().to_str().unwrap();
+        assert!(matches!(parse(folder), Ok(Location::Folder(_))));
+        assert!(matches!(
+            parse(file.to_str().unwrap()),
+            Ok(Location::Video(_))
+        ));
+        assert_eq!(parse("/nowhere"), Err(InvalidLocation::NoSuchFile));
+        assert_eq!(parse("ftp://camera/x"), Err(InvalidLocation::UnknownScheme));
+        assert_eq!(parse("rtsp://"), Err(InvalidLocation::InvalidUrl));
+    }
+}

@@ -1,0 +1,249 @@
+//! The sources of frames, and their supervision: a source that fails or stalls is started again.
+
+mod folder;
+mod http;
+mod jpeg_splitter;
+mod multipart;
+mod standard_input;
+mod video;
+
+pub(crate) use jpeg_splitter::JpegSplitter;
+pub use standard_input::ImageReader;
+
+use std::{
+    convert::Infallible,
+    time::{Duration, Instant},
+};
+
+use bytes::Bytes;
+use jiff::Timestamp;
+use parking_lot::Mutex;
+use reqwest::Client;
+use tokio::time::sleep;
+
+use crate::{
+    Camera, Frame, FrameError, Location,
+    backoff::Backoff,
+    log_once::LogOnce,
+    metrics::{CameraMetrics, Failure},
+    slot::Slot,
+};
+
+/// First and longest pause before a source is started again.
+const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));
+/// First and longest pause after wrong credentials: cameras lock accounts after a few attempts.
+const LOGIN_PAUSES: (Duration, Duration) = (Duration::from_secs(10), Duration::from_mins(5));
+/// Number of checks for a stalled source within its limit.
+const STALL_CHECKS: u32 = 4;
+/// Shortest time for the first frame: streams begin with a key frame.
+const FIRST_FRAME: Duration = Duration::from_secs(10);
+
+/// The reason why a source ended. Its text holds no credentials.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// Wrong credentials.
+    #[error(
+        "the camera refuses the user name {user:?} or its password: correct user and password_file, or the URL"
+    )]
+    CredentialsRefused {
+        /// The user name.
+        user: String,
+    },
+    /// Credentials are missing.
+    #[error(
+        "the camera requires a user name and a password: give user and password_file, or add them to the URL"
+    )]
+    CredentialsMissing,
+    /// The camera requires an unknown authentication scheme.
+    #[error(
+        "the camera requires an authentication other than Basic and Digest: select one of them in the camera"
+    )]
+    UnknownAuthentication,
+    /// Another status than 200.
+    #[error(
+        "the camera answered with the status {0}: check the path of the URL in the camera's manual"
+    )]
+    Status(u16),
+    /// A redirection.
+    #[error("the camera redirects to another URL: give that URL, which `curl -i` shows")]
+    Redirect,
+    /// Neither an image nor a stream of images.
+    #[error(
+        "the camera sends {0:?} instead of an image: give the URL of a JPEG snapshot, an MJPEG stream or RTSP"
+    )]
+    ContentType(String),
+    /// A frame that cannot be used.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A damaged stream.
+    #[error("{0}")]
+    Stream(String),
+    /// A frame beyond the limit.
+    #[error("the camera's image has more than 32 MiB: reduce its resolution or quality")]
+    TooLarge,
+    /// No frame within the limit.
+    #[error("no whole frame arrived within {0:?}: check the camera, or raise stall_after")]
+    Stalled(Duration),
+    /// The stream ended.
+    #[error("the camera ended the stream")]
+    Closed,
+    /// The camera cannot be reached.
+    #[error("the camera cannot be reached: {0}")]
+    Unreachable(String),
+    /// `ffmpeg` cannot be started.
+    #[error(
+        "{program} cannot be started: {problem}: install ffmpeg 5.1 or newer, or set its path with the key ffmpeg"
+    )]
+    NoFfmpeg {
+        /// The program.
+        program: String,
+        /// The cause.
+        problem: String,
+    },
+    /// `ffmpeg` failed, with its last line.
+    #[error("ffmpeg ended: {0}")]
+    Ffmpeg(String),
+    /// A file or a folder cannot be read.
+    #[error("{0} cannot be read: {1}")]
+    Unreadable(String, String),
+}
+
+impl SourceError {
+    /// Returns true if the camera refuses the credentials.
+    fn is_refused_login(&self) -> bool {
+        matches!(
+            self,
+            Self::CredentialsRefused { .. }
+                | Self::CredentialsMissing
+                | Self::UnknownAuthentication
+        )
+    }
+}
+
+/// The receiver of a camera's frames.
+pub(crate) struct Sink<'a> {
+    slot: &'a Slot<Frame>,
+    metrics: &'a CameraMetrics,
+    started: Instant,
+    /// The time of the last sign that the camera works.
+    alive: Mutex<Option<Instant>>,
+    is_failing: &'a Mutex<LogOnce>,
+}
+
+impl Sink<'_> {
+    /// Accepts an image file that was captured now.
+    fn accept(&self, image: Bytes) -> Result<(), FrameError> {
+        self.accept_at(image, Timestamp::now())
+    }
+
+    /// Accepts an image file that was captured at this time. It replaces an older frame that was
+    /// not sent yet.
+    fn accept_at(&self, image: Bytes, captured_at: Timestamp) -> Result<(), FrameError> {
+        let frame = Frame::new(image, captured_at)
+            .inspect_err(|_| self.metrics.failed(Failure::Damaged))?;
+        self.metrics.received(frame.received);
+        self.alive();
+        if self.slot.put(frame).is_some() {
+            self.metrics.skipped();
+        }
+        if self.is_failing.lock().settle() {
+            tracing::info!("the camera sends frames again");
+        }
+        Ok(())
+    }
+
+    /// Notes that the camera works, although it sent no new frame.
+    fn alive(&self) {
+        *self.alive.lock() = Some(Instant::now());
+    }
+
+    /// The time from the start to the last sign that the camera works.
+    fn lifetime(&self) -> Duration {
+        let alive = *self.alive.lock();
+        alive.map_or(Duration::ZERO, |alive| alive - self.started)
+    }
+
+    /// Waits until the camera showed no sign of work for this time.
+    async fn stalled(&self, limit: Duration) -> SourceError {
+        loop {
+            sleep(limit / STALL_CHECKS).await;
+            let (since, limit) = match *self.alive.lock() {
+                Some(alive) => (alive, limit),
+                None => (self.started, limit.max(FIRST_FRAME)),
+            };
+            if since.elapsed() >= limit {
+                return SourceError::Stalled(limit);
+            }
+        }
+    }
+}
+
+/// Fills the slot with the frames of a camera. Ends with the frames of a finite source, otherwise
+/// never.
+pub(crate) async fn supervise(
+    camera: &Camera,
+    client: &Client,
+    slot: &Slot<Frame>,
+    metrics: &CameraMetrics,
+) {
+    let (first, longest) = PAUSES;
+    let mut backoff = Backoff::new(first, longest);
+    let (first, longest) = LOGIN_PAUSES;
+    let mut login_backoff = Backoff::new(first, longest);
+    let log = Mutex::new(LogOnce::default());
+    loop {
+        let sink = Sink {
+            slot,
+            metrics,
+            started: Instant::now(),
+            alive: Mutex::default(),
+            is_failing: &log,
+        };
+        let outcome = tokio::select! {
+            outcome = run(camera, client, &sink) => outcome,
+            error = stalled(camera, &sink) => Err(error),
+        };
+        let pause = match outcome {
+            Ok(()) => return,
+            Err(error) => {
+                if log.lock().is_changed(&error.to_string()) {
+                    tracing::warn!("{error}");
+                }
+                if error.is_refused_login() {
+                    login_backoff.next_pause()
+                } else {
+                    login_backoff.reset();
+                    backoff.reset_if_stable(sink.lifetime());
+                    backoff.next_pause()
+                }
+            }
+        };
+        if camera.location.is_finite() {
+            return;
+        }
+        sleep(pause).await;
+        metrics.reconnected();
+    }
+}
+
+/// Reads frames until the source ends.
+async fn run(camera: &Camera, client: &Client, sink: &Sink<'_>) -> Result<(), SourceError> {
+    let ended: Infallible = match &camera.location {
+        Location::Http(url) => http::run(camera, url, client, sink).await?,
+        Location::Rtsp(url) => video::run_stream(camera, url, sink).await?,
+        Location::Folder(path) => folder::run(camera, path, sink).await?,
+        Location::Video(path) => return video::run_file(camera, path, sink).await,
+        Location::StandardInput => return standard_input::run(sink).await,
+    };
+    match ended {}
+}
+
+/// Waits until the source stalls. Folders and standard input may be without frames for any time.
+async fn stalled(camera: &Camera, sink: &Sink<'_>) -> SourceError {
+    match camera.location {
+        Location::Http(_) | Location::Rtsp(_) | Location::Video(_) => {
+            sink.stalled(camera.stall_after).await
+        }
+        Location::Folder(_) | Location::StandardInput => std::future::pending().await,
+    }
+}

@@ -1,0 +1,273 @@
+//! Parses `multipart/x-mixed-replace`, the format of MJPEG cameras (RFC 2046, section 5.1, with the
+//! deviations of cameras).
+//!
+//! The boundary is accepted with and without its leading dashes, lines may end without a carriage
+//! return, and `Content-Length` may be missing.
+
+use bytes::{Bytes, BytesMut};
+use memchr::memmem;
+
+/// Most bytes of the headers of a part.
+const MAX_HEADER_BYTES: usize = 8 << 10;
+/// Most bytes before the first boundary, and after a body of a wrong length.
+const MAX_BYTES_BETWEEN: usize = 64 << 10;
+
+/// A parser that takes bytes as they arrive, and returns whole bodies.
+#[derive(Debug)]
+pub(crate) struct PartReader {
+    buffer: BytesMut,
+    boundary: Vec<u8>,
+    max_part_bytes: usize,
+    state: State,
+    /// Number of bytes that do not contain what is searched for.
+    searched: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum State {
+    /// Before a boundary.
+    Boundary,
+    /// In the headers of a part.
+    Headers,
+    /// In a body, with the length that its headers declare.
+    Body(Option<usize>),
+}
+
+/// The reason why a stream is not read further.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum PartError {
+    #[error("the camera's multipart stream names no boundary")]
+    NoBoundary,
+    #[error(
+        "a part of the camera's multipart stream has more than {MAX_HEADER_BYTES} bytes of headers"
+    )]
+    LongHeaders,
+    #[error("the camera's multipart stream does not contain its boundary")]
+    BoundaryNotFound,
+    #[error("a frame of the camera's multipart stream is too large")]
+    TooLarge,
+}
+
+impl PartReader {
+    /// Creates a parser for a `Content-Type`, with a limit for each part.
+    ///
+    /// # Errors
+    /// [`PartError::NoBoundary`].
+    pub(crate) fn new(content_type: &str, max_part_bytes: usize) -> Result<Self, PartError> {
+        let boundary = boundary_of(content_type).ok_or(PartError::NoBoundary)?;
+        Ok(Self {
+            buffer: BytesMut::new(),
+            boundary: [b"--", boundary.as_bytes()].concat(),
+            max_part_bytes,
+            state: State::Boundary,
+            searched: 0,
+        })
+    }
+
+    /// Appends received bytes.
+    pub(crate) fn push(&mut self, bytes: &[u8]) {
+        self.buffer.extend_from_slice(bytes);
+    }
+
+    /// Returns the body of the next part, or `None` if more bytes are needed.
+    ///
+    /// # Errors
+    /// [`PartError`] if the stream cannot be read further.
+    pub(crate) fn next_part(&mut self) -> Result<Option<Bytes>, PartError> {
+        loop {
+            match self.state {
+                State::Boundary => {
+                    let Some(end) = self.end_of_boundary_line()? else {
+                        return Ok(None);
+                    };
+                    self.consume(end, State::Headers);
+                }
+                State::Headers => {
+                    let Some(end) = self.end_of_headers()? else {
+                        return Ok(None);
+                    };
+                    let length = content_length(&self.buffer[..end]);
+                    self.consume(end, State::Body(length));
+                }
+                State::Body(length) => {
+                    let body = match length {
+                        Some(length) => self.body_of_length(length)?,
+                        None => self.body_up_to_boundary()?,
+                    };
+                    let Some(body) = body else { return Ok(None) };
+                    self.state = State::Boundary;
+                    if !body.is_empty() {
+                        return Ok(Some(body));
+                    }
+                }
+            }
+        }
+    }
+
+    fn consume(&mut self, count: usize, state: State) -> Bytes {
+        self.searched = 0;
+        self.state = state;
+        self.buffer.split_to(count).freeze()
+    }
+
+    /// Returns the position of a boundary, or remembers that there is none so far.
+    fn find_boundary(&mut self) -> Option<usize> {
+        let found = memmem::find(&self.buffer[self.searched..], &self.boundary);
+        if found.is_none() {
+            let certain = self.buffer.len().saturating_sub(self.boundary.len());
+            self.searched = self.searched.max(certain);
+        }
+        found.map(|found| self.searched + found)
+    }
+
+    fn end_of_boundary_line(&mut self) -> Result<Option<usize>, PartError> {
+        let start = self.find_boundary();
+        let end = start.and_then(|start| {
+            let line = memchr::memchr(b'\n', &self.buffer[start..])?;
+            Some(start + line + 1)
+        });
+        if end.is_none() && self.buffer.len() > MAX_BYTES_BETWEEN {
+            return Err(PartError::BoundaryNotFound);
+        }
+        Ok(end)
+    }
+
+    fn end_of_headers(&self) -> Result<Option<usize>, PartError> {
+        let head = &self.buffer[..self.buffer.len().min(MAX_HEADER_BYTES)];
+        // A part without headers starts with the empty line.
+        let end = match head {
+            [b'\n', ..] => Some(1),
+            [b'\r', b'\n', ..] => Some(2),
+            _ => {
+                let long = memmem::find(head, b"\n\r\n").map(|at| at + 3);
+                let short = memmem::find(head, b"\n\n").map(|at| at + 2);
+                [long, short].into_iter().flatten().min()
+            }
+        };
+        if end.is_none() && self.buffer.len() > MAX_HEADER_BYTES {
+            return Err(PartError::LongHeaders);
+        }
+        Ok(end)
+    }
+
+    fn body_of_length(&mut self, length: usize) -> Result<Option<Bytes>, PartError> {
+        if length > self.max_part_bytes {
+            return Err(PartError::TooLarge);
+        }
+        if self.buffer.len() < length {
+            return Ok(None);
+        }
+        Ok(Some(self.consume(length, State::Boundary)))
+    }
+
+    fn body_up_to_boundary(&mut self) -> Result<Option<Bytes>, PartError> {
+        let found = self.find_boundary();
+        if found.unwrap_or(self.searched) > self.max_part_bytes {
+            return Err(PartError::TooLarge);
+        }
+        let Some(mut end) = found else {
+            return Ok(None);
+        };
+        // The boundary itself may begin with dashes that its declaration lacks.
+        while end > 0 && self.buffer[end - 1] == b'-' {
+            end -= 1;
+        }
+        for ending in [b'\n', b'\r'] {
+            if end > 0 && self.buffer[end - 1] == ending {
+                end -= 1;
+            }
+        }
+        Ok(Some(self.consume(end, State::Boundary)))
+    }
+}
+
+/// Returns the boundary of a `Content-Type` without leading dashes.
+fn boundary_of(content_type: &str) -> Option<&str> {
+    let mut parameters = content_type.split(';').skip(1);
+    let value = parameters.find_map(|parameter| {
+        let (name, value) = parameter.split_once('=')?;
+        let is_boundary = name.trim().eq_ignore_ascii_case("boundary");
+        is_boundary.then(|| value.trim().trim_matches('"'))
+    })?;
+    let value = value.trim_start_matches('-');
+    (!value.is_empty()).then_some(value)
+}
+
+/// Returns the declared length of a body.
+fn content_length(headers: &[u8]) -> Option<usize> {
+    let headers = std::str::from_utf8(headers).ok()?;
+    headers.lines().find_map(|line| {
+        let (name, value) = line.split_once(':')?;
+        let is_length = name.trim().eq_ignore_ascii_case("content-length");
+        is_length.then(|| value.trim().parse().ok())?
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TYPE: &str = "multipart/x-mixed-replace; boundary=frame";
+
+    fn parts(content_type: &str, stream: &[u8], chunk: usize) -> Result<Vec<Bytes>, PartError> {
+        let mut reader = PartReader::new(content_type, 100)?;
+        let mut parts = Vec::new();
+        for bytes in stream.chunks(chunk) {
+            reader.push(bytes);
+            while let Some(part) = reader.next_part()? {
+                parts.push(part);
+            }
+        }
+        Ok(parts)
+    }
+
+    #[test]
+    fn parts_are_read_at_any_chunk_size() {
+        let stream = b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: 3\r\n\r\none\r\n\
+            --frame\r\nContent-Type: image/jpeg\r\n\r\ntwo\r\n--frame\r\n\r\n3--3\r\n--frame--\r\n";
+        for chunk in [1, 2, 5, 1000] {
+            assert_eq!(parts(TYPE, stream, chunk).unwrap(), ["one", "two", "3--3"]);
+        }
+    }
+
+    #[test]
+    fn deviations_of_cameras_are_accepted() {
+        let doubled = "multipart/x-mixed-replace;boundary=\"--frame\"";
+        let stream = b"----frame\nContent-length:3\n\none\n----frame\n\ntwo\n----frame\n";
+        let declared = b"--frame\nContent-length:3\n\none\n--frame\n\ntwo\n--frame\n";
+        for chunk in [1, 1000] {
+            assert_eq!(parts(doubled, stream, chunk).unwrap(), ["one", "two"]);
+            assert_eq!(parts(doubled, declared, chunk).unwrap(), ["one", "two"]);
+        }
+    }
+
+    #[test]
+    fn a_wrong_length_costs_one_part_only() {
+        let stream =
+            b"--frame\r\nContent-Length: 2\r\n\r\nwrong\r\n--frame\r\n\r\nright\r\n--frame\r\n";
+        assert_eq!(parts(TYPE, stream, 4).unwrap(), ["wr", "right"]);
+    }
+
+    #[test]
+    fn large_parts_and_endless_headers_are_refused() {
+        let declared = b"--frame\r\nContent-Length: 101\r\n\r\n";
+        assert_eq!(parts(TYPE, declared, 1), Err(PartError::TooLarge));
+        let endless = [b"--frame\r\n\r\n".as_slice(), &[b'x'; 500]].concat();
+        assert_eq!(parts(TYPE, &endless, 10), Err(PartError::TooLarge));
+        let headers = [b"--frame\r\n".as_slice(), &[b'x'; 9000]].concat();
+        assert_eq!(parts(TYPE, &headers, 1000), Err(PartError::LongHeaders));
+        let noise = vec![b'x'; 70_000];
+        assert_eq!(parts(TYPE, &noise, 1000), Err(PartError::BoundaryNotFound));
+    }
+
+    #[test]
+    fn a_stream_without_a_boundary_is_refused() {
+        for content_type in [
+            "multipart/x-mixed-replace",
+            "a/b; boundary=",
+            "a/b; boundary=--",
+        ] {
+            assert_eq!(parts(content_type, b"", 1), Err(PartError::NoBoundary));
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! Video files that are read and written frame by frame, not in real time.
+
+use std::{ffi::OsString, path::Path, process::Stdio, time::Duration};
+
+use bytes::Bytes;
+use tokio::{
+    io::AsyncWriteExt,
+    process::{Child, ChildStdin},
+    time::timeout,
+};
+
+use crate::{
+    SourceError, VideoOptions,
+    ffmpeg::{Ffmpeg, command, decoding, file_input, file_url},
+    stderr_line::LastLine,
+};
+
+/// Longest time to read the duration of a file.
+const DURATION_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// The frames of a video file at an interval, one after another.
+pub struct VideoFrames {
+    ffmpeg: Ffmpeg,
+    every: Duration,
+    count: u32,
+}
+
+impl VideoFrames {
+    /// Starts to read a file. The interval is rounded to milliseconds.
+    ///
+    /// # Errors
+    /// [`SourceError`] if `ffmpeg` cannot be started.
+    pub async fn open(
+        path: &Path,
+        every: Duration,
+        options: &VideoOptions,
+    ) -> Result<Self, SourceError> {
+        let mut arguments = decoding(options);
+        arguments.extend(file_input(path));
+        let filter = format!("fps=fps=1000/{}", every.as_millis().max(1));
+        arguments.extend(["-vf", &filter].map(OsString::from));
+        Ok(Self {
+            ffmpeg: Ffmpeg::start(options, &arguments, "", None).await?,
+            every,
+            count: 0,
+        })
+    }
+
+    /// Returns the next frame and its position, or `None` at the end of the video.
+    ///
+    /// # Errors
+    /// [`SourceError`] if the file cannot be decoded.
+    pub async fn next_frame(&mut self) -> Result<Option<(Duration, Bytes)>, SourceError> {
+        let frame = self.ffmpeg.next_frame().await?;
+        Ok(frame.map(|frame| {
+            let position = self.every * self.count;
+            self.count += 1;
+            (position, frame)
+        }))
+    }
+}
+
+/// Returns the duration of a video file, if `ffprobe` can read it.
+pub async fn video_duration(path: &Path, options: &VideoOptions) -> Option<Duration> {
+    let mut command = tokio::process::Command::new(options.ffmpeg.with_file_name("ffprobe"));
+    command
+        .args(["-v", "error", "-protocol_whitelist", "file"])
+        .args(["-show_entries", "format=duration", "-of", "csv=p=0"])
+        .arg(file_url(path))
+        .stdin(Stdio::null())
+        .kill_on_drop(true);
+    let output = timeout(DURATION_TIMEOUT, command.output())
+        .await
+        .ok()?
+        .ok()?;
+    let seconds: f64 = String::from_utf8(output.stdout).ok()?.trim().parse().ok()?;
+    Duration::try_from_secs_f64(seconds).ok()
+}
+
+/// A video file that is written frame by frame.
+pub struct VideoWriter {
+    child: Child,
+    input: ChildStdin,
+    errors: LastLine,
+}
+
+impl VideoWriter {
+    /// Starts to write a file, with this interval between two frames. Its name decides the format.
+    /// An existing file is replaced.
+    ///
+    /// # Errors
+    /// [`SourceError`] if `ffmpeg` cannot be started.
+    pub fn create(
+        path: &Path,
+        every: Duration,
+        options: &VideoOptions,
+    ) -> Result<Self, SourceError> {
+        let no_ffmpeg = |problem: String| SourceError::NoFfmpeg {
+            program: options.ffmpeg.display().to_string(),
+            problem,
+        };
+        let rate = format!("1000/{}", every.as_millis().max(1));
+        let mut command = command(&options.ffmpeg);
+        command
+            .args([
+                "-y",
+                "-f",
+                "image2pipe",
+                "-c:v",
+                "mjpeg",
+                "-framerate",
+                &rate,
+            ])
+            .args(["-i", "pipe:0", "-pix_fmt", "yuv420p"])
+            // Most formats need even sides.
+            .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
+            .arg(file_url(path))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        let mut child = command
+            .spawn()
+            .map_err(|error| no_ffmpeg(error.to_string()))?;
+        let (Some(input), Some(errors)) = (child.stdin.take(), child.stderr.take()) else {
+            return Err(no_ffmpeg("it has no pipes".to_owned()));
+        };
+        Ok(Self {
+            child,
+            input,
+            errors: LastLine::new(errors),
+        })
+    }
+
+    /// Appends a JPEG.
+    ///
+    /// # Errors
+    /// [`SourceError`] with the last line of `ffmpeg` if it has ended.
+    pub async fn write(&mut self, jpeg: &[u8]) -> Result<(), SourceError> {
+        let written = tokio::select! {
+            written = self.input.write_all(jpeg) => written,
+            () = drain(&mut self.errors) => Ok(()),
+        };
+        match written {
+            Ok(()) => Ok(()),
+            Err(_) => Err(SourceError::Ffmpeg(self.errors.last().await)),
+        }
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`SourceError`] with the last line of `ffmpeg` if the file cannot be written.
+    pub async fn finish(mut self) -> Result<(), SourceError> {
+        drop(self.input);
+        let status = loop {
+            tokio::select! {
+                status = self.child.wait() => break status,
+                () = self.errors.read() => {}
+            }
+        };
+        if status.is_ok_and(|status| status.success()) {
+            return Ok(());
+        }
+        Err(SourceError::Ffmpeg(self.errors.last().await))
+    }
+}
+
+/// Reads what `ffmpeg` reports. Never ends.
+async fn drain(errors: &mut LastLine) {
+    loop {
+        errors.read().await;
+    }
+}

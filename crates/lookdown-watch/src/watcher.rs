@@ -1,0 +1,266 @@
+//! The cameras of a process: each is a task of its own, started and stopped as the settings change.
+
+use std::{
+    collections::HashMap, future::Future, net::SocketAddr, path::PathBuf, sync::Arc, time::Duration,
+};
+
+use reqwest::Client;
+use tokio::{
+    task::{AbortHandle, JoinHandle, spawn_blocking},
+    time::{sleep, timeout},
+};
+use tracing::Instrument as _;
+
+use crate::{
+    Camera, ConfigError, Metrics, ServerEntry, WatchOptions, load,
+    log_once::LogOnce,
+    metrics::CameraMetrics,
+    metrics_server, sender,
+    server::{ClientError, Server, camera_client},
+    slot::Slot,
+    source,
+};
+
+/// Interval of the checks for a changed file.
+const FILE_CHECK: Duration = Duration::from_secs(2);
+/// Longest time that the end waits for the reports of frames that were sent.
+const LAST_REPORTS: Duration = Duration::from_secs(5);
+
+/// The origin of the settings.
+#[derive(Debug, Clone)]
+pub enum Origin {
+    /// A file that is read again when it changes. The server has precedence over that of the file.
+    File(PathBuf, ServerEntry),
+    /// Settings that do not change.
+    Fixed(WatchOptions),
+}
+
+/// The reason why cameras are not watched.
+#[derive(Debug, thiserror::Error)]
+pub enum WatchError {
+    /// A setting that cannot be used.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// No HTTP client.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// The metrics cannot be created.
+    #[error("the metrics cannot be created: {0}")]
+    Metrics(#[from] prometheus::Error),
+    /// The address of the metrics cannot be used.
+    #[error("{0}")]
+    Address(String),
+    /// No frame of a finite source was processed.
+    #[error("{0}: no frame was processed: the log has the reason")]
+    NoFrame(String),
+}
+
+/// Watches cameras until `stop` ends, or until the sources of fixed settings end.
+///
+/// # Errors
+/// [`WatchError`].
+pub async fn watch(
+    origin: Origin,
+    metrics_listen: Option<SocketAddr>,
+    stop: impl Future<Output = ()>,
+) -> Result<(), WatchError> {
+    let metrics = Arc::new(Metrics::new()?);
+    let listener = match metrics_listen {
+        Some(address) => Some(
+            metrics_server::bind(address)
+                .await
+                .map_err(WatchError::Address)?,
+        ),
+        None => None,
+    };
+    let metrics_task = listener.map(|listener| {
+        if let Ok(address) = listener.local_addr() {
+            tracing::info!("metrics at http://{address}/metrics");
+        }
+        AbortOnDrop(
+            tokio::spawn(metrics_server::serve(listener, Arc::clone(&metrics))).abort_handle(),
+        )
+    });
+    let options = match &origin {
+        Origin::File(path, server) => read(path, server).await?,
+        Origin::Fixed(options) => options.clone(),
+    };
+    let mut watcher = Watcher::new(options, metrics)?;
+    let outcome = tokio::select! {
+        () = stop => Ok(()),
+        outcome = watcher.run(&origin) => outcome,
+    };
+    watcher.end().await;
+    drop(metrics_task);
+    outcome
+}
+
+/// Reads the file without blocking the runtime.
+async fn read(path: &std::path::Path, server: &ServerEntry) -> Result<WatchOptions, ConfigError> {
+    let (path, server) = (path.to_owned(), server.clone());
+    let read = spawn_blocking(move || load(&path, &server)).await;
+    read.unwrap_or_else(|error| Err(ConfigError::problem("cameras", &error)))
+}
+
+/// A task that ends when it is dropped.
+struct AbortOnDrop(AbortHandle);
+
+impl Drop for AbortOnDrop {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+/// The running cameras.
+struct Watcher {
+    options: WatchOptions,
+    server: Arc<Server>,
+    client: Client,
+    metrics: Arc<Metrics>,
+    running: HashMap<String, Running>,
+}
+
+/// A running camera.
+struct Running {
+    /// Fills the slot. Closes it when its source ends.
+    source: JoinHandle<()>,
+    /// Empties the slot.
+    sender: JoinHandle<()>,
+    slot: Arc<Slot<crate::Frame>>,
+    metrics: Arc<CameraMetrics>,
+}
+
+impl Watcher {
+    fn new(options: WatchOptions, metrics: Arc<Metrics>) -> Result<Self, WatchError> {
+        let server = Arc::new(Server::new(&options.server)?);
+        let mut watcher = Self {
+            server,
+            client: camera_client()?,
+            metrics,
+            running: HashMap::new(),
+            options,
+        };
+        for camera in watcher.options.cameras.clone() {
+            watcher.start(camera);
+        }
+        Ok(watcher)
+    }
+
+    fn start(&mut self, camera: Camera) {
+        let metrics = self.metrics.add(&camera.name);
+        let slot = Arc::new(Slot::default());
+        let span = tracing::info_span!("camera", camera = camera.name);
+        span.in_scope(|| tracing::info!("watching {}", camera.location));
+        let (name, camera) = (camera.name.clone(), Arc::new(camera));
+        let source = tokio::spawn({
+            let (camera, client) = (Arc::clone(&camera), self.client.clone());
+            let (slot, metrics) = (Arc::clone(&slot), Arc::clone(&metrics));
+            async move {
+                source::supervise(&camera, &client, &slot, &metrics).await;
+                slot.close();
+            }
+            .instrument(span.clone())
+        });
+        let sender = tokio::spawn({
+            let (server, slot) = (Arc::clone(&self.server), Arc::clone(&slot));
+            let metrics = Arc::clone(&metrics);
+            async move { sender::run(&camera, &server, &slot, &metrics).await }.instrument(span)
+        });
+        let running = Running {
+            source,
+            sender,
+            slot,
+            metrics,
+        };
+        self.running.insert(name, running);
+    }
+
+    /// Stops a camera at once.
+    fn stop(&mut self, name: &str) {
+        if let Some(running) = self.running.remove(name) {
+            running.source.abort();
+            running.sender.abort();
+            self.metrics.remove(name);
+            tracing::info!(camera = name, "no longer watching");
+        }
+    }
+
+    async fn run(&mut self, origin: &Origin) -> Result<(), WatchError> {
+        let Origin::File(path, server) = origin else {
+            return self.finish().await;
+        };
+        let mut log = LogOnce::default();
+        loop {
+            sleep(FILE_CHECK).await;
+            let outcome = match read(path, server).await {
+                Ok(options) => self.change(options).map_err(|error| error.to_string()),
+                Err(error) => Err(error.to_string()),
+            };
+            match outcome {
+                Ok(()) => drop(log.settle()),
+                Err(problem) if log.is_changed(&problem) => {
+                    tracing::warn!("{problem}; the last valid settings stay in use");
+                }
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// Waits for the end of all sources.
+    async fn finish(&mut self) -> Result<(), WatchError> {
+        for (name, running) in &mut self.running {
+            // A task that panicked is logged by the panic hook.
+            let _ = (&mut running.sender).await;
+            if running.metrics.reports() == 0 {
+                return Err(WatchError::NoFrame(name.clone()));
+            }
+        }
+        Ok(())
+    }
+
+    /// Applies new settings. Cameras that are unchanged keep running.
+    fn change(&mut self, options: WatchOptions) -> Result<(), ClientError> {
+        if options == self.options {
+            return Ok(());
+        }
+        let is_same_server = options.server == self.options.server;
+        if !is_same_server {
+            self.server = Arc::new(Server::new(&options.server)?);
+        }
+        let before = std::mem::replace(&mut self.options, options);
+        let kept = |camera: &Camera, others: &[Camera]| is_same_server && others.contains(camera);
+        for camera in &before.cameras {
+            if !kept(camera, &self.options.cameras) {
+                self.stop(&camera.name);
+            }
+        }
+        for camera in self.options.cameras.clone() {
+            if !kept(&camera, &before.cameras) {
+                self.start(camera);
+            }
+        }
+        Ok(())
+    }
+
+    /// Stops all sources, and waits for the reports of the frames that were sent.
+    async fn end(&mut self) {
+        for running in self.running.values() {
+            running.source.abort();
+            running.slot.clear();
+            running.slot.close();
+        }
+        let reports = async {
+            for running in self.running.values_mut() {
+                if !running.sender.is_finished() {
+                    let _ = (&mut running.sender).await;
+                }
+            }
+        };
+        if timeout(LAST_REPORTS, reports).await.is_err() {
+            tracing::warn!("stopped before the last reports arrived");
+        }
+        for running in self.running.values() {
+            running.sender.abort();
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! Videos and standard input of `lookdown detect`: a report for each frame, in order.
+
+use std::{
+    io::{self, IsTerminal},
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use anyhow::{Context, bail};
+use bytes::Bytes;
+use jiff::SignedDuration;
+use lookdown_watch::{ImageReader, VideoFrames, VideoOptions, VideoWriter, video_duration};
+use tokio::runtime::{self, Runtime};
+
+use crate::cli::progress::Progress;
+
+/// Endings of video files, in lower case.
+const ENDINGS: [&str; 10] = [
+    "mp4", "m4v", "mov", "mkv", "webm", "avi", "ts", "mpg", "mpeg", "mjpeg",
+];
+/// The interval between two frames of a video if none is given.
+const DEFAULT_EVERY: Duration = Duration::from_secs(1);
+
+/// A source of several frames.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Stream {
+    /// A video file.
+    Video(PathBuf),
+    /// Standard input.
+    StandardInput,
+}
+
+/// A frame of a stream.
+pub(super) struct StreamFrame {
+    /// The name of the frame: the file with the position as a media fragment, or `-` and a number.
+    pub name: String,
+    pub image: Bytes,
+}
+
+impl Stream {
+    /// Returns the stream among the paths, if there is one.
+    ///
+    /// # Errors
+    /// Returns an error if there are further paths.
+    pub(super) fn among(paths: &[PathBuf]) -> anyhow::Result<Option<Self>> {
+        let Some(stream) = paths.iter().find_map(|path| Self::of(path)) else {
+            return Ok(None);
+        };
+        if paths.len() > 1 {
+            let name = stream.name();
+            bail!("{name}: a video or - is read alone: give it without other files");
+        }
+        Ok(Some(stream))
+    }
+
+    fn of(path: &Path) -> Option<Self> {
+        if path.as_os_str() == "-" {
+            return Some(Self::StandardInput);
+        }
+        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+        let is_video = ENDINGS.contains(&ending.as_str()) && !path.is_dir();
+        is_video.then(|| Self::Video(path.to_owned()))
+    }
+
+    fn name(&self) -> String {
+        match self {
+            Self::Video(path) => path.display().to_string(),
+            Self::StandardInput => "-".to_owned(),
+        }
+    }
+}
+
+/// Parses `--every`.
+pub(super) fn interval(text: &str) -> Result<Duration, String> {
+    let parsed = text.parse::<SignedDuration>().ok();
+    let parsed = parsed.and_then(|parsed| Duration::try_from(parsed).ok());
+    let limits = Duration::from_millis(10)..=Duration::from_hours(1);
+    parsed
+        .filter(|parsed| limits.contains(parsed))
+        .ok_or_else(|| "give a duration from 10ms to 1h, such as 500ms or 2s".to_owned())
+}
+
+/// The frames of a stream, read one after another.
+pub(super) struct StreamReader {
+    runtime: Runtime,
+    frames: Frames,
+    name: String,
+    every: Duration,
+    pub(super) progress: Option<Progress>,
+}
+
+enum Frames {
+    Video(Box<VideoFrames>),
+    StandardInput {
+        images: ImageReader<tokio::io::Stdin>,
+        count: u64,
+    },
+}
+
+impl StreamReader {
+    /// Opens a stream.
+    ///
+    /// # Errors
+    /// Returns an error if `ffmpeg` is missing.
+    pub(super) fn open(stream: &Stream, every: Option<Duration>) -> anyhow::Result<Self> {
+        let runtime = runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .context("the operating system creates no thread")?;
+        let name = stream.name();
+        let options = VideoOptions::default();
+        let every = every.unwrap_or(DEFAULT_EVERY);
+        let mut progress = None;
+        let frames = match stream {
+            Stream::Video(path) => {
+                let frames = VideoFrames::open(path, every, &options);
+                let frames = runtime.block_on(frames)?;
+                // On a terminal the reports themselves show the progress.
+                if !io::stdout().is_terminal() {
+                    let duration = runtime.block_on(video_duration(path, &options));
+                    progress = duration.map(|duration| {
+                        let total = duration.as_millis().div_ceil(every.as_millis().max(1));
+                        Progress::start(&name, usize::try_from(total).unwrap_or(usize::MAX))
+                    });
+                }
+                Frames::Video(Box::new(frames))
+            }
+            Stream::StandardInput => Frames::StandardInput {
+                images: ImageReader::new(tokio::io::stdin()),
+                count: 0,
+            },
+        };
+        Ok(Self {
+            runtime,
+            frames,
+            name,
+            every,
+            progress,
+        })
+    }
+
+    /// Returns the next frame, or `None` at the end.
+    ///
+    /// # Errors
+    /// Returns an error if the stream cannot be decoded further.
+    pub(super) fn next_frame(&mut self) -> anyhow::Result<Option<StreamFrame>> {
+        let name = &self.name;
+        let frame = match &mut self.frames {
+            Frames::Video(frames) => {
+                let frame = self.runtime.block_on(frames.next_frame());
+                frame.map(|frame| {
+                    frame.map(|(position, image)| StreamFrame {
+                        name: format!("{name}#t={:.3}", position.as_secs_f64()),
+                        image,
+                    })
+                })
+            }
+            Frames::StandardInput { images, count } => {
+                let image = self.runtime.block_on(images.next_image());
+                image.map(|image| {
+                    image.map(|image| {
+                        *count += 1;
+                        StreamFrame {
+                            name: format!("{name}#{count}"),
+                            image,
+                        }
+                    })
+                })
+            }
+        };
+        frame.with_context(|| name.clone())
+    }
+
+    /// Starts to write a video with the interval of the frames.
+    ///
+    /// # Errors
+    /// Returns an error if `ffmpeg` is missing.
+    pub(super) fn writer(&self, path: &Path) -> anyhow::Result<VideoWriter> {
+        let _entered = self.runtime.enter();
+        let writer = VideoWriter::create(path, self.every, &VideoOptions::default());
+        writer.with_context(|| unwritable(path))
+    }
+
+    /// Appends a JPEG to a video.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub(super) fn write(
+        &self,
+        writer: &mut VideoWriter,
+        path: &Path,
+        jpeg: &[u8],
+    ) -> anyhow::Result<()> {
+        let written = self.runtime.block_on(writer.write(jpeg));
+        written.with_context(|| unwritable(path))
+    }
+
+    /// Completes a video.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub(super) fn finish(&self, writer: VideoWriter, path: &Path) -> anyhow::Result<()> {
+        let finished = self.runtime.block_on(writer.finish());
+        finished.with_context(|| unwritable(path))
+    }
+
+    /// Ends the reader. A read of standard input may never end, so it is not waited for.
+    pub(super) fn end(self) {
+        if let Some(progress) = self.progress {
+            progress.finish();
+        }
+        drop(self.frames);
+        self.runtime.shutdown_background();
+    }
+}
+
+fn unwritable(path: &Path) -> String {
+    format!("--annotate: {} cannot be written", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn videos_and_standard_input_are_read_alone() {
+        let among = |paths: &[&str]| {
+            let paths: Vec<_> = paths.iter().map(PathBuf::from).collect();
+            Stream::among(&paths).map_err(|error| error.to_string())
+        };
+        assert_eq!(among(&["a.jpg", "folder"]), Ok(None));
+        assert_eq!(among(&["-"]), Ok(Some(Stream::StandardInput)));
+        let clip = Stream::Video("clip.MP4".into());
+        assert_eq!(among(&["clip.MP4"]), Ok(Some(clip)));
+        assert!(among(&["clip.mp4", "a.jpg"]).unwrap_err().contains("alone"));
+    }
+
+    #[test]
+    fn intervals_have_a_unit_and_limits() {
+        assert_eq!(interval("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(interval("2s"), Ok(Duration::from_secs(2)));
+        for wrong in ["", "2", "1ms", "2h", "-1s"] {
+            assert!(interval(wrong).is_err(), "{wrong}");
+        }
+    }
+}

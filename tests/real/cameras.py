@@ -1,0 +1,195 @@
+"""Cameras for the tests: an MJPEG stream, a snapshot behind Digest, RTSP, and a proxy that damages connections."""
+
+import contextlib
+import hashlib
+import http.server
+import re
+import secrets
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from harness.processes import free_ports
+from waiting import wait_until
+
+HERE = Path(__file__).resolve().parent
+USER, PASSWORD = "viewer", "s@cret/of:gate"
+REALM = "camera"
+CHUNK = 4096
+
+
+class _Handler(http.server.BaseHTTPRequestHandler):
+    """`/stream` is MJPEG, `/snap` a snapshot behind Digest with an entity tag."""
+
+    protocol_version = "HTTP/1.1"
+    frames: list[bytes]
+    rate: float
+
+    def log_message(self, *_):
+        """Logs nothing."""
+
+    def do_GET(self):
+        """Answers a request."""
+        with contextlib.suppress(OSError):
+            if self.path == "/stream":
+                self._stream()
+            else:
+                self._snapshot()
+
+    def _frame(self) -> bytes:
+        return self.frames[int(time.monotonic() * self.rate) % len(self.frames)]
+
+    def _stream(self) -> None:
+        self.close_connection = True
+        self.send_response(200)
+        self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
+        self.end_headers()
+        while True:
+            frame = self._frame()
+            head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(frame)}\r\n\r\n"
+            self.wfile.write(head.encode() + frame + b"\r\n")
+            time.sleep(1.0 / self.rate)
+
+    def _snapshot(self) -> None:
+        if not self._is_authorized():
+            challenge = f'Digest realm="{REALM}", qop="auth", nonce="{secrets.token_hex(8)}", algorithm=MD5'
+            self.send_response(401)
+            self.send_header("WWW-Authenticate", f'Basic realm="{REALM}"')
+            self.send_header("WWW-Authenticate", challenge)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+            return
+        frame = self._frame()
+        tag = f'"{hashlib.md5(frame).hexdigest()}"'
+        if self.headers.get("If-None-Match") == tag:
+            self.send_response(304)
+            self.end_headers()
+            return
+        self.send_response(200)
+        self.send_header("Content-Type", "image/jpeg")
+        self.send_header("Content-Length", str(len(frame)))
+        self.send_header("ETag", tag)
+        self.end_headers()
+        self.wfile.write(frame)
+
+    def _is_authorized(self) -> bool:
+        header = self.headers.get("Authorization", "")
+        given = {key: quoted or plain for key, quoted, plain in re.findall(r'(\w+)=(?:"([^"]*)"|([^",\s]+))', header)}
+        if not header.startswith("Digest ") or given.get("username") != USER:
+            return False
+
+        def digest(*parts: str) -> str:
+            return hashlib.md5(":".join(parts).encode()).hexdigest()
+
+        first, second = digest(USER, REALM, PASSWORD), digest("GET", given["uri"])
+        return given["response"] == digest(first, given["nonce"], given["nc"], given["cnonce"], given["qop"], second)
+
+
+@contextlib.contextmanager
+def http_camera(frames: list[bytes], rate: float) -> Iterator[int]:
+    """Serves a camera over HTTP, and yields its port."""
+    handler = type("Handler", (_Handler,), {"frames": frames, "rate": rate})
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    server.daemon_threads = True
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield server.server_address[1]
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+@contextlib.contextmanager
+def rtsp_camera(folder: Path, rate: int, *login: str) -> Iterator[int]:
+    """Serves the files `0.jpg`, `1.jpg` … of a folder over RTSP, and yields the port."""
+    (port,) = free_ports(1)
+    command = ["/usr/bin/python3", HERE / "rtsp_server.py", str(port), folder, str(rate), *login]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def answers() -> bool:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
+            return True
+        return False
+
+    try:
+        wait_until(answers, "the RTSP server answers")
+        yield port
+    finally:
+        process.kill()
+        process.wait()
+
+
+class Proxy:
+    """Forwards connections to a port, and damages them: `mode` is `normal`, `killed`, `stalled`, `cut` or `corrupted`."""
+
+    def __init__(self, target: int):
+        self.target = target
+        self.mode = "normal"
+        self.open: set[socket.socket] = set()
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def set(self, mode: str) -> None:
+        """Changes the mode. `killed` closes all connections at once."""
+        self.mode = mode
+        if mode == "killed":
+            for connection in list(self.open):
+                self._close(connection)
+
+    def close(self) -> None:
+        """Ends the proxy."""
+        self.set("killed")
+        self.listener.close()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                client, _ = self.listener.accept()
+                if self.mode == "killed":
+                    client.close()
+                    continue
+                try:
+                    server = socket.create_connection(("127.0.0.1", self.target), timeout=5)
+                except OSError:
+                    client.close()
+                    continue
+                server.settimeout(None)
+                self.open |= {client, server}
+                for source, sink, is_answer in ((client, server, False), (server, client, True)):
+                    threading.Thread(target=self._forward, args=(source, sink, is_answer), daemon=True).start()
+
+    def _forward(self, source: socket.socket, sink: socket.socket, is_answer: bool) -> None:
+        with contextlib.suppress(OSError):
+            while chunk := source.recv(CHUNK):
+                while self.mode == "stalled":
+                    time.sleep(0.05)
+                if is_answer and self.mode == "cut":
+                    sink.sendall(chunk[: len(chunk) // 2])
+                    break
+                if is_answer and self.mode == "corrupted":
+                    damaged = bytearray(chunk)
+                    damaged[:: max(1, len(damaged) // 8)] = b"\xff" * len(damaged[:: max(1, len(damaged) // 8)])
+                    chunk = bytes(damaged)
+                sink.sendall(chunk)
+        for connection in (source, sink):
+            self._close(connection)
+
+    def _close(self, connection: socket.socket) -> None:
+        self.open.discard(connection)
+        with contextlib.suppress(OSError):
+            connection.shutdown(socket.SHUT_RDWR)
+        connection.close()
+
+
+@contextlib.contextmanager
+def proxy(target: int) -> Iterator[Proxy]:
+    """A proxy in front of a port."""
+    started = Proxy(target)
+    try:
+        yield started
+    finally:
+        started.close()
