@@ -12,7 +12,7 @@ pub(crate) struct PyLens(pub Lens);
 
 #[pymethods]
 impl PyLens {
-    /// Name of the lens model, such as "kannala_brandt".
+    /// Name of the lens model, such as `kannala_brandt`.
     #[getter]
     fn model(&self) -> &'static str {
         self.0.model()

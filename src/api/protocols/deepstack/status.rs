@@ -14,7 +14,7 @@ pub(in crate::api) struct Pong {
 /// Newer versions of the server.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(rename_all = "camelCase")]
-pub(in crate::api) struct UpdateAvailable {
+pub(in crate::api) struct VersionStatus {
     /// Always true.
     success: bool,
     /// An explanation.
@@ -25,7 +25,7 @@ pub(in crate::api) struct UpdateAvailable {
     version: &'static str,
 }
 
-/// Check that the server responds (CodeProject.AI)
+/// Ping the server (CodeProject.AI)
 #[utoipa::path(
     get, path = "/v1/status/ping", tag = "operation", operation_id = "ping_as_code_project_ai",
     security(()),
@@ -35,7 +35,7 @@ pub(in crate::api) async fn ping() -> Json<Pong> {
     Json(Pong { success: true })
 }
 
-/// Check that the server responds (CodeProject.AI, later versions)
+/// Ping the server (CodeProject.AI 2)
 #[utoipa::path(
     get, path = "/v1/server/status/ping", tag = "operation",
     operation_id = "ping_server_as_code_project_ai",
@@ -53,10 +53,10 @@ pub(in crate::api) async fn server_ping() -> Json<Pong> {
     get, path = "/v1/status/updateavailable", tag = "operation",
     operation_id = "get_update_as_code_project_ai",
     security(()),
-    responses((status = OK, description = "The version that runs.", body = UpdateAvailable))
+    responses((status = OK, description = "The version that runs.", body = VersionStatus))
 )]
-pub(in crate::api) async fn update_available() -> Json<UpdateAvailable> {
-    Json(UpdateAvailable {
+pub(in crate::api) async fn update_available() -> Json<VersionStatus> {
+    Json(VersionStatus {
         success: true,
         message: "Lookdown does not look for updates.",
         update_available: false,
