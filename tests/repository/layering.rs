@@ -203,6 +203,7 @@ const MAY_USE: [(&str, &[&str]); 35] = [
             "inference",
             "pipeline",
             "evaluation",
+            "fairness",
             "probe",
             "settings",
             "shutdown",
