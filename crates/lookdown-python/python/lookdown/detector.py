@@ -29,7 +29,7 @@ class Detector:
 
     def detect(
         self,
-        image: Path | bytes | npt.NDArray[np.uint8],
+        image: Path | bytes | npt.NDArray[Any],
         calibration: Calibration | Path | None = None,
         *,
         channel_order: Literal["RGB", "BGR"] = "RGB",
@@ -54,7 +54,7 @@ class Detector:
             report = self._detector.detect_file(content, os.fspath(image), calibration)
         return Detections.from_json(report)
 
-    def _detect_pixels(self, pixels: npt.NDArray[np.uint8], calibration: Calibration | None, channel_order: str) -> str:
+    def _detect_pixels(self, pixels: npt.NDArray[Any], calibration: Calibration | None, channel_order: str) -> str:
         if channel_order not in ("RGB", "BGR"):
             raise LookdownError(f'channel_order: {channel_order!r}; give "RGB" or "BGR"')
         if pixels.dtype != np.uint8 or pixels.ndim != 3:
