@@ -100,9 +100,6 @@ fn deepstack_routes() -> OpenApiRouter<ApiState> {
             deepstack::list_as_deepstack,
             deepstack::get_list_as_deepstack
         ))
-        .routes(routes!(deepstack::status::ping))
-        .routes(routes!(deepstack::status::server_ping))
-        .routes(routes!(deepstack::status::update_available))
 }
 
 fn description() -> OpenApiRouter<ApiState> {
@@ -111,6 +108,9 @@ fn description() -> OpenApiRouter<ApiState> {
         .routes(routes!(problems::list_problems))
         .routes(routes!(problems::get_problem))
         .routes(routes!(open_inference::describe::server))
+        .routes(routes!(deepstack::status::ping))
+        .routes(routes!(deepstack::status::server_ping))
+        .routes(routes!(deepstack::status::update_available))
 }
 
 fn probes() -> OpenApiRouter<ApiState> {
