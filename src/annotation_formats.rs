@@ -1,6 +1,6 @@
 //! Exports detected persons in the file formats of annotation tools, for correction there. The output
 //! is text in memory, which the caller writes or sends. A new format needs a file with its
-//! [`FormatSpec`] and a row of the table here.
+//! `FormatSpec` and a row of the table here.
 
 mod coco;
 mod content;
