@@ -52,6 +52,11 @@ def files_of(root: Path, pins: Pins, cpu: str) -> Iterator[tuple[Path, str]]:
         yield root / name, name
     for member in pins.runtime[cpu].members:
         yield root / member.to, member.to
+    yield from default_model_files(root, pins)
+
+
+def default_model_files(root: Path, pins: Pins) -> Iterator[tuple[Path, str]]:
+    """The default models with their manifests and licences, and their names below the folder of a package."""
     for model in pins.models + pins.quantised:
         if model.default:
             folder = root / "models" / model.name

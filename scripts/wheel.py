@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 
 from assets.pins import read_pins
+from dist import ROOT, default_model_files
 
-ROOT = Path(__file__).resolve().parents[1]
 CRATE = ROOT / "crates" / "lookdown-python"
 TOOLS = ROOT / ".setup" / "wheel" / "bin"
 WHEELS = ROOT / "target" / "wheels"
@@ -21,7 +21,7 @@ PLATFORM = "manylinux_2_28"
 
 def main() -> int:
     """Collects the models, builds the wheel, and checks its platform."""
-    collect_models(CRATE / "python" / "lookdown" / "models")
+    collect_models(CRATE / "python" / "lookdown")
     for text in ("LICENSE", "NOTICE"):
         shutil.copyfile(ROOT / text, CRATE / text)
     shutil.rmtree(WHEELS, ignore_errors=True)
@@ -39,20 +39,14 @@ def main() -> int:
     return 0
 
 
-def collect_models(folder: Path) -> None:
+def collect_models(package: Path) -> None:
     """Copies the default models with their manifests and licences into the package."""
-    shutil.rmtree(folder, ignore_errors=True)
-    pins = read_pins(ROOT / "scripts" / "pins.toml")
-    for model in pins.models + pins.quantised:
-        if not model.default:
-            continue
-        source = ROOT / "models" / model.name
-        target = folder / model.name
-        target.mkdir(parents=True)
-        for file in (source / "model.toml", source / "model.onnx", *sorted(source.glob("LICENSE-*"))):
-            if not file.is_file():
-                sys.exit(f"{file} is missing; run `make setup` first.")
-            shutil.copyfile(file, target / file.name)
+    shutil.rmtree(package / "models", ignore_errors=True)
+    for source, name in default_model_files(ROOT, read_pins(ROOT / "scripts" / "pins.toml")):
+        if not source.is_file():
+            sys.exit(f"{source} is missing; run `make setup` first.")
+        (package / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source, package / name)
 
 
 if __name__ == "__main__":
