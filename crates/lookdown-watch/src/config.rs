@@ -3,7 +3,7 @@
 mod entry;
 mod file;
 
-pub use entry::CameraEntry;
+pub use entry::{CameraEntry, parse_duration};
 pub use file::{ServerEntry, load};
 
 use std::path::PathBuf;

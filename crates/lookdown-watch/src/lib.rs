@@ -25,7 +25,9 @@ mod video;
 mod watcher;
 
 pub use camera::{Camera, Transport, VideoOptions};
-pub use config::{CameraEntry, ConfigError, ServerEntry, ServerOptions, WatchOptions, load};
+pub use config::{
+    CameraEntry, ConfigError, ServerEntry, ServerOptions, WatchOptions, load, parse_duration,
+};
 pub use credentials::Credentials;
 pub use frame::{Frame, FrameError, ImageFormat, MAX_FRAME_BYTES};
 pub use location::{InvalidLocation, Location};

@@ -17,7 +17,7 @@ use crate::{
     metrics::CameraMetrics,
     metrics_server, sender,
     server::{ClientError, Server, camera_client},
-    slot::Slot,
+    slot::{Slot, Writer},
     source,
 };
 
@@ -154,12 +154,9 @@ impl Watcher {
         let (name, camera) = (camera.name.clone(), Arc::new(camera));
         let source = tokio::spawn({
             let (camera, client) = (Arc::clone(&camera), self.client.clone());
-            let (slot, metrics) = (Arc::clone(&slot), Arc::clone(&metrics));
-            async move {
-                source::supervise(&camera, &client, &slot, &metrics).await;
-                slot.close();
-            }
-            .instrument(span.clone())
+            let (writer, metrics) = (Writer(Arc::clone(&slot)), Arc::clone(&metrics));
+            async move { source::supervise(&camera, &client, &writer.0, &metrics).await }
+                .instrument(span.clone())
         });
         let sender = tokio::spawn({
             let (server, slot) = (Arc::clone(&self.server), Arc::clone(&slot));

@@ -8,8 +8,9 @@ use std::{
 
 use anyhow::{Context, bail};
 use bytes::Bytes;
-use jiff::SignedDuration;
-use lookdown_watch::{ImageReader, VideoFrames, VideoOptions, VideoWriter, video_duration};
+use lookdown_watch::{
+    ImageReader, VideoFrames, VideoOptions, VideoWriter, parse_duration, video_duration,
+};
 use tokio::runtime::{self, Runtime};
 
 use crate::cli::progress::Progress;
@@ -72,11 +73,8 @@ impl Stream {
 
 /// Parses `--every`.
 pub(super) fn interval(text: &str) -> Result<Duration, String> {
-    let parsed = text.parse::<SignedDuration>().ok();
-    let parsed = parsed.and_then(|parsed| Duration::try_from(parsed).ok());
     let limits = Duration::from_millis(10)..=Duration::from_hours(1);
-    parsed
-        .filter(|parsed| limits.contains(parsed))
+    parse_duration(text, limits)
         .ok_or_else(|| "give a duration from 10ms to 1h, such as 500ms or 2s".to_owned())
 }
 

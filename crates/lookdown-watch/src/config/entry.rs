@@ -1,6 +1,6 @@
 //! One camera as it is written, and its checks.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use jiff::SignedDuration;
 use secrecy::SecretString;
@@ -226,17 +226,19 @@ fn duration(
     least: Duration,
 ) -> Result<Option<Duration>, ConfigError> {
     let Some(text) = text else { return Ok(None) };
-    let parsed = text.parse::<SignedDuration>().ok();
-    let parsed = parsed.and_then(|parsed| Duration::try_from(parsed).ok());
-    match parsed {
-        Some(parsed) if (least..=MAX_EVERY).contains(&parsed) => Ok(Some(parsed)),
-        _ => {
-            let least = least.as_secs_f64();
-            let remedy =
-                format!("is no duration from {least} s to 1 h: write it like 1s, 500ms or 2m");
-            Err(ConfigError::value(field, &text, &remedy))
-        }
-    }
+    let parsed = parse_duration(text, least..=MAX_EVERY);
+    parsed.map(Some).ok_or_else(|| {
+        let least = least.as_secs_f64();
+        let remedy = format!("is no duration from {least} s to 1 h: write it like 1s, 500ms or 2m");
+        ConfigError::value(field, &text, &remedy)
+    })
+}
+
+/// Parses a duration with its unit, such as `500ms`. `None` if it is none or outside of the limits.
+#[must_use]
+pub fn parse_duration(text: &str, limits: RangeInclusive<Duration>) -> Option<Duration> {
+    let parsed = Duration::try_from(text.parse::<SignedDuration>().ok()?).ok()?;
+    limits.contains(&parsed).then_some(parsed)
 }
 
 fn credentials(
