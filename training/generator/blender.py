@@ -6,8 +6,8 @@ import math
 import os
 
 os.environ["OPENCV_IO_ENABLE_OPENEXR"] = "1"
-import bmesh  # Exists only once bpy is imported.
-import bpy
+import bpy  # isort: skip  # First: bmesh exists only once bpy is imported.
+import bmesh
 import cv2
 import numpy as np
 from mathutils import Matrix
