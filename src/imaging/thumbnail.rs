@@ -1,8 +1,8 @@
 //! Reduced versions of images.
 
-use image::{
-    ImageBuffer, Rgb,
-    imageops::{FilterType, resize},
+use fast_image_resize::{
+    FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer,
+    images::{Image, ImageRef},
 };
 
 use super::Frame;
@@ -38,11 +38,19 @@ pub fn narrowed(frame: &Frame, width: u32) -> Frame {
 }
 
 fn resized(frame: &Frame, width: u32, height: u32) -> Frame {
-    ImageBuffer::<Rgb<u8>, &[u8]>::from_raw(frame.width(), frame.height(), frame.pixels())
-        .map(|image| resize(&image, width, height, FilterType::Triangle))
-        .and_then(|small| Frame::new(small.width(), small.height(), small.into_raw()).ok())
-        // Neither step can fail: the buffer length of a frame matches its size.
-        .unwrap_or_else(|| frame.clone())
+    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Bilinear));
+    let mut small = Image::new(width, height, PixelType::U8x3);
+    ImageRef::new(
+        frame.width(),
+        frame.height(),
+        frame.pixels(),
+        PixelType::U8x3,
+    )
+    .ok()
+    .and_then(|image| Resizer::new().resize(&image, &mut small, &options).ok())
+    .and_then(|()| Frame::new(width, height, small.into_vec()).ok())
+    // No step can fail: the buffer length of a frame matches its size.
+    .unwrap_or_else(|| frame.clone())
 }
 
 #[cfg(test)]

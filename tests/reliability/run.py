@@ -19,6 +19,7 @@ from proofs import (  # noqa: E402
     contract,
     descriptors,
     disk,
+    drawing,
     fairness,
     floods,
     kill,
@@ -34,7 +35,22 @@ from support.places import WORK  # noqa: E402
 from support.row import Row  # noqa: E402
 from support.tell import markdown  # noqa: E402
 
-PARTS = (contract, kill, stop, reload, disk, descriptors, memory, clock, rude, floods, fairness, overload, soak)
+PARTS = (
+    contract,
+    kill,
+    stop,
+    reload,
+    disk,
+    descriptors,
+    memory,
+    clock,
+    rude,
+    floods,
+    drawing,
+    fairness,
+    overload,
+    soak,
+)
 EFFORTS = {effort.name: effort for effort in (SHORT, LONG)}
 
 

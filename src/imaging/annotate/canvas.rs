@@ -16,14 +16,14 @@ pub(super) fn blend(frame: &mut Frame, x: u32, y: u32, colour: Rgb, opacity: f64
     };
     for (value, target) in pixel.iter_mut().zip(colour) {
         let mixed = f64::from(*value) + (f64::from(target) - f64::from(*value)) * opacity;
-        // `as` saturates, and both ends are bytes.
+        // `as` cuts off the fraction, so that adding 0.5 rounds; `round` is slower.
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "between two bytes"
         )]
         {
-            *value = mixed.round() as u8;
+            *value = (mixed + 0.5) as u8;
         }
     }
 }
@@ -63,19 +63,28 @@ impl Outline {
         let rows = self.corners.map(|corner| corner[1]);
         let top = rows.into_iter().fold(f64::INFINITY, f64::min) - reach;
         let bottom = rows.into_iter().fold(f64::NEG_INFINITY, f64::max) + reach;
+        let edges = self.edges();
         for y in pixels(top, bottom, frame.height()) {
             let row = f64::from(y) + 0.5;
-            let mut spans = self
-                .edges()
-                .map(|edge| edge_span(edge, row, reach))
-                .map(|[from, to]| pixels(from, to, frame.width()));
-            spans.sort_unstable_by_key(|span| span.start);
+            let mut spans = edges.map(|edge| {
+                let [from, to] = edge_span(edge, row, reach);
+                (pixels(from, to, frame.width()), edge)
+            });
+            spans.sort_unstable_by_key(|(span, _)| span.start);
             let mut painted = 0;
-            for x in spans.into_iter().flatten() {
+            for x in spans.iter().flat_map(|(span, _)| span.clone()) {
                 if x >= painted {
                     painted = x + 1;
-                    let coverage = reach - self.distance([f64::from(x) + 0.5, row]);
-                    blend(frame, x, y, colour, opacity * coverage.clamp(0.0, 1.0));
+                    let point = [f64::from(x) + 0.5, row];
+                    // Other edges are further away than their reach.
+                    let distance = spans
+                        .iter()
+                        .filter(|(span, _)| span.contains(&x))
+                        .map(|(_, edge)| squared_edge_distance(*edge, point))
+                        .fold(f64::INFINITY, f64::min)
+                        .sqrt();
+                    let coverage = (reach - distance).clamp(0.0, 1.0);
+                    blend(frame, x, y, colour, opacity * coverage);
                     painted_pixels += 1;
                 }
             }
@@ -86,14 +95,6 @@ impl Outline {
     fn edges(&self) -> [[[f64; 2]; 2]; 4] {
         let [a, b, c, d] = self.corners;
         [[a, b], [b, c], [c, d], [d, a]]
-    }
-
-    fn distance(&self, point: [f64; 2]) -> f64 {
-        self.edges()
-            .map(|edge| squared_edge_distance(edge, point))
-            .into_iter()
-            .fold(f64::INFINITY, f64::min)
-            .sqrt()
     }
 }
 

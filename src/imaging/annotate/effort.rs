@@ -7,7 +7,7 @@ const MAX_PAINTED_PER_PIXEL: u64 = 2;
 const MIN_BUDGET_PIXELS: u64 = 2_000_000;
 /// Most painted pixels of any frame, so that drawing takes less time than decoding. The outlines of
 /// a hundred persons in a frame of 50 megapixels are fewer.
-const MAX_BUDGET_PIXELS: u64 = 16_000_000;
+const MAX_BUDGET_PIXELS: u64 = 8_000_000;
 
 /// A drawing was cancelled because its result is no longer needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -53,10 +53,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn large_frames_have_no_larger_budget_than_16_million_pixels() {
+    fn large_frames_have_no_larger_budget_than_8_million_pixels() {
         let budget = |width, height| Effort::new(width, height, &|| false).pixels_left;
         assert_eq!(budget(100, 100), 2_000_000);
         assert_eq!(budget(2000, 2000), 8_000_000);
-        assert_eq!(budget(8192, 6100), 16_000_000);
+        assert_eq!(budget(8192, 6100), 8_000_000);
     }
 }

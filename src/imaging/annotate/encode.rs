@@ -1,8 +1,9 @@
 //! Encoding of a frame as JPEG or PNG.
 
-use image::codecs::jpeg::JpegEncoder;
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder, ImageError};
+use std::error::Error;
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use jpeg_encoder::{ColorType, Encoder as JpegEncoder, SamplingFactor};
 
 use crate::imaging::frame::Frame;
 
@@ -13,20 +14,38 @@ pub struct EncodeError {
     format: &'static str,
     width: u32,
     height: u32,
-    source: ImageError,
+    source: Box<dyn Error + Send + Sync>,
 }
 
-/// Encodes the frame as JPEG. `quality` is clamped to 1 to 100.
+impl EncodeError {
+    fn new(
+        frame: &Frame,
+        format: &'static str,
+        source: impl Into<Box<dyn Error + Send + Sync>>,
+    ) -> Self {
+        Self {
+            format,
+            width: frame.width(),
+            height: frame.height(),
+            source: source.into(),
+        }
+    }
+}
+
+/// Encodes the frame as JPEG with colours at half resolution. `quality` is clamped to 1 to 100.
 ///
 /// # Errors
 /// Returns an error if a side is longer than the 65535 pixels that JPEG can hold.
 pub fn encode_jpeg(frame: &Frame, quality: u8) -> Result<Vec<u8>, EncodeError> {
+    let failed = |source: Box<dyn Error + Send + Sync>| EncodeError::new(frame, "JPEG", source);
+    let width = u16::try_from(frame.width()).map_err(|error| failed(error.into()))?;
+    let height = u16::try_from(frame.height()).map_err(|error| failed(error.into()))?;
     let mut bytes = Vec::new();
-    encode(
-        frame,
-        "JPEG",
-        JpegEncoder::new_with_quality(&mut bytes, quality),
-    )?;
+    let mut encoder = JpegEncoder::new(&mut bytes, quality.clamp(1, 100));
+    encoder.set_sampling_factor(SamplingFactor::R_4_2_0);
+    encoder
+        .encode(frame.pixels(), width, height, ColorType::Rgb)
+        .map_err(|error| failed(error.into()))?;
     Ok(bytes)
 }
 
@@ -35,23 +54,10 @@ pub fn encode_jpeg(frame: &Frame, quality: u8) -> Result<Vec<u8>, EncodeError> {
 /// # Errors
 /// Returns an error if the encoder fails. No frame is known to cause this.
 pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
-    let mut bytes = Vec::new();
-    encode(frame, "PNG", PngEncoder::new(&mut bytes))?;
-    Ok(bytes)
-}
-
-fn encode(
-    frame: &Frame,
-    format: &'static str,
-    encoder: impl ImageEncoder,
-) -> Result<(), EncodeError> {
     let (width, height) = (frame.width(), frame.height());
-    encoder
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
         .write_image(frame.pixels(), width, height, ExtendedColorType::Rgb8)
-        .map_err(|source| EncodeError {
-            format,
-            width,
-            height,
-            source,
-        })
+        .map_err(|error| EncodeError::new(frame, "PNG", error))?;
+    Ok(bytes)
 }

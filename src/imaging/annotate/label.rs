@@ -71,7 +71,7 @@ impl<'a> Labels<'a> {
             effort.spend(plate.draw(frame, *colour, PLATE_OPACITY));
             let text_top = plate.top + (height - line_height) / 2.0;
             let corner = [plate.left + padding, text_top];
-            self.text.write(frame, &mark.label, corner, INK);
+            effort.spend(self.text.write(frame, &mark.label, corner, INK));
             self.placed.push(plate);
         }
         Ok(())

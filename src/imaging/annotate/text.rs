@@ -35,7 +35,7 @@ impl Text {
     }
 
     /// Writes one line with its upper left corner at `[left, top]`. Parts outside the frame are cut
-    /// off.
+    /// off. Returns the number of painted pixels.
     #[expect(clippy::cast_possible_truncation, reason = "positions in a frame")]
     pub(in crate::imaging) fn write(
         &self,
@@ -43,7 +43,8 @@ impl Text {
         text: &str,
         [left, top]: [f64; 2],
         ink: Rgb,
-    ) {
+    ) -> u64 {
+        let mut painted_pixels = 0;
         let font = self.font.as_scaled(self.scale);
         let mut pen = point(left as f32, top as f32 + font.ascent());
         for letter in text.chars() {
@@ -60,9 +61,11 @@ impl Text {
                 for y in pixels(row, row + 1.0, frame.height()) {
                     for x in pixels(column, column + 1.0, frame.width()) {
                         blend(frame, x, y, ink, f64::from(coverage.min(1.0)));
+                        painted_pixels += 1;
                     }
                 }
             });
         }
+        painted_pixels
     }
 }
