@@ -25,9 +25,40 @@ struct State {
     phase: Phase,
     /// The time at which the phase times out.
     until: Option<Instant>,
-    /// The time at which a client that does not read its response times out.
-    blocked_until: Option<Instant>,
+    reading: Reading,
     request: RequestBytes,
+}
+
+/// The progress of a client that reads responses.
+#[derive(Debug, Default)]
+struct Reading {
+    /// The time since which the client blocks the response.
+    blocked_since: Option<Instant>,
+    /// The time for which it blocked the response since it last read [`PROGRESS_BYTES`], without the
+    /// current wait.
+    blocked: Duration,
+    /// The bytes that were sent since then.
+    sent_bytes: usize,
+}
+
+/// A client that blocks a response must read as many bytes within the idle timeout, so that it
+/// cannot hold a response in memory by reading a few bytes at a time.
+const PROGRESS_BYTES: usize = 64 << 10;
+
+impl Reading {
+    fn sent(&mut self, bytes: usize) {
+        if let Some(since) = self.blocked_since.take() {
+            self.blocked += since.elapsed();
+        }
+        self.sent_bytes = self.sent_bytes.saturating_add(bytes);
+        if self.sent_bytes >= PROGRESS_BYTES {
+            *self = Self::default();
+        }
+    }
+
+    fn deadline(&self, timeout: Duration) -> Option<Instant> {
+        Some(self.blocked_since? + timeout.saturating_sub(self.blocked))
+    }
 }
 
 /// The bytes of the current request, counted to find bytes of the next one that arrived with it.
@@ -82,7 +113,7 @@ impl ConnectionTimeouts {
         let state = State {
             phase: Phase::FirstHead,
             until: Some(Instant::now() + limits.header_timeout),
-            blocked_until: None,
+            reading: Reading::default(),
             request: RequestBytes::default(),
         };
         Self {
@@ -123,14 +154,20 @@ impl ConnectionTimeouts {
         state.until = Some(Instant::now() + time);
     }
 
-    /// Records if the client is blocking the response.
-    pub(super) fn sending(&self, is_blocked: bool) {
+    /// Records that the client blocks the response.
+    pub(super) fn blocked(&self) {
+        self.state()
+            .reading
+            .blocked_since
+            .get_or_insert_with(Instant::now);
+    }
+
+    /// Records sent bytes.
+    pub(super) fn sent(&self, bytes: usize) {
         let mut state = self.state();
-        if is_blocked != state.blocked_until.is_some() {
-            state.blocked_until = is_blocked.then(|| Instant::now() + self.idle_timeout);
-        }
+        state.reading.sent(bytes);
         // The body of a response may be dropped long before its last byte is read.
-        if !is_blocked && state.phase == Phase::Idle {
+        if state.phase == Phase::Idle {
             state.until = Some(Instant::now() + self.idle_timeout);
         }
     }
@@ -148,7 +185,7 @@ impl ConnectionTimeouts {
         loop {
             let now = Instant::now();
             let next_look = now + self.header_timeout.min(self.idle_timeout);
-            let deadline = self.state().deadline();
+            let deadline = self.state().deadline(self.idle_timeout);
             if deadline.is_some_and(|deadline| deadline <= now) {
                 return;
             }
@@ -163,8 +200,9 @@ impl ConnectionTimeouts {
 }
 
 impl State {
-    fn deadline(&self) -> Option<Instant> {
-        [self.until, self.blocked_until].into_iter().flatten().min()
+    fn deadline(&self, idle_timeout: Duration) -> Option<Instant> {
+        let reading = self.reading.deadline(idle_timeout);
+        [self.until, reading].into_iter().flatten().min()
     }
 }
 
@@ -200,14 +238,29 @@ mod tests {
         timeouts.request_begins(Some(0));
         timeouts.request_ends();
         for _ in 0..5 {
-            timeouts.sending(true);
+            timeouts.blocked();
             advance(IDLE / 2).await;
-            timeouts.sending(false);
+            timeouts.sent(PROGRESS_BYTES);
             assert!(!is_overdue(&timeouts).await);
         }
-        timeouts.sending(true);
+        timeouts.blocked();
         advance(IDLE).await;
         assert!(is_overdue(&timeouts).await);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_client_that_reads_a_few_bytes_at_a_time_is_overdue() {
+        let timeouts = pace();
+        timeouts.request_begins(Some(0));
+        timeouts.request_ends();
+        let began = Instant::now();
+        while !is_overdue(&timeouts).await && began.elapsed() < 2 * IDLE {
+            timeouts.blocked();
+            advance(IDLE / 8).await;
+            timeouts.sent(1);
+            timeouts.blocked();
+        }
+        assert_eq!(began.elapsed().as_secs(), IDLE.as_secs());
     }
 
     #[tokio::test(start_paused = true)]

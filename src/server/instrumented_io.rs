@@ -18,6 +18,15 @@ pub(super) struct InstrumentedStream<T> {
     pub(super) timeouts: Arc<ConnectionTimeouts>,
 }
 
+impl<T> InstrumentedStream<T> {
+    fn record(&self, written: &Poll<io::Result<usize>>) {
+        match written {
+            Poll::Pending => self.timeouts.blocked(),
+            Poll::Ready(bytes) => self.timeouts.sent(*bytes.as_ref().unwrap_or(&0)),
+        }
+    }
+}
+
 impl<T: AsyncRead + Unpin> AsyncRead for InstrumentedStream<T> {
     fn poll_read(
         mut self: Pin<&mut Self>,
@@ -40,7 +49,7 @@ impl<T: AsyncWrite + Unpin> AsyncWrite for InstrumentedStream<T> {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write(context, bytes);
-        self.timeouts.sending(outcome.is_pending());
+        self.record(&outcome);
         outcome
     }
 
@@ -58,7 +67,7 @@ impl<T: AsyncWrite + Unpin> AsyncWrite for InstrumentedStream<T> {
         parts: &[IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write_vectored(context, parts);
-        self.timeouts.sending(outcome.is_pending());
+        self.record(&outcome);
         outcome
     }
 

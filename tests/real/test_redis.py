@@ -208,6 +208,22 @@ class Shared(unittest.TestCase):
         self.assertEqual(metric(self.one, "results_dropped_total"), 0.0)
 
 
+class Overwritten(unittest.TestCase):
+    """A key of another program."""
+
+    def test_a_key_of_another_type_hides_only_its_camera(self) -> None:
+        """The reports of other cameras are listed."""
+        with RedisServer() as redis, replica("redis-overwritten", redis.url) as server:
+            for camera in ("hall", "lift"):
+                detect(server, camera)
+            wait_until(lambda: len(get(server, "/results").json()) == 2, "both reports are stored")
+            key = next(key for key in redis.ask("KEYS", "*hall*") if redis.ask("TYPE", key) == b"stream")
+            redis.ask("SET", key, "theirs")
+            answer = get(server, "/results")
+            self.assertEqual(answer.status, 200, answer.body)
+            self.assertEqual([row["camera"] for row in answer.json()], ["lift"])
+
+
 class Away(unittest.TestCase):
     """A Redis that does not answer."""
 

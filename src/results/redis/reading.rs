@@ -44,7 +44,7 @@ impl Reader<'_> {
             let last = each.cmd("XREVRANGE").arg(self.keys.camera(camera));
             last.arg("+").arg("-").arg("COUNT").arg(1);
         }
-        let mut latest = self.found(&each, cameras).await?;
+        let mut latest = self.found(each, cameras).await?;
         // One may have been replaced after the cameras were listed.
         latest.sort_unstable_by_key(|report| report.id);
         Ok(latest)
@@ -82,7 +82,7 @@ impl Reader<'_> {
             one.arg(&id).arg(&id);
         }
         let cameras = entries.into_iter().map(|entry| entry.camera);
-        self.found(&each, cameras.collect()).await
+        self.found(each, cameras.collect()).await
     }
 
     pub(super) async fn picture(
@@ -145,19 +145,22 @@ impl Reader<'_> {
         range.query_async(&mut self.connection).await
     }
 
-    /// The reports that a pipeline with one query per camera returns.
+    /// The reports that a pipeline with one query per camera returns. A camera whose key another
+    /// program has overwritten has none.
     async fn found(
         &mut self,
-        each: &Pipeline,
+        mut each: Pipeline,
         cameras: Vec<String>,
     ) -> RedisResult<Vec<Arc<StoredReport>>> {
         if cameras.is_empty() {
             return Ok(Vec::new());
         }
-        let found: Vec<StreamRangeReply> = each.query_async(&mut self.connection).await?;
+        let replies = each.ignore_errors().query_async(&mut self.connection);
+        let found: Vec<RedisResult<StreamRangeReply>> = replies.await?;
         let found = cameras.into_iter().zip(found);
         Ok(found
-            .flat_map(|(camera, found)| reports(&camera, found))
+            .filter_map(|(camera, found)| Some(reports(&camera, found.ok()?)))
+            .flatten()
             .collect())
     }
 }
