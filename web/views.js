@@ -46,11 +46,20 @@ async function show() {
   find("#people").replaceChildren(...report.persons.map(chip));
   const facts = `${plural(plan.views.length, "view")} of the profile ${plan.profile} see `;
   find("#views-facts").textContent = plan.views.length
-    ? `${facts}${percent(plan.coverage)} of the lens image, and each point of it in ${plan.overlap.toFixed(1)} views on average.`
+    ? `${facts}${percent(plan.coverage)} of the lens image, and each point of it in ${plan.overlap.toFixed(1)} views on average.${secondLook(plan.cost)}`
     : "The profile direct uses the whole frame: there are no views.";
   sheet.classList.toggle("small", plan.views.length > 48);
   sheet.replaceChildren(...plan.views.map((view, index) => tile(view, index, frame, report)));
   pointOutAll();
+}
+
+/** States how many more inputs possible persons may get. */
+function secondLook({ crops_at_most: crops, zoomed_pictures_at_most: zoomed }) {
+  const parts = [
+    crops ? plural(crops, "upright crop") : "",
+    zoomed ? plural(zoomed, "zoomed view") : "",
+  ].filter(Boolean);
+  return parts.length ? ` Possible persons are seen again in up to ${parts.join(" and ")}.` : "";
 }
 
 function drawOutlines() {

@@ -13,7 +13,7 @@ use lookdown::{
 use numpy::PyReadonlyArray3;
 use pyo3::prelude::*;
 
-use crate::{calibration::PyCalibration, error::python_error};
+use crate::{calibration::PyCalibration, error::python_error, view::PyView};
 
 /// Finds persons in frames. May be used by several threads.
 #[pyclass(name = "Detector", module = "lookdown._lookdown", frozen)]
@@ -84,6 +84,20 @@ impl PyDetector {
         );
         let image = JobImage::Decoded(Arc::new(frame.map_err(python_error)?));
         py.detach(|| self.detect(name, image, calibration))
+    }
+
+    /// Returns the views of the profile, in the order in which the network receives them.
+    fn views(&self, py: Python<'_>, calibration: &PyCalibration) -> PyResult<Vec<PyView>> {
+        let (calibration, profile) = (Arc::clone(&calibration.0), self.parameters.profile);
+        let plan = py.detach(|| self.engine.planned_views(&calibration, profile));
+        let views = plan.map_err(python_error)?.views.into_iter();
+        let calibration = || Arc::clone(&calibration);
+        Ok(views
+            .map(|planned| PyView {
+                planned,
+                calibration: calibration(),
+            })
+            .collect())
     }
 }
 

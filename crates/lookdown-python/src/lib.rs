@@ -9,6 +9,7 @@ mod calibration;
 mod detector;
 mod error;
 mod lens;
+mod view;
 
 use std::{ffi::OsString, path::PathBuf, process::ExitCode};
 
@@ -38,6 +39,8 @@ mod _lookdown {
     use super::error::LookdownError;
     #[pymodule_export]
     use super::lens::PyLens;
+    #[pymodule_export]
+    use super::view::PyView;
     #[pymodule_export]
     use super::{run, use_files};
 }

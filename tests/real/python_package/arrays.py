@@ -1,5 +1,7 @@
 """Detects persons in a file and in its pixels: `arrays.py IMAGE CALIBRATION`. Prints `equal` if they are the same.
 
+The maps of the views are compared with the lens.
+
 The file is made a PNG first, because decoders of JPEG differ by a level.
 """
 
@@ -8,6 +10,7 @@ from pathlib import Path
 
 import cv2
 import lookdown
+import numpy as np
 
 image, calibration = sys.argv[1:]
 bgr = cv2.imread(image)
@@ -19,4 +22,13 @@ of_bgr = detector.detect(bgr, calibration, channel_order="BGR")
 of_rgb = detector.detect(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), lookdown.Calibration.read(calibration))
 persons = [detections.report["persons"] for detections in (of_file, of_bgr, of_rgb)]
 assert len(of_file) > 0
+
+lens = lookdown.Calibration.read(calibration).lens
+for view in detector.views(calibration):
+    # The pixel in the middle of an even number of columns is beside the principal point.
+    (column, row), (x, y) = (round(at) for at in view.principal_point), view.principal_point
+    ray = view.camera_from_view @ [(column - x) / view.focal, (row - y) / view.focal, 1.0]
+    seen = lens.project(ray[np.newaxis])[0]
+    mapped = [part[row, column] for part in view.maps()]
+    assert np.allclose(seen, mapped, atol=1e-3, equal_nan=True), (seen, mapped)
 print("equal" if persons[0] == persons[1] == persons[2] else persons)

@@ -16,21 +16,14 @@ frame = cv2.imread(str(samples / "office.jpg"))
 assert frame is not None
 print(calibration, calibration.lens)
 
-# %% Straighten: a pinhole view of 640×480 pixels and 90°, tilted by 40° from the optical axis.
-width, height = 640, 480
-focal = width / 2 / np.tan(np.radians(45))
-columns, rows = np.meshgrid(np.arange(width) - (width - 1) / 2, np.arange(height) - (height - 1) / 2)
-tilt = np.radians(40)
-# Columns: the view's right, down and forward in the camera frame. The nadir is below.
-right, forward = np.array([1.0, 0.0, 0.0]), np.array([0.0, -np.sin(tilt), np.cos(tilt)])
-view = np.stack([right, np.cross(forward, right), forward], axis=1)
-rays = np.stack([columns, rows, np.full_like(columns, focal)], axis=-1).reshape(-1, 3) @ view.T
-pixels = calibration.lens.project(np.ascontiguousarray(rays)).astype(np.float32).reshape(height, width, 2)
-straightened = cv2.remap(frame, pixels[..., 0], pixels[..., 1], cv2.INTER_LINEAR)
+# %% Straighten: the first upright view of the profile.
+detector = lookdown.Detector(profile="fast", score_threshold=0.3)
+view = detector.views(calibration)[0]
+map_x, map_y = view.maps()
+straightened = cv2.remap(frame, map_x, map_y, cv2.INTER_LINEAR)
 cv2.imwrite("straightened.png", straightened)
 
 # %% Detect: boxes, oriented boxes, scores, positions on the floor.
-detector = lookdown.Detector(profile="fast", score_threshold=0.3)
 detections = detector.detect(frame, calibration, channel_order="BGR")
 for score, floor in zip(detections.scores, detections.floor, strict=True):
     print(f"score {score:.2f} at {floor[0]:.1f} m, {floor[1]:.1f} m")

@@ -6,9 +6,9 @@
 >>> detections.boxes  # (N, 4): x_min, y_min, x_max, y_max
 """
 
-from lookdown._lookdown import Calibration, Lens, LookdownError
+from lookdown._lookdown import Calibration, Lens, LookdownError, View
 from lookdown.detections import Detections
 from lookdown.detector import Detector
 from lookdown.evaluation import evaluate
 
-__all__ = ["Calibration", "Detections", "Detector", "Lens", "LookdownError", "evaluate"]
+__all__ = ["Calibration", "Detections", "Detector", "Lens", "LookdownError", "View", "evaluate"]

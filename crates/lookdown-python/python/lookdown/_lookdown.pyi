@@ -47,6 +47,31 @@ class Calibration:
     def lens(self) -> Lens:
         """The lens, in pixels of frames of `image_size`."""
 
+class View:
+    """An upright perspective view of a part of the frame, as the network receives it."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+    @property
+    def focal(self) -> float:
+        """Focal length, pixels."""
+    @property
+    def principal_point(self) -> tuple[float, float]:
+        """Principal point, (x, y)."""
+    @property
+    def camera_from_view(self) -> npt.NDArray[np.float64]:
+        """Rotation from the view frame to the camera frame, of shape (3, 3)."""
+    @property
+    def axis(self) -> npt.NDArray[np.float64]:
+        """Direction of the axis in the camera frame, of shape (3,)."""
+    @property
+    def outline(self) -> npt.NDArray[np.float64]:
+        """Border in the frame, clockwise from the top left corner, of shape (N, 2)."""
+    def maps(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        """Returns the position in the frame of each pixel of the view, as two arrays of shape (height, width) for
+        `cv2.remap`. NaN beyond the lens."""
+
 class Detector:
     """Finds persons in frames. May be used by several threads."""
 
@@ -55,6 +80,8 @@ class Detector:
         """Detects persons in the content of an image file. Returns the report as JSON."""
     def detect_pixels(self, pixels: npt.NDArray[np.uint8], name: str, calibration: Calibration | None = None) -> str:
         """Detects persons in RGB pixels of shape (height, width, 3). Returns the report as JSON."""
+    def views(self, calibration: Calibration) -> list[View]:
+        """Returns the views of the profile, in the order in which the network receives them."""
 
 def run(arguments: list[str]) -> bool:
     """Runs the command line. Returns true if it succeeded. Ends the process if a flag is invalid."""

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from lookdown import _lookdown
 from lookdown._files import use_packaged_files
-from lookdown._lookdown import Calibration, LookdownError
+from lookdown._lookdown import Calibration, LookdownError, View
 from lookdown.detections import Detections
 
 Path = str | os.PathLike[str]
@@ -53,6 +53,12 @@ class Detector:
                 raise LookdownError(f"image: {os.fspath(image)} cannot be read: {error.strerror}") from error
             report = self._detector.detect_file(content, os.fspath(image), calibration)
         return Detections.from_json(report)
+
+    def views(self, calibration: Calibration | Path) -> list[View]:
+        """Returns the views of the profile for frames of the calibration, in the order in which the network receives them."""
+        if not isinstance(calibration, Calibration):
+            calibration = Calibration.read(calibration)
+        return self._detector.views(calibration)
 
     def _detect_pixels(self, pixels: npt.NDArray[Any], calibration: Calibration | None, channel_order: str) -> str:
         if channel_order not in ("RGB", "BGR"):

@@ -65,6 +65,8 @@ pub(in crate::api) struct PlanCost {
     pictures: usize,
     /// Largest number of additional zoomed images of possible persons.
     zoomed_pictures_at_most: usize,
+    /// Largest number of additional upright crops of the frame around possible persons.
+    crops_at_most: usize,
     /// Number of batches for the images of every frame.
     batches: usize,
     /// Number of pixels of the images of every frame.
@@ -251,6 +253,7 @@ impl From<&PlannedViews> for ViewPlanInfo {
             cost: PlanCost {
                 pictures: plan.pictures,
                 zoomed_pictures_at_most: plan.zoomed_pictures_at_most,
+                crops_at_most: plan.crops_at_most,
                 batches: plan.batches,
                 pixels: plan.pixels,
             },
