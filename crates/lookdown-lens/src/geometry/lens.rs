@@ -172,7 +172,8 @@ impl Lens {
             None => (x, y),
             Some(distortion) => distortion.undistort(x, y, self.max_radius)?,
         };
-        let radius = x.hypot(y);
+        // `hypot` is slower, and only differs far outside of any frame.
+        let radius = (x * x + y * y).sqrt();
         if radius == 0.0 {
             return Some(Ray::z());
         }

@@ -67,9 +67,9 @@ impl RadialTangential {
             return (distance == 0.0).then_some((0.0, 0.0));
         }
         let radial = |r: f64| r * (1.0 + r * r * (self.k1 + r * r * self.k2));
-        let slope = |r: f64| self.radial_slope(r);
+        let curve = |r: f64| (radial(r), self.radial_slope(r));
         let start = distance.min(max_radius);
-        let radius = rising_root(radial, slope, distance, (0.0, max_radius), start);
+        let radius = rising_root(curve, distance, (0.0, max_radius), start);
         let (mut u, mut v) = (x * radius / distance, y * radius / distance);
         for _ in 0..MAX_STEPS {
             let (found_x, found_y) = self.distort(u, v);

@@ -5,28 +5,47 @@
 
 use super::polynomial::Rising;
 
-/// Entries of the bracketing table: one Newton step from a bracket this narrow is nearly exact.
-const TABLE_ENTRIES: usize = 257;
+/// Steps of the bracketing table: one Newton step from a bracket this narrow is nearly exact.
+const TABLE_STEPS: usize = 1024;
 /// Bound on refinement steps; three suffice for real lenses, bisection alone needs about fifty.
 const MAX_STEPS: usize = 64;
+/// A Newton step below this share of the place is the last one: as the error is about the square of
+/// the step, the next step would change nothing.
+const LAST_STEP: f64 = 1.5e-8;
 /// Samples of the slope when looking for the first place at which a curve stops rising.
 const SLOPE_SAMPLES: usize = 20_000;
 
-/// A function that rises from 0 to its `end`, and a table of its values there.
+/// A function that rises from 0 to its `end`, and a table of the places at which it reaches equally
+/// spaced values.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tabulated<F> {
     function: F,
     end: f64,
-    values: Vec<f64>,
+    places: Vec<f64>,
+    steps_per_value: f64,
 }
 
 impl<F: Rising> Tabulated<F> {
     pub(super) fn new(function: F, end: f64) -> Self {
-        let places = (0..TABLE_ENTRIES).map(|index| place(end, index));
+        let most = function.value(end);
+        let mut places = vec![0.0];
+        for index in 1..TABLE_STEPS {
+            let value = most * fraction(index) / fraction(TABLE_STEPS);
+            let low = places[index - 1];
+            let curve = |x| function.value_and_slope(x);
+            places.push(rising_root(
+                curve,
+                value,
+                (low, end),
+                f64::midpoint(low, end),
+            ));
+        }
+        places.push(end);
         Self {
-            values: places.map(|x| function.value(x)).collect(),
+            steps_per_value: fraction(TABLE_STEPS) / most,
             function,
             end,
+            places,
         }
     }
 
@@ -45,59 +64,54 @@ impl<F: Rising> Tabulated<F> {
 
     /// Returns the place at which the function reaches `value`, which must lie within the table.
     pub(super) fn invert(&self, value: f64) -> f64 {
-        let above = self
-            .values
-            .partition_point(|&tabulated| tabulated < value)
-            .clamp(1, TABLE_ENTRIES - 1);
-        let (low, high) = (place(self.end, above - 1), place(self.end, above));
-        let rise = self.values[above] - self.values[above - 1];
-        let share = if rise > 0.0 {
-            ((value - self.values[above - 1]) / rise).clamp(0.0, 1.0)
-        } else {
-            0.5
-        };
-        rising_root(
-            |x| self.function.value(x),
-            |x| self.function.slope(x),
-            value,
-            (low, high),
-            low + share * (high - low),
-        )
+        let step = value * self.steps_per_value;
+        // `as` cuts off the fraction and saturates.
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an index into the table"
+        )]
+        let index = (step as usize).min(TABLE_STEPS - 1);
+        let (low, high) = (self.places[index], self.places[index + 1]);
+        let start = low + (step - fraction(index)) * (high - low);
+        let curve = |x| self.function.value_and_slope(x);
+        rising_root(curve, value, (low, high), start)
     }
 }
 
-/// Returns the place of the table entry `index` in a table that ends at `end`.
-fn place(end: f64, index: usize) -> f64 {
-    end / fraction(TABLE_ENTRIES - 1) * fraction(index)
-}
-
-/// Returns the place at which `function`, which rises from `low` to `high`, reaches `value`; the
-/// nearer end when it does not. Newton from `start`, kept within the bracket by bisection.
+/// Returns the place at which a function, which rises from `low` to `high`, reaches `value`; the
+/// nearer end when it does not. `curve` returns the function's value and slope. Newton from `start`,
+/// kept within the bracket by bisection.
 pub(super) fn rising_root(
-    function: impl Fn(f64) -> f64,
-    slope: impl Fn(f64) -> f64,
+    curve: impl Fn(f64) -> (f64, f64),
     value: f64,
     (mut low, mut high): (f64, f64),
     start: f64,
 ) -> f64 {
     let mut x = start;
     for _ in 0..MAX_STEPS {
-        let excess = function(x) - value;
+        let (reached, slope) = curve(x);
+        let excess = reached - value;
         if excess > 0.0 {
             high = x;
         } else {
             low = x;
         }
-        let newton = x - excess / slope(x);
-        let next = if newton > low && newton < high {
+        let newton = x - excess / slope;
+        let is_within = newton > low && newton < high;
+        let next = if is_within {
             newton
         } else {
             f64::midpoint(low, high)
         };
-        if (next - x).abs() <= f64::EPSILON * x || excess == 0.0 {
+        let step = (next - x).abs();
+        if step <= f64::EPSILON * x || excess == 0.0 {
             break;
         }
         x = next;
+        if is_within && step <= LAST_STEP * x {
+            break;
+        }
     }
     x
 }

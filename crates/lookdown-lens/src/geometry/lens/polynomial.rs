@@ -10,6 +10,9 @@ pub(super) trait Rising {
     fn value(&self, x: f64) -> f64;
     /// The derivative at `x`.
     fn slope(&self, x: f64) -> f64;
+    fn value_and_slope(&self, x: f64) -> (f64, f64) {
+        (self.value(x), self.slope(x))
+    }
 }
 
 /// `c0 + c1 x + c2 x² + …`
@@ -50,6 +53,13 @@ impl Rising for Polynomial {
     fn value(&self, x: f64) -> f64 {
         let coefficients = self.0.iter().rev();
         coefficients.fold(0.0, |sum, coefficient| sum * x + coefficient)
+    }
+
+    fn value_and_slope(&self, x: f64) -> (f64, f64) {
+        let coefficients = self.0.iter().rev();
+        coefficients.fold((0.0, 0.0), |(value, slope), coefficient| {
+            (value * x + coefficient, slope * x + value)
+        })
     }
 
     fn slope(&self, x: f64) -> f64 {
