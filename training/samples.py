@@ -68,10 +68,10 @@ class Frames:
     def load(self, k):
         """Image (RGB), boxes, upright angles (NaN below the camera: upright in every turn), ignore flags, circle's centre and radius."""
         about = self.images[k]
-        image = cv2.cvtColor(cv2.imread(str(self.folder / about["file_name"])), cv2.COLOR_BGR2RGB)
+        image = cv2.cvtColor(cv2.imread(str(self.folder / "images" / about["file_name"])), cv2.COLOR_BGR2RGB)
         found = self.annotations[about["id"]]
         boxes = np.array([(x, y, x + w, y + h) for x, y, w, h in (a["bbox"] for a in found)], float).reshape(-1, 4)
-        lens = json.loads((self.folder / about["calibration"]).read_text())["lens"]
+        lens = json.loads((self.folder / "calibrations" / f"{about['calibration']}.json").read_text())["lens"]
         radius = circle_radius(lens)
         angles = np.array([a["upright_deg"] if a["nadir_deg"] > BELOW_CAMERA else np.nan for a in found])
         return (

@@ -1,6 +1,7 @@
 """Writes composed frames with annotations: `WORK/frames/SPLIT/{images,ids,calibrations,records}` and `annotations.json`.
 
-Boxes are axis-parallel and oriented, of the visible pixels. Finished frames are skipped.
+Boxes are axis-parallel and oriented, of the visible pixels. `WORK/frames/SPLIT-oriented` is the same data set with the
+oriented boxes as its truth. Finished frames are skipped.
 """
 
 import json
@@ -64,7 +65,7 @@ def annotate(composition, calibration):
         out.append(
             dict(
                 category_id=1,
-                iscrowd=0,
+                iscrowd=int(ignore),
                 ignore=bool(ignore),
                 bbox=boxes["bbox"],
                 obb=[round(v, 2) for v in boxes["obb"]],
@@ -112,9 +113,9 @@ def make_frame(seed, rooms, files, folder, split):
     record = dict(
         image=dict(
             id=seed,
-            file_name=f"images/{name}.jpg",
+            file_name=f"{name}.jpg",
             id_mask=f"ids/{name}.png",
-            calibration=f"calibrations/{name}.json",
+            calibration=name,
             width=calibration.width,
             height=calibration.height,
             room=room.about["seed"],
@@ -138,6 +139,13 @@ def write_annotations(folder):
         others += [dict(d, image_id=record["image"]["id"]) for d in record["distractors"]]
     content = dict(images=images, annotations=annotations, distractors=others, categories=[dict(id=1, name="person")])
     (folder / "annotations.json").write_text(json.dumps(content))
+    oriented = folder.with_name(f"{folder.name}-oriented")
+    oriented.mkdir(exist_ok=True)
+    for part in ("images", "calibrations"):
+        if not (oriented / part).exists():
+            (oriented / part).symlink_to(folder.resolve() / part)
+    content["annotations"] = [dict(a, bbox=a["obb"]) for a in annotations]
+    (oriented / "annotations.json").write_text(json.dumps(content))
     return len(images), len(annotations)
 
 

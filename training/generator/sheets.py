@@ -63,7 +63,7 @@ def frame_sheet(folder, limit=12):
         return None
     data = json.loads(path.read_text())
     for image in data["images"][-limit:]:
-        picture = cv2.imread(str(folder / image["file_name"]))
+        picture = cv2.imread(str(folder / "images" / image["file_name"]))
         for a in (a for a in data["annotations"] if a["image_id"] == image["id"]):
             x, y, w, h = (int(round(v)) for v in a["bbox"])
             colour = (160, 160, 160) if a["ignore"] else (0, 220, 0)
