@@ -151,8 +151,8 @@ impl Hall {
 
     fn door(self, chance: &mut Chance) -> Vector2<f64> {
         let [x, y] = self.0.into();
-        // Two doors at either end.
-        let door_y = if chance.happens(0.5) { 0.5 } else { -0.5 };
+        // Wide openings at both ends.
+        let door_y = chance.uniform(-0.8, 0.8);
         let side = if chance.happens(0.5) { 1.0 } else { -1.0 };
         Vector2::new(side * x, door_y * y)
     }

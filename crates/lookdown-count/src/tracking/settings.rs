@@ -14,6 +14,8 @@ pub struct TrackerSettings {
     pub low_score: f64,
     /// Least score of a person that starts a track.
     pub new_track_score: f64,
+    /// Persons below this score are ignored in line with a person of a higher score.
+    pub least_score_in_line: f64,
     /// Least score of a person that starts a track in line with a person already tracked.
     pub new_track_score_in_line: f64,
     /// A confirmed track ends after this many seconds without a person, and `max_missed` misses.
@@ -44,6 +46,10 @@ pub struct TrackerSettings {
 pub struct MeasurementNoise {
     /// Distance of the foot point from the place of the body, metres.
     pub body_m: f64,
+    /// Added to it straight below the camera, metres.
+    pub below_m: f64,
+    /// Distance from the point below the camera at which nothing is added, metres.
+    pub below_range_m: f64,
     /// Angle of the foot point off the axis, degrees.
     pub angle_deg: f64,
     /// Angle of the foot point around the axis, degrees.
@@ -90,9 +96,10 @@ impl TrackerSettings {
 impl Default for TrackerSettings {
     fn default() -> Self {
         Self {
-            high_score: 0.5,
+            high_score: 0.3,
             low_score: 0.1,
             new_track_score: 0.4,
+            least_score_in_line: 0.3,
             new_track_score_in_line: 0.8,
             max_unseen_s: 2.0,
             max_missed: 3,
@@ -120,6 +127,8 @@ impl Default for MeasurementNoise {
     fn default() -> Self {
         Self {
             body_m: 0.1,
+            below_m: 0.3,
+            below_range_m: 0.8,
             angle_deg: 0.8,
             across_deg: 0.4,
             foot_offset_m: 0.12,

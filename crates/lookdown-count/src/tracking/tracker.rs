@@ -201,7 +201,21 @@ impl Tracker {
             })
         });
         candidates.truncate(MAX_PERSONS);
-        candidates
+        self.drop_parts(candidates)
+    }
+
+    /// Drops weak persons that may be a part of a stronger one, or the same one again. They come in
+    /// order of falling scores.
+    fn drop_parts<'a>(&self, candidates: Vec<Candidate<'a>>) -> Vec<Candidate<'a>> {
+        let mut kept: Vec<Candidate> = Vec::new();
+        for candidate in candidates {
+            let one = &candidate.measured;
+            let is_weak = one.score < self.settings.least_score_in_line;
+            if !is_weak || !kept.iter().any(|other| one.is_part_of(&other.measured)) {
+                kept.push(candidate);
+            }
+        }
+        kept
     }
 
     /// Continues tracks with persons; returns true for each candidate that continued one.
