@@ -53,6 +53,7 @@ impl HeatMap {
     /// [`HeatMapError`] without a size, or with more than [`MAX_CELLS`].
     #[allow(
         clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
         clippy::cast_sign_loss,
         reason = "limited by MAX_CELLS"
     )]
@@ -142,12 +143,14 @@ impl HeatMap {
     }
 
     /// Returns the seconds of presence, row by row from the least y on.
+    #[must_use]
     pub fn rows(&self) -> impl ExactSizeIterator<Item = &[f64]> {
         self.seconds.chunks(self.columns)
     }
 
     #[allow(
         clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
         clippy::cast_sign_loss,
         reason = "checked against the bounds of the grid"
     )]

@@ -31,8 +31,8 @@ pub(super) fn best_pairs(
     let ordered = |(a, b): (usize, usize)| if swap { (b, a) } else { (a, b) };
     let weights = Matrix::from_fn(short, long, |cell| {
         let (row, column) = ordered(cell);
-        // Not a number counts as no gain.
-        (gain(row, column).max(0.0).min(MAX_GAIN) * GAIN_STEPS).round() as i64
+        // A gain that is not a number is none: the conversion makes it 0.
+        (gain(row, column).clamp(0.0, MAX_GAIN) * GAIN_STEPS).round() as i64
     });
     let (_, matched) = kuhn_munkres(&weights);
     let cells = matched.into_iter().enumerate();

@@ -66,12 +66,12 @@ impl Evidence {
     }
 
     /// Returns true when the track is a person.
-    pub fn confirms(&self, settings: &EvidenceSettings) -> bool {
+    pub fn confirms(self, settings: &EvidenceSettings) -> bool {
         self.0 >= settings.confirm
     }
 
     /// Returns true when the track is none.
-    pub fn refutes(&self, settings: &EvidenceSettings) -> bool {
+    pub fn refutes(self, settings: &EvidenceSettings) -> bool {
         self.0 < settings.end
     }
 }
