@@ -53,9 +53,6 @@ impl Options {
             let value = arguments.next_if(|value| !value.starts_with("--"));
             given.insert(name, value.unwrap_or_default());
         }
-        fn number<T: FromStr<Err: Debug>>(text: Option<&String>, default: T) -> T {
-            text.map_or(default, |text| text.parse().expect("a number"))
-        }
         let detector = given.get("--detector").map_or("rendered", String::as_str);
         Self {
             rate: number(given.get("--rate"), 5.0),
@@ -75,6 +72,10 @@ impl Options {
                 }),
         }
     }
+}
+
+fn number<T: FromStr<Err: Debug>>(text: Option<&String>, default: T) -> T {
+    text.map_or(default, |text| text.parse().expect("a number"))
 }
 
 /// A tracker with its line.

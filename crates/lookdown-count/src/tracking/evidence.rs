@@ -65,6 +65,11 @@ impl Evidence {
         self.0 += settings.miss * weight(interval_s, settings);
     }
 
+    /// Returns the logarithm of the probability that the track is a person who is still there.
+    pub fn log_probability(self) -> f64 {
+        -(-self.0).exp().ln_1p()
+    }
+
     /// Returns true when the track is a person.
     pub fn confirms(self, settings: &EvidenceSettings) -> bool {
         self.0 >= settings.confirm

@@ -262,7 +262,8 @@ impl Tracker {
             return -1.0;
         }
         let is_person = self.settings.score_share * log_odds(measured.score);
-        innovation.log_density() - plane.clutter_density.ln() + is_person
+        let is_there = track.evidence.log_probability();
+        innovation.log_density() - plane.clutter_density.ln() + is_person + is_there
     }
 
     fn start_tracks(&mut self, report: &Report, candidates: &[Candidate], used: &[bool]) {
