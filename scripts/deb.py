@@ -44,7 +44,7 @@ def main() -> int:
     source = PLACE / "source"
     shutil.copytree(DIST, source)
     shutil.copytree(ROOT / "debian", source / "debian")
-    modified = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
+    modified = int(os.environ.get("SOURCE_DATE_EPOCH", (DIST / "lookdown").stat().st_mtime))
     (source / "debian" / "changelog").write_text(changelog(ROOT, modified), encoding="utf-8")
     (source / "debian" / "copyright").write_text(copyright_of(DIST), encoding="utf-8")
     built = subprocess.run(["debian/rules", "binary"], cwd=source, check=False)

@@ -10,7 +10,9 @@ from pathlib import Path
 from debian_base import debian_base
 
 AS_SERVICE = Path(__file__).with_name("as_service.sh")
-UNIT = "lib/systemd/system/lookdown.service"
+UNITS = "usr/lib/systemd/system"
+UNIT = f"{UNITS}/lookdown.service"
+WITH_PROC = 'mount --bind /proc "$1/proc" && exec chroot "$@"'
 DYNAMIC_USER = 61184
 """The first of systemd's dynamic users, as in `as_service.sh`."""
 OWN_RECORDS = ("proc/", "sys/", "dev/", "tmp/", "var/cache/", "var/log/", "var/lib/apt/", "var/lib/dpkg/")
@@ -33,7 +35,7 @@ class Chroot:
         """Returns the output of a command that must succeed."""
         environment = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive", "LC_ALL": "C"}
         done = subprocess.run(
-            ["/usr/sbin/chroot", self.root, *command],
+            ["/usr/bin/unshare", "--mount", "/bin/sh", "-c", WITH_PROC, "sh", self.root, *command],
             env=environment,
             capture_output=True,
             text=True,
@@ -45,9 +47,9 @@ class Chroot:
         return done.stdout
 
     def install(self, package: Path) -> None:
-        """Installs a package file, with its dependencies from the base alone."""
+        """Installs a package file. The base has all of its dependencies."""
         shutil.copy(package, self.root / "tmp")
-        self.run("apt-get", "install", "--yes", "--no-download", "--no-install-recommends", f"/tmp/{package.name}")
+        self.run("dpkg", "--install", f"/tmp/{package.name}")
 
     def files(self) -> dict[str, bytes | None]:
         """All files with the content of those in /etc, except the records of the installation."""
@@ -60,6 +62,10 @@ class Chroot:
                     is_text = place.startswith("etc/") and path.is_file() and not path.is_symlink()
                     found[place] = path.read_bytes() if is_text else None
         return found
+
+    def has(self, path: str) -> bool:
+        """`True` if the path exists, even as a dangling link."""
+        return os.path.lexists(self.root / path)
 
     def unit(self) -> ConfigParser:
         """The installed unit; of keys that occur several times, the last."""
