@@ -90,11 +90,11 @@ class DebianPackage(unittest.TestCase):
             report = json.loads(server.post("/detect?profile=fast", (SAMPLES / "office.jpg").read_bytes()))
             self.assertGreater(len(report["persons"]), 3)
             calibration = (SAMPLES / "calibrations" / "office.json").read_bytes()
-            url = f"http://{server.address}/calibrations/hall"
+            url = f"http://{server.address}/calibrations/office"
             headers = {"Content-Type": "application/json"}
             with urllib.request.urlopen(urllib.request.Request(url, calibration, headers, method="PUT"), timeout=10):
                 pass
-            self.assertEqual([file.name for file in (state / "calibrations").glob("hall*")], ["hall.json"])
+            self.assertEqual([file.name for file in (state / "calibrations").glob("*.json")], ["office.json"])
             server.process.terminate()
             self.assertIn("STOPPING=1", said(systemd, until="STOPPING=1"))
             self.assertEqual(server.process.wait(30), 0)
