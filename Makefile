@@ -7,11 +7,15 @@ CARGO_DENY = $(CHECKERS)/cargo-deny --locked check
 # The commit in the binary and the modification time of the files of `make dist`.
 LOOKDOWN_COMMIT ?= $(shell git describe --always --dirty --abbrev=12 --exclude '*' 2>/dev/null)
 SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2>/dev/null || echo 0)
+# The program that builds the image, and the address in the image's labels.
+ENGINE ?= docker
+SOURCE_URL ?= $(shell git config --get remote.origin.url 2>/dev/null | sed 's|://[^/@]*@|://|')
+VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml)
 # The form of the tests of `make reliability`: long or short.
 FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist wheel bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist deb image wheel bench bench-full bench-remap ci fuzz bless
 
 help: ## list the targets
 	@echo "make TARGET, where TARGET is:"
@@ -64,6 +68,16 @@ dist: ## pack everything that Lookdown needs to run: target/dist
 	@$(PYTHON) scripts/setup.py
 	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) cargo build --release --locked --target-dir target
 	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) scripts/dist.py
+
+deb: dist ## build the Debian package: target/deb
+	@scripts/packages.sh debhelper
+	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) scripts/deb.py
+
+image: ## build the container image from source with docker, or with ENGINE=podman or buildah
+	$(ENGINE) build $(if $(filter-out docker,$(ENGINE)),--format docker) --file docker/Dockerfile \
+		--build-arg PROGRAM=built --build-arg LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) \
+		--build-arg CREATED=$$(date --utc --date=@$(SOURCE_DATE_EPOCH) +%Y-%m-%dT%H:%M:%SZ) \
+		--build-arg SOURCE_URL=$(SOURCE_URL) --tag lookdown:$(VERSION) .
 
 wheel: ## build the Python wheel: target/wheels
 	@$(PYTHON) scripts/setup.py toolchain model wheel

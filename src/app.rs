@@ -5,6 +5,7 @@ mod models;
 mod reload;
 mod serving;
 mod sockets;
+mod systemd;
 
 use std::{
     num::NonZeroU64,

@@ -14,7 +14,7 @@ STATED = re.compile(r"(?:lookdown(?:-cuda)?:|image\.version=\"|newTag: |kubernet
 class OneVersion(unittest.TestCase):
     def test_images_have_the_version_of_the_crate(self):
         manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
-        for name in (*OWN, "docs/deployment.md"):
+        for name in (*OWN, "README.md", "docs/deployment.md"):
             stated = STATED.findall((ROOT / name).read_text(encoding="utf-8"))
             self.assertEqual({*stated}, {manifest["version"]}, name)
 

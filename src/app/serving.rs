@@ -1,15 +1,21 @@
 //! The life of the server, from the sockets to the last answer.
 
-use std::{future::pending, net::SocketAddr, sync::Arc, time::Duration};
+use std::{
+    future::pending,
+    net::SocketAddr,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use tokio::{
+    join,
     net::TcpListener,
     spawn,
     task::spawn_blocking,
     time::{sleep, timeout},
 };
 
-use super::{App, CALIBRATIONS_CHECK, Sockets};
+use super::{App, CALIBRATIONS_CHECK, Sockets, systemd};
 use crate::{
     api::{self, Phase},
     server::{self, Services},
@@ -84,6 +90,14 @@ impl App {
             if let Some(listener) = sockets.metrics {
                 self.serve_operation(listener).await;
             }
+        };
+        let limit = self.state.stall_limit();
+        let is_stuck = || self.workers.stall(Instant::now(), limit).is_some();
+        let alongside = async {
+            join!(
+                operation,
+                systemd::notify(&self.readiness, &shutdown, is_stuck)
+            );
             pending::<()>().await;
         };
         let outcome = tokio::select! {
@@ -93,7 +107,7 @@ impl App {
                 Ok(())
             }
             outcome = finished => outcome,
-            () = operation => Ok(()),
+            () = alongside => Ok(()),
             () = self.wind_up(&shutdown) => {
                 tracing::warn!("stopped before all requests had ended");
                 Ok(())

@@ -9,6 +9,7 @@ mod keys;
 mod samples;
 mod serve;
 mod shell;
+mod systemd;
 
 use std::process::{Command, Output};
 

@@ -31,8 +31,17 @@ class ContainerImage(unittest.TestCase):
         self.assertEqual((config["User"], config["WorkingDir"]), ("65532:65532", "/opt/lookdown"))
         self.assertEqual((config["Entrypoint"], config["Cmd"]), ([PROGRAM], ["serve"]))
         self.assertEqual(config["Healthcheck"]["Test"], ["CMD", PROGRAM, "health"])
-        self.assertEqual(config["Labels"]["org.opencontainers.image.revision"], "0123456789ab")
         self.assertEqual({*config["ExposedPorts"]}, {"8080/tcp"})
+
+    def test_its_labels_describe_where_it_comes_from(self):
+        prefix = "org.opencontainers.image."
+        labels = self.image.config["Labels"].items()
+        labels = {name.removeprefix(prefix): value for name, value in labels if name.startswith(prefix)}
+        self.assertEqual((labels["revision"], labels["created"]), ("0123456789ab", "2026-11-22T12:00:00Z"))
+        for name in ("source", "url", "documentation"):
+            self.assertTrue(labels[name].startswith("https://forge.example/lookdown"), name)
+        for name in ("title", "description", "version", "vendor", "licenses", "base.name"):
+            self.assertTrue(labels[name], name)
 
     def test_it_is_small_and_has_no_other_program(self):
         self.assertLess(self.image.size(), LARGEST_BYTES)

@@ -7,15 +7,20 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from debian_base import debian_base
 from harness.places import LOOKDOWN, ROOT
 
 HERE = ROOT / ".setup" / "real" / "image"
-BASE = HERE / "debian"
-"""A Debian of the release named in the Dockerfile, as created by `debootstrap`."""
 STORE = HERE / "store"
 # Required by buildah as root in a container that is not privileged.
 BUILDAH = ["buildah", f"--root={STORE}/images", f"--runroot={STORE}/run", "--storage-driver=vfs"]
 INSIDE = Path(__file__).with_name("inside.sh")
+BUILD_ARGUMENTS = {
+    "PROGRAM": "prebuilt",
+    "LOOKDOWN_COMMIT": "0123456789ab",
+    "CREATED": "2026-11-22T12:00:00Z",
+    "SOURCE_URL": "https://forge.example/lookdown",
+}
 
 
 class BuildError(Exception):
@@ -46,10 +51,11 @@ def build() -> Image:
     """Builds the image, which stays until `remove` is called."""
     remove()
     _run([sys.executable, ROOT / "scripts" / "dist.py", LOOKDOWN])
-    _import_base("debian:12-slim", "bookworm")
+    _import_base("debian:12-slim")
     _buildah(
-        *("bud", "--isolation=chroot", "--pull-never", "--format=docker", "--build-arg=PROGRAM=prebuilt"),
-        *("--build-arg=LOOKDOWN_COMMIT=0123456789ab", f"--file={ROOT}/docker/Dockerfile", "--tag=lookdown", ROOT),
+        *("bud", "--isolation=chroot", "--pull-never", "--format=docker"),
+        *(f"--build-arg={name}={value}" for name, value in BUILD_ARGUMENTS.items()),
+        *(f"--file={ROOT}/docker/Dockerfile", "--tag=lookdown", ROOT),
     )
     container = _buildah("from", "--pull-never", "lookdown")
     root = Path(_buildah("mount", container))
@@ -64,17 +70,9 @@ def remove() -> None:
     shutil.rmtree(STORE, ignore_errors=True)
 
 
-def _import_base(name: str, release: str) -> None:
-    if not BASE.is_dir():
-        unfinished = HERE / "unfinished"
-        shutil.rmtree(unfinished, ignore_errors=True)
-        unfinished.parent.mkdir(parents=True, exist_ok=True)
-        _run(["debootstrap", "--variant=minbase", release, unfinished])
-        for package in (unfinished / "var" / "cache" / "apt" / "archives").glob("*.deb"):
-            package.unlink()
-        unfinished.rename(BASE)
+def _import_base(name: str) -> None:
     container = _buildah("from", "scratch")
-    _buildah("add", "--quiet", container, BASE, "/")
+    _buildah("add", "--quiet", container, debian_base(), "/")
     _buildah("commit", "--quiet", "--rm", container, name)
 
 

@@ -1,0 +1,1 @@
+"""The Debian package in a minimal Debian, for `test_deb.py`."""

@@ -1,0 +1,30 @@
+"""A minimal Debian for the parts that need one: the base of the image, and the root of the package's tests."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+from harness.places import ROOT
+
+RELEASE = "bookworm"
+PLACE = ROOT / ".setup" / "real" / "debian"
+
+
+class DebianError(Exception):
+    """A failed creation of the folder, with the output of `debootstrap`."""
+
+
+def debian_base() -> Path:
+    """Returns the folder of a minimal Debian, which `debootstrap` creates on the first call."""
+    if not PLACE.is_dir():
+        unfinished = PLACE.with_name("debian.unfinished")
+        shutil.rmtree(unfinished, ignore_errors=True)
+        unfinished.parent.mkdir(parents=True, exist_ok=True)
+        command = ["debootstrap", "--variant=minbase", RELEASE, unfinished]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise DebianError(f"debootstrap failed:\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+        for package in (unfinished / "var" / "cache" / "apt" / "archives").glob("*.deb"):
+            package.unlink()
+        unfinished.rename(PLACE)
+    return PLACE
