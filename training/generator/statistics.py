@@ -11,7 +11,8 @@ def print_statistics(folder):
     """Persons a frame, angles from straight down, sizes relative to the circle, and shares of kinds."""
     data = json.loads((folder / "annotations.json").read_text())
     diameters = {
-        image["id"]: 2 * circle_radius(json.loads((folder / image["calibration"]).read_text())["lens"])
+        image["id"]: 2
+        * circle_radius(json.loads((folder / "calibrations" / f"{image['calibration']}.json").read_text())["lens"])
         for image in data["images"]
     }
     counted = [a for a in data["annotations"] if not a["ignore"]]
