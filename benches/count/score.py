@@ -9,7 +9,7 @@ import json
 import subprocess
 import sys
 from collections import defaultdict
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -215,7 +215,7 @@ def main():
     header += ["crossings", "% totals", "% each"]
     print("| " + " | ".join(header) + " |\n" + "|---" * len(header) + "|")
     jobs = defaultdict(list)
-    with ThreadPoolExecutor(2) as pool:
+    with ProcessPoolExecutor(2) as pool:
         for scene in given.scenes:
             for detector in given.detectors:
                 for rate in given.rates:
