@@ -35,7 +35,7 @@ pub struct Person {
     pause_s: f64,
 }
 
-/// The persons in a hall; whoever reaches a door is replaced by a new person at another one.
+/// The persons in a hall. A new person comes through a door after another one has left.
 pub struct People {
     pub present: Vec<Person>,
     hall: Hall,

@@ -274,9 +274,9 @@ fn tracks_and_their_histories_are_bounded() {
         ..TrackerSettings::default()
     };
     let mut tracker = Tracker::new(&[CameraPose::alone(Some(CAMERA_M))], settings).unwrap();
-    for frame in 0..200 {
+    for frame in 0..70 {
         let at_s = f64::from(frame) / 5.0;
-        let places = (0..400).map(|n| person(f64::from(n % 20) - 10.0, f64::from(n / 20) - 10.0));
+        let places = (0..320).map(|n| person(f64::from(n % 20) - 10.0, f64::from(n / 20) - 10.0));
         tracker
             .update(0, at_s, &places.collect::<Vec<_>>())
             .unwrap();
