@@ -1,8 +1,25 @@
 //! The `lookdown` binary.
 
-use std::process::ExitCode;
+use std::{
+    env,
+    os::unix::process::CommandExt,
+    process::{Command, ExitCode},
+};
+
+/// The variable that disables the telemetry of ONNX Runtime, which reads it when it is loaded.
+const NO_TELEMETRY: &str = "ORT_DISABLE_TELEMETRY";
 
 fn main() -> ExitCode {
+    if env::var_os(NO_TELEMETRY).is_none() {
+        let mut arguments = env::args_os();
+        // Setting a variable in a process is not memory-safe, so the process is replaced by itself.
+        // Without /proc this fails, and the program runs with the variables it has.
+        let _ = Command::new("/proc/self/exe")
+            .arg0(arguments.next().unwrap_or_default())
+            .args(arguments)
+            .env(NO_TELEMETRY, "1")
+            .exec();
+    }
     // `make dist` sets the commit. A source tarball has none.
-    lookdown::cli::run(std::env::args_os(), option_env!("LOOKDOWN_COMMIT"))
+    lookdown::cli::run(env::args_os(), option_env!("LOOKDOWN_COMMIT"))
 }

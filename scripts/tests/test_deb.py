@@ -16,7 +16,7 @@ class Deb(unittest.TestCase):
         self.assertEqual(first, f"lookdown ({manifest['version']}-1) unstable; urgency=medium")
         self.assertRegex(last, r"^ -- [\w ]+ <\S+@\S+>  Sun, 09 Sep 2001 01:46:40 -0000$")
 
-    def test_copyright_has_notices_and_only_licences_that_debian_lacks(self):
+    def test_copyright_has_notices_and_licences_that_debian_lacks(self):
         dist = Path(self.enterContext(tempfile.TemporaryDirectory()))
         texts = {
             "NOTICE": "the notices",

@@ -94,10 +94,9 @@ impl App {
         let limit = self.state.stall_limit();
         let is_stuck = || self.workers.stall(Instant::now(), limit).is_some();
         let alongside = async {
-            join!(
-                operation,
-                systemd::notify(&self.readiness, &shutdown, is_stuck)
-            );
+            // In memory of its own: the future of the server has a limit.
+            let notifications = Box::pin(systemd::notify(&self.readiness, &shutdown, is_stuck));
+            join!(operation, notifications);
             pending::<()>().await;
         };
         let outcome = tokio::select! {

@@ -10,6 +10,7 @@ mod samples;
 mod serve;
 mod shell;
 mod systemd;
+mod telemetry;
 
 use std::process::{Command, Output};
 

@@ -7,7 +7,7 @@ use std::{
 };
 
 /// Longest time for a message of the server. Models are loaded before the first.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A server, which is killed if a test fails.
 struct Service(Child);

@@ -28,6 +28,8 @@ pub(super) fn load(library: &Path) -> Result<&'static Environment, InferenceErro
     let environment = ort::environment::init_from(&library)
         .map_err(|error| unusable(error.to_string()))?
         .with_name("lookdown")
+        // Builds of Microsoft report usage and models to Microsoft by default.
+        .with_telemetry(false)
         .build()
         .map_err(|error| unusable(error.to_string()))?;
     Ok(ENVIRONMENT.get_or_init(|| environment))

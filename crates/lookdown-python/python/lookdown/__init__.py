@@ -6,6 +6,11 @@
 >>> detections.boxes  # (N, 4): x_min, y_min, x_max, y_max
 """
 
+import os
+
+# ONNX Runtime reads this when it is loaded; otherwise builds of its vendor send telemetry.
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+
 from lookdown._lookdown import Calibration, Lens, LookdownError, View
 from lookdown.detections import Detections
 from lookdown.detector import Detector
