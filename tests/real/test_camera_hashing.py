@@ -4,10 +4,16 @@ import collections
 import contextlib
 import json
 import os
+import random
 import signal
+import subprocess
+import tempfile
+import threading
+import time
 import unittest
 import urllib.parse
 import urllib.request
+from pathlib import Path
 
 from chain import RECIPE, REPLICAS, Chain, chain
 from crowd import Crowd, crowd
@@ -20,6 +26,15 @@ CAMERAS = tuple(f"camera-{number}" for number in range(12))
 DETECT = "/detect?calibration=office&profile=fast"
 ENOUGH = 20
 """Answers of each camera after which a change has been under load long enough."""
+PERSON = (344, 128, 74, 112)
+"""The part of the sample with a person: left, top, width and height in pixels."""
+PROFILE = "balanced"
+MOTION_CAMERAS = CAMERAS[:8]
+FRAMES = 40
+"""Frames of each camera, one per second."""
+JITTER_SECONDS = 0.05
+MOST_RUNS = 0.8
+"""Maximum network runs with hashing relative to `leastconn`."""
 
 
 def post(chain: Chain, path: str, frame: bytes) -> tuple[str, dict]:
@@ -131,3 +146,58 @@ class Hashing(unittest.TestCase):
     @staticmethod
     def _cameras_of(replica: str, home: dict[str, str]) -> set[str]:
         return {name for name, where in home.items() if where == replica}
+
+
+@unittest.skipIf(os.geteuid(), "only root can make hosts")
+class Motion(unittest.TestCase):
+    """Tests at the rate of real cameras. The network takes no time: only its runs are counted."""
+
+    def test_hashing_saves_network_runs_of_motion(self):
+        hashing = RECIPE.read_text(encoding="utf-8")
+        leastconn = "".join(line for line in hashing.splitlines(keepends=True) if "use_backend cameras" not in line)
+        inferred = {}
+        with tempfile.TemporaryDirectory() as folder:
+            frames = walk(Path(folder))
+        for name, front in (("leastconn", leastconn), ("hashing", hashing)):
+            with chain(TINY, front=front) as replicas:
+                put_everywhere(replicas.replicas, office())
+                began = time.monotonic()
+                views = send_at_their_rate(replicas, frames)
+                took = time.monotonic() - began
+            inferred[name] = views["inferred"]
+            told = f"{len(MOTION_CAMERAS)} cameras, {FRAMES} frames each in {took:.0f} s, views {dict(views)}"
+            print(f"{name}, {PROFILE}: {told}", flush=True)
+        self.assertLess(inferred["hashing"], MOST_RUNS * inferred["leastconn"])
+
+
+def walk(folder: Path) -> list[bytes]:
+    """Frames in which one person walks and everything else stands still."""
+    left, top, width, height = PERSON
+    crop = f"[0]crop={width}:{height}:{left}:{top}[person];[0][person]overlay=x=150+6*n:y=520:shortest=0"
+    command = ["ffmpeg", "-v", "error", "-loop", "1", "-i", str(OFFICE), "-filter_complex", crop]
+    subprocess.run([*command, "-frames:v", str(FRAMES), "-q:v", "2", str(folder / "%03d.jpg")], check=True)
+    return [file.read_bytes() for file in sorted(folder.glob("*.jpg"))]
+
+
+def send_at_their_rate(replicas: Chain, frames: list[bytes]) -> collections.Counter[str]:
+    """Sends a frame of each camera per second, each at its own phase. Returns the numbers of views by outcome."""
+    views: collections.Counter[str] = collections.Counter()
+    began, lock = time.monotonic(), threading.Lock()
+
+    def send(number: int, camera: str) -> None:
+        chance = random.Random(number)
+        phase = chance.random()
+        path = f"/detect?calibration=office&profile={PROFILE}&motion=true&camera={camera}"
+        for second, frame in enumerate(frames):
+            due = began + second + phase + chance.uniform(-JITTER_SECONDS, JITTER_SECONDS)
+            time.sleep(max(0.0, due - time.monotonic()))
+            report = post(replicas, path, frame)[1]
+            with lock:
+                views.update({name: report["views"][name] for name in ("inferred", "unchanged")})
+
+    threads = [threading.Thread(target=send, args=each) for each in enumerate(MOTION_CAMERAS)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return views
