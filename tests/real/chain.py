@@ -17,11 +17,13 @@ from redis_server import RedisServer
 from waiting import wait_until
 
 REPLICAS = ("r1", "r2", "r3")
+RECIPE = ROOT / "docker" / "haproxy.cfg"
+"""The recipe of the documentation: the frames of a camera reach one replica."""
 PORT = 8080
 GRACE_MILLIS = 2000
 KEY = "of-the-test"
 KEYS = f"test:admin:{hashlib.sha256(KEY.encode()).hexdigest()}"
-FRONT = """
+LEASTCONN = """
 defaults
     mode http
     timeout connect 1s
@@ -32,25 +34,38 @@ defaults
     retries 3
     retry-on conn-failure
     option redispatch 1
-global
-    stats socket {socket} mode 600 level admin
 frontend front
-    bind :{port}
-    http-request return status 200 if {{ path /front }}
+    bind :8080
+    monitor-uri /proxy-health
     default_backend replicas
 backend replicas
     balance leastconn
     option httpchk GET /readyz
     http-response set-header X-Replica %s
     default-server check inter 250ms fall 2 rise 2
+    server r1 lookdown-1:8080
+    server r2 lookdown-2:8080
+    server r3 lookdown-3:8080
+"""
+CONTROL = """
+global
+    stats socket {socket} mode 600 level admin
 """
 
 
 class Chain:
     """All processes."""
 
-    def __init__(self, machines: dict[str, Host], folder: Path, settings: dict[str, str], cores: float | None):
+    def __init__(
+        self,
+        machines: dict[str, Host],
+        folder: Path,
+        settings: dict[str, str],
+        cores: float | None,
+        front: str,
+    ):
         self._machines, self._folder, self._settings, self._cores = machines, folder, settings, cores
+        self._front = front
         self._stacks: dict[str, contextlib.ExitStack] = {}
         self.replicas: dict[str, Server] = {}
         self.front: Server
@@ -118,23 +133,27 @@ class Chain:
         stack.enter_context(_started([*store.inside, *moto], store, 5000))
         bucket = urllib.request.Request(f"http://{store.address}:5000/cameras", method="PUT")
         urllib.request.urlopen(bucket, timeout=30).close()
-        servers = [f"    server {name} {self._machines[name].address}:{PORT}\n" for name in REPLICAS]
+        listing = self._front
+        for number, name in enumerate(REPLICAS, 1):
+            listing = listing.replace(f"lookdown-{number}:", f"{self._machines[name].address}:")
         plan = self._folder / "haproxy.cfg"
-        listing = FRONT.format(socket=self._folder / "front.socket", port=PORT) + "".join(servers)
-        plan.write_text(listing, encoding="utf-8")
+        plan.write_text(listing + CONTROL.format(socket=self._folder / "front.socket"), encoding="utf-8")
         command = [*front.inside, "haproxy", "-db", "-f", str(plan)]
-        self.front = stack.enter_context(running("front", command, PORT, "/front", {}, host=front.address))
+        self.front = stack.enter_context(running("front", command, PORT, "/proxy-health", {}, host=front.address))
 
 
 @contextlib.contextmanager
-def chain(settings: dict[str, str], cores: float | None = None) -> Iterator[Chain]:
-    """Starts three replicas with these settings, each with this number of cores, or all with those of the machine."""
+def chain(settings: dict[str, str], cores: float | None = None, front: str = LEASTCONN) -> Iterator[Chain]:
+    """Starts three replicas with these settings, each with this number of cores, or all with those of the machine.
+
+    `front` is the configuration of HAProxy.
+    """
     with (
         tempfile.TemporaryDirectory() as folder,
         hosts("store", "front", *REPLICAS) as machines,
         contextlib.ExitStack() as stack,
     ):
-        made = Chain(machines, Path(folder), settings, cores)
+        made = Chain(machines, Path(folder), settings, cores, front)
         made.start_shared_parts(stack)
         for name in REPLICAS:
             stack.callback(made.end, name)

@@ -9,28 +9,19 @@ import subprocess
 import tempfile
 import time
 import unittest
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
-from email.message import Message
 from pathlib import Path
 
 from harness.places import ROOT, SAMPLES, model
 from harness.processes import Server, free_ports, running
+from remote_inference import BALANCED, FAST, FRAME, MODEL, answer, asking, assert_same, when_ready_is
 from support.lookdown import lookdown
-from waiting import wait_until
 
 from metrics import metric
 
 HERE = Path(__file__).resolve().parent
 MLSERVER = ROOT / ".setup" / "real" / "v2_backend" / "bin" / "mlserver"
-MODEL = "nanodet_g_416"
 SIDE = 416
-FRAME = (SAMPLES / "office.jpg").read_bytes()
-FAST = "/detect?calibration=office&profile=fast"
-BALANCED = "/detect?calibration=office"
-NOTICED_SECONDS = 20.0
-"""Time within which a server must detect that the other has gone or returned."""
 
 
 @contextlib.contextmanager
@@ -58,44 +49,8 @@ def mlserver(port: int) -> Iterator[Server]:
             yield server
 
 
-def asking(url: str, name: str = "") -> dict[str, str]:
-    """Settings of a server that uses another one for inference."""
-    there = {"INFERENCE__BACKEND": "v2", "INFERENCE__URL": url, "INFERENCE__TIMEOUT_MILLIS": "60000"}
-    return there | {"INFERENCE__MODEL": name or MODEL, "MODEL__PATH": str(model(MODEL).parent)}
-
-
-def answer(server: Server, path: str, body: bytes | None = None) -> tuple[int, Message, dict]:
-    """Status, headers and JSON of an answer."""
-    request = urllib.request.Request(f"http://{server.address}{path}", body, {"Content-Type": "image/jpeg"})
-    try:
-        with urllib.request.urlopen(request, timeout=120) as told:
-            return told.status, told.headers, json.loads(told.read())
-    except urllib.error.HTTPError as error:
-        return error.code, error.headers, json.loads(error.read())
-
-
-def when_ready_is(server: Server, status: int) -> dict:
-    """The answer of `/readyz` once it has that status."""
-
-    def said() -> dict | None:
-        found, _, told = answer(server, "/readyz")
-        return told if found == status else None
-
-    return wait_until(said, f"/readyz answers {status}", NOTICED_SECONDS)
-
-
 class RemoteInference(unittest.TestCase):
     """Detections do not depend on the location of the network, and outages are reported and recovered from."""
-
-    def assert_same(self, report: dict, wanted: dict) -> None:
-        """Asserts that boxes agree to a hundredth of a pixel, and scores to a thousandth."""
-        self.assertGreater(len(wanted["persons"]), 0)
-        self.assertEqual(len(report["persons"]), len(wanted["persons"]))
-        for person, other in zip(report["persons"], wanted["persons"]):
-            self.assertAlmostEqual(person["score"], other["score"], delta=1e-3)
-            self.assertEqual(person["views"], other["views"])
-            for side, place in other["box"].items():
-                self.assertAlmostEqual(person["box"][side], place, delta=0.02, msg=side)
 
     def test_mlserver_gives_the_same_detections_and_may_restart(self) -> None:
         with lookdown({"MODEL__PATH": str(model(MODEL).parent)}) as here:
@@ -107,7 +62,7 @@ class RemoteInference(unittest.TestCase):
             remote = first.enter_context(mlserver(port))
             server = stack.enter_context(lookdown(asking(f"http://127.0.0.1:{port}", "people")))
             for path, wanted in local.items():
-                self.assert_same(json.loads(server.post(path, FRAME)), wanted)
+                assert_same(self, json.loads(server.post(path, FRAME)), wanted)
             self.assertGreater(metric(server, 'remote_requests_total{result="answered"}'), 0)
             self.assertEqual(metric(server, "remote_up"), 1)
 
@@ -127,7 +82,7 @@ class RemoteInference(unittest.TestCase):
 
             stack.enter_context(mlserver(port))
             when_ready_is(server, 200)
-            self.assert_same(json.loads(server.post(FAST, FRAME)), local[FAST])
+            assert_same(self, json.loads(server.post(FAST, FRAME)), local[FAST])
 
     def test_a_server_that_starts_first_waits_for_mlserver(self) -> None:
         (port, own) = free_ports(2)
@@ -146,7 +101,7 @@ class RemoteInference(unittest.TestCase):
         with lookdown({"MODEL__PATH": str(model(MODEL).parent), "LIMITS__MAX_FRAMES_IN_FLIGHT": "64"}) as here:
             with lookdown(asking(f"http://{here.address}")) as front:
                 for path in (FAST, BALANCED):
-                    self.assert_same(json.loads(front.post(path, FRAME)), json.loads(here.post(path, FRAME)))
+                    assert_same(self, json.loads(front.post(path, FRAME)), json.loads(here.post(path, FRAME)))
 
     def test_the_bearer_token_is_sent(self) -> None:
         keys = f"front:detect:{hashlib.sha256(b's3cret').hexdigest()}"
