@@ -3,7 +3,7 @@
 /// One person of one report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Place on the floor in metres (x, y of the camera, or of the site); absent without the camera's height.
+    /// Place on the floor in metres (x, y of the camera); absent without the camera's height.
     pub floor_m: Option<[f64; 2]>,
     /// Direction of the person's centre: clockwise from the top of the frame, in degrees (0 to 360).
     pub azimuth_deg: f64,
@@ -11,6 +11,9 @@ pub struct Observation {
     pub off_axis_deg: f64,
     /// Centre of the oriented box in frame pixels (x, y).
     pub centre_px: [f64; 2],
+    /// Middle of the oriented box's lower side in frame pixels (x, y): lines and zones in the frame
+    /// count this point.
+    pub foot_px: [f64; 2],
     /// Probability that this is a person (0 to 1).
     pub score: f64,
 }
