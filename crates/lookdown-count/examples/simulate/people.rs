@@ -1,0 +1,135 @@
+//! Persons who walk through a hall: waypoints, pauses, and distance from each other.
+
+use nalgebra::Vector2;
+
+use crate::chance::Chance;
+
+/// Time step of the walks, seconds.
+pub const STEP_S: f64 = 0.02;
+/// Time in which a person adopts a new velocity, seconds.
+const RELAXATION_S: f64 = 0.5;
+/// Persons nearer than this walk apart, metres.
+const PERSONAL_M: f64 = 0.7;
+/// Acceleration apart at no distance, metres per square second.
+const REPULSION: f64 = 6.0;
+/// Share of waypoints at which a person stops, and the longest stop in seconds.
+const PAUSES: f64 = 0.3;
+const LONGEST_PAUSE_S: f64 = 8.0;
+
+/// The walls of the hall, metres: half the extent along x and y.
+#[derive(Clone, Copy)]
+pub struct Hall(pub Vector2<f64>);
+
+/// A walking person.
+pub struct Person {
+    pub id: u64,
+    pub place: Vector2<f64>,
+    pub height_m: f64,
+    velocity: Vector2<f64>,
+    speed: f64,
+    waypoints: Vec<Vector2<f64>>,
+    pause_s: f64,
+}
+
+/// The persons in a hall; whoever reaches a door is replaced by a new person at another one.
+pub struct People {
+    pub present: Vec<Person>,
+    hall: Hall,
+    count: usize,
+    next_id: u64,
+}
+
+impl People {
+    pub fn new(hall: Hall, count: usize, chance: &mut Chance) -> Self {
+        let mut people = Self {
+            present: Vec::new(),
+            hall,
+            count,
+            next_id: 1,
+        };
+        for _ in 0..count {
+            let place = hall.inside(chance);
+            people.add(place, chance);
+        }
+        people
+    }
+
+    fn add(&mut self, place: Vector2<f64>, chance: &mut Chance) {
+        let stops = 2 + chance.count(2.0);
+        let mut waypoints = vec![self.hall.door(chance)];
+        waypoints.extend((0..stops).map(|_| self.hall.inside(chance)));
+        self.present.push(Person {
+            id: self.next_id,
+            place,
+            height_m: 1.7 + 0.1 * chance.normal(),
+            velocity: Vector2::zeros(),
+            speed: (1.2 + 0.25 * chance.normal()).clamp(0.5, 2.0),
+            waypoints,
+            pause_s: 0.0,
+        });
+        self.next_id += 1;
+    }
+
+    /// Moves everyone by one step.
+    pub fn step(&mut self, chance: &mut Chance) {
+        let places: Vec<_> = self.present.iter().map(|person| person.place).collect();
+        for person in &mut self.present {
+            person.step(&places, chance);
+        }
+        self.present.retain(|person| !person.waypoints.is_empty());
+        // A new person after five seconds on average.
+        if self.present.len() < self.count && chance.happens(STEP_S / 5.0) {
+            let door = self.hall.door(chance);
+            self.add(door, chance);
+        }
+    }
+}
+
+impl Person {
+    fn step(&mut self, places: &[Vector2<f64>], chance: &mut Chance) {
+        let Some(&target) = self.waypoints.last() else {
+            return;
+        };
+        let way = target - self.place;
+        if way.norm() < 0.4 {
+            self.waypoints.pop();
+            if chance.happens(PAUSES) {
+                self.pause_s = chance.uniform(0.0, LONGEST_PAUSE_S);
+            }
+            return;
+        }
+        self.pause_s -= STEP_S;
+        let wanted = if self.pause_s > 0.0 {
+            Vector2::zeros()
+        } else {
+            way.normalize() * self.speed
+        };
+        let mut acceleration = (wanted - self.velocity) / RELAXATION_S;
+        for place in places {
+            let apart = self.place - place;
+            let distance = apart.norm();
+            if distance > 0.0 && distance < PERSONAL_M {
+                acceleration += apart / distance * REPULSION * (1.0 - distance / PERSONAL_M);
+            }
+        }
+        // A sway that keeps walks from being straight.
+        let sway = Vector2::new(chance.normal(), chance.normal()) * (0.4 / STEP_S.sqrt());
+        self.velocity += (acceleration + sway) * STEP_S;
+        self.place += self.velocity * STEP_S;
+    }
+}
+
+impl Hall {
+    fn inside(self, chance: &mut Chance) -> Vector2<f64> {
+        let [x, y] = (self.0 - Vector2::new(0.7, 0.7)).into();
+        Vector2::new(chance.uniform(-x, x), chance.uniform(-y, y))
+    }
+
+    fn door(self, chance: &mut Chance) -> Vector2<f64> {
+        let [x, y] = self.0.into();
+        // Two doors at either end.
+        let door_y = if chance.happens(0.5) { 0.5 } else { -0.5 };
+        let side = if chance.happens(0.5) { 1.0 } else { -1.0 };
+        Vector2::new(side * x, door_y * y)
+    }
+}
