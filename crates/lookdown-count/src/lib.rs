@@ -10,6 +10,8 @@ pub mod heat_map;
 pub mod lines;
 mod observation;
 mod site;
+#[cfg(test)]
+mod test_walks;
 pub mod tracking;
 pub mod zones;
 

@@ -39,3 +39,19 @@ impl CameraPose {
         [cos * x - sin * y, sin * x + cos * y]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quarter_turn_maps_x_to_y() {
+        let pose = CameraPose {
+            position_m: [10.0, 20.0],
+            yaw_deg: 90.0,
+            height_m: None,
+        };
+        let [x, y] = pose.to_site([1.0, 2.0]);
+        assert!((x - 8.0).abs() < 1e-9 && (y - 21.0).abs() < 1e-9, "{x} {y}");
+    }
+}

@@ -7,6 +7,7 @@
 mod assignment;
 mod camera;
 mod duplicates;
+mod evidence;
 mod kalman;
 mod measurement;
 mod motion;
@@ -16,6 +17,7 @@ mod tracker;
 
 use serde::{Deserialize, Serialize};
 
+pub use evidence::EvidenceSettings;
 pub use settings::{MeasurementNoise, PlaneSettings, TrackerSettings};
 pub use track::{MAX_TAIL_POINTS, PersonOfReport, TailPoint, Track};
 pub use tracker::{MAX_CAMERAS, MAX_PERSONS, RefusedReport, SiteError, Tracker};
@@ -32,3 +34,6 @@ pub enum Plane {
     /// Corner-origin frame pixels. Only for a camera that has its tracker to itself.
     FramePx,
 }
+
+#[cfg(test)]
+mod tests;

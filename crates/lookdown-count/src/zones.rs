@@ -9,7 +9,7 @@ use lookdown_lens::geometry::Polygon;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use crate::tracking::{Plane, Track, TrackId};
+use crate::tracking::{Plane, TailPoint, Track, TrackId};
 
 /// Most zones of a counter.
 pub const MAX_ZONES: usize = 64;
@@ -146,7 +146,10 @@ impl ZoneCounter {
             let known = before.remove(&track.id());
             let mut visits = known.unwrap_or_else(|| vec![Visit::default(); self.zones.len()]);
             for (zone, visit) in visits.iter_mut().enumerate() {
-                events.extend(visit.advance(zone, &self.zones[zone], track, self.hold_s));
+                let area = &self.zones[zone];
+                for side in visit.advance(area, track.tail(), self.hold_s) {
+                    events.push(side.event(zone, track.id()));
+                }
             }
             states.insert(track.id(), visits);
         }
@@ -155,7 +158,7 @@ impl ZoneCounter {
                 .iter()
                 .enumerate()
                 .filter(|(_, visit)| visit.is_inside);
-            events.extend(inside.map(|(zone, visit)| visit.left(zone, track)));
+            events.extend(inside.map(|(zone, visit)| visit.left().event(zone, track)));
         }
         self.state.tracks = states;
         events
@@ -180,58 +183,80 @@ impl ZoneCounter {
     }
 }
 
+/// A change of a visit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Change {
+    Entered { at_s: f64 },
+    Left { at_s: f64, dwell_s: f64 },
+}
+
 impl Visit {
     /// Follows the new points of a track and returns the entries and exits that now hold.
-    fn advance(&mut self, index: usize, zone: &Zone, track: &Track, hold_s: f64) -> Vec<ZoneEvent> {
-        let mut events = Vec::new();
-        for point in track.tail() {
+    fn advance<'a>(
+        &mut self,
+        zone: &Zone,
+        tail: impl Iterator<Item = &'a TailPoint>,
+        hold_s: f64,
+    ) -> Vec<Change> {
+        let mut changes = Vec::new();
+        for point in tail {
             let is_known = self.seen_s.is_some_and(|seen_s| point.at_s <= seen_s);
             let Some(place) = point.place(zone.plane).filter(|_| !is_known) else {
                 continue;
             };
             self.seen_s = Some(point.at_s);
             let is_inside = zone.area.holds(Point2::from(place));
-            let at_s = point.at_s;
-            if is_inside == self.is_inside {
-                self.places = 0;
-            } else {
-                self.places += 1;
-            }
-            if is_inside {
-                if !self.is_inside && self.places == 1 {
-                    self.since_s = at_s;
-                }
-                self.inside_s = at_s;
-            }
-            // Since the first place inside, or the last one inside.
-            let side_since_s = if is_inside {
-                self.since_s
-            } else {
-                self.inside_s
-            };
-            if self.places >= LEAST_PLACES && at_s - side_since_s >= hold_s {
-                self.places = 0;
-                self.is_inside = is_inside;
-                events.push(if is_inside {
-                    ZoneEvent::Entered {
-                        zone: index,
-                        track: track.id(),
-                        at_s: self.since_s,
-                    }
-                } else {
-                    self.left(index, track.id())
-                });
-            }
+            changes.extend(self.see(is_inside, point.at_s, hold_s));
         }
-        events
+        changes
     }
 
-    fn left(&self, zone: usize, track: TrackId) -> ZoneEvent {
-        ZoneEvent::Left {
-            zone,
-            track,
+    /// Takes one place into account.
+    fn see(&mut self, is_inside: bool, at_s: f64, hold_s: f64) -> Option<Change> {
+        let is_other_side = is_inside != self.is_inside;
+        self.places = if is_other_side { self.places + 1 } else { 0 };
+        if is_inside {
+            if is_other_side && self.places == 1 {
+                self.since_s = at_s;
+            }
+            self.inside_s = at_s;
+        }
+        // The first place inside, or the last one inside.
+        let changed_s = if is_inside {
+            self.since_s
+        } else {
+            self.inside_s
+        };
+        if self.places < LEAST_PLACES || at_s - changed_s < hold_s {
+            return None;
+        }
+        self.places = 0;
+        self.is_inside = is_inside;
+        Some(if is_inside {
+            Change::Entered { at_s: self.since_s }
+        } else {
+            self.left()
+        })
+    }
+
+    fn left(&self) -> Change {
+        Change::Left {
             at_s: self.inside_s,
             dwell_s: self.inside_s - self.since_s,
+        }
+    }
+}
+
+impl Change {
+    fn event(self, zone: usize, track: TrackId) -> ZoneEvent {
+        match self {
+            Self::Entered { at_s } => ZoneEvent::Entered { zone, track, at_s },
+            Self::Left { at_s, dwell_s } => ZoneEvent::Left {
+                zone,
+                track,
+                at_s,
+                dwell_s,
+            },
         }
     }
 }

@@ -9,9 +9,13 @@ pub const STEP_S: f64 = 0.02;
 /// Time in which a person adopts a new velocity, seconds.
 const RELAXATION_S: f64 = 0.5;
 /// Persons nearer than this walk apart, metres.
-const PERSONAL_M: f64 = 0.7;
+const PERSONAL_M: f64 = 1.0;
 /// Acceleration apart at no distance, metres per square second.
-const REPULSION: f64 = 6.0;
+const REPULSION: f64 = 8.0;
+/// Share of that acceleration that turns both to their right, so that they pass each other.
+const DODGE: f64 = 0.5;
+/// Least distance of the axes of two bodies, metres.
+const BODY_M: f64 = 0.5;
 /// Share of waypoints at which a person stops, and the longest stop in seconds.
 const PAUSES: f64 = 0.3;
 const LONGEST_PAUSE_S: f64 = 8.0;
@@ -76,11 +80,30 @@ impl People {
         for person in &mut self.present {
             person.step(&places, chance);
         }
+        self.keep_bodies_apart();
         self.present.retain(|person| !person.waypoints.is_empty());
         // A new person after five seconds on average.
         if self.present.len() < self.count && chance.happens(STEP_S / 5.0) {
             let door = self.hall.door(chance);
             self.add(door, chance);
+        }
+    }
+}
+
+impl People {
+    fn keep_bodies_apart(&mut self) {
+        for first in 1..self.present.len() {
+            let (before, after) = self.present.split_at_mut(first);
+            let one = &mut after[0];
+            for other in before {
+                let apart = one.place - other.place;
+                let distance = apart.norm();
+                if distance > 0.0 && distance < BODY_M {
+                    let push = apart / distance * ((BODY_M - distance) / 2.0);
+                    one.place += push;
+                    other.place -= push;
+                }
+            }
         }
     }
 }
@@ -109,7 +132,8 @@ impl Person {
             let apart = self.place - place;
             let distance = apart.norm();
             if distance > 0.0 && distance < PERSONAL_M {
-                acceleration += apart / distance * REPULSION * (1.0 - distance / PERSONAL_M);
+                let push = apart / distance * REPULSION * (1.0 - distance / PERSONAL_M);
+                acceleration += push + Vector2::new(-push.y, push.x) * DODGE;
             }
         }
         // A sway that keeps walks from being straight.

@@ -38,6 +38,7 @@ pub struct Options {
     persons: usize,
     figures: Figures,
     is_site: bool,
+    settings: TrackerSettings,
 }
 
 impl Options {
@@ -64,6 +65,11 @@ impl Options {
                 other => panic!("--detector {other}: give rendered or photographs"),
             },
             is_site: given.contains_key("--site"),
+            settings: given
+                .get("--settings")
+                .map_or_else(TrackerSettings::default, |text| {
+                    serde_json::from_str(text).expect("settings of the tracker as JSON")
+                }),
         }
     }
 }
@@ -76,9 +82,9 @@ struct Follower {
 }
 
 impl Follower {
-    fn new(poses: &[CameraPose], line: Line) -> Self {
+    fn new(poses: &[CameraPose], line: Line, settings: TrackerSettings) -> Self {
         Self {
-            tracker: Tracker::new(poses, TrackerSettings::default()).expect("valid cameras"),
+            tracker: Tracker::new(poses, settings).expect("valid cameras"),
             line: LineCounter::new(vec![line]).expect("a valid line"),
             crossings: Vec::new(),
         }
@@ -187,12 +193,16 @@ impl Scene {
             interval_s,
             now_s: 0.0,
             end_s: options.seconds,
-            site: Follower::new(&poses, line.clone()),
+            site: Follower::new(&poses, line.clone(), options.settings),
             separate: poses
                 .iter()
-                .map(|&pose| Follower::new(&[pose], line.clone()))
+                .map(|&pose| Follower::new(&[pose], line.clone(), options.settings))
                 .collect(),
-            bearing: Follower::new(&[CameraPose::alone(None)], frame_line(&cameras[0], hall.y)),
+            bearing: Follower::new(
+                &[CameraPose::alone(None)],
+                frame_line(&cameras[0], hall.y),
+                options.settings,
+            ),
             cameras,
             sides: BTreeMap::new(),
             true_crossings: Vec::new(),

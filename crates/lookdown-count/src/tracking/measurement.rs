@@ -1,6 +1,9 @@
 //! A person of a report as a measurement: a place with its covariance.
+//!
+//! Errors along the ray's floor direction (radial) are larger than those across it: the box of a
+//! person is several times as long as wide, and its lower end decides the place.
 
-use nalgebra::{Matrix2, Rotation2, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
 use super::MeasurementNoise;
 use crate::{CameraPose, Observation};
@@ -14,54 +17,109 @@ pub(super) enum Place {
     Bearing(Unit<Vector3<f64>>),
 }
 
-/// A measured place and its covariance: square metres, or square radians in any tangent plane.
+/// Extents in the radial direction and across it: metres, or radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Extents {
+    pub along: f64,
+    pub across: f64,
+}
+
+/// A measured place, its error and its score.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Measurement {
     pub place: Place,
-    pub noise: Matrix2<f64>,
+    /// The radial direction: on the floor (z is 0), or a tangent of the sphere at the place.
+    pub radial: Vector3<f64>,
+    /// Standard deviations of the place.
+    pub deviation: Extents,
+    /// Half the region in which a box shows the same person once more.
+    pub same_person: Extents,
     pub score: f64,
 }
 
 impl Measurement {
     /// Returns the measurement on the floor; `None` without a finite place.
     ///
-    /// An error of the angle moves the place along the ray's floor direction by `(r² + h²) / h` and
-    /// across it by `sqrt(r² + h²)` per radian: the derivatives of `r = h tan(angle)`.
+    /// An error of the angle moves the place radially by `(r² + h²) / h` and across by
+    /// `sqrt(r² + h²)` per radian: the derivatives of `r = h tan(angle)`. The lower end of the box is
+    /// the near side of the feet, so the body's axis lies farther out.
     pub fn on_floor(
         person: &Observation,
         camera: &CameraPose,
         height_m: f64,
         noise: &MeasurementNoise,
     ) -> Option<Self> {
-        let [x, y] = person
+        let finite = person
             .floor_m
-            .filter(|place| place.iter().all(|m| m.is_finite()))?;
-        let range = x.hypot(y);
+            .filter(|[x, y]| x.is_finite() && y.is_finite());
+        let foot = Vector2::from(finite?);
+        let range = foot.norm();
+        let outward = foot.try_normalize(f64::EPSILON).unwrap_or_else(Vector2::x);
         let slant_squared = range.powi(2) + height_m.powi(2);
-        let angle = noise.angle_deg.to_radians();
-        let body = noise.body_m.powi(2);
-        let radial = body + (angle * slant_squared / height_m).powi(2);
-        let across = body + angle.powi(2) * slant_squared;
-        let [dx, dy] = camera.turned_to_site([x, y]);
-        let axes = Rotation2::new(dy.atan2(dx)).into_inner();
-        let covariance = axes * Matrix2::new(radial, 0.0, 0.0, across) * axes.transpose();
+        let distrust = distrust(person.score, noise);
+        let radial_m = noise.angle_deg.to_radians() * slant_squared / height_m;
+        let across_m = noise.across_deg.to_radians() * slant_squared.sqrt();
+        let [x, y] = camera.turned_to_site(outward.into());
+        let axis = foot + outward * noise.foot_offset_m;
         Some(Self {
-            place: Place::Floor(Vector2::from(camera.to_site([x, y]))),
-            noise: covariance,
+            place: Place::Floor(camera.to_site(axis.into()).into()),
+            radial: Vector3::new(x, y, 0.0),
+            deviation: Extents {
+                along: noise.body_m.hypot(radial_m) * distrust,
+                across: noise.body_m.hypot(across_m) * distrust,
+            },
+            same_person: Extents {
+                along: noise.same_person_m + noise.same_person_share * range,
+                across: noise.same_person_m,
+            },
             score: person.score,
         })
     }
 
     /// Returns the measurement as a direction; `None` when the angles are not finite.
     pub fn of_bearing(person: &Observation, noise: &MeasurementNoise) -> Option<Self> {
-        let azimuth = person.azimuth_deg.to_radians();
-        let off_axis = person.off_axis_deg.to_radians();
-        let (sin, cos) = off_axis.sin_cos();
-        let direction = Vector3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos);
+        let (sin_azimuth, cos_azimuth) = person.azimuth_deg.to_radians().sin_cos();
+        let (sin, cos) = person.off_axis_deg.to_radians().sin_cos();
+        let direction = Vector3::new(sin * cos_azimuth, sin * sin_azimuth, cos);
+        let radial = Vector3::new(cos * cos_azimuth, cos * sin_azimuth, -sin);
+        let distrust = distrust(person.score, noise);
         direction.iter().all(|part| part.is_finite()).then(|| Self {
             place: Place::Bearing(Unit::new_normalize(direction)),
-            noise: Matrix2::from_diagonal_element(noise.bearing_deg.to_radians().powi(2)),
+            radial,
+            deviation: Extents {
+                along: noise.bearing_along_deg.to_radians() * distrust,
+                across: noise.bearing_across_deg.to_radians() * distrust,
+            },
+            same_person: Extents {
+                along: noise.same_person_along_deg.to_radians(),
+                across: noise.same_person_across_deg.to_radians(),
+            },
             score: person.score,
         })
     }
+
+    /// Returns the radial direction in the plane of `frame`: its components along x and y.
+    pub fn radial_in(&self, to_plane: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Unit<Vector2<f64>> {
+        let radial = to_plane(self.radial).xy();
+        Unit::try_new(radial, f64::EPSILON).unwrap_or_else(Vector2::x_axis)
+    }
+
+    /// Returns the covariance in a plane with this radial direction.
+    pub fn covariance(&self, radial: &Unit<Vector2<f64>>) -> Matrix2<f64> {
+        let Extents { along, across } = self.deviation;
+        let outer = radial.into_inner() * radial.transpose();
+        Matrix2::identity() * across.powi(2) + outer * (along.powi(2) - across.powi(2))
+    }
+
+    /// Returns true when a place this far away may be the same person once more.
+    pub fn is_same_person(&self, away: Vector2<f64>, radial: &Unit<Vector2<f64>>) -> bool {
+        let along = away.dot(radial) / self.same_person.along;
+        let across = away.perp(radial) / self.same_person.across;
+        along.hypot(across) < 1.0
+    }
+}
+
+/// The factor of the error of a person with this score: low scores are badly placed boxes.
+fn distrust(score: f64, noise: &MeasurementNoise) -> f64 {
+    1.0 + noise.low_score_factor * (1.0 - score.clamp(0.0, 1.0))
 }

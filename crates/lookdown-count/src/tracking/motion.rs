@@ -4,7 +4,7 @@
 //! update the tangent plane moves along the great circle to the new direction (parallel transport),
 //! which leaves velocity and covariance as they are.
 
-use nalgebra::{Matrix3, Rotation3, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -13,25 +13,29 @@ use super::{
     settings::PlaneSettings,
 };
 
+/// The columns of a rotation.
+type Tangent = [[f64; 3]; 3];
+
 /// The filter of a track and its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Motion {
     kalman: Kalman,
     /// Rotation from the tangent plane's frame (z through its origin) to the camera, column by
     /// column; absent on the floor.
-    tangent: Option<[[f64; 3]; 3]>,
+    tangent: Option<Tangent>,
     at_s: f64,
 }
 
 impl Motion {
     /// Returns the motion of a new track at its first measurement.
     pub fn new(measured: &Measurement, at_s: f64, plane: &PlaneSettings) -> Self {
-        let (origin, tangent) = match measured.place {
-            Place::Floor(place) => (place, None),
-            Place::Bearing(direction) => (Vector2::zeros(), Some(stored(&rotation_to(&direction)))),
+        let tangent = match &measured.place {
+            Place::Floor(_) => None,
+            Place::Bearing(direction) => Some(stored(&rotation_to(direction))),
         };
+        let (place, noise) = local(tangent, measured);
         Self {
-            kalman: Kalman::new(origin, &measured.noise, plane.velocity_sd),
+            kalman: Kalman::new(place, &noise, plane.velocity_sd),
             tangent,
             at_s,
         }
@@ -78,13 +82,22 @@ impl Motion {
         plane: &PlaneSettings,
     ) -> Innovation {
         let (filter, lag) = self.filter_at(at_s, plane);
-        filter.innovation(self.local(&measured.place), &measured.noise, lag)
+        let (place, noise) = local(self.tangent, measured);
+        filter.innovation(place, &noise, lag)
+    }
+
+    /// Returns true when a measurement may show the person of this track once more.
+    pub fn is_same_person(&self, measured: &Measurement, at_s: f64) -> bool {
+        let (place, _) = local(self.tangent, measured);
+        let expected = self.kalman.place() + self.kalman.velocity() * (at_s - self.at_s);
+        measured.is_same_person(place - expected, &radial(self.tangent, measured))
     }
 
     /// Updates the state with a measurement taken at `at_s`.
     pub fn update(&mut self, measured: &Measurement, at_s: f64, plane: &PlaneSettings) {
         let (mut filter, lag) = self.filter_at(at_s, plane);
-        filter.update(self.local(&measured.place), &measured.noise, lag);
+        let (place, noise) = local(self.tangent, measured);
+        filter.update(place, &noise, lag);
         self.at_s = self.at_s.max(at_s);
         self.kalman = filter;
         if let Some(tangent) = self.tangent {
@@ -103,17 +116,24 @@ impl Motion {
             (self.kalman, -dt)
         }
     }
+}
 
-    /// Returns a place in the coordinates of the filter.
-    fn local(&self, place: &Place) -> Vector2<f64> {
-        match (place, self.tangent) {
-            (Place::Floor(place), _) => *place,
-            (Place::Bearing(direction), None) => direction.xy(),
-            (Place::Bearing(direction), Some(tangent)) => {
-                logarithm(&(rotation(tangent).inverse() * direction.into_inner()))
-            }
+/// The place and the covariance of a measurement in the coordinates of a filter.
+fn local(tangent: Option<Tangent>, measured: &Measurement) -> (Vector2<f64>, Matrix2<f64>) {
+    let place = match (&measured.place, tangent) {
+        (Place::Floor(place), _) => *place,
+        (Place::Bearing(direction), tangent) => {
+            let to_plane = tangent.map_or_else(Rotation3::identity, rotation).inverse();
+            logarithm(&(to_plane * direction.into_inner()))
         }
-    }
+    };
+    (place, measured.covariance(&radial(tangent, measured)))
+}
+
+/// The radial direction of a measurement in the coordinates of a filter.
+fn radial(tangent: Option<Tangent>, measured: &Measurement) -> Unit<Vector2<f64>> {
+    let to_plane = tangent.map_or_else(Rotation3::identity, rotation).inverse();
+    measured.radial_in(|direction| to_plane * direction)
 }
 
 /// The smallest rotation that turns z into `direction`.
@@ -147,12 +167,12 @@ fn exponential(tangent: Vector2<f64>) -> Unit<Vector3<f64>> {
     ))
 }
 
-fn rotation(stored: [[f64; 3]; 3]) -> Rotation3<f64> {
+fn rotation(stored: Tangent) -> Rotation3<f64> {
     Rotation3::from_matrix_unchecked(stored.into())
 }
 
 /// The columns of a rotation, made orthonormal again against rounding over many updates.
-fn stored(rotation: &Rotation3<f64>) -> [[f64; 3]; 3] {
+fn stored(rotation: &Rotation3<f64>) -> Tangent {
     let z = rotation.matrix().column(2).normalize();
     let x = rotation.matrix().column(0) - z * z.dot(&rotation.matrix().column(0));
     let x = x.normalize();

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::measurement::Place;
+use super::{evidence::EvidenceSettings, measurement::Place};
 
 /// Settings of a tracker. The defaults are tuned on simulated walks (`docs/count-accuracy.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct TrackerSettings {
     /// Persons from this score on are associated first.
     pub high_score: f64,
@@ -13,10 +14,8 @@ pub struct TrackerSettings {
     pub low_score: f64,
     /// Least score of a person that starts a track.
     pub new_track_score: f64,
-    /// Sum of the scores of its persons from which on a track is confirmed.
-    pub confirm_score_sum: f64,
-    /// Least number of persons of a confirmed track.
-    pub confirm_hits: u32,
+    /// Least score of a person that starts a track in line with a person already tracked.
+    pub new_track_score_in_line: f64,
     /// A confirmed track ends after this many seconds without a person, and `max_missed` misses.
     pub max_unseen_s: f64,
     /// Least number of reports without its person before a confirmed track ends.
@@ -27,23 +26,44 @@ pub struct TrackerSettings {
     pub max_lateness_s: f64,
     /// Most tracks at any time; persons beyond them start none.
     pub max_tracks: usize,
+    /// Share of a score's log odds in the gain of an association.
+    pub score_share: f64,
     /// Noise of the measured places.
     pub noise: MeasurementNoise,
+    /// Evidence that confirms and ends tracks.
+    pub evidence: EvidenceSettings,
     /// Motion on the floor, in metres.
     pub floor: PlaneSettings,
     /// Motion in bearing space, in radians.
     pub bearing: PlaneSettings,
 }
 
-/// Standard deviations of a measured place.
+/// Standard deviations of a measured place, and the reach of a person's further boxes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct MeasurementNoise {
-    /// Distance of the measured foot point from the body's axis, metres.
+    /// Distance of the foot point from the place of the body, metres.
     pub body_m: f64,
-    /// Angle of the foot point, degrees.
+    /// Angle of the foot point off the axis, degrees.
     pub angle_deg: f64,
-    /// Angle of the person's centre in bearing space, degrees.
-    pub bearing_deg: f64,
+    /// Angle of the foot point around the axis, degrees.
+    pub across_deg: f64,
+    /// Distance from the lower end of a box out to the body's axis, metres.
+    pub foot_offset_m: f64,
+    /// Angle of the person's centre off the axis in bearing space, degrees.
+    pub bearing_along_deg: f64,
+    /// Angle of the person's centre around the axis in bearing space, degrees.
+    pub bearing_across_deg: f64,
+    /// Growth of the deviations toward a score of 0: they are 1 + this factor times as large.
+    pub low_score_factor: f64,
+    /// Boxes nearer than this show one person, metres.
+    pub same_person_m: f64,
+    /// Added to that radially, as a share of the distance from the camera.
+    pub same_person_share: f64,
+    /// Boxes nearer than this off the axis show one person in bearing space, degrees.
+    pub same_person_along_deg: f64,
+    /// Boxes nearer than this around the axis show one person in bearing space, degrees.
+    pub same_person_across_deg: f64,
 }
 
 /// Motion and association in one kind of plane.
@@ -55,8 +75,6 @@ pub struct PlaneSettings {
     pub velocity_sd: f64,
     /// Density of false and new persons: number per square unit of a frame.
     pub clutter_density: f64,
-    /// Persons nearer to a track than this start no other track, units.
-    pub least_distance: f64,
 }
 
 impl TrackerSettings {
@@ -75,30 +93,43 @@ impl Default for TrackerSettings {
             high_score: 0.5,
             low_score: 0.1,
             new_track_score: 0.4,
-            confirm_score_sum: 1.2,
-            confirm_hits: 2,
+            new_track_score_in_line: 0.8,
             max_unseen_s: 2.0,
             max_missed: 3,
             max_silent_s: 10.0,
             max_lateness_s: 2.0,
             max_tracks: 512,
-            noise: MeasurementNoise {
-                body_m: 0.15,
-                angle_deg: 1.0,
-                bearing_deg: 1.5,
-            },
+            score_share: 0.3,
+            noise: MeasurementNoise::default(),
+            evidence: EvidenceSettings::default(),
             floor: PlaneSettings {
                 acceleration_density: 0.6,
                 velocity_sd: 1.0,
                 clutter_density: 0.02,
-                least_distance: 0.3,
             },
             bearing: PlaneSettings {
                 acceleration_density: 0.05,
                 velocity_sd: 0.3,
                 clutter_density: 0.5,
-                least_distance: 0.06,
             },
+        }
+    }
+}
+
+impl Default for MeasurementNoise {
+    fn default() -> Self {
+        Self {
+            body_m: 0.1,
+            angle_deg: 0.8,
+            across_deg: 0.4,
+            foot_offset_m: 0.12,
+            bearing_along_deg: 1.5,
+            bearing_across_deg: 0.8,
+            low_score_factor: 1.0,
+            same_person_m: 0.3,
+            same_person_share: 0.3,
+            same_person_along_deg: 12.0,
+            same_person_across_deg: 4.0,
         }
     }
 }

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, VecDeque};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Plane, TrackId, TrackerSettings, measurement::Measurement, motion::Motion};
+use super::{
+    Plane, TrackId, TrackerSettings, evidence::Evidence, measurement::Measurement, motion::Motion,
+};
 use crate::Observation;
 
 /// Most places that a track keeps.
@@ -17,8 +19,7 @@ pub struct Track {
     pub(super) motion: Motion,
     first_seen_s: f64,
     seen_s: f64,
-    hits: u32,
-    score_sum: f64,
+    pub(super) evidence: Evidence,
     pub(super) missed: u32,
     confirmed: bool,
     last_person: PersonOfReport,
@@ -62,6 +63,8 @@ impl TailPoint {
 /// A measured person of the current report.
 pub(super) struct Sighting<'a> {
     pub at_s: f64,
+    /// Time since the camera's last report, seconds.
+    pub interval_s: f64,
     pub source: PersonOfReport,
     pub person: &'a Observation,
     pub measured: &'a Measurement,
@@ -76,8 +79,7 @@ impl Track {
             motion: Motion::new(seen.measured, seen.at_s, plane),
             first_seen_s: seen.at_s,
             seen_s: seen.at_s,
-            hits: 0,
-            score_sum: 0.0,
+            evidence: Evidence::first(seen.measured.score, &settings.evidence),
             missed: 0,
             confirmed: false,
             last_person: seen.source,
@@ -85,7 +87,7 @@ impl Track {
             seen_by: BTreeMap::new(),
             tail: VecDeque::new(),
         };
-        track.record(seen, settings);
+        track.record(seen);
         track
     }
 
@@ -93,15 +95,15 @@ impl Track {
     pub(super) fn update(&mut self, seen: &Sighting, settings: &TrackerSettings) {
         let plane = settings.plane_of(&seen.measured.place);
         self.motion.update(seen.measured, seen.at_s, plane);
-        self.record(seen, settings);
+        let score = seen.measured.score;
+        self.evidence
+            .add_hit(score, seen.interval_s, &settings.evidence);
+        self.confirmed |= self.evidence.confirms(&settings.evidence);
+        self.record(seen);
     }
 
-    fn record(&mut self, seen: &Sighting, settings: &TrackerSettings) {
-        self.hits = self.hits.saturating_add(1);
+    fn record(&mut self, seen: &Sighting) {
         self.missed = 0;
-        self.score_sum += seen.measured.score;
-        self.confirmed |=
-            self.hits >= settings.confirm_hits && self.score_sum >= settings.confirm_score_sum;
         self.seen_s = self.seen_s.max(seen.at_s);
         self.last_person = seen.source;
         self.foot_px = seen.person.foot_px;

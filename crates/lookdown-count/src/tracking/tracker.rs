@@ -1,6 +1,5 @@
 //! The tracker: association of each report's persons with the tracks.
 
-use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -8,6 +7,7 @@ use super::{
     assignment::best_pairs,
     camera::Camera,
     duplicates::end_duplicates,
+    evidence::log_odds,
     measurement::Measurement,
     track::{PersonOfReport, Sighting},
 };
@@ -20,8 +20,6 @@ pub const MAX_PERSONS: usize = 300;
 /// Squared Mahalanobis distance beyond which a person never continues a track: the 99.9 % quantile
 /// of the chi-squared distribution with two degrees of freedom.
 const GATE: f64 = 13.8;
-/// Reports without its person after which a track that is not confirmed ends.
-const MAX_MISSED_UNCONFIRMED: u32 = 2;
 
 /// A tracker of one camera or one site. Serializable: stored with the counts, it survives a restart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,7 +29,7 @@ pub struct Tracker {
     on_floor: bool,
     tracks: Vec<Track>,
     next_id: u64,
-    newest_report_s: f64,
+    newest_report_s: Option<f64>,
 }
 
 /// Cameras that make no tracker.
@@ -96,7 +94,7 @@ impl Tracker {
             on_floor: without_height.is_none(),
             tracks: Vec::new(),
             next_id: 1,
-            newest_report_s: f64::NEG_INFINITY,
+            newest_report_s: None,
         })
     }
 
@@ -117,14 +115,20 @@ impl Tracker {
     ) -> Result<Vec<Track>, RefusedReport> {
         self.check(camera, at_s)?;
         let candidates = self.candidates(camera, persons);
-        let updated = self.associate(camera, at_s, &candidates);
-        self.start_tracks(camera, at_s, &candidates, &updated);
-        self.count_misses(camera, at_s);
+        let report = Report {
+            camera,
+            at_s,
+            interval_s: self.interval_s(camera, at_s),
+        };
+        let used = self.associate(&report, &candidates);
+        self.start_tracks(&report, &candidates, &used);
+        self.count_misses(&report);
         self.cameras[camera].last_report_s = Some(at_s);
-        self.newest_report_s = self.newest_report_s.max(at_s);
-        let mut ended = self.end_unseen();
+        let now_s = self.newest_report_s.map_or(at_s, |newest| newest.max(at_s));
+        self.newest_report_s = Some(now_s);
+        let mut ended = self.end_unseen(now_s);
         if self.cameras.len() > 1 {
-            ended.extend(end_duplicates(&mut self.tracks, self.newest_report_s));
+            ended.extend(end_duplicates(&mut self.tracks, now_s));
         }
         ended.retain(Track::is_confirmed);
         Ok(ended)
@@ -145,11 +149,17 @@ impl Tracker {
         if known.last_report_s.is_some_and(|last| at_s <= last) {
             return Err(RefusedReport::OutOfOrder);
         }
-        let lateness = self.newest_report_s - at_s;
+        let lateness = self.newest_report_s.map_or(0.0, |newest| newest - at_s);
         if lateness > self.settings.max_lateness_s {
             return Err(RefusedReport::Late(lateness));
         }
         Ok(())
+    }
+
+    /// The time since the camera's last report; long where there was none.
+    fn interval_s(&self, camera: usize, at_s: f64) -> f64 {
+        let last = self.cameras[camera].last_report_s;
+        last.map_or(f64::INFINITY, |last| at_s - last)
     }
 
     /// The persons that count, in an order that does not depend on the report's.
@@ -195,7 +205,7 @@ impl Tracker {
     }
 
     /// Continues tracks with persons; returns true for each candidate that continued one.
-    fn associate(&mut self, camera: usize, at_s: f64, candidates: &[Candidate]) -> Vec<bool> {
+    fn associate(&mut self, report: &Report, candidates: &[Candidate]) -> Vec<bool> {
         let high = self.settings.high_score;
         let mut used = vec![false; candidates.len()];
         let mut continued = vec![false; self.tracks.len()];
@@ -214,11 +224,11 @@ impl Tracker {
                 .collect();
             let pairs = best_pairs(rows.len(), columns.len(), |row, column| {
                 let track = &self.tracks[rows[row]];
-                self.gain(track, &candidates[columns[column]].measured, at_s)
+                self.gain(track, &candidates[columns[column]].measured, report.at_s)
             });
             for (row, column) in pairs {
                 let (row, column) = (rows[row], columns[column]);
-                let seen = sighting(camera, at_s, &candidates[column]);
+                let seen = report.sighting(&candidates[column]);
                 self.tracks[row].update(&seen, &self.settings);
                 continued[row] = true;
                 used[column] = true;
@@ -236,76 +246,81 @@ impl Tracker {
         if innovation.squared_distance() > GATE {
             return -1.0;
         }
-        innovation.log_density() - plane.clutter_density.ln()
+        let is_person = self.settings.score_share * log_odds(measured.score);
+        innovation.log_density() - plane.clutter_density.ln() + is_person
     }
 
-    fn start_tracks(&mut self, camera: usize, at_s: f64, candidates: &[Candidate], used: &[bool]) {
+    fn start_tracks(&mut self, report: &Report, candidates: &[Candidate], used: &[bool]) {
         for (candidate, _) in candidates.iter().zip(used).filter(|(_, used)| !**used) {
-            let is_strong = candidate.measured.score >= self.settings.new_track_score;
-            let has_room = self.tracks.len() < self.settings.max_tracks;
-            if is_strong && has_room && !self.is_taken(camera, at_s, &candidate.measured) {
-                let seen = sighting(camera, at_s, candidate);
+            let least = if self.is_taken(report, &candidate.measured) {
+                self.settings.new_track_score_in_line
+            } else {
+                self.settings.new_track_score
+            };
+            if candidate.measured.score >= least && self.tracks.len() < self.settings.max_tracks {
                 let id = TrackId(self.next_id);
                 self.next_id += 1;
+                let seen = report.sighting(candidate);
                 self.tracks.push(Track::new(id, &seen, &self.settings));
             }
         }
     }
 
-    /// Returns true when a track that this report continued or started is too near for another.
-    fn is_taken(&self, camera: usize, at_s: f64, measured: &Measurement) -> bool {
-        let plane = self.settings.plane_of(&measured.place);
-        let exact = Measurement {
-            noise: Matrix2::zeros(),
-            ..*measured
-        };
-        self.tracks.iter().any(|track| {
-            let is_current = track.seen_by.get(&camera) == Some(&at_s);
-            let distance = track.motion.innovation(&exact, at_s, plane).residual.norm();
-            is_current && distance < plane.least_distance
-        })
+    /// Returns true when this may be a further box of a person that the report holds already.
+    fn is_taken(&self, report: &Report, measured: &Measurement) -> bool {
+        let current = self.tracks.iter().filter(|track| report.shows(track));
+        let mut motions = current.map(|track| &track.motion);
+        motions.any(|motion| motion.is_same_person(measured, report.at_s))
     }
 
-    fn count_misses(&mut self, camera: usize, at_s: f64) {
+    fn count_misses(&mut self, report: &Report) {
         let is_alone = self.cameras.len() == 1;
-        let known = &self.cameras[camera];
-        for track in &mut self.tracks {
-            let is_seen = track.seen_by.get(&camera) == Some(&at_s);
-            if !is_seen
-                && (is_alone
-                    || track
-                        .motion
-                        .floor_at(at_s)
-                        .is_some_and(|place| known.sees(place)))
-            {
+        let camera = &self.cameras[report.camera];
+        for track in self.tracks.iter_mut().filter(|track| !report.shows(track)) {
+            let expected = track.motion.floor_at(report.at_s);
+            if is_alone || expected.is_some_and(|place| camera.sees(place)) {
                 track.missed = track.missed.saturating_add(1);
+                let evidence = &self.settings.evidence;
+                track.evidence.add_miss(report.interval_s, evidence);
             }
         }
     }
 
-    fn end_unseen(&mut self) -> Vec<Track> {
-        let (settings, now) = (&self.settings, self.newest_report_s);
+    fn end_unseen(&mut self, now_s: f64) -> Vec<Track> {
+        let settings = &self.settings;
         let is_over = |track: &mut Track| {
-            let unseen_s = now - track.seen_s();
-            let is_missed = if track.is_confirmed() {
-                track.missed >= settings.max_missed && unseen_s > settings.max_unseen_s
-            } else {
-                track.missed >= MAX_MISSED_UNCONFIRMED
-            };
-            is_missed || unseen_s > settings.max_silent_s
+            let unseen_s = now_s - track.seen_s();
+            let is_missed = track.missed >= settings.max_missed && unseen_s > settings.max_unseen_s;
+            let is_refuted = track.evidence.refutes(&settings.evidence) && track.missed > 0;
+            is_missed || is_refuted || unseen_s > settings.max_silent_s
         };
         self.tracks.extract_if(.., is_over).collect()
     }
 }
 
-fn sighting<'a>(camera: usize, at_s: f64, candidate: &'a Candidate) -> Sighting<'a> {
-    Sighting {
-        at_s,
-        source: PersonOfReport {
-            camera,
-            person: candidate.index,
-        },
-        person: candidate.person,
-        measured: &candidate.measured,
+/// The camera and the time of the current report.
+struct Report {
+    camera: usize,
+    at_s: f64,
+    interval_s: f64,
+}
+
+impl Report {
+    /// Returns true when a person of this report continued or started the track.
+    fn shows(&self, track: &Track) -> bool {
+        track.seen_by.get(&self.camera) == Some(&self.at_s)
+    }
+
+    fn sighting<'a>(&self, candidate: &'a Candidate) -> Sighting<'a> {
+        Sighting {
+            at_s: self.at_s,
+            interval_s: self.interval_s,
+            source: PersonOfReport {
+                camera: self.camera,
+                person: candidate.index,
+            },
+            person: candidate.person,
+            measured: &candidate.measured,
+        }
     }
 }
