@@ -3,8 +3,7 @@
 use lookdown_lens::{
     calibration::{Calibration, CameraGeometry},
     geometry::{
-        CountingLine, LineEnds, Pixel, Polygon, ZoneArea,
-        floor::floor_position,
+        CountingLine, LineEnds, Pixel, Polygon, ZoneArea, floor::floor_position,
         polygon::MAX_CORNERS,
     },
 };

@@ -74,7 +74,8 @@ impl Report {
     /// is plausible, else the arrival.
     pub(crate) fn at_ms(&self) -> i64 {
         let received = self.received_at.as_millisecond();
-        let plausible = received.saturating_sub(MAX_BEHIND_MS)..=received.saturating_add(MAX_AHEAD_MS);
+        let plausible =
+            received.saturating_sub(MAX_BEHIND_MS)..=received.saturating_add(MAX_AHEAD_MS);
         let captured = self.captured_at.map(Timestamp::as_millisecond);
         captured
             .filter(|captured| plausible.contains(captured))
@@ -108,7 +109,11 @@ impl Report {
         };
         let (sin, cos) = angle_deg.to_radians().sin_cos();
         let axis = Vector2::new(sin, -cos);
-        let up = if axis.dot(&vertical) < 0.0 { -axis } else { axis };
+        let up = if axis.dot(&vertical) < 0.0 {
+            -axis
+        } else {
+            axis
+        };
         let foot = centre - up * (height / 2.0);
         Some(Observation {
             floor_m: person.floor.map(|floor| [floor.x_m, floor.y_m]),
@@ -143,14 +148,22 @@ mod tests {
             ("\"2026-11-22T11:00:00Z\"", 0),
             ("\"2020-01-01T00:00:00Z\"", 0),
         ] {
-            assert_eq!(report(captured, "").at_ms() - received, offset, "{captured}");
+            assert_eq!(
+                report(captured, "").at_ms() - received,
+                offset,
+                "{captured}"
+            );
         }
     }
 
     #[test]
     fn the_foot_is_toward_the_nadir() {
         let definition = CameraDefinition::unknown();
-        for (angle_deg, cx, foot) in [(90.0, 150.0, 130.0), (-90.0, 150.0, 130.0), (90.0, 50.0, 70.0)] {
+        for (angle_deg, cx, foot) in [
+            (90.0, 150.0, 130.0),
+            (-90.0, 150.0, 130.0),
+            (90.0, 50.0, 70.0),
+        ] {
             let person = format!(
                 r#"{{"score": 0.8, "floor": null, "bearing": {{"azimuth_deg": 0, "off_axis_deg": 40}},
                     "oriented_box": {{"cx": {cx}, "cy": 100, "width": 20, "height": 40,
