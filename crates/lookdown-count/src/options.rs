@@ -10,6 +10,7 @@ use jiff::SignedDuration;
 use lookdown_client::{
     ConfigError, ServerEntry, ServerOptions, parse_toml, read_file, read_secret,
 };
+use reqwest::Url;
 use secrecy::{ExposeSecret, SecretString};
 use serde::Deserialize;
 
@@ -98,6 +99,30 @@ pub struct MqttEntry {
     /// The prefix of the topics of Home Assistant; empty disables discovery.
     #[serde(default = "discovery_prefix")]
     pub discovery_prefix: String,
+}
+
+impl MqttEntry {
+    /// Returns the URL of the broker with the password of the file.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn url_with_password(&self) -> Result<String, ConfigError> {
+        let Some(path) = &self.password_file else {
+            return Ok(self.url.clone());
+        };
+        let password = read_secret("mqtt.password_file", path)?;
+        let mut url = Url::parse(&self.url).ok();
+        let url = url.as_mut().filter(|url| !url.username().is_empty());
+        let with_password = url.and_then(|url| {
+            url.set_password(Some(password.expose_secret())).ok()?;
+            Some(url.to_string())
+        });
+        with_password.ok_or_else(|| {
+            let problem =
+                "it has no user name for the password: write it like mqtt://user@host:1883";
+            ConfigError::problem("mqtt.url", &problem)
+        })
+    }
 }
 
 fn topic_prefix() -> String {
