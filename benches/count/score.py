@@ -9,7 +9,7 @@ import json
 import subprocess
 import sys
 from collections import defaultdict
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -190,14 +190,15 @@ def main():
     """Prints a Markdown table row for each detector, rate and tracker."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--binary", default=ROOT / "target/debug/examples/simulate")
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(range(101, 109)))
+    parser.add_argument("--seeds", type=int, nargs="+", default=list(range(101, 107)))
     parser.add_argument("--rates", type=int, nargs="+", default=RATES)
     parser.add_argument("--detectors", nargs="+", default=["rendered", "photographs"])
     parser.add_argument("--persons", type=int, default=8)
-    parser.add_argument("--seconds", type=int, default=300)
-    parser.add_argument("--activation", type=float, default=0.5, help="ByteTrack: least score of a new track")
-    parser.add_argument("--high", type=float, default=0.5, help="ByteTrack: least score of the first stage")
-    parser.add_argument("--least-overlap", type=float, default=0.1, help="ByteTrack: least overlap")
+    parser.add_argument("--seconds", type=int, default=240)
+    parser.add_argument("--settings", default="{}", help="settings of our tracker as JSON")
+    parser.add_argument("--activation", type=float, default=0.85, help="ByteTrack: least score of a new track")
+    parser.add_argument("--high", type=float, default=0.7, help="ByteTrack: least score of the first stage")
+    parser.add_argument("--least-overlap", type=float, default=0.05, help="ByteTrack: least overlap")
     parser.add_argument("--consecutive", type=int, default=2, help="ByteTrack: frames before a track counts")
     parser.add_argument("--lost", type=int, default=60, help="ByteTrack: frames of 1/30 s before a track ends")
     parser.add_argument("--scenes", nargs="+", default=["camera", "site"])
@@ -209,12 +210,12 @@ def main():
         "minimum_consecutive_frames": given.consecutive,
         "lost_track_buffer": given.lost,
     }
-    options = {"persons": given.persons, "seconds": given.seconds}
+    options = {"persons": given.persons, "seconds": given.seconds, "settings": given.settings}
     header = ["scene", "detector", "frames/s", "tracks", "HOTA", "IDF1", "worst", "MOTA", "switches", "persons off"]
     header += ["crossings", "% totals", "% each"]
     print("| " + " | ".join(header) + " |\n" + "|---" * len(header) + "|")
     jobs = defaultdict(list)
-    with ThreadPoolExecutor(2) as pool:
+    with ProcessPoolExecutor(2) as pool:
         for scene in given.scenes:
             for detector in given.detectors:
                 for rate in given.rates:

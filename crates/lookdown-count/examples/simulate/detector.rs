@@ -29,7 +29,7 @@ const FALSE_LOGIT: (f64, f64) = (-1.4, 1.2);
 const FALSE_SHARE_AT_THRESHOLD: f64 = 0.32;
 /// Share of the background's false alarms that come from fixed places (posters, coat stands).
 const FIXED_SHARE: f64 = 0.6;
-const FIXED_PLACES: usize = 4;
+const FIXED_PLACES: u32 = 4;
 /// Loss of the logit of a person who is half hidden behind another one.
 const HIDDEN_LOGIT: f64 = 2.0;
 
@@ -123,7 +123,7 @@ impl Camera {
     }
 
     /// The camera's floor coordinates of a place of the site.
-    pub fn from_site(&self, place: Vector2<f64>) -> Vector2<f64> {
+    pub fn floor_of_site(&self, place: Vector2<f64>) -> Vector2<f64> {
         let away = place - Vector2::from(self.pose.position_m);
         let (sin, cos) = self.pose.yaw_deg.to_radians().sin_cos();
         Vector2::new(cos * away.x + sin * away.y, cos * away.y - sin * away.x)
@@ -191,17 +191,17 @@ impl Camera {
 
     fn invent(&mut self, at_s: f64, found: &mut Vec<(Observation, OrientedBox)>) {
         let mean = self.figures.background / FALSE_SHARE_AT_THRESHOLD;
-        let each = (mean * FIXED_SHARE / FIXED_PLACES as f64).min(0.95);
+        let each = (mean * FIXED_SHARE / f64::from(FIXED_PLACES)).min(0.95);
         for index in 0..self.fixed.len() {
             let (place, mut slow) = self.fixed[index];
             let value = slow.at(at_s, 3.0, &mut self.chance);
             self.fixed[index].1 = slow;
             // Present for a share of the time, in spells of some seconds.
-            if self.chance.happens(each) {
-                if let Some(shown) = self.show(0, place, 1.7) {
-                    let logit = FALSE_LOGIT.0 + FALSE_LOGIT.1 * value;
-                    found.extend(self.observe(shown.oriented, logit));
-                }
+            if self.chance.happens(each)
+                && let Some(shown) = self.show(0, place, 1.7)
+            {
+                let logit = FALSE_LOGIT.0 + FALSE_LOGIT.1 * value;
+                found.extend(self.observe(shown.oriented, logit));
             }
         }
         for _ in 0..self.chance.count(mean * (1.0 - FIXED_SHARE)) {
@@ -335,14 +335,14 @@ fn logit(probability: f64) -> f64 {
 fn quantile(probability: f64) -> f64 {
     let (mut low, mut high) = (-6.0, 6.0);
     for _ in 0..60 {
-        let middle = (low + high) / 2.0;
+        let middle = f64::midpoint(low, high);
         if distribution(middle) < probability {
             low = middle;
         } else {
             high = middle;
         }
     }
-    (low + high) / 2.0
+    f64::midpoint(low, high)
 }
 
 fn distribution(x: f64) -> f64 {

@@ -35,7 +35,7 @@ pub struct Person {
     pause_s: f64,
 }
 
-/// The persons in a hall; whoever reaches a door is replaced by a new person at another one.
+/// The persons in a hall. A new person comes through a door after another one has left.
 pub struct People {
     pub present: Vec<Person>,
     hall: Hall,
@@ -151,8 +151,8 @@ impl Hall {
 
     fn door(self, chance: &mut Chance) -> Vector2<f64> {
         let [x, y] = self.0.into();
-        // Two doors at either end.
-        let door_y = if chance.happens(0.5) { 0.5 } else { -0.5 };
+        // Wide openings at both ends.
+        let door_y = chance.uniform(-0.8, 0.8);
         let side = if chance.happens(0.5) { 1.0 } else { -1.0 };
         Vector2::new(side * x, door_y * y)
     }

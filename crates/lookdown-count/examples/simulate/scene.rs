@@ -7,7 +7,11 @@ use lookdown_count::{
 };
 use nalgebra::Vector2;
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    collections::{BTreeMap, HashMap},
+    fmt::Debug,
+    str::FromStr,
+};
 
 use crate::{
     chance::Chance,
@@ -49,16 +53,12 @@ impl Options {
             let value = arguments.next_if(|value| !value.starts_with("--"));
             given.insert(name, value.unwrap_or_default());
         }
-        let number = |name: &str, default: f64| {
-            let text = given.get(name);
-            text.map_or(default, |text| text.parse().expect("a number"))
-        };
         let detector = given.get("--detector").map_or("rendered", String::as_str);
         Self {
-            rate: number("--rate", 5.0),
-            seed: number("--seed", 1.0) as u64,
-            seconds: number("--seconds", 300.0),
-            persons: number("--persons", 8.0) as usize,
+            rate: number(given.get("--rate"), 5.0),
+            seed: number(given.get("--seed"), 1),
+            seconds: number(given.get("--seconds"), 300.0),
+            persons: number(given.get("--persons"), 8),
             figures: match detector {
                 "rendered" => RENDERED,
                 "photographs" => PHOTOGRAPHS,
@@ -74,6 +74,10 @@ impl Options {
     }
 }
 
+fn number<T: FromStr<Err: Debug>>(text: Option<&String>, default: T) -> T {
+    text.map_or(default, |text| text.parse().expect("a number"))
+}
+
 /// A tracker with its line.
 struct Follower {
     tracker: Tracker,
@@ -82,9 +86,9 @@ struct Follower {
 }
 
 impl Follower {
-    fn new(poses: &[CameraPose], line: Line, settings: TrackerSettings) -> Self {
+    fn new(poses: &[CameraPose], line: Line, settings: &TrackerSettings) -> Self {
         Self {
-            tracker: Tracker::new(poses, settings).expect("valid cameras"),
+            tracker: Tracker::new(poses, *settings).expect("valid cameras"),
             line: LineCounter::new(vec![line]).expect("a valid line"),
             crossings: Vec::new(),
         }
@@ -193,15 +197,15 @@ impl Scene {
             interval_s,
             now_s: 0.0,
             end_s: options.seconds,
-            site: Follower::new(&poses, line.clone(), options.settings),
+            site: Follower::new(&poses, line.clone(), &options.settings),
             separate: poses
                 .iter()
-                .map(|&pose| Follower::new(&[pose], line.clone(), options.settings))
+                .map(|&pose| Follower::new(&[pose], line.clone(), &options.settings))
                 .collect(),
             bearing: Follower::new(
                 &[CameraPose::alone(None)],
                 frame_line(&cameras[0], hall.y),
-                options.settings,
+                &options.settings,
             ),
             cameras,
             sides: BTreeMap::new(),
@@ -233,7 +237,7 @@ impl Scene {
         let mut truth = Vec::new();
         let mut shown: Vec<Shown> = Vec::new();
         for person in &self.people.present {
-            let place = camera.from_site(person.place);
+            let place = camera.floor_of_site(person.place);
             let in_sight = (place.norm() <= SIGHT_M).then_some(());
             let seen = in_sight.and_then(|()| camera.show(person.id, place, person.height_m));
             if let Some(seen) = seen {
@@ -313,7 +317,7 @@ fn floor_line(half_m: f64) -> Line {
 fn frame_line(camera: &Camera, half_m: f64) -> Line {
     let steps = (0..=40).map(|step| half_m * (f64::from(step) / 20.0 - 1.0));
     let pixels = steps.filter_map(|y| {
-        let pixel = camera.pixel_of_floor(camera.from_site(Vector2::new(LINE_X_M, y)))?;
+        let pixel = camera.pixel_of_floor(camera.floor_of_site(Vector2::new(LINE_X_M, y)))?;
         Some([pixel.x, pixel.y])
     });
     Line {

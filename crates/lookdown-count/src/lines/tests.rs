@@ -86,30 +86,30 @@ fn a_step_through_a_corner_counts_once() {
 fn a_tracked_walk_is_counted_once() {
     let mut tracker = floor_tracker();
     let mut counter = LineCounter::new(vec![long()]).unwrap();
-    let mut counted = Vec::new();
+    let mut found = Vec::new();
     for frame in 0..60 {
         let at_s = f64::from(frame) / 10.0;
         tracker.update(0, at_s, &[person(at_s - 3.0, 1.0)]).unwrap();
-        counted.extend(counter.update(tracker.tracks()));
+        found.extend(counter.update(tracker.tracks()));
     }
-    assert_eq!(counted.len(), 1);
-    assert_eq!((counted[0].line, counted[0].direction), (0, Direction::Out));
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].line, found[0].direction), (0, Direction::Out));
 }
 
 #[test]
 fn a_resumed_counter_completes_a_pending_crossing() {
     let mut tracker = floor_tracker();
     let mut counter = LineCounter::new(vec![long()]).unwrap();
-    let mut counted = 0;
+    let mut sum = 0;
     for frame in 0..60 {
         let at_s = f64::from(frame) / 10.0;
         tracker.update(0, at_s, &[person(at_s - 3.0, 1.0)]).unwrap();
-        counted += counter.update(tracker.tracks()).len();
+        sum += counter.update(tracker.tracks()).len();
         let text = serde_json::to_string(counter.state()).unwrap();
         let state = serde_json::from_str(&text).unwrap();
         counter = LineCounter::resumed(vec![long()], state).unwrap();
     }
-    assert_eq!(counted, 1);
+    assert_eq!(sum, 1);
 }
 
 #[test]

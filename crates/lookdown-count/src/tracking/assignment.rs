@@ -31,8 +31,8 @@ pub(super) fn best_pairs(
     let ordered = |(a, b): (usize, usize)| if swap { (b, a) } else { (a, b) };
     let weights = Matrix::from_fn(short, long, |cell| {
         let (row, column) = ordered(cell);
-        // Not a number counts as no gain.
-        (gain(row, column).max(0.0).min(MAX_GAIN) * GAIN_STEPS).round() as i64
+        // A gain that is not a number is none: the conversion makes it 0.
+        (gain(row, column).clamp(0.0, MAX_GAIN) * GAIN_STEPS).round() as i64
     });
     let (_, matched) = kuhn_munkres(&weights);
     let cells = matched.into_iter().enumerate();
@@ -40,4 +40,54 @@ pub(super) fn best_pairs(
         .filter(|&cell| weights[cell] > 0)
         .map(ordered)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn sum(gains: &[Vec<f64>], pairs: &[(usize, usize)]) -> f64 {
+        pairs.iter().map(|&(row, column)| gains[row][column]).sum()
+    }
+
+    /// The greatest sum of gains by trying every assignment of the rows from `row` on.
+    fn greatest(gains: &[Vec<f64>], row: usize, taken: &mut Vec<usize>) -> f64 {
+        let Some(columns) = gains.get(row) else {
+            return 0.0;
+        };
+        let mut best = greatest(gains, row + 1, taken);
+        for (column, gain) in columns.iter().enumerate() {
+            if *gain > 0.0 && !taken.contains(&column) {
+                taken.push(column);
+                best = best.max(gain + greatest(gains, row + 1, taken));
+                taken.pop();
+            }
+        }
+        best
+    }
+
+    #[test]
+    fn nothing_is_paired_without_a_gain() {
+        assert_eq!(best_pairs(2, 3, |_, _| -1.0), []);
+        assert_eq!(best_pairs(2, 3, |_, _| f64::NAN), []);
+        assert_eq!(best_pairs(0, 3, |_, _| 1.0), []);
+        assert_eq!(best_pairs(3, 0, |_, _| 1.0), []);
+    }
+
+    proptest! {
+        #[test]
+        fn pairs_have_the_greatest_sum_of_gains(
+            (rows, columns, gains) in (1..5_usize, 1..5_usize).prop_flat_map(|(rows, columns)| {
+                let row = prop::collection::vec(-5.0..10.0_f64, columns);
+                (Just(rows), Just(columns), prop::collection::vec(row, rows))
+            }),
+        ) {
+            let pairs = best_pairs(rows, columns, |row, column| gains[row][column]);
+            let best = greatest(&gains, 0, &mut Vec::new());
+            prop_assert!((sum(&gains, &pairs) - best).abs() < 1e-4);
+            prop_assert!(pairs.iter().all(|&(row, column)| gains[row][column] > 0.0));
+        }
+    }
 }

@@ -30,13 +30,13 @@ pub struct EvidenceSettings {
 impl Default for EvidenceSettings {
     fn default() -> Self {
         Self {
-            start: -1.0,
-            hit: 1.0,
-            miss: -1.5,
-            confirm: 2.5,
+            start: -0.9,
+            hit: 1.05,
+            miss: -1.7,
+            confirm: 3.6,
             end: -3.0,
             most: 8.0,
-            independent_s: 0.4,
+            independent_s: 0.3,
         }
     }
 }
@@ -65,13 +65,18 @@ impl Evidence {
         self.0 += settings.miss * weight(interval_s, settings);
     }
 
+    /// Returns the logarithm of the probability that the track is a person who is still there.
+    pub fn log_probability(self) -> f64 {
+        -(-self.0).exp().ln_1p()
+    }
+
     /// Returns true when the track is a person.
-    pub fn confirms(&self, settings: &EvidenceSettings) -> bool {
+    pub fn confirms(self, settings: &EvidenceSettings) -> bool {
         self.0 >= settings.confirm
     }
 
     /// Returns true when the track is none.
-    pub fn refutes(&self, settings: &EvidenceSettings) -> bool {
+    pub fn refutes(self, settings: &EvidenceSettings) -> bool {
         self.0 < settings.end
     }
 }
@@ -84,4 +89,49 @@ fn weight(interval_s: f64, settings: &EvidenceSettings) -> f64 {
 pub(super) fn log_odds(score: f64) -> f64 {
     let odds = score / (1.0 - score);
     odds.ln().clamp(-SCORE_LIMIT, SCORE_LIMIT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(hits: u32, misses: u32, interval_s: f64) -> Evidence {
+        let settings = EvidenceSettings::default();
+        let mut evidence = Evidence::first(0.9, &settings);
+        for _ in 0..hits {
+            evidence.add_hit(0.9, interval_s, &settings);
+        }
+        for _ in 0..misses {
+            evidence.add_miss(interval_s, &settings);
+        }
+        evidence
+    }
+
+    #[test]
+    fn one_clear_person_a_second_confirms_at_the_second() {
+        let settings = EvidenceSettings::default();
+        assert!(!after(0, 0, 1.0).confirms(&settings));
+        assert!(after(1, 0, 1.0).confirms(&settings));
+    }
+
+    #[test]
+    fn frames_in_quick_succession_count_less() {
+        let settings = EvidenceSettings::default();
+        assert!(!after(1, 0, 0.1).confirms(&settings));
+        assert!(after(3, 0, 0.1).confirms(&settings));
+    }
+
+    #[test]
+    fn misses_refute_a_track() {
+        let settings = EvidenceSettings::default();
+        assert!(!after(3, 4, 1.0).refutes(&settings));
+        assert!(after(3, 7, 1.0).refutes(&settings));
+        assert!(after(3, 7, 1.0).log_probability() < after(3, 0, 1.0).log_probability());
+    }
+
+    #[test]
+    fn scores_of_zero_and_one_are_finite() {
+        assert_eq!(log_odds(0.0), -SCORE_LIMIT);
+        assert_eq!(log_odds(1.0), SCORE_LIMIT);
+    }
 }

@@ -149,3 +149,43 @@ impl From<Kalman> for Stored {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn filter() -> Kalman {
+        Kalman::new(Vector2::new(1.0, 2.0), &Matrix2::identity(), 1.0)
+    }
+
+    #[test]
+    fn two_short_steps_are_one_long_step() {
+        let twice = filter().predicted(0.3, 0.7).predicted(0.9, 0.7);
+        let once = filter().predicted(1.2, 0.7);
+        assert!((twice.covariance - once.covariance).norm() < 1e-12);
+        assert!((twice.mean - once.mean).norm() < 1e-12);
+    }
+
+    #[test]
+    fn measurements_reveal_the_velocity() {
+        let mut filter = filter();
+        let noise = Matrix2::identity() * 0.01;
+        for step in 1..20 {
+            filter = filter.predicted(0.1, 0.1);
+            let at_s = f64::from(step) * 0.1;
+            filter.update(Vector2::new(1.0 + 1.5 * at_s, 2.0 - at_s), &noise, 0.0);
+        }
+        assert!((filter.velocity() - Vector2::new(1.5, -1.0)).norm() < 0.1);
+        assert!(filter.place_covariance().trace() < 0.02);
+    }
+
+    #[test]
+    fn a_late_measurement_is_compared_with_the_past() {
+        let mut filter = filter();
+        filter.mean = Vector4::new(1.0, 2.0, 2.0, 0.0);
+        let past = Vector2::new(0.0, 2.0);
+        let innovation = filter.innovation(past, &Matrix2::identity(), 0.5);
+        assert!(innovation.residual.norm() < 1e-12);
+        assert_eq!(innovation.squared_distance(), 0.0);
+    }
+}

@@ -24,6 +24,13 @@ pub(super) struct Extents {
     pub across: f64,
 }
 
+impl Extents {
+    /// Returns true for an offset within the ellipse of these semi-axes.
+    fn holds(&self, along: f64, across: f64) -> bool {
+        (along / self.along).hypot(across / self.across) < 1.0
+    }
+}
+
 /// A measured place, its error and its score.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Measurement {
@@ -59,14 +66,17 @@ impl Measurement {
         let distrust = distrust(person.score, noise);
         let radial_m = noise.angle_deg.to_radians() * slant_squared / height_m;
         let across_m = noise.across_deg.to_radians() * slant_squared.sqrt();
+        // Below the camera the box has no lower end: its axis turns with every small error.
+        let below_m = noise.below_m * (1.0 - range / noise.below_range_m).max(0.0);
+        let body_m = noise.body_m.hypot(below_m);
         let [x, y] = camera.turned_to_site(outward.into());
-        let axis = foot + outward * noise.foot_offset_m;
+        let axis = foot + outward * noise.foot_offset_m.min(range);
         Some(Self {
             place: Place::Floor(camera.to_site(axis.into()).into()),
             radial: Vector3::new(x, y, 0.0),
             deviation: Extents {
-                along: noise.body_m.hypot(radial_m) * distrust,
-                across: noise.body_m.hypot(across_m) * distrust,
+                along: body_m.hypot(radial_m) * distrust,
+                across: body_m.hypot(across_m) * distrust,
             },
             same_person: Extents {
                 along: noise.same_person_m + noise.same_person_share * range,
@@ -111,11 +121,26 @@ impl Measurement {
         Matrix2::identity() * across.powi(2) + outer * (along.powi(2) - across.powi(2))
     }
 
+    /// Returns true when this may be a further box of the person that another measurement shows.
+    pub fn is_part_of(&self, other: &Self) -> bool {
+        let away = match (&self.place, &other.place) {
+            (Place::Floor(place), Place::Floor(other)) => {
+                let away = place - other;
+                Vector3::new(away.x, away.y, 0.0)
+            }
+            (Place::Bearing(place), Place::Bearing(other)) => {
+                place.into_inner() - other.into_inner()
+            }
+            _ => return false,
+        };
+        let along = away.dot(&self.radial);
+        let across = (away.norm_squared() - along.powi(2)).max(0.0).sqrt();
+        self.same_person.holds(along, across)
+    }
+
     /// Returns true when a place this far away may be the same person once more.
     pub fn is_same_person(&self, away: Vector2<f64>, radial: &Unit<Vector2<f64>>) -> bool {
-        let along = away.dot(radial) / self.same_person.along;
-        let across = away.perp(radial) / self.same_person.across;
-        along.hypot(across) < 1.0
+        self.same_person.holds(away.dot(radial), away.perp(radial))
     }
 }
 

@@ -28,14 +28,14 @@ pub(super) struct Motion {
 
 impl Motion {
     /// Returns the motion of a new track at its first measurement.
-    pub fn new(measured: &Measurement, at_s: f64, plane: &PlaneSettings) -> Self {
+    pub fn new(measured: &Measurement, at_s: f64, settings: &PlaneSettings) -> Self {
         let tangent = match &measured.place {
             Place::Floor(_) => None,
             Place::Bearing(direction) => Some(stored(&rotation_to(direction))),
         };
         let (place, noise) = local(tangent, measured);
         Self {
-            kalman: Kalman::new(place, &noise, plane.velocity_sd),
+            kalman: Kalman::new(place, &noise, settings.velocity_sd),
             tangent,
             at_s,
         }
@@ -79,9 +79,9 @@ impl Motion {
         &self,
         measured: &Measurement,
         at_s: f64,
-        plane: &PlaneSettings,
+        settings: &PlaneSettings,
     ) -> Innovation {
-        let (filter, lag) = self.filter_at(at_s, plane);
+        let (filter, lag) = self.filter_at(at_s, settings);
         let (place, noise) = local(self.tangent, measured);
         filter.innovation(place, &noise, lag)
     }
@@ -94,8 +94,8 @@ impl Motion {
     }
 
     /// Updates the state with a measurement taken at `at_s`.
-    pub fn update(&mut self, measured: &Measurement, at_s: f64, plane: &PlaneSettings) {
-        let (mut filter, lag) = self.filter_at(at_s, plane);
+    pub fn update(&mut self, measured: &Measurement, at_s: f64, settings: &PlaneSettings) {
+        let (mut filter, lag) = self.filter_at(at_s, settings);
         let (place, noise) = local(self.tangent, measured);
         filter.update(place, &noise, lag);
         self.at_s = self.at_s.max(at_s);
@@ -108,10 +108,13 @@ impl Motion {
     }
 
     /// Returns the filter at `at_s`, or at the state's time with the lag of an earlier `at_s`.
-    fn filter_at(&self, at_s: f64, plane: &PlaneSettings) -> (Kalman, f64) {
+    fn filter_at(&self, at_s: f64, settings: &PlaneSettings) -> (Kalman, f64) {
         let dt = at_s - self.at_s;
         if dt >= 0.0 {
-            (self.kalman.predicted(dt, plane.acceleration_density), 0.0)
+            (
+                self.kalman.predicted(dt, settings.acceleration_density),
+                0.0,
+            )
         } else {
             (self.kalman, -dt)
         }

@@ -14,6 +14,8 @@ pub struct TrackerSettings {
     pub low_score: f64,
     /// Least score of a person that starts a track.
     pub new_track_score: f64,
+    /// Persons below this score are ignored in line with a person of a higher score.
+    pub least_score_in_line: f64,
     /// Least score of a person that starts a track in line with a person already tracked.
     pub new_track_score_in_line: f64,
     /// A confirmed track ends after this many seconds without a person, and `max_missed` misses.
@@ -44,6 +46,10 @@ pub struct TrackerSettings {
 pub struct MeasurementNoise {
     /// Distance of the foot point from the place of the body, metres.
     pub body_m: f64,
+    /// Added to it straight below the camera, metres.
+    pub below_m: f64,
+    /// Distance from the point below the camera at which nothing is added, metres.
+    pub below_range_m: f64,
     /// Angle of the foot point off the axis, degrees.
     pub angle_deg: f64,
     /// Angle of the foot point around the axis, degrees.
@@ -90,10 +96,11 @@ impl TrackerSettings {
 impl Default for TrackerSettings {
     fn default() -> Self {
         Self {
-            high_score: 0.5,
-            low_score: 0.1,
-            new_track_score: 0.4,
-            new_track_score_in_line: 0.8,
+            high_score: 0.1,
+            low_score: 0.06,
+            new_track_score: 0.35,
+            least_score_in_line: 0.6,
+            new_track_score_in_line: 0.85,
             max_unseen_s: 2.0,
             max_missed: 3,
             max_silent_s: 10.0,
@@ -103,14 +110,14 @@ impl Default for TrackerSettings {
             noise: MeasurementNoise::default(),
             evidence: EvidenceSettings::default(),
             floor: PlaneSettings {
-                acceleration_density: 0.6,
-                velocity_sd: 1.0,
+                acceleration_density: 0.7,
+                velocity_sd: 1.2,
                 clutter_density: 0.02,
             },
             bearing: PlaneSettings {
-                acceleration_density: 0.05,
-                velocity_sd: 0.3,
-                clutter_density: 0.5,
+                acceleration_density: 0.038,
+                velocity_sd: 0.35,
+                clutter_density: 0.15,
             },
         }
     }
@@ -119,17 +126,19 @@ impl Default for TrackerSettings {
 impl Default for MeasurementNoise {
     fn default() -> Self {
         Self {
-            body_m: 0.1,
-            angle_deg: 0.8,
-            across_deg: 0.4,
+            body_m: 0.08,
+            below_m: 0.25,
+            below_range_m: 0.8,
+            angle_deg: 1.5,
+            across_deg: 0.3,
             foot_offset_m: 0.12,
-            bearing_along_deg: 1.5,
+            bearing_along_deg: 1.3,
             bearing_across_deg: 0.8,
-            low_score_factor: 1.0,
-            same_person_m: 0.3,
-            same_person_share: 0.3,
+            low_score_factor: 2.0,
+            same_person_m: 0.4,
+            same_person_share: 0.16,
             same_person_along_deg: 12.0,
-            same_person_across_deg: 4.0,
+            same_person_across_deg: 4.3,
         }
     }
 }

@@ -179,6 +179,7 @@ impl Track {
     }
 
     /// Returns the last places, oldest first, at most [`MAX_TAIL_POINTS`].
+    #[must_use]
     pub fn tail(&self) -> impl ExactSizeIterator<Item = &TailPoint> {
         self.tail.iter()
     }

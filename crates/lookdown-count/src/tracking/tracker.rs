@@ -201,37 +201,52 @@ impl Tracker {
             })
         });
         candidates.truncate(MAX_PERSONS);
-        candidates
+        self.drop_parts(candidates)
     }
 
-    /// Continues tracks with persons; returns true for each candidate that continued one.
+    /// Drops weak persons that may be a part of a stronger one, or the same one again. They come in
+    /// order of falling scores.
+    fn drop_parts<'a>(&self, candidates: Vec<Candidate<'a>>) -> Vec<Candidate<'a>> {
+        let mut kept: Vec<Candidate> = Vec::new();
+        for candidate in candidates {
+            let one = &candidate.measured;
+            let is_weak = one.score < self.settings.least_score_in_line;
+            if !is_weak || !kept.iter().any(|other| one.is_part_of(&other.measured)) {
+                kept.push(candidate);
+            }
+        }
+        kept
+    }
+
+    /// Continues tracks with persons in the three steps of `ByteTrack`: high scores, low scores, then
+    /// tracks without confirmation. Returns true for each candidate that continued a track.
     fn associate(&mut self, report: &Report, candidates: &[Candidate]) -> Vec<bool> {
         let high = self.settings.high_score;
         let mut used = vec![false; candidates.len()];
-        let mut continued = vec![false; self.tracks.len()];
-        // ByteTrack's three steps: high scores, low scores, then tracks without confirmation.
-        let steps: [(bool, fn(f64, f64) -> bool); 3] = [
-            (true, |score, high| score >= high),
-            (true, |score, high| score < high),
-            (false, |_, _| true),
-        ];
-        for (confirmed, admits) in steps {
+        for (confirmed, scores) in [
+            (true, high..=f64::INFINITY),
+            (true, f64::NEG_INFINITY..=high),
+            (false, f64::NEG_INFINITY..=f64::INFINITY),
+        ] {
             let rows: Vec<usize> = (0..self.tracks.len())
-                .filter(|&row| !continued[row] && self.tracks[row].is_confirmed() == confirmed)
+                .filter(|&row| {
+                    let track = &self.tracks[row];
+                    track.is_confirmed() == confirmed && !report.shows(track)
+                })
                 .collect();
             let columns: Vec<usize> = (0..candidates.len())
-                .filter(|&column| !used[column] && admits(candidates[column].measured.score, high))
+                .filter(|&column| {
+                    !used[column] && scores.contains(&candidates[column].measured.score)
+                })
                 .collect();
             let pairs = best_pairs(rows.len(), columns.len(), |row, column| {
                 let track = &self.tracks[rows[row]];
                 self.gain(track, &candidates[columns[column]].measured, report.at_s)
             });
             for (row, column) in pairs {
-                let (row, column) = (rows[row], columns[column]);
-                let seen = report.sighting(&candidates[column]);
-                self.tracks[row].update(&seen, &self.settings);
-                continued[row] = true;
-                used[column] = true;
+                let seen = report.sighting(&candidates[columns[column]]);
+                self.tracks[rows[row]].update(&seen, &self.settings);
+                used[columns[column]] = true;
             }
         }
         used
@@ -247,7 +262,8 @@ impl Tracker {
             return -1.0;
         }
         let is_person = self.settings.score_share * log_odds(measured.score);
-        innovation.log_density() - plane.clutter_density.ln() + is_person
+        let is_there = track.evidence.log_probability();
+        innovation.log_density() - plane.clutter_density.ln() + is_person + is_there
     }
 
     fn start_tracks(&mut self, report: &Report, candidates: &[Candidate], used: &[bool]) {
