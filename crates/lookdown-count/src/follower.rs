@@ -104,9 +104,11 @@ impl Follower {
                     Err(error) => return error,
                 },
                 () = stopped(&mut stop) => return StreamError::stopped(),
-                () = sleep_until(next_tick) => {
-                    next_tick = Instant::now() + TICK;
-                    self.tick().await;
+                () = sleep_until(next_tick.min(self.next_commit)) => {
+                    if Instant::now() >= next_tick {
+                        next_tick = Instant::now() + TICK;
+                        self.tick().await;
+                    }
                 }
             }
             if Instant::now() >= self.next_commit || !self.messages.is_empty() {

@@ -93,7 +93,7 @@ async fn with_companion<T>(
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
     let companion = Companion {
         url: format!("http://{address}"),
-        client: Client::builder().no_proxy().build().unwrap(),
+        client: lookdown_client::client_builder().build().unwrap(),
     };
     let mut outcome = None;
     let stop = async {
@@ -298,7 +298,7 @@ async fn a_person_in_two_views_of_a_site_counts_once() {
             )
             .await;
         assert_eq!(svg.matches("<circle").count(), 1, "{svg}");
-        assert!(svg.contains("cx=\"11.0"), "{svg}");
+        assert!(svg.contains("cx=\"11.1"), "{svg}");
         let (_, metrics) = companion.get("/metrics").await;
         assert!(
             metrics.contains("lookdown_count_site_persons{site=\"ground\"} 1"),
