@@ -31,7 +31,7 @@ pub(crate) struct DefinitionKey {
     pub(crate) height: u32,
 }
 
-/// What is counted for a camera.
+/// The lines and zones of a camera, and its place.
 #[derive(Debug, Clone)]
 pub(crate) struct CameraDefinition {
     pub(crate) key: DefinitionKey,

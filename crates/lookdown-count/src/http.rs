@@ -171,6 +171,3 @@ async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Problem> {
         )),
     })
 }
-
-#[cfg(test)]
-mod tests;

@@ -11,7 +11,8 @@ use std::{
     fs::{File, OpenOptions, TryLockError},
     path::{Path, PathBuf},
     sync::Arc,
-    time::Duration,
+    thread::sleep,
+    time::{Duration, Instant},
 };
 
 use parking_lot::Mutex;
@@ -21,6 +22,9 @@ pub(crate) use read::{Span, Step, StoredCalibrations};
 
 /// Longest wait for the other connection.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+/// Longest wait for an earlier user of the store, and the interval of the attempts.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(5);
+const LOCK_PAUSE: Duration = Duration::from_millis(50);
 
 /// A store that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -104,7 +108,8 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
     Ok(connection)
 }
 
-/// Locks the file beside the store.
+/// Locks the file beside the store. Waits for a process that ends, and for requests that end with
+/// earlier settings.
 fn lock(path: &Path) -> Result<File, StoreError> {
     let mut name = path.as_os_str().to_owned();
     name.push(".lock");
@@ -118,10 +123,14 @@ fn lock(path: &Path) -> Result<File, StoreError> {
         problem: problem.to_string(),
     };
     let file = opened.map_err(unusable)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::InUse(path.to_owned())),
-        Err(TryLockError::Error(problem)) => Err(unusable(problem)),
+    let started = Instant::now();
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(file),
+            Err(TryLockError::WouldBlock) if started.elapsed() < LOCK_TIMEOUT => sleep(LOCK_PAUSE),
+            Err(TryLockError::WouldBlock) => return Err(StoreError::InUse(path.to_owned())),
+            Err(TryLockError::Error(problem)) => return Err(unusable(problem)),
+        }
     }
 }
 

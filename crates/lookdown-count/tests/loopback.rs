@@ -248,6 +248,9 @@ async fn tracks_are_current_and_anonymous() {
             .await;
         assert_eq!(tracks["is_current"], true);
         assert_eq!(tracks["zones"][0]["persons"], 1);
+        let door = &tracks["lines"][0];
+        assert_eq!(door["crossings"]["in"], 0);
+        assert_eq!(door["outline_px"].as_array().unwrap().len(), 17);
         let track = tracks["tracks"][0].as_object().unwrap();
         let keys: Vec<_> = track.keys().map(String::as_str).collect();
         let expected = [

@@ -1,5 +1,7 @@
 //! The current tracks, with their last places.
 
+use std::collections::BTreeMap;
+
 use axum::{
     Json,
     extract::{Path, State},
@@ -11,13 +13,17 @@ use serde_json::{Value, json};
 use super::{Problem, Shared, check_known, now_ms};
 use crate::{
     engine::Engine,
-    scene::Scene,
+    scene::{Scene, SceneCamera},
+    snapshot::LineSnapshot,
     sums::Owner,
     tracking::{Plane, TailPoint, Track},
 };
 
 /// Longest tail of an answer, seconds.
 const TAIL_S: f64 = 5.0;
+
+/// Parts of a line in the frame: a straight line on the floor is a curve there.
+const OUTLINE_SEGMENTS: u32 = 16;
 
 /// The current tracks of a camera or a site.
 #[derive(Serialize)]
@@ -84,8 +90,8 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
         _ => true,
     });
     let snapshot = camera.and_then(|name| {
-        let snapshot = engine.snapshot(now_ms).cameras.into_iter();
-        snapshot.into_iter().find(|camera| camera.name == name)
+        let mut cameras = engine.snapshot(now_ms).cameras.into_iter();
+        cameras.find(|camera| camera.name == name)
     });
     let (lines, zones) = snapshot
         .map(|camera| (camera.lines, camera.zones))
@@ -96,13 +102,12 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
             .and_then(|last_ms| Timestamp::from_millisecond(last_ms).ok()),
         tracks: seen.filter(|_| is_current).map(|track| row(track, is_site)).collect(),
         is_current,
-        lines: lines
-            .into_iter()
-            .map(|line| json!({ "line": line.line, "direction": line.direction, "crossings": line.crossings }))
-            .collect(),
+        lines: of_camera.map_or_else(Vec::new, |(_, camera)| line_rows(camera, &lines)),
         zones: zones
             .into_iter()
-            .map(|zone| json!({ "zone": zone.zone, "persons": zone.persons, "entries": zone.entries }))
+            .map(|zone| {
+                json!({ "zone": zone.zone, "persons": zone.persons, "entries": zone.entries })
+            })
             .collect(),
     }
 }
@@ -118,6 +123,30 @@ impl Tracks {
             zones: Vec::new(),
         }
     }
+}
+
+/// Returns the lines with their totals and their places in the frame.
+fn line_rows(camera: &SceneCamera, totals: &[LineSnapshot]) -> Vec<Value> {
+    let geometry = camera.definition.geometry.as_ref();
+    let lines = geometry.into_iter().flat_map(|geometry| {
+        let lines = geometry.areas.lines.iter();
+        lines.map(|line| {
+            (
+                line,
+                line.outline(&geometry.lens, &geometry.mount, OUTLINE_SEGMENTS),
+            )
+        })
+    });
+    let rows = lines.map(|(line, outline)| {
+        let of_line = totals.iter().filter(|total| total.line == line.name);
+        let crossings: BTreeMap<_, _> = of_line
+            .map(|total| (total.direction.as_str(), total.crossings))
+            .collect();
+        let outline = outline.into_iter().flatten();
+        let outline: Vec<_> = outline.map(|point| rounded([point.x, point.y])).collect();
+        json!({ "line": line.name, "crossings": crossings, "outline_px": outline })
+    });
+    rows.collect()
 }
 
 fn row(track: &Track, is_site: bool) -> TrackRow {
