@@ -126,7 +126,8 @@ impl CountsPublisher {
         }
         let mut published = Retained::new();
         loop {
-            let wanted = self.retained(&self.snapshots.borrow_and_update().clone());
+            let snapshot = self.snapshots.borrow_and_update().clone();
+            let wanted = self.retained(&snapshot);
             session.publish(changes(&published, &wanted)).await?;
             published = wanted;
             tokio::select! {

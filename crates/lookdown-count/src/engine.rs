@@ -9,8 +9,8 @@ use crate::{
     definition::{CameraDefinition, DefinitionKey},
     report::Report,
     scene::{NamedCrossing, Scene, SceneState},
-    sums::{LineDirection, Owner, Sums, ZoneOf},
-    tracking::TrackerSettings,
+    sums::{DAY_MS, LineDirection, Owner, Sums, ZoneOf},
+    tracking::{MAX_CAMERAS, TrackerSettings},
 };
 
 /// The limits of counting.
@@ -190,7 +190,9 @@ impl Engine {
                 return Some(owner);
             }
         }
-        if before.is_none() && self.owners.len() >= self.options.max_cameras {
+        let is_full = before.is_none() && self.owners.len() >= self.options.max_cameras;
+        let site = self.scenes.get(&owner);
+        if is_full || site.is_some_and(|site| site.cameras.len() >= MAX_CAMERAS) {
             return None;
         }
         if let Some(before) = before {
@@ -201,6 +203,32 @@ impl Engine {
         });
         self.owners.insert(camera.to_owned(), owner.clone());
         Some(owner)
+    }
+
+    /// Removes cameras without a report in the day before the newest report, so that others have
+    /// their place. Their counts stay in the store.
+    pub(crate) fn forget_silent(&mut self) {
+        let cameras = self.scenes.values().flat_map(|scene| {
+            let cameras = scene.cameras.iter();
+            cameras.map(|camera| {
+                (
+                    scene.owner.clone(),
+                    camera.name.clone(),
+                    camera.presence().last_ms,
+                )
+            })
+        });
+        let cameras: Vec<_> = cameras.collect();
+        let newest = cameras.iter().filter_map(|(.., last_ms)| *last_ms).max();
+        for (owner, camera, last_ms) in cameras {
+            if newest.is_none_or(|newest| last_ms.is_some_and(|last| newest - last <= DAY_MS)) {
+                continue;
+            }
+            tracing::info!(camera, "no longer followed: it has had no report for a day");
+            self.owners.remove(&camera);
+            self.rebuild(&owner, |cameras| drop(cameras.remove(&camera)));
+            self.has_news = true;
+        }
     }
 
     /// Creates a scene again with other cameras. Its tracks end.

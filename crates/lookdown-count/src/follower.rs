@@ -193,6 +193,7 @@ impl Follower {
         }
         if Instant::now() >= self.next_expiry {
             self.next_expiry = Instant::now() + EXPIRY;
+            self.engine.lock().forget_silent();
             let age_ms = i64::try_from(self.retention.as_millis()).unwrap_or(i64::MAX);
             let store = self.store.clone();
             let expired = spawn_blocking(move || store.expire(now_ms.saturating_sub(age_ms))).await;
