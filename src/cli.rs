@@ -2,6 +2,7 @@
 
 mod annotate;
 mod calibration;
+mod count;
 mod detect;
 mod eval;
 mod health;
@@ -41,6 +42,8 @@ enum Command {
     Serve(serve::Arguments),
     /// Send frames of cameras to a server: snapshots, MJPEG, RTSP, folders, video files
     Watch(Box<watch::Arguments>),
+    /// Count persons over time: tracks, lines, zones, sites, from the reports of a server
+    Count(count::Arguments),
     /// Check that the server with these settings on this machine is ready: exits with 0 or 1
     Health(health::Arguments),
     /// Detect the persons in images: one JSON report per line on standard output
@@ -76,6 +79,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
     let outcome = match parse(arguments, commit).command {
         Command::Serve(arguments) => serve::run(&arguments, commit),
         Command::Watch(arguments) => watch::run(&arguments, commit),
+        Command::Count(arguments) => count::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Detect(arguments) => detect::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),

@@ -7,6 +7,7 @@
 mod broker;
 mod cameras;
 mod connection;
+mod counts;
 mod discovery;
 mod message;
 mod publisher;
@@ -14,4 +15,5 @@ mod session;
 mod topics;
 
 pub use broker::{Broker, BrokerError};
+pub use counts::{CountsOptions, CountsPublisher};
 pub use publisher::{MqttOptions, Publisher};

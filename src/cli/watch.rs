@@ -9,7 +9,8 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_watch::{CameraEntry, Origin, ServerEntry, Transport, WatchOptions, watch};
+use lookdown_client::ServerEntry;
+use lookdown_watch::{CameraEntry, Origin, Transport, WatchOptions, watch};
 use tokio::{runtime, time::sleep};
 
 use super::{SettingsFile, serve};

@@ -243,6 +243,8 @@ const MAY_USE_CRATE: [(&str, &[&str]); 29] = [
             "mqtt",
         ],
     ),
+    ("lookdown_client", &["cli"]),
+    ("lookdown_count", &["cli", "mqtt"]),
     ("lookdown_watch", &["cli"]),
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),

@@ -89,7 +89,7 @@ pub enum LineError {
 }
 
 /// The lines over the tracks of one tracker.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LineCounter {
     lines: Vec<Line>,
     state: LineState,

@@ -67,7 +67,7 @@ pub enum ZoneError {
 }
 
 /// The zones over the tracks of one tracker.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ZoneCounter {
     zones: Vec<Zone>,
     hold_s: f64,

@@ -9,6 +9,7 @@ pub mod formats;
 mod id;
 pub mod native;
 mod plausibility;
+mod site;
 mod warnings;
 
 pub use areas::Areas;

@@ -6,6 +6,7 @@
 //! * Boxes are corner-origin: pixel `i` covers `[i, i + 1)`. [`pixels`] crosses the half pixel.
 //! * Angles are radians; `theta` is the angle from the optical axis.
 
+pub mod counting_line;
 pub mod crop_placement;
 pub mod floor;
 pub mod footprint;
@@ -16,17 +17,20 @@ pub mod mount;
 pub mod oriented_box;
 pub mod pixels;
 pub mod polygon;
+pub mod site_placement;
 pub mod view_plan;
 pub mod virtual_view;
 pub mod zone;
 pub mod zoom;
 
+pub use counting_line::{CountingLine, LineEnds};
 pub use footprint::{BackProjection, Footprint};
 pub use frame_crop::{FrameCrop, QuarterTurn};
 pub use lens::{Lens, LensError};
 pub use mount::Mount;
 pub use oriented_box::OrientedBox;
 pub use polygon::{Polygon, PolygonError};
+pub use site_placement::SitePlacement;
 pub use view_plan::{FieldOfViewReading, ViewPlan};
 pub use virtual_view::VirtualView;
 pub use zone::{Zone, ZoneArea};

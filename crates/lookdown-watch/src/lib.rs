@@ -4,14 +4,12 @@
 //! posts it to `/detect` at an interval. All state is bounded, so one camera never slows another.
 //! This crate is a client of the public HTTP API. It does not depend on the server.
 
-mod backoff;
 mod camera;
 mod config;
 mod credentials;
 mod ffmpeg;
 mod frame;
 mod location;
-mod log_once;
 mod metrics;
 mod metrics_server;
 mod pace;
@@ -20,19 +18,15 @@ mod server;
 mod slot;
 mod source;
 mod stderr_line;
-mod text;
 mod video;
 mod watcher;
 
 pub use camera::{Camera, Transport, VideoOptions};
-pub use config::{
-    CameraEntry, ConfigError, ServerEntry, ServerOptions, WatchOptions, load, parse_duration,
-};
+pub use config::{CameraEntry, WatchOptions, load, parse_duration};
 pub use credentials::Credentials;
 pub use frame::{Frame, FrameError, ImageFormat, MAX_FRAME_BYTES};
 pub use location::{InvalidLocation, Location};
 pub use metrics::Metrics;
-pub use server::ClientError;
 pub use source::{ImageReader, SourceError};
 pub use video::{VideoFrames, VideoWriter, video_duration};
 pub use watcher::{Origin, WatchError, watch};

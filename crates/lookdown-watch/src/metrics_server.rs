@@ -1,6 +1,6 @@
 //! The HTTP server of the metrics.
 
-use std::{convert::Infallible, net::SocketAddr, sync::Arc, time::Duration};
+use std::{convert::Infallible, sync::Arc};
 
 use bytes::Bytes;
 use http_body_util::Full;
@@ -8,64 +8,20 @@ use hyper::{
     Method, Request, Response, StatusCode,
     body::Incoming,
     header::{ALLOW, CONTENT_TYPE},
-    server::conn::http1,
     service::service_fn,
 };
-use hyper_util::rt::TokioIo;
-use tokio::{
-    net::{TcpListener, TcpStream},
-    sync::Semaphore,
-    time::{sleep, timeout},
-};
+use lookdown_client::http_server;
+use tokio::net::TcpListener;
 
 use crate::Metrics;
 
-/// Most connections at a time.
-const MAX_CONNECTIONS: usize = 16;
-/// Longest time of a connection.
-const CONNECTION_TIMEOUT: Duration = Duration::from_secs(10);
-/// Pause after a failure to accept a connection.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
-
-/// Listens on an address.
-///
-/// # Errors
-/// If the address cannot be used.
-pub(crate) async fn bind(address: SocketAddr) -> Result<TcpListener, String> {
-    TcpListener::bind(address).await.map_err(|error| {
-        format!("--metrics-listen: {address} cannot be used: {error}: give a free address of this machine")
-    })
-}
-
 /// Serves the metrics. Never ends.
 pub(crate) async fn serve(listener: TcpListener, metrics: Arc<Metrics>) {
-    let permits = Arc::new(Semaphore::new(MAX_CONNECTIONS));
-    loop {
-        let Ok(permit) = Arc::clone(&permits).acquire_owned().await else {
-            return;
-        };
-        let Ok((connection, _)) = listener.accept().await else {
-            sleep(ACCEPT_PAUSE).await;
-            continue;
-        };
-        let metrics = Arc::clone(&metrics);
-        tokio::spawn(async move {
-            // A failed connection concerns its client only.
-            let _ = timeout(CONNECTION_TIMEOUT, answer(connection, metrics)).await;
-            drop(permit);
-        });
-    }
-}
-
-async fn answer(connection: TcpStream, metrics: Arc<Metrics>) -> hyper::Result<()> {
-    let service = service_fn(|request: Request<Incoming>| {
+    let service = service_fn(move |request: Request<Incoming>| {
         let response = response(&request, &metrics);
         async move { Ok::<_, Infallible>(response) }
     });
-    http1::Builder::new()
-        .keep_alive(false)
-        .serve_connection(TokioIo::new(connection), service)
-        .await
+    http_server::serve(listener, service).await;
 }
 
 fn response<B>(request: &Request<B>, metrics: &Metrics) -> Response<Full<Bytes>> {

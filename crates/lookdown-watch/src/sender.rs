@@ -6,13 +6,12 @@ use tokio::time::{sleep, sleep_until};
 
 use crate::{
     Camera, Frame,
-    backoff::Backoff,
-    log_once::LogOnce,
     metrics::{CameraMetrics, Failure},
     pace::Pace,
     server::{Answer, Server},
     slot::Slot,
 };
+use lookdown_client::{Backoff, LogOnce};
 
 /// First and longest pause after a failure of the server.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(15));

@@ -23,11 +23,10 @@ use tokio::time::sleep;
 
 use crate::{
     Camera, Frame, FrameError, Location,
-    backoff::Backoff,
-    log_once::LogOnce,
     metrics::{CameraMetrics, Failure},
     slot::Slot,
 };
+use lookdown_client::{Backoff, LogOnce};
 
 /// First and longest pause before a source is started again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));

@@ -6,20 +6,20 @@ use std::{
 
 use reqwest::Client;
 use tokio::{
-    task::{AbortHandle, JoinHandle, spawn_blocking},
+    task::{JoinHandle, spawn_blocking},
     time::{sleep, timeout},
 };
 use tracing::Instrument as _;
 
 use crate::{
-    Camera, ConfigError, Metrics, ServerEntry, WatchOptions, load,
-    log_once::LogOnce,
+    Camera, Metrics, WatchOptions, load,
     metrics::CameraMetrics,
     metrics_server, sender,
-    server::{ClientError, Server, camera_client},
+    server::{Server, camera_client},
     slot::{Slot, Writer},
     source,
 };
+use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry, http_server};
 
 /// Interval of the checks for a changed file.
 const FILE_CHECK: Duration = Duration::from_secs(2);
@@ -67,7 +67,7 @@ pub async fn watch(
     let metrics = Arc::new(Metrics::new()?);
     let listener = match metrics_listen {
         Some(address) => Some(
-            metrics_server::bind(address)
+            http_server::bind("--metrics-listen", address)
                 .await
                 .map_err(WatchError::Address)?,
         ),
@@ -100,15 +100,6 @@ async fn read(path: &std::path::Path, server: &ServerEntry) -> Result<WatchOptio
     let (path, server) = (path.to_owned(), server.clone());
     let read = spawn_blocking(move || load(&path, &server)).await;
     read.unwrap_or_else(|error| Err(ConfigError::problem("cameras", &error)))
-}
-
-/// A task that ends when it is dropped.
-struct AbortOnDrop(AbortHandle);
-
-impl Drop for AbortOnDrop {
-    fn drop(&mut self) {
-        self.0.abort();
-    }
 }
 
 /// The running cameras.

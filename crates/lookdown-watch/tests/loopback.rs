@@ -9,8 +9,9 @@ use std::{
 };
 
 use exchange::{Exchange, Reply, serve};
+use lookdown_client::ServerEntry;
 use lookdown_watch::{
-    CameraEntry, Origin, ServerEntry, VideoFrames, VideoOptions, WatchError, WatchOptions, watch,
+    CameraEntry, Origin, VideoFrames, VideoOptions, WatchError, WatchOptions, watch,
 };
 use tokio::time::{sleep, timeout};
 

@@ -69,6 +69,7 @@ fn entry(
             lens: described.lens,
             mount: described.mount,
             zones: described.zones,
+            lines: described.lines,
             masks: described.masks,
         },
         notes: described.notes,

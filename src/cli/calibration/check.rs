@@ -164,21 +164,37 @@ fn mount(calibration: &Calibration) -> String {
     } else {
         format!("looks {tilt:.1}° away from straight down")
     };
+    let site = calibration.site().map(|placement| {
+        let [x, y] = placement.position_m;
+        let (site, yaw) = (&placement.site, placement.yaw_deg);
+        format!(", at {x}, {y} m of the site {site}, turned by {yaw}°")
+    });
+    let site = site.unwrap_or_default();
     match mount.height_m() {
-        Some(height) => format!("{looks} from {height} m"),
+        Some(height) => format!("{looks} from {height} m{site}"),
         None => format!("{looks}, height unknown: persons have no floor position"),
     }
 }
 
-/// Describes the zones and masks, if there are any.
+/// Describes the zones, lines and masks, if there are any.
 fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, String)> {
-    let Areas { zones, masks } = calibration.areas();
+    let Areas {
+        zones,
+        lines,
+        masks,
+    } = calibration.areas();
     let names = zones.iter().map(|zone| match zone.area {
         ZoneArea::Frame(_) => format!("{} (in the frame)", zone.name),
         ZoneArea::Floor(_) => format!("{} (on the floor)", zone.name),
     });
     let names: Vec<_> = names.collect();
     let zones = (!names.is_empty()).then(|| ("  zones", names.join(", ")));
+    let crossings = lines.iter().map(|line| {
+        let [left_to_right, right_to_left] = &line.directions;
+        format!("{} ({left_to_right}, {right_to_left})", line.name)
+    });
+    let crossings: Vec<_> = crossings.collect();
+    let lines = (!crossings.is_empty()).then(|| ("  lines", crossings.join(", ")));
     let masks = (!masks.is_empty()).then(|| {
         let (width, height) = calibration.image_size();
         let hidden = MaskedPixels::new(masks, width, height).count();
@@ -187,7 +203,7 @@ fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, Strin
         let text = format!("{}, which hide {percent:.1} % of the frame", masks.len());
         ("  masks", text)
     });
-    zones.into_iter().chain(masks)
+    zones.into_iter().chain(lines).chain(masks)
 }
 
 fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<()> {

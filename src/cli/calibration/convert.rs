@@ -55,6 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         lens: stated.lens,
         mount: stated.mount,
         zones: stated.zones,
+        lines: stated.lines,
         masks: stated.masks,
     })?;
     let notes = stated.notes.iter().map(ToString::to_string);

@@ -140,6 +140,7 @@ fn calibration(
             ..NativeMount::default()
         },
         zones: Vec::new(),
+        lines: Vec::new(),
         masks: Vec::new(),
     })
 }

@@ -1,65 +1,42 @@
 use super::*;
-use crate::test_walks::{floor_tracker, person};
+use crate::{
+    CameraPose, Observation,
+    tracking::{Tracker, TrackerSettings},
+};
 
-fn grid() -> HeatMap {
-    HeatMap::new([-2.0, -2.0, 2.0, 2.0], 1.0).unwrap()
-}
-
-#[test]
-fn a_person_adds_its_seconds_to_its_cell() {
-    let (mut tracker, mut map) = (floor_tracker(), grid());
-    for frame in 0..=50 {
-        tracker
-            .update(0, f64::from(frame) / 5.0, &[person(0.4, -1.4)])
-            .unwrap();
-        map.update(tracker.tracks());
+fn person(x: f64, y: f64) -> Observation {
+    Observation {
+        floor_m: Some([x, y]),
+        azimuth_deg: y.atan2(x).to_degrees().rem_euclid(360.0),
+        off_axis_deg: (x.hypot(y) / 2.8).atan().to_degrees(),
+        centre_px: [0.0, 0.0],
+        foot_px: [0.0, 0.0],
+        score: 0.9,
     }
-    let rows: Vec<_> = map.rows().collect();
-    assert_eq!((rows.len(), map.columns(), map.cell_m()), (4, 4, 1.0));
-    assert!((rows[0][2] - 10.0).abs() < 1e-9, "{rows:?}");
-    assert!((rows.concat().iter().sum::<f64>() - 10.0).abs() < 1e-9);
 }
 
 #[test]
-fn persons_beyond_the_grid_add_nothing() {
-    let (mut tracker, mut map) = (floor_tracker(), grid());
-    for frame in 0..20 {
-        tracker
-            .update(0, f64::from(frame) / 5.0, &[person(4.0, 0.0)])
-            .unwrap();
-        map.update(tracker.tracks());
+fn a_standing_person_heats_one_cell() {
+    let poses = [CameraPose::alone(Some(2.8))];
+    let mut tracker = Tracker::new(&poses, TrackerSettings::default()).unwrap();
+    let mut heat_map = HeatMap::default();
+    for frame in 0..50 {
+        let at_s = 1000.0 + f64::from(frame) * 0.2;
+        tracker.update(0, at_s, &[person(1.1, -0.9)]).unwrap();
+        heat_map.update(tracker.tracks());
     }
-    assert!(map.rows().flatten().all(|&seconds| seconds == 0.0));
+    let cells = heat_map.take();
+    let of_person = cells[&Cell { column: 4, row: -4 }];
+    assert!((9_000..=10_000).contains(&of_person), "{cells:?}");
+    assert_eq!(cells.values().sum::<u64>(), of_person);
+    assert!(heat_map.take().is_empty());
 }
 
 #[test]
-fn grids_of_one_floor_add_up() {
-    let mut sum = grid();
-    let mut other = grid();
-    other.seconds[3] = 2.0;
-    sum.add(&other).unwrap();
-    sum.add(&other).unwrap();
-    assert_eq!(sum.rows().next().unwrap(), [0.0, 0.0, 0.0, 4.0]);
-    let finer = HeatMap::new([-2.0, -2.0, 2.0, 2.0], 0.5).unwrap();
-    assert_eq!(sum.add(&finer), Err(HeatMapError::Different));
-    sum.clear();
-    assert_eq!(sum, grid());
-}
-
-#[test]
-fn unusable_grids_are_refused() {
-    let refused = |bounds, cell| HeatMap::new(bounds, cell).unwrap_err();
-    let size = |bounds_m, cell_m| HeatMapError::Size { bounds_m, cell_m };
-    assert_eq!(
-        refused([0.0, 0.0, 0.0, 1.0], 1.0),
-        size([0.0, 0.0, 0.0, 1.0], 1.0)
-    );
-    assert_eq!(
-        refused([0.0, 0.0, 1.0, 1.0], 0.0),
-        size([0.0, 0.0, 1.0, 1.0], 0.0)
-    );
-    assert!(matches!(
-        refused([0.0, 0.0, 1e9, 1e9], 1e-3),
-        HeatMapError::Cells(_)
-    ));
+fn far_and_invalid_places_have_no_cell() {
+    assert_eq!(Cell::of([-0.1, 0.3]), Some(Cell { column: -1, row: 1 }));
+    assert_eq!(Cell { column: -1, row: 1 }.corner_m(), [-0.25, 0.25]);
+    for x in [f64::NAN, f64::INFINITY, 1e9] {
+        assert_eq!(Cell::of([x, 0.0]), None);
+    }
 }

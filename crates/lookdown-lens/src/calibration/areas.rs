@@ -1,17 +1,20 @@
-//! The zones and masks of a calibration, checked.
+//! The zones, lines and masks of a calibration, checked.
+
+mod line;
 
 use std::collections::BTreeSet;
 
 use super::{
     FormatError,
-    native::{NativeImage, NativeMask, NativeZone},
+    formats::Camera,
+    native::{NativeImage, NativeZone},
 };
 use crate::{
-    geometry::{Mount, Polygon, Zone, ZoneArea},
+    geometry::{CountingLine, Mount, Polygon, Zone, ZoneArea},
     plain_name::{MAX_CHARS, is_plain},
 };
 
-/// Most zones of a calibration, and most masks.
+/// Most zones of a calibration, most lines and most masks.
 const MAX_AREAS: usize = 32;
 
 /// Areas that are drawn into the frames or onto the floor of a camera.
@@ -19,20 +22,27 @@ const MAX_AREAS: usize = 32;
 pub struct Areas {
     /// Areas in which persons are counted; their names differ.
     pub zones: Vec<Zone>,
+    /// Lines over which persons are counted; their names differ.
+    pub lines: Vec<CountingLine>,
     /// Areas that are blanked before detection, corner-origin frame pixels.
     pub masks: Vec<Polygon>,
 }
 
 impl Areas {
-    /// Checks the areas of a file for frames of the size `image` of a camera that hangs as `mount`
-    /// says.
+    /// Checks the areas of a camera for frames of the size `image`.
     pub(super) fn checked(
-        zones: &[NativeZone],
-        masks: &[NativeMask],
+        camera: &Camera,
         image: NativeImage,
         mount: &Mount,
     ) -> Result<Self, FormatError> {
+        let Camera {
+            zones,
+            lines,
+            masks,
+            ..
+        } = camera;
         at_most("zones", zones.len())?;
+        at_most("lines", lines.len())?;
         at_most("masks", masks.len())?;
         let mut names = BTreeSet::new();
         let zones = zones.iter().enumerate().map(|(index, zone)| {
@@ -48,12 +58,14 @@ impl Areas {
             })
         });
         let zones = zones.collect::<Result<_, _>>()?;
+        let lines = line::checked(lines, image, mount)?;
         let masks = masks.iter().enumerate().map(|(index, mask)| {
             let field = format!("masks[{index}].frame_px");
             frame_polygon(&field, &mask.frame_px, image)
         });
         Ok(Self {
             zones,
+            lines,
             masks: masks.collect::<Result<_, _>>()?,
         })
     }
@@ -61,8 +73,9 @@ impl Areas {
     /// The same areas in frames `scale_x`, `scale_y` times as large.
     #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
-        let (zones, masks) = (self.zones.iter(), self.masks.iter());
+        let (zones, lines, masks) = (self.zones.iter(), self.lines.iter(), self.masks.iter());
         Self {
+            lines: lines.map(|line| line.scaled(scale_x, scale_y)).collect(),
             zones: zones.map(|zone| zone.scaled(scale_x, scale_y)).collect(),
             masks: masks.map(|mask| mask.scaled(scale_x, scale_y)).collect(),
         }

@@ -2,7 +2,7 @@
 
 use super::{Areas, CalibrationId};
 use crate::{
-    geometry::{Lens, Mount, Pixel},
+    geometry::{Lens, Mount, Pixel, SitePlacement},
     revision::revision_of,
 };
 
@@ -19,6 +19,7 @@ pub struct Calibration {
     lens: Lens,
     mount: Mount,
     areas: Areas,
+    site: Option<SitePlacement>,
 }
 
 /// A calibration fitted to the frames at hand.
@@ -28,7 +29,7 @@ pub struct CameraGeometry {
     pub lens: Lens,
     /// The mount of the camera.
     pub mount: Mount,
-    /// Its zones and masks, in pixels of the frame.
+    /// Its zones, lines and masks, in pixels of the frame.
     pub areas: Areas,
 }
 
@@ -58,10 +59,16 @@ impl Calibration {
             lens,
             mount,
             areas: Areas::default(),
+            site: None,
         }
     }
 
-    /// The calibration with these zones and masks, in pixels of frames of its size.
+    /// The calibration at this place of a site.
+    pub(super) fn with_site(self, site: Option<SitePlacement>) -> Self {
+        Self { site, ..self }
+    }
+
+    /// The calibration with these zones, lines and masks, in pixels of frames of its size.
     pub(super) fn with_areas(self, areas: Areas) -> Self {
         Self { areas, ..self }
     }
@@ -96,7 +103,13 @@ impl Calibration {
         &self.mount
     }
 
-    /// Its zones and masks, in pixels of frames of [`Calibration::image_size`].
+    /// The place of the camera on the floor of a site, if it has one.
+    #[must_use]
+    pub fn site(&self) -> Option<&SitePlacement> {
+        self.site.as_ref()
+    }
+
+    /// Its zones, lines and masks, in pixels of frames of [`Calibration::image_size`].
     #[must_use]
     pub fn areas(&self) -> &Areas {
         &self.areas

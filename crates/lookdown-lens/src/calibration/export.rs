@@ -109,6 +109,7 @@ impl Target {
         }
         for (areas, count) in [
             ("zones", calibration.zones.len()),
+            ("lines", calibration.lines.len()),
             ("masks", calibration.masks.len()),
         ] {
             if count > 0 {

@@ -9,6 +9,7 @@ use super::{
     formats::{CalibrationFile, Camera, FileCamera, Format, FormatError},
     native::{NativeImage, NativeMount},
     plausibility,
+    site::site_placement,
 };
 use crate::geometry::{Lens, Mount};
 
@@ -114,8 +115,11 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
     let lens = Lens::new(&camera.lens).map_err(|error| invalid("lens", error.to_string()))?;
     let mount = mount(&camera.mount).map_err(|problem| invalid("mount", problem))?;
     let image = NativeImage { width, height };
-    let areas = Areas::checked(&camera.zones, &camera.masks, image, &mount)?;
-    let whole = Calibration::new(id, content, width, height, lens, mount).with_areas(areas);
+    let areas = Areas::checked(camera, image, &mount)?;
+    let site = site_placement(&camera.mount)?;
+    let whole = Calibration::new(id, content, width, height, lens, mount)
+        .with_areas(areas)
+        .with_site(site);
     let within_frame = whole.clone().limited_to_image();
     plausibility::check(whole.lens(), width, height, within_frame.lens().max_theta())
         .map_err(|problem| invalid("lens", problem))?;

@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-pub use areas::{NativeMask, NativeZone};
+pub use areas::{NativeLine, NativeMask, NativeZone};
 
 use crate::geometry::lens::LensModel;
 
@@ -28,6 +28,9 @@ pub struct NativeCalibration {
     /// Areas that persons are counted in.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zones: Vec<NativeZone>,
+    /// Lines over which persons are counted.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<NativeLine>,
     /// Areas that are blanked before detection.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masks: Vec<NativeMask>,
@@ -63,7 +66,7 @@ impl FromStr for NativeImage {
 pub struct NotAFrameSize;
 
 /// The mount of the camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NativeMount {
     /// The direction of up in the camera frame, a unit vector.
@@ -71,6 +74,15 @@ pub struct NativeMount {
     /// Metres above the floor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f64>,
+    /// The name of the site whose floor several cameras share.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub site: Option<String>,
+    /// The floor point below the camera, in metres of the site.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<[f64; 2]>,
+    /// The angle from the x axis of the site to that of the camera's floor, in degrees from x to y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub yaw_deg: Option<f64>,
 }
 
 impl Default for NativeMount {
@@ -78,6 +90,9 @@ impl Default for NativeMount {
         Self {
             world_up: [0.0, 0.0, -1.0],
             height_m: None,
+            site: None,
+            position_m: None,
+            yaw_deg: None,
         }
     }
 }

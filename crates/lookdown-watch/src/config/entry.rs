@@ -6,8 +6,8 @@ use jiff::SignedDuration;
 use secrecy::SecretString;
 use serde::Deserialize;
 
-use super::{ConfigError, file::read_secret};
 use crate::{Camera, Credentials, Location, Transport, VideoOptions};
+use lookdown_client::{ConfigError, read_secret};
 
 /// Shortest interval between two frames.
 const MIN_EVERY: Duration = Duration::from_millis(40);

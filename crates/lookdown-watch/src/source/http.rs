@@ -3,6 +3,8 @@
 
 use std::convert::Infallible;
 
+use lookdown_client::text::with_causes;
+
 use bytes::{Bytes, BytesMut};
 use reqwest::{
     Client, Response, StatusCode, Url,
@@ -11,7 +13,7 @@ use reqwest::{
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::{Sink, SourceError, multipart::PartReader};
-use crate::{Camera, MAX_FRAME_BYTES, credentials::Login, text::with_causes};
+use crate::{Camera, MAX_FRAME_BYTES, credentials::Login};
 
 /// Requests for one answer: the second one answers the challenge of the first.
 const ATTEMPTS: usize = 2;

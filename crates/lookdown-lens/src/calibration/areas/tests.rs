@@ -2,7 +2,7 @@ use crate::calibration::{CalibrationFile, export::Target, native::NativeCalibrat
 use crate::geometry::{Pixel, ZoneArea};
 
 /// A camera of 800 × 600 pixels with these further fields.
-fn file(height: &str, areas: &str) -> String {
+pub(super) fn file(height: &str, areas: &str) -> String {
     format!(
         r#"{{ "id": "hall", "image": {{"width": 800, "height": 600}},
              "lens": {{"model": "equidistant", "focal": 250, "cx": 399.5, "cy": 299.5, "max_theta": 1.5}},
@@ -10,13 +10,13 @@ fn file(height: &str, areas: &str) -> String {
     )
 }
 
-fn read(content: &str) -> Result<crate::calibration::Calibration, String> {
+pub(super) fn read(content: &str) -> Result<crate::calibration::Calibration, String> {
     let file = CalibrationFile::parse(content.as_bytes()).map_err(|error| error.to_string())?;
     let (_, checked) = file.calibrations("hall", content.as_bytes()).swap_remove(0);
     checked.map_err(|error| error.to_string())
 }
 
-fn refusal(areas: &str) -> String {
+pub(super) fn refusal(areas: &str) -> String {
     read(&file(r#", "height_m": 3"#, areas)).unwrap_err()
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Format, FormatError};
 use crate::{
-    calibration::native::{NativeImage, NativeMask, NativeMount, NativeZone},
+    calibration::native::{NativeImage, NativeLine, NativeMask, NativeMount, NativeZone},
     geometry::lens::LensModel,
     warning::Warning,
 };
@@ -36,6 +36,8 @@ pub struct Camera {
     pub mount: NativeMount,
     /// Its zones; only native files have some.
     pub zones: Vec<NativeZone>,
+    /// Its lines; only native files have some.
+    pub lines: Vec<NativeLine>,
     /// Its masks; only native files have some.
     pub masks: Vec<NativeMask>,
     /// The assumptions of the reader.
@@ -49,6 +51,7 @@ impl Camera {
             lens: lens.into(),
             mount: NativeMount::default(),
             zones: Vec::new(),
+            lines: Vec::new(),
             masks: Vec::new(),
             notes: Vec::new(),
         }

@@ -1,5 +1,5 @@
 //! The native format, in JSON, YAML or TOML: the only one with an ID, a mount,
-//! zones and masks.
+//! zones, lines and masks.
 
 use super::{
     CalibrationFile, Camera, FileCamera, Format, FormatError,
@@ -26,6 +26,7 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
                 lens: file.lens,
                 mount: file.mount,
                 zones: file.zones,
+                lines: file.lines,
                 masks: file.masks,
                 notes: Vec::new(),
             }),

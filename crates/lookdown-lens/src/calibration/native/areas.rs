@@ -1,4 +1,4 @@
-//! Zones and masks as they are written. Corners follow each other along the outline; pixels are
+//! Zones, lines and masks as they are written. Corners follow each other along the outline; pixels are
 //! corner-origin, of frames of the calibration's own size.
 
 use serde::{Deserialize, Serialize};
@@ -15,6 +15,32 @@ pub struct NativeZone {
     /// Corners `[x, y]`, metres on the floor from the place below the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor_m: Option<Vec<[f64; 2]>>,
+}
+
+/// A named line, in pixels of the frame or in metres on the floor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NativeLine {
+    /// Its name, `[a-z0-9][a-z0-9_-]{0,63}`.
+    pub name: String,
+    /// Its two ends `[x, y]`, frame pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_px: Option<Vec<[f64; 2]>>,
+    /// Its two ends `[x, y]`, metres on the floor from the place below the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor_m: Option<Vec<[f64; 2]>>,
+    /// The names of the crossings from left to right and from right to left, as seen from the first
+    /// end toward the second one.
+    #[serde(default = "in_and_out", skip_serializing_if = "is_in_and_out")]
+    pub directions: [String; 2],
+}
+
+fn in_and_out() -> [String; 2] {
+    ["in", "out"].map(ToOwned::to_owned)
+}
+
+fn is_in_and_out(directions: &[String; 2]) -> bool {
+    directions == &["in", "out"]
 }
 
 /// An area that is blanked before anything looks at a frame.

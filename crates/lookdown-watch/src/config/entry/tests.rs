@@ -1,6 +1,8 @@
 use std::{fs, path::Path};
 
-use crate::{Location, config::file::ServerEntry, load};
+use lookdown_client::ServerEntry;
+
+use crate::{Location, load};
 
 fn error_of(text: &str) -> String {
     loaded(text).unwrap_err()

@@ -2,11 +2,11 @@
 
 /// The last logged problem.
 #[derive(Debug, Default)]
-pub(crate) struct LogOnce(Option<String>);
+pub struct LogOnce(Option<String>);
 
 impl LogOnce {
     /// Returns true if this problem is to be logged: it is not the last one.
-    pub(crate) fn is_changed(&mut self, problem: &str) -> bool {
+    pub fn is_changed(&mut self, problem: &str) -> bool {
         let is_changed = self.0.as_deref() != Some(problem);
         if is_changed {
             self.0 = Some(problem.to_owned());
@@ -15,7 +15,7 @@ impl LogOnce {
     }
 
     /// Clears the problem. Returns true if there was one.
-    pub(crate) fn settle(&mut self) -> bool {
+    pub fn settle(&mut self) -> bool {
         self.0.take().is_some()
     }
 }

@@ -8,7 +8,7 @@ const STABLE: Duration = Duration::from_secs(3);
 /// The pauses between attempts. Each is a random time between half of the current limit and the
 /// limit, which doubles with every attempt.
 #[derive(Debug, Clone)]
-pub(crate) struct Backoff {
+pub struct Backoff {
     first: Duration,
     longest: Duration,
     attempts: u32,
@@ -16,7 +16,8 @@ pub(crate) struct Backoff {
 
 impl Backoff {
     /// Creates a backoff from the first to the longest pause.
-    pub(crate) fn new(first: Duration, longest: Duration) -> Self {
+    #[must_use]
+    pub fn new(first: Duration, longest: Duration) -> Self {
         Self {
             first,
             longest,
@@ -25,19 +26,19 @@ impl Backoff {
     }
 
     /// Returns the next pause.
-    pub(crate) fn next_pause(&mut self) -> Duration {
+    pub fn next_pause(&mut self) -> Duration {
         let limit = self.first.saturating_mul(1 << self.attempts.min(20));
         self.attempts = self.attempts.saturating_add(1);
         jittered(limit.min(self.longest))
     }
 
     /// Starts again with the first pause.
-    pub(crate) fn reset(&mut self) {
+    pub fn reset(&mut self) {
         self.attempts = 0;
     }
 
     /// Starts again with the first pause if the connection lived long enough.
-    pub(crate) fn reset_if_stable(&mut self, lifetime: Duration) {
+    pub fn reset_if_stable(&mut self, lifetime: Duration) {
         if lifetime >= STABLE {
             self.reset();
         }

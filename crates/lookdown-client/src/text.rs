@@ -5,13 +5,15 @@ const MAX_CHARS: usize = 300;
 
 /// Formats a text as one line of at most 300 characters, so that it can neither forge nor fill log
 /// lines.
-pub(crate) fn one_line(text: &str) -> String {
+#[must_use]
+pub fn one_line(text: &str) -> String {
     let text = text.trim().chars().take(MAX_CHARS);
     text.map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 /// Formats an error with its causes in one line.
-pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
+#[must_use]
+pub fn with_causes(error: &dyn std::error::Error) -> String {
     let mut message = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {

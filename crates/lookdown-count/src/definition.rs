@@ -1,0 +1,211 @@
+//! The settings of a camera's calibration that counting needs: lines, zones, and the place on a site.
+
+use lookdown_lens::{
+    calibration::{Calibration, CameraGeometry},
+    geometry::{
+        CountingLine, LineEnds, Pixel, Polygon, ZoneArea, floor::floor_position,
+        polygon::MAX_CORNERS,
+    },
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    CameraPose,
+    lines::{DEFAULT_BAND_M, Line},
+    report::Report,
+    tracking::Plane,
+    zones::Zone,
+};
+
+/// Half the width of the hysteresis band of a line in the frame, as a share of the frame's width.
+const BAND_OF_FRAME: f64 = 0.02;
+
+/// The calibration and the frame size that a definition belongs to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct DefinitionKey {
+    /// The ID of the calibration; `None` without one.
+    pub(crate) calibration: Option<String>,
+    /// Its revision.
+    pub(crate) revision: String,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+}
+
+/// The lines and zones of a camera, and its place.
+#[derive(Debug, Clone)]
+pub(crate) struct CameraDefinition {
+    pub(crate) key: DefinitionKey,
+    /// The camera for frames of the report's size; `None` without a calibration.
+    pub(crate) geometry: Option<CameraGeometry>,
+    /// The site that the camera is part of.
+    pub(crate) site: Option<String>,
+    /// Its place on the site, or at the origin of its own floor.
+    pub(crate) pose: CameraPose,
+    /// The lines in the plane of the tracker.
+    pub(crate) lines: Vec<Line>,
+    /// The names of the two directions of each line.
+    pub(crate) directions: Vec<[String; 2]>,
+    /// The zones in the plane of the tracker.
+    pub(crate) zones: Vec<Zone>,
+}
+
+impl DefinitionKey {
+    pub(crate) fn of(report: &Report) -> Self {
+        let used = &report.calibration;
+        Self {
+            calibration: (!used.assumed).then(|| used.id.clone()),
+            revision: used.revision.clone(),
+            width: report.image.width,
+            height: report.image.height,
+        }
+    }
+}
+
+impl CameraDefinition {
+    /// Returns the definition of a camera without a calibration: nothing but persons is counted.
+    pub(crate) fn without_calibration(key: DefinitionKey) -> Self {
+        Self {
+            key,
+            geometry: None,
+            site: None,
+            pose: CameraPose::alone(None),
+            lines: Vec::new(),
+            directions: Vec::new(),
+            zones: Vec::new(),
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn unknown() -> Self {
+        Self::without_calibration(DefinitionKey {
+            calibration: None,
+            revision: String::new(),
+            width: 200,
+            height: 200,
+        })
+    }
+
+    /// Returns the definition of a calibration. Lines and zones that cannot be placed on the floor
+    /// of a site are logged and left out.
+    pub(crate) fn new(key: DefinitionKey, calibration: &Calibration) -> Self {
+        let Ok(geometry) = calibration.for_frame(key.width, key.height) else {
+            return Self::without_calibration(key);
+        };
+        let height_m = geometry.mount.height_m();
+        let placement = calibration.site();
+        let pose = placement.map_or_else(
+            || CameraPose::alone(height_m),
+            |placement| CameraPose {
+                position_m: placement.position_m,
+                yaw_deg: placement.yaw_deg,
+                height_m,
+            },
+        );
+        let planes = Planes {
+            geometry: &geometry,
+            pose,
+            is_on_site: placement.is_some(),
+        };
+        let id = calibration.id().as_str();
+        let lines = geometry.areas.lines.iter();
+        let (lines, directions) = lines
+            .filter_map(|line| {
+                let placed = planes.line(line, key.width);
+                if placed.is_none() {
+                    tracing::warn!(
+                        "calibration {id}: the line {} is not on the floor of its site: draw it with floor_m",
+                        line.name
+                    );
+                }
+                Some((placed?, line.directions.clone()))
+            })
+            .unzip();
+        let zones = geometry.areas.zones.iter().filter_map(|zone| {
+            let placed = planes.zone(&zone.area);
+            if placed.is_none() {
+                tracing::warn!(
+                    "calibration {id}: the zone {} is not on the floor of its site: draw it with floor_m",
+                    zone.name
+                );
+            }
+            let (plane, area) = placed?;
+            let name = zone.name.clone();
+            Some(Zone { name, plane, area })
+        });
+        Self {
+            site: placement.map(|placement| placement.site.clone()),
+            pose,
+            lines,
+            directions,
+            zones: zones.collect(),
+            key,
+            geometry: Some(geometry),
+        }
+    }
+}
+
+/// Maps what is drawn in the frame or on the camera's floor to the plane of the tracker.
+struct Planes<'a> {
+    geometry: &'a CameraGeometry,
+    pose: CameraPose,
+    is_on_site: bool,
+}
+
+impl Planes<'_> {
+    fn line(&self, line: &CountingLine, frame_width: u32) -> Option<Line> {
+        let (plane, points) = match line.ends {
+            LineEnds::Frame(ends) if !self.is_on_site => {
+                (Plane::FramePx, ends.map(|end| [end.x, end.y]).to_vec())
+            }
+            LineEnds::Frame(ends) => {
+                let points = ends.map(|end| self.floor_of(end));
+                (Plane::FloorM, points.into_iter().collect::<Option<_>>()?)
+            }
+            LineEnds::Floor(ends) => {
+                let points = ends.map(|end| self.pose.to_site([end.x, end.y]));
+                (Plane::FloorM, points.to_vec())
+            }
+        };
+        Some(Line {
+            name: line.name.clone(),
+            plane,
+            points,
+            band: match plane {
+                Plane::FloorM => DEFAULT_BAND_M,
+                Plane::FramePx => f64::from(frame_width) * BAND_OF_FRAME,
+            },
+        })
+    }
+
+    fn zone(&self, area: &ZoneArea) -> Option<(Plane, Polygon)> {
+        match area {
+            ZoneArea::Frame(area) if !self.is_on_site => Some((Plane::FramePx, area.clone())),
+            ZoneArea::Frame(area) => {
+                // Straight edges of the frame are curves on the floor.
+                let per_edge = (MAX_CORNERS / area.corners().len()).clamp(1, 8);
+                let points = area.edges().flat_map(|[from, to]| {
+                    (0..per_edge).map(move |point| {
+                        #[expect(clippy::cast_precision_loss, reason = "at most 8")]
+                        let share = point as f64 / per_edge as f64;
+                        from + (to - from) * share
+                    })
+                });
+                let corners: Option<Vec<_>> = points.map(|point| self.floor_of(point)).collect();
+                let area = Polygon::new(&corners?).ok()?;
+                Some((Plane::FloorM, area))
+            }
+            ZoneArea::Floor(area) => {
+                let corners = area.corners().iter();
+                let corners: Vec<_> = corners
+                    .map(|corner| self.pose.to_site([corner.x, corner.y]))
+                    .collect();
+                Some((Plane::FloorM, Polygon::new(&corners).ok()?))
+            }
+        }
+    }
+
+    fn floor_of(&self, pixel: Pixel) -> Option<[f64; 2]> {
+        let floor = floor_position(pixel, &self.geometry.lens, &self.geometry.mount)?;
+        Some(self.pose.to_site([floor.x_m, floor.y_m]))
+    }
+}

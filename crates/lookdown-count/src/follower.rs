@@ -1,0 +1,255 @@
+//! Follows the reports of the server: counts them, and stores the sums in intervals.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use lookdown_client::{Backoff, LogOnce, ServerClient};
+use parking_lot::Mutex;
+use tokio::{
+    sync::watch,
+    task::spawn_blocking,
+    time::{Instant, sleep, sleep_until},
+};
+
+use crate::{
+    calibrations::{CalibrationProblem, Calibrations},
+    definition::DefinitionKey,
+    engine::{Accepted, Batch, Engine},
+    event_parser::Event,
+    event_stream::{EventStream, StreamError},
+    metrics::Metrics,
+    report::Report,
+    snapshot::Snapshot,
+    store::Store,
+    webhooks::{Conditions, Deliveries, Message},
+};
+
+/// Pauses between connections.
+const FIRST_PAUSE: Duration = Duration::from_millis(500);
+const LONGEST_PAUSE: Duration = Duration::from_secs(15);
+/// Interval of the evaluation of time: silent cameras, and the current counts.
+const TICK: Duration = Duration::from_secs(1);
+/// Interval of the removal of old sums.
+const EXPIRY: Duration = Duration::from_mins(30);
+
+/// Everything that the reports change.
+pub(crate) struct Follower {
+    pub(crate) client: ServerClient,
+    pub(crate) engine: Arc<Mutex<Engine>>,
+    pub(crate) calibrations: Calibrations,
+    pub(crate) store: Store,
+    pub(crate) conditions: Conditions,
+    pub(crate) deliveries: Deliveries,
+    pub(crate) metrics: Arc<Metrics>,
+    pub(crate) snapshots: watch::Sender<Snapshot>,
+    pub(crate) commit_every: Duration,
+    pub(crate) retention: Duration,
+    /// Messages that are not stored yet.
+    pub(crate) messages: Vec<Message>,
+    pub(crate) next_commit: Instant,
+    pub(crate) next_expiry: Instant,
+    /// True once the companion is to end. Reports are abandoned between transactions only.
+    pub(crate) stop: watch::Receiver<bool>,
+}
+
+impl Follower {
+    /// Follows the reports until the companion is to end, and stores the last sums.
+    pub(crate) async fn run(&mut self) {
+        let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
+        let mut log = LogOnce::default();
+        while !*self.stop.borrow() {
+            let began = Instant::now();
+            let error = self.follow(&mut log).await;
+            self.metrics.connected.set(0);
+            if !error.message.is_empty() && log.is_changed(&error.message) {
+                tracing::warn!("{}", error.message);
+            }
+            backoff.reset_if_stable(began.elapsed());
+            let pause = error.retry_after.unwrap_or_else(|| backoff.next_pause());
+            let until = Instant::now() + pause;
+            while Instant::now() < until && !*self.stop.borrow() {
+                self.tick().await;
+                let next = until.min(Instant::now() + TICK);
+                let mut stop = self.stop.clone();
+                tokio::select! {
+                    () = sleep_until(next) => {}
+                    () = stopped(&mut stop) => {}
+                }
+            }
+        }
+        self.commit().await;
+    }
+
+    /// Follows one connection until it ends.
+    async fn follow(&mut self, log: &mut LogOnce) -> StreamError {
+        let client = self.client.clone();
+        let last_event = self.engine.lock().last_event();
+        let mut stop = self.stop.clone();
+        let opened = tokio::select! {
+            opened = EventStream::open(&client, last_event) => opened,
+            () = stopped(&mut stop) => return StreamError::stopped(),
+        };
+        let mut stream = match opened {
+            Ok(stream) => stream,
+            Err(error) => return error,
+        };
+        self.metrics.connected.set(1);
+        log.settle();
+        tracing::info!("following the reports of {}", client.address());
+        let mut next_tick = Instant::now();
+        loop {
+            tokio::select! {
+                event = stream.next() => match event {
+                    Ok(event) => if let Err(error) = self.accept(&event).await { return error },
+                    Err(error) => return error,
+                },
+                () = stopped(&mut stop) => return StreamError::stopped(),
+                () = sleep_until(next_tick.min(self.next_commit)) => {
+                    if Instant::now() >= next_tick {
+                        next_tick = Instant::now() + TICK;
+                        self.tick().await;
+                    }
+                }
+            }
+            if Instant::now() >= self.next_commit || !self.messages.is_empty() {
+                self.commit().await;
+            }
+        }
+    }
+
+    /// Counts the report of an event.
+    async fn accept(&mut self, event: &Event) -> Result<(), StreamError> {
+        let skipped = |reason: &str| {
+            self.metrics
+                .reports_skipped
+                .with_label_values(&[reason])
+                .inc()
+        };
+        let Some(id) = event.id else {
+            skipped("malformed");
+            return Ok(());
+        };
+        let Ok(report) = serde_json::from_slice::<Report>(&event.data) else {
+            skipped("malformed");
+            return Ok(());
+        };
+        let definition = self.engine.lock().definition(&report.camera);
+        let key = DefinitionKey::of(&report);
+        let definition = match definition.filter(|definition| definition.key == key) {
+            Some(definition) => definition,
+            None => {
+                let mut stop = self.stop.clone();
+                let updated = tokio::select! {
+                    updated = self.calibrations.update(&self.client, &self.store, &key) => updated,
+                    () = stopped(&mut stop) => return Err(StreamError::stopped()),
+                };
+                updated.map_err(|problem| StreamError {
+                    message: match problem {
+                        CalibrationProblem::Server(problem) => problem,
+                        CalibrationProblem::Store(problem) => problem.to_string(),
+                    },
+                    retry_after: None,
+                })?;
+                self.calibrations.definition(key)
+            }
+        };
+        let mut engine = self.engine.lock();
+        match engine.accept(id, &report, &definition) {
+            Accepted::Counted(crossings) => {
+                self.metrics.reports.inc();
+                if let Some(scene) = engine.scene_of(&report.camera) {
+                    let at_ms = report.at_ms();
+                    let messages =
+                        self.conditions
+                            .of_report(id, &report.camera, at_ms, &crossings, scene);
+                    self.messages.extend(messages);
+                }
+            }
+            Accepted::Repeated => {}
+            Accepted::OutOfOrder(reason) => {
+                tracing::debug!(
+                    camera = report.camera,
+                    "the report is not counted: {reason}"
+                );
+                skipped("out_of_order");
+            }
+            Accepted::TooManyCameras => skipped("too_many_cameras"),
+        }
+        Ok(())
+    }
+
+    /// Evaluates what follows from the time alone, and stores what is due.
+    async fn tick(&mut self) {
+        let now_ms = Timestamp::now().as_millisecond();
+        self.messages.extend(self.conditions.of_time(now_ms));
+        let snapshot = self.engine.lock().snapshot(now_ms);
+        self.snapshots.send_if_modified(|last| {
+            let is_changed = *last != snapshot;
+            *last = snapshot;
+            is_changed
+        });
+        if Instant::now() >= self.next_commit || !self.messages.is_empty() {
+            self.commit().await;
+        }
+        if Instant::now() >= self.next_expiry {
+            self.next_expiry = Instant::now() + EXPIRY;
+            self.engine.lock().forget_silent();
+            let age_ms = i64::try_from(self.retention.as_millis()).unwrap_or(i64::MAX);
+            let store = self.store.clone();
+            let expired = spawn_blocking(move || store.expire(now_ms.saturating_sub(age_ms))).await;
+            if let Ok(Err(problem)) = expired {
+                tracing::warn!("{problem}");
+            }
+        }
+    }
+
+    /// Stores all sums. Repeats a failed transaction until it succeeds: meanwhile no report is read,
+    /// so that memory stays bounded. The server sends those reports again.
+    pub(crate) async fn commit(&mut self) {
+        let batch = self.engine.lock().take_batch();
+        let messages = std::mem::take(&mut self.messages);
+        self.next_commit = Instant::now() + self.commit_every;
+        if batch.is_none() && messages.is_empty() {
+            return;
+        }
+        let last_event = self.engine.lock().last_event();
+        let batch = batch.unwrap_or_else(|| Batch::empty(last_event));
+        let batch = Arc::new((batch, messages));
+        let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
+        let mut log = LogOnce::default();
+        loop {
+            let store = self.store.clone();
+            let shared = Arc::clone(&batch);
+            let committed = spawn_blocking(move || store.commit(&shared.0, &shared.1)).await;
+            match committed {
+                Ok(Ok(())) => break,
+                Ok(Err(problem)) => {
+                    self.metrics.commits_failed.inc();
+                    let problem = problem.to_string();
+                    if log.is_changed(&problem) {
+                        tracing::error!("{problem}: free space, or correct store.path");
+                    }
+                }
+                // A task that panicked is logged by the panic hook.
+                Err(_) => self.metrics.commits_failed.inc(),
+            }
+            if *self.stop.borrow() {
+                tracing::error!(
+                    "the last sums are not stored: the server sends their reports again"
+                );
+                return;
+            }
+            sleep(backoff.next_pause()).await;
+        }
+        if log.settle() {
+            tracing::info!("the store is written again");
+        }
+        self.deliveries.send(batch.1.clone());
+    }
+}
+
+/// Waits until the companion is to end.
+async fn stopped(stop: &mut watch::Receiver<bool>) {
+    // A sender that is gone means the same.
+    let _ = stop.wait_for(|stop| *stop).await;
+}

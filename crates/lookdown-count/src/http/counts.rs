@@ -1,0 +1,284 @@
+//! Counts per step as JSON and CSV.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Write as _,
+};
+
+use axum::{
+    Json,
+    extract::{Path, Query, State, rejection::QueryRejection},
+    http::{
+        HeaderMap,
+        header::{ACCEPT, CONTENT_TYPE},
+    },
+    response::{IntoResponse, Response},
+};
+use jiff::Timestamp;
+use serde::Serialize;
+
+use super::{Problem, Shared, check_known, query, time::TimeParameters};
+use crate::{
+    store::{Span, Step},
+    sums::{MINUTE_MS, Owner},
+};
+
+/// The counts of a camera or a site.
+#[derive(Debug, Serialize)]
+struct Counts {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    site: Option<String>,
+    from: Timestamp,
+    to: Timestamp,
+    step_seconds: i64,
+    steps: Vec<StepCounts>,
+}
+
+/// The counts of a step. Unknown counts are null.
+#[derive(Debug, Serialize)]
+struct StepCounts {
+    from: Timestamp,
+    to: Timestamp,
+    /// Seconds of the step in which reports arrived.
+    known_seconds: f64,
+    persons: Option<PersonCounts>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lines: Option<BTreeMap<String, BTreeMap<String, Option<u64>>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    zones: Option<BTreeMap<String, Option<ZoneCounts>>>,
+}
+
+#[derive(Debug, Serialize)]
+struct PersonCounts {
+    mean: f64,
+    max: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct ZoneCounts {
+    entries: u64,
+    mean: f64,
+    max: u64,
+    /// Visits that ended in the step, and their mean duration.
+    visits: u64,
+    dwell_seconds: Option<f64>,
+}
+
+/// The lines with their directions, and the zones.
+type Names = (BTreeSet<(String, String)>, BTreeSet<String>);
+
+pub(super) async fn of_camera(
+    State(api): State<Shared>,
+    Path(camera): Path<String>,
+    parameters: Result<Query<TimeParameters>, QueryRejection>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    answer(&api, Owner::Camera(camera), parameters, &headers).await
+}
+
+pub(super) async fn of_site(
+    State(api): State<Shared>,
+    Path(site): Path<String>,
+    parameters: Result<Query<TimeParameters>, QueryRejection>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    answer(&api, Owner::Site(site), parameters, &headers).await
+}
+
+async fn answer(
+    api: &Shared,
+    owner: Owner,
+    parameters: Result<Query<TimeParameters>, QueryRejection>,
+    headers: &HeaderMap,
+) -> Result<Response, Problem> {
+    let Query(parameters) = parameters.map_err(|_| unknown_parameter())?;
+    let span = parameters.span()?;
+    let is_csv = match parameters.format.as_deref() {
+        Some("csv") => true,
+        Some("json") => false,
+        None => headers
+            .get(ACCEPT)
+            .is_some_and(|accept| accept.as_bytes().starts_with(b"text/csv")),
+        Some(_) => {
+            return Err(Problem::of_parameter(
+                "format",
+                "it is unknown: give json or csv",
+            ));
+        }
+    };
+    check_known(api, &owner).await?;
+    let names = current_names(api, &owner);
+    let asked = owner.clone();
+    let sums = query(api, move |store| store.steps(&asked, span)).await?;
+    let counts = counts(owner, span, &sums, names);
+    if !is_csv {
+        return Ok(Json(counts).into_response());
+    }
+    let content_type = [(CONTENT_TYPE, "text/csv; charset=utf-8; header=present")];
+    Ok((content_type, csv(&counts)).into_response())
+}
+
+pub(super) fn unknown_parameter() -> Problem {
+    Problem::of_parameter(
+        "query",
+        "it has an unknown or repeated parameter: docs/count.md lists them",
+    )
+}
+
+/// Returns the lines and zones that are counted now: a step without any has the count 0.
+fn current_names(api: &Shared, owner: &Owner) -> Names {
+    let Owner::Camera(camera) = owner else {
+        return Names::default();
+    };
+    let Some(definition) = api.engine.lock().definition(camera) else {
+        return Names::default();
+    };
+    let directions = definition.lines.iter().zip(&definition.directions);
+    let lines = directions.flat_map(|(line, directions)| {
+        let pairs = directions.iter();
+        pairs.map(|direction| (line.name.clone(), direction.clone()))
+    });
+    let zones = definition.zones.iter().map(|zone| zone.name.clone());
+    (lines.collect(), zones.collect())
+}
+
+fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) -> Counts {
+    let (mut lines, mut zones) = names;
+    for step in sums.values() {
+        lines.extend(step.crossings.keys().cloned());
+        zones.extend(step.zones.keys().cloned());
+    }
+    let count = (span.to - span.from + span.step - 1) / span.step;
+    let nothing = Step::default();
+    let steps = (0..count).map(|number| {
+        let from = span.from + number * span.step;
+        let to = (from + span.step).min(span.to);
+        let step = sums.get(&number).unwrap_or(&nothing);
+        step_counts(step, (from, to), (&lines, &zones), &owner)
+    });
+    Counts {
+        from: time(span.from),
+        to: time(span.to),
+        step_seconds: span.step * 60,
+        steps: steps.collect(),
+        camera: match &owner {
+            Owner::Camera(name) => Some(name.clone()),
+            Owner::Site(_) => None,
+        },
+        site: match owner {
+            Owner::Site(name) => Some(name),
+            Owner::Camera(_) => None,
+        },
+    }
+}
+
+fn step_counts(
+    step: &Step,
+    (from, to): (i64, i64),
+    (lines, zones): (&BTreeSet<(String, String)>, &BTreeSet<String>),
+    owner: &Owner,
+) -> StepCounts {
+    let known_ms = step.presence.known_ms;
+    let is_known = known_ms > 0;
+    let is_camera = matches!(owner, Owner::Camera(_));
+    let mut line_counts = BTreeMap::<String, BTreeMap<String, Option<u64>>>::new();
+    for of in lines {
+        let crossings = step.crossings.get(of).copied();
+        let crossings = crossings.or(is_known.then_some(0));
+        let directions = line_counts.entry(of.0.clone()).or_default();
+        directions.insert(of.1.clone(), crossings);
+    }
+    let zone_counts = zones.iter().map(|zone| {
+        let sum = step.zones.get(zone).copied();
+        let sum = sum.or(is_known.then(Default::default));
+        let counts = sum.map(|sum| ZoneCounts {
+            entries: sum.entries,
+            mean: thousandths(ratio(sum.person_ms, known_ms)),
+            max: sum.most,
+            visits: sum.visits,
+            dwell_seconds: (sum.visits > 0)
+                .then(|| thousandths(ratio(sum.visit_ms, sum.visits) / 1000.0)),
+        });
+        (zone.clone(), counts)
+    });
+    StepCounts {
+        from: time(from),
+        to: time(to),
+        known_seconds: ratio(known_ms, 1000),
+        persons: is_known.then(|| PersonCounts {
+            mean: thousandths(ratio(step.presence.person_ms, known_ms)),
+            max: step.presence.most,
+        }),
+        zones: is_camera.then(|| zone_counts.collect()),
+        lines: is_camera.then_some(line_counts),
+    }
+}
+
+/// Writes the counts as a table. Unknown counts are empty cells.
+fn csv(counts: &Counts) -> String {
+    let mut text = "from,to,known_seconds,persons_mean,persons_max".to_owned();
+    let first = counts.steps.first();
+    let lines = first.and_then(|step| step.lines.as_ref());
+    for (line, directions) in lines.into_iter().flatten() {
+        for direction in directions.keys() {
+            let _ = write!(text, ",line.{line}.{direction}");
+        }
+    }
+    let zones = first.and_then(|step| step.zones.as_ref());
+    for zone in zones.into_iter().flat_map(BTreeMap::keys) {
+        for column in ["entries", "mean", "max", "visits", "dwell_seconds"] {
+            let _ = write!(text, ",zone.{zone}.{column}");
+        }
+    }
+    text.push_str("\r\n");
+    for step in &counts.steps {
+        let _ = write!(text, "{},{},{}", step.from, step.to, step.known_seconds);
+        let persons = step.persons.as_ref();
+        cell(&mut text, persons.map(|persons| persons.mean));
+        cell(&mut text, persons.map(|persons| persons.max));
+        for directions in step.lines.iter().flat_map(BTreeMap::values) {
+            for crossings in directions.values() {
+                cell(&mut text, *crossings);
+            }
+        }
+        for zone in step.zones.iter().flat_map(BTreeMap::values) {
+            let zone = zone.as_ref();
+            cell(&mut text, zone.map(|zone| zone.entries));
+            cell(&mut text, zone.map(|zone| zone.mean));
+            cell(&mut text, zone.map(|zone| zone.max));
+            cell(&mut text, zone.map(|zone| zone.visits));
+            cell(&mut text, zone.and_then(|zone| zone.dwell_seconds));
+        }
+        text.push_str("\r\n");
+    }
+    text
+}
+
+fn cell(text: &mut String, value: Option<impl std::fmt::Display>) {
+    text.push(',');
+    if let Some(value) = value {
+        let _ = write!(text, "{value}");
+    }
+}
+
+fn time(minute: i64) -> Timestamp {
+    Timestamp::from_millisecond(minute * MINUTE_MS).unwrap_or(Timestamp::UNIX_EPOCH)
+}
+
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "exact for centuries of milliseconds"
+)]
+fn ratio(value: u64, of: u64) -> f64 {
+    if of == 0 {
+        0.0
+    } else {
+        value as f64 / of as f64
+    }
+}
+
+fn thousandths(value: f64) -> f64 {
+    (value * 1000.0).round() / 1000.0
+}

@@ -1,0 +1,201 @@
+//! The heat map of the floor as JSON and PNG.
+
+use std::collections::BTreeMap;
+
+use axum::{
+    Json,
+    extract::{Path, Query, State, rejection::QueryRejection},
+    http::header::CONTENT_TYPE,
+    response::{IntoResponse, Response},
+};
+use jiff::Timestamp;
+use serde::Serialize;
+
+use super::{Problem, Shared, check_known, counts::unknown_parameter, query, time::TimeParameters};
+use crate::{
+    heat_map::{CELL_M, Cell},
+    sums::{DAY_MS, MINUTE_MS, Owner},
+};
+
+/// Most cells along a side of an answer: those with the most time decide.
+const MAX_SIDE: i64 = 400;
+/// Pixels of a cell.
+const CELL_PX: usize = 8;
+
+/// Presence on the floor.
+#[derive(Serialize)]
+struct HeatMap {
+    /// First and last day are whole days (UTC).
+    from: Timestamp,
+    to: Timestamp,
+    cell_m: f64,
+    /// The corner with the least x and y, metres on the floor of the camera or the site.
+    origin_m: [f64; 2],
+    /// Seconds of presence, row by row from the least y on.
+    seconds: Vec<Vec<f64>>,
+}
+
+type Parameters = Result<Query<TimeParameters>, QueryRejection>;
+
+pub(super) async fn json_of_camera(
+    State(api): State<Shared>,
+    Path(camera): Path<String>,
+    parameters: Parameters,
+) -> Result<Json<impl Serialize>, Problem> {
+    heat_map(&api, Owner::Camera(camera), parameters)
+        .await
+        .map(Json)
+}
+
+pub(super) async fn json_of_site(
+    State(api): State<Shared>,
+    Path(site): Path<String>,
+    parameters: Parameters,
+) -> Result<Json<impl Serialize>, Problem> {
+    heat_map(&api, Owner::Site(site), parameters)
+        .await
+        .map(Json)
+}
+
+pub(super) async fn png_of_camera(
+    State(api): State<Shared>,
+    Path(camera): Path<String>,
+    parameters: Parameters,
+) -> Result<Response, Problem> {
+    png(&heat_map(&api, Owner::Camera(camera), parameters).await?)
+}
+
+pub(super) async fn png_of_site(
+    State(api): State<Shared>,
+    Path(site): Path<String>,
+    parameters: Parameters,
+) -> Result<Response, Problem> {
+    png(&heat_map(&api, Owner::Site(site), parameters).await?)
+}
+
+async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<HeatMap, Problem> {
+    let Query(parameters) = parameters.map_err(|_| unknown_parameter())?;
+    let span = parameters.span()?;
+    check_known(api, &owner).await?;
+    let time = (span.from * MINUTE_MS, span.to * MINUTE_MS);
+    // A camera of a site shares the floor of the site.
+    let owner = match &owner {
+        Owner::Camera(camera) => {
+            let engine = api.engine.lock();
+            engine
+                .scene_of(camera)
+                .map_or(owner.clone(), |scene| scene.owner.clone())
+        }
+        Owner::Site(_) => owner,
+    };
+    let cells = query(api, move |store| store.cells(&owner, time)).await?;
+    let day = |milliseconds: i64| {
+        let time = Timestamp::from_millisecond(milliseconds.div_euclid(DAY_MS) * DAY_MS);
+        time.unwrap_or(Timestamp::UNIX_EPOCH)
+    };
+    let (origin, seconds) = grid(&cells);
+    Ok(HeatMap {
+        from: day(time.0),
+        to: day(time.1 + DAY_MS - 1),
+        cell_m: CELL_M,
+        origin_m: origin.corner_m(),
+        seconds,
+    })
+}
+
+/// Returns the least cell and the seconds of all cells around the one with the most time.
+fn grid(cells: &BTreeMap<Cell, u64>) -> (Cell, Vec<Vec<f64>>) {
+    let hottest = cells.iter().max_by_key(|(_, milliseconds)| **milliseconds);
+    let Some((hottest, _)) = hottest else {
+        return (Cell { column: 0, row: 0 }, Vec::new());
+    };
+    let is_near = |cell: &&Cell| {
+        let distance = |one: i16, other: i16| (i64::from(one) - i64::from(other)).abs();
+        distance(cell.column, hottest.column) < MAX_SIDE / 2
+            && distance(cell.row, hottest.row) < MAX_SIDE / 2
+    };
+    let near: Vec<Cell> = cells.keys().filter(is_near).copied().collect();
+    let range = |index: fn(&Cell) -> i16| {
+        let values = near.iter().map(index);
+        let (least, most) = (values.clone().min(), values.max());
+        (least.unwrap_or_default(), most.unwrap_or_default())
+    };
+    let (left, right) = range(|cell| cell.column);
+    let (top, bottom) = range(|cell| cell.row);
+    let rows = (top..=bottom).map(|row| {
+        let columns = (left..=right).map(|column| {
+            let milliseconds = cells
+                .get(&Cell { column, row })
+                .copied()
+                .unwrap_or_default();
+            #[expect(clippy::cast_precision_loss, reason = "exact for centuries")]
+            let seconds = milliseconds as f64 / 1000.0;
+            seconds
+        });
+        columns.collect()
+    });
+    (
+        Cell {
+            column: left,
+            row: top,
+        },
+        rows.collect(),
+    )
+}
+
+/// Draws the map: transparent without presence, from blue to red with the logarithm of the time.
+fn png(map: &HeatMap) -> Result<Response, Problem> {
+    let columns = map.seconds.first().map_or(1, Vec::len);
+    let rows = map.seconds.len().max(1);
+    let most = map.seconds.iter().flatten().copied().fold(0.0, f64::max);
+    let mut pixels = vec![0; columns * rows * CELL_PX * CELL_PX * 4];
+    let width = columns * CELL_PX;
+    for (row, cells) in map.seconds.iter().enumerate() {
+        for (column, seconds) in cells.iter().enumerate() {
+            let colour = colour(*seconds, most);
+            for y in row * CELL_PX..(row + 1) * CELL_PX {
+                let start = (y * width + column * CELL_PX) * 4;
+                for pixel in pixels[start..start + CELL_PX * 4].chunks_exact_mut(4) {
+                    pixel.copy_from_slice(&colour);
+                }
+            }
+        }
+    }
+    let file = encoded(&pixels, width, rows * CELL_PX).map_err(|problem| {
+        tracing::error!("the heat map cannot be encoded: {problem}");
+        Problem::internal()
+    })?;
+    Ok(([(CONTENT_TYPE, "image/png")], file).into_response())
+}
+
+fn encoded(pixels: &[u8], width: usize, height: usize) -> Result<Vec<u8>, png::EncodingError> {
+    let mut file = Vec::new();
+    let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+    let mut encoder = png::Encoder::new(&mut file, side(width), side(height));
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.write_header()?.write_image_data(pixels)?;
+    Ok(file)
+}
+
+fn colour(seconds: f64, most: f64) -> [u8; 4] {
+    if seconds <= 0.0 {
+        return [0; 4];
+    }
+    let share = (1.0 + seconds).ln() / (1.0 + most).ln();
+    let channel = |value: f64| {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped"
+        )]
+        let channel = (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+        channel
+    };
+    [
+        channel(2.0 * share - 0.6),
+        channel(1.2 - (2.4 * share - 1.2).abs()),
+        channel(1.0 - 1.6 * share),
+        channel(0.35 + 0.5 * share),
+    ]
+}

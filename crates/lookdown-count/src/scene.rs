@@ -1,0 +1,361 @@
+//! A tracker with the cameras that it follows: one camera, or all cameras of a site.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Observation,
+    definition::{CameraDefinition, DefinitionKey},
+    heat_map::HeatMap,
+    lines::{Direction, LineCounter, LineState},
+    sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, Sums, ZoneOf, minutes},
+    tracking::{RefusedReport, SiteError, Track, Tracker, TrackerSettings},
+    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
+};
+
+/// A tracker, the counters of its cameras, and the state of their sums.
+pub(crate) struct Scene {
+    pub(crate) owner: Owner,
+    tracker: Tracker,
+    heat_map: HeatMap,
+    presence: Presence,
+    pub(crate) cameras: Vec<SceneCamera>,
+}
+
+/// A camera of a scene.
+pub(crate) struct SceneCamera {
+    pub(crate) name: String,
+    pub(crate) definition: Arc<CameraDefinition>,
+    lines: LineCounter,
+    zones: ZoneCounter,
+    presence: Presence,
+    /// Persons in each zone at the last report of this camera.
+    zone_persons: Vec<u64>,
+}
+
+/// The last report and its number of persons.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Presence {
+    pub(crate) last_ms: Option<i64>,
+    pub(crate) persons: u64,
+}
+
+/// The state of a scene as it is stored.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct SceneState {
+    owner: Owner,
+    tracker: Tracker,
+    heat_map: HeatMap,
+    presence: Presence,
+    cameras: Vec<CameraState>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct CameraState {
+    name: String,
+    key: DefinitionKey,
+    lines: LineState,
+    zones: ZoneState,
+    presence: Presence,
+    zone_persons: Vec<u64>,
+}
+
+/// A crossing with its names.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NamedCrossing {
+    pub(crate) of: LineDirection,
+    pub(crate) at_ms: i64,
+}
+
+impl Presence {
+    /// Returns the time since the last report if it is known: positive, and no longer than the
+    /// longest gap.
+    fn known_since(&self, at_ms: i64, longest_gap_ms: i64) -> Option<i64> {
+        let last = self.last_ms?;
+        (last < at_ms && at_ms - last <= longest_gap_ms).then_some(last)
+    }
+
+    /// Adds the time since the last report to the sums, and sets the number of persons.
+    fn advance(
+        &mut self,
+        owner: &Owner,
+        (at_ms, longest_gap_ms): (i64, i64),
+        persons: u64,
+        sums: &mut Sums,
+    ) {
+        if let Some(last) = self.known_since(at_ms, longest_gap_ms) {
+            for (minute, length_ms) in minutes(last, at_ms) {
+                let sum = sums.presence.entry((owner.clone(), minute)).or_default();
+                sum.known_ms += length_ms;
+                sum.person_ms += length_ms * self.persons;
+                sum.most = sum.most.max(self.persons);
+            }
+        }
+        if self.last_ms.is_none_or(|last| last < at_ms) {
+            let minute = at_ms.div_euclid(MINUTE_MS);
+            let sum = sums.presence.entry((owner.clone(), minute)).or_default();
+            sum.most = sum.most.max(persons);
+            *self = Self {
+                last_ms: Some(at_ms),
+                persons,
+            };
+        }
+    }
+}
+
+impl SceneCamera {
+    fn new(name: &str, definition: Arc<CameraDefinition>) -> Self {
+        Self {
+            name: name.to_owned(),
+            lines: line_counter(&definition, LineState::default()),
+            zones: zone_counter(&definition, ZoneState::default()),
+            presence: Presence::default(),
+            zone_persons: vec![0; definition.zones.len()],
+            definition,
+        }
+    }
+
+    /// Changes what is counted. Visits and approaches begin again.
+    pub(crate) fn redefine(&mut self, definition: Arc<CameraDefinition>) {
+        let presence = self.presence;
+        *self = Self::new(&self.name, definition);
+        self.presence = presence;
+    }
+
+    pub(crate) fn presence(&self) -> &Presence {
+        &self.presence
+    }
+
+    /// Returns each zone with its persons now.
+    pub(crate) fn occupancy(&self) -> impl Iterator<Item = (&str, usize)> {
+        let names = self.zones.zones().iter().map(|zone| zone.name.as_str());
+        names.zip(self.zones.occupancy())
+    }
+
+    fn zone_of(&self, index: usize) -> ZoneOf {
+        let zone = self.zones.zones().get(index);
+        ZoneOf {
+            camera: self.name.clone(),
+            zone: zone.map(|zone| zone.name.clone()).unwrap_or_default(),
+        }
+    }
+
+    /// Adds the crossings, entries and visits of the tracks to the sums.
+    fn count(&mut self, tracks: &[&Track], sums: &mut Sums) -> Vec<NamedCrossing> {
+        let mut named = Vec::new();
+        for crossing in self.lines.update(tracks.iter().copied()) {
+            let line = &self.lines.lines()[crossing.line];
+            let direction = match crossing.direction {
+                Direction::In => 0,
+                Direction::Out => 1,
+            };
+            let at_ms = milliseconds(crossing.at_s);
+            let of = LineDirection {
+                camera: self.name.clone(),
+                line: line.name.clone(),
+                direction: self.definition.directions[crossing.line][direction].clone(),
+            };
+            let key = (of.clone(), at_ms.div_euclid(MINUTE_MS));
+            *sums.crossings.entry(key).or_default() += 1;
+            named.push(NamedCrossing { of, at_ms });
+        }
+        for event in self.zones.update(tracks.iter().copied()) {
+            let (ZoneEvent::Entered { zone, at_s, .. } | ZoneEvent::Left { zone, at_s, .. }) =
+                event;
+            let minute = milliseconds(at_s).div_euclid(MINUTE_MS);
+            let sum = sums.zones.entry((self.zone_of(zone), minute)).or_default();
+            match event {
+                ZoneEvent::Entered { .. } => sum.entries += 1,
+                ZoneEvent::Left { dwell_s, .. } => {
+                    sum.visits += 1;
+                    sum.visit_ms += milliseconds(dwell_s).unsigned_abs();
+                }
+            }
+        }
+        named
+    }
+
+    /// Adds the time since the last report of this camera to its zones.
+    fn advance_zones(&mut self, at_ms: i64, longest_gap_ms: i64, sums: &mut Sums) {
+        let since = self.presence.known_since(at_ms, longest_gap_ms);
+        let occupancy = self.zones.occupancy();
+        for (index, persons) in occupancy.into_iter().enumerate() {
+            let persons = persons as u64;
+            let zone = self.zone_of(index);
+            let before = std::mem::replace(&mut self.zone_persons[index], persons);
+            let parts = since.map(|since| minutes(since, at_ms));
+            for (minute, length_ms) in parts.into_iter().flatten().filter(|_| before > 0) {
+                let sum = sums.zones.entry((zone.clone(), minute)).or_default();
+                sum.person_ms += length_ms * before;
+                sum.most = sum.most.max(before);
+            }
+            if persons > 0 {
+                let minute = at_ms.div_euclid(MINUTE_MS);
+                let sum = sums.zones.entry((zone, minute)).or_default();
+                sum.most = sum.most.max(persons);
+            }
+        }
+    }
+}
+
+impl Scene {
+    /// Creates a scene of these cameras without tracks.
+    pub(crate) fn new(
+        owner: Owner,
+        cameras: Vec<(String, Arc<CameraDefinition>)>,
+        settings: TrackerSettings,
+    ) -> Result<Self, SiteError> {
+        let poses: Vec<_> = cameras.iter().map(|(_, camera)| camera.pose).collect();
+        let cameras = cameras.into_iter();
+        Ok(Self {
+            tracker: Tracker::new(&poses, settings)?,
+            owner,
+            heat_map: HeatMap::default(),
+            presence: Presence::default(),
+            cameras: cameras
+                .map(|(name, definition)| SceneCamera::new(&name, definition))
+                .collect(),
+        })
+    }
+
+    /// Creates the scene of a stored state. `definition` returns the definition of a key.
+    pub(crate) fn resumed(
+        state: SceneState,
+        mut definition: impl FnMut(DefinitionKey) -> Arc<CameraDefinition>,
+    ) -> Self {
+        let cameras = state.cameras.into_iter().map(|camera| {
+            let definition = definition(camera.key);
+            let mut zone_persons = camera.zone_persons;
+            zone_persons.resize(definition.zones.len(), 0);
+            SceneCamera {
+                name: camera.name,
+                lines: line_counter(&definition, camera.lines),
+                zones: zone_counter(&definition, camera.zones),
+                presence: camera.presence,
+                zone_persons,
+                definition,
+            }
+        });
+        Self {
+            cameras: cameras.collect(),
+            owner: state.owner,
+            tracker: state.tracker,
+            heat_map: state.heat_map,
+            presence: state.presence,
+        }
+    }
+
+    /// Returns the state to be stored.
+    pub(crate) fn state(&self) -> SceneState {
+        let cameras = self.cameras.iter().map(|camera| CameraState {
+            name: camera.name.clone(),
+            key: camera.definition.key.clone(),
+            lines: camera.lines.state().clone(),
+            zones: camera.zones.state().clone(),
+            presence: camera.presence,
+            zone_persons: camera.zone_persons.clone(),
+        });
+        SceneState {
+            owner: self.owner.clone(),
+            tracker: self.tracker.clone(),
+            heat_map: self.heat_map.clone(),
+            presence: self.presence,
+            cameras: cameras.collect(),
+        }
+    }
+
+    /// Takes the persons of a report, and adds to the sums. Returns the crossings.
+    pub(crate) fn accept(
+        &mut self,
+        camera: usize,
+        (at_ms, longest_gap_ms): (i64, i64),
+        persons: &[Observation],
+        sums: &mut Sums,
+    ) -> Result<Vec<NamedCrossing>, RefusedReport> {
+        self.tracker.update(camera, seconds(at_ms), persons)?;
+        let tracks: Vec<&Track> = self.tracker.tracks().collect();
+        let mut crossings = Vec::new();
+        for camera in &mut self.cameras {
+            crossings.extend(camera.count(&tracks, sums));
+        }
+        self.heat_map.update(tracks.iter().copied());
+        let day = at_ms.div_euclid(DAY_MS);
+        for (cell, milliseconds) in self.heat_map.take() {
+            let key = (self.owner.clone(), day, cell);
+            *sums.cells.entry(key).or_default() += milliseconds;
+        }
+        let tracked = tracks.len() as u64;
+        let time = (at_ms, longest_gap_ms);
+        let is_site = matches!(self.owner, Owner::Site(_));
+        let reporting = &mut self.cameras[camera];
+        reporting.advance_zones(at_ms, longest_gap_ms, sums);
+        let own = if is_site {
+            let own = tracks
+                .iter()
+                .filter(|track| track.last_person().camera == camera);
+            own.count() as u64
+        } else {
+            tracked
+        };
+        let owner = Owner::Camera(reporting.name.clone());
+        reporting.presence.advance(&owner, time, own, sums);
+        if is_site {
+            self.presence.advance(&self.owner, time, tracked, sums);
+        }
+        Ok(crossings)
+    }
+
+    /// Returns the confirmed tracks.
+    pub(crate) fn tracks(&self) -> impl Iterator<Item = &Track> {
+        self.tracker.tracks()
+    }
+
+    /// Returns the persons of the site at its last report.
+    pub(crate) fn presence(&self) -> &Presence {
+        match self.owner {
+            Owner::Site(_) => &self.presence,
+            Owner::Camera(_) => &self.cameras[0].presence,
+        }
+    }
+
+    /// Returns a camera and its index.
+    pub(crate) fn camera(&self, name: &str) -> Option<(usize, &SceneCamera)> {
+        let mut cameras = self.cameras.iter().enumerate();
+        cameras.find(|(_, camera)| camera.name == name)
+    }
+
+    pub(crate) fn definitions(&self) -> BTreeMap<String, Arc<CameraDefinition>> {
+        let cameras = self.cameras.iter();
+        cameras
+            .map(|camera| (camera.name.clone(), Arc::clone(&camera.definition)))
+            .collect()
+    }
+}
+
+// The definition was checked: counters accept it. Without it, nothing is counted.
+fn line_counter(definition: &CameraDefinition, state: LineState) -> LineCounter {
+    LineCounter::resumed(definition.lines.clone(), state).unwrap_or_else(|error| {
+        tracing::warn!("the lines of {:?} are not counted: {error}", definition.key);
+        LineCounter::default()
+    })
+}
+
+fn zone_counter(definition: &CameraDefinition, state: ZoneState) -> ZoneCounter {
+    ZoneCounter::resumed(definition.zones.clone(), DEFAULT_HOLD_S, state).unwrap_or_else(|error| {
+        tracing::warn!("the zones of {:?} are not counted: {error}", definition.key);
+        ZoneCounter::default()
+    })
+}
+
+fn seconds(milliseconds: i64) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "exact for 285,000 years")]
+    let milliseconds = milliseconds as f64;
+    milliseconds / 1000.0
+}
+
+fn milliseconds(seconds: f64) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "times of reports")]
+    let milliseconds = (seconds * 1000.0).round() as i64;
+    milliseconds
+}

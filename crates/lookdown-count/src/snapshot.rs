@@ -1,0 +1,133 @@
+//! The current counts of all cameras and sites, for metrics and MQTT.
+
+use crate::{
+    engine::Engine,
+    sums::{LineDirection, Owner, ZoneOf},
+};
+
+/// The current counts.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Snapshot {
+    /// The cameras, by name.
+    pub cameras: Vec<CameraSnapshot>,
+    /// The sites, by name.
+    pub sites: Vec<SiteSnapshot>,
+}
+
+/// The current counts of a camera.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CameraSnapshot {
+    /// The name.
+    pub name: String,
+    /// Time of the last frame, milliseconds since the Unix epoch.
+    pub last_report_ms: i64,
+    /// Persons now; `None` while unknown.
+    pub persons: Option<u64>,
+    /// The directions of its lines.
+    pub lines: Vec<LineSnapshot>,
+    /// Its zones.
+    pub zones: Vec<ZoneSnapshot>,
+}
+
+/// The crossings of a line in a direction.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LineSnapshot {
+    /// The name of the line.
+    pub line: String,
+    /// The name of the direction.
+    pub direction: String,
+    /// Crossings since the store was created.
+    pub crossings: u64,
+}
+
+/// The current counts of a zone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ZoneSnapshot {
+    /// The name.
+    pub zone: String,
+    /// Persons now; `None` while unknown.
+    pub persons: Option<u64>,
+    /// Entries since the store was created.
+    pub entries: u64,
+    /// Time that persons spent in the zone since the store was created, milliseconds.
+    pub person_ms: u64,
+}
+
+/// The current counts of a site.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SiteSnapshot {
+    /// The name.
+    pub name: String,
+    /// Persons now; `None` while unknown.
+    pub persons: Option<u64>,
+}
+
+impl Engine {
+    /// Returns the current counts.
+    pub(crate) fn snapshot(&self, now_ms: i64) -> Snapshot {
+        let is_known = |last_ms: Option<i64>| {
+            last_ms.is_some_and(|last_ms| now_ms - last_ms <= self.longest_gap_ms())
+        };
+        let mut snapshot = Snapshot::default();
+        for scene in self.scenes() {
+            if let Owner::Site(name) = &scene.owner {
+                let presence = scene.presence();
+                snapshot.sites.push(SiteSnapshot {
+                    name: name.clone(),
+                    persons: is_known(presence.last_ms).then_some(presence.persons),
+                });
+            }
+            for camera in &scene.cameras {
+                let presence = camera.presence();
+                let Some(last_report_ms) = presence.last_ms else {
+                    continue;
+                };
+                let is_known = is_known(Some(last_report_ms));
+                let directions = camera
+                    .definition
+                    .lines
+                    .iter()
+                    .zip(&camera.definition.directions);
+                let lines = directions.flat_map(|(line, directions)| {
+                    directions.iter().map(|direction| {
+                        let of = LineDirection {
+                            camera: camera.name.clone(),
+                            line: line.name.clone(),
+                            direction: direction.clone(),
+                        };
+                        let crossings = self.totals().crossings.get(&of);
+                        LineSnapshot {
+                            crossings: crossings.copied().unwrap_or_default(),
+                            line: of.line,
+                            direction: of.direction,
+                        }
+                    })
+                });
+                let zones = camera.occupancy().map(|(zone, persons)| {
+                    let of = ZoneOf {
+                        camera: camera.name.clone(),
+                        zone: zone.to_owned(),
+                    };
+                    let total = self.totals().zones.get(&of).copied().unwrap_or_default();
+                    ZoneSnapshot {
+                        zone: of.zone,
+                        persons: is_known.then_some(persons as u64),
+                        entries: total.entries,
+                        person_ms: total.person_ms,
+                    }
+                });
+                snapshot.cameras.push(CameraSnapshot {
+                    name: camera.name.clone(),
+                    last_report_ms,
+                    persons: is_known.then_some(presence.persons),
+                    lines: lines.collect(),
+                    zones: zones.collect(),
+                });
+            }
+        }
+        snapshot
+            .cameras
+            .sort_by(|one, other| one.name.cmp(&other.name));
+        snapshot
+    }
+}

@@ -1,0 +1,138 @@
+//! The embedded store: sums per minute, the state of the trackers and the ID of the last report.
+//!
+//! All of it changes in one transaction, so that the sums contain every report up to that ID and none
+//! after it, however the process ends.
+
+mod read;
+mod schema;
+mod write;
+
+use std::{
+    fs::{File, OpenOptions, TryLockError},
+    path::{Path, PathBuf},
+    sync::Arc,
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use parking_lot::Mutex;
+use rusqlite::Connection;
+
+pub(crate) use read::{Span, Step, StoredCalibrations};
+
+/// Longest wait for the other connection.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+/// Longest wait for an earlier user of the store, and the interval of the attempts.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(5);
+const LOCK_PAUSE: Duration = Duration::from_millis(50);
+
+/// A store that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The file cannot be opened, or is no store.
+    #[error(
+        "store.path: {path} cannot be used: {problem}: give a writable path of a store of lookdown count"
+    )]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        problem: String,
+    },
+    /// Another process has the store open.
+    #[error("store.path: {0} is in use by another process: stop it, or give another path")]
+    InUse(PathBuf),
+    /// The store is of a later version.
+    #[error(
+        "store.path: {path} has the version {version}: use the program that wrote it, or give another path"
+    )]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        version: i64,
+    },
+    /// A query failed.
+    #[error("the store cannot be read or written: {0}")]
+    Query(#[from] rusqlite::Error),
+    /// A state cannot be encoded.
+    #[error("the state of a tracker cannot be stored: {0}")]
+    State(#[from] postcard::Error),
+}
+
+/// The store. One connection writes, one reads.
+#[derive(Clone)]
+pub(crate) struct Store {
+    writer: Arc<Mutex<Connection>>,
+    reader: Arc<Mutex<Connection>>,
+    /// Locked while the store is open.
+    _lock: Arc<File>,
+}
+
+impl Store {
+    /// Opens or creates the store. Blocks.
+    pub(crate) fn open(path: &Path) -> Result<Self, StoreError> {
+        let lock = lock(path)?;
+        let unusable = |problem: rusqlite::Error| StoreError::Unusable {
+            path: path.to_owned(),
+            problem: problem.to_string(),
+        };
+        let writer = connect(path).map_err(unusable)?;
+        let version = schema::version(&writer).map_err(unusable)?;
+        if version > schema::VERSION {
+            return Err(StoreError::Version {
+                path: path.to_owned(),
+                version,
+            });
+        }
+        schema::create(&writer).map_err(unusable)?;
+        let reader = connect(path).map_err(unusable)?;
+        reader
+            .pragma_update(None, "query_only", true)
+            .map_err(unusable)?;
+        Ok(Self {
+            writer: Arc::new(Mutex::new(writer)),
+            reader: Arc::new(Mutex::new(reader)),
+            _lock: Arc::new(lock),
+        })
+    }
+}
+
+fn connect(path: &Path) -> rusqlite::Result<Connection> {
+    let connection = Connection::open(path)?;
+    connection.busy_timeout(BUSY_TIMEOUT)?;
+    connection.pragma_update(None, "journal_mode", "wal")?;
+    // A transaction survives the end of the process at once. A power failure may lose the last ones
+    // as a whole: the server sends their reports again.
+    connection.pragma_update(None, "synchronous", "normal")?;
+    Ok(connection)
+}
+
+/// Locks the file beside the store. Waits for a process that ends, and for requests that end with
+/// earlier settings.
+fn lock(path: &Path) -> Result<File, StoreError> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".lock");
+    let opened = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&name);
+    let unusable = |problem: std::io::Error| StoreError::Unusable {
+        path: path.to_owned(),
+        problem: problem.to_string(),
+    };
+    let file = opened.map_err(unusable)?;
+    let started = Instant::now();
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(file),
+            Err(TryLockError::WouldBlock) if started.elapsed() < LOCK_TIMEOUT => sleep(LOCK_PAUSE),
+            Err(TryLockError::WouldBlock) => return Err(StoreError::InUse(path.to_owned())),
+            Err(TryLockError::Error(problem)) => return Err(unusable(problem)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,225 @@
+//! Queries of the store.
+
+use std::collections::BTreeMap;
+
+use rusqlite::{Connection, OptionalExtension, params};
+
+use super::{Store, StoreError};
+use crate::{
+    engine::{Totals, ZoneTotal},
+    heat_map::Cell,
+    scene::SceneState,
+    sums::{DAY_MS, LineDirection, Owner, PresenceSum, ZoneOf, ZoneSum},
+    webhooks::Message,
+};
+
+/// The content of the store at the start.
+pub(crate) struct Resumed {
+    pub(crate) last_event: u64,
+    pub(crate) totals: Totals,
+    pub(crate) scenes: Vec<SceneState>,
+    pub(crate) calibrations: StoredCalibrations,
+    pub(crate) messages: Vec<Message>,
+}
+
+/// The calibrations by ID: the revision, and the content if the server has one.
+pub(crate) type StoredCalibrations = BTreeMap<String, (String, Option<Vec<u8>>)>;
+
+/// A time in whole minutes, in steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Span {
+    /// First minute.
+    pub(crate) from: i64,
+    /// Minute after the last.
+    pub(crate) to: i64,
+    /// Minutes of a step.
+    pub(crate) step: i64,
+}
+
+/// The sums of a step.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Step {
+    pub(crate) presence: PresenceSum,
+    /// Crossings per line and direction.
+    pub(crate) crossings: BTreeMap<(String, String), u64>,
+    /// Sums per zone.
+    pub(crate) zones: BTreeMap<String, ZoneSum>,
+}
+
+impl Store {
+    /// Reads what a start continues from. A state of another version is left out. Blocks.
+    pub(crate) fn resumed(&self) -> Result<Resumed, StoreError> {
+        let connection = self.reader.lock();
+        let last_event = connection
+            .query_row("SELECT last_event FROM progress", [], |row| {
+                row.get::<_, i64>(0)
+            })
+            .optional()?;
+        Ok(Resumed {
+            last_event: last_event.unwrap_or_default().cast_unsigned(),
+            totals: totals(&connection)?,
+            scenes: scenes(&connection)?,
+            calibrations: calibrations(&connection)?,
+            messages: messages(&connection)?,
+        })
+    }
+
+    /// Returns the sums of the steps of a time that have any, by the number of the step. Blocks.
+    pub(crate) fn steps(
+        &self,
+        owner: &Owner,
+        span: Span,
+    ) -> Result<BTreeMap<i64, Step>, StoreError> {
+        let connection = self.reader.lock();
+        let Span { from, to, step } = span;
+        let mut steps = BTreeMap::<i64, Step>::new();
+        let mut statement = connection.prepare_cached(
+            "SELECT (minute - ?2) / ?4, sum(known_ms), sum(person_ms), max(most) FROM presence
+             WHERE owner = ?1 AND minute >= ?2 AND minute < ?3 GROUP BY 1",
+        )?;
+        let mut rows = statement.query(params![owner.key(), from, to, step])?;
+        while let Some(row) = rows.next()? {
+            steps.entry(row.get(0)?).or_default().presence = PresenceSum {
+                known_ms: row.get::<_, i64>(1)?.cast_unsigned(),
+                person_ms: row.get::<_, i64>(2)?.cast_unsigned(),
+                most: row.get::<_, i64>(3)?.cast_unsigned(),
+            };
+        }
+        let Owner::Camera(camera) = owner else {
+            return Ok(steps);
+        };
+        let mut statement = connection.prepare_cached(
+            "SELECT (minute - ?2) / ?4, line, direction, sum(crossings) FROM crossings
+             WHERE camera = ?1 AND minute >= ?2 AND minute < ?3 GROUP BY 1, 2, 3",
+        )?;
+        let mut rows = statement.query(params![camera, from, to, step])?;
+        while let Some(row) = rows.next()? {
+            let crossings = &mut steps.entry(row.get(0)?).or_default().crossings;
+            crossings.insert(
+                (row.get(1)?, row.get(2)?),
+                row.get::<_, i64>(3)?.cast_unsigned(),
+            );
+        }
+        let mut statement = connection.prepare_cached(
+            "SELECT (minute - ?2) / ?4, zone, sum(entries), sum(visits), sum(visit_ms), sum(person_ms),
+             max(most) FROM zones WHERE camera = ?1 AND minute >= ?2 AND minute < ?3 GROUP BY 1, 2",
+        )?;
+        let mut rows = statement.query(params![camera, from, to, step])?;
+        while let Some(row) = rows.next()? {
+            let zones = &mut steps.entry(row.get(0)?).or_default().zones;
+            let sum = ZoneSum {
+                entries: row.get::<_, i64>(2)?.cast_unsigned(),
+                visits: row.get::<_, i64>(3)?.cast_unsigned(),
+                visit_ms: row.get::<_, i64>(4)?.cast_unsigned(),
+                person_ms: row.get::<_, i64>(5)?.cast_unsigned(),
+                most: row.get::<_, i64>(6)?.cast_unsigned(),
+            };
+            zones.insert(row.get(1)?, sum);
+        }
+        Ok(steps)
+    }
+
+    /// Returns the milliseconds of presence per cell in whole days. Blocks.
+    pub(crate) fn cells(
+        &self,
+        owner: &Owner,
+        (from_ms, to_ms): (i64, i64),
+    ) -> Result<BTreeMap<Cell, u64>, StoreError> {
+        let connection = self.reader.lock();
+        let mut statement = connection.prepare_cached(
+            "SELECT cell_column, cell_row, sum(milliseconds) FROM cells
+             WHERE owner = ? AND day >= ? AND day < ? GROUP BY 1, 2",
+        )?;
+        let days = (
+            from_ms.div_euclid(DAY_MS),
+            (to_ms + DAY_MS - 1).div_euclid(DAY_MS),
+        );
+        let mut rows = statement.query(params![owner.key(), days.0, days.1])?;
+        let mut cells = BTreeMap::new();
+        while let Some(row) = rows.next()? {
+            let cell = Cell {
+                column: row.get(0)?,
+                row: row.get(1)?,
+            };
+            cells.insert(cell, row.get::<_, i64>(2)?.cast_unsigned());
+        }
+        Ok(cells)
+    }
+
+    /// Returns true if there are sums of the owner. Blocks.
+    pub(crate) fn has(&self, owner: &Owner) -> Result<bool, StoreError> {
+        let connection = self.reader.lock();
+        let mut statement =
+            connection.prepare_cached("SELECT 1 FROM presence WHERE owner = ? LIMIT 1")?;
+        Ok(statement.exists([owner.key()])?)
+    }
+}
+
+fn totals(connection: &Connection) -> rusqlite::Result<Totals> {
+    let mut totals = Totals::default();
+    let mut statement =
+        connection.prepare("SELECT camera, line, direction, crossings FROM line_totals")?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let of = LineDirection {
+            camera: row.get(0)?,
+            line: row.get(1)?,
+            direction: row.get(2)?,
+        };
+        totals
+            .crossings
+            .insert(of, row.get::<_, i64>(3)?.cast_unsigned());
+    }
+    let mut statement =
+        connection.prepare("SELECT camera, zone, entries, person_ms FROM zone_totals")?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let of = ZoneOf {
+            camera: row.get(0)?,
+            zone: row.get(1)?,
+        };
+        let total = ZoneTotal {
+            entries: row.get::<_, i64>(2)?.cast_unsigned(),
+            person_ms: row.get::<_, i64>(3)?.cast_unsigned(),
+        };
+        totals.zones.insert(of, total);
+    }
+    Ok(totals)
+}
+
+fn scenes(connection: &Connection) -> rusqlite::Result<Vec<SceneState>> {
+    let mut scenes = Vec::new();
+    let mut statement = connection.prepare("SELECT owner, state FROM scenes")?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let state: Vec<u8> = row.get(1)?;
+        match postcard::from_bytes(&state) {
+            Ok(state) => scenes.push(state),
+            Err(problem) => {
+                let owner: String = row.get(0)?;
+                tracing::warn!("the tracks of {owner} begin again: {problem}");
+            }
+        }
+    }
+    Ok(scenes)
+}
+
+fn calibrations(connection: &Connection) -> rusqlite::Result<StoredCalibrations> {
+    let mut statement = connection.prepare("SELECT id, revision, content FROM calibrations")?;
+    let rows = statement.query_map([], |row| Ok((row.get(0)?, (row.get(1)?, row.get(2)?))))?;
+    rows.collect()
+}
+
+fn messages(connection: &Connection) -> rusqlite::Result<Vec<Message>> {
+    let mut statement =
+        connection.prepare("SELECT id, url, body, created_s FROM outbox ORDER BY created_s, id")?;
+    let rows = statement.query_map([], |row| {
+        Ok(Message {
+            id: row.get(0)?,
+            url: row.get(1)?,
+            body: row.get(2)?,
+            created_s: row.get(3)?,
+        })
+    })?;
+    rows.collect()
+}

@@ -1,0 +1,48 @@
+//! The tables.
+
+use rusqlite::Connection;
+
+/// The version of the tables.
+pub(super) const VERSION: i64 = 1;
+
+/// Owners are `camera:NAME` or `site:NAME`. Minutes and days are counted from the Unix epoch.
+const TABLES: &str = "
+BEGIN IMMEDIATE;
+CREATE TABLE IF NOT EXISTS progress (only INTEGER PRIMARY KEY CHECK (only = 1), last_event INTEGER NOT NULL);
+CREATE TABLE IF NOT EXISTS scenes (owner TEXT PRIMARY KEY, state BLOB NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS calibrations (
+  id TEXT PRIMARY KEY, revision TEXT NOT NULL, content BLOB) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS presence (
+  owner TEXT, minute INTEGER, known_ms INTEGER NOT NULL, person_ms INTEGER NOT NULL, most INTEGER NOT NULL,
+  PRIMARY KEY (owner, minute)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS crossings (
+  camera TEXT, line TEXT, direction TEXT, minute INTEGER, crossings INTEGER NOT NULL,
+  PRIMARY KEY (camera, minute, line, direction)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS zones (
+  camera TEXT, zone TEXT, minute INTEGER, entries INTEGER NOT NULL, visits INTEGER NOT NULL,
+  visit_ms INTEGER NOT NULL, person_ms INTEGER NOT NULL, most INTEGER NOT NULL,
+  PRIMARY KEY (camera, minute, zone)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS cells (
+  owner TEXT, day INTEGER, cell_column INTEGER, cell_row INTEGER, milliseconds INTEGER NOT NULL,
+  PRIMARY KEY (owner, day, cell_column, cell_row)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS line_totals (
+  camera TEXT, line TEXT, direction TEXT, crossings INTEGER NOT NULL,
+  PRIMARY KEY (camera, line, direction)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS zone_totals (
+  camera TEXT, zone TEXT, entries INTEGER NOT NULL, person_ms INTEGER NOT NULL,
+  PRIMARY KEY (camera, zone)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS outbox (
+  id TEXT PRIMARY KEY, url TEXT NOT NULL, body TEXT NOT NULL, created_s INTEGER NOT NULL) WITHOUT ROWID;
+PRAGMA user_version = 1;
+COMMIT;
+";
+
+/// Returns the version of the tables of a store, 0 for a new one.
+pub(super) fn version(connection: &Connection) -> rusqlite::Result<i64> {
+    connection.pragma_query_value(None, "user_version", |row| row.get(0))
+}
+
+/// Creates the tables that are missing.
+pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
+    connection.execute_batch(TABLES)
+}

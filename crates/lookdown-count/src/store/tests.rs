@@ -1,0 +1,157 @@
+use super::*;
+use crate::{
+    engine::Batch,
+    heat_map::Cell,
+    sums::{LineDirection, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
+    webhooks::Message,
+};
+
+fn batch(minute: i64, last_event: u64) -> Batch {
+    let mut batch = Batch::empty(last_event);
+    let hall = Owner::Camera("hall".to_owned());
+    let presence = PresenceSum {
+        known_ms: 30_000,
+        person_ms: 60_000,
+        most: 3,
+    };
+    let door = LineDirection {
+        camera: "hall".to_owned(),
+        line: "door".to_owned(),
+        direction: "in".to_owned(),
+    };
+    let till = ZoneOf {
+        camera: "hall".to_owned(),
+        zone: "till".to_owned(),
+    };
+    let zone = ZoneSum {
+        entries: 1,
+        visits: 1,
+        visit_ms: 2_000,
+        person_ms: 2_000,
+        most: 1,
+    };
+    let cell = Cell { column: -3, row: 4 };
+    batch.sums = Sums {
+        presence: [((hall.clone(), minute), presence)].into(),
+        crossings: [((door, minute), 2)].into(),
+        zones: [((till, minute), zone)].into(),
+        cells: [((hall, 0, cell), 500)].into(),
+    };
+    batch
+}
+
+#[test]
+fn sums_of_batches_add_up_over_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    for minute in [0, 0, 1, 17] {
+        store.commit(&batch(minute, 7), &[]).unwrap();
+    }
+    let hall = Owner::Camera("hall".to_owned());
+    let span = |step| Span {
+        from: 0,
+        to: 30,
+        step,
+    };
+    let steps = store.steps(&hall, span(15)).unwrap();
+    assert_eq!(steps.keys().copied().collect::<Vec<_>>(), [0, 1]);
+    assert_eq!(steps[&0].presence.known_ms, 90_000);
+    let whole = &store.steps(&hall, span(30)).unwrap()[&0];
+    assert_eq!(
+        (whole.presence.person_ms, whole.presence.most),
+        (240_000, 3)
+    );
+    let door = ("door".to_owned(), "in".to_owned());
+    assert_eq!(whole.crossings[&door], 8);
+    assert_eq!(
+        (whole.zones["till"].entries, whole.zones["till"].most),
+        (4, 1)
+    );
+    let cells = store.cells(&hall, (0, 1)).unwrap();
+    assert_eq!(cells[&Cell { column: -3, row: 4 }], 2_000);
+    let resumed = store.resumed().unwrap();
+    assert_eq!(resumed.last_event, 7);
+    assert_eq!(
+        resumed
+            .totals
+            .crossings
+            .values()
+            .copied()
+            .collect::<Vec<_>>(),
+        [8]
+    );
+}
+
+#[test]
+fn old_sums_expire_and_totals_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    store.commit(&batch(1, 7), &[]).unwrap();
+    store.commit(&batch(100, 8), &[]).unwrap();
+    store.expire(60 * 60_000).unwrap();
+    let hall = Owner::Camera("hall".to_owned());
+    let span = Span {
+        from: 0,
+        to: 200,
+        step: 200,
+    };
+    assert_eq!(
+        store.steps(&hall, span).unwrap()[&0].presence.known_ms,
+        30_000
+    );
+    assert_eq!(
+        store
+            .resumed()
+            .unwrap()
+            .totals
+            .crossings
+            .values()
+            .sum::<u64>(),
+        4
+    );
+}
+
+#[test]
+fn messages_stay_until_they_are_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    let message = Message {
+        id: "msg_1".to_owned(),
+        url: "http://127.0.0.1/".to_owned(),
+        body: "{}".to_owned(),
+        created_s: 5,
+    };
+    for _ in 0..2 {
+        store
+            .commit(&Batch::empty(1), std::slice::from_ref(&message))
+            .unwrap();
+    }
+    assert_eq!(store.resumed().unwrap().messages, [message]);
+    store.remove_message("msg_1").unwrap();
+    assert!(store.resumed().unwrap().messages.is_empty());
+}
+
+#[test]
+fn a_store_has_one_user_and_a_known_version() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("counts.sqlite");
+    let store = Store::open(&path).unwrap();
+    let second = Store::open(&path).err().unwrap().to_string();
+    assert!(second.contains("is in use by another process"), "{second}");
+    store
+        .writer
+        .lock()
+        .pragma_update(None, "user_version", 9)
+        .unwrap();
+    drop(store);
+    let later = Store::open(&path).err().unwrap().to_string();
+    assert!(later.contains("has the version 9"), "{later}");
+    let other = folder.path().join("other");
+    std::fs::write(
+        &other,
+        "no database at all, but long enough for a header".repeat(20),
+    )
+    .unwrap();
+    let refused = Store::open(&other).err().unwrap().to_string();
+    assert!(refused.contains("cannot be used"), "{refused}");
+}

@@ -1,0 +1,159 @@
+//! Transactions of the store.
+
+use rusqlite::{Transaction, params};
+
+use super::{Store, StoreError};
+use crate::{
+    engine::Batch,
+    sums::{DAY_MS, MINUTE_MS, Owner, Sums},
+    webhooks::Message,
+};
+
+impl Owner {
+    /// Returns the key of the store.
+    pub(super) fn key(&self) -> String {
+        match self {
+            Self::Camera(name) => format!("camera:{name}"),
+            Self::Site(name) => format!("site:{name}"),
+        }
+    }
+}
+
+impl Store {
+    /// Stores sums, states, the ID of the last report and the messages that follow from them in one
+    /// transaction. Blocks.
+    pub(crate) fn commit(&self, batch: &Batch, messages: &[Message]) -> Result<(), StoreError> {
+        let mut connection = self.writer.lock();
+        let transaction = connection.transaction()?;
+        add(&transaction, &batch.sums)?;
+        for (owner, state) in &batch.scenes {
+            match state {
+                Some(state) => {
+                    let state = postcard::to_stdvec(state)?;
+                    transaction
+                        .prepare_cached("INSERT OR REPLACE INTO scenes VALUES (?, ?)")?
+                        .execute(params![owner.key(), state])?;
+                }
+                None => {
+                    transaction.execute("DELETE FROM scenes WHERE owner = ?", [owner.key()])?;
+                }
+            }
+        }
+        for message in messages {
+            transaction
+                .prepare_cached("INSERT OR IGNORE INTO outbox VALUES (?, ?, ?, ?)")?
+                .execute(params![
+                    message.id,
+                    message.url,
+                    message.body,
+                    message.created_s
+                ])?;
+        }
+        transaction.execute(
+            "INSERT OR REPLACE INTO progress VALUES (1, ?)",
+            [batch.last_event.cast_signed()],
+        )?;
+        Ok(transaction.commit()?)
+    }
+
+    /// Stores a calibration; `None` if the server has none with this ID. Blocks.
+    pub(crate) fn put_calibration(
+        &self,
+        id: &str,
+        revision: &str,
+        content: Option<&[u8]>,
+    ) -> Result<(), StoreError> {
+        self.writer.lock().execute(
+            "INSERT OR REPLACE INTO calibrations VALUES (?, ?, ?)",
+            params![id, revision, content],
+        )?;
+        Ok(())
+    }
+
+    /// Removes a message that was delivered or given up. Blocks.
+    pub(crate) fn remove_message(&self, id: &str) -> Result<(), StoreError> {
+        self.writer
+            .lock()
+            .execute("DELETE FROM outbox WHERE id = ?", [id])?;
+        Ok(())
+    }
+
+    /// Removes sums of minutes and days that ended before this time. Blocks.
+    pub(crate) fn expire(&self, before_ms: i64) -> Result<(), StoreError> {
+        let mut connection = self.writer.lock();
+        let transaction = connection.transaction()?;
+        let minute = before_ms.div_euclid(MINUTE_MS);
+        for table in ["presence", "crossings", "zones"] {
+            transaction.execute(&format!("DELETE FROM {table} WHERE minute < ?"), [minute])?;
+        }
+        let day = before_ms.div_euclid(DAY_MS);
+        transaction.execute("DELETE FROM cells WHERE day < ?", [day])?;
+        Ok(transaction.commit()?)
+    }
+}
+
+/// Adds sums to those of the store.
+fn add(transaction: &Transaction<'_>, sums: &Sums) -> rusqlite::Result<()> {
+    let mut presence = transaction.prepare_cached(
+        "INSERT INTO presence VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+         known_ms = known_ms + excluded.known_ms, person_ms = person_ms + excluded.person_ms,
+         most = max(most, excluded.most)",
+    )?;
+    for ((owner, minute), sum) in &sums.presence {
+        let [known_ms, person_ms, most] =
+            [sum.known_ms, sum.person_ms, sum.most].map(u64::cast_signed);
+        presence.execute(params![owner.key(), minute, known_ms, person_ms, most])?;
+    }
+    let mut crossings = transaction.prepare_cached(
+        "INSERT INTO crossings VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+         crossings = crossings + excluded.crossings",
+    )?;
+    let mut line_totals = transaction.prepare_cached(
+        "INSERT INTO line_totals VALUES (?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+         crossings = crossings + excluded.crossings",
+    )?;
+    for ((of, minute), count) in &sums.crossings {
+        let count = count.cast_signed();
+        crossings.execute(params![of.camera, of.line, of.direction, minute, count])?;
+        line_totals.execute(params![of.camera, of.line, of.direction, count])?;
+    }
+    let mut zones = transaction.prepare_cached(
+        "INSERT INTO zones VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+         entries = entries + excluded.entries, visits = visits + excluded.visits,
+         visit_ms = visit_ms + excluded.visit_ms, person_ms = person_ms + excluded.person_ms,
+         most = max(most, excluded.most)",
+    )?;
+    let mut zone_totals = transaction.prepare_cached(
+        "INSERT INTO zone_totals VALUES (?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+         entries = entries + excluded.entries, person_ms = person_ms + excluded.person_ms",
+    )?;
+    for ((of, minute), sum) in &sums.zones {
+        let [entries, visits, visit_ms, person_ms, most] = [
+            sum.entries,
+            sum.visits,
+            sum.visit_ms,
+            sum.person_ms,
+            sum.most,
+        ]
+        .map(u64::cast_signed);
+        zones.execute(params![
+            of.camera, of.zone, minute, entries, visits, visit_ms, person_ms, most
+        ])?;
+        zone_totals.execute(params![of.camera, of.zone, entries, person_ms])?;
+    }
+    let mut cells = transaction.prepare_cached(
+        "INSERT INTO cells VALUES (?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+         milliseconds = milliseconds + excluded.milliseconds",
+    )?;
+    for ((owner, day, cell), milliseconds) in &sums.cells {
+        let milliseconds = milliseconds.cast_signed();
+        cells.execute(params![
+            owner.key(),
+            day,
+            cell.column,
+            cell.row,
+            milliseconds
+        ])?;
+    }
+    Ok(())
+}

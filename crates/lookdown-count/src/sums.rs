@@ -1,0 +1,102 @@
+//! Sums per minute that are added to the store.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::heat_map::Cell;
+
+/// Milliseconds of a minute and of a day.
+pub(crate) const MINUTE_MS: i64 = 60_000;
+pub(crate) const DAY_MS: i64 = 86_400_000;
+
+/// A camera, or a site of several cameras.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Owner {
+    /// A camera.
+    Camera(String),
+    /// A site.
+    Site(String),
+}
+
+/// The minute or the day of a sum: its number since the Unix epoch.
+pub(crate) type Period = i64;
+
+/// Sums that are not stored yet.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Sums {
+    /// Known time and persons per minute.
+    pub(crate) presence: BTreeMap<(Owner, Period), PresenceSum>,
+    /// Crossings per camera, line, direction and minute.
+    pub(crate) crossings: BTreeMap<(LineDirection, Period), u64>,
+    /// Sums per camera, zone and minute.
+    pub(crate) zones: BTreeMap<(ZoneOf, Period), ZoneSum>,
+    /// Milliseconds of presence per cell and day.
+    pub(crate) cells: BTreeMap<(Owner, Period, Cell), u64>,
+}
+
+/// A direction of a line.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct LineDirection {
+    pub(crate) camera: String,
+    pub(crate) line: String,
+    pub(crate) direction: String,
+}
+
+/// A zone of a camera.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct ZoneOf {
+    pub(crate) camera: String,
+    pub(crate) zone: String,
+}
+
+/// The persons of a time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct PresenceSum {
+    /// Milliseconds for which the number of persons is known.
+    pub(crate) known_ms: u64,
+    /// Persons times milliseconds.
+    pub(crate) person_ms: u64,
+    /// Most persons at once.
+    pub(crate) most: u64,
+}
+
+/// The persons in a zone in a time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct ZoneSum {
+    /// Persons who entered.
+    pub(crate) entries: u64,
+    /// Visits that ended.
+    pub(crate) visits: u64,
+    /// Their durations, milliseconds.
+    pub(crate) visit_ms: u64,
+    /// Persons times milliseconds.
+    pub(crate) person_ms: u64,
+    /// Most persons at once.
+    pub(crate) most: u64,
+}
+
+/// Splits a time into its parts per minute: the minute and the milliseconds in it.
+pub(crate) fn minutes(from_ms: i64, to_ms: i64) -> impl Iterator<Item = (Period, u64)> {
+    let first = from_ms.div_euclid(MINUTE_MS);
+    let last = to_ms.div_euclid(MINUTE_MS);
+    (first..=last).filter_map(move |minute| {
+        let start = from_ms.max(minute * MINUTE_MS);
+        let end = to_ms.min((minute + 1) * MINUTE_MS);
+        let length = u64::try_from(end - start).ok()?;
+        (length > 0).then_some((minute, length))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_split_at_the_minutes() {
+        let parts: Vec<_> = minutes(59_000, 181_000).collect();
+        assert_eq!(parts, [(0, 1_000), (1, 60_000), (2, 60_000), (3, 1_000)]);
+        assert_eq!(minutes(60_000, 120_000).collect::<Vec<_>>(), [(1, 60_000)]);
+        assert_eq!(minutes(5, 5).count(), 0);
+    }
+}

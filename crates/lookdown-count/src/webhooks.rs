@@ -1,0 +1,141 @@
+//! Webhooks: signed messages on conditions (Standard Webhooks 1.0).
+
+mod conditions;
+mod delivery;
+mod signature;
+
+use std::{path::PathBuf, time::Duration};
+
+use lookdown_client::{ConfigError, read_secret};
+use reqwest::Url;
+use secrecy::ExposeSecret;
+use serde::Deserialize;
+
+pub(crate) use conditions::Conditions;
+pub(crate) use delivery::Deliveries;
+use signature::SigningKey;
+
+use crate::options::duration;
+
+/// Time without a report after which a camera is silent.
+const SILENT_AFTER: Duration = Duration::from_secs(60);
+
+/// A message to be delivered.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Message {
+    /// The same for every attempt.
+    pub(crate) id: String,
+    /// The receiver.
+    pub(crate) url: String,
+    /// JSON.
+    pub(crate) body: String,
+    /// Time of the message, seconds since the Unix epoch.
+    pub(crate) created_s: i64,
+}
+
+/// A webhook as it is written.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WebhookEntry {
+    url: String,
+    secret_file: PathBuf,
+    on: Occasion,
+    camera: Option<String>,
+    line: Option<String>,
+    direction: Option<String>,
+    zone: Option<String>,
+    at_least: Option<u64>,
+    after: Option<String>,
+}
+
+/// The kind of a condition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Occasion {
+    Crossing,
+    Occupancy,
+    Silent,
+}
+
+/// A checked webhook.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Webhook {
+    pub(crate) url: Url,
+    pub(crate) key: SigningKey,
+    pub(crate) camera: Option<String>,
+    pub(crate) condition: Condition,
+}
+
+/// The condition of a webhook.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Condition {
+    /// Each crossing.
+    Crossing {
+        line: Option<String>,
+        direction: Option<String>,
+    },
+    /// The persons in a zone, or of the camera, reach a number.
+    Occupancy { zone: Option<String>, at_least: u64 },
+    /// A camera has no report for this time.
+    Silent { after: Duration },
+}
+
+impl WebhookEntry {
+    /// Checks the entry and reads its secret.
+    pub(crate) fn check(self, prefix: &str) -> Result<Webhook, ConfigError> {
+        let field = |name: &str| format!("{prefix}{name}");
+        let url = Url::parse(&self.url).ok();
+        let url = url.filter(|url| matches!(url.scheme(), "http" | "https"));
+        let Some(url) = url else {
+            // It may hold a password.
+            let shown = self.url.rsplit('@').next().unwrap_or_default();
+            let remedy = "is no URL of a receiver: write it like https://example.com/hook";
+            return Err(ConfigError::value(&field("url"), shown, remedy));
+        };
+        let secret = read_secret(&field("secret_file"), &self.secret_file)?;
+        let key = SigningKey::parse(secret.expose_secret());
+        let key = key.map_err(|problem| ConfigError::problem(&field("secret_file"), &problem))?;
+        let is_for = |name: &str, is_given: bool, on: &[Occasion]| {
+            if !is_given || on.contains(&self.on) {
+                return Ok(());
+            }
+            let problem = "it does not belong to this condition: remove it, or change `on`";
+            Err(ConfigError::problem(&field(name), &problem))
+        };
+        is_for("line", self.line.is_some(), &[Occasion::Crossing])?;
+        is_for("direction", self.direction.is_some(), &[Occasion::Crossing])?;
+        is_for("zone", self.zone.is_some(), &[Occasion::Occupancy])?;
+        is_for("at_least", self.at_least.is_some(), &[Occasion::Occupancy])?;
+        is_for("after", self.after.is_some(), &[Occasion::Silent])?;
+        let condition = match self.on {
+            Occasion::Crossing => Condition::Crossing {
+                line: self.line,
+                direction: self.direction,
+            },
+            Occasion::Occupancy => {
+                let at_least = self.at_least.unwrap_or(1);
+                if at_least == 0 {
+                    let remedy = "is always reached: give 1 or more";
+                    return Err(ConfigError::value(&field("at_least"), &at_least, remedy));
+                }
+                Condition::Occupancy {
+                    zone: self.zone,
+                    at_least,
+                }
+            }
+            Occasion::Silent => {
+                let limits = (Duration::from_secs(5), Duration::from_secs(86_400));
+                let after = duration(&field("after"), self.after, limits)?;
+                Condition::Silent {
+                    after: after.unwrap_or(SILENT_AFTER),
+                }
+            }
+        };
+        Ok(Webhook {
+            url,
+            key,
+            camera: self.camera,
+            condition,
+        })
+    }
+}

@@ -1,0 +1,152 @@
+//! Evaluates the conditions of the webhooks.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use serde_json::{Value, json};
+
+use super::{Condition, Message, Webhook};
+use crate::scene::{NamedCrossing, Scene};
+
+/// The conditions and whether they hold.
+pub(crate) struct Conditions {
+    webhooks: Vec<Webhook>,
+    /// Webhook and camera of each condition that holds.
+    holding: BTreeSet<(usize, String)>,
+    /// Last report of each camera, milliseconds since the Unix epoch.
+    reports: BTreeMap<String, i64>,
+}
+
+impl Conditions {
+    pub(crate) fn new(webhooks: Vec<Webhook>) -> Self {
+        Self {
+            webhooks,
+            holding: BTreeSet::new(),
+            reports: BTreeMap::new(),
+        }
+    }
+
+    /// Returns the messages of a counted report.
+    pub(crate) fn of_report(
+        &mut self,
+        event: u64,
+        camera: &str,
+        at_ms: i64,
+        crossings: &[NamedCrossing],
+        scene: &Scene,
+    ) -> Vec<Message> {
+        let mut messages = Vec::new();
+        for (index, webhook) in self.webhooks.iter().enumerate() {
+            let is_of = |name: &str| {
+                webhook
+                    .camera
+                    .as_deref()
+                    .is_none_or(|camera| camera == name)
+            };
+            match &webhook.condition {
+                Condition::Crossing { line, direction } => {
+                    let fits = |crossing: &&NamedCrossing| {
+                        let of = &crossing.of;
+                        is_of(&of.camera)
+                            && line.as_ref().is_none_or(|line| *line == of.line)
+                            && direction.as_ref().is_none_or(|name| *name == of.direction)
+                    };
+                    for (number, crossing) in crossings.iter().filter(fits).enumerate() {
+                        let of = &crossing.of;
+                        let data = json!({
+                            "camera": of.camera, "line": of.line, "direction": of.direction,
+                        });
+                        let id = format!("msg_{event}_{index}_{number}");
+                        messages.push(message(id, webhook, "crossing", crossing.at_ms, &data));
+                    }
+                }
+                Condition::Occupancy { zone, at_least } if is_of(camera) => {
+                    let Some((_, of)) = scene.camera(camera) else {
+                        continue;
+                    };
+                    let persons = match zone {
+                        Some(zone) => of.occupancy().find(|(name, _)| name == zone),
+                        None => usize::try_from(of.presence().persons)
+                            .ok()
+                            .map(|count| ("", count)),
+                    };
+                    let Some((_, persons)) = persons else {
+                        continue;
+                    };
+                    let data = json!({
+                        "camera": camera, "zone": zone, "persons": persons, "at_least": at_least,
+                    });
+                    let holds = persons as u64 >= *at_least;
+                    let names = ["occupancy.reached", "occupancy.ended"];
+                    let id = format!("msg_{event}_{index}");
+                    let changed = change(&mut self.holding, (index, camera), holds, names);
+                    messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
+                }
+                Condition::Silent { .. } if is_of(camera) => {
+                    let data = json!({ "camera": camera });
+                    let names = ["camera.silent", "camera.back"];
+                    let id = format!("msg_{event}_{index}");
+                    let changed = change(&mut self.holding, (index, camera), false, names);
+                    messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
+                }
+                Condition::Occupancy { .. } | Condition::Silent { .. } => {}
+            }
+        }
+        self.reports.insert(camera.to_owned(), at_ms);
+        messages
+    }
+
+    /// Returns the messages of the time: cameras that became silent.
+    pub(crate) fn of_time(&mut self, now_ms: i64) -> Vec<Message> {
+        let mut messages = Vec::new();
+        for (index, webhook) in self.webhooks.iter().enumerate() {
+            let Condition::Silent { after } = webhook.condition else {
+                continue;
+            };
+            for (camera, last_ms) in &self.reports {
+                let is_of = webhook.camera.as_ref().is_none_or(|name| name == camera);
+                let silence = u128::from(now_ms.saturating_sub(*last_ms).max(0).unsigned_abs());
+                if !is_of || silence < after.as_millis() {
+                    continue;
+                }
+                let data = json!({ "camera": camera, "last_report": time(*last_ms) });
+                let names = ["camera.silent", "camera.back"];
+                let id = format!("msg_{last_ms}_{index}_silent");
+                let changed = change(&mut self.holding, (index, camera), true, names);
+                messages.extend(changed.map(|name| message(id, webhook, name, now_ms, &data)));
+            }
+        }
+        messages
+    }
+}
+
+/// Records that a condition holds or not. Returns the name of the change: the first when it begins
+/// to hold, the second when it ends.
+fn change(
+    holding: &mut BTreeSet<(usize, String)>,
+    (index, camera): (usize, &str),
+    holds: bool,
+    [begun, ended]: [&'static str; 2],
+) -> Option<&'static str> {
+    let key = (index, camera.to_owned());
+    if holds {
+        holding.insert(key).then_some(begun)
+    } else {
+        holding.remove(&key).then_some(ended)
+    }
+}
+
+fn message(id: String, webhook: &Webhook, kind: &str, at_ms: i64, data: &Value) -> Message {
+    let body = json!({ "type": kind, "timestamp": time(at_ms), "data": data });
+    Message {
+        id,
+        url: webhook.url.to_string(),
+        body: body.to_string(),
+        created_s: at_ms.div_euclid(1000),
+    }
+}
+
+fn time(milliseconds: i64) -> Value {
+    let time = Timestamp::from_millisecond(milliseconds);
+    time.map_or(Value::Null, |time| json!(time.to_string()))
+}

@@ -1,0 +1,192 @@
+//! Delivers messages: each receiver has a task, so that one never slows another.
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use lookdown_client::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
+use reqwest::{Client, StatusCode, header::CONTENT_TYPE};
+use tokio::{
+    sync::mpsc::{self, error::TrySendError},
+    task::spawn_blocking,
+    time::sleep,
+};
+
+use super::{Message, Webhook, signature::SigningKey};
+use crate::{metrics::Metrics, store::Store};
+
+/// Most messages that wait for a receiver.
+const QUEUE: usize = 256;
+/// Longest time of an attempt.
+const TIMEOUT: Duration = Duration::from_secs(15);
+/// Pauses before further attempts.
+const PAUSES: [Duration; 4] = [
+    Duration::from_secs(2),
+    Duration::from_secs(15),
+    Duration::from_secs(120),
+    Duration::from_secs(600),
+];
+
+/// The receivers.
+pub(crate) struct Deliveries {
+    receivers: BTreeMap<String, mpsc::Sender<Message>>,
+    store: Store,
+    metrics: Arc<Metrics>,
+    _tasks: Vec<AbortOnDrop>,
+}
+
+/// A receiver of messages.
+struct Receiver {
+    client: Client,
+    key: SigningKey,
+    /// The scheme, the host and the port: the path may be a secret.
+    address: String,
+    log: LogOnce,
+}
+
+/// The outcome of an attempt.
+enum Attempt {
+    Delivered,
+    /// The receiver wants no messages.
+    Refused(String),
+    Failed(String),
+}
+
+impl Deliveries {
+    /// Starts the tasks. `waiting` are the messages of the store.
+    pub(crate) fn start(
+        webhooks: &[Webhook],
+        waiting: Vec<Message>,
+        store: &Store,
+        metrics: &Arc<Metrics>,
+    ) -> Result<Self, ClientError> {
+        let client = client_builder().timeout(TIMEOUT).build()?;
+        let mut receivers = BTreeMap::new();
+        let mut tasks = Vec::new();
+        for webhook in webhooks {
+            let url = webhook.url.to_string();
+            if receivers.contains_key(&url) {
+                continue;
+            }
+            let (sender, queue) = mpsc::channel(QUEUE);
+            let receiver = Receiver {
+                client: client.clone(),
+                key: webhook.key.clone(),
+                address: webhook.url.origin().ascii_serialization(),
+                log: LogOnce::default(),
+            };
+            let (store, metrics) = (store.clone(), Arc::clone(metrics));
+            let task = tokio::spawn(receiver.run(queue, store, metrics));
+            tasks.push(AbortOnDrop(task.abort_handle()));
+            receivers.insert(url, sender);
+        }
+        let deliveries = Self {
+            receivers,
+            store: store.clone(),
+            metrics: Arc::clone(metrics),
+            _tasks: tasks,
+        };
+        deliveries.send(waiting);
+        Ok(deliveries)
+    }
+
+    /// Queues messages that are in the store. A message that cannot be queued is dropped.
+    pub(crate) fn send(&self, messages: Vec<Message>) {
+        for message in messages {
+            let id = message.id.clone();
+            let sent = match self.receivers.get(&message.url) {
+                Some(receiver) => receiver.try_send(message),
+                // The webhook was removed from the settings.
+                None => Err(TrySendError::Closed(message)),
+            };
+            if sent.is_err() {
+                self.metrics.webhooks_dropped.inc();
+                spawn_blocking({
+                    let store = self.store.clone();
+                    move || remove(&store, &id)
+                });
+            }
+        }
+    }
+}
+
+impl Receiver {
+    async fn run(
+        mut self,
+        mut queue: mpsc::Receiver<Message>,
+        store: Store,
+        metrics: Arc<Metrics>,
+    ) {
+        while let Some(message) = queue.recv().await {
+            if self.deliver(&message).await {
+                metrics.webhooks_delivered.inc();
+            } else {
+                metrics.webhooks_dropped.inc();
+            }
+            let (store, id) = (store.clone(), message.id);
+            // A task that panicked is logged by the panic hook.
+            let _ = spawn_blocking(move || remove(&store, &id)).await;
+        }
+    }
+
+    /// Returns true if the message was delivered.
+    async fn deliver(&mut self, message: &Message) -> bool {
+        let mut pauses = PAUSES.into_iter();
+        loop {
+            let problem = match self.attempt(message).await {
+                Attempt::Delivered => {
+                    self.log.settle();
+                    return true;
+                }
+                Attempt::Refused(problem) => {
+                    if self.log.is_changed(&problem) {
+                        tracing::warn!("{problem}; the message is dropped");
+                    }
+                    return false;
+                }
+                Attempt::Failed(problem) => problem,
+            };
+            let pause = pauses.next();
+            if self.log.is_changed(&problem) {
+                tracing::warn!("{problem}");
+            }
+            match pause {
+                Some(pause) => sleep(pause).await,
+                None => return false,
+            }
+        }
+    }
+
+    async fn attempt(&self, message: &Message) -> Attempt {
+        let timestamp_s = Timestamp::now().as_second();
+        let signature = self.key.sign(&message.id, timestamp_s, &message.body);
+        let request = self
+            .client
+            .post(&message.url)
+            .header(CONTENT_TYPE, "application/json")
+            .header("webhook-id", &message.id)
+            .header("webhook-timestamp", timestamp_s)
+            .header("webhook-signature", signature)
+            .body(message.body.clone());
+        let address = &self.address;
+        match request.send().await {
+            Ok(response) if response.status().is_success() => Attempt::Delivered,
+            Ok(response) if response.status() == StatusCode::GONE => Attempt::Refused(format!(
+                "the webhook at {address} answered 410 Gone: remove it from the settings"
+            )),
+            Ok(response) => Attempt::Failed(format!(
+                "the webhook at {address} answered {}: check its URL and its secret",
+                response.status()
+            )),
+            Err(error) => Attempt::Failed(format!(
+                "the webhook at {address} cannot be reached: {}: start it, or correct its URL",
+                with_causes(&error.without_url())
+            )),
+        }
+    }
+}
+
+fn remove(store: &Store, id: &str) {
+    if let Err(problem) = store.remove_message(id) {
+        tracing::warn!("{problem}");
+    }
+}

@@ -1,0 +1,484 @@
+//! The companion against a server on this machine: counts, unknown time, tracks, sites, webhooks.
+
+mod events;
+
+use std::{
+    net::TcpListener,
+    path::Path,
+    sync::{Arc, Mutex, atomic::Ordering},
+    time::Duration,
+};
+
+use events::{CALIBRATION, START_MS, Server, event, person, walks};
+use lookdown_count::{Origin, Snapshot, count, load};
+use reqwest::Client;
+use serde_json::Value;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    sync::watch,
+    time::{Instant, sleep},
+};
+
+/// Longest wait for a condition.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A running companion.
+struct Companion {
+    url: String,
+    client: Client,
+}
+
+impl Companion {
+    async fn get(&self, path: &str) -> (u16, String) {
+        let response = self.client.get(format!("{}{path}", self.url)).send().await;
+        let response = response.unwrap();
+        (response.status().as_u16(), response.text().await.unwrap())
+    }
+
+    async fn json(&self, path: &str) -> Value {
+        let (status, body) = self.get(path).await;
+        assert_eq!(status, 200, "{path}: {body}");
+        serde_json::from_str(&body).unwrap()
+    }
+
+    /// Waits until `found` returns a value.
+    async fn until<T>(&self, what: &str, mut found: impl AsyncFnMut(&Self) -> Option<T>) -> T {
+        let started = Instant::now();
+        loop {
+            if let Some(value) = found(self).await {
+                return value;
+            }
+            assert!(started.elapsed() < PATIENCE, "{what}");
+            sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    async fn until_counted(&self, reports: usize) {
+        let wanted = format!("lookdown_count_reports_total {reports}\n");
+        self.until("all reports are counted", async |companion: &Self| {
+            let (_, metrics) = companion.get("/metrics").await;
+            metrics.contains(&wanted).then_some(())
+        })
+        .await;
+    }
+}
+
+/// Runs a test with a companion of these settings.
+async fn with_companion<T>(
+    server: &Server,
+    settings: &str,
+    folder: &Path,
+    test: impl AsyncFnOnce(Companion) -> T,
+) -> T {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    drop(listener);
+    let store = folder.join("counts.sqlite");
+    let file = folder.join("count.toml");
+    let (http, settings) = match settings.strip_prefix("[http]\n") {
+        Some(http) => (http, ""),
+        None => ("", settings),
+    };
+    let text = format!(
+        "[server]\nurl = \"http://{}\"\n[http]\nlisten = \"{address}\"\n{http}[store]\npath = {store:?}\n\
+         commit_every = \"100ms\"\nretention_days = 3660\n{settings}",
+        server.address
+    );
+    std::fs::write(&file, text).unwrap();
+    let origin = Origin {
+        file: Some(file),
+        flags: lookdown_count::CountEntry::default(),
+    };
+    let options = origin.load().await.unwrap();
+    let (snapshots, _receiver) = watch::channel(Snapshot::default());
+    let companion = Companion {
+        url: format!("http://{address}"),
+        client: lookdown_client::client_builder().build().unwrap(),
+    };
+    let mut outcome = None;
+    let stop = async {
+        companion
+            .until("the companion answers", async |companion: &Companion| {
+                let url = format!("{}/livez", companion.url);
+                companion.client.get(url).send().await.ok()
+            })
+            .await;
+        outcome = Some(test(companion).await);
+    };
+    count(&options, snapshots, stop).await.unwrap();
+    outcome.unwrap()
+}
+
+/// Returns the query of the minutes from the first report on.
+fn minutes(count: i64, step: &str) -> String {
+    let time = |minute: i64| jiff::Timestamp::from_millisecond(START_MS + minute * 60_000).unwrap();
+    format!("from={}&to={}&step={step}", time(0), time(count))
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn steps_add_up_and_a_gap_is_unknown() {
+    let folder = tempfile::tempdir().unwrap();
+    // People cross in each minute. No frame arrives in the third minute.
+    let walks = walks("hall", 300, 120..180);
+    let reports = walks.len();
+    let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
+    with_companion(&server, "", folder.path(), async |companion| {
+        companion.until_counted(reports).await;
+        sleep(Duration::from_millis(400)).await;
+        let counts = companion
+            .json(&format!("/counts/hall?{}", minutes(5, "1m")))
+            .await;
+        let steps = counts["steps"].as_array().unwrap();
+        assert_eq!(steps.len(), 5);
+        assert_eq!(counts["step_seconds"], 60);
+        let door = |step: &Value, direction: &str| step["lines"]["door"][direction].as_u64();
+        let sum = |direction: &str| {
+            steps
+                .iter()
+                .filter_map(|step| door(step, direction))
+                .sum::<u64>()
+        };
+        // One walker every 6 s; those of the minute without frames are not counted.
+        assert_eq!((sum("in"), sum("out")), (20, 20), "{counts:#}");
+        let whole = companion
+            .json(&format!("/counts/hall?{}", minutes(5, "5m")))
+            .await;
+        let whole = &whole["steps"][0];
+        assert_eq!(
+            (door(whole, "in"), door(whole, "out")),
+            (Some(20), Some(20))
+        );
+        assert_eq!(whole["zones"]["middle"]["entries"], 40);
+
+        let unknown = &steps[2];
+        assert_eq!(unknown["known_seconds"], 0.0);
+        for field in ["persons", "lines/door/in", "zones/middle"] {
+            let value = unknown.pointer(&format!("/{field}")).unwrap();
+            assert!(value.is_null(), "{field} is {value}");
+        }
+        assert_eq!(steps[0]["known_seconds"], 60.0);
+        let mean = steps[1]["persons"]["mean"].as_f64().unwrap();
+        assert!((0.8..1.4).contains(&mean), "{mean}");
+
+        let (_, csv) = companion
+            .get(&format!("/counts/hall?{}&format=csv", minutes(5, "1m")))
+            .await;
+        let mut lines = csv.lines();
+        assert_eq!(
+            lines.next().unwrap(),
+            "from,to,known_seconds,persons_mean,persons_max,line.door.in,line.door.out,\
+             zone.middle.entries,zone.middle.mean,zone.middle.max,zone.middle.visits,\
+             zone.middle.dwell_seconds"
+        );
+        let third = lines.nth(2).unwrap();
+        assert!(third.ends_with(",0,,,,,,,,,"), "{third}");
+        assert_eq!(lines.count(), 2);
+
+        let map = companion
+            .json(&format!("/counts/hall/heatmap.json?{}", minutes(5, "5m")))
+            .await;
+        let rows = map["seconds"].as_array().unwrap();
+        let cells = rows.iter().flat_map(|row| row.as_array().unwrap());
+        let seconds: f64 = cells.map(|cell| cell.as_f64().unwrap()).sum();
+        assert!((150.0..260.0).contains(&seconds), "{seconds}");
+        let (status, png) = companion.get("/counts/hall/heatmap.png").await;
+        assert!(status == 200 && png.contains("PNG"));
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_restart_resumes_after_the_last_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let walks = walks("hall", 30, 0..0);
+    let (reports, last) = (walks.len(), walks.last().unwrap().0);
+    let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
+    with_companion(&server, "", folder.path(), async |companion| {
+        companion.until_counted(reports).await;
+    })
+    .await;
+    with_companion(&server, "", folder.path(), async |companion| {
+        companion
+            .until("it resumes", async |_: &Companion| {
+                let resumed = server.resumed.lock().unwrap().clone();
+                (resumed.last() == Some(&Some(last))).then_some(())
+            })
+            .await;
+        let counts = companion
+            .json(&format!("/counts/hall?{}", minutes(1, "1m")))
+            .await;
+        assert_eq!(counts["steps"][0]["lines"]["door"]["in"], 3, "{counts:#}");
+    })
+    .await;
+    assert_eq!(server.sent.load(Ordering::SeqCst), last);
+}
+
+/// Returns events of the last seconds with these persons per camera.
+fn current(cameras: &[(&str, Vec<String>)]) -> Vec<(u64, String)> {
+    let now_ms = jiff::Timestamp::now().as_millisecond() - START_MS;
+    let frames = (0..10).flat_map(|frame| {
+        let cameras = cameras.iter().enumerate();
+        cameras.map(move |(index, (camera, persons))| {
+            let offset = i64::try_from(index).unwrap() * 10;
+            event(camera, now_ms - 3000 + frame * 200 + offset, persons)
+        })
+    });
+    frames.collect()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn tracks_are_current_and_anonymous() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(
+        current(&[("hall", vec![person(0.5, 0.5), person(-2.0, 0.0)])]),
+        Duration::ZERO,
+        CALIBRATION,
+    )
+    .await;
+    with_companion(&server, "", folder.path(), async |companion| {
+        let tracks = companion
+            .until("there are two tracks", async |companion: &Companion| {
+                let (status, body) = companion.get("/counts/hall/tracks").await;
+                let tracks: Value = serde_json::from_str(&body).unwrap();
+                let is_complete = tracks["tracks"]
+                    .as_array()
+                    .is_some_and(|list| list.len() == 2);
+                (status == 200 && is_complete).then_some(tracks)
+            })
+            .await;
+        assert_eq!(tracks["is_current"], true);
+        assert_eq!(tracks["zones"][0]["persons"], 1);
+        let door = &tracks["lines"][0];
+        assert_eq!(door["crossings"]["in"], 0);
+        assert_eq!(door["outline_px"].as_array().unwrap().len(), 17);
+        let track = tracks["tracks"][0].as_object().unwrap();
+        let keys: Vec<_> = track.keys().map(String::as_str).collect();
+        let expected = [
+            "first_seen",
+            "floor_m",
+            "frame_px",
+            "id",
+            "last_seen",
+            "tail",
+            "velocity_m_s",
+        ];
+        assert_eq!(keys, expected);
+        let (_, metrics) = companion.get("/metrics").await;
+        assert!(
+            metrics.contains("lookdown_count_persons{camera=\"hall\"} 2"),
+            "{metrics}"
+        );
+        let cameras = companion.json("/counts").await;
+        assert_eq!(cameras[0]["name"], "hall");
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_person_in_two_views_of_a_site_counts_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibration = CALIBRATION.replace(
+        "\"height_m\": 2.8",
+        "\"height_m\": 2.8, \"site\": \"ground\", \"position_m\": [10, 5]",
+    );
+    // Both cameras have the same calibration, so they share their place.
+    let one = vec![person(1.0, 0.5)];
+    let server = Server::start(
+        current(&[("east", one.clone()), ("west", one)]),
+        Duration::ZERO,
+        &calibration,
+    )
+    .await;
+    with_companion(&server, "", folder.path(), async |companion| {
+        let svg = companion
+            .until(
+                "the person is on the floor",
+                async |companion: &Companion| {
+                    let (status, svg) = companion.get("/sites/ground/floor.svg").await;
+                    let tracks = companion.get("/sites/ground/tracks").await;
+                    (status == 200 && svg.contains("<circle") && tracks.0 == 200).then_some(svg)
+                },
+            )
+            .await;
+        assert_eq!(svg.matches("<circle").count(), 1, "{svg}");
+        assert!(svg.contains("cx=\"11.1"), "{svg}");
+        let (_, metrics) = companion.get("/metrics").await;
+        assert!(
+            metrics.contains("lookdown_count_site_persons{site=\"ground\"} 1"),
+            "{metrics}"
+        );
+        let counts = companion.json("/sites/ground").await;
+        assert_eq!(counts["site"], "ground");
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_key_of_the_settings_is_required() {
+    let folder = tempfile::tempdir().unwrap();
+    let key = folder.path().join("key");
+    std::fs::write(&key, "0123456789abcdef\n").unwrap();
+    let server = Server::start(walks("hall", 2, 0..0), Duration::ZERO, CALIBRATION).await;
+    let settings = format!("[http]\napi_key_file = {key:?}\n");
+    with_companion(&server, &settings, folder.path(), async |companion| {
+        assert_eq!(companion.get("/livez").await.0, 200);
+        assert_eq!(companion.get("/counts").await.0, 401);
+        for (key, status) in [("0123456789abcdef", 200), ("0123456789abcdeg", 401)] {
+            let request = companion.client.get(format!("{}/counts", companion.url));
+            let response = request.bearer_auth(key).send().await.unwrap();
+            assert_eq!(response.status().as_u16(), status);
+        }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn refusals_are_problem_documents() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(walks("hall", 2, 0..0), Duration::ZERO, CALIBRATION).await;
+    with_companion(&server, "", folder.path(), async |companion| {
+        for (path, status, detail) in [
+            ("/nothing", 404, "there is no resource at /nothing"),
+            ("/counts/gate", 404, "there is no camera gate"),
+            ("/sites/ground", 404, "there is no site ground"),
+            (
+                "/counts/hall?step=90s",
+                422,
+                "step: it is no duration of whole minutes",
+            ),
+            ("/counts/hall?from=yesterday", 422, "from: it is no time"),
+            (
+                "/counts/hall?from=2020-01-01T00:00:00Z&step=1m",
+                422,
+                "from: the time has more than",
+            ),
+            ("/counts/hall?colour=red", 422, "query: it has an unknown"),
+            ("/counts/hall?format=xml", 422, "format: it is unknown"),
+        ] {
+            let (given, body) = companion.get(path).await;
+            let problem: Value = serde_json::from_str(&body).unwrap();
+            assert_eq!(
+                (given, &problem["status"]),
+                (status, &Value::from(status)),
+                "{path}"
+            );
+            assert!(
+                problem["detail"].as_str().unwrap().starts_with(detail),
+                "{body}"
+            );
+        }
+    })
+    .await;
+}
+
+/// Answers requests with these statuses in turn, and keeps the requests.
+async fn receiver(statuses: &'static [u16]) -> (String, Arc<Mutex<Vec<String>>>) {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}/hook", listener.local_addr().unwrap());
+    let requests = Arc::new(Mutex::new(Vec::new()));
+    let kept = Arc::clone(&requests);
+    tokio::spawn(async move {
+        for number in 0.. {
+            let (mut stream, _) = listener.accept().await.unwrap();
+            let mut request = Vec::new();
+            let mut chunk = [0; 4096];
+            while !request.ends_with(b"}") {
+                let length = stream.read(&mut chunk).await.unwrap();
+                if length == 0 {
+                    break;
+                }
+                request.extend_from_slice(&chunk[..length]);
+            }
+            let status = statuses.get(number).copied().unwrap_or(200);
+            kept.lock()
+                .unwrap()
+                .push(String::from_utf8(request).unwrap());
+            let answer =
+                format!("HTTP/1.1 {status} X\r\ncontent-length: 0\r\nconnection: close\r\n\r\n");
+            stream.write_all(answer.as_bytes()).await.unwrap();
+        }
+    });
+    (url, requests)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn crossings_reach_webhooks_signed_and_repeated() {
+    let folder = tempfile::tempdir().unwrap();
+    let secret = folder.path().join("secret");
+    std::fs::write(&secret, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n").unwrap();
+    let (url, requests) = receiver(&[500]).await;
+    let walks = walks("hall", 12, 0..0);
+    let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
+    let settings = format!(
+        "[[webhooks]]\nurl = \"{url}\"\nsecret_file = {secret:?}\non = \"crossing\"\ncamera = \"hall\"\n"
+    );
+    with_companion(&server, &settings, folder.path(), async |companion| {
+        companion
+            .until(
+                "both messages are delivered",
+                async |companion: &Companion| {
+                    let (_, metrics) = companion.get("/metrics").await;
+                    metrics
+                        .contains("lookdown_count_webhooks_delivered_total 2")
+                        .then_some(())
+                },
+            )
+            .await;
+    })
+    .await;
+    let requests = requests.lock().unwrap().clone();
+    let [failed, repeated, second] = requests.as_slice() else {
+        panic!("{requests:#?}");
+    };
+    let header = |request: &str, name: &str| {
+        let value = request.lines().find_map(|line| line.strip_prefix(name));
+        value
+            .unwrap_or_else(|| panic!("{name} is missing in {request}"))
+            .to_owned()
+    };
+    assert_eq!(
+        header(failed, "webhook-id: "),
+        header(repeated, "webhook-id: ")
+    );
+    assert!(header(repeated, "webhook-signature: ").starts_with("v1,"));
+    header(repeated, "webhook-timestamp: ");
+    let body = |request: &str| -> Value {
+        serde_json::from_str(request.split("\r\n\r\n").nth(1).unwrap()).unwrap()
+    };
+    assert_eq!(body(repeated)["type"], "crossing");
+    assert_eq!(body(repeated)["data"]["direction"], "in");
+    assert_eq!(body(second)["data"]["direction"], "out");
+}
+
+#[test]
+fn invalid_settings_name_field_value_and_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let error_of = |text: &str| {
+        let path = folder.path().join("count.toml");
+        std::fs::write(&path, text).unwrap();
+        let loaded = load(Some(&path), &lookdown_count::CountEntry::default());
+        loaded.unwrap_err().to_string()
+    };
+    for (text, expected) in [
+        (
+            "[store]\nretention_days = 0",
+            "store.retention_days: \"0\" is out of range: give 1 to 3660",
+        ),
+        (
+            "[counting]\nlongest_gap = \"1h\"",
+            "counting.longest_gap: \"1h\" is no duration from 1 s to 600 s",
+        ),
+        (
+            "[server]\nurl = \"ftp://x\"",
+            "server.url: \"ftp://x\" is no URL of a server",
+        ),
+        ("[stores]\n", "stores: unknown field `stores`"),
+        (
+            "[[webhooks]]\nurl = \"http://x\"\nsecret_file = \"/nowhere\"\non = \"crossing\"",
+            "webhooks[0].secret_file: /nowhere cannot be read",
+        ),
+    ] {
+        let error = error_of(text);
+        assert!(error.starts_with(expected), "{error}");
+    }
+}

@@ -1,0 +1,134 @@
+//! `lookdown count`
+
+use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
+
+use anyhow::Context;
+use clap::Args;
+use lookdown_client::ServerEntry;
+use lookdown_count::{
+    CountEntry, CountOptions, HttpEntry, MqttEntry, Origin, Snapshot, StoreEntry, count,
+};
+use tokio::{runtime, sync::watch};
+
+use super::{SettingsFile, serve};
+use crate::{
+    mqtt::{Broker, CountsOptions, CountsPublisher},
+    shutdown::Shutdown,
+};
+
+/// Threads for all cameras.
+const RUNTIME_THREADS: usize = 2;
+
+/// Arguments of `lookdown count`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A file of settings (docs/count.md) [default: none]
+    #[arg(value_name = "COUNT.toml")]
+    file: Option<PathBuf>,
+    /// The URL of the server [default: port 8080 on this machine]
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
+    /// A file with the API key for the server
+    #[arg(long, value_name = "FILE")]
+    api_key_file: Option<PathBuf>,
+    /// A PEM file with the authorities of the server's certificate [default: those of the system]
+    #[arg(long, value_name = "FILE")]
+    authorities: Option<PathBuf>,
+    /// The address of the counts [default: 127.0.0.1:8090]
+    #[arg(long, value_name = "ADDRESS")]
+    listen: Option<SocketAddr>,
+    /// The file of the counts [default: counts.sqlite]
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+    #[command(flatten)]
+    settings_file: SettingsFile,
+}
+
+impl Arguments {
+    fn origin(&self) -> Origin {
+        let flags = CountEntry {
+            server: ServerEntry {
+                url: self.server.clone(),
+                api_key_file: self.api_key_file.clone(),
+                authorities: self.authorities.clone(),
+            },
+            http: HttpEntry {
+                listen: self.listen,
+                ..HttpEntry::default()
+            },
+            store: StoreEntry {
+                path: self.store.clone(),
+                ..StoreEntry::default()
+            },
+            ..CountEntry::default()
+        };
+        Origin {
+            file: self.file.clone(),
+            flags,
+        }
+    }
+}
+
+/// Counts until a stop is requested. Changed settings apply at once.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    arguments.settings_file.load()?;
+    let runtime = runtime::Builder::new_multi_thread()
+        .worker_threads(RUNTIME_THREADS)
+        .enable_all()
+        .build()
+        .context("the operating system creates no thread")?;
+    let origin = arguments.origin();
+    let outcome = runtime.block_on(async {
+        let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
+        let mut options = origin.load().await?;
+        loop {
+            match count_until_changed(&origin, &options, &shutdown).await? {
+                Some(changed) => options = changed,
+                None => return anyhow::Ok(()),
+            }
+        }
+    });
+    serve::end(runtime);
+    outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// Counts with these settings. Returns the changed settings, or `None` when a stop is requested.
+async fn count_until_changed(
+    origin: &Origin,
+    options: &CountOptions,
+    shutdown: &Shutdown,
+) -> anyhow::Result<Option<CountOptions>> {
+    let (snapshots, published) = watch::channel(Snapshot::default());
+    let publisher = match &options.mqtt {
+        Some(entry) => Some(CountsPublisher::new(broker(entry)?, published)?),
+        None => None,
+    };
+    let mut changed = None;
+    let stop = async {
+        changed = tokio::select! {
+            options = origin.changed(options) => Some(options),
+            () = shutdown.requested() => None,
+        };
+    };
+    let publishing = async {
+        if let Some(publisher) = publisher {
+            publisher.run().await;
+        }
+    };
+    // The end of the counts ends the publisher.
+    let (counted, ()) = tokio::join!(count(options, snapshots, stop), publishing);
+    counted?;
+    Ok(changed)
+}
+
+/// The broker of the settings, with its password.
+fn broker(entry: &MqttEntry) -> anyhow::Result<CountsOptions> {
+    let broker: Broker = entry.url_with_password()?.parse().context("mqtt.url")?;
+    let discovery = &entry.discovery_prefix;
+    Ok(CountsOptions {
+        broker,
+        authorities: entry.authorities.clone(),
+        topic_prefix: entry.topic_prefix.clone(),
+        discovery_prefix: (!discovery.is_empty()).then(|| discovery.clone()),
+    })
+}

@@ -1,0 +1,407 @@
+//! Publishes the counts of `lookdown count`: totals, occupancy and dwell times.
+
+use std::{
+    collections::BTreeMap,
+    future::Future,
+    path::PathBuf,
+    pin::{Pin, pin},
+    time::Duration,
+};
+
+use lookdown_count::Snapshot;
+use serde_json::{Value, json};
+use tokio::{
+    sync::watch,
+    time::{Instant, sleep},
+};
+use uuid::Uuid;
+
+use super::{
+    Broker,
+    discovery::{OFFLINE, ONLINE},
+    message::Message,
+    session::{Session, SessionError},
+    topics::level,
+};
+use crate::tls::{ClientTls, TlsError};
+
+/// Pauses before the next attempt to connect to the broker.
+const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
+const LONGEST_PAUSE: Duration = Duration::from_mins(1);
+/// A connection that has lasted this long resets the pause.
+const STABLE: Duration = Duration::from_secs(10);
+
+/// The broker of the counts, and the settings of the messages.
+pub struct CountsOptions {
+    /// The broker.
+    pub broker: Broker,
+    /// PEM file of the authorities of a broker with TLS. `None` trusts those of the system.
+    pub authorities: Option<PathBuf>,
+    /// The prefix of all topics.
+    pub topic_prefix: String,
+    /// The prefix of the topics of Home Assistant. `None` disables discovery.
+    pub discovery_prefix: Option<String>,
+}
+
+/// Publishes counts.
+pub struct CountsPublisher {
+    options: CountsOptions,
+    tls: Option<ClientTls>,
+    client_id: String,
+    snapshots: watch::Receiver<Snapshot>,
+}
+
+/// The retained messages: payloads by topic.
+type Retained = BTreeMap<String, String>;
+
+impl CountsPublisher {
+    /// Creates a publisher that is not connected yet.
+    ///
+    /// # Errors
+    /// [`TlsError`] when the authorities cannot be used.
+    pub fn new(
+        options: CountsOptions,
+        snapshots: watch::Receiver<Snapshot>,
+    ) -> Result<Self, TlsError> {
+        let tls = options.broker.has_tls.then(|| {
+            let authorities = options.authorities.as_deref();
+            ClientTls::new("mqtt.authorities", authorities)
+        });
+        Ok(Self {
+            tls: tls.transpose()?,
+            client_id: format!("lookdown-count-{}", Uuid::new_v4().simple()),
+            options,
+            snapshots,
+        })
+    }
+
+    /// Publishes until the counts end, and then publishes the status "offline".
+    pub async fn run(mut self) {
+        let mut snapshots = self.snapshots.clone();
+        let mut stop = pin!(async move { while snapshots.changed().await.is_ok() {} });
+        let mut pause = SHORTEST_PAUSE;
+        let mut has_warned = false;
+        loop {
+            let began = Instant::now();
+            let Err(error) = self.serve(&mut has_warned, stop.as_mut()).await else {
+                return;
+            };
+            if began.elapsed() >= STABLE {
+                pause = SHORTEST_PAUSE;
+            }
+            if !has_warned {
+                let broker = &self.options.broker;
+                tracing::warn!("not publishing to the broker {broker} (mqtt.url): {error}");
+            }
+            has_warned = true;
+            tokio::select! {
+                () = sleep(pause) => {}
+                () = &mut stop => return,
+            }
+            pause = (2 * pause).min(LONGEST_PAUSE);
+        }
+    }
+
+    /// Connects, and publishes every change until the connection or the counts end.
+    async fn serve(
+        &mut self,
+        has_warned: &mut bool,
+        mut stop: Pin<&mut impl Future<Output = ()>>,
+    ) -> Result<(), SessionError> {
+        let broker = &self.options.broker;
+        let status = |status: &'static str| Message::retained(self.topic("counts/status"), status);
+        let (online, offline) = (status(ONLINE), status(OFFLINE));
+        let opened = Session::open(broker, self.tls.as_ref(), &self.client_id, offline.clone());
+        let mut session = tokio::select! {
+            session = opened => session?,
+            () = &mut stop => return Ok(()),
+        };
+        tracing::info!("publishing to the broker {broker} (mqtt.url)");
+        *has_warned = false;
+        session.publish([online]).await?;
+        let birth = self.options.discovery_prefix.as_ref();
+        let birth = birth.map(|prefix| format!("{prefix}/status"));
+        if let Some(birth) = &birth {
+            session.subscribe([birth.clone()]).await?;
+        }
+        let mut published = Retained::new();
+        loop {
+            let snapshot = self.snapshots.borrow_and_update().clone();
+            let wanted = self.retained(&snapshot);
+            session.publish(changes(&published, &wanted)).await?;
+            published = wanted;
+            tokio::select! {
+                message = session.next() => {
+                    let message = message?;
+                    if birth.as_ref() == Some(&message.topic) && message.payload == ONLINE {
+                        published.clear();
+                    }
+                }
+                Ok(()) = self.snapshots.changed() => {}
+                () = &mut stop => return session.close(offline).await,
+            }
+        }
+    }
+
+    fn topic(&self, rest: &str) -> String {
+        format!("{}/{rest}", self.options.topic_prefix)
+    }
+
+    /// Returns all messages that the broker is to retain.
+    fn retained(&self, snapshot: &Snapshot) -> Retained {
+        let mut retained = Retained::new();
+        for camera in &snapshot.cameras {
+            let base = self.topic(&format!("counts/cameras/{}", level(&camera.name)));
+            let is_known = if camera.persons.is_some() {
+                ONLINE
+            } else {
+                OFFLINE
+            };
+            retained.insert(format!("{base}/availability"), is_known.to_owned());
+            let mut device = Device {
+                publisher: self,
+                id: format!(
+                    "{}_{}",
+                    level(&self.options.topic_prefix),
+                    level(&camera.name)
+                ),
+                name: &camera.name,
+                availability: format!("{base}/availability"),
+                retained: &mut retained,
+            };
+            device.state(
+                "Tracked persons",
+                "tracked",
+                format!("{base}/persons"),
+                camera.persons,
+            );
+            for line in &camera.lines {
+                let (line_level, direction) = (level(&line.line), level(&line.direction));
+                device.total(
+                    &format!("{} {}", line.line, line.direction),
+                    &format!("line_{line_level}_{direction}"),
+                    format!("{base}/lines/{line_level}/{direction}"),
+                    line.crossings,
+                    &json!({}),
+                );
+            }
+            for zone in &camera.zones {
+                let name = level(&zone.zone);
+                let topic = |rest: &str| format!("{base}/zones/{name}/{rest}");
+                device.state(
+                    &format!("Tracked persons in {}", zone.zone),
+                    &format!("tracked_in_{name}"),
+                    topic("persons"),
+                    zone.persons,
+                );
+                device.total(
+                    &format!("Entries into {}", zone.zone),
+                    &format!("entries_{name}"),
+                    topic("entries"),
+                    zone.entries,
+                    &json!({}),
+                );
+                device.total(
+                    &format!("Dwell time in {}", zone.zone),
+                    &format!("dwell_{name}"),
+                    topic("dwell_seconds"),
+                    zone.person_ms / 1000,
+                    &json!({ "device_class": "duration", "unit_of_measurement": "s" }),
+                );
+            }
+        }
+        for site in &snapshot.sites {
+            let base = self.topic(&format!("counts/sites/{}", level(&site.name)));
+            let is_known = if site.persons.is_some() {
+                ONLINE
+            } else {
+                OFFLINE
+            };
+            retained.insert(format!("{base}/availability"), is_known.to_owned());
+            let mut device = Device {
+                publisher: self,
+                id: format!(
+                    "{}_site_{}",
+                    level(&self.options.topic_prefix),
+                    level(&site.name)
+                ),
+                name: &format!("Site {}", site.name),
+                availability: format!("{base}/availability"),
+                retained: &mut retained,
+            };
+            device.state(
+                "Tracked persons",
+                "tracked",
+                format!("{base}/persons"),
+                site.persons,
+            );
+        }
+        retained
+    }
+}
+
+/// The entities of a camera or a site.
+struct Device<'a> {
+    publisher: &'a CountsPublisher,
+    id: String,
+    name: &'a str,
+    availability: String,
+    retained: &'a mut Retained,
+}
+
+impl Device<'_> {
+    /// Adds a number that changes in both directions. An unknown one has no message.
+    fn state(&mut self, name: &str, entity: &str, topic: String, value: Option<u64>) {
+        let config = json!({ "state_class": "measurement", "icon": "mdi:account-group" });
+        self.announce(name, entity, &topic, &config, true);
+        if let Some(value) = value {
+            self.retained.insert(topic, value.to_string());
+        }
+    }
+
+    /// Adds a number that only grows.
+    fn total(&mut self, name: &str, entity: &str, topic: String, value: u64, config: &Value) {
+        let mut config = config.clone();
+        config["state_class"] = json!("total_increasing");
+        self.announce(name, entity, &topic, &config, false);
+        self.retained.insert(topic, value.to_string());
+    }
+
+    fn announce(
+        &mut self,
+        name: &str,
+        entity: &str,
+        topic: &str,
+        config: &Value,
+        is_current: bool,
+    ) {
+        let Some(prefix) = &self.publisher.options.discovery_prefix else {
+            return;
+        };
+        let id = format!("{}_count_{entity}", self.id);
+        let version = env!("CARGO_PKG_VERSION");
+        let mut availability = vec![json!({ "topic": self.publisher.topic("counts/status") })];
+        if is_current {
+            availability.push(json!({ "topic": self.availability }));
+        }
+        let mut config = config.clone();
+        config["name"] = json!(name);
+        config["state_topic"] = json!(topic);
+        config["unique_id"] = json!(id);
+        config["availability_mode"] = json!("all");
+        config["availability"] = json!(availability);
+        config["device"] = json!({
+            "identifiers": [self.id],
+            "name": self.name,
+            "manufacturer": "Lookdown",
+            "sw_version": version,
+        });
+        config["origin"] = json!({ "name": "Lookdown", "sw_version": version });
+        let topic = format!("{prefix}/sensor/{id}/config");
+        self.retained.insert(topic, config.to_string());
+    }
+}
+
+/// Returns the messages that turn the published state into the wanted one.
+fn changes(published: &Retained, wanted: &Retained) -> Vec<Message> {
+    let gone = published
+        .keys()
+        .filter(|topic| !wanted.contains_key(*topic));
+    let new = wanted
+        .iter()
+        .filter(|(topic, payload)| published.get(*topic) != Some(*payload));
+    gone.map(|topic| Message::forget(topic.clone()))
+        .chain(new.map(|(topic, payload)| Message::retained(topic.clone(), payload.clone())))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use lookdown_count::{CameraSnapshot, LineSnapshot, SiteSnapshot, ZoneSnapshot};
+
+    use super::*;
+
+    fn publisher() -> CountsPublisher {
+        let options = CountsOptions {
+            broker: "mqtt://127.0.0.1".parse().unwrap(),
+            authorities: None,
+            topic_prefix: "lookdown".to_owned(),
+            discovery_prefix: Some("homeassistant".to_owned()),
+        };
+        let (_, snapshots) = watch::channel(Snapshot::default());
+        CountsPublisher::new(options, snapshots).unwrap()
+    }
+
+    fn snapshot(persons: Option<u64>) -> Snapshot {
+        Snapshot {
+            cameras: vec![CameraSnapshot {
+                name: "hall".to_owned(),
+                last_report_ms: 0,
+                persons,
+                lines: vec![LineSnapshot {
+                    line: "door".to_owned(),
+                    direction: "in".to_owned(),
+                    crossings: 12,
+                }],
+                zones: vec![ZoneSnapshot {
+                    zone: "till".to_owned(),
+                    persons,
+                    entries: 7,
+                    person_ms: 61_500,
+                }],
+            }],
+            sites: vec![SiteSnapshot {
+                name: "ground".to_owned(),
+                persons,
+            }],
+        }
+    }
+
+    #[test]
+    fn totals_and_occupancy_are_published() {
+        let retained = publisher().retained(&snapshot(Some(3)));
+        let base = "lookdown/counts/cameras/hall";
+        for (topic, payload) in [
+            (format!("{base}/availability"), "online"),
+            (format!("{base}/persons"), "3"),
+            (format!("{base}/lines/door/in"), "12"),
+            (format!("{base}/zones/till/persons"), "3"),
+            (format!("{base}/zones/till/entries"), "7"),
+            (format!("{base}/zones/till/dwell_seconds"), "61"),
+            ("lookdown/counts/sites/ground/persons".to_owned(), "3"),
+        ] {
+            assert_eq!(
+                retained.get(&topic).map(String::as_str),
+                Some(payload),
+                "{topic}"
+            );
+        }
+        let config = &retained["homeassistant/sensor/lookdown_hall_count_line_door_in/config"];
+        let config: Value = serde_json::from_str(config).unwrap();
+        assert_eq!(config["state_class"], "total_increasing");
+        assert_eq!(
+            config["state_topic"],
+            "lookdown/counts/cameras/hall/lines/door/in"
+        );
+        assert_eq!(config["device"]["identifiers"][0], "lookdown_hall");
+    }
+
+    #[test]
+    fn unknown_occupancy_is_removed_and_totals_stay() {
+        let publisher = publisher();
+        let known = publisher.retained(&snapshot(Some(3)));
+        let unknown = publisher.retained(&snapshot(None));
+        let messages = changes(&known, &unknown);
+        let topics: Vec<_> = messages
+            .iter()
+            .map(|message| message.topic.as_str())
+            .collect();
+        let base = "lookdown/counts/cameras/hall";
+        assert!(
+            topics.contains(&format!("{base}/persons").as_str()),
+            "{topics:?}"
+        );
+        assert!(!topics.contains(&format!("{base}/lines/door/in").as_str()));
+        assert!(changes(&known, &known).is_empty());
+    }
+}
