@@ -47,6 +47,8 @@ const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
 /// Interval of the checks that the calibrations were read.
 const CALIBRATIONS_CHECK: Duration = Duration::from_millis(50);
+/// Interval of the checks for reports that are too old, seconds.
+const EXPIRY_EVERY: NonZeroU64 = NonZeroU64::MIN;
 /// Interval of the checks for workers without progress, seconds.
 const WATCHDOG_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
@@ -239,8 +241,11 @@ impl App {
             max_upload_bytes: settings.limits.max_upload_bytes,
             max_header_bytes: settings.connections.max_header_bytes,
             max_headers: settings.connections.max_headers,
+            detect_defaults: settings.detect.clone(),
             zone_metrics: settings.calibrations.zone_metrics,
+            camera_metrics: settings.results.camera_metrics,
             pictures_of: Arc::new(settings.results.pictures_of.clone()),
+            conceal_pictures: settings.results.conceal_pictures,
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
             min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
@@ -317,6 +322,8 @@ impl App {
                 tracing::error!(seconds, "no frame makes progress; in flight are {stall}");
             }
         });
+        let results = Arc::clone(&self.results);
+        let expiry = Poller::start("result-expiry", EXPIRY_EVERY, move || results.expire());
         let remote = self.models.remote().cloned();
         let remote_poller = remote.map(|remote| {
             Poller::start("remote-watcher", REMOTE_EVERY, move || {
@@ -329,7 +336,7 @@ impl App {
             .chain(calibration_poller)
             .chain(key_poller)
             .chain(tls)
-            .chain([watchdog]);
+            .chain([watchdog, expiry]);
         pollers
             .collect::<Result<_, _>>()
             .context("the operating system creates no thread to watch files")

@@ -76,6 +76,7 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
         mount: camera.mount,
         zones: camera.zones.clone(),
         masks: camera.masks.clone(),
+        detect: camera.detect.clone(),
     });
     let Ok(Exported { content, .. }) = written else {
         return;

@@ -65,6 +65,11 @@ pub struct Report {
     pub profile: &'static str,
     /// The refinement with all its parameters.
     pub refinement: ReportRefinement,
+    /// The parameters whose values were defaults of the calibration or the server; absent if the
+    /// request and the built-in defaults gave all.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub defaults: Vec<ReportDefault>,
     /// The numbers of views by outcome.
     pub views: ReportViews,
     /// Persons, highest score first.
@@ -78,6 +83,18 @@ pub struct Report {
     pub timings_ms: ReportTimings,
     /// Circumstances that the client should consider.
     pub warnings: Vec<ReportWarning>,
+}
+
+/// A parameter that the request did not give, with its default.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+#[schema(example = json!({"name": "profile", "value": "fast", "source": "calibration"}))]
+pub struct ReportDefault {
+    /// The name of the parameter.
+    pub name: &'static str,
+    /// The value, as a request would give it.
+    pub value: String,
+    /// The origin: `calibration` (its field `detect`) or `server` (the settings `detect.*`).
+    pub source: &'static str,
 }
 
 /// The calibration of a report.

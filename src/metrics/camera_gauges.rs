@@ -1,13 +1,13 @@
-//! The gauges of persons in zones. A gauge vector of the registry identifies rows by a hash of their
-//! concatenated label values, in which `a` and `bc` equal `ab` and `c`. So these rows are collected
-//! from a map.
+//! Gauges of cameras and their zones. A gauge vector of the registry identifies rows by a hash of
+//! their concatenated label values, in which `a` and `bc` equal `ab` and `c`. So these rows are
+//! collected from a map.
 
 use std::{
     collections::{BTreeMap, HashMap},
     sync::Arc,
 };
 
-use parking_lot::{Mutex, MutexGuard};
+use parking_lot::Mutex;
 use prometheus::{
     Error,
     core::{Collector, Desc},
@@ -16,46 +16,49 @@ use prometheus::{
 
 use super::kind::Kind;
 
-/// Most zones that are published.
+/// Most rows of one metric.
 pub(super) const MAX_ROWS: usize = 1000;
 
-/// The number of persons in each zone of a calibration. Clones share the rows.
+/// A gauge whose first label is the name of a camera. Clones share the rows.
 #[derive(Debug, Clone)]
-pub struct ZonePersons {
+pub struct CameraGauges {
     desc: Desc,
-    labels: [String; 2],
+    labels: Vec<String>,
     rows: Rows,
 }
 
-/// The persons by calibration and zone.
-type Rows = Arc<Mutex<BTreeMap<(String, String), u32>>>;
+/// The values by camera and the other labels.
+type Rows = Arc<Mutex<BTreeMap<(String, Vec<String>), f64>>>;
 
-impl ZonePersons {
-    /// Sets the number of persons in a zone, unless too many zones are published.
-    pub(super) fn set(&self, calibration: &str, zone: &str, persons: usize) {
-        let mut rows = self.lock();
-        let row = (calibration.to_owned(), zone.to_owned());
-        if rows.len() < MAX_ROWS || rows.contains_key(&row) {
-            rows.insert(row, u32::try_from(persons).unwrap_or(u32::MAX));
+impl CameraGauges {
+    /// Replaces the rows of a camera, each with the values of its other labels, unless there are
+    /// too many rows.
+    pub(super) fn replace<'a>(
+        &self,
+        camera: &str,
+        values: impl IntoIterator<Item = (Option<&'a str>, f64)>,
+    ) {
+        let mut rows = self.rows.lock();
+        rows.retain(|(known, _), _| known != camera);
+        for (label, value) in values {
+            if rows.len() < MAX_ROWS {
+                let labels = label.into_iter().map(ToOwned::to_owned).collect();
+                rows.insert((camera.to_owned(), labels), value);
+            }
         }
     }
 
-    /// Removes the zones for which `is_kept` is false.
-    pub(super) fn retain(&self, is_kept: impl Fn(&str, &str) -> bool) {
-        self.lock()
-            .retain(|(calibration, zone), _| is_kept(calibration, zone));
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<(String, String), u32>> {
-        self.rows.lock()
+    /// Removes the rows of all other cameras.
+    pub(super) fn retain(&self, cameras: &[String]) {
+        let mut rows = self.rows.lock();
+        rows.retain(|(camera, _), _| cameras.contains(camera));
     }
 }
 
-impl Kind for ZonePersons {
+impl Kind for CameraGauges {
     fn create(name: &str, help: &str, labels: &[&str]) -> Result<Self, Error> {
-        let names: Vec<String> = labels.iter().map(|&label| label.to_owned()).collect();
-        let labels = <[String; 2]>::try_from(names.clone())
-            .map_err(|_| Error::Msg(format!("{name} needs two labels")))?;
+        let labels: Vec<String> = labels.iter().map(|&label| label.to_owned()).collect();
+        let names = labels.clone();
         let desc = Desc::new(name.to_owned(), help.to_owned(), names, HashMap::default())?;
         Ok(Self {
             desc,
@@ -65,23 +68,23 @@ impl Kind for ZonePersons {
     }
 }
 
-impl Collector for ZonePersons {
+impl Collector for CameraGauges {
     fn desc(&self) -> Vec<&Desc> {
         vec![&self.desc]
     }
 
     fn collect(&self) -> Vec<MetricFamily> {
-        let rows = self.lock();
-        let metrics = rows.iter().map(|((calibration, zone), persons)| {
+        let rows = self.rows.lock();
+        let metrics = rows.iter().map(|((camera, others), value)| {
             let pair = |(name, value): (&String, &String)| {
                 let mut pair = LabelPair::default();
                 pair.set_name(name.clone());
                 pair.set_value(value.clone());
                 pair
             };
-            let values = [calibration, zone];
+            let values = [camera].into_iter().chain(others);
             let mut gauge = Gauge::default();
-            gauge.set_value(f64::from(*persons));
+            gauge.set_value(*value);
             let mut metric = Metric::from_gauge(gauge);
             metric.set_label(self.labels.iter().zip(values).map(pair).collect());
             metric

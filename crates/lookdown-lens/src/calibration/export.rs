@@ -110,6 +110,7 @@ impl Target {
         for (areas, count) in [
             ("zones", calibration.zones.len()),
             ("masks", calibration.masks.len()),
+            ("defaults (detect)", calibration.detect.len()),
         ] {
             if count > 0 {
                 lost.push(format!(

@@ -1,8 +1,10 @@
 //! The content of a calibration file: cameras that are not checked yet.
 
+use std::collections::BTreeMap;
+
 use super::{Format, FormatError};
 use crate::{
-    calibration::native::{NativeImage, NativeMask, NativeMount, NativeZone},
+    calibration::native::{NativeImage, NativeMask, NativeMount, NativeValue, NativeZone},
     geometry::lens::LensModel,
     warning::Warning,
 };
@@ -38,6 +40,8 @@ pub struct Camera {
     pub zones: Vec<NativeZone>,
     /// Its masks; only native files have some.
     pub masks: Vec<NativeMask>,
+    /// Its defaults of detection parameters; only native files have some.
+    pub detect: BTreeMap<String, NativeValue>,
     /// The assumptions of the reader.
     pub notes: Vec<Warning>,
 }
@@ -50,6 +54,7 @@ impl Camera {
             mount: NativeMount::default(),
             zones: Vec::new(),
             masks: Vec::new(),
+            detect: BTreeMap::new(),
             notes: Vec::new(),
         }
     }

@@ -27,6 +27,7 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
                 mount: file.mount,
                 zones: file.zones,
                 masks: file.masks,
+                detect: file.detect,
                 notes: Vec::new(),
             }),
         }],
