@@ -21,6 +21,7 @@ use utoipa::ToSchema;
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,
         "max_detections": 1000
     },
+    "defaults": [{"name": "profile", "value": "quality", "source": "calibration"}],
     "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},

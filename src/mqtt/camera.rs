@@ -135,7 +135,7 @@ impl Camera {
         self.is_available
     }
 
-    /// Whether it has a zone whose name is this level of a topic.
+    /// Returns true if the name of a zone is this level of a topic.
     pub(super) fn has_zone_level(&self, level: &str) -> bool {
         let mut zones = self.zones.iter();
         zones.any(|zone| topics::level(&zone.name) == level)

@@ -1,6 +1,10 @@
 //! The state of each camera that the broker is to have, and its changes by reports and by time.
 
-use std::{collections::BTreeMap, num::NonZeroUsize, time::Duration};
+use std::{
+    collections::{BTreeMap, HashSet},
+    num::NonZeroUsize,
+    time::Duration,
+};
 
 use tokio::time::Instant;
 
@@ -172,7 +176,7 @@ impl Cameras {
 
     /// Removes the cameras that have no report any longer. Returns the messages.
     pub(super) fn retain(&mut self, cameras: &[String]) -> Vec<Message> {
-        let kept: Vec<_> = cameras.iter().map(|name| level(name)).collect();
+        let kept: HashSet<_> = cameras.iter().map(|name| level(name)).collect();
         let removed = self.known.extract_if(.., |key, _| !kept.contains(key));
         let messages = removed.flat_map(|(_, camera)| camera.withdrawal(&self.topics));
         messages.collect()

@@ -9,7 +9,7 @@ use tokio::time::Instant;
 pub(super) const ON: &str = "ON";
 pub(super) const OFF: &str = "OFF";
 
-/// Whether there are persons.
+/// The presence of persons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Occupancy {
     is_on: bool,

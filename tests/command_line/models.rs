@@ -76,7 +76,7 @@ fn weights_are_fetched_from_a_folder() {
         let weights = repository.path().join("tiny/model.onnx");
         assert_eq!(fs::read(&weights).unwrap(), WEIGHTS);
         assert!(listed(repository.path()).contains("0.0 MiB  MIT"));
-        fs::remove_dir_all(source.path().join("tiny")).unwrap();
+        fs::remove_file(place.join("model.onnx")).unwrap();
         fs::remove_file(weights).unwrap();
     }
 }

@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
-NOBODY = f"{DETECT}&score_threshold=1"
+NO_PERSONS = f"{DETECT}&score_threshold=1"
 PERSONS = "lookdown_office_persons"
 OCCUPANCY = "lookdown_office_occupancy"
 LEFT = "lookdown_office_zone_left"
@@ -73,8 +73,8 @@ class HomeAssistant:
 def home_assistant(folder: Path, of: Broker) -> Iterator[HomeAssistant]:
     """A Home Assistant that is connected to the broker, and is stopped at the end."""
     started = HomeAssistant(folder, of)
-    started.start()
     try:
+        started.start()
         yield started
     finally:
         started.stop()
@@ -129,7 +129,7 @@ class Entities(unittest.TestCase):
                 self.assertEqual(entity["device"], "office")
                 self.assertEqual(entity["sw_version"], json.loads(version)["info"]["version"])
                 self.assertEqual(entity["configuration_url"], PAGE)
-            server.post(NOBODY, OFFICE)
+            server.post(NO_PERSONS, OFFICE)
             self.home.until({PERSONS: "0", OCCUPANCY: "off", LEFT: "0", LEFT_OCCUPANCY: "off"})
             # A zone that is removed.
             self.write_calibration([])

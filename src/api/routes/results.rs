@@ -2,6 +2,7 @@
 //! ones.
 
 mod address;
+pub(in crate::api) mod delete;
 pub(in crate::api) mod events;
 mod feed;
 pub(in crate::api) mod history;
@@ -12,17 +13,17 @@ mod row;
 use axum::{
     Json,
     extract::State,
-    http::{HeaderValue, StatusCode, header::CACHE_CONTROL},
+    http::{HeaderValue, header::CACHE_CONTROL},
     response::IntoResponse,
 };
 use jiff::Timestamp;
 
-use self::{address::CameraAddress, row::CameraRow};
+use self::row::CameraRow;
 use crate::{
     api::{
         ApiState,
         http::problem::{Problem, ProblemKind},
-        require_scope::{RequireAdmin, RequireRead},
+        require_scope::RequireRead,
     },
     quoted::Quoted,
     results::{ListenError, Unreachable},
@@ -51,29 +52,6 @@ pub(in crate::api) async fn list(
         .collect();
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));
     Ok(([(CACHE_CONTROL, NO_CACHE)], Json(rows)))
-}
-
-/// Delete a camera's reports
-///
-/// Deletes all stored reports of a camera and its image. Home Assistant removes its entities. The
-/// camera returns with its next frame.
-#[utoipa::path(
-    delete, path = "/results/{camera}", tag = "results", operation_id = "delete_results",
-    params(("camera" = String, Path, description = "The name of the camera.", example = "lobby")),
-    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
-    responses((status = NO_CONTENT, description = "The reports are deleted."))
-)]
-pub(in crate::api) async fn delete(
-    State(state): State<ApiState>,
-    _admin: RequireAdmin,
-    CameraAddress(camera): CameraAddress,
-) -> Result<StatusCode, Problem> {
-    if state.results.delete(&camera).await? {
-        tracing::info!(camera, "all reports of the camera were deleted");
-        Ok(StatusCode::NO_CONTENT)
-    } else {
-        Err(unknown(&camera))
-    }
 }
 
 /// Returns the problem of a camera without a stored report.
