@@ -1,6 +1,7 @@
 //! The parameters of requests: the tables of their specifications, the checks of their values, and
 //! default values for them. Pure: they are known before a frame or a camera is.
 
+mod checked_defaults;
 mod defaults;
 mod detect_parameters;
 mod given_parameters;
