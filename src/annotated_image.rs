@@ -11,7 +11,9 @@ use std::sync::Arc;
 use crate::{
     imaging::{
         Frame,
-        annotate::{Cancelled, EncodeError, annotate_unless, encode_jpeg, encode_png},
+        annotate::{
+            Cancelled, Concealment, EncodeError, annotate_unless, conceal, encode_jpeg, encode_png,
+        },
         narrowed,
     },
     pipeline::Detected,
@@ -71,6 +73,14 @@ fn drawn(
         Arc::unwrap_or_clone(frame)
     };
     let drawing = sketch.drawing(picture.width(), &options.layers);
+    for (layer, concealment) in [
+        (Layer::Blur, Concealment::Blur),
+        (Layer::Silhouette, Concealment::Silhouette),
+    ] {
+        if options.layers.contains(&layer) {
+            conceal(&mut picture, &drawing.marks, concealment, is_cancelled)?;
+        }
+    }
     annotate_unless(&mut picture, &drawing, is_cancelled)?;
     let encoded = match format {
         ImageFormat::Jpeg => encode_jpeg(&picture, options.quality),

@@ -3,6 +3,7 @@
 
 mod answer;
 mod caller;
+mod detect_parameters;
 mod http;
 mod limit;
 mod openapi;

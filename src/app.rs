@@ -2,16 +2,13 @@
 
 mod check;
 mod models;
+mod pollers;
 mod reload;
 mod serving;
 mod sockets;
 mod systemd;
 
-use std::{
-    num::NonZeroU64,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
 
@@ -25,7 +22,6 @@ use crate::{
     metrics::Metrics,
     mqtt::Publisher,
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
-    poller::Poller,
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
         AccessSettings, CalibrationPlace, LimitSettings, ResultSettings, Settings,
@@ -43,13 +39,9 @@ pub(crate) use models::onnx_options;
 /// Longest time that the start waits for the calibrations. The rest is read while the server
 /// listens, and the server is ready after that.
 const CALIBRATIONS_WAIT: Duration = Duration::from_secs(3);
-/// Interval of the checks of the inference server, seconds.
-const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
 /// Interval of the checks that the calibrations were read.
 const CALIBRATIONS_CHECK: Duration = Duration::from_millis(50);
-/// Interval of the checks for workers without progress, seconds.
-const WATCHDOG_EVERY: NonZeroU64 = NonZeroU64::MIN;
 
 /// An engine with its calibrations and models.
 pub struct Assembly {
@@ -240,8 +232,11 @@ impl App {
             max_upload_bytes: settings.limits.max_upload_bytes,
             max_header_bytes: settings.connections.max_header_bytes,
             max_headers: settings.connections.max_headers,
+            detect_defaults: settings.detect.clone(),
             zone_metrics: settings.calibrations.zone_metrics,
+            camera_metrics: settings.results.camera_metrics,
             pictures_of: Arc::new(settings.results.pictures_of.clone()),
+            conceal_pictures: settings.results.conceal_pictures,
             metrics_elsewhere: settings.server.metrics_listen.is_some(),
             request_timeout: settings.server.request_timeout,
             min_upload_bytes_per_second: settings.limits.min_upload_bytes_per_second,
@@ -292,48 +287,6 @@ impl App {
     #[must_use]
     pub fn tracer(&self) -> Tracer {
         self.tracer.clone()
-    }
-
-    /// The threads that look for changed models, calibrations, keys and certificates.
-    fn start_pollers(&self) -> anyhow::Result<Vec<Poller>> {
-        let (models, calibrations) = (Arc::clone(&self.models), Arc::clone(&self.calibrations));
-        let model_poller =
-            self.settings.model.poll_seconds.map(|every| {
-                Poller::start("model-watcher", every, move || models.reload_changed())
-            });
-        let calibration_poller = self.settings.calibrations.poll_seconds.map(|every| {
-            Poller::start("calibration-watcher", every, move || calibrations.refresh())
-        });
-        let keys = self.keys.clone().zip(self.settings.access.poll_seconds);
-        let key_poller =
-            keys.map(|(keys, every)| Poller::start("key-watcher", every, move || keys.refresh()));
-        let tls = self.tls.clone().and_then(|tls| {
-            let every = tls.poll_seconds()?;
-            Some(Poller::start("tls-watcher", every, move || tls.refresh()))
-        });
-        let (workers, limit) = (Arc::clone(&self.workers), self.state.stall_limit());
-        let watchdog = Poller::start("worker-watchdog", WATCHDOG_EVERY, move || {
-            if let Some(stall) = workers.new_stall(Instant::now(), limit) {
-                let seconds = stall.since.as_secs();
-                tracing::error!(seconds, "no frame makes progress; in flight are {stall}");
-            }
-        });
-        let remote = self.models.remote().cloned();
-        let remote_poller = remote.map(|remote| {
-            Poller::start("remote-watcher", REMOTE_EVERY, move || {
-                remote.check_health();
-            })
-        });
-        let pollers = model_poller
-            .into_iter()
-            .chain(remote_poller)
-            .chain(calibration_poller)
-            .chain(key_poller)
-            .chain(tls)
-            .chain([watchdog]);
-        pollers
-            .collect::<Result<_, _>>()
-            .context("the operating system creates no thread to watch files")
     }
 }
 

@@ -8,6 +8,7 @@ mod eval;
 mod health;
 mod key;
 mod model;
+mod output;
 mod parameters;
 mod progress;
 mod serve;
@@ -25,7 +26,10 @@ use std::{
 use anyhow::Context;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use self::settings_file::SettingsFile;
+use self::{
+    output::{UNWRITABLE, is_closed_pipe},
+    settings_file::SettingsFile,
+};
 use crate::api;
 
 /// Detects persons in the images of ceiling fisheye cameras.
@@ -53,7 +57,7 @@ enum Command {
     /// Check, convert and fit calibrations
     #[command(subcommand)]
     Calibration(calibration::Command),
-    /// Check person models
+    /// Check, list and fetch person models
     #[command(subcommand)]
     Model(model::Command),
     /// Create API keys
@@ -93,6 +97,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
     };
     match outcome {
         Ok(code) => code,
+        Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             // Printed directly: the log may not be started, or may filter this out.
             eprintln!("lookdown: {error:#}");
@@ -117,6 +122,6 @@ fn command(commit: Option<&str>) -> clap::Command {
 
 fn print_openapi() -> anyhow::Result<ExitCode> {
     let document = api::openapi_document().to_pretty_json()?;
-    writeln!(io::stdout(), "{document}").context("standard output cannot be written")?;
+    writeln!(io::stdout(), "{document}").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }

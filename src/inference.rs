@@ -3,6 +3,7 @@
 mod detector;
 mod device;
 mod error;
+mod fetch;
 mod head_output;
 pub mod heads;
 mod manifest;
@@ -18,6 +19,7 @@ mod staging;
 pub use detector::Detector;
 pub use device::{Device, UnknownDevice};
 pub use error::InferenceError;
+pub use fetch::{FetchError, ModelSource, fetch_weights};
 pub use head_output::{HeadOutput, ViewDetection};
 pub use heads::CandidateOptions;
 pub use manifest::{Layout, ManifestInput, ModelManifest};
@@ -27,5 +29,5 @@ pub use registry::{ModelRegistry, RegistryFull};
 pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{
     ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
-    is_fetched,
+    is_fetched, model_names,
 };

@@ -20,6 +20,7 @@ pub mod inference;
 pub mod metrics;
 pub mod mqtt;
 pub mod open_inference;
+pub mod parameters;
 pub mod pipeline;
 pub mod poller;
 pub mod probe;

@@ -1,9 +1,9 @@
 //! Every metric of the server: one struct with its own registry. The doc comment of a field is its
-//! help text. Each subsystem shares the struct and counts its own events in it. Label values come from short fixed lists, never from clients. The labels of zones,
-//! which administrators name, are optional and limited to a thousand.
+//! help text. Each subsystem shares the struct and counts its own events in it. Label values come from short fixed
+//! lists, never from clients. Those of cameras and zones are optional and limited to a thousand.
 
+mod camera_gauges;
 mod kind;
-mod zone_persons;
 
 use prometheus::{
     Encoder, HistogramVec, IntCounterVec, IntGaugeVec, Registry, TextEncoder,
@@ -11,8 +11,8 @@ use prometheus::{
 };
 pub use prometheus::{IntCounter, IntGauge};
 
+use camera_gauges::CameraGauges;
 use kind::Kind;
-use zone_persons::ZonePersons;
 
 /// Declares the struct, and registers each field as `lookdown_` followed by its name.
 macro_rules! metrics {
@@ -69,8 +69,12 @@ metrics! {
     non_finite: IntCounter = "non_finite_candidates_total" [];
     /// Persons reported.
     persons: IntCounter = "persons_total" [];
-    /// Persons in a zone of a calibration, latest frame; only with `calibrations.zone_metrics`.
-    zone_persons: ZonePersons = "zone_persons" ["calibration", "zone"];
+    /// Persons in the latest frame of a camera; only with `results.camera_metrics`.
+    camera_persons: CameraGauges = "camera_persons" ["camera"];
+    /// Time of a camera's latest report, seconds since 1970; only with `results.camera_metrics`.
+    camera_last_report: CameraGauges = "camera_last_report_timestamp_seconds" ["camera"];
+    /// Persons in a zone in the latest frame of a camera; only with `calibrations.zone_metrics`.
+    zone_persons: CameraGauges = "zone_persons" ["camera", "zone"];
     /// Requests answered with a problem, by its kind.
     failures: IntCounterVec = "request_failures_total" ["reason"];
     /// Frames that wait for a worker or are being processed.
@@ -168,21 +172,32 @@ impl Metrics {
         self.build_info.with_label_values(&labels).set(1);
     }
 
-    /// Sets the number of persons in the zones (each by its name) of a calibration's latest frame.
-    /// At most a thousand zones are published.
-    pub fn set_zones<'a>(
-        &self,
-        calibration: &str,
-        zones: impl IntoIterator<Item = (&'a str, usize)>,
-    ) {
-        for (zone, persons) in zones {
-            self.zone_persons.set(calibration, zone, persons);
-        }
+    /// Sets the number of persons in the zones (each by its name) of a camera's latest frame. At
+    /// most a thousand zones are published.
+    pub fn set_zones<'a>(&self, camera: &str, zones: impl IntoIterator<Item = (&'a str, usize)>) {
+        let zones = zones.into_iter();
+        let rows = zones.map(|(zone, persons)| (Some(zone), count(persons)));
+        self.zone_persons.replace(camera, rows);
     }
 
-    /// Removes the zones for which `is_kept` is false, by calibration and name.
-    pub fn retain_zones(&self, is_kept: impl Fn(&str, &str) -> bool) {
-        self.zone_persons.retain(is_kept);
+    /// Sets the number of persons of a camera's latest frame and the time of its report, seconds
+    /// since 1970. At most a thousand cameras are published.
+    pub fn set_camera(&self, camera: &str, persons: usize, reported_at: f64) {
+        self.camera_persons
+            .replace(camera, [(None, count(persons))]);
+        let row = [(None, reported_at)];
+        self.camera_last_report.replace(camera, row);
+    }
+
+    /// Removes the metrics of all other cameras.
+    pub fn retain_cameras(&self, cameras: &[String]) {
+        for gauges in [
+            &self.camera_persons,
+            &self.camera_last_report,
+            &self.zone_persons,
+        ] {
+            gauges.retain(cameras);
+        }
     }
 
     /// Returns all metrics in the Prometheus text format.
@@ -212,6 +227,10 @@ pub fn replace_info(info: &IntGaugeVec, before: Option<&[&str]>, now: &[&str]) {
         // There may be no such row yet.
         let _ = info.remove_label_values(before);
     }
+}
+
+fn count(persons: usize) -> f64 {
+    u32::try_from(persons).unwrap_or(u32::MAX).into()
 }
 
 /// Returns the value of a gauge that counts things.

@@ -5,15 +5,19 @@
 //! connection do not matter.
 
 mod broker;
+mod camera;
 mod cameras;
 mod connection;
 mod counts;
 mod discovery;
 mod message;
+mod occupancy;
 mod publisher;
+mod retained;
 mod session;
 mod topics;
 
 pub use broker::{Broker, BrokerError};
 pub use counts::{CountsOptions, CountsPublisher};
+pub use discovery::Discovery;
 pub use publisher::{MqttOptions, Publisher};

@@ -7,6 +7,7 @@
 mod access;
 mod calibrations;
 mod declare;
+mod detect;
 mod entry;
 mod error;
 mod form;
@@ -48,7 +49,10 @@ use self::{
     declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
     threads::ThreadKeys, tls::TlsKeys, values::Values,
 };
-use crate::{mqtt::MqttOptions, results::ResultLimits, server::ConnectionLimits, tls::TlsOptions};
+use crate::{
+    mqtt::MqttOptions, parameters::DetectDefaults, results::ResultLimits, server::ConnectionLimits,
+    tls::TlsOptions,
+};
 
 /// All settings, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +69,8 @@ pub struct Settings {
     pub access: AccessSettings,
     /// The calibration store.
     pub calibrations: CalibrationSettings,
+    /// The defaults of detection parameters.
+    pub detect: DetectDefaults,
     /// The models.
     pub model: ModelSettings,
     /// ONNX Runtime and the candidates of a view.
@@ -107,6 +113,7 @@ impl Settings {
             shutdown: ShutdownSettings::read(values)?,
             access: AccessSettings::read(values)?,
             calibrations: CalibrationSettings::read(values)?,
+            detect: DetectDefaults::read(values)?,
             threads: ThreadKeys::read(values)?.plan(inference.device, is_remote),
             model,
             inference,
@@ -128,6 +135,7 @@ fn entries() -> Vec<Entry> {
         ShutdownSettings::entries(),
         AccessSettings::entries(),
         CalibrationSettings::entries(),
+        DetectDefaults::entries(),
         ModelSettings::entries(),
         RemoteKeys::entries(),
         ThreadKeys::entries(),
@@ -152,7 +160,22 @@ pub fn load(
     file: Option<&Path>,
     environment: impl IntoIterator<Item = (String, String)>,
 ) -> Result<Settings, SettingsError> {
-    Settings::read(&Values::read(file, environment, &entries())?)
+    load_with(file, environment, &[])
+}
+
+/// [`load`], with values that take precedence over all others, each with its key.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn load_with(
+    file: Option<&Path>,
+    environment: impl IntoIterator<Item = (String, String)>,
+    overrides: &[(String, String)],
+) -> Result<Settings, SettingsError> {
+    let entries = entries();
+    let mut values = Values::read(file, environment, &entries)?;
+    values.override_with(overrides, &entries)?;
+    Settings::read(&values)
 }
 
 /// A sentence on the variables among `names` that begin with `LOOKDOWN_` and are no settings, with

@@ -28,11 +28,11 @@ export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldO
 }
 
 /** The circle from which `calibrationOf` makes this file; null if there is none. */
-export function circleOf({ lens, mount, image, zones, masks }) {
+export function circleOf({ lens, mount, image, zones, masks, detect }) {
   const curve = CURVES[lens.model];
   const focal = lens.focal ?? (lens.fx === lens.fy ? lens.fx : null);
   const up = mount?.world_up ?? STRAIGHT_DOWN;
-  const isOther = up.some((part, axis) => Math.abs(part - STRAIGHT_DOWN[axis]) > 1e-6) || zones?.length || masks?.length;
+  const isOther = up.some((part, axis) => Math.abs(part - STRAIGHT_DOWN[axis]) > 1e-6) || zones?.length || masks?.length || detect;
   if (!curve || !focal || !lens.max_theta || isOther) return null;
   return {
     ...image,

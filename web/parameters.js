@@ -10,11 +10,11 @@ const OWN_REFINEMENT = { paper: "soft_nms_gaussian", direct: "nms" };
 
 const form = () => find("#parameters");
 
-/** The query of a request. Reports of the page have their own camera name, and inference is cached, because sliders
- * send the same frame again. */
+/** The query of a request. Reports of the page are not stored, and inference is cached, because sliders send the same
+ * frame again. */
 export function query() {
   const given = [...new FormData(form())].filter(([, value]) => value !== "");
-  return new URLSearchParams([...given, ["camera", "web-page"], ["remember", "true"]]);
+  return new URLSearchParams([...given, ["camera", "web-page"], ["store", "false"], ["remember", "true"]]);
 }
 
 export const profile = () => new FormData(form()).get("profile");

@@ -1,5 +1,6 @@
 """The folders of the benchmarks."""
 
+import os
 from pathlib import Path
 
 BENCHES = Path(__file__).resolve().parents[1]
@@ -14,7 +15,8 @@ PYTHONS = ROOT / ".setup" / "benches"
 WORK = PYTHONS / "work"
 """Generated files: frames, plans, logs."""
 
-LOOKDOWN = ROOT / "target" / "release" / "lookdown"
+LOOKDOWN = Path(os.environ.get("LOOKDOWN_BINARY") or ROOT / "target" / "release" / "lookdown")
+"""The release binary, or the one that the environment names."""
 LOAD = ROOT / "target" / "release" / "examples" / "load"
 
 

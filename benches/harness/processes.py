@@ -57,6 +57,12 @@ class Server:
                     raise BenchError(f"{path} is still answered {error.code} after {seconds:.0f} s") from None
             time.sleep(0.05)
 
+    def delete(self, path: str) -> int:
+        """Returns the status of a deletion."""
+        request = urllib.request.Request(f"http://{self.address}{path}", method="DELETE")
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return answer.status
+
     def post(self, path: str, body: bytes, content_type: str = "image/jpeg") -> bytes:
         """Returns the response to a body."""
         headers = {"Content-Type": content_type}

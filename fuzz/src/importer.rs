@@ -75,7 +75,9 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
         lens: camera.lens.clone(),
         mount: camera.mount,
         zones: camera.zones.clone(),
+        lines: camera.lines.clone(),
         masks: camera.masks.clone(),
+        detect: camera.detect.clone(),
     });
     let Ok(Exported { content, .. }) = written else {
         return;

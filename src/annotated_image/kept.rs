@@ -10,7 +10,7 @@ use super::{AnnotationError, AnnotationOptions, ImageFormat, Layer, drawn, sketc
 use crate::{
     imaging::{
         Frame,
-        annotate::{EncodeError, encode_jpeg},
+        annotate::{Concealment, EncodeError, conceal, encode_jpeg},
         decode::{DecodeError, DecodeLimits, decode},
         narrowed,
     },
@@ -58,14 +58,28 @@ pub enum StoredFrameError {
 }
 
 impl StoredFrame {
-    /// Keeps a frame: its original JPEG, if that is small enough and nothing is masked, else a new
-    /// one. A new one takes tens of milliseconds for a large frame: keep it off the async runtime.
+    /// Keeps a frame, with its persons concealed if `concealment` is given: its original JPEG, if
+    /// that is small enough and nothing is masked or concealed, else a new one. A new one takes tens of milliseconds for a large frame: keep it off the async runtime.
     ///
     ///
     /// # Errors
     /// [`StoredFrameError`] for a frame that cannot be kept.
-    pub fn of(detected: &Detected) -> Result<Self, StoredFrameError> {
+    pub fn of(
+        detected: &Detected,
+        concealment: Option<Concealment>,
+    ) -> Result<Self, StoredFrameError> {
         let sketch = Sketch::of(detected, Layer::VARIANTS).rounded();
+        if let Some(concealment) = concealment {
+            let mut frame = Frame::clone(&detected.frame);
+            let marks = sketch.drawing(frame.width(), &[]).marks;
+            let is_cancelled = || detected.withdrawn.is_cancelled();
+            conceal(&mut frame, &marks, concealment, &is_cancelled)
+                .map_err(AnnotationError::from)?;
+            return Ok(Self {
+                jpeg: jpeg_of(&frame)?,
+                sketch: serde_json::to_vec(&sketch)?.into(),
+            });
+        }
         let sketch = serde_json::to_vec(&sketch)?.into();
         let jpeg = match &detected.encoded {
             Some(encoded) if is_kept_as_it_is(encoded, &detected.frame) => {

@@ -23,7 +23,8 @@ parameter_table! {
             none: NO_LAYER,
         },
         default: ParameterDefault::Value("oriented,scores"),
-        help: "Layers that are drawn into an annotated image, separated by commas.",
+        help: "Layers that are drawn into an annotated image, separated by commas. `blur` and \
+               `silhouette` conceal the persons of the report, below the other layers.",
         example: None,
         interfaces: INTERFACES,
     };
@@ -51,6 +52,10 @@ parameter_table! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, EnumString, VariantArray, VariantNames)]
 #[strum(serialize_all = "snake_case")]
 pub enum Layer {
+    /// The area of each person is blurred.
+    Blur,
+    /// The area of each person is filled with one colour.
+    Silhouette,
     /// Axis-parallel boxes.
     Boxes,
     /// Boxes turned along the persons.
@@ -162,8 +167,8 @@ mod tests {
         let error = AnnotationOptions::parse([("draw", "hats")]).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "draw: \"hats\" is not none or a comma-separated list of boxes, oriented, scores, zones, views, \
-             timestamp"
+            "draw: \"hats\" is not none or a comma-separated list of blur, silhouette, boxes, oriented, scores, \
+             zones, views, timestamp"
         );
     }
 }

@@ -1,6 +1,7 @@
 //! The OpenAPI document. Each route describes its own parameters and responses. This module adds
 //! the common parts.
 
+mod examples;
 mod failures;
 mod parameters;
 mod security;
@@ -40,6 +41,7 @@ pub(super) struct Common;
 /// Adds the failures, and the operations that need no key, to the document of the routes.
 pub(super) fn complete(mut document: openapi::OpenApi) -> openapi::OpenApi {
     failures::describe(&mut document);
+    examples::add(&mut document);
     security::state_public_operations(&mut document);
     document
 }

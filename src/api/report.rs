@@ -21,6 +21,7 @@ use utoipa::ToSchema;
         "name": "fusion", "score_threshold": 0.3, "iou_threshold": 0.5, "sigma": 0.3,
         "max_detections": 1000
     },
+    "defaults": [{"name": "profile", "value": "quality", "source": "calibration"}],
     "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},
@@ -65,6 +66,11 @@ pub struct Report {
     pub profile: &'static str,
     /// The refinement with all its parameters.
     pub refinement: ReportRefinement,
+    /// The parameters whose values were defaults of the calibration or the server; absent if the
+    /// request and the built-in defaults gave all.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub defaults: Vec<ReportDefault>,
     /// The numbers of views by outcome.
     pub views: ReportViews,
     /// Persons, highest score first.
@@ -78,6 +84,18 @@ pub struct Report {
     pub timings_ms: ReportTimings,
     /// Circumstances that the client should consider.
     pub warnings: Vec<ReportWarning>,
+}
+
+/// A parameter that the request did not give, with its default.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+#[schema(example = json!({"name": "profile", "value": "fast", "source": "calibration"}))]
+pub struct ReportDefault {
+    /// The name of the parameter.
+    pub name: &'static str,
+    /// The value, as a request would give it.
+    pub value: String,
+    /// The origin: `calibration` (its field `detect`) or `server` (the settings `detect.*`).
+    pub source: &'static str,
 }
 
 /// The calibration of a report.

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
+use jiff::Timestamp;
 
 use crate::{
     annotated_image::StoredFrame,
@@ -13,6 +14,7 @@ use crate::{
         limit::Limit,
         report::Report,
     },
+    imaging::annotate::Concealment,
     metrics::Metrics,
     pipeline::{DetectJob, Detected, DetectionReport},
     results::{NewPicture, NewReport},
@@ -40,30 +42,30 @@ pub(super) async fn run_detection<T: Send + 'static>(
 ) -> Result<(DetectionReport, T), Problem> {
     let limit = Limit::of(deadline, job.parameters.timeout);
     let timeline = job.ticket.timeline.clone();
+    let is_stored = job.parameters.store;
+    let concealment = state.options.conceal_pictures;
     let pictures_of = Arc::clone(&state.options.pictures_of);
     let work = state.workers.detect_and(job, move |detected| {
         // Drawing needs the frame after the report has been taken.
         let report = detected.report.clone();
-        let is_kept = pictures_of.include(&report.camera);
-        let picture = is_kept.then(|| picture(&detected)).flatten();
+        let is_kept = is_stored && pictures_of.include(&report.camera);
+        let picture = is_kept.then(|| picture(&detected, concealment)).flatten();
         (report, picture, written(detected, write))
     });
     let (report, picture, written) = limit.wait(trace, &timeline, work).await?;
     describe(trace, &report);
     record(&state.metrics, &report);
-    if state.options.zone_metrics {
-        let zones = report.zones.iter();
-        let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
-        state.metrics.set_zones(&report.calibration.id, zones);
-    }
     let (json, answer) = written?;
-    let kept = NewReport {
-        camera: report.camera.clone(),
-        received_at: report.received_at,
-        persons: report.persons.len(),
-        json,
-    };
-    state.results.publish(kept, picture);
+    if is_stored {
+        let kept = NewReport {
+            camera: report.camera.clone(),
+            received_at: report.received_at,
+            persons: report.persons.len(),
+            json,
+        };
+        state.results.publish(kept, picture);
+        record_camera(state, &report);
+    }
     Ok((report, answer))
 }
 
@@ -84,8 +86,8 @@ fn written<T>(
 }
 
 /// Returns the image to store with the report. A failure here does not fail the request.
-fn picture(detected: &Detected) -> Option<NewPicture> {
-    match StoredFrame::of(detected) {
+fn picture(detected: &Detected, concealment: Option<Concealment>) -> Option<NewPicture> {
+    match StoredFrame::of(detected, concealment) {
         Ok(kept) => Some(NewPicture {
             frame: kept.jpeg,
             sketch: kept.sketch,
@@ -109,6 +111,20 @@ fn describe(trace: &RequestTrace, report: &DetectionReport) {
         ("lookdown.persons", report.persons.len()),
     ] {
         trace.note(key, i64::try_from(count).unwrap_or(i64::MAX));
+    }
+}
+
+/// Sets the metrics of the camera.
+fn record_camera(state: &ApiState, report: &DetectionReport) {
+    if state.options.zone_metrics {
+        let zones = report.zones.iter();
+        let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
+        state.metrics.set_zones(&report.camera, zones);
+    }
+    if state.options.camera_metrics {
+        let now = Timestamp::now().as_duration().as_secs_f64();
+        let persons = report.persons.len();
+        state.metrics.set_camera(&report.camera, persons, now);
     }
 }
 

@@ -24,9 +24,10 @@ use super::{
 use crate::{
     calibration_store::Calibrations,
     fairness::{Client, SharedBudget},
+    imaging::annotate::Concealment,
     inference::ModelRepository,
     metrics::Metrics,
-    pipeline::{PipelineError, WorkerPool},
+    pipeline::{DetectDefaults, PipelineError, WorkerPool},
     results::{PicturesOf, ResultStore},
     telemetry::Tracer,
 };
@@ -45,10 +46,16 @@ pub struct ApiOptions {
     pub max_header_bytes: usize,
     /// Largest number of headers of a request.
     pub max_headers: usize,
+    /// The defaults of detection parameters.
+    pub detect_defaults: DetectDefaults,
     /// `true` if the number of persons in each zone is a metric.
     pub zone_metrics: bool,
+    /// `true` if the number of persons of each camera is a metric.
+    pub camera_metrics: bool,
     /// The cameras whose latest image is stored.
     pub pictures_of: Arc<PicturesOf>,
+    /// The concealment of persons in these images.
+    pub conceal_pictures: Option<Concealment>,
     /// `true` if the metrics have a port of their own.
     pub metrics_elsewhere: bool,
     /// Longest duration of a request, from its first byte to its response.
@@ -98,8 +105,11 @@ impl ApiOptions {
             max_upload_bytes: 1 << 24,
             max_header_bytes: 4096,
             max_headers: 32,
+            detect_defaults: DetectDefaults::default(),
             zone_metrics: false,
+            camera_metrics: false,
             pictures_of: Arc::default(),
+            conceal_pictures: None,
             metrics_elsewhere: false,
             request_timeout: Duration::from_secs(20),
             min_upload_bytes_per_second: None,

@@ -30,7 +30,7 @@ use crate::{
 };
 
 pub use change::{Put, WriteCondition};
-pub use content::{CalibrationEntry, Reading};
+pub use content::{CalibrationEntry, Reading, defaults};
 pub use error::{ChangeError, UnusableCalibration};
 pub use snapshot::{CalibrationRow, CalibrationsHealth};
 

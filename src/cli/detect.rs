@@ -31,6 +31,7 @@ use super::{
     parameters::{ParameterFlags, PictureFlags},
     progress::Progress,
 };
+use crate::cli::output::UNWRITABLE;
 use crate::{
     annotation_formats::{AnnotationFormat, BoxKind},
     api::Report,
@@ -272,5 +273,5 @@ fn detect(
 
 fn print(detected: &Detected) -> anyhow::Result<()> {
     let report = serde_json::to_string(&Report::from(&detected.report))?;
-    writeln!(io::stdout(), "{report}").context("standard output cannot be written")
+    writeln!(io::stdout(), "{report}").context(UNWRITABLE)
 }

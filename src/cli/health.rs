@@ -10,6 +10,7 @@ use clap::Args;
 use tokio::runtime;
 
 use super::SettingsFile;
+use crate::cli::output::UNWRITABLE;
 use crate::probe::{self, Probe};
 
 /// Arguments of `lookdown health`.
@@ -35,6 +36,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         .build()
         .context("the operating system gives no runtime")?;
     let url = runtime.block_on(probe::ask(&settings, probe))?;
-    writeln!(io::stdout(), "{url} answered yes").context("standard output cannot be written")?;
+    writeln!(io::stdout(), "{url} answered yes").context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -9,6 +9,7 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 
 use super::parameters::one_of;
+use crate::cli::output::UNWRITABLE;
 use crate::{
     access::{KeyDigest, KeyName, Scope, Scopes, new_key},
     fairness::PriorityLevel,
@@ -59,6 +60,6 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
          {name}:{}:{digest}{in_entry}",
         scopes.joined("+"),
     );
-    written.context("standard output cannot be written")?;
+    written.context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,7 @@
 //! `lookdown model`
 
 mod description;
+mod fetch;
 
 use std::{
     io::{self, Write},
@@ -13,6 +14,7 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 
 use super::{SettingsFile, annotate};
+use crate::cli::output::UNWRITABLE;
 use crate::{
     annotated_image::AnnotationOptions,
     app::{engine_for, onnx_options},
@@ -34,6 +36,10 @@ const RUNS: usize = 5;
 pub(super) enum Command {
     /// Show the properties of a model, run it on a sample and draw the detections
     Check(Arguments),
+    /// List the models of the repository: name, size of the weights or `missing`, licence
+    List(SettingsFile),
+    /// Fetch the weights of a model of the repository, whose `model.toml` has their SHA-256
+    Fetch(fetch::Arguments),
 }
 
 /// Arguments of `lookdown model check`.
@@ -54,7 +60,14 @@ pub(super) struct Arguments {
 
 /// Runs the subcommand.
 pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
-    let Command::Check(arguments) = command;
+    match command {
+        Command::Check(arguments) => check(arguments),
+        Command::List(settings_file) => fetch::list(settings_file),
+        Command::Fetch(arguments) => fetch::run(arguments),
+    }
+}
+
+fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut settings = arguments.settings_file.load()?;
     let library = settings.inference.find_library()?;
     let loading = Instant::now();
@@ -109,8 +122,6 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
     }
     Ok(ExitCode::SUCCESS)
 }
-
-const UNWRITABLE: &str = "standard output cannot be written";
 
 fn count(number: usize, thing: &str) -> String {
     match number {

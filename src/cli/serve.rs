@@ -18,6 +18,7 @@ use tokio::{
 };
 
 use super::SettingsFile;
+use crate::cli::output::UNWRITABLE;
 use crate::{
     app::{App, Reloader, Sockets, assemble},
     settings::Settings,
@@ -37,13 +38,20 @@ pub(super) struct Arguments {
     /// addresses), print the clients that would have access, and end
     #[arg(long)]
     check: bool,
+    /// IP address and port to listen on, such as 0.0.0.0:8080 (`server.listen`)
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<String>,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
 
 /// Runs the server until a stop is requested, or checks that it could run.
 pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result<ExitCode> {
-    let settings = arguments.settings_file.load()?;
+    let listen = arguments.listen.iter();
+    let flags: Vec<_> = listen
+        .map(|address| ("server.listen".to_owned(), address.clone()))
+        .collect();
+    let settings = arguments.settings_file.load_with(&flags)?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(runtime_threads())
         .enable_all()
@@ -109,7 +117,7 @@ async fn check(settings: Settings) -> anyhow::Result<()> {
     drop(Sockets::bind(&settings.server).await?);
     let app = start(settings).await?;
     let report = spawn_blocking(move || app.check()).await??;
-    writeln!(io::stdout(), "{report}").context("standard output cannot be written")
+    writeln!(io::stdout(), "{report}").context(UNWRITABLE)
 }
 
 async fn start(settings: Settings) -> anyhow::Result<App> {

@@ -11,6 +11,8 @@ use anyhow::Context;
 use clap::{Args, Command};
 use clap_complete::Shell;
 
+use crate::cli::output::UNWRITABLE;
+
 /// Arguments of `lookdown completions`.
 #[derive(Debug, Args)]
 pub(super) struct CompletionArguments {
@@ -32,9 +34,7 @@ pub(super) fn print_completions(
 ) -> anyhow::Result<ExitCode> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "lookdown", &mut script);
-    io::stdout()
-        .write_all(&script)
-        .context("standard output cannot be written")?;
+    io::stdout().write_all(&script).context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }
 

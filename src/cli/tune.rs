@@ -13,6 +13,7 @@ use clap::Args;
 
 use self::trial::{Choice, Trial};
 use super::{SettingsFile, parameters::one_of};
+use crate::cli::output::UNWRITABLE;
 use crate::{inference::Device, pipeline::Profile, settings::Settings};
 
 /// Minimum speed-up over the present settings. A smaller one may be due to chance.
@@ -40,8 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         batch_views: settings.threads.batch_views,
     };
     let mut out = io::stdout().lock();
-    let mut say =
-        |line: String| writeln!(out, "{line}").context("standard output cannot be written");
+    let mut say = |line: String| writeln!(out, "{line}").context(UNWRITABLE);
     say("sessions  threads  batch  views/s".to_owned())?;
     let mut best = (present, 0.0);
     for choice in choices(&settings) {

@@ -8,13 +8,15 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use clap::Args;
+use clap::{Args, builder::PossibleValuesParser};
 use lookdown_client::ServerEntry;
 use lookdown_watch::{CameraEntry, Origin, Transport, WatchOptions, watch};
+use strum::VariantNames;
 use tokio::{runtime, time::sleep};
 
 use super::{SettingsFile, serve};
 use crate::{
+    pipeline::Profile,
     probe::{self, Probe},
     settings::Settings,
     shutdown::Shutdown,
@@ -65,7 +67,7 @@ struct CameraFlags {
     #[arg(long, value_name = "ID")]
     calibration: Option<String>,
     /// The profile [default: that of the server]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Profile::VARIANTS))]
     profile: Option<String>,
     /// The interval between two frames, such as 500ms or 2s [default: 1s]
     #[arg(long, value_name = "DURATION")]

@@ -5,6 +5,7 @@
 mod area_sketch;
 mod canvas;
 mod caption;
+mod conceal;
 mod effort;
 mod encode;
 mod label;
@@ -16,6 +17,7 @@ pub(super) mod text;
 use super::frame::Frame;
 pub use area_sketch::{ZoneOutline, sketch_areas};
 use canvas::{Outline, Rgb, Stroke};
+pub use conceal::{Concealment, conceal};
 pub use effort::Cancelled;
 use effort::Effort;
 pub use encode::{EncodeError, encode_jpeg, encode_png};

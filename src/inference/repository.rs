@@ -17,7 +17,7 @@ use super::{InferenceError, Model, ModelRegistry, RemoteServer, model::ModelFile
 use crate::metrics::{Metrics, replace_info, start_at_zero};
 
 pub use error::RepositoryError;
-pub use folder::{ModelFolder, is_fetched};
+pub use folder::{ModelFolder, is_fetched, model_names};
 pub(super) use stamp::Stamp;
 
 /// Loads a model from its folder or ONNX file.

@@ -34,20 +34,38 @@ fn at_most_a_thousand_zones_are_shown_until_they_are_removed() {
     metrics.set_zones("lobby", [("door", 2), ("till", 0)]);
     metrics.set_zones("lobby", [("door", 1), ("till", 3)]);
     let (door, till) = (
-        "lookdown_zone_persons{calibration=\"lobby\",zone=\"door\"} 1",
-        "lookdown_zone_persons{calibration=\"lobby\",zone=\"till\"} 3",
+        "lookdown_zone_persons{camera=\"lobby\",zone=\"door\"} 1",
+        "lookdown_zone_persons{camera=\"lobby\",zone=\"till\"} 3",
     );
     assert_eq!(shown(), [door, till]);
-    metrics.retain_zones(|_, zone| zone != "door");
+    metrics.set_zones("lobby", [("till", 3)]);
     assert_eq!(shown(), [till]);
-    for calibration in 0..100 {
+    metrics.retain_cameras(&["hall".to_owned()]);
+    assert!(shown().is_empty());
+    for camera in 0..100 {
         let names: Vec<_> = (0..20).map(|zone| zone.to_string()).collect();
         metrics.set_zones(
-            &calibration.to_string(),
+            &camera.to_string(),
             names.iter().map(|name| (name.as_str(), 1)),
         );
     }
-    assert_eq!(shown().len(), zone_persons::MAX_ROWS);
+    assert_eq!(shown().len(), camera_gauges::MAX_ROWS);
+}
+
+#[test]
+fn a_camera_shows_its_persons_and_the_time_of_its_report() {
+    let metrics = Metrics::default();
+    metrics.set_camera("lobby", 2, 1_763_717_400.5);
+    metrics.set_camera("lobby", 3, 1_763_717_401.5);
+    let text = metrics.render().unwrap();
+    for row in [
+        "lookdown_camera_persons{camera=\"lobby\"} 3",
+        "lookdown_camera_last_report_timestamp_seconds{camera=\"lobby\"} 1763717401.5",
+    ] {
+        assert!(text.contains(row), "{text}");
+    }
+    metrics.retain_cameras(&[]);
+    assert!(!metrics.render().unwrap().contains("{camera="));
 }
 
 #[test]

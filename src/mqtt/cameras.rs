@@ -1,61 +1,74 @@
-//! The state of each camera that the broker is to have, and its changes by reports.
+//! The state of each camera that the broker is to have, and its changes by reports and by time.
 
-use std::{collections::BTreeMap, num::NonZeroUsize};
+use std::{
+    collections::{BTreeMap, HashSet},
+    num::NonZeroUsize,
+    time::Duration,
+};
 
-use serde::Deserialize;
+use tokio::time::Instant;
 
 use super::{
-    discovery::{announcements, withdrawal},
+    camera::{Camera, Delays},
+    discovery::{Discovery, OFFLINE},
     message::Message,
-    topics::Topics,
+    retained::{RetainedTopics, withdrawal, zone_withdrawal},
+    topics::{CameraTopic, Topics, level},
 };
 use crate::results::StoredReport;
+
+/// Time after the connection until unknown cameras are withdrawn, where none expire.
+const UNKNOWN_FOR: Duration = Duration::from_mins(10);
 
 /// The published cameras, a bounded number of them.
 pub(super) struct Cameras {
     topics: Topics,
+    discovery: Discovery,
+    delays: Delays,
     most: NonZeroUsize,
-    known: BTreeMap<String, Counts>,
+    /// By the level of their topics.
+    known: BTreeMap<String, Camera>,
+    retained: RetainedTopics,
+    /// The time at which the cameras of `retained` are withdrawn.
+    withdraw_at: Option<Instant>,
     /// True once the warning about further cameras was logged.
     has_warned: bool,
 }
 
-/// The persons in a camera's frame and in its zones.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Counts {
-    persons: usize,
-    zones: Vec<ZoneCount>,
-}
-
-/// The parts of a report's JSON that are read.
-#[derive(Deserialize)]
-struct Zones {
-    #[serde(default)]
-    zones: Vec<ZoneCount>,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-struct ZoneCount {
-    name: String,
-    persons: usize,
-}
-
 impl Cameras {
-    pub(super) fn new(topics: Topics, most: NonZeroUsize) -> Self {
+    pub(super) fn new(
+        topics: Topics,
+        discovery: Discovery,
+        hold: Duration,
+        most: NonZeroUsize,
+    ) -> Self {
         Self {
+            delays: Delays {
+                hold,
+                expire: discovery.expire_after,
+            },
             topics,
+            discovery,
             most,
             known: BTreeMap::new(),
+            retained: RetainedTopics::default(),
+            withdraw_at: None,
             has_warned: false,
         }
     }
 
-    /// Updates the camera of a report. Returns the messages to publish: none for a camera beyond
-    /// the limit.
-    pub(super) fn hear(&mut self, report: &StoredReport) -> Vec<Message> {
+    /// Updates the camera of a report whose frame arrived `age` ago. Returns the messages to
+    /// publish: none for a camera beyond the limit.
+    pub(super) fn update(
+        &mut self,
+        report: &StoredReport,
+        age: Duration,
+        now: Instant,
+    ) -> Vec<Message> {
         let report = &report.report;
-        let camera = report.camera.as_str();
-        let is_known = self.known.contains_key(camera);
+        let name = report.camera.as_str();
+        let key = level(name);
+        let is_known = self.known.contains_key(&key);
         if !is_known && self.known.len() >= self.most.get() {
             if !self.has_warned {
                 tracing::warn!(
@@ -66,65 +79,107 @@ impl Cameras {
             self.has_warned = true;
             return Vec::new();
         }
-        // Reports come from this server and are always JSON.
-        let zones = serde_json::from_slice(&report.json);
-        let counts = Counts {
-            persons: report.persons,
-            zones: zones.map_or(Vec::new(), |Zones { zones }| zones),
-        };
-        let before = self.known.insert(camera.to_owned(), counts);
+        let camera = self.known.entry(key).or_insert_with(|| Camera::new(name));
+        let (removed, has_changed) = camera.update(report, age, now, &self.delays);
+        let topics = &self.topics;
         let mut messages = Vec::new();
-        let Some(counts) = self.known.get(camera) else {
-            return messages;
-        };
-        if before
-            .as_ref()
-            .is_none_or(|before| !before.has_zones_of(counts))
-        {
-            for zone in before.iter().flat_map(|before| &before.zones) {
-                if !counts.zones.iter().any(|there| there.name == zone.name) {
-                    messages.extend(withdrawal(&self.topics, camera, &zone.name));
-                    messages.push(Message::forget(self.topics.zone(camera, &zone.name)));
-                }
-            }
-            messages.extend(counts.announced(&self.topics, camera));
+        for zone in removed {
+            messages.extend(zone_withdrawal(topics, name, &zone));
         }
-        messages.extend(counts.count_messages(&self.topics, camera));
+        if has_changed || !is_known {
+            messages.extend(camera.announced(topics, &self.discovery));
+        }
+        messages.extend(camera.state(topics));
         let json = report.json.clone();
-        messages.push(Message::passing(self.topics.report(camera), json));
+        messages.push(Message::passing(topics.report(name), json));
         messages
     }
 
     /// All messages that the broker is to retain.
-    pub(super) fn all(&self) -> Vec<Message> {
-        let known = self.known.iter();
-        let messages = known.flat_map(|(camera, counts)| {
-            let mut messages = counts.announced(&self.topics, camera);
-            messages.extend(counts.count_messages(&self.topics, camera));
+    pub(super) fn all(&mut self, now: Instant) -> Vec<Message> {
+        let topics = &self.topics;
+        let known = self.known.values_mut();
+        let messages = known.flat_map(|camera| {
+            camera.expire(now, topics);
+            let mut messages = camera.announced(topics, &self.discovery);
+            messages.extend(camera.state(topics));
             messages
         });
         messages.collect()
     }
-}
 
-impl Counts {
-    fn has_zones_of(&self, other: &Self) -> bool {
-        let (own, other) = (self.zones.iter(), other.zones.iter());
-        own.map(|zone| &zone.name).eq(other.map(|zone| &zone.name))
+    /// Begins a connection, at whose start the broker sends what it has retained.
+    pub(super) fn begin_connection(&mut self, now: Instant) {
+        self.retained = RetainedTopics::default();
+        self.withdraw_at = Some(now + self.delays.expire.unwrap_or(UNKNOWN_FOR));
     }
 
-    fn announced(&self, topics: &Topics, camera: &str) -> Vec<Message> {
-        let zones = self.zones.iter().map(|zone| zone.name.as_str());
-        announcements(topics, camera, zones)
+    /// Compares a message of the broker with the state. Returns the messages that correct it.
+    pub(super) fn compare(
+        &mut self,
+        topic: &str,
+        payload: &[u8],
+        is_retained: bool,
+    ) -> Option<Message> {
+        let topic = self.topics.camera_topic(topic)?;
+        // The echo of a message that removes a topic.
+        if payload.is_empty() {
+            return None;
+        }
+        let known = self.known.get(topic.camera());
+        if is_retained {
+            // Without a time, the withdrawal of this connection is over.
+            self.withdraw_at?;
+            return self.retained.note(&topic, known.is_some(), &self.topics);
+        }
+        match (topic, known) {
+            // Another server has this camera.
+            (CameraTopic::Persons { camera }, None) => self.retained.keep(camera),
+            // Another server does not have it.
+            (CameraTopic::Availability { .. }, Some(camera))
+                if camera.is_available() && payload == OFFLINE.as_bytes() =>
+            {
+                return Some(camera.availability(&self.topics));
+            }
+            _ => {}
+        }
+        None
     }
 
-    fn count_messages(&self, topics: &Topics, camera: &str) -> Vec<Message> {
-        let count = |topic, persons: usize| Message::retained(topic, persons.to_string());
-        let zones = self.zones.iter();
-        let zones = zones.map(|zone| count(topics.zone(camera, &zone.name), zone.persons));
-        std::iter::once(count(topics.persons(camera), self.persons))
-            .chain(zones)
-            .collect()
+    /// The time of the next change without a report.
+    pub(super) fn next_change(&self) -> Option<Instant> {
+        let known = self.known.values().filter_map(Camera::next_change);
+        known.chain(self.withdraw_at).min()
+    }
+
+    /// Changes what has changed by now without a report. Returns the messages.
+    pub(super) fn expire(&mut self, now: Instant) -> Vec<Message> {
+        let topics = &self.topics;
+        let known = self.known.values_mut();
+        let mut messages: Vec<_> = known
+            .flat_map(|camera| camera.expire(now, topics))
+            .collect();
+        if self.withdraw_at.is_some_and(|at| at <= now) {
+            self.withdraw_at = None;
+            for (key, zones) in self.retained.take() {
+                match self.known.get(&key) {
+                    None => messages.extend(withdrawal(topics, &key, zones)),
+                    Some(camera) => {
+                        let gone = zones.iter().filter(|zone| !camera.has_zone_level(zone));
+                        messages.extend(gone.flat_map(|zone| zone_withdrawal(topics, &key, zone)));
+                    }
+                }
+            }
+        }
+        messages
+    }
+
+    /// Removes the cameras that have no report any longer. Returns the messages.
+    pub(super) fn retain(&mut self, cameras: &[String]) -> Vec<Message> {
+        let kept: HashSet<_> = cameras.iter().map(|name| level(name)).collect();
+        let removed = self.known.extract_if(.., |key, _| !kept.contains(key));
+        let messages = removed.flat_map(|(_, camera)| camera.withdrawal(&self.topics));
+        messages.collect()
     }
 }
 

@@ -1,87 +1,145 @@
 //! Announces a camera's entities to Home Assistant (its documentation: MQTT, section "MQTT
-//! discovery"): occupancy, the number of persons, and the number in each zone.
+//! discovery"): occupancy and the number of persons, of the camera and of each zone.
+
+use std::time::Duration;
 
 use serde_json::{Value, json};
+use url::Url;
 
 use super::{
     message::Message,
+    occupancy::{OFF, ON},
     topics::{Topics, level},
 };
 
-/// The status while the server is connected, and the one that the broker publishes when it is not.
+/// The status while the server is connected or a camera sends frames, and the one when it is not.
 pub(super) const ONLINE: &str = "online";
 pub(super) const OFFLINE: &str = "offline";
 const SENSOR: &str = "sensor";
 const BINARY_SENSOR: &str = "binary_sensor";
-/// Home Assistant's template for a state that is ON or OFF.
-const IS_OCCUPIED: &str = "{{ 'ON' if value | int(0) > 0 else 'OFF' }}";
 
-/// The announcements of a camera and its zones. Empty without a discovery prefix.
-pub(super) fn announcements<'a>(
+/// The parts of the announcements that the settings give.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Discovery {
+    /// Time without a report after which a sensor is unavailable.
+    pub expire_after: Option<Duration>,
+    /// The address of the server's web page, shown with each device.
+    pub configuration_url: Option<Url>,
+    /// The address at which users of this installation get help.
+    pub support_url: Option<Url>,
+}
+
+/// An entity: component, ID within the device, and configuration.
+type Entity = (&'static str, String, Value);
+
+impl Discovery {
+    /// The announcements of a camera and its zones. Empty without a discovery prefix.
+    pub(super) fn announcements<'a>(
+        &self,
+        topics: &Topics,
+        camera: &str,
+        zones: impl IntoIterator<Item = &'a str>,
+    ) -> Vec<Message> {
+        let of_camera = [
+            occupancy("Occupancy", None, topics.occupancy(camera)),
+            persons("Persons", None, topics.persons(camera)),
+        ];
+        let zones = zones.into_iter().flat_map(|zone| {
+            let name = |what: &str| format!("{what} in {zone}");
+            let state = topics.zone(camera, zone);
+            let occupied = topics.zone_occupancy(camera, zone);
+            [
+                persons(&name("Persons"), Some(zone), state),
+                occupancy(&name("Occupancy"), Some(zone), occupied),
+            ]
+        });
+        let all = of_camera.into_iter().chain(zones);
+        all.filter_map(|(component, entity, config)| {
+            let id = format!("{}_{entity}", topics.device_id(camera));
+            let topic = topics.config(component, &id)?;
+            let config = self.completed(config, &id, topics, camera);
+            Some(Message::retained(topic, config.to_string()))
+        })
+        .collect()
+    }
+
+    /// Adds the fields that all entities of a camera have in common.
+    fn completed(&self, mut config: Value, id: &str, topics: &Topics, camera: &str) -> Value {
+        let version = env!("CARGO_PKG_VERSION");
+        config["unique_id"] = json!(id);
+        config["availability_mode"] = json!("all");
+        config["availability"] = json!([
+            {"topic": topics.status()},
+            {"topic": topics.availability(camera)},
+        ]);
+        config["device"] = json!({
+            "identifiers": [topics.device_id(camera)],
+            "name": camera,
+            "manufacturer": "Lookdown",
+            "model": "Ceiling fisheye camera",
+            "sw_version": version,
+        });
+        config["origin"] = json!({"name": "Lookdown", "sw_version": version});
+        if let Some(expire_after) = self.expire_after {
+            config["expire_after"] = json!(expire_after.as_secs());
+        }
+        if let Some(url) = &self.configuration_url {
+            config["device"]["configuration_url"] = json!(url.as_str());
+        }
+        if let Some(url) = &self.support_url {
+            config["origin"]["support_url"] = json!(url.as_str());
+        }
+        config
+    }
+}
+
+/// The messages that remove the entities of a camera, or of one of its zones, from Home Assistant.
+pub(super) fn config_withdrawals(
     topics: &Topics,
     camera: &str,
-    zones: impl IntoIterator<Item = &'a str>,
+    zone: Option<&str>,
 ) -> Vec<Message> {
-    let occupancy = json!({
-        "name": "Occupancy",
-        "state_topic": topics.persons(camera),
-        "device_class": "occupancy",
-        "value_template": IS_OCCUPIED,
+    let entities = [occupancy_id(zone), persons_id(zone)];
+    let topics = entities.into_iter().filter_map(|(component, entity)| {
+        let id = format!("{}_{entity}", topics.device_id(camera));
+        topics.config(component, &id)
     });
-    let persons = json!({
-        "name": "Persons",
-        "state_topic": topics.persons(camera),
+    topics.map(Message::forget).collect()
+}
+
+fn occupancy(name: &str, zone: Option<&str>, state_topic: String) -> Entity {
+    let config = json!({
+        "name": name,
+        "state_topic": state_topic,
+        "device_class": "occupancy",
+        "payload_on": ON,
+        "payload_off": OFF,
+    });
+    let (component, id) = occupancy_id(zone);
+    (component, id, config)
+}
+
+fn persons(name: &str, zone: Option<&str>, state_topic: String) -> Entity {
+    let config = json!({
+        "name": name,
+        "state_topic": state_topic,
         "state_class": "measurement",
         "icon": "mdi:account-group",
     });
-    let zones = zones.into_iter().map(|zone| {
-        let config = json!({
-            "name": format!("Persons in {zone}"),
-            "state_topic": topics.zone(camera, zone),
-            "state_class": "measurement",
-            "icon": "mdi:account-group",
-        });
-        (SENSOR, zone_entity(zone), config)
-    });
-    let of_camera = [
-        (BINARY_SENSOR, "occupancy".to_owned(), occupancy),
-        (SENSOR, "persons".to_owned(), persons),
-    ];
-    let all = of_camera.into_iter().chain(zones);
-    all.filter_map(|(component, entity, config)| {
-        let id = format!("{}_{entity}", topics.device_id(camera));
-        let topic = topics.config(component, &id)?;
-        let config = completed(config, &id, topics, camera);
-        Some(Message::retained(topic, config.to_string()))
-    })
-    .collect()
+    let (component, id) = persons_id(zone);
+    (component, id, config)
 }
 
-/// The message that removes a zone from Home Assistant.
-pub(super) fn withdrawal(topics: &Topics, camera: &str, zone: &str) -> Option<Message> {
-    let id = format!("{}_{}", topics.device_id(camera), zone_entity(zone));
-    topics.config(SENSOR, &id).map(Message::forget)
+fn occupancy_id(zone: Option<&str>) -> (&'static str, String) {
+    let id = zone.map_or("occupancy".to_owned(), |zone| {
+        format!("zone_{}_occupancy", level(zone))
+    });
+    (BINARY_SENSOR, id)
 }
 
-fn zone_entity(zone: &str) -> String {
-    format!("zone_{}", level(zone))
-}
-
-/// Adds the fields that all entities of a camera have in common.
-fn completed(mut config: Value, id: &str, topics: &Topics, camera: &str) -> Value {
-    config["unique_id"] = json!(id);
-    config["availability_topic"] = json!(topics.status());
-    config["device"] = json!({
-        "identifiers": [topics.device_id(camera)],
-        "name": camera,
-        "manufacturer": "Lookdown",
-        "model": "Ceiling fisheye camera",
-    });
-    config["origin"] = json!({
-        "name": "Lookdown",
-        "sw_version": env!("CARGO_PKG_VERSION"),
-    });
-    config
+fn persons_id(zone: Option<&str>) -> (&'static str, String) {
+    let id = zone.map_or("persons".to_owned(), |zone| format!("zone_{}", level(zone)));
+    (SENSOR, id)
 }
 
 #[cfg(test)]
@@ -92,52 +150,88 @@ mod tests {
         Topics::new("lookdown", Some("homeassistant"))
     }
 
+    fn config(message: &Message) -> Value {
+        serde_json::from_slice(&message.payload).unwrap()
+    }
+
     #[test]
-    fn a_camera_announces_occupancy_persons_and_zones() {
-        let messages = announcements(&topics(), "north gate", ["till"]);
-        let [occupancy, persons, till] = messages.as_slice() else {
+    fn camera_and_zones_announce_occupancy_and_persons() {
+        let discovery = Discovery::default();
+        let messages = discovery.announcements(&topics(), "north gate", ["till"]);
+        let [occupancy, persons, till, till_occupancy] = messages.as_slice() else {
             panic!("{messages:?}")
         };
         assert!(messages.iter().all(|message| message.retained));
-        let config =
-            |message: &Message| -> Value { serde_json::from_slice(&message.payload).unwrap() };
         let device = "lookdown_north_gate-d44d9e17";
-        assert_eq!(
-            occupancy.topic,
-            format!("homeassistant/binary_sensor/{device}_occupancy/config")
-        );
-        assert_eq!(config(occupancy)["device_class"], "occupancy");
-        assert_eq!(
-            persons.topic,
-            format!("homeassistant/sensor/{device}_persons/config")
-        );
-        assert_eq!(
-            till.topic,
-            format!("homeassistant/sensor/{device}_zone_till/config")
-        );
         let state = "lookdown/cameras/north_gate-d44d9e17";
-        assert_eq!(config(persons)["state_topic"], format!("{state}/persons"));
-        assert_eq!(config(till)["state_topic"], format!("{state}/zones/till"));
-        for message in [occupancy, persons, till] {
+        for (message, entity, state_topic) in [
+            (occupancy, "binary_sensor/DEVICE_occupancy", "occupancy"),
+            (persons, "sensor/DEVICE_persons", "persons"),
+            (till, "sensor/DEVICE_zone_till", "zones/till"),
+            (
+                till_occupancy,
+                "binary_sensor/DEVICE_zone_till_occupancy",
+                "zones/till/occupancy",
+            ),
+        ] {
+            let entity = entity.replace("DEVICE", device);
+            assert_eq!(message.topic, format!("homeassistant/{entity}/config"));
             let config = config(message);
-            assert_eq!(config["availability_topic"], "lookdown/status");
+            assert_eq!(config["state_topic"], format!("{state}/{state_topic}"));
+            let availability = json!([
+                {"topic": "lookdown/status"},
+                {"topic": format!("{state}/availability")},
+            ]);
+            assert_eq!(config["availability"], availability);
+            assert_eq!(config["availability_mode"], "all");
             assert_eq!(config["device"]["name"], "north gate");
             assert_eq!(config["device"]["identifiers"][0], device);
+            let version = env!("CARGO_PKG_VERSION");
+            assert_eq!(config["device"]["sw_version"], version);
+            assert_eq!(config["origin"]["sw_version"], version);
+            assert!(config.get("expire_after").is_none());
+            assert!(config["device"].get("configuration_url").is_none());
+            assert!(config["origin"].get("support_url").is_none());
+        }
+        assert_eq!(config(occupancy)["device_class"], "occupancy");
+    }
+
+    #[test]
+    fn expiry_and_addresses_come_from_the_settings() {
+        let url = |text: &str| text.parse::<Url>().unwrap();
+        let discovery = Discovery {
+            expire_after: Some(Duration::from_mins(10)),
+            configuration_url: Some(url("http://lookdown.local:8080/")),
+            support_url: Some(url("https://help.example/")),
+        };
+        for message in discovery.announcements(&topics(), "lobby", ["till"]) {
+            let config = config(&message);
+            assert_eq!(config["expire_after"], 600);
+            let page = &config["device"]["configuration_url"];
+            assert_eq!(page, "http://lookdown.local:8080/");
+            assert_eq!(config["origin"]["support_url"], "https://help.example/");
         }
     }
 
     #[test]
-    fn a_zone_is_withdrawn_on_its_announcement_topic() {
-        let announced = announcements(&topics(), "lobby", ["till"]);
-        let withdrawn = withdrawal(&topics(), "lobby", "till").unwrap();
-        assert_eq!(withdrawn.topic, announced[2].topic);
-        assert!(withdrawn.payload.is_empty() && withdrawn.retained);
+    fn withdrawals_have_the_topics_of_announcements() {
+        let announced = Discovery::default().announcements(&topics(), "lobby", ["till"]);
+        let mut withdrawn = config_withdrawals(&topics(), "lobby", None);
+        withdrawn.extend(config_withdrawals(&topics(), "lobby", Some("till")));
+        let sorted = |messages: &[Message]| {
+            let topics = messages.iter().map(|message| message.topic.clone());
+            topics.collect::<std::collections::BTreeSet<_>>()
+        };
+        assert_eq!(sorted(&withdrawn), sorted(&announced));
+        let is_empty = |message: &Message| message.payload.is_empty() && message.retained;
+        assert!(withdrawn.iter().all(is_empty));
     }
 
     #[test]
     fn nothing_is_announced_without_a_discovery_prefix() {
         let topics = Topics::new("lookdown", None);
-        assert!(announcements(&topics, "lobby", ["till"]).is_empty());
-        assert_eq!(withdrawal(&topics, "lobby", "till"), None);
+        let announced = Discovery::default().announcements(&topics, "lobby", ["till"]);
+        assert!(announced.is_empty());
+        assert!(config_withdrawals(&topics, "lobby", None).is_empty());
     }
 }

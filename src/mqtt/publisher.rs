@@ -3,17 +3,18 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 
+use jiff::Timestamp;
 use rumqttc::Publish;
 use tokio::{
     sync::broadcast::{self, error::RecvError},
-    time::{Instant, sleep, sleep_until},
+    time::{Instant, interval, sleep, sleep_until},
 };
 use uuid::Uuid;
 
 use super::{
     Broker,
     cameras::Cameras,
-    discovery::{OFFLINE, ONLINE},
+    discovery::{Discovery, OFFLINE, ONLINE},
     message::Message,
     session::{Session, SessionError},
     topics::Topics,
@@ -36,6 +37,9 @@ const STEADY: Duration = Duration::from_secs(10);
 /// Shortest time between two messages of the whole state. Any client of the broker can ask for it.
 const BIRTH_PAUSE: Duration = Duration::from_secs(10);
 
+/// Interval of the checks for cameras that another server with the same result store has removed.
+const REMOVAL_CHECK: Duration = Duration::from_mins(1);
+
 /// The broker to publish to, and the settings of the messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MqttOptions {
@@ -50,6 +54,10 @@ pub struct MqttOptions {
     pub discovery_prefix: Option<String>,
     /// Most cameras that are published.
     pub max_cameras: NonZeroUsize,
+    /// Time without a person until occupancy is off.
+    pub hold: Duration,
+    /// The parts of the announcements that the settings give.
+    pub discovery: Discovery,
 }
 
 /// Publishes the results.
@@ -97,10 +105,17 @@ impl Publisher {
 
     /// Keeps a connection, and reconnects when it is lost.
     async fn publish(&self, mut queue: Queue) {
-        let mut cameras = Cameras::new(self.topics.clone(), self.options.max_cameras);
+        let mut cameras = Cameras::new(
+            self.topics.clone(),
+            self.options.discovery.clone(),
+            self.options.hold,
+            self.options.max_cameras,
+        );
         // If the result store does not answer now, a camera is published with its next report.
         for report in self.results.latest_of_all().await.unwrap_or_default() {
-            cameras.hear(&report);
+            let age = Timestamp::now().duration_since(report.report.received_at);
+            let age = Duration::try_from(age).unwrap_or_default();
+            cameras.update(&report, age, Instant::now());
         }
         let mut pause = SHORTEST_PAUSE;
         let mut is_told = false;
@@ -161,7 +176,7 @@ impl Publisher {
         loop {
             match queue.recv().await {
                 Ok(report) => {
-                    cameras.hear(&report);
+                    cameras.update(&report, Duration::ZERO, Instant::now());
                     self.metrics.mqtt_reports_dropped.inc();
                 }
                 Err(RecvError::Lagged(count)) => self.metrics.mqtt_reports_dropped.inc_by(count),
@@ -180,15 +195,24 @@ impl Publisher {
         session.publish([self.status(ONLINE)]).await?;
         let birth = self.topics.birth();
         let topics = [self.topics.status()].into_iter().chain(birth);
-        session.subscribe(topics).await?;
-        session.publish(cameras.all()).await?;
+        let mut removals = self.results.listeners().removals();
+        let mut checks = interval(REMOVAL_CHECK);
+        cameras.begin_connection(Instant::now());
+        session
+            .subscribe(topics.chain(self.topics.camera_filters()))
+            .await?;
+        session.publish(self.without_removed(cameras).await).await?;
+        session.publish(cameras.all(Instant::now())).await?;
         let mut next_state: Option<Instant> = None;
         let mut not_before = Instant::now();
         loop {
+            let next_change = cameras.next_change();
             tokio::select! {
                 message = session.next() => {
                     let message = message?;
-                    if self.is_birth(&message) {
+                    if let Some(answer) = cameras.compare(&message.topic, &message.payload, message.retain) {
+                        session.publish([answer]).await?;
+                    } else if self.is_birth(&message) {
                         next_state.get_or_insert(not_before);
                     } else if message.topic == self.topics.status() && message.payload == OFFLINE {
                         // Another client says otherwise, such as the will of a replica that has ended.
@@ -198,11 +222,20 @@ impl Publisher {
                 () = sleep_until(next_state.unwrap_or(not_before)), if next_state.is_some() => {
                     next_state = None;
                     not_before = Instant::now() + BIRTH_PAUSE;
-                    session.publish(cameras.all()).await?;
+                    session.publish(cameras.all(Instant::now())).await?;
+                }
+                () = sleep_until(next_change.unwrap_or(not_before)), if next_change.is_some() => {
+                    session.publish(cameras.expire(Instant::now())).await?;
+                }
+                Ok(()) = removals.changed() => {
+                    session.publish(self.without_removed(cameras).await).await?;
+                }
+                _ = checks.tick() => {
+                    session.publish(self.without_removed(cameras).await).await?;
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {
-                        let messages = cameras.hear(&report);
+                        let messages = cameras.update(&report, Duration::ZERO, Instant::now());
                         let is_one_too_many = messages.is_empty();
                         let published = session.publish(messages).await;
                         let counter = if is_one_too_many || published.is_err() {
@@ -218,6 +251,13 @@ impl Publisher {
                 },
             }
         }
+    }
+
+    /// Removes the cameras that the result store has no longer. Returns the messages.
+    async fn without_removed(&self, cameras: &mut Cameras) -> Vec<Message> {
+        // Without an answer, nothing is known to be removed.
+        let stored = self.results.cameras().await;
+        stored.map_or(Vec::new(), |stored| cameras.retain(&stored))
     }
 
     /// Returns whether Home Assistant says that it has started: it needs the whole state then.

@@ -38,6 +38,43 @@ impl Topics {
         format!("{}/zones/{}", self.of_camera(camera), level(zone))
     }
 
+    /// The topic of a camera's occupancy.
+    pub(super) fn occupancy(&self, camera: &str) -> String {
+        format!("{}/occupancy", self.of_camera(camera))
+    }
+
+    /// The topic of a zone's occupancy.
+    pub(super) fn zone_occupancy(&self, camera: &str, zone: &str) -> String {
+        format!("{}/occupancy", self.zone(camera, zone))
+    }
+
+    /// The topic of a camera's availability.
+    pub(super) fn availability(&self, camera: &str) -> String {
+        format!("{}/availability", self.of_camera(camera))
+    }
+
+    /// Filters for the topics that [`Topics::camera_topic`] recognises.
+    pub(super) fn camera_filters(&self) -> [String; 3] {
+        ["+/persons", "+/availability", "+/zones/+"]
+            .map(|rest| format!("{}/cameras/{rest}", self.prefix))
+    }
+
+    /// Recognises a topic of a camera.
+    pub(super) fn camera_topic<'a>(&self, topic: &'a str) -> Option<CameraTopic<'a>> {
+        let topic = topic
+            .strip_prefix(&self.prefix)?
+            .strip_prefix("/cameras/")?;
+        let (camera, rest) = topic.split_once('/')?;
+        match rest {
+            "persons" => Some(CameraTopic::Persons { camera }),
+            "availability" => Some(CameraTopic::Availability { camera }),
+            _ => {
+                let zone = rest.strip_prefix("zones/")?;
+                (!zone.contains('/')).then_some(CameraTopic::Zone { camera, zone })
+            }
+        }
+    }
+
     /// The topic of a camera's reports.
     pub(super) fn report(&self, camera: &str) -> String {
         format!("{}/report", self.of_camera(camera))
@@ -63,6 +100,27 @@ impl Topics {
     /// The ID that identifies a camera in Home Assistant.
     pub(super) fn device_id(&self, camera: &str) -> String {
         format!("{}_{}", level(&self.prefix), level(camera))
+    }
+}
+
+/// A topic of a camera, by the levels of its name and of a zone's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CameraTopic<'a> {
+    /// The number of persons.
+    Persons { camera: &'a str },
+    /// The availability.
+    Availability { camera: &'a str },
+    /// The number of persons in a zone.
+    Zone { camera: &'a str, zone: &'a str },
+}
+
+impl<'a> CameraTopic<'a> {
+    pub(super) fn camera(&self) -> &'a str {
+        match self {
+            Self::Persons { camera }
+            | Self::Availability { camera }
+            | Self::Zone { camera, .. } => camera,
+        }
     }
 }
 
@@ -110,6 +168,33 @@ mod tests {
     }
 
     #[test]
+    fn topics_of_cameras_are_recognised() {
+        let topics = Topics::new("home/lookdown", None);
+        let (camera, zone) = ("lobby", "till");
+        for (topic, expected) in [
+            (topics.persons(camera), CameraTopic::Persons { camera }),
+            (
+                topics.availability(camera),
+                CameraTopic::Availability { camera },
+            ),
+            (
+                topics.zone(camera, zone),
+                CameraTopic::Zone { camera, zone },
+            ),
+        ] {
+            assert_eq!(topics.camera_topic(&topic), Some(expected));
+        }
+        for other in [
+            topics.status(),
+            topics.report(camera),
+            topics.zone_occupancy(camera, zone),
+            "lookdown/cameras/lobby/persons".to_owned(),
+        ] {
+            assert_eq!(topics.camera_topic(&other), None, "{other}");
+        }
+    }
+
+    #[test]
     fn names_that_become_alike_stay_distinct() {
         let names = [
             "north gate",
@@ -130,6 +215,8 @@ mod tests {
             let level = level(&name);
             prop_assert!((1..=MAX_CHARS).contains(&level.len()));
             prop_assert!(level.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c)));
+            // Topics of levels are those of the names.
+            prop_assert_eq!(super::level(&level), level);
         }
     }
 }

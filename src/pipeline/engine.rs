@@ -166,6 +166,7 @@ impl Engine {
             model: ModelUsed::from(observation.model()),
             profile: parameters.profile,
             refinement: parameters.refinement,
+            defaults: parameters.defaults.clone(),
             persons,
             zones,
             views,

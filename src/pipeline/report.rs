@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::Profile;
+use super::{DefaultUsed, Profile};
 use crate::{
     detection::{BBox, FramePixels, RefinementParameters},
     geometry::{
@@ -41,6 +41,8 @@ pub struct DetectionReport {
     pub profile: Profile,
     /// The refinement used, with all its parameters.
     pub refinement: RefinementParameters,
+    /// The parameters whose values were defaults of the calibration or the server.
+    pub defaults: Vec<DefaultUsed>,
     /// Persons, highest score first.
     pub persons: Vec<Person>,
     /// The number of persons in each zone, in the order of the calibration.

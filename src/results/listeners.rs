@@ -4,7 +4,7 @@
 use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
 use parking_lot::{Mutex, MutexGuard};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use super::{Cameras, StoredReport};
 use crate::{
@@ -48,6 +48,8 @@ pub struct Listeners {
     /// The permits, including those of dropped listeners that have not noticed yet.
     budget: SharedBudget,
     group: Mutex<Group>,
+    /// The number of times that cameras were removed.
+    removals: watch::Sender<u64>,
     metrics: Arc<Metrics>,
 }
 
@@ -65,6 +67,7 @@ impl Listeners {
         Self {
             budget: SharedBudget::new(most.get()),
             group: Mutex::default(),
+            removals: watch::Sender::default(),
             metrics,
         }
     }
@@ -105,6 +108,17 @@ impl Listeners {
             listeners: Arc::clone(self),
             _permit: permit,
         })
+    }
+
+    /// Returns a receiver that changes when a camera is removed from the store by this process.
+    #[must_use]
+    pub fn removals(&self) -> watch::Receiver<u64> {
+        self.removals.subscribe()
+    }
+
+    /// Reports that a camera was removed.
+    pub(super) fn note_removal(&self) {
+        self.removals.send_modify(|count| *count += 1);
     }
 
     /// Returns true if any listener would receive a report of this camera.

@@ -40,15 +40,28 @@ impl MemoryResults {
     pub fn store(&self, report: NewReport, picture: Option<NewPicture>) -> Arc<StoredReport> {
         // Published while the lock is held: listeners rely on the order.
         let mut kept = self.kept();
+        let before = kept.removed_cameras();
         let stored = kept.add(report, picture, Timestamp::now());
         self.metrics.results_stored.inc();
         self.listeners.tell(&stored);
+        self.note_removals(&kept, before);
         stored
     }
 
+    /// The reports that are not too old.
     fn kept(&self) -> MutexGuard<'_, Kept> {
         // No change can panic before it is complete.
-        self.kept.lock()
+        let mut kept = self.kept.lock();
+        let before = kept.removed_cameras();
+        kept.expire(Timestamp::now());
+        self.note_removals(&kept, before);
+        kept
+    }
+
+    fn note_removals(&self, kept: &Kept, before: u64) {
+        if kept.removed_cameras() > before {
+            self.listeners.note_removal();
+        }
     }
 }
 
@@ -64,6 +77,22 @@ impl ResultStore for MemoryResults {
 
     async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
         Ok(self.kept().latest_of_all())
+    }
+
+    async fn cameras(&self) -> Result<Vec<String>, Unreachable> {
+        Ok(self.kept().cameras())
+    }
+
+    async fn delete(&self, camera: &str) -> Result<bool, Unreachable> {
+        let is_deleted = self.kept().delete(camera);
+        if is_deleted {
+            self.listeners.note_removal();
+        }
+        Ok(is_deleted)
+    }
+
+    fn expire(&self) {
+        drop(self.kept());
     }
 
     async fn since(

@@ -122,6 +122,19 @@ impl ResultStore for RedisResults {
             .await
     }
 
+    async fn cameras(&self) -> Result<Vec<String>, Unreachable> {
+        self.ask(async |mut reader| reader.cameras().await).await
+    }
+
+    async fn delete(&self, camera: &str) -> Result<bool, Unreachable> {
+        let deleted = self.ask(async |mut reader| reader.delete(camera).await);
+        let is_deleted = deleted.await?;
+        if is_deleted {
+            self.shared.listeners.note_removal();
+        }
+        Ok(is_deleted)
+    }
+
     async fn since(
         &self,
         cameras: &Cameras,

@@ -1,6 +1,6 @@
 //! The interface of a result store.
 
-use std::{num::NonZeroUsize, sync::Arc};
+use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
 
@@ -30,6 +30,22 @@ pub trait ResultStore: Send + Sync {
     /// # Errors
     /// [`Unreachable`].
     async fn latest_of_all(&self) -> Result<Vec<Arc<StoredReport>>, Unreachable>;
+
+    /// The names of the cameras with a report.
+    ///
+    /// # Errors
+    /// [`Unreachable`].
+    async fn cameras(&self) -> Result<Vec<String>, Unreachable>;
+
+    /// Deletes all reports of a camera and its image. Returns false if it had none.
+    ///
+    /// # Errors
+    /// [`Unreachable`].
+    async fn delete(&self, camera: &str) -> Result<bool, Unreachable>;
+
+    /// Removes the reports that are too old from the memory of this process. A store elsewhere
+    /// does that itself.
+    fn expire(&self) {}
 
     /// The first reports after `after` that are still stored, oldest first, at most `most`.
     async fn since(
@@ -74,6 +90,8 @@ pub struct ResultLimits {
     pub max_reports: NonZeroUsize,
     /// Most bytes of all reports, evicted in the same order.
     pub max_bytes: usize,
+    /// Longest time for which a report is stored.
+    pub max_age: Duration,
     /// Most cameras with an image. The one that has been silent for longest loses its image first.
     pub max_pictures: NonZeroUsize,
     /// Most listeners at the same time.
@@ -81,7 +99,8 @@ pub struct ResultLimits {
 }
 
 impl Default for ResultLimits {
-    /// A hundred reports of each of a hundred cameras, and the latest report of many more.
+    /// A hundred reports of each of a hundred cameras, and the latest report of many more, for a
+    /// day.
     fn default() -> Self {
         let count = |number| NonZeroUsize::new(number).unwrap_or(NonZeroUsize::MIN);
         Self {
@@ -89,6 +108,7 @@ impl Default for ResultLimits {
             history_per_camera: count(100),
             max_reports: count(10_000),
             max_bytes: 64 << 20,
+            max_age: Duration::from_hours(24),
             max_pictures: count(64),
             max_listeners: count(256),
         }

@@ -27,7 +27,7 @@ settings! {
         /// `false` for replicas that only read.
         writable: bool = true => flag();
         /// `true` if `/metrics` shows the number of persons in each zone, with the names of its
-        /// calibration and of the zone as labels: 1000 zones at most.
+        /// camera and of the zone as labels: 1000 zones at most.
         zone_metrics: bool = false => flag();
         /// The most memory for the remap tables of cameras, in bytes. The least recently used go
         /// first.

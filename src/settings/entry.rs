@@ -14,8 +14,8 @@ use super::{SettingsError, form::Form};
 pub(super) struct Entry {
     /// The key with its table, such as `server.tls.certificate`.
     pub(super) key: &'static str,
-    /// The documentation, one line of the source after the other.
-    pub(super) help: &'static [&'static str],
+    /// The documentation.
+    pub(super) help: String,
     /// The values that are accepted, as a phrase.
     pub(super) kind: String,
     /// The default as TOML.
@@ -25,15 +25,14 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    pub(super) fn new<T>(
-        key: &'static str,
-        help: &'static [&'static str],
-        form: &Form<T>,
-        default: &T,
-    ) -> Self {
+    pub(super) fn new<T>(key: &'static str, help: &[&str], form: &Form<T>, default: &T) -> Self {
         Self {
             key,
-            help,
+            help: help
+                .iter()
+                .map(|line| line.trim())
+                .collect::<Vec<_>>()
+                .join(" "),
             kind: form.kind.clone(),
             default: (form.write)(default),
             example: form.example,

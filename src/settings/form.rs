@@ -10,7 +10,7 @@ pub(super) use numbers::{
     zero_is_none,
 };
 pub(super) use texts::{
-    address, choice, given_path, list, names, optional, parsed, path, secret, text,
+    address, choice, given_path, list, names, optional, optional_text, parsed, path, secret, text,
 };
 pub(super) use written::{Refusal, Written};
 

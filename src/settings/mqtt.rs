@@ -1,18 +1,21 @@
 //! The MQTT broker; enabled by its URL.
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
 use secrecy::{ExposeSecret, SecretString};
+use url::Url;
 
 use super::{
     SettingsError,
     declare::settings,
-    form::{Form, count, optional, path, secret, text},
+    form::{Form, Refusal, count, optional, parsed, path, seconds, secret, text, zero_is_none},
 };
-use crate::mqtt::{Broker, BrokerError, MqttOptions};
+use crate::mqtt::{Broker, BrokerError, Discovery, MqttOptions};
 
 /// Most bytes of a prefix: a topic has 65,535.
 const MAX_PREFIX_BYTES: usize = 256;
+/// A week, seconds.
+const MAX_EXPIRY: u64 = 7 * 86_400;
 
 settings! {
     /// The MQTT broker as it is written.
@@ -33,6 +36,20 @@ settings! {
         /// The most cameras that are published: the first that send frames. Each is a device in
         /// Home Assistant.
         max_cameras: NonZeroUsize = NonZeroUsize::new(100).unwrap_or(NonZeroUsize::MIN) => count();
+        /// The time without a person after which occupancy is off: single frames that miss a person
+        /// change nothing. 0: each frame counts.
+        hold as "hold_seconds": Duration = Duration::from_secs(5) => seconds(0..=3600);
+        /// The time without a report after which a camera is unavailable. It must be longer than
+        /// the interval of its frames. Retained topics of removed cameras are withdrawn as long
+        /// after a connection. 0: cameras stay available.
+        expire_after as "expire_after_seconds": Option<Duration> = Some(Duration::from_mins(10))
+            => zero_is_none(seconds(0..=MAX_EXPIRY));
+        /// The address of the server's web page, which Home Assistant shows with each camera.
+        /// Empty: none.
+        configuration_url: Option<Url> = None => optional(web_address());
+        /// The address at which users of this installation get help, which Home Assistant shows
+        /// with its logs. Empty: none.
+        support_url: Option<Url> = None => optional(web_address());
     }
 }
 
@@ -52,8 +69,28 @@ impl MqttKeys {
             topic_prefix: self.topic_prefix,
             discovery_prefix: self.discovery_prefix,
             max_cameras: self.max_cameras,
+            hold: self.hold,
+            discovery: Discovery {
+                expire_after: self.expire_after,
+                configuration_url: self.configuration_url,
+                support_url: self.support_url,
+            },
         }))
     }
+}
+
+fn web_address() -> Form<Url> {
+    parsed(
+        "URL",
+        |text| {
+            let url = text.parse::<Url>().ok();
+            let url = url.filter(|url| matches!(url.scheme(), "http" | "https"));
+            url.ok_or_else(|| {
+                Refusal::Shown("give an address such as http://lookdown.local:8080".to_owned())
+            })
+        },
+        Url::to_string,
+    )
 }
 
 /// The beginning of topics (MQTT 3.1.1, section 4.7): no wildcard, no empty level, and none of the

@@ -1,15 +1,18 @@
 //! The result store: the memory of this process, or a Redis that several servers share.
 
-use std::{collections::BTreeSet, ops::RangeInclusive, time::Duration};
+use std::{collections::BTreeSet, ops::RangeInclusive};
 
 use secrecy::{ExposeSecret, SecretString};
 
 use super::{
     SettingsError,
     declare::settings,
-    form::{Form, MAX_BYTES, count, list, seconds, secret, text, whole},
+    form::{Form, MAX_BYTES, choice, count, flag, list, seconds, secret, text, whole},
 };
-use crate::results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
+use crate::{
+    imaging::annotate::Concealment,
+    results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits},
+};
 
 /// 8 MiB: enough for any single report.
 const MIN_BYTES: u64 = 8 << 20;
@@ -23,6 +26,10 @@ pub struct ResultSettings {
     pub redis: Option<RedisOptions>,
     /// The cameras whose latest image is kept as well.
     pub pictures_of: PicturesOf,
+    /// The concealment of persons in these images.
+    pub conceal_pictures: Option<Concealment>,
+    /// True if the persons of each camera are a metric.
+    pub camera_metrics: bool,
     /// The limits of the store.
     pub limits: ResultLimits,
 }
@@ -37,11 +44,19 @@ settings! {
         url: Option<SecretString> = None => secret("URL of a Redis");
         /// The prefix of all keys in that Redis. Servers with the same prefix share their reports.
         key_prefix: String = "lookdown".to_owned() => key_prefix();
-        /// The longest time that a report is kept in that Redis.
-        max_age as "max_age_seconds": Duration = Duration::from_hours(24) => seconds(AGES);
         /// The cameras whose latest image is kept for `/results/{camera}/latest.jpg`, by name;
         /// `"*"` is all. Images show persons. Each takes 4 MiB at most.
         pictures: PicturesOf = PicturesOf::default() => pictures();
+        /// The concealment of the persons of the report in these images before they are stored:
+        /// `none`, `blur` or `silhouette`.
+        conceal_pictures: Option<Concealment> = None => choice(&[
+            ("none", None),
+            ("blur", Some(Concealment::Blur)),
+            ("silhouette", Some(Concealment::Silhouette)),
+        ]);
+        /// `true` if `/metrics` shows the number of persons of each camera and the time of its
+        /// latest report, with its name as a label: 1000 cameras at most.
+        camera_metrics: bool = false => flag();
     }
 }
 
@@ -55,6 +70,9 @@ settings! {
         max_reports => count();
         /// The most bytes of all reports. The oldest that is not its camera's latest goes first.
         max_bytes => whole(MIN_BYTES..=MAX_BYTES);
+        /// The longest time that a report and its image are stored. With a Redis, all its servers
+        /// need the same value.
+        max_age as "max_age_seconds" => seconds(AGES);
         /// The most cameras whose latest image is kept. The one without reports for longest goes
         /// first.
         max_pictures => count();
@@ -77,9 +95,10 @@ impl ResultKeys {
             redis: address.map(|address| RedisOptions {
                 address,
                 key_prefix: self.key_prefix,
-                max_age: self.max_age,
             }),
             pictures_of: self.pictures,
+            conceal_pictures: self.conceal_pictures,
+            camera_metrics: self.camera_metrics,
             limits,
         })
     }

@@ -17,7 +17,7 @@ use super::{
 pub(super) struct Values {
     /// Those of the settings file, by their keys.
     file: BTreeMap<String, Value>,
-    /// Those of the environment, by their keys.
+    /// Those of the environment and the command line, by their keys.
     variables: BTreeMap<String, String>,
 }
 
@@ -38,6 +38,21 @@ impl Values {
             }
         }
         Ok(values)
+    }
+
+    /// Replaces the values of these keys, each as in a variable.
+    pub(super) fn override_with(
+        &mut self,
+        overrides: &[(String, String)],
+        entries: &[Entry],
+    ) -> Result<(), SettingsError> {
+        for (key, value) in overrides {
+            if !entries.iter().any(|entry| entry.key == key) {
+                return Err(unknown(&format!("--set {key}"), key, entries));
+            }
+            self.variables.insert(key.clone(), value.clone());
+        }
+        Ok(())
     }
 
     fn add_table(

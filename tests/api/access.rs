@@ -19,7 +19,7 @@ const ADMINISTRATOR: &str = "lookdown_administrator";
 const BOTH: &str = "lookdown_both";
 
 /// All routes that need a scope.
-const GUARDED: [(&str, &str, &str); 25] = [
+const GUARDED: [(&str, &str, &str); 26] = [
     ("POST", "/detect?calibration=lobby&profile=fast", "detect"),
     ("POST", "/v1/vision/detection", "detect"),
     ("POST", "/v1/vision/custom/lobby", "detect"),
@@ -43,6 +43,7 @@ const GUARDED: [(&str, &str, &str); 25] = [
     ("POST", "/v2/repository/index", "read"),
     ("PUT", "/calibrations/lobby", "admin"),
     ("DELETE", "/calibrations/missing", "admin"),
+    ("DELETE", "/results/missing", "admin"),
     ("POST", "/v2/repository/models/eager/load", "admin"),
     ("POST", "/v2/repository/models/eager/unload", "admin"),
 ];

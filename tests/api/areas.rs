@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use lookdown::results::ResultStore;
 use serde_json::{Value, json};
 
 use crate::service::{Bounds, Service, frame};
@@ -99,7 +100,7 @@ async fn zone_metrics_are_optional_and_follow_the_zones() {
         let row = |zone: &Value| {
             let name = zone["name"].as_str().unwrap();
             format!(
-                "lookdown_zone_persons{{calibration=\"lobby\",zone=\"{name}\"}} {}",
+                "lookdown_zone_persons{{camera=\"lobby\",zone=\"{name}\"}} {}",
                 zone["persons"]
             )
         };
@@ -116,7 +117,10 @@ async fn zone_metrics_are_optional_and_follow_the_zones() {
         assert_eq!(shown().await, expected);
         let sent = lobby(&json!([zones()[0]]), &json!([]));
         service.put("/calibrations/lobby", &sent.to_string()).await;
+        service.post_raw(query, frame()).await;
         assert_eq!(shown().await.len(), usize::from(zone_metrics));
+        service.results.delete("lobby").await.unwrap();
+        assert!(shown().await.is_empty());
     }
 }
 

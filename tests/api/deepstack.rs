@@ -99,17 +99,17 @@ async fn deepstack_detection_returns_the_persons_of_detect() {
 }
 
 #[tokio::test]
-async fn reports_are_stored_with_and_without_a_calibration() {
+async fn reports_are_stored_under_the_name_of_their_camera() {
     let service = Service::start();
-    for path in [ANYWHERE, LOBBY] {
+    let named = format!("{ANYWHERE}?camera=hall");
+    for path in [ANYWHERE, &named, LOBBY] {
         let answer = post(&service, path, &[("image", &frame())]).await;
         assert_eq!(answer.status, 200, "{}", answer.text());
     }
     let cameras = service.get("/results").await.json();
     let cameras: Vec<_> = cameras.as_array().unwrap().iter().collect();
     let names: Vec<_> = cameras.iter().map(|row| &row["camera"]).collect();
-    assert!(names.contains(&&Value::from("assumed")), "{names:?}");
-    assert!(names.contains(&&Value::from("lobby")), "{names:?}");
+    assert_eq!(names, [&Value::from("hall"), &Value::from("lobby")]);
     let metrics = service.get("/metrics").await.text();
     assert!(
         metrics.contains("lookdown_results_stored_total 2"),

@@ -6,7 +6,7 @@ use bytes::Bytes;
 use lookdown::{
     imaging::{
         Frame,
-        annotate::encode_jpeg,
+        annotate::{Concealment, encode_jpeg},
         decode::{DecodeLimits, decode},
     },
     results::{NewPicture, NewReport, PicturesOf, ResultStore},
@@ -230,4 +230,19 @@ async fn a_large_frame_is_stored_at_a_smaller_size() {
         let kept = picture(&service.get(&format!("{PATH}{query}")).await);
         assert_eq!((kept.width(), kept.height()), (width, height));
     }
+}
+
+#[tokio::test]
+async fn persons_are_concealed_in_stored_images_on_request() {
+    let service = Service::within(&Bounds {
+        pictures_of: PicturesOf::All,
+        conceal_pictures: Some(Concealment::Silhouette),
+        ..Bounds::default()
+    });
+    service.detect_in("hall").await;
+    let stored = service.results.picture("hall").await.unwrap().unwrap();
+    let frame = decode(&stored.picture.frame, &DecodeLimits::default());
+    assert!(!is_plain(&frame.unwrap().frame));
+    let shown = service.get(&format!("{PATH}?draw=none")).await;
+    assert!(!is_plain(&picture(&shown)));
 }

@@ -8,6 +8,7 @@ mod calibrations;
 mod complexity;
 mod connections;
 mod deepstack;
+mod defaults;
 mod detect;
 mod detector;
 mod drain_body;

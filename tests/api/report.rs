@@ -77,6 +77,7 @@ fn report() -> DetectionReport {
             score_threshold: 0.3,
             max_detections: 1000,
         },
+        defaults: Vec::new(),
         persons: vec![person(), unknown_place],
         zones: vec![ZoneCount {
             name: "entrance".to_owned(),

@@ -60,7 +60,7 @@ async fn the_latest_report_has_the_bytes_of_the_response() {
 async fn the_camera_name_defaults_to_the_calibration_id() {
     let service = Service::start();
     for query in [
-        "profile=fast",
+        "profile=fast&store=true",
         "profile=fast&calibration=lobby",
         "profile=fast&camera=hall",
     ] {
@@ -245,5 +245,31 @@ async fn the_limits_bound_the_stored_reports() {
             metrics.lines().any(|told| told == line),
             "{line}: {metrics}"
         );
+    }
+}
+
+#[tokio::test]
+async fn deleted_results_are_gone_until_the_next_frame() {
+    let service = Service::within(&Bounds {
+        camera_metrics: true,
+        ..Bounds::default()
+    });
+    let query = "calibration=lobby&profile=fast&camera=hall";
+    let delete = async |path| service.ask("DELETE", path, &[]).await;
+    assert_eq!(delete("/results/hall").await.status, 404);
+    let shown = async || {
+        let metrics = service.get("/metrics").await.text();
+        let row = |name| metrics.contains(&format!("lookdown_camera_{name}{{camera=\"hall\"}} "));
+        [row("persons"), row("last_report_timestamp_seconds")]
+    };
+    for _ in 0..2 {
+        let sent = service.post_raw(query, frame()).await.json();
+        let latest = service.get("/results/hall/latest").await;
+        assert_eq!(latest.json()["request_id"], sent["request_id"]);
+        assert_eq!(shown().await, [true, true]);
+        assert_eq!(delete("/results/hall").await.status, 204);
+        assert_eq!(service.get("/results/hall/latest").await.status, 404);
+        assert_eq!(service.get("/results").await.json(), json!([]));
+        assert_eq!(shown().await, [false, false]);
     }
 }

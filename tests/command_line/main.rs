@@ -6,13 +6,14 @@ mod evaluate;
 mod evaluation;
 mod health;
 mod keys;
+mod models;
 mod samples;
 mod serve;
 mod shell;
 mod systemd;
 mod telemetry;
 
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 pub(crate) fn lookdown(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookdown"));
@@ -69,6 +70,42 @@ fn unknown_choices_are_refused_with_the_possible_values() {
     ] {
         assert_lists_values(&lookdown(&arguments, &[]), "best", possible);
     }
+}
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lookdown"))
+        .arg("openapi")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The document is larger than the buffer of a pipe.
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    assert!(output.stderr.is_empty(), "{output:?}");
+}
+
+#[test]
+fn flags_override_settings_of_the_environment() {
+    let environment = [("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:1")];
+    let refused = |flags: &[&str], parts: &[&str]| {
+        let arguments = [&["serve", "--check"], flags].concat();
+        assert_fails_with(&lookdown(&arguments, &environment), parts);
+    };
+    refused(
+        &["--listen", "nowhere"],
+        &["server.listen", "nowhere", "127.0.0.1:8080"],
+    );
+    refused(
+        &["--set", "limits.max_image_side=0"],
+        &["limits.max_image_side"],
+    );
+    refused(
+        &["--set", "server.listn=127.0.0.1:0"],
+        &["--set server.listn", "`listen`"],
+    );
 }
 
 #[test]

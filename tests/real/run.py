@@ -1,6 +1,6 @@
 """Runs the tests against real software: `run.py [PART...]`, where `PART` is a `test_PART.py` in this folder.
 
-Each test starts the release binary and the other software, uses them like a user, and stops them. Exits with
+Each test starts the release binary, or the one that `LOOKDOWN_BINARY` names, and the other software, uses them like a user, and stops them. Exits with
 1 if a test fails. All parts are run by default.
 """
 

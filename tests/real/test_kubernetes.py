@@ -9,7 +9,7 @@ from harness.places import LOOKDOWN, ROOT
 from harness.processes import free_ports
 from kubernetes.tools import manifests, only, read_yaml
 
-OVERLAYS = ("overlays/cpu", "overlays/gpu", "overlays/ha")
+OVERLAYS = ("overlays/cpu", "overlays/gpu", "overlays/ha", "overlays/keda", "examples/gateway", "examples/ingress")
 
 
 class Manifests(unittest.TestCase):
@@ -83,6 +83,43 @@ class Manifests(unittest.TestCase):
         metrics = only(self.all["overlays/ha"], "HorizontalPodAutoscaler")["spec"]["metrics"]
         asked = [metric["pods"]["metric"]["name"] for metric in metrics if metric["type"] == "Pods"]
         self.assertEqual(asked, [rule["name"]["as"]])
+
+    def test_only_one_autoscaler_scales_the_deployment(self):
+        for folder, documents in self.all.items():
+            kinds = ("HorizontalPodAutoscaler", "ScaledObject")
+            found = [document["kind"] for document in documents if document["kind"] in kinds]
+            self.assertEqual(len(found), 0 if folder in ("base", "overlays/gpu") else 1, f"{folder}: {found}")
+        scaled = only(self.all["overlays/keda"], "ScaledObject")["spec"]
+        autoscaler = only(self.all["overlays/ha"], "HorizontalPodAutoscaler")["spec"]
+        self.assertEqual(scaled["scaleTargetRef"]["name"], autoscaler["scaleTargetRef"]["name"])
+        limits = (scaled["minReplicaCount"], scaled["maxReplicaCount"])
+        self.assertEqual(limits, (autoscaler["minReplicas"], autoscaler["maxReplicas"]))
+
+    def test_routes_lead_to_the_service(self):
+        service = only(self.all["base"], "Service")
+        ports = {port["name"]: port["port"] for port in service["spec"]["ports"]}
+        (rule,) = only(self.all["examples/ingress"], "Ingress")["spec"]["rules"]
+        (path,) = rule["http"]["paths"]
+        name = service["metadata"]["name"]
+        self.assertEqual(path["backend"]["service"], {"name": name, "port": {"name": "http"}})
+        (rule,) = only(self.all["examples/gateway"], "HTTPRoute")["spec"]["rules"]
+        self.assertEqual(rule["backendRefs"], [{"name": name, "port": ports["http"]}])
+        for folder in ("examples/ingress", "examples/gateway"):
+            policies = [document for document in self.all[folder] if document["kind"] == "NetworkPolicy"]
+            self.assertEqual(len(policies), 2, folder)
+
+    def test_kserve_uses_the_runtime(self):
+        documents = manifests("examples/kserve")
+        runtime, service = only(documents, "ServingRuntime"), only(documents, "InferenceService")
+        model = service["spec"]["predictor"]["model"]
+        self.assertEqual(model["runtime"], runtime["metadata"]["name"])
+        formats = [supported["name"] for supported in runtime["spec"]["supportedModelFormats"]]
+        self.assertIn(model["modelFormat"]["name"], formats)
+        self.assertIn(model["protocolVersion"], runtime["spec"]["protocolVersions"])
+        (container,) = runtime["spec"]["containers"]
+        settings = {variable["name"]: variable["value"] for variable in container["env"]}
+        (port,) = container["ports"]
+        self.assertEqual(settings["LOOKDOWN__SERVER__LISTEN"], f"0.0.0.0:{port['containerPort']}")
 
     @staticmethod
     def container(documents: list[dict]) -> dict:

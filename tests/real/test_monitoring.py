@@ -11,10 +11,11 @@ from pathlib import Path
 
 from harness.places import LOOKDOWN, ROOT, SAMPLES, model
 from harness.processes import free_ports, running
-from kubernetes.tools import manifests, only, read_yaml, run
+from kubernetes.tools import PYTHON, manifests, only, read_yaml, run
 from waiting import wait_until
 
 MONITORING = ROOT / "k8s" / "monitoring"
+DASHBOARDS = ("dashboard.json", "occupancy.json")
 UNIT_TESTS = Path(__file__).with_name("kubernetes") / "alerts_test.yaml"
 SELECTOR = re.compile(r"\b(lookdown_\w+|process_\w+)(?:\{([^}]*)\})?")
 MATCHER = re.compile(r'(\w+)="([^"]+)"')
@@ -28,8 +29,9 @@ class Monitoring(unittest.TestCase):
         cls.documents = manifests("monitoring")
         cls.alerts = only(cls.documents, "PrometheusRule")["spec"]
         cls.rules = [rule for group in cls.alerts["groups"] for rule in group["rules"]]
-        dashboard = json.loads((MONITORING / "dashboard.json").read_text(encoding="utf-8"))
-        cls.panels = [target["expr"] for panel in dashboard["panels"] for target in panel["targets"]]
+        dashboards = [json.loads((MONITORING / name).read_text(encoding="utf-8")) for name in DASHBOARDS]
+        panels = [panel for dashboard in dashboards for panel in dashboard["panels"]]
+        cls.panels = [target["expr"] for panel in panels for target in panel["targets"]]
         (cls.adapter,) = read_yaml(MONITORING / "prometheus-adapter.yaml")["rules"]
 
     def setUp(self):
@@ -48,8 +50,17 @@ class Monitoring(unittest.TestCase):
     def test_every_alert_has_a_runbook(self):
         page = (ROOT / "docs" / "observability.md").read_text(encoding="utf-8")
         anchors = {line.strip("# ").lower() for line in page.splitlines() if line.startswith("### Lookdown")}
-        runbooks = {rule["annotations"]["runbook"] for rule in self.rules}
+        runbooks = {rule["annotations"]["runbook_url"] for rule in self.rules}
         self.assertEqual(runbooks, {f"docs/observability.md#{anchor}" for anchor in anchors})
+
+    def test_runbooks_have_the_address_of_the_annotation(self):
+        folder = self.folder / "monitoring"
+        shutil.copytree(MONITORING, folder)
+        alerts, address = folder / "alerts.yaml", "https://help.example/lookdown.html"
+        given = alerts.read_text(encoding="utf-8").replace("runbooks: docs/observability.md", f"runbooks: {address}")
+        alerts.write_text(given, encoding="utf-8")
+        shown = run([PYTHON / "kubectl", "kustomize", folder])
+        self.assertEqual(shown.count(f"runbook_url: {address}#lookdown"), len(self.rules))
 
     def test_prometheus_accepts_the_dashboard(self):
         self.assertTrue(self.panels)
@@ -117,14 +128,26 @@ class Monitoring(unittest.TestCase):
             "SERVER__TLS__CERTIFICATE": str(certificate),
             "SERVER__TLS__PRIVATE_KEY": str(key),
             "SHUTDOWN__GRACE_MILLIS": "0",
+            "CALIBRATIONS__PATH": str(self.calibrations()),
+            "CALIBRATIONS__ZONE_METRICS": "true",
+            "RESULTS__CAMERA_METRICS": "true",
         }
         environment = {f"LOOKDOWN__{name}": value for name, value in settings.items()}
         with running("monitored", [str(LOOKDOWN), "serve"], metrics_port, "/readyz", environment) as server:
             context = ssl.create_default_context(cafile=certificate)
             connection = http.client.HTTPSConnection("localhost", port, timeout=60, context=context)
-            connection.request("POST", "/detect?profile=fast", (SAMPLES / "office.jpg").read_bytes())
+            connection.request("POST", "/detect?profile=fast&calibration=office", (SAMPLES / "office.jpg").read_bytes())
             self.assertEqual(connection.getresponse().status, 200)
             return server.get("/metrics").decode()
+
+    def calibrations(self) -> Path:
+        """A folder with the calibration of the sample, which has a zone."""
+        folder = self.folder / "calibrations"
+        folder.mkdir()
+        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
+        zones = [{"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}]
+        (folder / "office.json").write_text(json.dumps(calibration | {"zones": zones}), encoding="utf-8")
+        return folder
 
     def scrape_without_the_inference_server(self) -> str:
         """The metrics of a server whose inference server does not answer."""

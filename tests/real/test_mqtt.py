@@ -20,12 +20,16 @@ OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
 STATUS = "lookdown/status"
 PERSONS = "lookdown/cameras/office/persons"
+OCCUPANCY = "lookdown/cameras/office/occupancy"
+AVAILABILITY = "lookdown/cameras/office/availability"
 ZONES = "lookdown/cameras/office/zones"
 REPORT = "lookdown/cameras/office/report"
 CONFIGS = {
     "homeassistant/binary_sensor/lookdown_office_occupancy/config",
     "homeassistant/sensor/lookdown_office_persons/config",
+    "homeassistant/binary_sensor/lookdown_office_zone_left_occupancy/config",
     "homeassistant/sensor/lookdown_office_zone_left/config",
+    "homeassistant/binary_sensor/lookdown_office_zone_empty_occupancy/config",
     "homeassistant/sensor/lookdown_office_zone_empty/config",
 }
 AREAS = [
@@ -68,12 +72,16 @@ class Mqtt(unittest.TestCase):
             for zone in report["zones"]:
                 self.assertEqual(kept[f"{ZONES}/{zone['name']}"], str(zone["persons"]))
             self.assertEqual(kept[f"{ZONES}/empty"], "0")
+            self.assertEqual(kept[f"{ZONES}/empty/occupancy"], "OFF")
+            self.assertEqual((kept[OCCUPANCY], kept[AVAILABILITY]), ("ON", "online"))
             configs = {topic: json.loads(kept[topic]) for topic in kept if topic.startswith("homeassistant/")}
             self.assertEqual(set(configs), CONFIGS)
-            self.assertEqual(len({config["unique_id"] for config in configs.values()}), len(CONFIGS))
+            ids = {topic.split("/")[1] + config["unique_id"] for topic, config in configs.items()}
+            self.assertEqual(len(ids), len(CONFIGS))
             for config in configs.values():
                 self.assertIn(config["state_topic"], kept)
-                self.assertEqual(config["availability_topic"], STATUS)
+                self.assertEqual([it["topic"] for it in config["availability"]], [STATUS, AVAILABILITY])
+                self.assertEqual(config["availability_mode"], "all")
                 self.assertEqual(config["device"]["identifiers"], ["lookdown_office"])
             self.assertEqual(metric(server, "mqtt_connected"), 1)
             self.assertEqual(metric(server, "mqtt_reports_sent_total"), 1)
@@ -139,6 +147,25 @@ class Mqtt(unittest.TestCase):
                 os.kill(server.pid, signal.SIGKILL)
                 wait_until(lambda: heard.of(STATUS)[-2:] == ["offline", "online"], "the status is corrected")
             self.assertEqual(self.broker.retained()[STATUS], "online")
+
+    def test_topics_of_removed_cameras_are_withdrawn(self):
+        old = "lookdown/cameras/old"
+        kept = [f"{old}/persons", f"{old}/zones/till", "homeassistant/sensor/lookdown_old_zone_till/config"]
+        for topic in kept:
+            self.broker.client("pub", "-r", "-m", "3", "-t", topic)
+        with self.lookdown(MQTT__EXPIRE_AFTER_SECONDS="5") as server:
+            wait_until(lambda: self.broker.retained().get(f"{old}/availability") == "offline", "it is unavailable")
+            server.post(DETECT, OFFICE)
+            wait_until(lambda: not [it for it in self.broker.retained() if "old" in it], "the topics are withdrawn")
+            self.assertIn(PERSONS, self.broker.retained())
+            wait_until(lambda: self.broker.retained()[AVAILABILITY] == "offline", "the silent camera is unavailable")
+
+    def test_deleted_results_are_withdrawn(self):
+        with self.lookdown() as server:
+            server.post(DETECT, OFFICE)
+            wait_until(lambda: set(self.broker.retained()) > CONFIGS, "discovery is published")
+            self.assertEqual(server.delete("/results/office"), 204)
+            wait_until(lambda: not [it for it in self.broker.retained() if "office" in it], "the topics are withdrawn")
 
     def test_names_are_encoded_and_limited_in_number(self):
         with self.lookdown(MQTT__MAX_CAMERAS="3") as server:

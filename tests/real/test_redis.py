@@ -112,6 +112,10 @@ class Shared(unittest.TestCase):
         wait_until(lambda: get(server, path).body == report, "the report is the latest")
         return get(server, path)
 
+    def usage(self) -> list[float]:
+        """The numbers of stored cameras, reports and bytes."""
+        return [metric(self.other, f"results_{name}") for name in ("cameras", "reports", "bytes")]
+
     def test_reports_and_ids_are_identical_on_every_server(self) -> None:
         """Latest, history, list and 304."""
         sent = [detect(server, "atrium").body for server in (self.one, self.other, self.one)]
@@ -142,6 +146,20 @@ class Shared(unittest.TestCase):
 
     def append_latest(self, answers: list[Answer], path: str, tag: str) -> None:
         answers.append(get(self.other, path, If_None_Match=tag))
+
+    def test_deleted_cameras_are_gone_on_every_server(self) -> None:
+        """Reports, and the total of their bytes."""
+        before = self.usage()
+        for _ in range(3):
+            sent = detect(self.one, "attic").body
+        self.latest(self.other, "attic", sent)
+        self.assertEqual(ask(self.other.address, "DELETE", "/results/attic").status, 204)
+        for server in (self.one, self.other):
+            self.assertEqual(get(server, "/results/attic/latest").status, 404)
+        self.assertEqual(self.usage(), before)
+        self.assertEqual(ask(self.one.address, "DELETE", "/results/attic").status, 404)
+        self.latest(self.other, "attic", detect(self.one, "attic").body)
+        self.assertEqual(ask(self.one.address, "DELETE", "/results/attic").status, 204)
 
     def test_long_polls_are_answered_by_reports_of_other_servers(self) -> None:
         """Long polls, also for the first report of a camera."""

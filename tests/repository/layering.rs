@@ -9,7 +9,7 @@ use source_scan::{absolute, code, names_crate, sources, used_paths};
 
 /// Every module, and the modules of this crate it may use. A row for a part of a module replaces
 /// the row of the module for the files of that part.
-const MAY_USE: [(&str, &[&str]); 35] = [
+const MAY_USE: [(&str, &[&str]); 36] = [
     ("plain_name", &[]),
     ("quoted", &[]),
     ("watched_file", &[]),
@@ -31,10 +31,15 @@ const MAY_USE: [(&str, &[&str]); 35] = [
         &["geometry", "plain_name", "quoted", "revision", "warning"],
     ),
     (
+        "parameters",
+        &["calibration", "detection", "fairness", "geometry", "quoted"],
+    ),
+    (
         "calibration_store",
         &[
             "calibration",
             "metrics",
+            "parameters",
             "plain_name",
             "quoted",
             "revision",
@@ -57,7 +62,16 @@ const MAY_USE: [(&str, &[&str]); 35] = [
     ("mqtt", &["fairness", "metrics", "results", "tls"]),
     (
         "settings",
-        &["access", "inference", "mqtt", "results", "server", "tls"],
+        &[
+            "access",
+            "imaging",
+            "inference",
+            "mqtt",
+            "parameters",
+            "results",
+            "server",
+            "tls",
+        ],
     ),
     ("telemetry", &["settings"]),
     ("probe", &["settings"]),
@@ -72,6 +86,7 @@ const MAY_USE: [(&str, &[&str]); 35] = [
             "calibration_store",
             "inference",
             "metrics",
+            "parameters",
             "quoted",
             "revision",
             "warning",
@@ -218,7 +233,7 @@ const MAY_USE: [(&str, &[&str]); 35] = [
 const WITH_INDEPENDENT_PARTS: [&str; 2] = ["api::routes", "api::protocols"];
 
 /// Crates for external systems, and the only modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 29] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 31] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),

@@ -143,7 +143,7 @@ fn choices_list_their_names() {
     };
     let formats = ["json", "image", "coco", "cvat", "yolo", "voc", "geojson"];
     assert_eq!(schema("format")["enum"], serde_json::json!(formats));
-    let layers = "boxes|oriented|scores|zones|views|timestamp";
+    let layers = "blur|silhouette|boxes|oriented|scores|zones|views|timestamp";
     let pattern = format!("^(none|({layers})(,({layers}))*)$");
     assert_eq!(schema("draw")["pattern"], pattern);
 }

@@ -1,6 +1,6 @@
 //! A process that is killed at any moment neither loses nor invents counts.
 
-#[expect(dead_code, reason = "shared with the other tests")]
+#[allow(dead_code, reason = "shared with the other tests")]
 mod events;
 
 use std::{

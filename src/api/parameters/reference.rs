@@ -58,6 +58,7 @@ fn interfaces(spec: &ParameterSpec) -> String {
         (Interface::FrameModel, "`/v2` frames"),
         (Interface::Detector, "`/v2` detectors"),
         (Interface::CommandLine, flag.as_str()),
+        (Interface::Defaults, "[defaults](configuration.md#detect)"),
     ];
     let offering = interfaces
         .into_iter()

@@ -89,7 +89,7 @@ async fn answer(
 ) -> Result<Json<DeepStackAnswer>, Problem> {
     let (limit, arrived) = (sent.upload.deadline, sent.upload.arrived);
     trace.stage("upload", limit.began().into_std(), arrived);
-    let job = sent.job(calibration.as_ref().map(CalibrationId::as_str))?;
+    let job = sent.job(state, calibration.as_ref().map(CalibrationId::as_str))?;
     let written = run_detection(state, trace, limit, job, |found| {
         Ok(DeepStackAnswer::from(found.report))
     });

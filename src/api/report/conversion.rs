@@ -1,13 +1,13 @@
 //! Converts the report of the pipeline to the units and decimals of the API.
 
 use super::{
-    Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportFloor, ReportImage,
-    ReportModel, ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings, ReportViews,
-    ReportWarning, ReportZone,
+    Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportDefault, ReportFloor,
+    ReportImage, ReportModel, ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings,
+    ReportViews, ReportWarning, ReportZone,
 };
 use crate::{
     imaging::lens_circle::LensCircle,
-    pipeline::{self, DetectionReport, ModelUsed},
+    pipeline::{self, DefaultUsed, DetectionReport, ModelUsed},
     rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
     warning::Warning,
 };
@@ -40,6 +40,7 @@ impl From<&DetectionReport> for Report {
                 sigma: refinement.sigma,
                 max_detections: refinement.max_detections,
             },
+            defaults: report.defaults.iter().map(ReportDefault::from).collect(),
             views: ReportViews {
                 inferred: report.views.inferred,
                 unchanged: report.views.unchanged,
@@ -64,6 +65,16 @@ impl From<LensCircle> for ReportCircle {
             cx: pixels(circle.cx + 0.5),
             cy: pixels(circle.cy + 0.5),
             radius: pixels(circle.radius),
+        }
+    }
+}
+
+impl From<&DefaultUsed> for ReportDefault {
+    fn from(used: &DefaultUsed) -> Self {
+        Self {
+            name: used.name,
+            value: used.value.clone(),
+            source: used.source.name(),
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::{
     api::{
         ApiState,
         answer::AnswerOptions,
+        detect_parameters::detect_parameters,
         http::{problem::Problem, query::pairs},
         openapi::{DetectForm, DetectQuery, RawBytes},
         report::Report,
@@ -18,7 +19,7 @@ use crate::{
         run_detection::{DetectionOutcome, run_detection},
         upload::Upload,
     },
-    pipeline::{DetectJob, DetectParameters},
+    pipeline::DetectJob,
     telemetry::RequestTrace,
 };
 
@@ -64,7 +65,7 @@ pub(in crate::api) async fn detect_persons(
 ) -> Result<impl IntoResponse, Problem> {
     let deadline = upload.deadline;
     trace.stage("upload", deadline.began().into_std(), upload.arrived);
-    let (job, answer) = job(upload)?;
+    let (job, answer) = job(&state, upload)?;
     let write = move |found: DetectionOutcome<'_>| answer.content(found.detected, found.json);
     let (report, content) = run_detection(&state, &trace, deadline, job, write).await?;
     let media_type = [(CONTENT_TYPE, HeaderValue::from_static(content.media_type))];
@@ -75,10 +76,10 @@ pub(in crate::api) async fn detect_persons(
     ))
 }
 
-fn job(mut upload: Upload) -> Result<(DetectJob, AnswerOptions), Problem> {
+fn job(state: &ApiState, mut upload: Upload) -> Result<(DetectJob, AnswerOptions), Problem> {
     let parameters = &mut upload.parameters;
     let answer = AnswerOptions::take_from(parameters, &upload.headers, upload.file_name.take())?;
-    let parameters = DetectParameters::parse(pairs(parameters))?;
+    let parameters = detect_parameters(state, pairs(parameters).collect(), &[])?;
     let mut job = upload.job(parameters)?;
     job.ticket.drawn_width = answer.drawn_width();
     Ok((job, answer))

@@ -12,7 +12,6 @@ use utoipa::ToSchema;
 
 use crate::{
     api::{ApiState, http::problem::Problem, require_scope::RequireRead},
-    calibration::CalibrationId,
     calibration_store::CalibrationsHealth,
     metrics::gauge_value,
 };
@@ -150,7 +149,7 @@ pub(in crate::api) async fn metrics(
     State(state): State<ApiState>,
 ) -> Result<impl IntoResponse, Problem> {
     read_gauges(&state).await;
-    forget_zones(&state);
+    forget_cameras(&state).await;
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
@@ -176,15 +175,10 @@ async fn read_gauges(state: &ApiState) {
     }
 }
 
-/// Removes the metrics of zones that no calibration has any longer. A frame that used the calibration
-/// before the change may set them later than the change, so the scrape does it.
-fn forget_zones(state: &ApiState) {
-    state.metrics.retain_zones(|calibration, zone| {
-        let entry = calibration.parse::<CalibrationId>().ok();
-        let entry = entry.and_then(|id| state.calibrations.entry(&id));
-        entry.is_some_and(|entry| {
-            let mut zones = entry.calibration.areas().zones.iter();
-            zones.any(|known| known.name == zone)
-        })
-    });
+/// Removes the metrics of cameras without a stored report.
+async fn forget_cameras(state: &ApiState) {
+    let has_cameras = state.options.zone_metrics || state.options.camera_metrics;
+    if has_cameras && let Ok(cameras) = state.results.cameras().await {
+        state.metrics.retain_cameras(&cameras);
+    }
 }

@@ -2,6 +2,7 @@
 //! ones.
 
 mod address;
+pub(in crate::api) mod delete;
 pub(in crate::api) mod events;
 mod feed;
 pub(in crate::api) mod history;

@@ -1,6 +1,6 @@
 //! From the content of a stored or uploaded file to calibrations under their IDs.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use super::ChangeError;
 use crate::{
@@ -8,8 +8,9 @@ use crate::{
         Calibration, CalibrationFile, CalibrationId, FormatError,
         export::Target,
         formats::FileCamera,
-        native::{NativeCalibration, NativeImage},
+        native::{NativeCalibration, NativeImage, NativeValue},
     },
+    parameters::DetectDefaults,
     warning::Warning,
 };
 
@@ -23,6 +24,8 @@ pub struct CalibrationEntry {
     pub calibration: Arc<Calibration>,
     /// The same in the native format, whatever format its file has.
     pub native: NativeCalibration,
+    /// The defaults of detection parameters for this camera.
+    pub defaults: DetectDefaults,
     /// The assumptions of the reader.
     pub notes: Vec<Warning>,
     /// The name of its file in the store.
@@ -62,6 +65,7 @@ fn entry(
 ) -> Result<CalibrationEntry, FormatError> {
     let described = described.camera?;
     let (width, height) = calibration.image_size();
+    let defaults = defaults(&described.detect)?;
     Ok(CalibrationEntry {
         native: NativeCalibration {
             id: calibration.id().to_string(),
@@ -71,11 +75,27 @@ fn entry(
             zones: described.zones,
             lines: described.lines,
             masks: described.masks,
+            detect: described.detect,
         },
+        defaults,
         notes: described.notes,
         calibration: Arc::new(calibration),
         file: name.to_owned(),
     })
+}
+
+/// Checks the defaults of detection parameters in a calibration.
+///
+/// # Errors
+/// [`FormatError`] for a parameter without defaults, and a value out of range.
+pub fn defaults(detect: &BTreeMap<String, NativeValue>) -> Result<DetectDefaults, FormatError> {
+    let texts: Vec<_> = detect
+        .iter()
+        .map(|(name, value)| (name.as_str(), value.to_string()))
+        .collect();
+    let pairs = texts.iter().map(|(name, value)| (*name, value.as_str()));
+    DetectDefaults::parse(pairs)
+        .map_err(|error| FormatError::invalid(format!("detect.{}", error.name), error.problem))
 }
 
 impl CalibrationEntry {

@@ -14,6 +14,7 @@ use super::{
     read_frame,
     source::{NamedCamera, Source},
 };
+use crate::cli::output::UNWRITABLE;
 use crate::{
     calibration::{Areas, Calibration, CameraGeometry},
     geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
@@ -51,9 +52,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let found = arguments.source.read()?;
     let mut out = io::stdout().lock();
-    let mut line = |label: &str, text: String| {
-        writeln!(out, "{label:<12} {text}").context("standard output cannot be written")
-    };
+    let mut line =
+        |label: &str, text: String| writeln!(out, "{label:<12} {text}").context(UNWRITABLE);
     let count = match found.cameras.len() {
         1 => "1 camera".to_owned(),
         count => format!("{count} cameras"),

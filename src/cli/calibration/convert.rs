@@ -11,6 +11,7 @@ use anyhow::Context;
 use clap::Args;
 
 use super::source::Source;
+use crate::cli::output::UNWRITABLE;
 use crate::{
     calibration::{
         export::Target,
@@ -57,6 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         zones: stated.zones,
         lines: stated.lines,
         masks: stated.masks,
+        detect: stated.detect,
     })?;
     let notes = stated.notes.iter().map(ToString::to_string);
     for note in notes.chain(exported.lost) {
@@ -65,8 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     match &arguments.out {
         Some(out) => fs::write(out, exported.content)
             .with_context(|| format!("--out: {} cannot be written", out.display()))?,
-        None => write!(io::stdout(), "{}", exported.content)
-            .context("standard output cannot be written")?,
+        None => write!(io::stdout(), "{}", exported.content).context(UNWRITABLE)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,7 @@
 //! `lookdown calibration fit`
 
 use std::{
+    collections::BTreeMap,
     fs,
     io::{self, Write},
     path::PathBuf,
@@ -11,6 +12,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 
 use super::read_frame;
+use crate::cli::output::UNWRITABLE;
 use crate::{
     calibration::{
         CalibrationId,
@@ -80,7 +82,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     match &arguments.out {
         Some(out) => fs::write(out, written)
             .with_context(|| format!("--out: {} cannot be written", out.display()))?,
-        None => write!(io::stdout(), "{written}").context("standard output cannot be written")?,
+        None => write!(io::stdout(), "{written}").context(UNWRITABLE)?,
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -142,6 +144,7 @@ fn calibration(
         zones: Vec::new(),
         lines: Vec::new(),
         masks: Vec::new(),
+        detect: BTreeMap::new(),
     })
 }
 

@@ -5,11 +5,14 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::Args;
 
-use crate::calibration::{
-    Calibration, CalibrationFile, FormatError,
-    formats::{FileCamera, Format},
-    native::NativeImage,
-    read_content,
+use crate::{
+    calibration::{
+        Calibration, CalibrationFile, FormatError,
+        formats::{FileCamera, Format},
+        native::NativeImage,
+        read_content,
+    },
+    calibration_store::defaults,
 };
 
 /// The arguments that select a file, and a camera of it.
@@ -55,8 +58,13 @@ impl Source {
         let mut cameras: Vec<_> = cameras
             .map(|(stated, (id, checked))| NamedCamera {
                 id,
+                checked: checked.and_then(|calibration| {
+                    if let Ok(camera) = &stated.camera {
+                        defaults(&camera.detect)?;
+                    }
+                    Ok(calibration)
+                }),
                 stated,
-                checked,
             })
             .collect();
         if let Some(wanted) = &self.camera {

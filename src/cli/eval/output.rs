@@ -8,6 +8,7 @@ use super::{
     Arguments,
     table::{self, Row},
 };
+use crate::cli::output::UNWRITABLE;
 use crate::evaluation::{DataSet, DetectedRow, EvaluatedRow, precision_recall_plot};
 
 /// The rows of one run.
@@ -48,7 +49,7 @@ impl<'a> Output<'a> {
         } else {
             writeln!(out, "{line}")
         };
-        written.context("standard output cannot be written")?;
+        written.context(UNWRITABLE)?;
         if self.arguments.plot.is_some() {
             self.plotted.push((detected.name.to_string(), evaluated));
         }

@@ -13,6 +13,7 @@ use super::{
     table::{Row, SWEEP_HEAD},
     variants,
 };
+use crate::cli::output::UNWRITABLE;
 use crate::{
     app::{decode_limits, evaluation_engine},
     evaluation::{DataSet, DetectedRow, EvaluatedRow, sweep},
@@ -71,7 +72,7 @@ fn print(cells: &Cells, json: bool) -> anyhow::Result<()> {
             row.sweep_line()
         });
     }
-    writeln!(io::stdout(), "{}", lines.join("\n")).context("standard output cannot be written")
+    writeln!(io::stdout(), "{}", lines.join("\n")).context(UNWRITABLE)
 }
 
 /// The first of the images with the most persons, and its position in the data set.

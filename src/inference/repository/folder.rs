@@ -64,6 +64,16 @@ impl ModelFolder {
     }
 }
 
+/// Returns the names of the models in a folder, sorted.
+#[must_use]
+pub fn model_names(folder: &Path) -> Vec<String> {
+    let folder = ModelFolder {
+        path: folder.to_owned(),
+        elsewhere: None,
+    };
+    folder.names()
+}
+
 /// Returns true if a model's ONNX file exists. Weights are fetched, manifests are not.
 #[must_use]
 pub fn is_fetched(model: &Path) -> bool {

@@ -1,11 +1,24 @@
+use std::collections::BTreeSet;
+
 use jiff::Timestamp;
 
 use super::*;
 use crate::results::{NewReport, ReportId};
 
+const HOLD: Duration = Duration::from_secs(5);
+const EXPIRY: Duration = Duration::from_mins(10);
+
+fn topics() -> Topics {
+    Topics::new("lookdown", Some("homeassistant"))
+}
+
 fn cameras(most: usize) -> Cameras {
-    let topics = Topics::new("lookdown", Some("homeassistant"));
-    Cameras::new(topics, NonZeroUsize::new(most).unwrap())
+    let discovery = Discovery {
+        expire_after: Some(EXPIRY),
+        ..Discovery::default()
+    };
+    let most = NonZeroUsize::new(most).unwrap();
+    Cameras::new(topics(), discovery, HOLD, most)
 }
 
 fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
@@ -20,6 +33,10 @@ fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
     }
 }
 
+fn update(cameras: &mut Cameras, report: &StoredReport) -> Vec<Message> {
+    cameras.update(report, Duration::ZERO, Instant::now())
+}
+
 /// Topic and payload of all messages that are no announcements, and the number of announcements.
 fn published(messages: &[Message]) -> (Vec<(String, String)>, usize) {
     let is_announcement = |message: &&Message| message.topic.starts_with("homeassistant/");
@@ -32,20 +49,29 @@ fn published(messages: &[Message]) -> (Vec<(String, String)>, usize) {
     )
 }
 
+fn expected(messages: &[(&str, &str)]) -> Vec<(String, String)> {
+    let topic = |topic: &str| format!("lookdown/cameras/{topic}");
+    let messages = messages.iter();
+    messages
+        .map(|(name, payload)| (topic(name), (*payload).to_owned()))
+        .collect()
+}
+
 #[test]
 fn the_first_report_announces_a_camera_and_each_updates_it() {
     let mut cameras = cameras(10);
-    let messages = cameras.hear(&report("lobby", 2, ""));
-    let expected = [
-        ("lookdown/cameras/lobby/persons", "2"),
-        ("lookdown/cameras/lobby/report", "{\"camera\":\"lobby\"}"),
-    ];
-    let expected = expected.map(|(topic, text)| (topic.to_owned(), text.to_owned()));
-    assert_eq!(published(&messages), (expected.to_vec(), 2));
+    let messages = update(&mut cameras, &report("lobby", 2, ""));
+    let wanted = expected(&[
+        ("lobby/persons", "2"),
+        ("lobby/occupancy", "ON"),
+        ("lobby/availability", "online"),
+        ("lobby/report", "{\"camera\":\"lobby\"}"),
+    ]);
+    assert_eq!(published(&messages), (wanted, 2));
     let kept: Vec<_> = messages.iter().map(|message| message.retained).collect();
-    assert_eq!(kept, [true, true, true, false]);
+    assert_eq!(kept, [true, true, true, true, true, false]);
 
-    let (published, announcements) = published(&cameras.hear(&report("lobby", 0, "")));
+    let (published, announcements) = published(&update(&mut cameras, &report("lobby", 0, "")));
     assert_eq!((published[0].1.as_str(), announcements), ("0", 0));
 }
 
@@ -53,55 +79,137 @@ fn the_first_report_announces_a_camera_and_each_updates_it() {
 fn zones_come_and_go_with_the_calibration() {
     let mut cameras = cameras(10);
     let zones = ",\"zones\":[{\"name\":\"door\",\"persons\":1},{\"name\":\"till\",\"persons\":0}]";
-    let (first, announcements) = published(&cameras.hear(&report("lobby", 1, zones)));
-    assert_eq!(announcements, 4);
-    assert_eq!(
-        first[1],
-        ("lookdown/cameras/lobby/zones/door".into(), "1".into())
-    );
-    assert_eq!(
-        first[2],
-        ("lookdown/cameras/lobby/zones/till".into(), "0".into())
-    );
+    let (first, announcements) = published(&update(&mut cameras, &report("lobby", 1, zones)));
+    assert_eq!(announcements, 6);
+    let wanted = expected(&[
+        ("lobby/zones/door", "1"),
+        ("lobby/zones/door/occupancy", "ON"),
+        ("lobby/zones/till", "0"),
+        ("lobby/zones/till/occupancy", "OFF"),
+    ]);
+    assert_eq!(first[2..6], wanted);
 
-    let messages = cameras.hear(&report(
-        "lobby",
-        1,
-        ",\"zones\":[{\"name\":\"till\",\"persons\":1}]",
-    ));
-    let door = Message::forget("lookdown/cameras/lobby/zones/door".to_owned());
-    assert!(messages.contains(&door), "{messages:?}");
-    let config = "homeassistant/sensor/lookdown_lobby_zone_door/config";
-    assert!(
-        messages.contains(&Message::forget(config.to_owned())),
-        "{messages:?}"
-    );
-    assert_eq!(published(&messages).1, 1 + 3);
+    let zones = ",\"zones\":[{\"name\":\"till\",\"persons\":1}]";
+    let messages = update(&mut cameras, &report("lobby", 1, zones));
+    let removed = messages.iter().filter(|message| message.payload.is_empty());
+    let removed: BTreeSet<_> = removed.map(|message| message.topic.as_str()).collect();
+    let wanted = [
+        "homeassistant/binary_sensor/lookdown_lobby_zone_door_occupancy/config",
+        "homeassistant/sensor/lookdown_lobby_zone_door/config",
+        "lookdown/cameras/lobby/zones/door",
+        "lookdown/cameras/lobby/zones/door/occupancy",
+    ];
+    assert_eq!(removed, BTreeSet::from(wanted));
+    assert_eq!(published(&messages).1, 2 + 4);
 }
 
 #[test]
 fn retained_messages_are_repeated_without_reports() {
     let mut cameras = cameras(10);
-    cameras.hear(&report("lobby", 1, ""));
-    cameras.hear(&report("gate", 3, ""));
-    cameras.hear(&report("lobby", 2, ""));
-    let messages = cameras.all();
+    update(&mut cameras, &report("lobby", 1, ""));
+    update(&mut cameras, &report("gate", 3, ""));
+    update(&mut cameras, &report("lobby", 2, ""));
+    let messages = cameras.all(Instant::now());
     assert!(messages.iter().all(|message| message.retained));
-    let expected = [
-        ("lookdown/cameras/gate/persons", "3"),
-        ("lookdown/cameras/lobby/persons", "2"),
-    ];
-    let expected = expected.map(|(topic, text)| (topic.to_owned(), text.to_owned()));
-    assert_eq!(published(&messages), (expected.to_vec(), 4));
+    let (published, announcements) = published(&messages);
+    assert_eq!((published.len(), announcements), (6, 4));
+    assert_eq!(published[0], expected(&[("gate/persons", "3")])[0]);
+    assert_eq!(published[3], expected(&[("lobby/persons", "2")])[0]);
 }
 
 #[test]
 fn only_the_first_cameras_up_to_the_limit_are_published() {
     let mut cameras = cameras(2);
     for camera in ["a", "b", "c"] {
-        let published = !cameras.hear(&report(camera, 1, "")).is_empty();
+        let published = !update(&mut cameras, &report(camera, 1, "")).is_empty();
         assert_eq!(published, camera != "c", "{camera}");
     }
-    assert!(!cameras.hear(&report("a", 2, "")).is_empty());
-    assert_eq!(published(&cameras.all()).0.len(), 2);
+    assert!(!update(&mut cameras, &report("a", 2, "")).is_empty());
+    assert_eq!(published(&cameras.all(Instant::now())).0.len(), 6);
+}
+
+#[test]
+fn occupancy_ends_after_the_hold_availability_at_expiry() {
+    let (mut cameras, begin) = (cameras(10), Instant::now());
+    cameras.update(&report("lobby", 1, ""), Duration::ZERO, begin);
+    assert_eq!(cameras.next_change(), Some(begin + EXPIRY));
+    let messages = cameras.update(&report("lobby", 0, ""), Duration::ZERO, begin);
+    assert_eq!(published(&messages).0[1].1, "ON");
+    assert_eq!(cameras.next_change(), Some(begin + HOLD));
+    assert!(cameras.expire(begin).is_empty());
+    let messages = published(&cameras.expire(begin + HOLD)).0;
+    assert_eq!(messages, expected(&[("lobby/occupancy", "OFF")]));
+    let messages = published(&cameras.expire(begin + EXPIRY)).0;
+    assert_eq!(messages, expected(&[("lobby/availability", "offline")]));
+    assert_eq!(cameras.next_change(), None);
+    let messages = update(&mut cameras, &report("lobby", 0, ""));
+    assert_eq!(published(&messages).0[2].1, "online");
+    let messages = cameras.update(&report("gate", 0, ""), EXPIRY, begin);
+    assert_eq!(published(&messages).0[2].1, "offline");
+}
+
+#[test]
+fn removed_cameras_are_withdrawn() {
+    let mut cameras = cameras(10);
+    let zones = ",\"zones\":[{\"name\":\"door\",\"persons\":1}]";
+    let announced = update(&mut cameras, &report("lobby", 1, zones));
+    update(&mut cameras, &report("gate", 1, ""));
+    let removed = cameras.retain(&["gate".to_owned()]);
+    let topics = |messages: &[Message]| {
+        let kept = messages.iter().filter(|message| message.retained);
+        kept.map(|message| message.topic.clone())
+            .collect::<BTreeSet<_>>()
+    };
+    assert_eq!(topics(&removed), topics(&announced));
+    assert!(removed.iter().all(|message| message.payload.is_empty()));
+    assert!(cameras.retain(&["gate".to_owned()]).is_empty());
+}
+
+#[test]
+fn unknown_retained_cameras_are_withdrawn_after_a_time() {
+    let (mut cameras, begin, topics) = (cameras(10), Instant::now(), topics());
+    update(&mut cameras, &report("lobby", 1, ""));
+    cameras.begin_connection(begin);
+    let mut retained = |topic: &str| cameras.compare(topic, b"1", true);
+    let offline = |camera: &str| {
+        let topic = topics.availability(camera);
+        Some(Message::retained(topic, "offline"))
+    };
+    assert_eq!(retained(&topics.persons("old")), offline("old"));
+    assert_eq!(retained(&topics.zone("old", "door")), None);
+    assert_eq!(retained(&topics.availability("other")), offline("other"));
+    assert_eq!(retained(&topics.persons("lobby")), None);
+    assert_eq!(retained(&topics.zone("lobby", "gone")), None);
+    assert_eq!(retained("lookdown/status"), None);
+    // The messages of this server and of another one come back as they are published.
+    assert_eq!(
+        cameras.compare(&topics.availability("old"), b"offline", false),
+        None
+    );
+    assert_eq!(cameras.compare(&topics.persons("other"), b"3", false), None);
+    let online = Message::retained(topics.availability("lobby"), "online");
+    let answer = cameras.compare(&topics.availability("lobby"), b"offline", false);
+    assert_eq!(answer, Some(online));
+
+    let removed = cameras.expire(begin + EXPIRY);
+    let removed = removed.iter().filter(|message| message.payload.is_empty());
+    let removed: BTreeSet<_> = removed.map(|message| message.topic.as_str()).collect();
+    let wanted = [
+        "homeassistant/binary_sensor/lookdown_lobby_zone_gone_occupancy/config",
+        "homeassistant/binary_sensor/lookdown_old_occupancy/config",
+        "homeassistant/binary_sensor/lookdown_old_zone_door_occupancy/config",
+        "homeassistant/sensor/lookdown_lobby_zone_gone/config",
+        "homeassistant/sensor/lookdown_old_persons/config",
+        "homeassistant/sensor/lookdown_old_zone_door/config",
+        "lookdown/cameras/lobby/zones/gone",
+        "lookdown/cameras/lobby/zones/gone/occupancy",
+        "lookdown/cameras/old/availability",
+        "lookdown/cameras/old/occupancy",
+        "lookdown/cameras/old/persons",
+        "lookdown/cameras/old/zones/door",
+        "lookdown/cameras/old/zones/door/occupancy",
+    ];
+    assert_eq!(removed, BTreeSet::from(wanted));
+    // Later, retained messages are ignored.
+    assert_eq!(cameras.compare(&topics.persons("late"), b"1", true), None);
 }

@@ -30,6 +30,8 @@ async fn setup() -> Setup {
         topic_prefix: "lookdown".to_owned(),
         discovery_prefix: Some("homeassistant".to_owned()),
         max_cameras: NonZeroUsize::MIN,
+        hold: Duration::ZERO,
+        discovery: Discovery::default(),
     };
     let store = Arc::clone(&results) as Arc<dyn ResultStore>;
     Setup {
@@ -116,7 +118,11 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     );
     let camera = "lookdown/cameras/lobby";
     let count = said(&format!("{camera}/persons"), "2", true);
-    assert_eq!(heard(&mut client).await, count);
+    let occupancy = said(&format!("{camera}/occupancy"), "ON", true);
+    let availability = said(&format!("{camera}/availability"), "online", true);
+    for expected in [&count, &occupancy, &availability] {
+        assert_eq!(heard(&mut client).await, *expected);
+    }
     assert_eq!(
         heard(&mut client).await,
         said(&format!("{camera}/report"), "{}", false)
@@ -130,7 +136,15 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     for config in configs {
         assert_eq!(heard(&mut client).await, config);
     }
-    assert_eq!(heard(&mut client).await, count);
+    for expected in [&count, &occupancy, &availability] {
+        assert_eq!(heard(&mut client).await, *expected);
+    }
+    // Home Assistant withdraws a camera whose reports are deleted.
+    assert!(setup.results.delete("lobby").await.unwrap());
+    for _ in 0..5 {
+        let (_, payload, is_retained) = heard(&mut client).await;
+        assert!(payload.is_empty() && is_retained);
+    }
     let will = Publish::new(status, QoS::AtMostOnce, "offline");
     client.send(Packet::Publish(will)).await.unwrap();
     assert_eq!(heard(&mut client).await, said(status, "online", true));

@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::pictures::Pictures;
 use crate::results::{
@@ -26,6 +26,8 @@ pub(super) struct Kept {
     pictures: Pictures,
     bytes: usize,
     newest: ReportId,
+    /// The number of cameras that were removed.
+    removed_cameras: u64,
 }
 
 impl Kept {
@@ -38,6 +40,7 @@ impl Kept {
             earlier: BTreeMap::new(),
             bytes: 0,
             newest: ReportId::default(),
+            removed_cameras: 0,
         }
     }
 
@@ -66,6 +69,44 @@ impl Kept {
         }
         self.keep_limits();
         stored
+    }
+
+    /// Removes the reports that are too old.
+    pub(super) fn expire(&mut self, now: Timestamp) {
+        let Ok(max_age) = SignedDuration::try_from(self.limits.max_age) else {
+            return;
+        };
+        let Ok(oldest) = now.checked_sub(max_age).map(ReportId::at) else {
+            return;
+        };
+        while let Some(camera) = self.oldest_before(oldest) {
+            self.forget_oldest_of(&camera);
+        }
+    }
+
+    /// The camera of the oldest report, if that was stored before `id`.
+    fn oldest_before(&self, id: ReportId) -> Option<String> {
+        let earlier = self.earlier.first_key_value();
+        let oldest = earlier.into_iter().chain(self.latest.first_key_value());
+        let (oldest, report) = oldest.min_by_key(|(id, _)| **id)?;
+        (*oldest < id).then(|| report.report.camera.clone())
+    }
+
+    /// Deletes all reports of a camera. Returns false if it had none.
+    pub(super) fn delete(&mut self, camera: &str) -> bool {
+        let is_known = self.cameras.contains_key(camera);
+        while self.forget_oldest_of(camera) {}
+        is_known
+    }
+
+    /// The names of the cameras.
+    pub(super) fn cameras(&self) -> Vec<String> {
+        self.cameras.keys().cloned().collect()
+    }
+
+    /// The number of cameras that were removed since the start.
+    pub(super) fn removed_cameras(&self) -> u64 {
+        self.removed_cameras
     }
 
     fn keep_limits(&mut self) {
@@ -99,6 +140,7 @@ impl Kept {
         if reports.is_empty() {
             self.cameras.remove(camera);
             self.pictures.forget(camera);
+            self.removed_cameras += 1;
         }
         true
     }

@@ -5,7 +5,7 @@ use std::{num::NonZeroUsize, sync::Arc};
 
 use bytes::Bytes;
 use redis::{
-    FromRedisValue, Pipeline, RedisResult, Value,
+    FromRedisValue, Pipeline, RedisResult, Script, Value,
     aio::MultiplexedConnection,
     cmd, pipe,
     streams::{StreamId, StreamRangeReply},
@@ -13,6 +13,9 @@ use redis::{
 
 use super::keys::Keys;
 use crate::results::{NewPicture, NewReport, ReportId, ResultUse, StoredPicture, StoredReport};
+
+/// The script that deletes a camera.
+const DELETE: &str = include_str!("delete.lua");
 
 /// An entry of the stream of all reports.
 pub(super) struct Entry {
@@ -35,10 +38,33 @@ impl Reader<'_> {
         Ok(reports(camera, found).pop())
     }
 
-    pub(super) async fn latest_of_all(&mut self) -> RedisResult<Vec<Arc<StoredReport>>> {
+    pub(super) async fn cameras(&mut self) -> RedisResult<Vec<String>> {
         let mut all = cmd("ZRANGE");
         all.arg(self.keys.cameras()).arg(0).arg(-1);
-        let cameras: Vec<String> = all.query_async(&mut self.connection).await?;
+        all.query_async(&mut self.connection).await
+    }
+
+    /// Deletes all reports of a camera. Returns false if it had none.
+    pub(super) async fn delete(&mut self, camera: &str) -> RedisResult<bool> {
+        let script = Script::new(DELETE);
+        let keys = self.keys;
+        let mut call = script.prepare_invoke();
+        for key in [
+            keys.reports(),
+            keys.earlier(),
+            keys.cameras(),
+            keys.totals(),
+            keys.pictures(),
+        ] {
+            call.key(key);
+        }
+        call.arg(keys.camera(camera));
+        call.arg(keys.picture(camera)).arg(camera);
+        call.invoke_async(&mut self.connection).await
+    }
+
+    pub(super) async fn latest_of_all(&mut self) -> RedisResult<Vec<Arc<StoredReport>>> {
+        let cameras = self.cameras().await?;
         let mut each = atomic();
         for camera in &cameras {
             let last = each.cmd("XREVRANGE").arg(self.keys.camera(camera));

@@ -97,7 +97,7 @@ impl Sender<'_> {
         ] {
             call.arg(limit);
         }
-        call.arg(self.shared.options.max_age.as_secs());
+        call.arg(limits.max_age.as_secs());
         call.invoke_async(&mut connection).await
     }
 }

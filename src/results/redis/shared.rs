@@ -1,6 +1,6 @@
 //! The options and the state that the store shares with its background tasks.
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
 
 use super::{RedisAddress, connect::Connector, keys::Keys, link::Link, outbox::Outbox};
 use crate::{
@@ -15,8 +15,6 @@ pub struct RedisOptions {
     pub address: RedisAddress,
     /// The prefix of all keys: servers with the same prefix share their reports.
     pub key_prefix: String,
-    /// The longest time for which a report is kept.
-    pub max_age: Duration,
 }
 
 /// The state that the store shares with its background tasks.

@@ -60,12 +60,12 @@ impl EvilRedis {
         let limits = ResultLimits {
             max_bytes: 1 << 20,
             max_reports: NonZeroUsize::MIN,
+            max_age: Duration::from_mins(1),
             ..ResultLimits::default()
         };
         let options = RedisOptions {
             address: format!("redis://127.0.0.1:{}", self.port).parse().unwrap(),
             key_prefix: "lookdown".to_owned(),
-            max_age: Duration::from_mins(1),
         };
         let store = RedisResults::start(options, limits, Arc::default()).unwrap();
         timeout(TIMEOUT, store.shared.link.next_line())

@@ -57,6 +57,27 @@ pub(in crate::settings) fn optional<T: 'static>(form: Form<T>) -> Form<Option<T>
     }
 }
 
+/// An optional value of any simple type, as text; the empty text means none.
+pub(in crate::settings) fn optional_text(
+    kind: String,
+    read: impl Fn(&str) -> Result<String, Refusal> + 'static,
+) -> Form<Option<String>> {
+    let remedy = format!("give {kind}");
+    let form = Form::new(
+        kind,
+        move |written| match written {
+            Written::Variable(text) => read(text),
+            Written::Toml(Value::String(text)) => read(text),
+            Written::Toml(value @ (Value::Boolean(_) | Value::Integer(_) | Value::Float(_))) => {
+                read(&value.to_string())
+            }
+            Written::Toml(_) => Err(Refusal::Shown(remedy.clone())),
+        },
+        |text: &String| Value::String(text.clone()),
+    );
+    optional(form)
+}
+
 /// An address with a port.
 pub(in crate::settings) fn address() -> Form<SocketAddr> {
     parsed(

@@ -3,6 +3,7 @@
 use std::{fs, sync::Arc};
 
 use lookdown::{
+    annotated_image::{AnnotationOptions, ImageFormat, annotated_image},
     app::engine_for,
     calibration::Calibration,
     detection::{BBox, FramePixels},
@@ -75,6 +76,36 @@ fn every_fetched_model_finds_the_persons_of_a_sample() {
             "{name} finds {found} of {}",
             annotated.len()
         );
+    }
+}
+
+#[test]
+fn the_detector_finds_no_person_in_a_concealed_frame() {
+    let settings = settings::load(None, []).unwrap();
+    let parse = |threshold| DetectParameters::parse([("score_threshold", threshold)]).unwrap();
+    let (careful, usual) = (parse("0.1"), parse("0.3"));
+    let engine = engine_for(&settings, std::slice::from_ref(&usual)).unwrap();
+    let calibration = of_repository("samples/calibrations/office.json");
+    let calibration = Arc::new(Calibration::read(&calibration).unwrap());
+    let detect = |image: Vec<u8>, parameters: &DetectParameters| {
+        let job = DetectJob::local(
+            "test".to_owned(),
+            JobImage::Encoded(image.into()),
+            parameters.clone(),
+            Some(Arc::clone(&calibration)),
+        );
+        engine.detect(&job).unwrap()
+    };
+    let office = fs::read(of_repository("samples/office.jpg")).unwrap();
+    let persons = detect(office.clone(), &usual).report.persons.len();
+    assert!(persons >= annotated().len() - 1, "{persons}");
+    for layer in ["blur", "silhouette"] {
+        let detected = detect(office.clone(), &careful);
+        let options = AnnotationOptions::parse([("draw", layer)]).unwrap();
+        let concealed = annotated_image(detected, ImageFormat::Jpeg, &options).unwrap();
+        let persons = detect(concealed, &usual).report.persons;
+        let scores: Vec<_> = persons.iter().map(|person| person.score).collect();
+        assert!(scores.is_empty(), "{layer}: {scores:?}");
     }
 }
 

@@ -152,6 +152,7 @@ fn a_native_file_keeps_everything() {
         mount: read_back.mount,
         zones: read_back.zones,
         masks: read_back.masks,
+        detect: read_back.detect,
     };
     let written = Target::Native.write(&native).unwrap().content;
     let file = CalibrationFile::parse(written.as_bytes()).unwrap();

@@ -104,6 +104,13 @@ pageTest("a later visitor sees earlier results", "", async (page) => {
   assert.match(await card.locator(".plot .steps").getAttribute("d"), /V/);
 });
 
+/** Sends a frame of a named camera. Runs in the page. */
+const sendFrame = async (key) => {
+  const frame = await (await fetch("assets/office.jpg")).blob();
+  const headers = { "X-API-Key": key };
+  await fetch("detect?camera=door&profile=fast", { method: "POST", body: frame, headers });
+};
+
 pageTest(
   "a server with keys asks for one, and works with it",
   "",
@@ -116,8 +123,10 @@ pageTest(
     await page.keyboard.press("Enter");
     await page.locator("#calibration option[value=office]").waitFor({ state: "attached" });
     await detectSample(page, "office", "office");
+    await page.evaluate(sendFrame, process.env.LOOKDOWN_KEY);
     await go(page, "Live");
-    await page.getByRole("article", { name: "Camera web-page" }).waitFor();
+    await page.getByRole("article", { name: "Camera door" }).waitFor();
+    assert.equal(await page.getByRole("article", { name: "Camera web-page" }).count(), 0);
     assert.equal(await page.evaluate(() => localStorage.length), 0);
   },
   { server: process.env.LOOKDOWN_KEYED_URL, expected: /status of 401/ },

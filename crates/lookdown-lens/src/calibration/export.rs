@@ -111,6 +111,7 @@ impl Target {
             ("zones", calibration.zones.len()),
             ("lines", calibration.lines.len()),
             ("masks", calibration.masks.len()),
+            ("defaults (detect)", calibration.detect.len()),
         ] {
             if count > 0 {
                 lost.push(format!(

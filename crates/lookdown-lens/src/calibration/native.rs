@@ -2,13 +2,15 @@
 //! other formats are turned into. Writing one gives a file that reads back as the same camera.
 
 mod areas;
+mod detect;
 mod read_lens;
 
-use std::str::FromStr;
+use std::{collections::BTreeMap, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
 pub use areas::{NativeLine, NativeMask, NativeZone};
+pub use detect::NativeValue;
 
 use crate::geometry::lens::LensModel;
 
@@ -34,6 +36,9 @@ pub struct NativeCalibration {
     /// Areas that are blanked before detection.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masks: Vec<NativeMask>,
+    /// Defaults of detection parameters for the frames of this camera, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub detect: BTreeMap<String, NativeValue>,
 }
 
 /// A frame size.

@@ -8,6 +8,7 @@ use crate::{
     access::Scope,
     api::{
         ApiState,
+        detect_parameters::detect_parameters,
         http::{
             access,
             problem::{Problem, ProblemKind},
@@ -106,7 +107,11 @@ fn no_form() -> Problem {
 
 impl DeepStackUpload {
     /// Returns the detection job of this form. `calibration` is that of the path.
-    pub(super) fn job(self, calibration: Option<&str>) -> Result<DetectJob, Problem> {
+    pub(super) fn job(
+        self,
+        state: &ApiState,
+        calibration: Option<&str>,
+    ) -> Result<DetectJob, Problem> {
         let Self { upload, query } = self;
         let query = query.iter();
         let mut given: Vec<_> = query.map(|(name, value)| (&**name, &**value)).collect();
@@ -116,13 +121,12 @@ impl DeepStackUpload {
         let confidences = upload.parameters.iter().map(|(_, value)| &**value);
         let confidences = confidences.filter(|value| !value.is_empty());
         given.extend(confidences.map(|value| (SCORE_THRESHOLD, value)));
-        if !given.iter().any(|(name, _)| *name == SCORE_THRESHOLD) {
-            given.push((SCORE_THRESHOLD, DEFAULT_MIN_CONFIDENCE));
-        }
-        let parameters = DetectParameters::parse(given).map_err(|error| match &*error.name {
-            SCORE_THRESHOLD if !is_in_query => renamed(error),
-            _ => error,
-        })?;
+        let protocol = [(SCORE_THRESHOLD, DEFAULT_MIN_CONFIDENCE)];
+        let parameters =
+            detect_parameters(state, given, &protocol).map_err(|error| match &*error.name {
+                SCORE_THRESHOLD if !is_in_query => renamed(error),
+                _ => error,
+            })?;
         upload.job(parameters)
     }
 }

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     answer::{Answerer, InferAnswer, Output, OutputValues},
-    infer_parameters::{TIMEOUT, parameters},
+    infer_parameters::{TIMEOUT, as_texts},
     own_metadata::{NAME, tensor},
     request::InferRequest,
     tensor::{Tensor, Values, misfit},
@@ -15,7 +15,7 @@ use crate::{
     api::{
         ApiState,
         caller::Caller,
-        http::{deadline::Deadline, problem::Problem, request_body::Held},
+        http::{deadline::Deadline, problem::Problem, query::pairs, request_body::Held},
         limit::Limit,
     },
     inference::{HeadOutput, Model},
@@ -107,7 +107,8 @@ fn view_parameters(request: &InferRequest) -> Result<DetectParameters, Problem> 
         let problem = format!("a detector has no such parameter; the parameters are {known}");
         return Err(ParameterError::unknown(other, problem).into());
     }
-    Ok(parameters(&request.parameters)?)
+    let given = as_texts(&request.parameters)?;
+    Ok(DetectParameters::parse(pairs(&given))?)
 }
 
 /// Returns `[views, candidates, 4]` and `[views, candidates]`, padded to the largest number of

@@ -1,7 +1,6 @@
 //! The parameters of an inference request: those of `/detect`, and the protocol's `timeout`.
 
 use crate::{
-    api::http::query::pairs,
     open_inference::parameters::Parameter,
     pipeline::{DetectParameters, JsonType, ParameterError},
 };
@@ -11,16 +10,15 @@ pub(super) const TIMEOUT: &str = "timeout";
 const TIMEOUT_MILLIS: &str = "timeout_millis";
 const MICROS_PER_MILLI: u64 = 1000;
 
-/// Returns the parameters of `/detect` among those of a request.
-pub(super) fn parameters(
+/// Returns the parameters of a request as names and values of `/detect`.
+pub(super) fn as_texts(
     given: &[(String, Parameter)],
-) -> Result<DetectParameters, ParameterError> {
+) -> Result<Vec<(String, String)>, ParameterError> {
     let texts = given.iter().map(|(name, value)| match name.as_str() {
         TIMEOUT => timeout(value),
         _ => as_text(name, value),
     });
-    let texts = texts.collect::<Result<Vec<_>, _>>()?;
-    DetectParameters::parse(pairs(&texts))
+    texts.collect()
 }
 
 /// Returns a parameter as text, as in a query. The value of an unknown one is omitted: its name is
@@ -88,7 +86,7 @@ mod tests {
     #[test]
     fn timeout_in_microseconds_is_rounded_up() {
         let given = [("timeout".to_owned(), Parameter::Number("1500".to_owned()))];
-        let timeout = parameters(&given).unwrap().timeout;
-        assert_eq!(timeout, Some(std::time::Duration::from_millis(2)));
+        let texts = as_texts(&given).unwrap();
+        assert_eq!(texts, [(TIMEOUT_MILLIS.to_owned(), "2".to_owned())]);
     }
 }

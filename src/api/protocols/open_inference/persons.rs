@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     answer::{Answerer, InferAnswer, Output, OutputValues},
-    infer_parameters::parameters,
+    infer_parameters::as_texts,
     own_metadata::{NAME, tensor},
     request::InferRequest,
     tensor::{Values, misfit},
@@ -15,7 +15,8 @@ use crate::{
     api::{
         ApiState,
         caller::Caller,
-        http::{deadline::Deadline, problem::Problem},
+        detect_parameters::detect_parameters,
+        http::{deadline::Deadline, problem::Problem, query::pairs},
         report::ReportPerson,
         report_headers::report_headers,
         run_detection::{DetectionOutcome, run_detection},
@@ -64,7 +65,8 @@ pub(super) async fn infer(
     if image.is_empty() {
         return Err(misfit(INPUT, "it is empty: send an encoded frame"));
     }
-    let parameters = parameters(&request.parameters)?;
+    let given = as_texts(&request.parameters)?;
+    let parameters = detect_parameters(state, pairs(&given).collect(), &[])?;
     let ticket = caller.ticket_at(parameters.priority)?;
     let job = DetectJob::sent(image, parameters, ticket, received_at, arrived);
     let write = move |found: DetectionOutcome<'_>| {

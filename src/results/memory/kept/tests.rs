@@ -1,4 +1,5 @@
 use std::num::NonZeroUsize;
+use std::time::Duration;
 
 use bytes::Bytes;
 use proptest::prelude::*;
@@ -16,6 +17,7 @@ fn kept([max_cameras, history_per_camera, max_reports, max_bytes]: [usize; 4]) -
         max_bytes,
         max_pictures: count(2),
         max_listeners: NonZeroUsize::MIN,
+        max_age: Duration::from_hours(24),
     })
 }
 
@@ -164,4 +166,31 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn reports_beyond_their_age_are_removed() {
+    let mut kept = kept(ROOMY);
+    // The times of these IDs are microseconds apart.
+    for camera in ["lobby", "lobby", "hall"] {
+        add_with_picture(&mut kept, camera);
+    }
+    let hours = |hours| Timestamp::UNIX_EPOCH + SignedDuration::from_hours(hours);
+    kept.expire(hours(23));
+    assert_eq!((kept.usage().reports, kept.removed_cameras()), (3, 0));
+    kept.expire(hours(25));
+    assert_eq!((kept.usage().reports, kept.removed_cameras()), (0, 2));
+    assert!(kept.picture("lobby").is_none());
+}
+
+#[test]
+fn a_deleted_camera_leaves_the_others() {
+    let mut kept = kept(ROOMY);
+    for camera in ["lobby", "hall", "lobby"] {
+        add_with_picture(&mut kept, camera);
+    }
+    assert!(kept.delete("lobby"));
+    assert!(!kept.delete("lobby"));
+    assert_eq!(kept.cameras(), ["hall"]);
+    assert_eq!((kept.usage().reports, kept.usage().pictures), (1, 1));
 }

@@ -1,8 +1,12 @@
 //! The content of a calibration file: cameras that are not checked yet.
 
+use std::collections::BTreeMap;
+
 use super::{Format, FormatError};
 use crate::{
-    calibration::native::{NativeImage, NativeLine, NativeMask, NativeMount, NativeZone},
+    calibration::native::{
+        NativeImage, NativeLine, NativeMask, NativeMount, NativeValue, NativeZone,
+    },
     geometry::lens::LensModel,
     warning::Warning,
 };
@@ -40,6 +44,8 @@ pub struct Camera {
     pub lines: Vec<NativeLine>,
     /// Its masks; only native files have some.
     pub masks: Vec<NativeMask>,
+    /// Its defaults of detection parameters; only native files have some.
+    pub detect: BTreeMap<String, NativeValue>,
     /// The assumptions of the reader.
     pub notes: Vec<Warning>,
 }
@@ -53,6 +59,7 @@ impl Camera {
             zones: Vec::new(),
             lines: Vec::new(),
             masks: Vec::new(),
+            detect: BTreeMap::new(),
             notes: Vec::new(),
         }
     }

@@ -28,6 +28,7 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
                 zones: file.zones,
                 lines: file.lines,
                 masks: file.masks,
+                detect: file.detect,
                 notes: Vec::new(),
             }),
         }],

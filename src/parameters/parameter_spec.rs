@@ -87,6 +87,8 @@ pub enum Interface {
     Detector,
     /// Flags of `lookdown detect`.
     CommandLine,
+    /// Defaults in a calibration (`detect`) and in the settings (table `detect`).
+    Defaults,
 }
 
 /// The type of a value in JSON.
@@ -195,10 +197,10 @@ impl JsonType {
 /// Declares the rows of a table: a constant for each row, and the table of all rows.
 macro_rules! parameter_table {
     ($(#[$about:meta])* $visibility:vis const $table:ident; $($name:ident = $spec:expr;)+) => {
-        $(const $name: $crate::pipeline::ParameterSpec = $spec;)+
+        $(const $name: $crate::parameters::ParameterSpec = $spec;)+
 
         $(#[$about])*
-        $visibility const $table: &[$crate::pipeline::ParameterSpec] = &[$($name),+];
+        $visibility const $table: &[$crate::parameters::ParameterSpec] = &[$($name),+];
     };
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::pipeline::ParameterFault;
+use crate::parameters::ParameterFault;
 
 fn parse(pairs: &[(&str, &str)]) -> Result<DetectParameters, ParameterError> {
     DetectParameters::parse(pairs.iter().copied())

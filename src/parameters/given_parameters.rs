@@ -2,11 +2,17 @@
 
 use std::str::FromStr;
 
-use super::{ParameterDefault, ParameterError, ParameterSpec};
+use super::{
+    DefaultSource, DefaultUsed, DetectDefaults, ParameterDefault, ParameterError, ParameterSpec,
+};
 
-/// The parameter values of a request, at most one for each parameter of a table.
+/// The parameter values of a request, at most one for each parameter of a table, and defaults for
+/// those that it omits.
 #[derive(Debug)]
-pub struct GivenParameters<'a>(Vec<(&'static str, &'a str)>);
+pub struct GivenParameters<'a> {
+    request: Vec<(&'static str, &'a str)>,
+    defaults: Vec<(&'static str, &'a str, DefaultSource)>,
+}
 
 impl<'a> GivenParameters<'a> {
     /// Reads `(name, value)` pairs.
@@ -30,19 +36,56 @@ impl<'a> GivenParameters<'a> {
             }
             given.push((known.name, value));
         }
-        Ok(Self(given))
+        Ok(Self {
+            request: given,
+            defaults: Vec::new(),
+        })
     }
 
-    /// Returns the text of a parameter in the request.
+    /// Adds defaults, those with precedence first, for the parameters that the request omits.
+    #[must_use]
+    pub fn with_defaults(mut self, layers: &[(DefaultSource, &'a DetectDefaults)]) -> Self {
+        for (source, defaults) in layers {
+            for (name, value) in defaults.values() {
+                let has_default = self.defaults.iter().any(|(known, ..)| *known == name);
+                if !has_default && !self.request.iter().any(|(known, _)| *known == name) {
+                    self.defaults.push((name, value, *source));
+                }
+            }
+        }
+        self
+    }
+
+    /// Drops the default of a parameter.
+    pub fn drop_default(&mut self, spec: &ParameterSpec) {
+        self.defaults.retain(|(name, ..)| *name != spec.name);
+    }
+
+    /// Returns the defaults that complete the request.
+    #[must_use]
+    pub fn defaults_used(&self) -> Vec<DefaultUsed> {
+        let used = self
+            .defaults
+            .iter()
+            .map(|(name, value, source)| DefaultUsed {
+                name,
+                value: (*value).to_owned(),
+                source: *source,
+            });
+        used.collect()
+    }
+
+    /// Returns the text of a parameter in the request or in the defaults.
     #[must_use]
     pub fn text(&self, spec: &ParameterSpec) -> Option<&'a str> {
-        let mut given = self.0.iter();
+        let defaults = self.defaults.iter().map(|(name, value, _)| (*name, *value));
+        let mut given = self.request.iter().copied().chain(defaults);
         given
             .find(|(name, _)| *name == spec.name)
-            .map(|(_, value)| *value)
+            .map(|(_, value)| value)
     }
 
-    /// Parses the value of a parameter, or its default in the table; `None` without either.
+    /// Parses the value of a parameter, or its default; `None` without either.
     ///
     /// # Errors
     /// Returns a [`ParameterError`] for an invalid value.

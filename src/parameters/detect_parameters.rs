@@ -8,8 +8,9 @@ use jiff::Timestamp;
 use strum::VariantNames;
 
 use super::{
-    GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
-    Priority, Profile, parameter_spec::parameter_table,
+    DefaultSource, DefaultUsed, DetectDefaults, GivenParameters, Interface, ParameterDefault,
+    ParameterError, ParameterKind, ParameterSpec, Priority, Profile,
+    parameter_spec::parameter_table,
 };
 use crate::{
     calibration::CalibrationId,
@@ -25,6 +26,15 @@ const EVERY_DETECTION: &[Interface] = &[
     Interface::FrameModel,
     Interface::CommandLine,
 ];
+/// Those of the parameters whose defaults can be set for a camera or a server.
+const DETECTION_WITH_DEFAULTS: &[Interface] = &[
+    Interface::Http,
+    Interface::FrameModel,
+    Interface::CommandLine,
+    Interface::Defaults,
+];
+const REQUESTS_WITH_DEFAULTS: &[Interface] =
+    &[Interface::Http, Interface::FrameModel, Interface::Defaults];
 const EVERY_REQUEST: &[Interface] = &[Interface::Http, Interface::FrameModel, Interface::Detector];
 
 parameter_table! {
@@ -57,7 +67,7 @@ parameter_table! {
         help: "Trade-off between accuracy and cost. `paper` is the published method with its 128 views, \
                `direct` runs the detector on the frame itself.",
         example: None,
-        interfaces: EVERY_DETECTION,
+        interfaces: DETECTION_WITH_DEFAULTS,
     };
     REFINE = ParameterSpec {
         name: "refine",
@@ -67,7 +77,7 @@ parameter_table! {
         ),
         help: "Method that merges overlapping boxes into persons.",
         example: None,
-        interfaces: EVERY_DETECTION,
+        interfaces: DETECTION_WITH_DEFAULTS,
     };
     MODEL = ParameterSpec {
         name: "model",
@@ -75,7 +85,7 @@ parameter_table! {
         default: ParameterDefault::Described("the model of the profile"),
         help: "Name of the person detector.",
         example: Some("ssdlite_mobilenet_v2"),
-        interfaces: EVERY_DETECTION,
+        interfaces: DETECTION_WITH_DEFAULTS,
     };
     SCORE_THRESHOLD = ParameterSpec {
         name: "score_threshold",
@@ -83,7 +93,7 @@ parameter_table! {
         default: ParameterDefault::Value("0.3"),
         help: "Minimum score of a person (`C_t`), with fusion a probability. Persons with a lower score are left out.",
         example: None,
-        interfaces: EVERY_DETECTION,
+        interfaces: DETECTION_WITH_DEFAULTS,
     };
     // Seidel et al. state "IoU > 0.5" for NMS in section IV; the boxes of fusion overlap as much.
     IOU_THRESHOLD = ParameterSpec {
@@ -92,7 +102,7 @@ parameter_table! {
         default: ParameterDefault::Value("0.5"),
         help: "Minimum IoU of boxes of the same person (`N_t`).",
         example: None,
-        interfaces: EVERY_DETECTION,
+        interfaces: DETECTION_WITH_DEFAULTS,
     };
     // The paper does not state the value that it used.
     SIGMA = ParameterSpec {
@@ -101,7 +111,7 @@ parameter_table! {
         default: ParameterDefault::Value("0.3"),
         help: "Width σ of `soft_nms_gaussian`.",
         example: None,
-        interfaces: EVERY_DETECTION,
+        interfaces: DETECTION_WITH_DEFAULTS,
     };
     MAX_DETECTIONS = ParameterSpec {
         name: "max_detections",
@@ -109,7 +119,7 @@ parameter_table! {
         default: ParameterDefault::Value("1000"),
         help: "Maximum number of persons in the report, best first.",
         example: None,
-        interfaces: EVERY_DETECTION,
+        interfaces: DETECTION_WITH_DEFAULTS,
     };
     CAPTURED_AT = ParameterSpec {
         name: "captured_at",
@@ -127,7 +137,7 @@ parameter_table! {
                processed, at most 10 s ago. The report counts them as unchanged. Needs `camera` or \
                `calibration`; up to 256 cameras are cached.",
         example: None,
-        interfaces: REQUESTS,
+        interfaces: REQUESTS_WITH_DEFAULTS,
     };
     REMEMBER = ParameterSpec {
         name: "remember",
@@ -138,6 +148,16 @@ parameter_table! {
                inference, and the report counts all views as unchanged.",
         example: None,
         interfaces: REQUESTS,
+    };
+    STORE = ParameterSpec {
+        name: "store",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Described("`true` with `camera` or `calibration`, else `false`"),
+        help: "Stores the report under the name of its camera, for `/results`, MQTT and the metrics \
+               of cameras. Without `camera` and `calibration` that name is `assumed`, which all such \
+               frames share.",
+        example: None,
+        interfaces: REQUESTS_WITH_DEFAULTS,
     };
     PRIORITY = ParameterSpec {
         name: "priority",
@@ -181,10 +201,14 @@ pub struct DetectParameters {
     pub motion: bool,
     /// Caches the detections in the views, and uses cached ones.
     pub remember: bool,
+    /// Stores the report under the name of its camera.
+    pub store: bool,
     /// The priority among queued frames.
     pub priority: Priority,
     /// The timeout, from the arrival of the request.
     pub timeout: Option<Duration>,
+    /// The values that were defaults of the camera or the server.
+    pub defaults: Vec<DefaultUsed>,
 }
 
 impl DetectParameters {
@@ -192,6 +216,8 @@ impl DetectParameters {
     pub const TABLE: &'static [ParameterSpec] = TABLE;
     /// The parameter of the calibration.
     pub const CALIBRATION: &'static str = CALIBRATION.name;
+    /// The parameter of the camera's name.
+    pub const CAMERA: &'static str = CAMERA.name;
     /// The parameter of the least score.
     pub const SCORE_THRESHOLD: &'static str = SCORE_THRESHOLD.name;
 
@@ -202,7 +228,23 @@ impl DetectParameters {
     pub fn parse<'a>(
         pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
     ) -> Result<Self, ParameterError> {
-        let given = GivenParameters::read(TABLE, pairs)?;
+        Self::parse_with(pairs, &[])
+    }
+
+    /// Checks `(name, value)` pairs of a request, and completes them with defaults, those with
+    /// precedence first.
+    ///
+    /// # Errors
+    /// [`ParameterError`] for an unknown or repeated name and for a value out of range.
+    pub fn parse_with<'a>(
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+        defaults: &[(DefaultSource, &'a DetectDefaults)],
+    ) -> Result<Self, ParameterError> {
+        let mut given = GivenParameters::read(TABLE, pairs)?.with_defaults(defaults);
+        let is_named = given.text(&CAMERA).or(given.text(&CALIBRATION)).is_some();
+        if !is_named {
+            given.drop_default(&MOTION);
+        }
         let profile: Profile = given.value(&PROFILE)?;
         let refinement = given.optional(&REFINE)?;
         let max_detections: u32 = given.value(&MAX_DETECTIONS)?;
@@ -222,10 +264,12 @@ impl DetectParameters {
             captured_at: given.optional(&CAPTURED_AT)?,
             motion: given.value(&MOTION)?,
             remember: given.value(&REMEMBER)?,
+            store: given.optional(&STORE)?.unwrap_or(is_named),
             priority: Priority::of_level(given.value(&PRIORITY)?),
             timeout: timeout.map(Duration::from_millis),
+            defaults: given.defaults_used(),
         };
-        if parameters.motion && parameters.camera_name().is_none() {
+        if parameters.motion && !is_named {
             let rule = "name the camera, or its calibration: without a name there is no last \
                         frame to compare with";
             return Err(ParameterError::bad_value(MOTION.name, rule.to_owned()));

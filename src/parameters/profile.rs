@@ -63,7 +63,7 @@ impl Profile {
     }
 
     /// Returns the zoom pass that follows the views of the plan, if any.
-    pub(super) fn zoom_pass(self) -> Option<ZoomPass> {
+    pub(crate) fn zoom_pass(self) -> Option<ZoomPass> {
         (self == Self::Quality).then_some(ZoomPass {
             most_views: 40,
             fill: 1.0 / 3.0,
@@ -71,7 +71,7 @@ impl Profile {
     }
 
     /// Returns the pass through upright crops that follows the views of the plan, if any.
-    pub(super) fn crop_pass(self) -> Option<CropPass> {
+    pub(crate) fn crop_pass(self) -> Option<CropPass> {
         let max_crops = match self {
             Self::Fast => 5,
             Self::Balanced => 6,
@@ -85,7 +85,7 @@ impl Profile {
     }
 
     /// Returns the maximum number of network inputs of the passes after the views of the plan.
-    pub(super) fn max_second_pass_views(self) -> usize {
+    pub(crate) fn max_second_pass_views(self) -> usize {
         let zoom_views = self.zoom_pass().map_or(0, |zoom| zoom.most_views);
         zoom_views + self.crop_pass().map_or(0, |crops| crops.max_crops)
     }
@@ -101,7 +101,7 @@ impl Profile {
 
     /// Returns the score at which a person merged by fusion is as likely as not. The more views
     /// see a person, the more of them must agree.
-    pub(super) fn even_odds_score(self) -> f64 {
+    pub(crate) fn even_odds_score(self) -> f64 {
         match self {
             Self::Quality => 0.31,
             Self::Paper | Self::Fast | Self::Balanced | Self::Direct => 0.25,
@@ -120,18 +120,18 @@ impl Profile {
 }
 
 /// A second pass through upright crops of the frame around possible persons.
-pub(super) struct CropPass {
+pub(crate) struct CropPass {
     /// The maximum number of crops.
-    pub(super) max_crops: usize,
+    pub(crate) max_crops: usize,
     /// The share of a crop's side that the larger side of a person's box fills.
-    pub(super) fill: f64,
+    pub(crate) fill: f64,
 }
 
 /// A second pass through zoom views of possible persons.
-pub(super) struct ZoomPass {
+pub(crate) struct ZoomPass {
     /// The maximum number of zoom views.
-    pub(super) most_views: usize,
+    pub(crate) most_views: usize,
     /// The share of a view's shorter side that a person fills. A larger share confirms false
     /// detections: at a high zoom, half a person or a poster resembles a whole person.
-    pub(super) fill: f64,
+    pub(crate) fill: f64,
 }

@@ -1,0 +1,29 @@
+//! The deletion of a camera's reports.
+
+use axum::{extract::State, http::StatusCode};
+
+use super::{address::CameraAddress, unknown};
+use crate::api::{ApiState, http::problem::Problem, require_scope::RequireAdmin};
+
+/// Delete a camera's reports
+///
+/// Deletes all stored reports of a camera and its image. Home Assistant removes its entities. The
+/// camera returns with its next frame.
+#[utoipa::path(
+    delete, path = "/results/{camera}", tag = "results", operation_id = "delete_results",
+    params(("camera" = String, Path, description = "The name of the camera.", example = "lobby")),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    responses((status = NO_CONTENT, description = "The reports are deleted."))
+)]
+pub(in crate::api) async fn delete(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    CameraAddress(camera): CameraAddress,
+) -> Result<StatusCode, Problem> {
+    if state.results.delete(&camera).await? {
+        tracing::info!(camera, "all reports of the camera were deleted");
+        Ok(StatusCode::NO_CONTENT)
+    } else {
+        Err(unknown(&camera))
+    }
+}

@@ -1,0 +1,61 @@
+//! The threads that check something at an interval.
+
+use std::{num::NonZeroU64, sync::Arc, time::Instant};
+
+use anyhow::Context;
+
+use super::App;
+use crate::poller::Poller;
+
+/// Interval of the checks of the inference server, seconds.
+const REMOTE_EVERY: NonZeroU64 = NonZeroU64::MIN;
+/// Interval of the checks for reports that are too old, seconds.
+const EXPIRY_EVERY: NonZeroU64 = NonZeroU64::MIN;
+/// Interval of the checks for workers without progress, seconds.
+const WATCHDOG_EVERY: NonZeroU64 = NonZeroU64::MIN;
+
+impl App {
+    /// The threads that look for changed models, calibrations, keys and certificates.
+    pub(super) fn start_pollers(&self) -> anyhow::Result<Vec<Poller>> {
+        let (models, calibrations) = (Arc::clone(&self.models), Arc::clone(&self.calibrations));
+        let model_poller =
+            self.settings.model.poll_seconds.map(|every| {
+                Poller::start("model-watcher", every, move || models.reload_changed())
+            });
+        let calibration_poller = self.settings.calibrations.poll_seconds.map(|every| {
+            Poller::start("calibration-watcher", every, move || calibrations.refresh())
+        });
+        let keys = self.keys.clone().zip(self.settings.access.poll_seconds);
+        let key_poller =
+            keys.map(|(keys, every)| Poller::start("key-watcher", every, move || keys.refresh()));
+        let tls = self.tls.clone().and_then(|tls| {
+            let every = tls.poll_seconds()?;
+            Some(Poller::start("tls-watcher", every, move || tls.refresh()))
+        });
+        let (workers, limit) = (Arc::clone(&self.workers), self.state.stall_limit());
+        let watchdog = Poller::start("worker-watchdog", WATCHDOG_EVERY, move || {
+            if let Some(stall) = workers.new_stall(Instant::now(), limit) {
+                let seconds = stall.since.as_secs();
+                tracing::error!(seconds, "no frame makes progress; in flight are {stall}");
+            }
+        });
+        let results = Arc::clone(&self.results);
+        let expiry = Poller::start("result-expiry", EXPIRY_EVERY, move || results.expire());
+        let remote = self.models.remote().cloned();
+        let remote_poller = remote.map(|remote| {
+            Poller::start("remote-watcher", REMOTE_EVERY, move || {
+                remote.check_health();
+            })
+        });
+        let pollers = model_poller
+            .into_iter()
+            .chain(remote_poller)
+            .chain(calibration_poller)
+            .chain(key_poller)
+            .chain(tls)
+            .chain([watchdog, expiry]);
+        pollers
+            .collect::<Result<_, _>>()
+            .context("the operating system creates no thread to watch files")
+    }
+}

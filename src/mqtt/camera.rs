@@ -1,0 +1,188 @@
+//! The published state of one camera: counts and occupancy of its latest report, and availability.
+
+use std::time::Duration;
+
+use serde::Deserialize;
+use tokio::time::Instant;
+
+use super::{
+    discovery::{Discovery, OFFLINE, ONLINE},
+    message::Message,
+    occupancy::Occupancy,
+    retained::withdrawal,
+    topics::{self, Topics},
+};
+use crate::results::NewReport;
+
+/// The times after which states change without a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Delays {
+    /// Time without a person until occupancy is off.
+    pub(super) hold: Duration,
+    /// Time without a report until a camera is unavailable; `None` for never.
+    pub(super) expire: Option<Duration>,
+}
+
+/// A camera with a report.
+#[derive(Debug)]
+pub(super) struct Camera {
+    name: String,
+    persons: usize,
+    occupancy: Occupancy,
+    zones: Vec<Zone>,
+    /// The time at which it becomes unavailable.
+    expires_at: Option<Instant>,
+    is_available: bool,
+}
+
+#[derive(Debug)]
+struct Zone {
+    name: String,
+    persons: usize,
+    occupancy: Occupancy,
+}
+
+/// The parts of a report's JSON that are read.
+#[derive(Deserialize)]
+struct Zones {
+    #[serde(default)]
+    zones: Vec<ZoneCount>,
+}
+
+#[derive(Deserialize)]
+struct ZoneCount {
+    name: String,
+    persons: usize,
+}
+
+impl Camera {
+    /// A camera without a report, which is unavailable.
+    pub(super) fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            persons: 0,
+            occupancy: Occupancy::default(),
+            zones: Vec::new(),
+            expires_at: None,
+            is_available: false,
+        }
+    }
+
+    /// Updates the state with a report of age `age`. Returns the names of removed zones, and true
+    /// if the entities have changed.
+    pub(super) fn update(
+        &mut self,
+        report: &NewReport,
+        age: Duration,
+        now: Instant,
+        delays: &Delays,
+    ) -> (Vec<String>, bool) {
+        // Reports come from a server of this version or an earlier one, and are always JSON.
+        let counts = serde_json::from_slice(&report.json);
+        let counts = counts.map_or(Vec::new(), |Zones { zones }| zones);
+        let mut earlier = std::mem::take(&mut self.zones);
+        let names = earlier.iter().map(|zone| zone.name.as_str());
+        let has_changed = !names.eq(counts.iter().map(|zone| zone.name.as_str()));
+        for ZoneCount { name, persons } in counts {
+            let known = earlier.iter().position(|zone| zone.name == name);
+            let known = known.map(|index| earlier.swap_remove(index));
+            let mut zone = known.unwrap_or(Zone {
+                name,
+                persons,
+                occupancy: Occupancy::default(),
+            });
+            zone.persons = persons;
+            zone.occupancy.update(persons, now, delays.hold);
+            self.zones.push(zone);
+        }
+        self.persons = report.persons;
+        self.occupancy.update(report.persons, now, delays.hold);
+        let rest = delays.expire.map(|expire| expire.saturating_sub(age));
+        self.expires_at = rest.map(|rest| now + rest);
+        self.is_available = rest != Some(Duration::ZERO);
+        let removed = earlier.into_iter().map(|zone| zone.name).collect();
+        (removed, has_changed)
+    }
+
+    /// Changes what has changed by now without a report. Returns the messages.
+    pub(super) fn expire(&mut self, now: Instant, topics: &Topics) -> Vec<Message> {
+        let mut messages = Vec::new();
+        if self.occupancy.expire(now) {
+            messages.push(self.occupancy_message(topics));
+        }
+        for zone in &mut self.zones {
+            if zone.occupancy.expire(now) {
+                messages.push(zone.occupancy_message(&self.name, topics));
+            }
+        }
+        let is_expired = self.expires_at.is_some_and(|expires_at| expires_at <= now);
+        if self.is_available && is_expired {
+            self.is_available = false;
+            messages.push(self.availability(topics));
+        }
+        messages
+    }
+
+    /// The time of the next change without a report.
+    pub(super) fn next_change(&self) -> Option<Instant> {
+        let expiry = self.expires_at.filter(|_| self.is_available);
+        let zones = self.zones.iter().filter_map(|zone| zone.occupancy.off_at());
+        let others = expiry.into_iter().chain(self.occupancy.off_at());
+        zones.chain(others).min()
+    }
+
+    pub(super) fn is_available(&self) -> bool {
+        self.is_available
+    }
+
+    /// Returns true if the name of a zone is this level of a topic.
+    pub(super) fn has_zone_level(&self, level: &str) -> bool {
+        let mut zones = self.zones.iter();
+        zones.any(|zone| topics::level(&zone.name) == level)
+    }
+
+    /// The announcements of its entities.
+    pub(super) fn announced(&self, topics: &Topics, discovery: &Discovery) -> Vec<Message> {
+        let zones = self.zones.iter().map(|zone| zone.name.as_str());
+        discovery.announcements(topics, &self.name, zones)
+    }
+
+    /// The current state.
+    pub(super) fn state(&self, topics: &Topics) -> Vec<Message> {
+        let camera = self.name.as_str();
+        let count = |topic, persons: usize| Message::retained(topic, persons.to_string());
+        let mut messages = vec![
+            count(topics.persons(camera), self.persons),
+            self.occupancy_message(topics),
+        ];
+        for zone in &self.zones {
+            messages.push(count(topics.zone(camera, &zone.name), zone.persons));
+            messages.push(zone.occupancy_message(camera, topics));
+        }
+        // The last one: entities become available with their new state.
+        messages.push(self.availability(topics));
+        messages
+    }
+
+    pub(super) fn availability(&self, topics: &Topics) -> Message {
+        let status = if self.is_available { ONLINE } else { OFFLINE };
+        Message::retained(topics.availability(&self.name), status)
+    }
+
+    fn occupancy_message(&self, topics: &Topics) -> Message {
+        Message::retained(topics.occupancy(&self.name), self.occupancy.payload())
+    }
+
+    /// The messages that remove it from the broker and from Home Assistant.
+    pub(super) fn withdrawal(&self, topics: &Topics) -> Vec<Message> {
+        let zones = self.zones.iter().map(|zone| zone.name.clone());
+        withdrawal(topics, &self.name, zones)
+    }
+}
+
+impl Zone {
+    fn occupancy_message(&self, camera: &str, topics: &Topics) -> Message {
+        let topic = topics.zone_occupancy(camera, &self.name);
+        Message::retained(topic, self.occupancy.payload())
+    }
+}

@@ -1,0 +1,73 @@
+"""Home Assistant without a user interface: `home_assistant_core.py FOLDER PORT USER PASSWORD`.
+
+It runs in the environment of the tests' part `home_assistant`, connects to the broker at localhost, and writes its
+states and devices to `FOLDER/states.json` every half second. SIGTERM stops it.
+"""
+
+import asyncio
+import json
+import signal
+import sys
+from pathlib import Path
+
+from homeassistant import bootstrap, runner
+from homeassistant.helpers import device_registry, entity_registry
+
+INTERVAL_SECONDS = 0.5
+
+
+def prepare(folder: Path, port: int, user: str, password: str) -> None:
+    """Writes the configuration: the integration for MQTT, as if set up in the user interface."""
+    (folder / ".storage").mkdir(parents=True, exist_ok=True)
+    (folder / "configuration.yaml").write_text("homeassistant:\n  name: Test\n", encoding="utf-8")
+    entry = {
+        "entry_id": "mqtt", "version": 1, "minor_version": 1, "domain": "mqtt", "title": "MQTT", "options": {},
+        "data": {"broker": "localhost", "port": port, "username": user, "password": password, "discovery": True},
+        "pref_disable_new_entities": False, "pref_disable_polling": False, "source": "user", "unique_id": None,
+        "disabled_by": None,
+    }  # fmt: skip
+    entries = {"version": 1, "minor_version": 2, "key": "core.config_entries", "data": {"entries": [entry]}}
+    file = folder / ".storage" / "core.config_entries"
+    if not file.exists():
+        file.write_text(json.dumps(entries), encoding="utf-8")
+
+
+def snapshot(hass) -> dict:
+    """The entities of the integration with their states, and their devices."""
+    entities, devices = entity_registry.async_get(hass), device_registry.async_get(hass)
+    found = {}
+    for entry in entities.entities.values():
+        if entry.platform != "mqtt":
+            continue
+        state, device = hass.states.get(entry.entity_id), devices.async_get(entry.device_id or "")
+        found[entry.unique_id] = {
+            "entity": entry.entity_id,
+            "state": state.state if state else None,
+            "device": device.name if device else None,
+            "sw_version": device.sw_version if device else None,
+            "configuration_url": device.configuration_url if device else None,
+        }
+    return found
+
+
+async def main(folder: Path) -> None:
+    """Runs until SIGTERM."""
+    # Its user interface needs packages of many more integrations.
+    bootstrap.DEFAULT_INTEGRATIONS = bootstrap.CRITICAL_INTEGRATIONS = set()
+    config = runner.RuntimeConfig(config_dir=str(folder), skip_pip=True, verbose=False, log_no_color=True)
+    hass = await bootstrap.async_setup_hass(config)
+    ended = asyncio.Event()
+    hass.loop.add_signal_handler(signal.SIGTERM, ended.set)
+    await hass.async_start()
+    file, unfinished = folder / "states.json", folder / "states.unfinished"
+    while not ended.is_set():
+        unfinished.write_text(json.dumps(snapshot(hass)), encoding="utf-8")
+        unfinished.replace(file)
+        await asyncio.sleep(INTERVAL_SECONDS)
+    await hass.async_stop(force=True)
+
+
+if __name__ == "__main__":
+    FOLDER = Path(sys.argv[1])
+    prepare(FOLDER, int(sys.argv[2]), *sys.argv[3:5])
+    asyncio.run(main(FOLDER))

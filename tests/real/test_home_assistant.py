@@ -1,0 +1,172 @@
+"""Lookdown with Home Assistant and mosquitto: the entities of cameras and zones."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import unittest
+from collections.abc import Iterator
+from pathlib import Path
+
+from harness.places import ROOT, SAMPLES
+from mosquitto import PASSWORD, USER, Broker, broker
+from support.lookdown import lookdown
+from waiting import wait_until
+
+HERE = Path(__file__).resolve().parent
+PYTHON = ROOT / ".setup" / "real" / "home_assistant" / "bin" / "python"
+OFFICE = (SAMPLES / "office.jpg").read_bytes()
+DETECT = "/detect?calibration=office&profile=fast"
+NO_PERSONS = f"{DETECT}&score_threshold=1"
+PERSONS = "lookdown_office_persons"
+OCCUPANCY = "lookdown_office_occupancy"
+LEFT = "lookdown_office_zone_left"
+LEFT_OCCUPANCY = f"{LEFT}_occupancy"
+ENTITIES = {PERSONS, OCCUPANCY, LEFT, LEFT_OCCUPANCY}
+LEFT_HALF = {"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}
+PAGE = "http://lookdown.local:8080/"
+START_SECONDS = 60.0
+EXPIRE_SECONDS = 6
+STALE_SECONDS = EXPIRE_SECONDS + 15.0
+
+
+class HomeAssistant:
+    """A Home Assistant whose state is in a folder."""
+
+    def __init__(self, folder: Path, of: Broker):
+        self.folder, self.broker, self.process = folder, of, None
+        folder.mkdir()
+
+    def start(self) -> None:
+        """Starts it and waits until it writes its states."""
+        (self.folder / "states.json").unlink(missing_ok=True)
+        script = HERE / "home_assistant_core.py"
+        command = [PYTHON, script, self.folder, str(self.broker.port), USER, PASSWORD]
+        with (self.folder / "output.log").open("ab") as log:
+            self.process = subprocess.Popen(command, stdout=log, stderr=log)
+        wait_until((self.folder / "states.json").exists, "Home Assistant has started", START_SECONDS)
+
+    def stop(self) -> None:
+        """Stops it."""
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait(timeout=START_SECONDS)
+
+    def entities(self) -> dict[str, dict]:
+        """The entities by their unique IDs."""
+        return json.loads((self.folder / "states.json").read_text(encoding="utf-8"))
+
+    def state(self, unique_id: str) -> str | None:
+        """The state of an entity."""
+        return self.entities().get(unique_id, {}).get("state")
+
+    def until(self, wanted: dict[str, str], seconds: float = 30.0) -> None:
+        """Waits until the entities have these states."""
+        try:
+            wait_until(lambda: all(self.state(name) == state for name, state in wanted.items()), "", seconds)
+        except AssertionError:
+            raise AssertionError(f"{wanted} is not in {json.dumps(self.entities(), indent=1)}") from None
+
+
+@contextlib.contextmanager
+def home_assistant(folder: Path, of: Broker) -> Iterator[HomeAssistant]:
+    """A Home Assistant that is connected to the broker, and is stopped at the end."""
+    started = HomeAssistant(folder, of)
+    try:
+        started.start()
+        yield started
+    finally:
+        started.stop()
+
+
+class Entities(unittest.TestCase):
+    """Entities as Home Assistant shows them."""
+
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.calibrations = self.folder / "calibrations"
+        self.calibrations.mkdir()
+        self.write_calibration([LEFT_HALF])
+        self.broker = self.enterContext(broker(self.folder))
+        self.home = self.enterContext(home_assistant(self.folder / "home", self.broker))
+
+    def write_calibration(self, zones: list[dict]) -> None:
+        """Writes the calibration of the sample."""
+        calibration = json.loads((SAMPLES / "calibrations" / "office.json").read_text(encoding="utf-8"))
+        content = json.dumps(calibration | {"zones": zones})
+        (self.calibrations / "office.json").write_text(content, encoding="utf-8")
+
+    def lookdown(self, **settings: str):
+        """A server that publishes."""
+        own = {
+            "MQTT__URL": self.broker.url,
+            "MQTT__CONFIGURATION_URL": PAGE,
+            "MQTT__HOLD_SECONDS": "1",
+            "MQTT__EXPIRE_AFTER_SECONDS": "600",
+        }
+        return lookdown(own | settings, calibrations=self.calibrations)
+
+    def until_found(self, server) -> dict:
+        """Sends a frame and waits until its counts are shown. Returns the report."""
+        report = json.loads(server.post(DETECT, OFFICE))
+        self.assertGreater(len(report["persons"]), 3)
+        left = report["zones"][0]["persons"]
+        counts = {PERSONS: str(len(report["persons"])), LEFT: str(left)}
+        self.home.until(counts | {OCCUPANCY: "on", LEFT_OCCUPANCY: "on" if left else "off"})
+        return report
+
+    def test_entities_appear_change_and_go_away(self):
+        with self.lookdown() as server:
+            server.post("/detect?profile=fast", OFFICE)
+            server.post(f"{DETECT}&camera=web-page&store=false", OFFICE)
+            self.until_found(server)
+            entities = self.home.entities()
+            self.assertEqual(set(entities), ENTITIES)
+            print("\n" + json.dumps(entities, indent=1))
+            version = server.get("/openapi.json")
+            for entity in entities.values():
+                self.assertEqual(entity["device"], "office")
+                self.assertEqual(entity["sw_version"], json.loads(version)["info"]["version"])
+                self.assertEqual(entity["configuration_url"], PAGE)
+            server.post(NO_PERSONS, OFFICE)
+            self.home.until({PERSONS: "0", OCCUPANCY: "off", LEFT: "0", LEFT_OCCUPANCY: "off"})
+            # A zone that is removed.
+            self.write_calibration([])
+            wait_until(lambda: "zones" not in json.loads(server.post(DETECT, OFFICE)), "the zone is gone")
+            wait_until(lambda: set(self.home.entities()) == {PERSONS, OCCUPANCY}, "the entities of the zone are gone")
+            # A camera that is removed.
+            self.assertEqual(server.delete("/results/office"), 204)
+            wait_until(lambda: self.home.entities() == {}, "the entities of the camera are gone")
+            self.assertFalse([topic for topic in self.broker.retained() if "office" in topic])
+
+    def test_entities_of_a_silent_camera_become_unavailable(self):
+        with self.lookdown(MQTT__EXPIRE_AFTER_SECONDS=str(EXPIRE_SECONDS)) as server:
+            self.until_found(server)
+            self.home.until(dict.fromkeys(ENTITIES, "unavailable"), STALE_SECONDS)
+            self.until_found(server)
+
+    def test_entities_survive_restarts_of_each_program(self):
+        with self.lookdown() as server:
+            self.until_found(server)
+            counts = {name: entity["state"] for name, entity in self.home.entities().items()}
+            self.home.stop()
+            self.home.start()
+            self.home.until(counts)
+            self.broker.stop(signal.SIGKILL)
+            self.home.until(dict.fromkeys(ENTITIES, "unavailable"))
+            self.broker.start()
+            # The broker has kept nothing: the server publishes all again.
+            self.home.until(counts, START_SECONDS)
+            os.kill(server.pid, signal.SIGKILL)
+            self.home.until(dict.fromkeys(ENTITIES, "unavailable"))
+        with self.lookdown(MQTT__EXPIRE_AFTER_SECONDS=str(EXPIRE_SECONDS)) as server:
+            # Nothing is shown of the time before, and a camera without frames is withdrawn.
+            wait_until(lambda: self.broker.retained().get("lookdown/status") == "online", "the server is connected")
+            self.assertEqual(self.home.state(PERSONS), "unavailable")
+            wait_until(lambda: self.home.entities() == {}, "the camera is withdrawn", STALE_SECONDS)
+            self.until_found(server)
+
+
+if __name__ == "__main__":
+    unittest.main()
