@@ -176,7 +176,7 @@ pub struct App {
     publisher: Option<Publisher>,
     tracer: Tracer,
     state: ApiState,
-    settings: Settings,
+    settings: Box<Settings>,
 }
 
 impl App {
@@ -272,7 +272,7 @@ impl App {
             publisher: publisher.transpose()?,
             tracer,
             state,
-            settings,
+            settings: Box::new(settings),
         })
     }
 
