@@ -177,7 +177,7 @@ pub struct App {
     publisher: Option<Publisher>,
     tracer: Tracer,
     state: ApiState,
-    settings: Settings,
+    settings: Box<Settings>,
 }
 
 impl App {
@@ -273,7 +273,7 @@ impl App {
             publisher: publisher.transpose()?,
             tracer,
             state,
-            settings,
+            settings: Box::new(settings),
         })
     }
 

@@ -41,16 +41,16 @@ impl Discovery {
         zones: impl IntoIterator<Item = &'a str>,
     ) -> Vec<Message> {
         let of_camera = [
-            occupancy("Occupancy", None, topics.occupancy(camera)),
-            persons("Persons", None, topics.persons(camera)),
+            occupancy("Occupancy", None, &topics.occupancy(camera)),
+            persons("Persons", None, &topics.persons(camera)),
         ];
         let zones = zones.into_iter().flat_map(|zone| {
             let name = |what: &str| format!("{what} in {zone}");
             let state = topics.zone(camera, zone);
             let occupied = topics.zone_occupancy(camera, zone);
             [
-                persons(&name("Persons"), Some(zone), state),
-                occupancy(&name("Occupancy"), Some(zone), occupied),
+                persons(&name("Persons"), Some(zone), &state),
+                occupancy(&name("Occupancy"), Some(zone), &occupied),
             ]
         });
         let all = of_camera.into_iter().chain(zones);
@@ -107,7 +107,7 @@ pub(super) fn config_withdrawals(
     topics.map(Message::forget).collect()
 }
 
-fn occupancy(name: &str, zone: Option<&str>, state_topic: String) -> Entity {
+fn occupancy(name: &str, zone: Option<&str>, state_topic: &str) -> Entity {
     let config = json!({
         "name": name,
         "state_topic": state_topic,
@@ -119,7 +119,7 @@ fn occupancy(name: &str, zone: Option<&str>, state_topic: String) -> Entity {
     (component, id, config)
 }
 
-fn persons(name: &str, zone: Option<&str>, state_topic: String) -> Entity {
+fn persons(name: &str, zone: Option<&str>, state_topic: &str) -> Entity {
     let config = json!({
         "name": name,
         "state_topic": state_topic,

@@ -108,8 +108,8 @@ async fn reports_are_stored_under_the_name_of_their_camera() {
     }
     let cameras = service.get("/results").await.json();
     let cameras: Vec<_> = cameras.as_array().unwrap().iter().collect();
-    let names: Vec<_> = cameras.iter().map(|row| &row["camera"]).collect();
-    assert_eq!(names, [&Value::from("hall"), &Value::from("lobby")]);
+    let listed: Vec<_> = cameras.iter().map(|row| &row["camera"]).collect();
+    assert_eq!(listed, [&Value::from("hall"), &Value::from("lobby")]);
     let metrics = service.get("/metrics").await.text();
     assert!(
         metrics.contains("lookdown_results_stored_total 2"),

@@ -47,7 +47,8 @@ fn listed(repository: &Path) -> String {
 fn server() -> (String, thread::JoinHandle<String>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/converted/", listener.local_addr().unwrap());
-    let served = thread::spawn(move || {
+    let served = thread::Builder::new().name("file-server".to_owned());
+    let served = served.spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
         let mut request = [0; 4096];
         let length = stream.read(&mut request).unwrap();
@@ -61,7 +62,7 @@ fn server() -> (String, thread::JoinHandle<String>) {
         let request = String::from_utf8_lossy(&request[..length]).into_owned();
         request.split(' ').nth(1).unwrap().to_owned()
     });
-    (address, served)
+    (address, served.unwrap())
 }
 
 #[test]

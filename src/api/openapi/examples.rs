@@ -142,7 +142,7 @@ fn calibration() -> Value {
         "id": "lobby",
         "image": {"width": 1680, "height": 1680},
         "lens": {
-            "model": "equidistant", "focal": 534.76, "cx": 839.5, "cy": 839.5, "max_theta": 1.5708
+            "model": "equidistant", "focal": 534.76, "cx": 839.5, "cy": 839.5, "max_theta": 1.5
         },
         "mount": {"world_up": [0, 0, -1], "height_m": 2.8},
         "zones": [{"name": "till", "floor_m": [[1, -0.5], [2.5, -0.5], [2.5, 1], [1, 1]]}],

@@ -119,9 +119,10 @@ impl Area {
     /// The columns that it touches in a row.
     fn span(&self, y: u32, width: u32) -> Range<u32> {
         let (from, to) = (f64::from(y), f64::from(y) + 1.0);
-        let [a, b, c, d] = self.corners;
+        let corners = self.corners;
+        let edges = [0, 1, 2, 3].map(|index| [corners[index], corners[(index + 1) % 4]]);
         let mut columns = [f64::INFINITY, f64::NEG_INFINITY];
-        for [one, other] in [[a, b], [b, c], [c, d], [d, a]] {
+        for [one, other] in edges {
             let [upper, lower] = if one[1] <= other[1] {
                 [one, other]
             } else {
