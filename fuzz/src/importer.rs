@@ -73,7 +73,7 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
         id: calibration.id().to_string(),
         image: NativeImage { width, height },
         lens: camera.lens.clone(),
-        mount: camera.mount,
+        mount: camera.mount.clone(),
         zones: camera.zones.clone(),
         lines: camera.lines.clone(),
         masks: camera.masks.clone(),

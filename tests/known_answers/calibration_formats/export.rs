@@ -151,6 +151,7 @@ fn a_native_file_keeps_everything() {
         lens: read_back.lens,
         mount: read_back.mount,
         zones: read_back.zones,
+        lines: Vec::new(),
         masks: read_back.masks,
         detect: read_back.detect,
     };
