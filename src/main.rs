@@ -13,8 +13,9 @@ fn main() -> ExitCode {
     if env::var_os(NO_TELEMETRY).is_none() {
         let mut arguments = env::args_os();
         // Setting a variable in a process is not memory-safe, so the process is replaced by itself.
-        // Without /proc this fails, and the program runs with the variables it has.
-        let _ = Command::new("/proc/self/exe")
+        // If that fails, as without /proc, the program runs with the variables it has. The path, not
+        // `/proc/self/exe`, keeps the name of the process.
+        let _ = Command::new(env::current_exe().unwrap_or_default())
             .arg0(arguments.next().unwrap_or_default())
             .args(arguments)
             .env(NO_TELEMETRY, "1")

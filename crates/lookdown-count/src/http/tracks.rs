@@ -27,6 +27,7 @@ const OUTLINE_SEGMENTS: u32 = 16;
 
 /// The current tracks of a camera or a site.
 #[derive(Serialize)]
+#[expect(clippy::struct_field_names, reason = "names of the answer")]
 pub(super) struct Tracks {
     /// Time of the last frame; null before the first.
     last_report: Option<Timestamp>,
