@@ -110,7 +110,7 @@ async fn a_killed_process_counts_as_an_uninterrupted_one() {
     let uninterrupted = folder.path().join("whole.sqlite");
     count_to_the_end(&whole, &uninterrupted, last).await;
 
-    let server = Server::start(events, Duration::from_millis(30), CALIBRATION).await;
+    let server = Server::start(events, Duration::from_millis(80), CALIBRATION).await;
     let interrupted = folder.path().join("killed.sqlite");
     let mut random = 7_u64;
     for kill in 0..KILLS {
