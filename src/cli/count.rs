@@ -98,9 +98,9 @@ async fn count_until_changed(
     options: &CountOptions,
     shutdown: &Shutdown,
 ) -> anyhow::Result<Option<CountOptions>> {
-    let (snapshots, published) = watch::channel(Snapshot::default());
+    let (snapshots, latest_snapshot) = watch::channel(Snapshot::default());
     let publisher = match &options.mqtt {
-        Some(entry) => Some(CountsPublisher::new(broker(entry)?, published)?),
+        Some(entry) => Some(CountsPublisher::new(broker(entry)?, latest_snapshot)?),
         None => None,
     };
     let mut changed = None;
