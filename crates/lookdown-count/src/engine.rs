@@ -10,7 +10,7 @@ use crate::{
     report::Report,
     scene::{NamedCrossing, Scene, SceneState},
     sums::{DAY_MS, LineDirection, Owner, Sums, ZoneOf},
-    tracking::{MAX_CAMERAS, TrackerSettings},
+    tracking::MAX_CAMERAS,
 };
 
 /// The limits of counting.
@@ -245,7 +245,7 @@ impl Engine {
             return;
         }
         let cameras = cameras.into_iter().collect();
-        match Scene::new(owner.clone(), cameras, TrackerSettings::default()) {
+        match Scene::new(owner.clone(), cameras) {
             Ok(scene) => drop(self.scenes.insert(owner.clone(), scene)),
             Err(problem) => tracing::warn!("{owner:?} is not followed: {problem}"),
         }

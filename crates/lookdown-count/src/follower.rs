@@ -120,10 +120,8 @@ impl Follower {
     /// Counts the report of an event.
     async fn accept(&mut self, event: &Event) -> Result<(), StreamError> {
         let skipped = |reason: &str| {
-            self.metrics
-                .reports_skipped
-                .with_label_values(&[reason])
-                .inc()
+            let counter = self.metrics.reports_skipped.with_label_values(&[reason]);
+            counter.inc();
         };
         let Some(id) = event.id else {
             skipped("malformed");
@@ -135,23 +133,23 @@ impl Follower {
         };
         let definition = self.engine.lock().definition(&report.camera);
         let key = DefinitionKey::of(&report);
-        let definition = match definition.filter(|definition| definition.key == key) {
-            Some(definition) => definition,
-            None => {
-                let mut stop = self.stop.clone();
-                let updated = tokio::select! {
-                    updated = self.calibrations.update(&self.client, &self.store, &key) => updated,
-                    () = stopped(&mut stop) => return Err(StreamError::stopped()),
-                };
-                updated.map_err(|problem| StreamError {
-                    message: match problem {
-                        CalibrationProblem::Server(problem) => problem,
-                        CalibrationProblem::Store(problem) => problem.to_string(),
-                    },
-                    retry_after: None,
-                })?;
-                self.calibrations.definition(key)
-            }
+        let known = definition.filter(|definition| definition.key == key);
+        let definition = if let Some(definition) = known {
+            definition
+        } else {
+            let mut stop = self.stop.clone();
+            let updated = tokio::select! {
+                updated = self.calibrations.update(&self.client, &self.store, &key) => updated,
+                () = stopped(&mut stop) => return Err(StreamError::stopped()),
+            };
+            updated.map_err(|problem| StreamError {
+                message: match problem {
+                    CalibrationProblem::Server(problem) => problem,
+                    CalibrationProblem::Store(problem) => problem.to_string(),
+                },
+                retry_after: None,
+            })?;
+            self.calibrations.definition(key)
         };
         let mut engine = self.engine.lock();
         match engine.accept(id, &report, &definition) {

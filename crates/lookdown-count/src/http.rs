@@ -34,7 +34,7 @@ pub(crate) struct Api {
     pub(crate) engine: Arc<Mutex<Engine>>,
     pub(crate) store: Store,
     pub(crate) metrics: Arc<Metrics>,
-    pub(crate) api_key: Option<SecretString>,
+    pub(crate) key: Option<SecretString>,
 }
 
 type Shared = Arc<Api>;
@@ -80,7 +80,7 @@ async fn without_cache(mut response: Response) -> Response {
 
 /// Requires the key of the settings.
 async fn check_key(State(api): State<Shared>, request: Request, next: Next) -> Response {
-    match &api.api_key {
+    match &api.key {
         Some(key) if !has_key(request.headers(), key) => Problem::unauthorized().into_response(),
         _ => next.run(request).await,
     }
@@ -89,7 +89,9 @@ async fn check_key(State(api): State<Shared>, request: Request, next: Next) -> R
 fn has_key(headers: &HeaderMap, key: &SecretString) -> bool {
     let bearer = headers.get(AUTHORIZATION);
     let bearer = bearer.and_then(|value| value.as_bytes().strip_prefix(b"Bearer "));
-    let plain = headers.get("x-api-key").map(|value| value.as_bytes());
+    let plain = headers
+        .get("x-api-key")
+        .map(axum::http::HeaderValue::as_bytes);
     // Digests of equal length make the time of the comparison independent of the key.
     let wanted = Sha256::digest(key.expose_secret());
     let given = bearer.or(plain);

@@ -100,12 +100,11 @@ impl Report {
         } = person.oriented_box;
         let centre = Pixel::new(cx, cy);
         // The angle does not tell the head from the foot.
-        let vertical = match &definition.geometry {
-            Some(camera) => vertical_in_frame(centre, &camera.lens, &camera.mount),
-            None => {
-                let Image { width, height } = self.image;
-                centre - Pixel::new(f64::from(width) / 2.0, f64::from(height) / 2.0)
-            }
+        let vertical = if let Some(camera) = &definition.geometry {
+            vertical_in_frame(centre, &camera.lens, &camera.mount)
+        } else {
+            let Image { width, height } = self.image;
+            centre - Pixel::new(f64::from(width) / 2.0, f64::from(height) / 2.0)
         };
         let (sin, cos) = angle_deg.to_radians().sin_cos();
         let axis = Vector2::new(sin, -cos);

@@ -125,7 +125,7 @@ pub async fn count(
         engine: Arc::clone(&engine),
         store: store.clone(),
         metrics: Arc::clone(&metrics),
-        api_key: options.api_key.clone(),
+        key: options.api_key.clone(),
     };
     if let Ok(address) = listener.local_addr() {
         tracing::info!("counts at http://{address}/counts");

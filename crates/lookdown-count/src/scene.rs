@@ -204,12 +204,11 @@ impl Scene {
     pub(crate) fn new(
         owner: Owner,
         cameras: Vec<(String, Arc<CameraDefinition>)>,
-        settings: TrackerSettings,
     ) -> Result<Self, SiteError> {
         let poses: Vec<_> = cameras.iter().map(|(_, camera)| camera.pose).collect();
         let cameras = cameras.into_iter();
         Ok(Self {
-            tracker: Tracker::new(&poses, settings)?,
+            tracker: Tracker::new(&poses, TrackerSettings::default())?,
             owner,
             heat_map: HeatMap::default(),
             presence: Presence::default(),

@@ -18,7 +18,7 @@ use signature::SigningKey;
 use crate::options::duration;
 
 /// Time without a report after which a camera is silent.
-const SILENT_AFTER: Duration = Duration::from_secs(60);
+const SILENT_AFTER: Duration = Duration::from_mins(1);
 
 /// A message to be delivered.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -124,7 +124,7 @@ impl WebhookEntry {
                 }
             }
             Occasion::Silent => {
-                let limits = (Duration::from_secs(5), Duration::from_secs(86_400));
+                let limits = (Duration::from_secs(5), Duration::from_hours(24));
                 let after = duration(&field("after"), self.after, limits)?;
                 Condition::Silent {
                     after: after.unwrap_or(SILENT_AFTER),

@@ -1,4 +1,5 @@
 //! The companion against a server on this machine: counts, unknown time, tracks, sites, webhooks.
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod events;
 
@@ -79,12 +80,13 @@ async fn with_companion<T>(
         Some(http) => (http, ""),
         None => ("", settings),
     };
-    let text = format!(
-        "[server]\nurl = \"http://{}\"\n[http]\nlisten = \"{address}\"\n{http}[store]\npath = {store:?}\n\
+    let content = format!(
+        "[server]\nurl = \"http://{}\"\n[http]\nlisten = \"{address}\"\n{http}[store]\npath = \"{}\"\n\
          commit_every = \"100ms\"\nretention_days = 3660\n{settings}",
-        server.address
+        server.address,
+        store.display(),
     );
-    std::fs::write(&file, text).unwrap();
+    std::fs::write(&file, content).unwrap();
     let origin = Origin {
         file: Some(file),
         flags: lookdown_count::CountEntry::default(),

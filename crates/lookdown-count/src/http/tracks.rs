@@ -32,7 +32,8 @@ pub(super) struct Tracks {
     last_report: Option<Timestamp>,
     /// False if the last frame is older than the longest gap: there are no tracks then.
     is_current: bool,
-    tracks: Vec<TrackRow>,
+    #[serde(rename = "tracks")]
+    rows: Vec<TrackRow>,
     /// The lines and zones of the camera with their counts.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lines: Vec<Value>,
@@ -100,7 +101,7 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
         last_report: presence
             .last_ms
             .and_then(|last_ms| Timestamp::from_millisecond(last_ms).ok()),
-        tracks: seen.filter(|_| is_current).map(|track| row(track, is_site)).collect(),
+        rows: seen.filter(|_| is_current).map(|track| row(track, is_site)).collect(),
         is_current,
         lines: of_camera.map_or_else(Vec::new, |(_, camera)| line_rows(camera, &lines)),
         zones: zones
@@ -118,7 +119,7 @@ impl Tracks {
         Self {
             last_report: None,
             is_current: false,
-            tracks: Vec::new(),
+            rows: Vec::new(),
             lines: Vec::new(),
             zones: Vec::new(),
         }

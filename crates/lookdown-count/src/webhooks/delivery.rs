@@ -22,8 +22,8 @@ const TIMEOUT: Duration = Duration::from_secs(15);
 const PAUSES: [Duration; 4] = [
     Duration::from_secs(2),
     Duration::from_secs(15),
-    Duration::from_secs(120),
-    Duration::from_secs(600),
+    Duration::from_mins(2),
+    Duration::from_mins(10),
 ];
 
 /// The receivers.

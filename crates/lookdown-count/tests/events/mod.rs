@@ -129,7 +129,7 @@ pub fn walks(camera: &str, seconds: i64, gap: std::ops::Range<i64>) -> Vec<(u64,
             random = random
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1);
-            let is_missed = (random >> 33) % 20 == 0;
+            let is_missed = (random >> 33).is_multiple_of(20);
             if walked > 7.0 || is_missed {
                 continue;
             }
