@@ -235,7 +235,7 @@ class Overwritten(unittest.TestCase):
             for camera in ("hall", "lift"):
                 detect(server, camera)
             wait_until(lambda: len(get(server, "/results").json()) == 2, "both reports are stored")
-            key = next(key for key in redis.ask("KEYS", "*hall*") if redis.ask("TYPE", key) == b"stream")
+            key = next(key for key in redis.ask("KEYS", "*hall*") if redis.ask("TYPE", key) == "stream")
             redis.ask("SET", key, "theirs")
             answer = get(server, "/results")
             self.assertEqual(answer.status, 200, answer.body)
