@@ -202,7 +202,7 @@ fn annotate_draws_persons_into_the_image() {
 fn annotation_options_are_validated_and_need_annotate() {
     let annotate = ["detect", "a.jpg", "--annotate", "out.jpg"];
     let output = lookdown(&[&annotate[..], &["--draw", "hats"]].concat(), &[]);
-    assert_lists_values(&output, "hats", "boxes, oriented, scores");
+    assert_lists_values(&output, "hats", "blur, silhouette, boxes");
     let output = lookdown(&[&annotate[..], &["--quality", "101"]].concat(), &[]);
     assert_fails_with(
         &output,

@@ -223,6 +223,7 @@ const MAY_USE: [(&str, &[&str]); 36] = [
             "settings",
             "shutdown",
             "telemetry",
+            "mqtt",
             "api",
             "app",
         ],

@@ -1,5 +1,6 @@
 //! The zones, lines and masks of a calibration, checked.
 
+mod area_name;
 mod line;
 
 use std::collections::BTreeSet;
@@ -9,10 +10,8 @@ use super::{
     formats::Camera,
     native::{NativeImage, NativeZone},
 };
-use crate::{
-    geometry::{CountingLine, Mount, Polygon, Zone, ZoneArea},
-    plain_name::{MAX_CHARS, is_plain},
-};
+use crate::geometry::{CountingLine, Mount, Polygon, Zone, ZoneArea};
+use area_name::check_name;
 
 /// Most zones of a calibration, most lines and most masks.
 const MAX_AREAS: usize = 32;
@@ -47,7 +46,7 @@ impl Areas {
         let mut names = BTreeSet::new();
         let zones = zones.iter().enumerate().map(|(index, zone)| {
             let field = format!("zones[{index}]");
-            name(&format!("{field}.name"), &zone.name)?;
+            check_name(&format!("{field}.name"), &zone.name)?;
             if !names.insert(&zone.name) {
                 let problem = format!("another zone is called {:?}, too: rename one", zone.name);
                 return Err(FormatError::invalid(format!("{field}.name"), problem));
@@ -87,18 +86,6 @@ fn at_most(field: &str, count: usize) -> Result<(), FormatError> {
         return Ok(());
     }
     let problem = format!("there are {count}: a calibration may have {MAX_AREAS}");
-    Err(FormatError::invalid(field, problem))
-}
-
-fn name(field: &str, name: &str) -> Result<(), FormatError> {
-    if is_plain(name) {
-        return Ok(());
-    }
-    let shown: String = name.chars().take(MAX_CHARS).collect();
-    let problem = format!(
-        "it is {shown:?}: use 1 to {MAX_CHARS} of a-z, 0-9, _ and -, beginning with a letter or \
-         digit"
-    );
     Err(FormatError::invalid(field, problem))
 }
 

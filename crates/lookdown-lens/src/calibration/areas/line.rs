@@ -9,7 +9,7 @@ use super::{
         FormatError,
         native::{NativeImage, NativeLine},
     },
-    name,
+    area_name::check_name,
 };
 use crate::geometry::{CountingLine, LineEnds, Mount, Polygon, polygon::Edge};
 
@@ -27,13 +27,13 @@ pub(super) fn checked(
     let mut names = BTreeSet::new();
     let lines = lines.iter().enumerate().map(|(index, line)| {
         let field = format!("lines[{index}]");
-        name(&format!("{field}.name"), &line.name)?;
+        check_name(&format!("{field}.name"), &line.name)?;
         if !names.insert(&line.name) {
             let problem = format!("another line has the name {:?}: rename one", line.name);
             return Err(FormatError::invalid(format!("{field}.name"), problem));
         }
         for (index, direction) in line.directions.iter().enumerate() {
-            name(&format!("{field}.directions[{index}]"), direction)?;
+            check_name(&format!("{field}.directions[{index}]"), direction)?;
         }
         let [one, other] = &line.directions;
         if one == other {
