@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point2;
 
-use super::{
-    super::{
+use super::area_name::check_name;
+use crate::{
+    calibration::{
         FormatError,
         native::{NativeImage, NativeLine},
     },
-    area_name::check_name,
+    geometry::{CountingLine, LineEnds, Mount, Polygon, polygon::Edge},
 };
-use crate::geometry::{CountingLine, LineEnds, Mount, Polygon, polygon::Edge};
 
 /// Shortest line on the floor, metres, and in the frame, pixels.
 const SHORTEST_M: f64 = 0.1;
