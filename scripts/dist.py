@@ -57,7 +57,7 @@ def files_of(root: Path, pins: Pins, cpu: str) -> Iterator[tuple[Path, str]]:
 
 def default_model_files(root: Path, pins: Pins) -> Iterator[tuple[Path, str]]:
     """The default models with their manifests and licences, and their names below the folder of a package."""
-    for model in pins.models + pins.quantised:
+    for model in pins.models + pins.derived:
         if model.default:
             folder = root / "models" / model.name
             for file in (folder / "model.toml", folder / "model.onnx", *sorted(folder.glob("LICENSE-*"))):

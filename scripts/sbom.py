@@ -13,7 +13,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from assets.machine import supported_cpu
-from assets.pins import Archive, Model, Pins, Quantised, read_pins
+from assets.pins import Archive, Derived, Model, Pins, read_pins
 
 ROOT = Path(__file__).resolve().parents[1]
 NOT_STATED = "NOASSERTION"
@@ -49,7 +49,7 @@ def bill_of_materials(root: Path, cpu: str, metadata: dict) -> dict:
     own = packages[metadata["resolve"]["root"]]
     crates = [crate(package, sums) for package in packages.values() if package["id"] in needs and package is not own]
     runtime = onnx_runtime(pins, cpu)
-    models = [model(root, pinned) for pinned in pins.models + pins.quantised]
+    models = [model(root, pinned) for pinned in pins.models + pins.derived]
     application = identity("application", reference(own), own["name"], own["version"])
     application["licenses"] = licences(own["license"])
     dependencies = {
@@ -116,10 +116,10 @@ def onnx_runtime(pins: Pins, cpu: str) -> dict:
     return package | {"bom-ref": package["purl"], "licenses": licences("MIT")}
 
 
-def model(root: Path, pinned: Model | Quantised) -> dict:
+def model(root: Path, pinned: Model | Derived) -> dict:
     """The component for a model; its ancestor is the package its weights come from."""
     manifest = tomllib.loads((root / "models" / pinned.name / "model.toml").read_text(encoding="utf-8"))
-    source = pinned.source if isinstance(pinned, Quantised) else pinned
+    source = pinned.origin if isinstance(pinned, Derived) else pinned
     version = pinned.onnx_sha256[:12]
     return identity("machine-learning-model", f"model:{pinned.name}", pinned.name, version) | {
         "description": manifest["source"],

@@ -2,11 +2,13 @@
 //! is text in memory, which the caller writes or sends. A new format needs a file with its
 //! `FormatSpec` and a row of the table here.
 
+mod cepdof;
 mod coco;
 mod content;
 mod cvat;
 mod format_spec;
 mod geojson;
+mod label_studio;
 mod report;
 mod voc;
 mod xml;
@@ -17,7 +19,7 @@ use strum::{Display, EnumString, VariantArray};
 pub use self::content::{AnnotatedBox, AnnotatedImage, AnnotationFile, BoxKind};
 use self::{
     content::{LABEL, file, stem},
-    format_spec::{FormatSpec, Layout},
+    format_spec::{FormatSpec, Layout, SupportedBoxes},
 };
 
 /// Declares [`AnnotationFormat`]: for each format a description, a variant and its module.
@@ -55,19 +57,31 @@ annotation_formats! {
     Coco = coco,
     /// CVAT for images 1.1: annotations.xml.
     Cvat = cvat,
-    /// YOLO as Ultralytics reads it: labels/, data.yaml, classes.txt.
+    /// YOLO as Ultralytics reads it, also with oriented boxes (OBB): labels/, data.yaml, classes.txt.
     Yolo = yolo,
     /// Pascal VOC: Annotations/.
     Voc = voc,
     /// GeoJSON with the oriented boxes as polygons in pixels: features/.
     GeoJson = geojson,
+    /// CEPDOF and RAPiD, COCO with oriented boxes: annotations.json.
+    Cepdof = cepdof,
+    /// Label Studio: tasks.json, tasks with predictions.
+    LabelStudio = label_studio,
 }
 
 impl AnnotationFormat {
-    /// Returns whether the format offers oriented boxes beside axis-parallel ones.
+    /// Returns true if the format can have oriented boxes as its shapes.
     #[must_use]
     pub fn has_oriented_boxes(self) -> bool {
-        self.spec().has_oriented_boxes
+        self.spec().boxes != SupportedBoxes::AxisParallel
+    }
+
+    /// Returns the formats that can have oriented boxes, for messages.
+    #[must_use]
+    pub fn names_with_oriented_boxes() -> String {
+        let formats = Self::VARIANTS.iter();
+        let formats = formats.filter(|format| format.has_oriented_boxes());
+        formats.map(Self::to_string).collect::<Vec<_>>().join(", ")
     }
 
     /// Returns the media type of a document.
@@ -76,8 +90,8 @@ impl AnnotationFormat {
         self.spec().media_type
     }
 
-    /// Returns the files that describe `images`. `boxes` applies only if the format [has oriented
-    /// boxes](Self::has_oriented_boxes). Images whose names differ only in their extensions share a
+    /// Returns the files that describe `images`. `boxes` applies only if the format has both kinds.
+    /// Images whose names differ only in their extensions share a
     /// file in YOLO and VOC: the last one is written.
     #[must_use]
     pub fn files(self, images: &[AnnotatedImage], boxes: BoxKind) -> Vec<AnnotationFile> {
@@ -90,7 +104,7 @@ impl AnnotationFormat {
             } => {
                 let own = images
                     .iter()
-                    .map(|image| file(&path(&image.file_name), document(image)));
+                    .map(|image| file(&path(&image.file_name), document(image, boxes)));
                 others().into_iter().chain(own).collect()
             }
         }
@@ -101,7 +115,7 @@ impl AnnotationFormat {
     pub fn document(self, image: &AnnotatedImage, boxes: BoxKind) -> String {
         match self.spec().layout {
             Layout::OneFile { document, .. } => document(std::slice::from_ref(image), boxes),
-            Layout::FilePerImage { document, .. } => document(image),
+            Layout::FilePerImage { document, .. } => document(image, boxes),
         }
     }
 

@@ -57,7 +57,6 @@ pub struct Assembly {
 
 /// Creates the engine that the settings describe, with no model loaded yet.
 ///
-///
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn assemble(settings: &Settings) -> anyhow::Result<Assembly> {
@@ -80,7 +79,7 @@ fn assemble_with(
     metrics: Arc<Metrics>,
     paper_field_of_view: FieldOfViewReading,
 ) -> anyhow::Result<Assembly> {
-    let (models, default_models) = models::open(settings, &metrics)?;
+    let (models, default_models) = models::open(settings, &metrics.detect)?;
     let options = EngineOptions {
         decode_limits: decode_limits(&settings.limits),
         default_models,
@@ -94,9 +93,9 @@ fn assemble_with(
         rig_cache_bytes: settings.calibrations.cache_bytes,
         inference_cache_frames: settings.inference.inference_cache_frames,
     };
-    let known = Some(Arc::clone(&calibrations));
+    let known = Arc::clone(&calibrations);
     let registry = Arc::clone(models.registry());
-    let engine = Engine::new(registry, known, options, Arc::clone(&metrics))
+    let engine = Engine::new(registry, Some(known), options, Arc::clone(&metrics.detect))
         .context("the operating system gives no threads")?;
     Ok(Assembly {
         engine,
@@ -119,7 +118,6 @@ pub(crate) fn decode_limits(limits: &LimitSettings) -> DecodeLimits {
 /// Creates the engine that the settings describe, with the models that requests with any of these
 /// parameters need.
 ///
-///
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub fn engine_for(settings: &Settings, requests: &[DetectParameters]) -> anyhow::Result<Engine> {
@@ -139,18 +137,7 @@ pub fn evaluation_engine(
     let assembly = assemble_with(settings, calibrations, Arc::default(), paper_field_of_view)?;
     let Assembly { engine, models, .. } = assembly;
     for request in requests {
-        let defaults = engine.default_models();
-        let needed = match &request.model {
-            Some(name) => vec![name.as_str()],
-            None => [
-                Some(defaults.of(request.profile)),
-                defaults.second_opinion(request.profile),
-            ]
-            .into_iter()
-            .flatten()
-            .collect(),
-        };
-        for name in needed {
+        for name in engine.default_models().needed_by(request) {
             if models.registry().get(name).is_none() {
                 models.load(name)?;
             }
@@ -249,6 +236,7 @@ impl App {
                 }),
             access,
             cors_origins: settings.access.cors_origins.clone(),
+            page_counts_path: settings.page.counts_path.clone(),
             tracer: tracer.clone(),
         };
         let state = ApiState::new(

@@ -5,7 +5,7 @@ mod store;
 
 pub use calibrations::{
     CalibrationEntry, CalibrationRow, Calibrations, CalibrationsHealth, ChangeError, Put, Reading,
-    UnusableCalibration, WriteCondition, defaults,
+    WriteCondition, defaults,
 };
 pub use store::{
     BucketStore, CalibrationStore, FolderStore, MAX_FILES, READ_AT_ONCE, Replaces, StoreError,

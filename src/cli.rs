@@ -2,6 +2,7 @@
 
 mod annotate;
 mod calibration;
+mod complete;
 mod count;
 mod detect;
 mod eval;
@@ -12,6 +13,7 @@ mod output;
 mod parameters;
 mod progress;
 mod serve;
+mod server_flags;
 mod settings_file;
 mod shell;
 mod tune;
@@ -80,6 +82,12 @@ enum Command {
 /// which the binary was built, if it is known. Ends the process if the command line is invalid.
 #[must_use]
 pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) -> ExitCode {
+    let arguments: Vec<_> = arguments.into_iter().collect();
+    match complete::complete(&arguments, || command(commit)) {
+        Ok(false) => {}
+        Ok(true) => return ExitCode::SUCCESS,
+        Err(error) => error.exit(),
+    }
     let outcome = match parse(arguments, commit).command {
         Command::Serve(arguments) => serve::run(&arguments, commit),
         Command::Watch(arguments) => watch::run(&arguments, commit),
@@ -92,7 +100,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
         Command::Key(command) => key::run(&command),
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Openapi => print_openapi(),
-        Command::Completions(arguments) => shell::print_completions(&arguments, command(commit)),
+        Command::Completions(arguments) => shell::print_completions(&arguments),
         Command::Manual(arguments) => shell::write_manual(&arguments, command(commit)),
     };
     match outcome {

@@ -12,16 +12,8 @@ pub mod api;
 pub mod app;
 pub mod calibration_store;
 pub mod cli;
-pub mod detection;
-pub mod evaluation;
-pub mod fairness;
-pub mod imaging;
-pub mod inference;
 pub mod metrics;
 pub mod mqtt;
-pub mod open_inference;
-pub mod parameters;
-pub mod pipeline;
 pub mod poller;
 pub mod probe;
 pub mod results;
@@ -33,4 +25,8 @@ pub mod telemetry;
 pub mod tls;
 pub mod watched_file;
 
+pub use lookdown_detect::{
+    detection, fairness, imaging, inference, open_inference, parameters, pipeline,
+};
+pub use lookdown_eval as evaluation;
 pub use lookdown_lens::{calibration, geometry, plain_name, quoted, revision, warning};

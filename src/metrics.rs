@@ -3,8 +3,11 @@
 //! lists, never from clients. Those of cameras and zones are optional and limited to a thousand.
 
 mod camera_gauges;
-mod kind;
 
+use std::sync::Arc;
+
+use lookdown_detect::metric_set;
+pub use lookdown_detect::metrics::{DetectMetrics, gauge_value, replace_info, start_at_zero};
 use prometheus::{
     Encoder, HistogramVec, IntCounterVec, IntGaugeVec, Registry, TextEncoder,
     process_collector::ProcessCollector,
@@ -12,37 +15,17 @@ use prometheus::{
 pub use prometheus::{IntCounter, IntGauge};
 
 use camera_gauges::CameraGauges;
-use kind::Kind;
 
-/// Declares the struct, and registers each field as `lookdown_` followed by its name.
-macro_rules! metrics {
-    ($($(#[doc = $help:literal])+ $field:ident: $kind:ty = $name:literal [$($label:literal),*];)+) => {
-        /// The metrics of one server.
-        #[derive(Debug)]
-        pub struct Metrics {
-            registry: Registry,
-            /// Separate, as its names have no prefix.
-            process: Registry,
-            $($(#[doc = $help])+ pub $field: $kind,)+
-        }
+metric_set! {
+    /// The metrics of one server.
+    pub struct Metrics {
+        registry: Registry,
+        /// Separate, as its names have no prefix.
+        process: Registry,
+        /// The metrics of detection.
+        pub detect: Arc<DetectMetrics>,
+    }
 
-        impl Metrics {
-            fn registered() -> Result<Self, prometheus::Error> {
-                let registry = Registry::new_custom(Some("lookdown".to_owned()), None)?;
-                $(
-                    let help = concat!($($help),+).trim_start();
-                    let $field = <$kind as Kind>::create($name, help, &[$($label),*])?;
-                    registry.register(Box::new($field.clone()))?;
-                )+
-                let process = Registry::new();
-                process.register(Box::new(ProcessCollector::for_self()))?;
-                Ok(Self { registry, process, $($field,)+ })
-            }
-        }
-    };
-}
-
-metrics! {
     /// Open connections, including those of the metrics port.
     connections: IntGauge = "connections" [];
     /// HTTP requests answered.
@@ -79,20 +62,8 @@ metrics! {
     failures: IntCounterVec = "request_failures_total" ["reason"];
     /// Frames that wait for a worker or are being processed.
     pending_frames: IntGauge = "pending_frames" [];
-    /// Frames dropped because their client had disconnected.
-    withdrawn_frames: IntCounter = "withdrawn_frames_total" [];
     /// Seconds since the last progress of a frame; 0 without frames.
     seconds_without_progress: IntGauge = "seconds_without_progress" [];
-    /// Stalls: no frame progressed for twice `server.request_timeout_millis`.
-    worker_stalls: IntCounter = "worker_stalls_total" [];
-    /// Always 1; the labels are the loaded models.
-    model_info: IntGaugeVec = "model_info" ["model", "revision"];
-    /// Model loads, by result.
-    model_loads: IntCounterVec = "model_loads_total" ["result"];
-    /// 1 while the inference server answers, else 0; only with an inference server.
-    remote_up: IntGaugeVec = "remote_up" [];
-    /// Requests to the inference server, by result; only with an inference server.
-    remote_requests: IntCounterVec = "remote_requests_total" ["result"];
     /// Calibrations in use.
     calibrations: IntGauge = "calibrations" [];
     /// Always 1; the label identifies the set of calibrations in use, and is equal for equal sets.
@@ -103,16 +74,6 @@ metrics! {
     calibration_loads: IntCounterVec = "calibration_loads_total" ["result"];
     /// 1 when the calibration store can be read, else 0.
     calibration_store_up: IntGauge = "calibration_store_up" [];
-    /// Cameras with remap tables in memory, one per profile and frame size.
-    rig_cache_rigs: IntGauge = "rig_cache_rigs" [];
-    /// Memory of remap tables, bytes.
-    rig_cache_bytes: IntGauge = "rig_cache_bytes" [];
-    /// Builds of remap tables.
-    rig_cache_builds: IntCounter = "rig_cache_builds_total" [];
-    /// Remap tables evicted from memory.
-    rig_cache_evictions: IntCounter = "rig_cache_evictions_total" [];
-    /// Frames answered from the inference cache.
-    inference_cache_hits: IntCounter = "recalled_frames_total" [];
     /// Cameras with a stored report.
     results_cameras: IntGauge = "results_cameras" [];
     /// Stored reports.
@@ -165,6 +126,14 @@ impl Default for Metrics {
 }
 
 impl Metrics {
+    fn registered() -> Result<Self, prometheus::Error> {
+        let registry = Registry::new_custom(Some("lookdown".to_owned()), None)?;
+        let process = Registry::new();
+        process.register(Box::new(ProcessCollector::for_self()))?;
+        let detect = Arc::new(DetectMetrics::registered_in(&registry)?);
+        Self::registered_with(&registry.clone(), registry, process, detect)
+    }
+
     /// Sets the version of the server, and the commit from which it was built, if known.
     pub fn set_build(&self, commit: Option<&str>) {
         let labels = [env!("CARGO_PKG_VERSION"), commit.unwrap_or_default()];
@@ -213,30 +182,8 @@ impl Metrics {
     }
 }
 
-/// Creates the rows of these results, at zero: an alert must see the first of each.
-pub fn start_at_zero(counters: &IntCounterVec, results: &[&str]) {
-    for result in results {
-        counters.with_label_values(&[result]);
-    }
-}
-
-/// Replaces the row of an info metric. A concurrent scrape sees one of them at least.
-pub fn replace_info(info: &IntGaugeVec, before: Option<&[&str]>, now: &[&str]) {
-    info.with_label_values(now).set(1);
-    if let Some(before) = before.filter(|before| *before != now) {
-        // There may be no such row yet.
-        let _ = info.remove_label_values(before);
-    }
-}
-
 fn count(persons: usize) -> f64 {
     u32::try_from(persons).unwrap_or(u32::MAX).into()
-}
-
-/// Returns the value of a gauge that counts things.
-#[must_use]
-pub fn gauge_value(count: impl TryInto<i64>) -> i64 {
-    count.try_into().unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

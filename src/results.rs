@@ -8,6 +8,7 @@ mod picture;
 mod redis;
 mod report;
 mod store;
+mod unreachable;
 
 pub use cameras::Cameras;
 pub use listeners::{ListenError, Listeners, Listening};
@@ -15,4 +16,5 @@ pub use memory::MemoryResults;
 pub use picture::{NewPicture, PicturesOf, StoredPicture};
 pub use redis::{RedisAddress, RedisAddressError, RedisOptions, RedisResults};
 pub use report::{NewReport, ReportId, StoredReport};
-pub use store::{ResultLimits, ResultStore, ResultUse, StoreHealth, Unreachable};
+pub use store::{ResultLimits, ResultStore, ResultUse, StoreHealth};
+pub use unreachable::Unreachable;

@@ -17,6 +17,7 @@ mod locate;
 mod model;
 mod mqtt;
 mod observability;
+mod page;
 #[cfg(test)]
 mod reference;
 mod remote;
@@ -37,6 +38,7 @@ pub use limits::LimitSettings;
 pub use locate::{PackagedFiles, find_beside_executable, find_calibrations, use_packaged_files};
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
+pub use page::PageSettings;
 pub use remote::RemoteSettings;
 pub use results::ResultSettings;
 pub use server::{ServerSettings, ShutdownSettings};
@@ -67,6 +69,8 @@ pub struct Settings {
     pub shutdown: ShutdownSettings,
     /// API keys, and the web pages that may call the server.
     pub access: AccessSettings,
+    /// The web page.
+    pub page: PageSettings,
     /// The calibration store.
     pub calibrations: CalibrationSettings,
     /// The defaults of detection parameters.
@@ -112,6 +116,7 @@ impl Settings {
             tls: TlsKeys::read(values)?.checked()?,
             shutdown: ShutdownSettings::read(values)?,
             access: AccessSettings::read(values)?,
+            page: PageSettings::read(values)?,
             calibrations: CalibrationSettings::read(values)?,
             detect: DetectDefaults::read(values)?,
             threads: ThreadKeys::read(values)?.plan(inference.device, is_remote),
@@ -134,6 +139,7 @@ fn entries() -> Vec<Entry> {
         TlsKeys::entries(),
         ShutdownSettings::entries(),
         AccessSettings::entries(),
+        PageSettings::entries(),
         CalibrationSettings::entries(),
         DetectDefaults::entries(),
         ModelSettings::entries(),

@@ -1,4 +1,4 @@
-"""The generator's commands: textures, persons, rooms, frames, sheets, statistics. Everything is made below --work and can be resumed.
+"""The generator's commands: textures, persons, rooms, frames, walks, sheets, statistics. Everything is made below --work and can be resumed.
 
 nice -n 19 python training/make.py persons --work WORK --first-seed 1000000 --count 200
 """
@@ -13,7 +13,9 @@ FIRST_SEED = 1_000_000
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("textures", "portraits", "persons", "rooms", "frames", "sheets", "statistics"))
+    parser.add_argument(
+        "what", choices=("textures", "portraits", "persons", "rooms", "frames", "walks", "sheets", "statistics")
+    )
     parser.add_argument("--work", type=Path, default=Path(__file__).parent / "work")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--count", type=int, default=20)
@@ -56,6 +58,13 @@ def main():
         from generator.frames import make_frames
 
         make_frames(work, options.first_seed, options.count, options.split)
+    elif options.what == "walks":
+        import cv2
+
+        cv2.setNumThreads(options.threads)
+        from generator.walks import make_walks
+
+        make_walks(work)
     elif options.what == "statistics":
         from generator.statistics import print_statistics
 

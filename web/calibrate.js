@@ -5,7 +5,7 @@ import { afterPause, element, find } from "./dom.js";
 import { assumedCircle, calibrationOf, circleOf } from "./lens.js";
 import { isServing, loadCalibrations } from "./parameters.js";
 import { shown, showFailure, withProgress } from "./progress.js";
-import { ask, askJson } from "./server.js";
+import { Problem, ask, askJson } from "./server.js";
 import { shared, whenChanged } from "./shared.js";
 import { viewCanvas } from "./straighten.js";
 import { GRID_CELLS } from "./views.js";
@@ -18,6 +18,8 @@ const PREVIEW_PIXELS = 320;
 /** An imported file: `{name, content, needsSize}`; null while the circle is edited. */
 let imported = null;
 let circle = null;
+/** The calibration that was opened: `{name, file, tag}`. A saved circle keeps everything in it but the lens. */
+let opened = null;
 let isVisible = false;
 let trying = null;
 
@@ -33,7 +35,7 @@ function begin() {
   const picture = find("#calibrate-picture");
   if (picture.src !== frame.url) {
     Object.assign(picture, { src: frame.url, width: frame.width, height: frame.height });
-    circle = null;
+    [circle, opened] = [null, null];
   }
   const { width, height } = frame;
   if (!circle) setCircle(assumedCircle(report ?? { image: { width, height } }));
@@ -58,10 +60,11 @@ function drawn() {
   if (imported) drawing.replaceChildren();
   else drawCircle(drawing, circle, (moved) => edited({ ...circle, ...moved }));
   for (const name of FIELDS) find(`output[for=calibrate-${name}]`).textContent = Number(field(name).value).toFixed(1);
-  find("#import-name").textContent = imported ? `${imported.name} is saved unchanged.` : "";
+  const id = field("id").value;
+  const loss = isServing(id) && imported?.name !== id ? ` The zones, lines and masks of ${id} are not kept.` : "";
+  find("#import-name").textContent = imported ? `${imported.name} is saved unchanged.${loss}` : "";
   find("#circle-fields").disabled = Boolean(imported);
   find("#import-fields").hidden = !imported;
-  const id = field("id").value;
   find("#save").textContent = isServing(id) ? `Replace ${id}` : "Save";
 }
 
@@ -70,7 +73,7 @@ function edited(next) {
   previewSoon();
 }
 
-const content = () => imported?.content ?? JSON.stringify(calibrationOf({ id: id(), ...circle }), null, 2);
+const content = (base = opened?.file) => imported?.content ?? JSON.stringify(calibrationOf({ id: id(), ...circle }, base), null, 2);
 const id = () => field("id").value || "camera";
 
 /** The query for an imported file: the camera, and the frame size if the format has none. */
@@ -113,18 +116,41 @@ const previewSoon = afterPause(REST_MILLIS, previewShown);
 
 async function save() {
   const name = id();
-  const before = shared.calibrations.find((calibration) => calibration.id === name);
-  const headers = before ? { "If-Match": `"${before.revision}"` } : { "If-None-Match": "*" };
-  const path = `calibrations/${name}?${reading()}`;
-  const options = { method: "PUT", body: content(), headers };
-  const answer = await withProgress(find("#save-progress"), "Saving", () => ask(path, options));
+  const answer = await withProgress(find("#save-progress"), "Saving", () => put(name));
   const { warnings = [] } = await answer.json();
+  if (!imported) opened = await read(name);
   await loadCalibrations();
   find("#saved").textContent = [`${name} is saved and in use.`, ...warnings.map(({ message }) => message)].join(" ");
   find("#calibration").value = name;
   find("#parameters").dispatchEvent(new Event("input"));
   drawn();
 }
+
+/** Reads a calibration of the server: `{name, file, tag}`. */
+async function read(name) {
+  const answer = await ask(`calibrations/${name}`);
+  return { name, file: await answer.json(), tag: answer.headers.get("ETag") };
+}
+
+/** Replaces the current calibration of this name, of which a circle keeps everything but the lens, or creates it. */
+async function put(name) {
+  let [base, headers] = [opened?.file, { "If-None-Match": "*" }];
+  if (imported && imported.name === name && opened?.name === name) headers = { "If-Match": opened.tag };
+  else if (isServing(name)) {
+    const current = await read(name);
+    headers = { "If-Match": current.tag };
+    base = current.file;
+    if (!imported && opened?.name === name && cameraOf(base) !== cameraOf(opened.file)) {
+      opened = current;
+      const remedy = "Open it again under Start from, or save again to replace it.";
+      throw new Problem(412, `${name} has another lens or mount since it was opened here. ${remedy}`);
+    }
+  }
+  return ask(`calibrations/${name}?${reading()}`, { method: "PUT", body: content(base), headers });
+}
+
+/** The part of a calibration that the circle replaces, as text. */
+const cameraOf = ({ image, lens, mount }) => JSON.stringify([image, lens, mount]);
 
 /** Imports a file from the disk; the server parses it. */
 async function importFile(file) {
@@ -139,7 +165,8 @@ async function importFile(file) {
 
 /** Loads a calibration of the server. */
 async function open(name) {
-  const file = await askJson(`calibrations/${name}`);
+  opened = await read(name);
+  const { file } = opened;
   const known = circleOf(file);
   field("id").value = name;
   imported = known ? null : { name, content: JSON.stringify(file), needsSize: false };

@@ -1,16 +1,12 @@
 /** The section Floor: persons from above, if the camera height is known. */
 
 import { element, find, plural, shape } from "./dom.js";
-import { points, roundStep } from "./geometry.js";
+import { VIEW_BOX, floorDot, floorGrid, floorPlaces, reachOf, scaleOf } from "./floor_map.js";
+import { points } from "./geometry.js";
 import { shown, withProgress } from "./progress.js";
 import { askJson } from "./server.js";
 import { change, shared, whenChanged } from "./shared.js";
 import { pointOut } from "./marks.js";
-
-/** Half the side of the drawing, in drawing units. */
-const HALF = 240;
-/** The minimum extent of the map, metres. */
-const LEAST_REACH = 3;
 
 let isVisible = false;
 let shownReport = null;
@@ -37,43 +33,26 @@ function reason(report) {
 
 function draw(report, file) {
   const zones = (file.zones ?? []).filter((zone) => zone.floor_m);
-  const distances = report.persons.flatMap(({ floor }) => (floor ? [Math.hypot(floor.x_m, floor.y_m)] : []));
-  const reach = Math.max(LEAST_REACH, ...distances) * 1.12;
-  const scale = HALF / reach;
-  const step = roundStep(reach, 6);
-  const rings = Array.from({ length: Math.floor(reach / step) }, (_, index) => (index + 1) * step);
-  const lines = rings.flatMap((ring) => [
-    shape("circle", { r: ring * scale, class: "ring" }),
-    shape("text", { x: 4, y: -ring * scale - 4, class: "metres" }, `${ring} m`),
-  ]);
+  const places = floorPlaces(report.persons);
+  const reach = reachOf(places.filter(Boolean));
+  const scale = scaleOf(reach);
   const areas = zones.map((zone) => {
     const outline = zone.floor_m.map((place) => place.map((value) => value * scale));
     return shape("polygon", { points: points(outline), class: "zone" }, shape("title", {}, zone.name));
   });
   const drawing = find("#map");
-  drawing.setAttribute("viewBox", `${-HALF} ${-HALF} ${2 * HALF} ${2 * HALF}`);
-  drawing.setAttribute("aria-label", `${plural(distances.length, "person")} on the floor, seen from above`);
+  drawing.setAttribute("viewBox", VIEW_BOX);
+  drawing.setAttribute("aria-label", `${plural(places.filter(Boolean).length, "person")} on the floor, seen from above`);
   drawing.replaceChildren(
-    shape("path", { d: `M${-HALF} 0H${HALF}M0 ${-HALF}V${HALF}`, class: "axis" }),
-    ...lines,
+    ...floorGrid(reach),
     ...areas,
-    shape("path", { d: "M-7 0L0 -7L7 0L0 7Z", class: "camera" }, shape("title", {}, "The camera")),
-    ...report.persons.flatMap((person, index) => (person.floor ? [dot(person.floor, index, scale)] : [])),
+    ...places.flatMap((place, index) => (place ? [floorDot(place, index, scale, over(index))] : [])),
   );
   find("#floor-facts").textContent = `The diamond in the middle is the camera, ${file.mount.height_m} m above the floor. Right and down are the directions in the frame.`;
   find("#places").replaceChildren(...report.persons.map(row));
 }
 
 const over = (index) => ({ onmouseenter: () => change("person", index), onmouseleave: () => change("person", null) });
-
-function dot({ x_m: x, y_m: y }, index, scale) {
-  return shape(
-    "g",
-    { class: "dot-mark", "data-person": index, transform: `translate(${x * scale} ${y * scale})`, ...over(index) },
-    shape("circle", { r: 12 }),
-    shape("text", {}, String(index + 1)),
-  );
-}
 
 function row({ floor }, index) {
   const cells = floor

@@ -25,6 +25,12 @@ export const points = (places) => places.map(([x, y]) => `${x.toFixed(1)},${y.to
 /** The centre of a person's box. */
 export const centre = ({ oriented_box: box }) => [box.cx, box.cy];
 
+/** The foot of a person: the middle of the lower end of the box, which decides the zones of the person. */
+export function foot({ oriented_box: { cx, cy, height, angle_deg: degrees } }) {
+  const turn = (degrees * Math.PI) / 180;
+  return [cx - (Math.sin(turn) * height) / 2, cy + (Math.cos(turn) * height) / 2];
+}
+
 /** The smallest of 1, 2 and 5 times a power of ten of which `most` steps reach `length`. */
 export function roundStep(length, most) {
   const least = length / most;

@@ -1,5 +1,7 @@
 /** Ideal lenses: converts a circle and a field of view to a calibration file and back. */
 
+import { scaledTo } from "./areas.js";
+
 /** The radius divided by the focal length for an angle from the axis. */
 const CURVES = {
   equidistant: (theta) => theta,
@@ -12,13 +14,16 @@ const STRAIGHT_DOWN = [0, 0, -1];
 
 /**
  * The calibration file of a lens whose image is a circle: `cx`, `cy` and `radius` in corner-origin pixels of a
- * frame of `width` × `height`, `fieldOfView` in degrees, `cameraHeight` in metres or null.
+ * frame of `width` × `height`, `fieldOfView` in degrees, `cameraHeight` in metres or null. Everything else, such as
+ * zones, is that of the file `base`.
  */
-export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldOfView, cameraHeight }) {
+export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldOfView, cameraHeight }, base = null) {
   const maxTheta = (fieldOfView / 2) * (Math.PI / 180);
-  const mount = { world_up: STRAIGHT_DOWN };
+  const { height_m: _, ...kept } = base?.mount ?? {};
+  const mount = { ...kept, world_up: STRAIGHT_DOWN };
   if (cameraHeight) mount.height_m = cameraHeight;
   return {
+    ...(base && scaledTo(base, { width, height })),
     id,
     image: { width, height },
     // Lens functions use pixel centres.
@@ -28,12 +33,12 @@ export function calibrationOf({ id, width, height, model, cx, cy, radius, fieldO
 }
 
 /** The circle from which `calibrationOf` makes this file; null if there is none. */
-export function circleOf({ lens, mount, image, zones, masks, detect }) {
+export function circleOf({ lens, mount, image }) {
   const curve = CURVES[lens.model];
   const focal = lens.focal ?? (lens.fx === lens.fy ? lens.fx : null);
   const up = mount?.world_up ?? STRAIGHT_DOWN;
-  const isOther = up.some((part, axis) => Math.abs(part - STRAIGHT_DOWN[axis]) > 1e-6) || zones?.length || masks?.length || detect;
-  if (!curve || !focal || !lens.max_theta || isOther) return null;
+  const isTilted = up.some((part, axis) => Math.abs(part - STRAIGHT_DOWN[axis]) > 1e-6);
+  if (!curve || !focal || !lens.max_theta || isTilted) return null;
   return {
     ...image,
     model: lens.model,

@@ -1,5 +1,6 @@
 /** The section Live: a card for each camera, updated by events. */
 
+import { addCounts, followCounts, layersBelow } from "./counts.js";
 import { element, find } from "./dom.js";
 import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
@@ -90,6 +91,7 @@ function draw(card) {
   );
   tellAge(card);
   showPicture(card);
+  addCounts(card);
 }
 
 /** Replaces the sketch by the image of the latest report, if the server stores images of this camera. */
@@ -97,7 +99,7 @@ async function showPicture(card) {
   if (!card.hasPicture || card.isAsking) return;
   card.isAsking = true;
   try {
-    const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=oriented,zones&width=480`);
+    const answer = await ask(`results/${encodeURIComponent(card.camera)}/latest.jpg?draw=${layersBelow(card)}&width=480`);
     const picture = element("img", { alt: `The latest frame of ${card.camera}`, src: URL.createObjectURL(await answer.blob()) });
     await picture.decode();
     find(".sight", card.node).firstChild.replaceWith(picture);
@@ -120,6 +122,7 @@ function tellAge({ age, history }) {
 const listenShown = shown(listen);
 
 export function visible(is) {
+  if (is === !listening) followCounts(is);
   if (!is) {
     listening?.abort();
     listening = null;

@@ -10,8 +10,9 @@ import * as live from "./live.js";
 import { loadCalibrations } from "./parameters.js";
 import { shown } from "./progress.js";
 import * as views from "./views.js";
+import * as zones from "./zones.js";
 
-const SECTIONS = { detect, views, floor, calibrate, live };
+const SECTIONS = { detect, views, floor, calibrate, zones, live };
 
 function showSection() {
   const name = location.hash.slice(1);

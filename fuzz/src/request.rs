@@ -115,7 +115,7 @@ fn router() -> Router {
             kept: vec![MODEL.to_owned()],
         },
         Box::new(|_| Ok(Model::new(Box::new(Silent(NetworkInput::plain(16, 16)))))),
-        Arc::clone(&metrics),
+        Arc::clone(&metrics.detect),
     );
     models.load(MODEL).unwrap();
     let calibrations = Arc::new(
@@ -133,9 +133,9 @@ fn router() -> Router {
     let registry = Arc::clone(models.registry());
     let engine = Engine::new(
         registry,
-        Some(Arc::clone(&calibrations)),
+        Some(calibrations.clone()),
         options,
-        Arc::clone(&metrics),
+        Arc::clone(&metrics.detect),
     )
     .unwrap();
     let workers = WorkerPool::start(&Arc::new(engine), one, one).unwrap();

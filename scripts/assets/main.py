@@ -8,10 +8,10 @@ from pathlib import Path
 
 from .console import SetupError, say
 from .machine import supported_cpu
-from .pins import Model, Pins, Quantised, read_pins
+from .pins import Derived, Model, Pins, read_pins
 from .places import Places
 from .private_python import PrivatePython
-from .steps import install_benches, install_model, install_quantised, install_runtime
+from .steps import install, install_benches, install_runtime
 from .toolchain import check_toolchain
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,7 +40,7 @@ def main(arguments: list[str]) -> int:
     signal.signal(signal.SIGTERM, _stop)
     try:
         pins = read_pins(ROOT / "scripts" / "pins.toml")
-        names = {model.name for model in pins.models + pins.quantised}
+        names = {model.name for model in pins.models + pins.derived}
         unknown = [name for name in arguments if name not in names.union(STEPS, MORE_STEPS)]
         if unknown:
             print(
@@ -89,13 +89,12 @@ def _set_up(places: Places, pins: Pins, arguments: list[str]) -> None:
             PrivatePython(places, WHEEL, places.own / "wheel").install_file(listed, "--require-hashes")
         if BENCHES in arguments:
             install_benches(places)
-        for model in chosen_models(pins.models + pins.quantised, arguments):
-            install = install_quantised if isinstance(model, Quantised) else install_model
+        for model in chosen_models(pins.models + pins.derived, arguments):
             install(places, model, pins)
     say("set-up", f"everything is in place ({time.monotonic() - started:.1f} s)")
 
 
-def chosen_models(models: tuple[Model | Quantised, ...], arguments: list[str]) -> list[Model | Quantised]:
+def chosen_models(models: tuple[Model | Derived, ...], arguments: list[str]) -> list[Model | Derived]:
     """The models of the arguments, in the order of the pins."""
     if EVERY_MODEL in arguments:
         return list(models)

@@ -62,16 +62,24 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Quantised:
-    """The INT8 version of a model, made from its ONNX file, and the sum of the result.
+class Derived:
+    """A model made from the ONNX file of another one and a file in its own folder, and the sum of the result.
 
-    `default` forms belong to every set-up.
+    `converter` is a module; `file` is the name of the file in the model's folder. `default` models belong to every
+    set-up.
     """
 
     name: str
-    source: Model
+    source: "Model | Derived"
+    converter: str
+    file: str
     onnx_sha256: str
     default: bool
+
+    @property
+    def origin(self) -> Model:
+        """The model from a package at the beginning of the chain of sources."""
+        return self.source.origin if isinstance(self.source, Derived) else self.source
 
 
 @dataclass(frozen=True)
@@ -90,7 +98,7 @@ class Pins:
 
     runtime: dict[str, Runtime]
     models: tuple[Model, ...]
-    quantised: tuple[Quantised, ...]
+    derived: tuple[Derived, ...]
     converter: tuple[Requirement, ...]
     node: tuple[Requirement, ...]
     builder: tuple[Requirement, ...]
@@ -109,13 +117,13 @@ def read_pins(file: Path, models_folder: Path = MODELS) -> Pins:
             name: _model(name, table, document["archives"][table["archive"]], models_folder)
             for name, table in document["models"].items()
         }
+        derived: dict[str, Derived] = {}
+        for name, table in document["derived"].items():
+            derived[name] = _derived(name, table, (models | derived)[table["source"]], models_folder)
         return Pins(
             runtime={cpu: _runtime(runtime, runtime[cpu]) for cpu in ("x86_64", "aarch64")},
             models=tuple(models.values()),
-            quantised=tuple(
-                _quantised(name, table, models[table["source"]], models_folder)
-                for name, table in document["quantised"].items()
-            ),
+            derived=tuple(derived.values()),
             converter=tuple(_requirement(table) for table in document["converter"]),
             node=tuple(_requirement(table) for table in document["node"]),
             builder=tuple(_requirement(table) for table in document["builder"]),
@@ -151,8 +159,15 @@ def _model(name: str, table: dict, archive: dict, models_folder: Path) -> Model:
     )
 
 
-def _quantised(name: str, table: dict, source: Model, models_folder: Path) -> Quantised:
-    return Quantised(name, source, _onnx_sha256(models_folder, name), table.get("default", False))
+def _derived(name: str, table: dict, source: Model | Derived, models_folder: Path) -> Derived:
+    return Derived(
+        name=name,
+        source=source,
+        converter=table["converter"],
+        file=_inside(table["file"]),
+        onnx_sha256=_onnx_sha256(models_folder, name),
+        default=table.get("default", False),
+    )
 
 
 def _onnx_sha256(models_folder: Path, name: str) -> str:

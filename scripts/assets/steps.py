@@ -8,7 +8,7 @@ from .archives import extract
 from .commands import run
 from .console import SetupError, megabytes, say
 from .downloads import fetch_package, fetch_wheel
-from .pins import Member, Model, Pins, Quantised, Runtime
+from .pins import Derived, Member, Model, Pins, Runtime
 from .places import Places, put_in_place
 from .private_python import PrivatePython, pip_environment
 from .sums import is_whole, require_sum
@@ -55,18 +55,23 @@ def install_model(places: Places, model: Model, pins: Pins) -> None:
     say(step, f"{model.name} is in place ({megabytes(onnx_file.stat().st_size)})")
 
 
-def install_quantised(places: Places, model: Quantised, pins: Pins) -> None:
-    """Puts the INT8 version of a model into its folder under `models/`, after the model itself."""
+def install(places: Places, model: Model | Derived, pins: Pins) -> None:
+    """Puts a model into its folder under `models/`, after its source."""
+    (install_derived if isinstance(model, Derived) else install_model)(places, model, pins)
+
+
+def install_derived(places: Places, model: Derived, pins: Pins) -> None:
+    """Puts a model that is made from another one into its folder under `models/`, after that one."""
     step = "model"
     onnx_file = places.root / "models" / model.name / "model.onnx"
     if not is_whole(onnx_file, model.onnx_sha256):
-        install_model(places, model.source, pins)
+        install(places, model.source, pins)
         python = PrivatePython(places, step)
         python.install("converter", pins.converter)
         source = places.root / "models" / model.source.name / "model.onnx"
         with places.temporary() as folder:
-            ranges = str(onnx_file.with_name("activation_ranges.json"))
-            put_in_place(_convert(places, model, python, folder, source, "convert.quantise", ranges), onnx_file)
+            own_file = str(onnx_file.with_name(model.file))
+            put_in_place(_convert(places, model, python, folder, source, model.converter, own_file), onnx_file)
     say(step, f"{model.name} is in place ({megabytes(onnx_file.stat().st_size)})")
 
 
@@ -80,7 +85,7 @@ def install_benches(places: Places) -> None:
 
 
 def _convert(
-    places: Places, model: Model | Quantised, python: PrivatePython, folder: Path, source: Path, module: str, *arguments
+    places: Places, model: Model | Derived, python: PrivatePython, folder: Path, source: Path, module: str, *arguments
 ) -> Path:
     say("model", f"making the ONNX file of {model.name}")
     onnx_file = folder / "model.onnx"

@@ -29,7 +29,7 @@ class Dist(unittest.TestCase):
         for name in ("LICENSE", "NOTICE", "runtime/libonnxruntime.so", "runtime/ThirdPartyNotices.txt"):
             self.assertIn(name, names)
         models = {name.split("/")[1] for name in names if name.endswith("/model.onnx")}
-        self.assertEqual(models, {model.name for model in pins.models + pins.quantised if model.default})
+        self.assertEqual(models, {model.name for model in pins.models + pins.derived if model.default})
 
     def test_a_file_that_is_missing_is_named(self):
         with self.assertRaises(SystemExit) as refused:

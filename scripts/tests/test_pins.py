@@ -33,22 +33,29 @@ class ShippedPins(InEmptyRepository):
 
     def test_every_model_has_a_manifest_of_its_name(self):
         pins = read_pins(SHIPPED)
-        for model in pins.models + pins.quantised:
+        for model in pins.models + pins.derived:
             text = (SCRIPTS.parent / "models" / model.name / "model.toml").read_text(encoding="utf-8")
             manifest = tomllib.loads(text)
             self.assertEqual((manifest["name"], manifest["onnx"]), (model.name, "model.onnx"))
 
     def test_every_fetched_model_has_the_sum_of_its_manifest(self):
         pins = read_pins(SHIPPED)
-        for model in pins.models + pins.quantised:
+        for model in pins.models + pins.derived:
             onnx_file = SCRIPTS.parent / "models" / model.name / "model.onnx"
             if onnx_file.is_file():
                 self.assertEqual(sha256_of(onnx_file), model.onnx_sha256, model.name)
 
     def test_every_int8_model_has_the_ranges_of_its_source(self):
-        for model in read_pins(SHIPPED).quantised:
-            text = (SCRIPTS.parent / "models" / model.name / "activation_ranges.json").read_text(encoding="utf-8")
+        quantised = [model for model in read_pins(SHIPPED).derived if model.converter == "convert.quantise"]
+        self.assertIn("nanodet_g_416_int8", [model.name for model in quantised])
+        for model in quantised:
+            text = (SCRIPTS.parent / "models" / model.name / model.file).read_text(encoding="utf-8")
             self.assertEqual(json.loads(text)["model_sha256"], model.source.onnx_sha256)
+
+    def test_every_derived_model_has_its_converter_and_its_file(self):
+        for model in read_pins(SHIPPED).derived:
+            self.assertTrue((SCRIPTS / f"{model.converter.replace('.', '/')}.py").is_file())
+            self.assertTrue((SCRIPTS.parent / "models" / model.name / model.file).is_file())
 
     def test_weights_without_a_stated_licence_come_with_a_caution(self):
         for model in read_pins(SHIPPED).models:
@@ -63,7 +70,7 @@ class ShippedPins(InEmptyRepository):
     def test_no_sum_is_pinned_for_two_different_archives(self):
         pins = read_pins(SHIPPED)
         archives = {model.archive for model in pins.models}
-        sums = [archive.sha256 for archive in archives] + [model.onnx_sha256 for model in pins.models + pins.quantised]
+        sums = [archive.sha256 for archive in archives] + [model.onnx_sha256 for model in pins.models + pins.derived]
         sums += [runtime.archive.sha256 for runtime in pins.runtime.values()]
         sums += [value for pin in pins.converter + pins.node + pins.builder + pins.checker for value in pin.sha256]
         self.assertEqual(len(sums), len(set(sums)))

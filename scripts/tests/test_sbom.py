@@ -57,7 +57,7 @@ class ShippedBill(unittest.TestCase):
         runtime = pins.runtime[self.cpu].archive
         library = self.components[f"pkg:pypi/onnxruntime@{runtime.version}"]
         self.assertEqual(library["hashes"][0]["content"], runtime.sha256)
-        for model in pins.models + pins.quantised:
+        for model in pins.models + pins.derived:
             part = self.components[f"model:{model.name}"]
             self.assertEqual(part["hashes"][0]["content"], model.onnx_sha256)
             self.assertEqual(part["scope"], "required" if model.default else "optional")

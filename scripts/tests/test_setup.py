@@ -9,8 +9,8 @@ from unittest import mock
 import setup
 from assets import main
 from assets.console import SetupError
-from assets.pins import Archive, Pins, Quantised, Runtime
-from assets.steps import install_model, install_quantised, install_runtime
+from assets.pins import Archive, Derived, Pins, Runtime
+from assets.steps import install_derived, install_model, install_runtime
 
 from .support import InEmptyRepository, archive_of, member, model_of, sha256
 
@@ -54,7 +54,7 @@ class Installing(InEmptyRepository):
 
     def test_an_int8_form_brings_the_model_it_is_made_from(self):
         model = model_of(archive_of(b""), (WEIGHTS,), b"onnx")
-        form = Quantised("net_int8", model, sha256(b"int8"), default=False)
+        form = Derived("net_int8", model, "convert.quantise", "activation_ranges.json", sha256(b"int8"), default=False)
         self.enterContext(mock.patch("assets.steps.PrivatePython"))
         install = self.enterContext(mock.patch("assets.steps.install_model"))
 
@@ -68,7 +68,7 @@ class Installing(InEmptyRepository):
         self.enterContext(mock.patch("assets.steps.run", side_effect=quantise))
         self.write("models/net_int8/activation_ranges.json", b"{}")
         pins = Pins({}, (model,), (form,), (), (), (), ())
-        install_quantised(self.places, form, pins)
+        install_derived(self.places, form, pins)
         install.assert_called_once_with(self.places, model, pins)
         self.assertEqual((self.places.root / "models/net_int8/model.onnx").read_bytes(), b"int8")
 

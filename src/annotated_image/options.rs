@@ -2,11 +2,11 @@
 
 use std::str::FromStr;
 
+use lookdown_detect::parameter_table;
 use strum::{EnumString, VariantArray, VariantNames};
 
 use crate::pipeline::{
     GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
-    parameter_table,
 };
 
 const NO_LAYER: &str = "none";

@@ -3,13 +3,13 @@
 
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout};
+use super::{AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes};
 use crate::rounding::{degrees, pixels, share};
 
 /// The format.
 pub(super) const FORMAT: FormatSpec = FormatSpec {
     media_type: "application/x.coco+json",
-    has_oriented_boxes: false,
+    boxes: SupportedBoxes::AxisParallel,
     layout: Layout::OneFile {
         path: "annotations.json",
         document,
@@ -20,9 +20,9 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
 const PERSON: u64 = 1;
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct Document<'a, Shape> {
     images: Vec<Image<'a>>,
-    annotations: Vec<Annotation>,
+    annotations: Vec<Annotation<Shape>>,
     categories: [Category; 1],
 }
 
@@ -37,16 +37,23 @@ struct Image<'a> {
 }
 
 #[derive(Serialize)]
-struct Annotation {
+struct Annotation<Shape> {
     id: u64,
     image_id: u64,
     category_id: u64,
-    bbox: [f64; 4],
-    area: f64,
+    #[serde(flatten)]
+    shape: Shape,
     iscrowd: u8,
     /// Required by some tools, though there are no masks.
     segmentation: [f64; 0],
     score: f64,
+}
+
+/// The box of an annotation.
+#[derive(Serialize)]
+struct Shape {
+    bbox: [f64; 4],
+    area: f64,
     oriented_box: Oriented,
 }
 
@@ -67,6 +74,14 @@ struct Category {
 }
 
 fn document(images: &[AnnotatedImage], _boxes: BoxKind) -> String {
+    document_of(images, shape)
+}
+
+/// Returns the document whose annotations have the keys of `shape` for each clipped box and person.
+pub(super) fn document_of<Shape: Serialize>(
+    images: &[AnnotatedImage],
+    shape: fn([f64; 4], &AnnotatedBox) -> Shape,
+) -> String {
     let mut document = Document {
         images: Vec::with_capacity(images.len()),
         annotations: Vec::new(),
@@ -86,31 +101,27 @@ fn document(images: &[AnnotatedImage], _boxes: BoxKind) -> String {
         });
         for (corners, person) in image.boxes() {
             let id = document.annotations.len() as u64 + 1;
-            let annotation = annotation(id, image_id, corners, person);
-            document.annotations.push(annotation);
+            document.annotations.push(Annotation {
+                id,
+                image_id,
+                category_id: PERSON,
+                shape: shape(corners, person),
+                iscrowd: 0,
+                segmentation: [],
+                score: share(person.score),
+            });
         }
     }
     // Serialising numbers and strings in a fixed structure cannot fail.
     serde_json::to_string_pretty(&document).unwrap_or_default()
 }
 
-fn annotation(
-    id: u64,
-    image_id: u64,
-    [left, top, right, bottom]: [f64; 4],
-    person: &AnnotatedBox,
-) -> Annotation {
+fn shape([left, top, right, bottom]: [f64; 4], person: &AnnotatedBox) -> Shape {
     let (width, height) = (pixels(right - left), pixels(bottom - top));
     let oriented = &person.oriented_box;
-    Annotation {
-        id,
-        image_id,
-        category_id: PERSON,
+    Shape {
         bbox: [left, top, width, height],
         area: pixels(width * height),
-        iscrowd: 0,
-        segmentation: [],
-        score: share(person.score),
         oriented_box: Oriented {
             cx: pixels(oriented.center.x),
             cy: pixels(oriented.center.y),

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::{
-    AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout,
+    AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes,
     xml::{self, Text},
 };
 use crate::{
@@ -22,7 +22,7 @@ struct Annotations {
 /// The format.
 pub(super) const FORMAT: FormatSpec = FormatSpec {
     media_type: "application/xml",
-    has_oriented_boxes: true,
+    boxes: SupportedBoxes::Both,
     layout: Layout::OneFile {
         path: "annotations.xml",
         document,

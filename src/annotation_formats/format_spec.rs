@@ -7,9 +7,19 @@ pub(super) struct FormatSpec {
     /// The media type of a document. One that is not registered begins with `x.`, so that it is not
     /// taken for a report.
     pub(super) media_type: &'static str,
-    /// True if the format offers oriented boxes beside axis-parallel ones.
-    pub(super) has_oriented_boxes: bool,
+    pub(super) boxes: SupportedBoxes,
     pub(super) layout: Layout,
+}
+
+/// The kinds of boxes that a format can have as its shapes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SupportedBoxes {
+    /// Axis-parallel boxes. Oriented boxes may be additional keys.
+    AxisParallel,
+    /// Oriented boxes.
+    Oriented,
+    /// Either kind, as requested.
+    Both,
 }
 
 /// The files of a format.
@@ -23,7 +33,7 @@ pub(super) enum Layout {
     FilePerImage {
         /// Returns the path of the file of the image with this name.
         path: fn(&str) -> String,
-        document: fn(&AnnotatedImage) -> String,
+        document: fn(&AnnotatedImage, BoxKind) -> String,
         others: fn() -> Vec<AnnotationFile>,
     },
 }

@@ -5,11 +5,10 @@
 
 use serde::Serialize;
 
-use super::{AnnotatedBox, AnnotatedImage, FormatSpec, LABEL, Layout, stem};
-use crate::{
-    geometry::OrientedBox,
-    rounding::{degrees, metres, pixels, share},
+use super::{
+    AnnotatedBox, AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes, stem,
 };
+use crate::rounding::{degrees, metres, pixels, share};
 
 #[derive(Serialize)]
 struct FeatureCollection<'a> {
@@ -62,7 +61,7 @@ struct Floor {
 /// The format.
 pub(super) const FORMAT: FormatSpec = FormatSpec {
     media_type: "application/geo+json",
-    has_oriented_boxes: false,
+    boxes: SupportedBoxes::Oriented,
     layout: Layout::FilePerImage {
         path,
         document,
@@ -75,7 +74,7 @@ fn path(image_file_name: &str) -> String {
     format!("features/{}.geojson", stem(image_file_name))
 }
 
-fn document(image: &AnnotatedImage) -> String {
+fn document(image: &AnnotatedImage, _boxes: BoxKind) -> String {
     let features = image.boxes().zip(1..);
     let document = FeatureCollection {
         r#type: "FeatureCollection",
@@ -101,7 +100,7 @@ fn feature(id: usize, corners: [f64; 4], person: &AnnotatedBox) -> Feature {
         id,
         geometry: Polygon {
             r#type: "Polygon",
-            coordinates: [ring(oriented)],
+            coordinates: [ring(person)],
         },
         properties: Properties {
             label: LABEL,
@@ -119,18 +118,10 @@ fn feature(id: usize, corners: [f64; 4], person: &AnnotatedBox) -> Feature {
 
 /// The corners, with the first repeated at the end. They are counterclockwise with y upward, as RFC
 /// 7946 requires (section 3.1.6), and therefore clockwise in the image.
-fn ring(oriented: &OrientedBox) -> [[f64; 2]; 5] {
-    let (up, center) = (oriented.up, oriented.center);
-    let right = nalgebra::Vector2::new(-up.y, up.x);
-    [
-        (-0.5, 0.5),
-        (0.5, 0.5),
-        (0.5, -0.5),
-        (-0.5, -0.5),
-        (-0.5, 0.5),
-    ]
-    .map(|(across, along)| {
-        let corner = center + right * (across * oriented.width) + up * (along * oriented.height);
-        [pixels(corner.x), pixels(corner.y)]
-    })
+fn ring(person: &AnnotatedBox) -> [[f64; 2]; 5] {
+    let [a, b, c, d] = person
+        .oriented_box
+        .corners()
+        .map(|corner| [pixels(corner.x), pixels(corner.y)]);
+    [a, b, c, d, a]
 }

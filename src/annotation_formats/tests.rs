@@ -7,15 +7,14 @@ use crate::{
 fn person(corners: [f64; 4], angle_deg: f64) -> AnnotatedBox {
     AnnotatedBox {
         bbox: BBox::new(corners).unwrap(),
-        oriented_box: OrientedBox::turned(
-            Pixel::new(60.0, 50.0),
-            20.0,
-            40.0,
-            angle_deg.to_radians(),
-        ),
+        oriented_box: turned(60.0, 50.0, angle_deg),
         score: 0.876_54,
         floor: None,
     }
+}
+
+fn turned(x: f64, y: f64, angle_deg: f64) -> OrientedBox {
+    OrientedBox::turned(Pixel::new(x, y), 20.0, 40.0, angle_deg.to_radians())
 }
 
 /// An image of 200×100 pixels with one person inside, one half outside and one outside.
@@ -91,6 +90,48 @@ fn yolo_has_relative_boxes_a_file_per_image_and_the_class() {
     );
     assert_eq!(content(AnnotationFormat::Yolo, "classes.txt"), "person\n");
     assert!(content(AnnotationFormat::Yolo, "data.yaml").contains("  0: person\n"));
+}
+
+#[test]
+fn yolo_obb_has_the_corners_of_boxes_within_the_image() {
+    let mut image = image("a.jpg");
+    image.persons.truncate(2);
+    image.persons[0].oriented_box = turned(30.0, 50.0, 90.0);
+    image.persons[1].oriented_box = turned(190.0, 50.0, 0.0);
+    let text = AnnotationFormat::Yolo.document(&image, BoxKind::Oriented);
+    let expected = "0 0.250000 0.400000 0.250000 0.600000 0.050000 0.600000 0.050000 0.400000\n\
+                    0 0.900000 0.300000 1.000000 0.300000 1.000000 0.700000 0.900000 0.700000\n";
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn cepdof_has_five_numbers_per_box() {
+    let text = content(AnnotationFormat::Cepdof, "annotations.json");
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let expected = serde_json::json!({
+        "id": 1, "image_id": 1, "category_id": 1, "bbox": [60.0, 50.0, 20.0, 40.0, -30.0],
+        "area": 800.0, "iscrowd": 0, "segmentation": [], "score": 0.8765,
+    });
+    assert_eq!(document["annotations"][0], expected);
+}
+
+#[test]
+fn label_studio_rotates_about_the_upper_left_corner() {
+    let mut image = image("hall/a & b+1.jpg");
+    image.persons[0].oriented_box = turned(60.0, 50.0, -90.0);
+    let region = |boxes| {
+        let text = AnnotationFormat::LabelStudio.document(&image, boxes);
+        let tasks: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let address = "/data/local-files/?d=hall/a%20%26%20b%2B1.jpg";
+        assert_eq!(tasks[0]["data"]["image"], address);
+        tasks[0]["predictions"][0]["result"][0].clone()
+    };
+    let expected = serde_json::json!({"x": 20.0, "y": 60.0, "width": 10.0, "height": 40.0,
+        "rotation": 270.0, "rectanglelabels": ["person"]});
+    assert_eq!(region(BoxKind::Oriented)["value"], expected);
+    let expected = serde_json::json!({"x": 20.0, "y": 30.0, "width": 20.0, "height": 40.0,
+        "rotation": 0.0, "rectanglelabels": ["person"]});
+    assert_eq!(region(BoxKind::AxisParallel)["value"], expected);
 }
 
 #[test]

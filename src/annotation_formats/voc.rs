@@ -4,14 +4,14 @@
 use serde::Serialize;
 
 use super::{
-    AnnotatedImage, FormatSpec, LABEL, Layout, stem,
+    AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes, stem,
     xml::{self, Text},
 };
 
 /// The format.
 pub(super) const FORMAT: FormatSpec = FormatSpec {
     media_type: "application/xml",
-    has_oriented_boxes: false,
+    boxes: SupportedBoxes::AxisParallel,
     layout: Layout::FilePerImage {
         path,
         document,
@@ -60,7 +60,7 @@ fn path(image_file_name: &str) -> String {
     format!("Annotations/{}.xml", stem(image_file_name))
 }
 
-fn document(image: &AnnotatedImage) -> String {
+fn document(image: &AnnotatedImage, _boxes: BoxKind) -> String {
     let (folder, name) = image
         .file_name
         .rsplit_once('/')

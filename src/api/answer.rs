@@ -10,7 +10,7 @@ use self::format::AnswerFormat;
 pub(super) use self::format::TABLE;
 use crate::{
     annotated_image::{AnnotationError, AnnotationOptions, annotated_image},
-    annotation_formats::{AnnotatedImage, BoxKind},
+    annotation_formats::AnnotatedImage,
     api::http::{
         problem::{Problem, ProblemKind},
         query::{pairs, take},
@@ -55,7 +55,7 @@ impl AnswerOptions {
     pub(super) fn drawn_width(&self) -> u32 {
         match self.format {
             AnswerFormat::Picture(_) => self.picture.width,
-            AnswerFormat::Report | AnswerFormat::Annotations(_) => 0,
+            AnswerFormat::Report | AnswerFormat::Annotations(..) => 0,
         }
     }
 
@@ -69,10 +69,10 @@ impl AnswerOptions {
                 let picture = annotated_image(detected, format, &self.picture);
                 picture.map_err(not_drawn)?.into()
             }
-            AnswerFormat::Annotations(format) => {
+            AnswerFormat::Annotations(format, boxes) => {
                 let name = self.file_name.unwrap_or_else(|| NAMELESS.to_owned());
                 let image = AnnotatedImage::of(report, name);
-                format.document(&image, BoxKind::default()).into()
+                format.document(&image, boxes).into()
             }
         };
         Ok(Content {

@@ -21,8 +21,10 @@ pub(super) use parameters::{
     info(
         title = "Lookdown",
         description = "Detects persons in the frames of ceiling fisheye cameras. Every failure is a \
-                       problem document (RFC 9457)."
+                       problem document (RFC 9457).",
+        contact(name = "The Lookdown authors")
     ),
+    external_docs(url = "/problems", description = "Problems and their remedies"),
     servers((url = "/", description = "This server")),
     tags(
         (name = "detection", description = "Frames in, persons out."),

@@ -4,23 +4,22 @@ use std::{path::Path, sync::Arc};
 
 use crate::{
     inference::{
-        CandidateOptions, Detector, Device, Model, ModelFolder, ModelLoader, ModelManifest,
-        ModelRepository, OnnxDetector, OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer,
-        RepositoryOptions, is_fetched,
+        CandidateOptions, Device, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
+        OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, is_fetched,
+        onnx_loader,
     },
-    metrics::Metrics,
+    metrics::DetectMetrics,
     pipeline::{DefaultModels, Profile},
     settings::{RemoteSettings, Settings, SettingsError},
 };
 
 /// Opens the repository without loading a model. Also returns the default models.
 ///
-///
 /// # Errors
 /// One sentence that names the setting, for a file that is missing or cannot be used.
 pub(super) fn open(
     settings: &Settings,
-    metrics: &Arc<Metrics>,
+    metrics: &Arc<DetectMetrics>,
 ) -> anyhow::Result<(ModelRepository, DefaultModels)> {
     let path = settings.model.find_repository()?;
     let mut one = settings.model.find_one()?;
@@ -53,20 +52,16 @@ pub(super) fn open(
             let loader = remote_loader(settings, Arc::clone(&server));
             ModelRepository::new(options, loader, Arc::clone(metrics)).on(server)
         }
-        None => ModelRepository::new(options, onnx_loader(settings)?, Arc::clone(metrics)),
+        None => ModelRepository::new(options, local_loader(settings)?, Arc::clone(metrics)),
     };
     Ok((repository, defaults))
 }
 
 /// Returns the loader of models that run in this process.
-fn onnx_loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
+fn local_loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
     let library = settings.inference.find_library()?;
     let options = onnx_options(settings);
-    let sessions = settings.threads.sessions;
-    Ok(Box::new(move |path| {
-        let (first, others) = OnnxDetector::load_sessions(&library, path, &options, sessions)?;
-        Ok(model_of(first, others))
-    }))
+    Ok(onnx_loader(library, options, settings.threads.sessions))
 }
 
 /// Returns the loader of models that run on an inference server.
@@ -75,14 +70,8 @@ fn remote_loader(settings: &Settings, server: Arc<RemoteServer>) -> ModelLoader 
     let sessions = settings.threads.sessions;
     Box::new(move |path| {
         let (first, others) = RemoteDetector::load_sessions(&server, path, options, sessions)?;
-        Ok(model_of(first, others))
+        Ok(Model::of_sessions(first, others))
     })
-}
-
-fn model_of<D: Detector + 'static>(first: D, others: Vec<D>) -> Model {
-    let others = others.into_iter();
-    let others = others.map(|session| Box::new(session) as Box<dyn Detector>);
-    Model::of_sessions(Box::new(first), others.collect())
 }
 
 /// The inference server of the settings. `called` is the model's name in this process.

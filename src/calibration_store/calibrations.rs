@@ -27,11 +27,12 @@ use super::{CalibrationStore, StoreError};
 use crate::{
     calibration::{Calibration, CalibrationId},
     metrics::{Metrics, start_at_zero},
+    pipeline::{CalibrationLookup, UnusableCalibration},
 };
 
 pub use change::{Put, WriteCondition};
 pub use content::{CalibrationEntry, Reading, defaults};
-pub use error::{ChangeError, UnusableCalibration};
+pub use error::ChangeError;
 pub use snapshot::{CalibrationRow, CalibrationsHealth};
 
 /// The calibrations of a store. Shared; lookups never wait for the store.
@@ -141,24 +142,6 @@ impl Calibrations {
         self.is_read.load(Ordering::Relaxed)
     }
 
-    /// The calibration `id`; `None` when there is none. Does not block.
-    ///
-    /// # Errors
-    /// [`UnusableCalibration`] when its file has never held one that can be used, or several.
-    pub fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, UnusableCalibration> {
-        let now = self.now();
-        if let Some(entry) = now.entry(id) {
-            return Ok(Some(Arc::clone(&entry.calibration)));
-        }
-        match now.why_unusable(id) {
-            Some((file, problem)) => Err(UnusableCalibration {
-                place: format!("{}/{file}", self.store.place()),
-                problem,
-            }),
-            None => Ok(None),
-        }
-    }
-
     /// Returns the entry of the calibration `id` that serves. Does not block.
     #[must_use]
     pub fn entry(&self, id: &CalibrationId) -> Option<Arc<CalibrationEntry>> {
@@ -189,6 +172,22 @@ impl Calibrations {
     fn lock(&self) -> MutexGuard<'_, ()> {
         // Guards no data that a panic could leave half changed.
         self.changing.lock()
+    }
+}
+
+impl CalibrationLookup for Calibrations {
+    fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, UnusableCalibration> {
+        let now = self.now();
+        if let Some(entry) = now.entry(id) {
+            return Ok(Some(Arc::clone(&entry.calibration)));
+        }
+        match now.why_unusable(id) {
+            Some((file, problem)) => Err(UnusableCalibration {
+                place: format!("{}/{file}", self.store.place()),
+                problem,
+            }),
+            None => Ok(None),
+        }
     }
 }
 

@@ -4,13 +4,12 @@ use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 
 use anyhow::Context;
 use clap::Args;
-use lookdown_client::ServerEntry;
 use lookdown_count::{
     CountEntry, CountOptions, HttpEntry, MqttEntry, Origin, Snapshot, StoreEntry, count,
 };
 use tokio::{runtime, sync::watch};
 
-use super::{SettingsFile, serve};
+use super::{SettingsFile, serve, server_flags::ServerFlags};
 use crate::{
     mqtt::{Broker, CountsOptions, CountsPublisher},
     shutdown::Shutdown,
@@ -25,15 +24,8 @@ pub(super) struct Arguments {
     /// A file of settings (docs/count.md) [default: none]
     #[arg(value_name = "COUNT.toml")]
     file: Option<PathBuf>,
-    /// The URL of the server [default: port 8080 on this machine]
-    #[arg(long, value_name = "URL")]
-    server: Option<String>,
-    /// A file with the API key for the server
-    #[arg(long, value_name = "FILE")]
-    api_key_file: Option<PathBuf>,
-    /// A PEM file with the authorities of the server's certificate [default: those of the system]
-    #[arg(long, value_name = "FILE")]
-    authorities: Option<PathBuf>,
+    #[command(flatten)]
+    server: ServerFlags,
     /// The address of the counts [default: 127.0.0.1:8090]
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
@@ -47,11 +39,7 @@ pub(super) struct Arguments {
 impl Arguments {
     fn origin(&self) -> Origin {
         let flags = CountEntry {
-            server: ServerEntry {
-                url: self.server.clone(),
-                api_key_file: self.api_key_file.clone(),
-                authorities: self.authorities.clone(),
-            },
+            server: self.server.entry(),
             http: HttpEntry {
                 listen: self.listen,
                 ..HttpEntry::default()

@@ -70,7 +70,7 @@ pub(super) struct Arguments {
     /// The folder for --format
     #[arg(long, value_name = "FOLDER", requires = "format")]
     out: Option<PathBuf>,
-    /// Write boxes turned along the persons; with --format cvat
+    /// Write boxes rotated along the persons, for example YOLO OBB with --format yolo
     #[arg(long, requires = "format")]
     oriented: bool,
     #[command(flatten)]
@@ -219,7 +219,10 @@ fn labels(arguments: &Arguments, pictures: &[Picture]) -> anyhow::Result<Option<
     let boxes = match arguments.oriented {
         false => BoxKind::AxisParallel,
         true if format.has_oriented_boxes() => BoxKind::Oriented,
-        true => bail!("--oriented: {format} has no turned boxes; use --format cvat"),
+        true => bail!(
+            "--oriented: {format} has no oriented boxes: use --format with one of {}",
+            AnnotationFormat::names_with_oriented_boxes()
+        ),
     };
     Labels::start(format, boxes, folder, pictures).map(Some)
 }

@@ -11,6 +11,7 @@ use strum::VariantNames;
 
 use crate::{
     annotated_image::AnnotationOptions,
+    cli::complete,
     pipeline::{
         DetectParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
     },
@@ -119,11 +120,14 @@ fn flag(spec: &ParameterSpec) -> Arg {
         }
         ParameterDefault::None => String::new(),
     };
-    let flag = Arg::new(spec.name)
+    let mut flag = Arg::new(spec.name)
         .long(spec.name.replace('_', "-"))
         .allow_hyphen_values(true)
         .help(format!("{summary}{default}"))
         .long_help(format!("{}{default}", spec.help));
+    if spec.name == DetectParameters::MODEL {
+        flag = flag.add(complete::of_model());
+    }
     match spec.kind {
         ParameterKind::Choice(names) => flag
             .value_name("NAME")

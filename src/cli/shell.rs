@@ -11,7 +11,7 @@ use anyhow::Context;
 use clap::{Args, Command};
 use clap_complete::Shell;
 
-use crate::cli::output::UNWRITABLE;
+use crate::cli::{complete, output::UNWRITABLE};
 
 /// Arguments of `lookdown completions`.
 #[derive(Debug, Args)]
@@ -27,13 +27,10 @@ pub(super) struct ManualArguments {
     folder: PathBuf,
 }
 
-/// Prints the completions of `command` for a shell.
-pub(super) fn print_completions(
-    arguments: &CompletionArguments,
-    mut command: Command,
-) -> anyhow::Result<ExitCode> {
+/// Prints the script that completes the command line in a shell. It calls this program.
+pub(super) fn print_completions(arguments: &CompletionArguments) -> anyhow::Result<ExitCode> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut command, "lookdown", &mut script);
+    complete::write_script(arguments.shell, &mut script).context(UNWRITABLE)?;
     io::stdout().write_all(&script).context(UNWRITABLE)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -9,12 +9,11 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::{Args, builder::PossibleValuesParser};
-use lookdown_client::ServerEntry;
 use lookdown_watch::{CameraEntry, Origin, Transport, WatchOptions, watch};
 use strum::VariantNames;
 use tokio::{runtime, time::sleep};
 
-use super::{SettingsFile, serve};
+use super::{SettingsFile, serve, server_flags::ServerFlags};
 use crate::{
     pipeline::Profile,
     probe::{self, Probe},
@@ -37,15 +36,8 @@ pub(super) struct Arguments {
     source: String,
     #[command(flatten)]
     camera: CameraFlags,
-    /// The URL of the server [default: port 8080 on this machine]
-    #[arg(long, value_name = "URL")]
-    server: Option<String>,
-    /// A file with the API key for the server
-    #[arg(long, value_name = "FILE")]
-    api_key_file: Option<PathBuf>,
-    /// A PEM file with the authorities of the server's certificate [default: those of the system]
-    #[arg(long, value_name = "FILE")]
-    authorities: Option<PathBuf>,
+    #[command(flatten)]
+    server: ServerFlags,
     /// The address of the metrics of the cameras, such as 127.0.0.1:9102 [default: none]
     #[arg(long, value_name = "ADDRESS")]
     metrics_listen: Option<SocketAddr>,
@@ -210,15 +202,10 @@ async fn watch_and_serve(
 
 /// The cameras, and the server that receives their frames.
 fn origin(arguments: &Arguments, settings: &Settings) -> anyhow::Result<Origin> {
-    let own = match (&arguments.server, arguments.serve) {
-        (None, true) => Some(own_address(settings)?),
-        (url, _) => url.clone(),
-    };
-    let server = ServerEntry {
-        url: own,
-        api_key_file: arguments.api_key_file.clone(),
-        authorities: arguments.authorities.clone(),
-    };
+    let mut server = arguments.server.entry();
+    if server.url.is_none() && arguments.serve {
+        server.url = Some(own_address(settings)?);
+    }
     let path = Path::new(&arguments.source);
     if path.extension().is_some_and(|ending| ending == "toml") {
         if arguments.camera.is_given() {

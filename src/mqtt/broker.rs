@@ -1,9 +1,11 @@
 //! The address of the broker and the login, as one URL.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, path::Path, str::FromStr};
 
 use percent_encoding::percent_decode_str;
 use url::Url;
+
+use crate::tls::{ClientTls, TlsError};
 
 const PORT: u16 = 1883;
 const TLS_PORT: u16 = 8883;
@@ -18,6 +20,15 @@ pub struct Broker {
     /// True if the connection uses TLS.
     pub has_tls: bool,
     pub(super) login: Option<(String, String)>,
+}
+
+impl Broker {
+    /// Returns the client side of TLS if the connection uses it. `authorities` is a PEM file; `None`
+    /// trusts those of the system.
+    pub(super) fn tls(&self, authorities: Option<&Path>) -> Result<Option<ClientTls>, TlsError> {
+        let tls = || ClientTls::new("mqtt.authorities", authorities);
+        self.has_tls.then(tls).transpose()
+    }
 }
 
 /// The text is no URL of a broker. The text is not repeated, as it may hold a password.

@@ -5,7 +5,6 @@ use std::{
     future::Future,
     path::PathBuf,
     pin::{Pin, pin},
-    time::Duration,
 };
 
 use lookdown_count::Snapshot;
@@ -20,16 +19,10 @@ use super::{
     Broker,
     discovery::{OFFLINE, ONLINE},
     message::Message,
-    session::{Session, SessionError},
+    session::{Session, SessionError, reconnect_backoff},
     topics::level,
 };
 use crate::tls::{ClientTls, TlsError};
-
-/// Pauses before the next attempt to connect to the broker.
-const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
-const LONGEST_PAUSE: Duration = Duration::from_mins(1);
-/// A connection that has lasted this long resets the pause.
-const STABLE: Duration = Duration::from_secs(10);
 
 /// The broker of the counts, and the settings of the messages.
 pub struct CountsOptions {
@@ -63,12 +56,8 @@ impl CountsPublisher {
         options: CountsOptions,
         snapshots: watch::Receiver<Snapshot>,
     ) -> Result<Self, TlsError> {
-        let tls = options.broker.has_tls.then(|| {
-            let authorities = options.authorities.as_deref();
-            ClientTls::new("mqtt.authorities", authorities)
-        });
         Ok(Self {
-            tls: tls.transpose()?,
+            tls: options.broker.tls(options.authorities.as_deref())?,
             client_id: format!("lookdown-count-{}", Uuid::new_v4().simple()),
             options,
             snapshots,
@@ -79,26 +68,23 @@ impl CountsPublisher {
     pub async fn run(mut self) {
         let mut snapshots = self.snapshots.clone();
         let mut stop = pin!(async move { while snapshots.changed().await.is_ok() {} });
-        let mut pause = SHORTEST_PAUSE;
+        let mut backoff = reconnect_backoff();
         let mut has_warned = false;
         loop {
             let began = Instant::now();
             let Err(error) = self.serve(&mut has_warned, stop.as_mut()).await else {
                 return;
             };
-            if began.elapsed() >= STABLE {
-                pause = SHORTEST_PAUSE;
-            }
+            backoff.reset_if_stable(began.elapsed());
             if !has_warned {
                 let broker = &self.options.broker;
                 tracing::warn!("not publishing to the broker {broker} (mqtt.url): {error}");
             }
             has_warned = true;
             tokio::select! {
-                () = sleep(pause) => {}
+                () = sleep(backoff.next_pause()) => {}
                 () = &mut stop => return,
             }
-            pause = (2 * pause).min(LONGEST_PAUSE);
         }
     }
 
@@ -151,30 +137,11 @@ impl CountsPublisher {
     fn retained(&self, snapshot: &Snapshot) -> Retained {
         let mut retained = Retained::new();
         for camera in &snapshot.cameras {
-            let base = self.topic(&format!("counts/cameras/{}", level(&camera.name)));
-            let is_known = if camera.persons.is_some() {
-                ONLINE
-            } else {
-                OFFLINE
-            };
-            retained.insert(format!("{base}/availability"), is_known.to_owned());
-            let mut device = Device {
-                publisher: self,
-                id: format!(
-                    "{}_{}",
-                    level(&self.options.topic_prefix),
-                    level(&camera.name)
-                ),
-                name: &camera.name,
-                availability: format!("{base}/availability"),
-                retained: &mut retained,
-            };
-            device.state(
-                "Tracked persons",
-                "tracked",
-                format!("{base}/persons"),
-                camera.persons,
-            );
+            let name = level(&camera.name);
+            let base = self.topic(&format!("counts/cameras/{name}"));
+            let id = format!("{}_{name}", level(&self.options.topic_prefix));
+            let shown = camera.name.clone();
+            let mut device = Device::new(self, id, shown, &base, camera.persons, &mut retained);
             for line in &camera.lines {
                 let (line_level, direction) = (level(&line.line), level(&line.direction));
                 device.total(
@@ -211,30 +178,11 @@ impl CountsPublisher {
             }
         }
         for site in &snapshot.sites {
-            let base = self.topic(&format!("counts/sites/{}", level(&site.name)));
-            let is_known = if site.persons.is_some() {
-                ONLINE
-            } else {
-                OFFLINE
-            };
-            retained.insert(format!("{base}/availability"), is_known.to_owned());
-            let mut device = Device {
-                publisher: self,
-                id: format!(
-                    "{}_site_{}",
-                    level(&self.options.topic_prefix),
-                    level(&site.name)
-                ),
-                name: &format!("Site {}", site.name),
-                availability: format!("{base}/availability"),
-                retained: &mut retained,
-            };
-            device.state(
-                "Tracked persons",
-                "tracked",
-                format!("{base}/persons"),
-                site.persons,
-            );
+            let name = level(&site.name);
+            let base = self.topic(&format!("counts/sites/{name}"));
+            let id = format!("{}_site_{name}", level(&self.options.topic_prefix));
+            let shown = format!("Site {}", site.name);
+            Device::new(self, id, shown, &base, site.persons, &mut retained);
         }
         retained
     }
@@ -244,12 +192,36 @@ impl CountsPublisher {
 struct Device<'a> {
     publisher: &'a CountsPublisher,
     id: String,
-    name: &'a str,
+    name: String,
     availability: String,
     retained: &'a mut Retained,
 }
 
-impl Device<'_> {
+impl<'a> Device<'a> {
+    /// A device with its availability and the number of its persons, below the topic `base`.
+    fn new(
+        publisher: &'a CountsPublisher,
+        id: String,
+        name: String,
+        base: &str,
+        persons: Option<u64>,
+        retained: &'a mut Retained,
+    ) -> Self {
+        let availability = format!("{base}/availability");
+        let is_known = if persons.is_some() { ONLINE } else { OFFLINE };
+        retained.insert(availability.clone(), is_known.to_owned());
+        let mut device = Self {
+            publisher,
+            id,
+            name,
+            availability,
+            retained,
+        };
+        let topic = format!("{base}/persons");
+        device.state("Tracked persons", "tracked", topic, persons);
+        device
+    }
+
     /// Adds a number that changes in both directions. An unknown one has no message.
     fn state(&mut self, name: &str, entity: &str, topic: String, value: Option<u64>) {
         let config = json!({ "state_class": "measurement", "icon": "mdi:account-group" });

@@ -16,7 +16,7 @@ use super::{
     cameras::Cameras,
     discovery::{Discovery, OFFLINE, ONLINE},
     message::Message,
-    session::{Session, SessionError},
+    session::{Session, SessionError, reconnect_backoff},
     topics::Topics,
 };
 use crate::{
@@ -28,11 +28,8 @@ use crate::{
 
 /// Most reports that wait for the broker. When the queue is full, the oldest report is not sent.
 const QUEUE: usize = 64;
-/// Pauses before the next attempt to connect to the broker.
-const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
-const LONGEST_PAUSE: Duration = Duration::from_mins(1);
-/// A connection that has lasted this long resets the pause.
-const STEADY: Duration = Duration::from_secs(10);
+/// Pause before the next attempt to listen to the results.
+const LISTEN_PAUSE: Duration = Duration::from_secs(1);
 
 /// Shortest time between two messages of the whole state. Any client of the broker can ask for it.
 const BIRTH_PAUSE: Duration = Duration::from_secs(10);
@@ -83,12 +80,8 @@ impl Publisher {
         results: Arc<dyn ResultStore>,
         metrics: Arc<Metrics>,
     ) -> Result<Self, TlsError> {
-        let tls = options.broker.has_tls.then(|| {
-            let authorities = options.authorities.as_deref();
-            ClientTls::new("mqtt.authorities", authorities)
-        });
         Ok(Self {
-            tls: tls.transpose()?,
+            tls: options.broker.tls(options.authorities.as_deref())?,
             topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
             client_id: format!("lookdown-{}", Uuid::new_v4().simple()),
             options,
@@ -117,7 +110,7 @@ impl Publisher {
             let age = Duration::try_from(age).unwrap_or_default();
             cameras.update(&report, age, Instant::now());
         }
-        let mut pause = SHORTEST_PAUSE;
+        let mut backoff = reconnect_backoff();
         let mut is_told = false;
         loop {
             let opened = tokio::select! {
@@ -135,9 +128,7 @@ impl Publisher {
                     self.metrics.mqtt_connected.set(1);
                     let ended = self.serve(session, &mut cameras, &mut queue).await;
                     self.metrics.mqtt_connected.set(0);
-                    if began.elapsed() >= STEADY {
-                        pause = SHORTEST_PAUSE;
-                    }
+                    backoff.reset_if_stable(began.elapsed());
                     ended
                 }
                 Err(error) => Err(error),
@@ -149,10 +140,9 @@ impl Publisher {
             }
             is_told = true;
             tokio::select! {
-                () = sleep(pause) => {}
+                () = sleep(backoff.next_pause()) => {}
                 () = self.skip_reports(&mut cameras, &mut queue) => return,
             }
-            pause = (2 * pause).min(LONGEST_PAUSE);
         }
     }
 
@@ -282,8 +272,12 @@ async fn hear(results: &Arc<dyn ResultStore>, queue: broadcast::Sender<Arc<Store
             }
             Err(ListenError::Ended) => return,
             // A permit is released when another listener leaves.
-            Err(ListenError::Full { .. } | ListenError::ShareUsed { .. }) => {
-                sleep(SHORTEST_PAUSE).await;
+            Err(
+                ListenError::Full { .. }
+                | ListenError::ShareUsed { .. }
+                | ListenError::Unreachable(_),
+            ) => {
+                sleep(LISTEN_PAUSE).await;
             }
         }
     }

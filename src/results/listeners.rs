@@ -6,7 +6,7 @@ use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::{mpsc, watch};
 
-use super::{Cameras, StoredReport};
+use super::{Cameras, StoredReport, Unreachable};
 use crate::{
     fairness::{BudgetError, BudgetShare, Client, SharedBudget},
     metrics::Metrics,
@@ -37,6 +37,9 @@ pub enum ListenError {
         /// The maximum number of listeners.
         most: usize,
     },
+    /// The store does not answer.
+    #[error(transparent)]
+    Unreachable(#[from] Unreachable),
     /// The server is shutting down.
     #[error("no more reports will be published: the server is shutting down")]
     Ended,
@@ -48,6 +51,8 @@ pub struct Listeners {
     /// The permits, including those of dropped listeners that have not noticed yet.
     budget: SharedBudget,
     group: Mutex<Group>,
+    /// The number of times that cameras got their first listener.
+    arrivals: watch::Sender<u64>,
     /// The number of times that cameras were removed.
     removals: watch::Sender<u64>,
     metrics: Arc<Metrics>,
@@ -67,12 +72,14 @@ impl Listeners {
         Self {
             budget: SharedBudget::new(most.get()),
             group: Mutex::default(),
+            arrivals: watch::Sender::default(),
             removals: watch::Sender::default(),
             metrics,
         }
     }
 
-    /// Adds a listener that receives everything published from now on.
+    /// Adds a listener that receives everything that is published here from now on. A store that
+    /// servers share may publish here only a moment later, see [`super::ResultStore::listen`].
     ///
     /// # Errors
     /// [`ListenError`] when all permits, or those of the client, are in use, or the server is
@@ -100,6 +107,9 @@ impl Listeners {
         let (sender, queue) = mpsc::channel(QUEUE);
         let queues = group.queues.entry(to.clone()).or_default();
         queues.insert(number, sender);
+        if queues.len() == 1 {
+            self.arrivals.send_modify(|count| *count += 1);
+        }
         self.metrics.results_listeners.inc();
         Ok(Listening {
             queue,
@@ -121,26 +131,38 @@ impl Listeners {
         self.removals.send_modify(|count| *count += 1);
     }
 
-    /// Returns true if any listener would receive a report of this camera.
-    pub(super) fn has_listener_for(&self, camera: &str) -> bool {
-        let group = self.group();
-        let one = Cameras::One(camera.to_owned());
-        group.queues.contains_key(&Cameras::All) || group.queues.contains_key(&one)
+    /// Returns a receiver that changes when cameras get their first listener.
+    pub(super) fn arrivals(&self) -> watch::Receiver<u64> {
+        self.arrivals.subscribe()
     }
 
-    /// Publishes a report to the listeners of its camera. Never waits.
+    /// The cameras that have listeners.
+    pub(super) fn cameras(&self) -> Vec<Cameras> {
+        self.group().queues.keys().cloned().collect()
+    }
+
+    /// Returns true if these cameras have a listener.
+    pub(super) fn has_listener_for(&self, cameras: &Cameras) -> bool {
+        self.group().queues.contains_key(cameras)
+    }
+
+    /// Publishes a report to the listeners of its camera and to those of all cameras. Never waits.
     pub fn tell(&self, report: &Arc<StoredReport>) {
-        let mut group = self.group();
-        let group = &mut *group;
         for to in [Cameras::All, Cameras::One(report.report.camera.clone())] {
-            if let Some(queues) = group.queues.get_mut(&to) {
-                let before = queues.len();
-                queues.retain(|_, queue| queue.try_send(Arc::clone(report)).is_ok());
-                let dropped = (before - queues.len()) as u64;
-                self.metrics.results_listeners_dropped.inc_by(dropped);
-                if queues.is_empty() {
-                    group.queues.remove(&to);
-                }
+            self.publish_to(&to, report);
+        }
+    }
+
+    /// Publishes a report to the listeners to these cameras. Never waits.
+    pub(super) fn publish_to(&self, to: &Cameras, report: &Arc<StoredReport>) {
+        let mut group = self.group();
+        if let Some(queues) = group.queues.get_mut(to) {
+            let before = queues.len();
+            queues.retain(|_, queue| queue.try_send(Arc::clone(report)).is_ok());
+            let dropped = (before - queues.len()) as u64;
+            self.metrics.results_listeners_dropped.inc_by(dropped);
+            if queues.is_empty() {
+                group.queues.remove(to);
             }
         }
     }

@@ -11,10 +11,10 @@ use parking_lot::{Mutex, MutexGuard};
 
 use self::kept::Kept;
 use super::{
-    Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
-    StoreHealth, StoredPicture, StoredReport, Unreachable,
+    Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, ResultLimits,
+    ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
-use crate::metrics::Metrics;
+use crate::{fairness::Client, metrics::Metrics};
 
 /// Keeps reports in memory, within limits. They are lost when the process ends.
 #[derive(Debug)]
@@ -106,6 +106,10 @@ impl ResultStore for MemoryResults {
 
     async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
         Ok(self.kept().picture(camera))
+    }
+
+    async fn listen(&self, client: &Client, to: Cameras) -> Result<Listening, ListenError> {
+        self.listeners.listen(client, to)
     }
 
     fn listeners(&self) -> &Arc<Listeners> {

@@ -1,15 +1,21 @@
 //! Reports in a Redis that several servers share, so that each server answers for every camera.
 //!
 //! A server holds two connections, independent of the number of listeners: one for queries and
-//! reports, one that blocks until new reports arrive. Redis assigns the IDs, so they are the same
-//! on every server. While Redis is unreachable, reports wait in a bounded outbox, and detection
+//! reports, one that subscribes to the cameras that have listeners here. Redis assigns the IDs, so
+//! they are the same on every server. While Redis is unreachable, reports wait in a bounded outbox, and detection
 //! does not wait for them.
 
 mod address;
 mod connect;
+mod followed;
 mod keys;
 mod link;
+mod message;
+mod news;
+mod node;
+mod nodes;
 mod outbox;
+mod pushes;
 mod reading;
 mod reply_limit;
 mod sender;
@@ -28,17 +34,19 @@ pub use self::address::{RedisAddress, RedisAddressError};
 pub use self::shared::RedisOptions;
 use self::{
     connect::{Connector, TIMEOUT},
+    followed::Followed,
     keys::Keys,
     link::Link,
+    nodes::Nodes,
     outbox::Outbox,
     reading::Reader,
     shared::Shared,
 };
 use super::{
-    Cameras, Listeners, NewPicture, NewReport, ReportId, ResultLimits, ResultStore, ResultUse,
-    StoreHealth, StoredPicture, StoredReport, Unreachable,
+    Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, ResultLimits,
+    ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
-use crate::{metrics::Metrics, tls::TlsError};
+use crate::{fairness::Client, metrics::Metrics, tls::TlsError};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);
@@ -66,7 +74,9 @@ impl RedisResults {
         metrics: Arc<Metrics>,
     ) -> Result<Self, TlsError> {
         let shared = Arc::new(Shared {
-            keys: Keys::new(options.key_prefix.clone()),
+            keys: Keys::new(&options.key_prefix, options.address.database()),
+            nodes: Nodes::default(),
+            followed: Followed::default(),
             connector: Connector::new(options.address.clone(), max_reply_bytes(&limits))?,
             options,
             link: Link::new(metrics.results_store_up.clone()),
@@ -141,16 +151,29 @@ impl ResultStore for RedisResults {
         after: ReportId,
         most: NonZeroUsize,
     ) -> Result<Vec<Arc<StoredReport>>, Unreachable> {
-        self.ask(async |mut reader| match cameras {
-            Cameras::All => reader.since(after, most).await,
-            Cameras::One(camera) => reader.since_of(camera, after, most).await,
-        })
-        .await
+        self.ask(async |mut reader| reader.since(cameras, after, most).await)
+            .await
     }
 
     async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
         self.ask(async |mut reader| reader.picture(camera).await)
             .await
+    }
+
+    async fn listen(&self, client: &Client, to: Cameras) -> Result<Listening, ListenError> {
+        let Shared { link, followed, .. } = &*self.shared;
+        let listening = self.shared.listeners.listen(client, to.clone())?;
+        let is_followed = async {
+            tokio::select! {
+                biased;
+                () = followed.contains(&to) => Ok(listening),
+                problem = link.lost() => Err(Unreachable(problem).into()),
+            }
+        };
+        timeout(TIMEOUT, is_followed).await.unwrap_or_else(|_| {
+            let problem = "it has not confirmed a subscription in time".to_owned();
+            Err(Unreachable(problem).into())
+        })
     }
 
     fn listeners(&self) -> &Arc<Listeners> {

@@ -24,6 +24,12 @@ impl ReportId {
         Self(u64::try_from(time.as_microsecond()).unwrap_or(0))
     }
 
+    /// Returns the ID of this number.
+    #[must_use]
+    pub(super) fn of_micros(micros: u64) -> Self {
+        Self(micros)
+    }
+
     /// The time at which the report was stored, to the microsecond.
     #[must_use]
     pub fn time(self) -> Timestamp {

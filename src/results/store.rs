@@ -4,12 +4,11 @@ use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
 
-use super::{Cameras, Listeners, NewPicture, NewReport, ReportId, StoredPicture, StoredReport};
-
-/// The result store does not answer.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the result store does not answer: {0}")]
-pub struct Unreachable(pub String);
+use super::{
+    Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, StoredPicture,
+    StoredReport, Unreachable,
+};
+use crate::fairness::Client;
 
 /// A result store. Its return values are shared, not copied.
 #[async_trait]
@@ -60,6 +59,14 @@ pub trait ResultStore: Send + Sync {
     /// # Errors
     /// [`Unreachable`].
     async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable>;
+
+    /// Adds a listener that receives every report of these cameras that is stored after this
+    /// returns, and perhaps some that were stored before.
+    ///
+    /// # Errors
+    /// [`ListenError`] when there are too many listeners, the store does not answer, or the server
+    /// is shutting down.
+    async fn listen(&self, client: &Client, to: Cameras) -> Result<Listening, ListenError>;
 
     /// The listeners to what is published, here or on another server with the same store.
     fn listeners(&self) -> &Arc<Listeners>;

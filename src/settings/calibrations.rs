@@ -9,6 +9,7 @@ use super::{
     form::{Form, MAX_BYTES, Refusal, flag, parsed, poll_seconds, whole},
     locate::DEFAULT_CALIBRATIONS,
 };
+use crate::pipeline::EngineOptions;
 
 settings! {
     /// The calibration store.
@@ -31,7 +32,7 @@ settings! {
         zone_metrics: bool = false => flag();
         /// The most memory for the remap tables of cameras, in bytes. The least recently used go
         /// first.
-        cache_bytes: usize = 256 << 20 => whole(0..=MAX_BYTES);
+        cache_bytes: usize = EngineOptions::RIG_CACHE_BYTES => whole(0..=MAX_BYTES);
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
     form::{Form, Refusal, count, millis, parsed, path, share},
     locate::{DEFAULT_LIBRARY, locate},
 };
-use crate::inference::{Device, UnknownDevice};
+use crate::inference::{CandidateOptions, Device, UnknownDevice};
 
 /// A second: a server whose batches take longer to fill has no traffic to fill them.
 const MAX_QUEUE_DELAY_MILLIS: u64 = 1_000;
@@ -25,12 +25,12 @@ settings! {
         library_path: PathBuf = DEFAULT_LIBRARY.into() => path();
         /// The device that runs models: `cpu`, or a GPU by its number as `cuda:0` or `tensorrt:0`.
         /// For a GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
-        /// `onnxruntime-gpu`.
+        /// `onnxruntime-gpu`. GPUs are experimental: none has been tested.
         device: Device = Device::Cpu => device();
         /// The least score of a candidate. Candidates below it are dropped first of all.
-        score_floor: f64 = 0.05 => share();
+        score_floor: f64 = CandidateOptions::DEFAULT.score_floor => share();
         /// The most candidates kept of one view, best first.
-        max_detections_per_view: NonZeroUsize = NonZeroUsize::new(300).unwrap_or(NonZeroUsize::MIN)
+        max_detections_per_view: NonZeroUsize = NonZeroUsize::new(CandidateOptions::DEFAULT.max_detections_per_view).unwrap_or(NonZeroUsize::MIN)
             => count();
         /// The most frames whose candidates are kept for requests with `remember=true`: with
         /// another refinement these need no new inference. They hold 32 MiB at most.

@@ -5,14 +5,14 @@ use std::{
     sync::OnceLock,
 };
 
+pub(super) use lookdown_detect::{
+    DEFAULT_MODELS as DEFAULT_REPOSITORY, DEFAULT_ONNX_RUNTIME as DEFAULT_LIBRARY,
+};
+
 use super::SettingsError;
 
 /// Default folder of calibration files.
 pub(super) const DEFAULT_CALIBRATIONS: &str = "calibrations";
-/// Default folder of models.
-pub(super) const DEFAULT_REPOSITORY: &str = "models";
-/// Default ONNX Runtime library, installed by `make setup`.
-pub(super) const DEFAULT_LIBRARY: &str = "runtime/libonnxruntime.so";
 
 /// The files of a package whose executable is not Lookdown's own, such as the Python package.
 #[derive(Debug)]

@@ -159,7 +159,17 @@ async fn every_response_has_the_report_headers() {
         .unwrap()
         .len()
         .to_string();
-    for format in ["json", "image", "coco", "cvat", "yolo", "voc", "geojson"] {
+    for format in [
+        "json",
+        "image",
+        "coco",
+        "cvat",
+        "yolo",
+        "voc",
+        "geojson",
+        "cepdof",
+        "labelstudio",
+    ] {
         let answer = accepting(&service, "*/*", &format!("format={format}")).await;
         assert_eq!(answer.header("x-person-count"), count, "{format}");
         assert!(answer.header("server-timing").contains("inference;dur="));
@@ -186,6 +196,16 @@ async fn annotation_files_have_the_name_of_the_uploaded_file() {
             "\"file_name\": \"hall 1.png\"",
         ),
         ("yolo", "text/plain; charset=utf-8", "0 0."),
+        (
+            "cepdof",
+            "application/x.cepdof+json",
+            "\"file_name\": \"hall 1.png\"",
+        ),
+        (
+            "labelstudio",
+            "application/x.label-studio+json",
+            "?d=hall%201.png\"",
+        ),
     ] {
         let parts: [(&str, &[u8]); 4] = [
             (named, &image),
@@ -204,6 +224,36 @@ async fn annotation_files_have_the_name_of_the_uploaded_file() {
         "{}",
         raw.text()
     );
+}
+
+#[tokio::test]
+async fn oriented_boxes_are_the_shapes_of_formats_with_them() {
+    let service = Service::start();
+    let report = accepting(&service, "application/json", "").await.json();
+    let persons = report["persons"].as_array().unwrap().len();
+    assert!(persons > 0);
+    for (format, part, count) in [
+        ("cvat", "rotation=\"", persons),
+        ("labelstudio", "\"rectanglelabels\": ", persons),
+        ("yolo", " ", 8 * persons),
+    ] {
+        let query = format!("format={format}&oriented=true");
+        let answer = accepting(&service, "*/*", &query).await;
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        let text = answer.text();
+        assert_eq!(text.matches(part).count(), count, "{text}");
+    }
+    for format in ["coco", "voc", "json"] {
+        let query = format!("format={format}&oriented=true");
+        let answer = accepting(&service, "*/*", &query).await;
+        assert_eq!(answer.status, 422, "{format}");
+        let problem = answer.problem();
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(
+            detail.contains("cvat, yolo, geojson, cepdof, labelstudio"),
+            "{detail}"
+        );
+    }
 }
 
 #[tokio::test]

@@ -69,6 +69,10 @@ fn report() -> DetectionReport {
             name: "nanodet_g_416".to_owned(),
             revision: "a3c2e9b54d10".to_owned(),
         }),
+        crop_model: Some(ModelUsed {
+            name: "nanodet_g_fisheye_416".to_owned(),
+            revision: "5b1f0c77e2aa".to_owned(),
+        }),
         profile: Profile::Balanced,
         refinement: RefinementParameters {
             refinement: Refinement::Fusion,

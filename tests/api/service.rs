@@ -179,14 +179,14 @@ pub(crate) fn assembly(gate: &Arc<Gate>) -> (Assembly, TempDir) {
             };
             Ok(Model::new(Box::new(detector)))
         }),
-        Arc::clone(&metrics),
+        Arc::clone(&metrics.detect),
     );
     let options = EngineOptions::for_testing("eager");
     let store = Box::new(FolderStore::new(folder.path()));
     let calibrations = Arc::new(Calibrations::open(store, true, Arc::clone(&metrics)).unwrap());
     let registry = Arc::clone(models.registry());
-    let known = Some(Arc::clone(&calibrations));
-    let engine = Engine::new(registry, known, options, Arc::clone(&metrics)).unwrap();
+    let known = Arc::clone(&calibrations);
+    let engine = Engine::new(registry, Some(known), options, Arc::clone(&metrics.detect)).unwrap();
     let models = Arc::new(models);
     let assembly = Assembly {
         engine,

@@ -1,5 +1,6 @@
 //! The Open Inference Protocol: JSON and bytes, frames and views.
 
+mod batch;
 mod describe;
 mod frames;
 mod refusals;

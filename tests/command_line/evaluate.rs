@@ -93,6 +93,17 @@ fn rotated_boxes_match_their_oriented_boxes() {
 }
 
 #[test]
+fn annotations_in_the_format_of_cepdof_are_matched() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let flags = ["--format", "cepdof", "--out", out];
+    lookdown(&[&["detect", "samples/office.jpg"], &flags[..]].concat());
+    let file = std::fs::read_to_string(folder.path().join("annotations.json")).unwrap();
+    let row = evaluated("images/office.jpg", &[("annotations.json", file)]);
+    assert_all_were_detected(&row, found().len());
+}
+
+#[test]
 fn boxes_of_a_coco_file_are_matched() {
     let found = found();
     let boxes = found.iter().map(|person| {

@@ -246,7 +246,7 @@ fn images_with_the_same_annotation_file_are_refused() {
 
 #[test]
 fn oriented_boxes_are_refused_for_formats_without_them() {
-    let flags = ["--format", "yolo", "--out", "labels", "--oriented"];
+    let flags = ["--format", "voc", "--out", "labels", "--oriented"];
     let output = lookdown(&[&["detect", "a.jpg"], &flags[..]].concat(), &[]);
-    assert_fails_with(&output, &["--oriented", "yolo", "cvat"]);
+    assert_fails_with(&output, &["--oriented", "voc", "yolo", "cvat"]);
 }

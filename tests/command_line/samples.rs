@@ -1,7 +1,13 @@
 //! The shipped samples with the real binary and the real models, as in the quick start.
 
-use std::{path::Path, process::Command};
+use std::{path::Path, process::Command, sync::Arc};
 
+use lookdown::{
+    calibration::Calibration,
+    imaging::decode::{DecodeLimits, decode},
+    parameters::DetectParameters,
+};
+use lookdown_detect::{Detector, DetectorOptions};
 use serde_json::Value;
 
 /// `x_min, y_min, x_max, y_max`.
@@ -152,10 +158,70 @@ fn the_paper_s_refinements_differ_as_their_formulas_require() {
 }
 
 #[test]
-fn quality_reports_both_models_and_other_profiles_report_one() {
-    let report = detect("office", &["--profile", "quality"]);
-    let names = ["model", "second_opinion"].map(|part| report[part]["name"].as_str().unwrap());
-    assert_eq!(names, ["nanodet_g_416", "ssdlite_mobilenet_v2_int8"]);
-    let one = detect("office", &["--profile", "fast"]);
-    assert!(one.get("second_opinion").is_none());
+fn report_names_the_models_of_first_pass_zoom_views_and_crops() {
+    let names = |report: &Value| {
+        ["model", "second_opinion", "crop_model"].map(|part| {
+            let name = report.get(part).map(|model| model["name"].as_str());
+            name.map(|name| name.unwrap().to_owned())
+        })
+    };
+    let some = |name: &str| Some(name.to_owned());
+    let quality = detect("office", &["--profile", "quality"]);
+    assert_eq!(
+        names(&quality),
+        [
+            some("nanodet_g_416"),
+            some("ssdlite_mobilenet_v2_int8"),
+            some("nanodet_g_fisheye_416_int8")
+        ]
+    );
+    let fast = detect("office", &["--profile", "fast"]);
+    assert_eq!(
+        names(&fast),
+        [
+            some("nanodet_g_416_int8"),
+            None,
+            some("nanodet_g_fisheye_416_int8")
+        ]
+    );
+}
+
+#[test]
+fn named_model_processes_the_crops_as_well() {
+    let report = detect(
+        "office",
+        &["--profile", "fast", "--model", "nanodet_g_416_int8"],
+    );
+    assert!(report.get("crop_model").is_none());
+}
+
+#[test]
+fn the_library_detects_the_persons_that_the_command_reports() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let detector = Detector::new(&DetectorOptions {
+        onnx_runtime: root.join("runtime/libonnxruntime.so"),
+        models: root.join("models"),
+        ..DetectorOptions::default()
+    });
+    let content = std::fs::read(root.join("samples/office.jpg")).unwrap();
+    let frame = decode(&content, &DecodeLimits::default()).unwrap().frame;
+    let camera = Calibration::read(&root.join("samples/calibrations/office.json")).unwrap();
+    let parameters = DetectParameters::parse([("profile", "fast")]).unwrap();
+    let found = detector
+        .unwrap()
+        .detect(Arc::new(frame), Some(Arc::new(camera)), &parameters)
+        .unwrap();
+
+    let calibration = "samples/calibrations/office.json";
+    let report = detect(
+        "office",
+        &["--profile", "fast", "--calibration", calibration],
+    );
+    assert!(!found.persons.is_empty());
+    assert_eq!(found.persons.len(), persons(&report).len());
+    for (person, reported) in found.persons.iter().zip(persons(&report)) {
+        for (side, expected) in person.bbox.corners().into_iter().zip(corners(reported)) {
+            assert!((side - expected).abs() < 0.01, "{person:?}, {reported}");
+        }
+    }
 }

@@ -5,14 +5,47 @@ use std::fs;
 use super::lookdown;
 
 #[test]
-fn completions_contain_the_commands() {
-    for shell in ["bash", "zsh", "fish"] {
+fn completion_scripts_call_the_program() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let output = lookdown(&["completions", shell], &[]);
         let script = String::from_utf8(output.stdout).unwrap();
-        for word in ["calibration", "score-threshold", "soft_nms_gaussian"] {
-            assert!(script.contains(word), "{shell}: {word}: {script}");
-        }
+        assert!(script.contains("LOOKDOWN_COMPLETE"), "{shell}: {script}");
     }
+}
+
+/// Returns what bash offers for the last of these words.
+fn offered(words: &[&str]) -> Vec<String> {
+    let index = words.len().to_string();
+    let variables = [
+        ("LOOKDOWN_COMPLETE", "bash"),
+        ("_CLAP_COMPLETE_INDEX", &index),
+        ("_CLAP_IFS", "\n"),
+    ];
+    let arguments = [&["--", "lookdown"], words].concat();
+    let output = lookdown(&arguments, &variables);
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().map(|line| line.trim().to_owned()).collect()
+}
+
+#[test]
+fn commands_flags_and_values_are_completed() {
+    for (words, expected) in [
+        (&["cal"][..], "calibration"),
+        (&["detect", "--score-t"], "--score-threshold"),
+        (&["detect", "--profile", "qu"], "quality"),
+        (&["detect", "--refine", "soft_nms_g"], "soft_nms_gaussian"),
+        (&["detect", "--format", "labels"], "labelstudio"),
+    ] {
+        assert_eq!(offered(words), [expected], "{words:?}");
+    }
+}
+
+#[test]
+fn names_of_models_are_completed() {
+    let expected = ["yolov3_tiny_416".to_owned()];
+    assert_eq!(offered(&["detect", "--model", "yolov3_t"]), expected);
+    assert_eq!(offered(&["model", "fetch", "yolov3_t"]), expected);
+    assert!(offered(&["detect", "--model", "unknown"]).is_empty());
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use lookdown::{
     annotation_formats::{AnnotatedBox, AnnotatedImage, AnnotationFormat, BoxKind},
     detection::BBox,
-    evaluation::{AnnotatedPerson, DataSet, Outline},
+    evaluation::{AnnotatedPerson, DataSet, Outline, RotatedBox},
     geometry::{OrientedBox, Pixel},
 };
 
@@ -54,6 +54,32 @@ fn coco_with_calibrations_is_read_back_as_a_data_set() {
             .all(|image| image.calibration.is_some())
     );
     assert_same_persons(&data_set, &images);
+}
+
+#[test]
+fn cepdof_with_images_is_read_back_with_its_angles() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = [image("a.jpg", 10.25), image("hall/b.jpg", 300.0)];
+    for image in &images {
+        let path = folder.path().join(&image.file_name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, "").unwrap();
+    }
+    write(AnnotationFormat::Cepdof, &images, folder.path());
+
+    let data_set = DataSet::open(folder.path()).unwrap();
+    assert_eq!(data_set.images.len(), 2);
+    for read in &data_set.images {
+        let [person] = &read.truth.persons[..] else {
+            panic!("{:?}", read.truth.persons);
+        };
+        let Outline::Rotated(rotated) = person.outline else {
+            panic!("{:?}", person.outline);
+        };
+        let written =
+            RotatedBox::new([30.0, 55.0, 40.0, 70.0], 11.46_f64.to_radians(), [960; 2]).unwrap();
+        assert_eq!(rotated, written);
+    }
 }
 
 #[test]

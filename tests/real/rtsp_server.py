@@ -20,10 +20,12 @@ def main(port: str, folder: str, rate: str, *login: str) -> None:
     Gst.init(None)
     server = GstRtspServer.RTSPServer(service=port, address="127.0.0.1")
     factory = GstRtspServer.RTSPMediaFactory(shared=True)
+    # One thread writes one slice for each frame. rtph264pay repeats the parameter sets before every slice of a key frame,
+    # which would end the frame after its first slice.
     factory.set_launch(
         f"( multifilesrc location={folder}/%d.jpg loop=true caps=image/jpeg,framerate={rate}/1 ! jpegdec"
         " ! videoconvert ! video/x-raw,format=I420 ! identity sync=true"
-        " ! x264enc tune=zerolatency speed-preset=ultrafast key-int-max=10"
+        " ! x264enc tune=zerolatency speed-preset=ultrafast key-int-max=10 threads=1"
         " ! rtph264pay name=pay0 config-interval=-1 )"
     )
     if login:

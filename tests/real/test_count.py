@@ -104,7 +104,8 @@ class Counts(unittest.TestCase):
             tracks = wait_until(lambda: (count.get("/counts/office/tracks") or {}).get("tracks"), "there are tracks")
             self.assertLessEqual(abs(len(tracks) - persons), 2)
             self.assertEqual(
-                {"frame_px", "id", "first_seen", "last_seen", "tail"}, set(tracks[0]) - {"floor_m", "velocity_m_s"}
+                {"frame_px", "id", "first_seen", "last_seen", "tail", "tail_px"},
+                set(tracks[0]) - {"floor_m", "velocity_m_s"},
             )
             wait_until(
                 lambda: self.broker.retained().get(f"{TOPICS}/persons") == str(len(tracks)), "the broker has them"

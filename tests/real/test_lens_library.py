@@ -1,4 +1,4 @@
-"""A program outside of this repository that depends on the library lookdown-lens, and the package of the library."""
+"""A program outside of this repository that depends on the library lookdown-lens, and the packages of the libraries."""
 
 import math
 import shutil
@@ -41,9 +41,10 @@ class LensLibrary(unittest.TestCase):
             self.assertAlmostEqual(x, FX * distorted + CX, places=9)
             self.assertAlmostEqual(y, CY, places=9)
 
-    def test_the_library_can_be_packaged(self):
-        said = cargo("package", "--allow-dirty", "--no-verify", "--offline", "--package", "lookdown-lens", cwd=ROOT)
-        self.assertIn("Packaged", said)
+    def test_the_libraries_can_be_packaged(self):
+        chosen = [f"--package=lookdown-{name}" for name in ("lens", "detect", "eval")]
+        said = cargo("package", "--allow-dirty", "--no-verify", "--offline", *chosen, cwd=ROOT)
+        self.assertEqual(said.count("Packaged"), len(chosen), said)
 
 
 def cargo(*arguments: str | Path, cwd: Path) -> str:

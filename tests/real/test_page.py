@@ -3,21 +3,31 @@
 `LOOKDOWN_PAGE_PICTURES=docs/images make real PARTS=page` updates the screenshots in docs/images.
 """
 
+import contextlib
 import hashlib
+import json
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import unittest
+from collections.abc import Iterator
 from pathlib import Path
 
+from harness.processes import free_ports
+from reverse_proxy import reverse_proxy
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
+from test_count import Count
 
 HERE = Path(__file__).resolve().parent / "page"
 KEY = "a key that only this test knows"
 PICTURED = "gate,office,canteen,lounge"
 """Cameras whose images are kept."""
+WALKS = HERE.parent / "walks"
+WALK_SECONDS = 12
+ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
 
 
 class Page(unittest.TestCase):
@@ -36,6 +46,7 @@ class Page(unittest.TestCase):
 
     def test_the_calculations_of_the_page(self) -> None:
         self.run_node("maths.test.js", {})
+        self.run_node("areas.test.js", {})
 
     def test_the_page_in_a_browser(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
@@ -47,7 +58,10 @@ class Page(unittest.TestCase):
                 f'page = {{ scopes = ["detect", "read", "admin"], sha256 = "{digest}" }}\n', encoding="utf-8"
             )
             with lookdown({"RESULTS__PICTURES": PICTURED}, calibrations=calibrations) as server:
-                with lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed:
+                with (
+                    lookdown({"ACCESS__KEYS_FILE": str(keys)}) as keyed,
+                    self.counted(Path(folder)) as counted,
+                ):
                     self.run_node(
                         "all.test.js",
                         {
@@ -56,8 +70,39 @@ class Page(unittest.TestCase):
                             "LOOKDOWN_KEY": KEY,
                             "LOOKDOWN_SAMPLES": str(SAMPLES),
                             "LOOKDOWN_FIXTURES": str(FIXTURES / "calibrations"),
+                            **counted,
                         },
                     )
+
+    @contextlib.contextmanager
+    def counted(self, folder: Path) -> Iterator[dict[str, str]]:
+        """A server with `lookdown count` behind a proxy, and frames of a walk. Yields variables of the tests."""
+        calibrations, frames = folder / "counted", folder / "walk"
+        calibrations.mkdir()
+        frames.mkdir()
+        calibration = json.loads((WALKS / "calibration.json").read_text(encoding="utf-8"))
+        (calibrations / "walks.json").write_text(json.dumps(calibration | {"zones": [ZONE]}), encoding="utf-8")
+        clip = ["-t", str(WALK_SECONDS), "-i", WALKS / "walks.mp4", "-q:v", "3", frames / "%d.jpg"]
+        subprocess.run(["ffmpeg", "-v", "error", *clip], check=True)
+        (port,) = free_ports(1)
+        settings = folder / "count.toml"
+        server_settings = {"PAGE__COUNTS_PATH": "/counts", "RESULTS__PICTURES": "hall"}
+        with lookdown(server_settings, calibrations=calibrations) as server:
+            settings.write_text(
+                f'[server]\nurl = "http://{server.address}"\n[http]\nlisten = "127.0.0.1:{port}"\n'
+                f'[store]\npath = "{folder / "counts.sqlite"}"\n[counting]\nlongest_gap = "10m"\n',
+                encoding="utf-8",
+            )
+            count = Count(settings, folder / "count.log", port)
+            try:
+                with reverse_proxy("/counts", f"127.0.0.1:{port}", server.address) as proxy:
+                    yield {
+                        "LOOKDOWN_COUNTED_URL": f"http://{proxy}",
+                        "LOOKDOWN_UNCOUNTED_URL": f"http://{server.address}",
+                        "LOOKDOWN_WALK": str(frames),
+                    }
+            finally:
+                count.stop(signal.SIGKILL)
 
     def run_node(self, tests: str, settings: dict[str, str]) -> None:
         """Runs tests that are written in JavaScript."""

@@ -25,7 +25,8 @@ from waiting import PATIENCE_SECONDS, wait_until
 from metrics import metric
 
 PICTURE = OFFICE.read_bytes()
-RECORD = (ROOT / "src" / "results" / "redis" / "record.lua").read_text(encoding="utf-8")
+SCRIPTS = ROOT / "src" / "results" / "redis"
+RECORD = "".join((SCRIPTS / name).read_text(encoding="utf-8") for name in ("forget.lua", "record.lua"))
 """The script that stores a report."""
 MOST_PICTURES = 2
 
@@ -206,6 +207,23 @@ class Shared(unittest.TestCase):
         for stream in streams:
             stream.close()
 
+    def test_a_server_subscribes_only_to_cameras_with_listeners(self) -> None:
+        """And ends a subscription some seconds after its last listener has left."""
+
+        def channels() -> set[bytes]:
+            return set(self.redis.ask("PUBSUB", "SHARDCHANNELS"))
+
+        wait_until(lambda: not channels(), "no listener is left of other tests")
+        streams = [Stream(self.one, "/results/a/events"), Stream(self.other, "/results/b/events")]
+        streams.append(Stream(self.other, "/results/b/events"))
+        self.assertEqual(channels(), {b"{lookdown}:0:camera:a", b"{lookdown}:0:camera:b"})
+        self.assertEqual(self.redis.ask("PUBSUB", "SHARDNUMSUB", "{lookdown}:0:camera:b")[1], 1)
+        streams.append(Stream(self.one, "/events"))
+        self.assertIn(b"{lookdown}:0:all", channels())
+        for stream in streams:
+            stream.close()
+        wait_until(lambda: not channels(), "the subscriptions have ended")
+
     def test_every_key_expires(self) -> None:
         """Every key has an expiry."""
         detect(self.one, "hall")
@@ -213,7 +231,7 @@ class Shared(unittest.TestCase):
         self.assertGreater(len(keys), 5)
         for key in keys:
             self.assertIn(self.redis.ask("TTL", key), range(80_000, 86_401), key)
-            self.assertTrue(key.startswith(b"lookdown:"), key)
+            self.assertTrue(key.startswith(b"{lookdown}:"), key)
 
     def test_metrics_show_the_content_of_redis(self) -> None:
         """The same on both."""
@@ -312,7 +330,7 @@ class Away(unittest.TestCase):
         with RedisServer() as redis:
             with replica("redis-ends", redis.url) as server:
                 sent = [detect(server, "hall").body for _ in range(5)]
-            kept = redis.ask("XRANGE", "lookdown:camera:hall", "-", "+")
+            kept = redis.ask("XRANGE", "{lookdown}:camera:hall", "-", "+")
             self.assertEqual([entry[1][5] for entry in kept], sent)
 
 
@@ -393,8 +411,8 @@ class Bounds(unittest.TestCase):
             self.assertEqual(get(other, path, If_None_Match=latest).status, 304)
             problem = get(other, "/results/stairs/latest.jpg").json()
             self.assertEqual(problem["type"], "/problems/picture-not-kept")
-            self.assertIn(redis.ask("TTL", "lookdown:picture:hall"), range(80_000, 86_401))
-            self.assertLess(redis.ask("MEMORY", "USAGE", "lookdown:picture:hall"), 4 << 20)
+            self.assertIn(redis.ask("TTL", "{lookdown}:picture:hall"), range(80_000, 86_401))
+            self.assertLess(redis.ask("MEMORY", "USAGE", "{lookdown}:picture:hall"), 4 << 20)
             # A report from a server that keeps no images removes the previous one.
             detect(other, "hall")
             wait_until(lambda: get(one, path).status == 404, "the picture is gone")
@@ -432,8 +450,8 @@ class Bounds(unittest.TestCase):
                         number
                     )
                     pictured = [camera for camera in pictured if any(one[0] == camera for one in kept)][-MOST_PICTURES:]
-                    entries = redis.ask("XRANGE", "t:reports", "-", "+")
-                    self.assertEqual([tuple(entry[1][1::2]) for entry in entries], [_fields(one) for one in kept])
+                    entries = _entries(redis)
+                    self.assertEqual([entry[1:] for entry in entries], [_fields(one) for one in kept])
                     ids = {
                         int(one[1][1]): entry[0] for entry, one in zip(entries, _contents(redis, entries), strict=True)
                     }
@@ -456,9 +474,9 @@ def has_picture(number: int) -> bool:
 def record(report: tuple[str, int, int], limits: list[int]) -> tuple:
     """The command that stores a report of a camera, with its number and its size."""
     camera, number, size = report
-    keys = [f"t:{name}" for name in ("reports", "earlier", "cameras", "totals", "pictures", "sender")]
+    keys = [f"t:{name}" for name in ("earlier", "cameras", "latest", "totals", "pictures", "senders")]
     picture = ("frame", "sketch") if has_picture(number) else ("", "")
-    told = (number, camera, "then", number, "{}", *picture, size)
+    told = (camera, "t:on", "t:all", "sender", number, "then", number, "{}", *picture, size)
     return ("EVAL", RECORD, len(keys), *keys, "t:camera:", "t:picture:", *told, *limits, MOST_PICTURES, 3600)
 
 
@@ -487,9 +505,20 @@ def _fields(report: tuple[str, int, int]) -> tuple[bytes, bytes]:
     return report[0].encode(), str(report[2]).encode()
 
 
+def _entries(redis: RedisServer) -> list[tuple[bytes, bytes, bytes]]:
+    """The ID, the camera and the size of every stored report, in order."""
+    earlier = [element.split(b":", 2) for element in redis.ask("ZRANGE", "t:earlier", 0, -1)]
+    found = [(micros, camera, size) for micros, size, camera in earlier]
+    latest = redis.ask("HGETALL", "t:latest")
+    for camera, entry in zip(latest[::2], latest[1::2], strict=True):
+        micros, size = entry.split(b":")
+        found.append((micros, camera, size))
+    return sorted(found)
+
+
 def _contents(redis: RedisServer, entries: list) -> list:
     """The content of the cameras' streams under the IDs of these entries."""
-    asked = [("XRANGE", b"t:camera:" + entry[1][1], entry[0], entry[0]) for entry in entries]
+    asked = [("XRANGE", b"t:camera:" + camera, micros + b"-0", micros + b"-0") for micros, camera, _ in entries]
     found = redis.ask_all(asked) if asked else []
     return [(entry[0][0], entry[0][1][2:4]) for entry in found]
 

@@ -38,13 +38,13 @@ class TritonClient(unittest.TestCase):
         self.assertEqual(self.told["health"], [True, True, True, True, False])
         self.assertEqual(self.told["server"]["name"], "lookdown")
         self.assertIn("binary_tensor_data", self.told["server"]["extensions"])
-        self.assertEqual(self.told["model"]["inputs"], [{"name": "image", "datatype": "BYTES", "shape": [1]}])
+        self.assertEqual(self.told["model"]["inputs"], [{"name": "image", "datatype": "BYTES", "shape": [-1]}])
         self.assertIn("READY", {row["state"] for row in self.told["index"]})
 
     def test_json_and_bytes_give_the_persons_of_the_report(self) -> None:
         persons = self.report["persons"]
         self.assertGreater(len(persons), 0)
-        self.assertEqual(len(self.told["found"]), 4)
+        self.assertEqual(len(self.told["found"]), 5)
         for way, found in self.told["found"].items():
             self.assertEqual(len(found["boxes"]), len(persons), way)
             for box, score, person in zip(found["boxes"], found["scores"], persons):
@@ -52,9 +52,17 @@ class TritonClient(unittest.TestCase):
                 for side, name in zip(box, ("x_min", "y_min", "x_max", "y_max")):
                     self.assertAlmostEqual(side, person["box"][name], places=2)
             self.assertEqual([len(row) for row in found["oriented_boxes"]], [5] * len(persons))
+            self.assertEqual(found["counts"], [len(persons)])
             self.assertEqual(found["views"], [person["views"] for person in persons])
             self.assertEqual(len(json.loads(found["report"])["persons"]), len(persons))
             self.assertEqual((found["model"], found["id"]), ("lookdown", "17"))
+
+    def test_a_batch_has_the_persons_of_each_frame(self) -> None:
+        count = len(self.report["persons"])
+        for way, found in self.told["batch"].items():
+            self.assertEqual(found["counts"], [count] * 3, way)
+            self.assertEqual(len(found["reports"]), 3, way)
+            self.assertEqual(found["scores"], found["scores"][:count] * 3, way)
 
     def test_the_bare_detector_accepts_views(self) -> None:
         for datatype, found in self.told["views"].items():
@@ -71,14 +79,14 @@ class TritonClient(unittest.TestCase):
         for name, (status, part) in {
             "unknown model": ("404", "model: "),
             "no picture": ("415", "JPEG"),
-            "two frames": ("422", "one frame"),
+            "no picture in a batch": ("415", "image[1]"),
+            "too many frames": ("422", "[16]"),
             "unknown parameter": ("400", "colour"),
             "unknown calibration": ("404", "unknown-id"),
             "score out of range": ("422", "score_threshold"),
             "sequence": ("400", "sequence_id"),
             "shared memory": ("422", "shared memory"),
             "classes": ("422", "classification"),
-            "compressed": ("400", "compressed"),
             "unknown output": ("422", "masks"),
         }.items():
             self.assertEqual(refused[name][0], status, (name, refused[name]))

@@ -90,7 +90,10 @@ fn detection_describes_every_status_and_every_parameter() {
         .collect();
     let [detection, picture] = [DetectParameters::TABLE, AnnotationOptions::TABLE]
         .map(|table| table.iter().map(|spec| spec.name));
-    let names: Vec<_> = detection.chain(["format"]).chain(picture).collect();
+    let names: Vec<_> = detection
+        .chain(["format", "oriented"])
+        .chain(picture)
+        .collect();
     assert_eq!(query, names);
 
     let form = serde_json::to_string(&document["components"]["schemas"]).unwrap();
@@ -141,7 +144,17 @@ fn choices_list_their_names() {
         let named = parameters.find(|parameter| parameter["name"] == name);
         named.unwrap()["schema"].clone()
     };
-    let formats = ["json", "image", "coco", "cvat", "yolo", "voc", "geojson"];
+    let formats = [
+        "json",
+        "image",
+        "coco",
+        "cvat",
+        "yolo",
+        "voc",
+        "geojson",
+        "cepdof",
+        "labelstudio",
+    ];
     assert_eq!(schema("format")["enum"], serde_json::json!(formats));
     let layers = "blur|silhouette|boxes|oriented|scores|zones|views|timestamp";
     let pattern = format!("^(none|({layers})(,({layers}))*)$");

@@ -3,7 +3,8 @@
 use lookdown_lens::{
     calibration::{Calibration, CameraGeometry},
     geometry::{
-        CountingLine, LineEnds, Pixel, Polygon, ZoneArea, floor::floor_position,
+        CountingLine, LineEnds, Pixel, Polygon, ZoneArea,
+        floor::{FloorPosition, floor_position, pixel_of},
         polygon::MAX_CORNERS,
     },
 };
@@ -141,6 +142,23 @@ impl CameraDefinition {
             key,
             geometry: Some(geometry),
         }
+    }
+
+    /// Returns the frame pixel of a place on the floor of the tracker; `None` where the lens does not
+    /// see it.
+    pub(crate) fn pixel_of(&self, floor_m: [f64; 2]) -> Option<[f64; 2]> {
+        let geometry = self.geometry.as_ref()?;
+        let [x_m, y_m] = self.pose.of_site(floor_m);
+        let pixel = pixel_of(FloorPosition { x_m, y_m }, &geometry.lens, &geometry.mount)?;
+        Some([pixel.x, pixel.y])
+    }
+
+    /// Returns the place on the floor of the tracker at a frame pixel; `None` where the lens does not
+    /// see the floor.
+    pub(crate) fn floor_at(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let geometry = self.geometry.as_ref()?;
+        let floor = floor_position(Pixel::new(x, y), &geometry.lens, &geometry.mount)?;
+        Some(self.pose.to_site([floor.x_m, floor.y_m]))
     }
 }
 

@@ -119,6 +119,14 @@ impl Engine {
         self.scenes.get(self.owners.get(camera)?)
     }
 
+    /// Returns the time of the last report of each camera, milliseconds since the Unix epoch.
+    pub(crate) fn last_reports(&self) -> BTreeMap<String, i64> {
+        let cameras = self.scenes().flat_map(|scene| &scene.cameras);
+        cameras
+            .filter_map(|camera| Some((camera.name.clone(), camera.presence().last_ms?)))
+            .collect()
+    }
+
     /// Returns the scene of a site.
     pub(crate) fn site(&self, site: &str) -> Option<&Scene> {
         self.scenes.get(&Owner::Site(site.to_owned()))

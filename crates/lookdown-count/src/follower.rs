@@ -209,18 +209,23 @@ impl Follower {
         let batch = self.engine.lock().take_batch();
         let messages = std::mem::take(&mut self.messages);
         self.next_commit = Instant::now() + self.commit_every;
-        if batch.is_none() && messages.is_empty() {
+        let held = self.conditions.take_changed();
+        if batch.is_none() && messages.is_empty() && held.is_none() {
             return;
         }
         let last_event = self.engine.lock().last_event();
         let batch = batch.unwrap_or_else(|| Batch::empty(last_event));
-        let batch = Arc::new((batch, messages));
+        let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
         let mut log = LogOnce::default();
         loop {
             let store = self.store.clone();
             let shared = Arc::clone(&batch);
-            let committed = spawn_blocking(move || store.commit(&shared.0, &shared.1)).await;
+            let committed = spawn_blocking(move || {
+                let (batch, messages, held) = &*shared;
+                store.commit(batch, messages, held.as_ref())
+            })
+            .await;
             match committed {
                 Ok(Ok(())) => break,
                 Ok(Err(problem)) => {

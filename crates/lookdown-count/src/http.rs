@@ -2,6 +2,7 @@
 
 mod counts;
 mod floor;
+mod frame_heat_map;
 mod heat_map;
 mod problem;
 mod time;
@@ -52,6 +53,10 @@ pub(crate) fn router(api: Api) -> Router {
             get(heat_map::json_of_camera),
         )
         .route("/counts/{camera}/heatmap.png", get(heat_map::png_of_camera))
+        .route(
+            "/counts/{camera}/heatmap-frame.png",
+            get(frame_heat_map::png),
+        )
         .route("/sites/{site}", get(counts::of_site))
         .route("/sites/{site}/tracks", get(tracks::of_site))
         .route("/sites/{site}/heatmap.json", get(heat_map::json_of_site))

@@ -120,6 +120,12 @@ pub async fn count(
     for state in resumed.scenes {
         engine.resume(state, |key| calibrations.definition(key));
     }
+    let conditions = Conditions::resumed(
+        options.webhooks.clone(),
+        &resumed.held,
+        engine.last_reports(),
+        Timestamp::now().as_millisecond(),
+    );
     let engine = Arc::new(Mutex::new(engine));
     let api = Api {
         engine: Arc::clone(&engine),
@@ -136,7 +142,7 @@ pub async fn count(
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(&options.webhooks, resumed.messages, &store, &metrics)?,
-        conditions: Conditions::new(options.webhooks.clone()),
+        conditions,
         client,
         engine,
         calibrations,

@@ -33,6 +33,13 @@ impl CameraPose {
         [x + self.position_m[0], y + self.position_m[1]]
     }
 
+    /// Returns the floor place of this camera at the site's coordinates, metres.
+    pub(crate) fn of_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (x, y) = (x - self.position_m[0], y - self.position_m[1]);
+        let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
+        [cos * x + sin * y, cos * y - sin * x]
+    }
+
     /// Returns a floor vector of this camera in the axes of the site.
     pub(crate) fn turned_to_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
@@ -53,5 +60,7 @@ mod tests {
         };
         let [x, y] = pose.to_site([1.0, 2.0]);
         assert!((x - 8.0).abs() < 1e-9 && (y - 21.0).abs() < 1e-9, "{x} {y}");
+        let [x, y] = pose.of_site([x, y]);
+        assert!((x - 1.0).abs() < 1e-9 && (y - 2.0).abs() < 1e-9, "{x} {y}");
     }
 }

@@ -6,12 +6,15 @@ mod signature;
 
 use std::{path::PathBuf, time::Duration};
 
+use base64::{Engine as _, engine::general_purpose::STANDARD};
 use lookdown_client::{ConfigError, read_secret};
 use reqwest::Url;
 use secrecy::ExposeSecret;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use sha2::{Digest, Sha256};
 
-pub(crate) use conditions::Conditions;
+pub(crate) use conditions::{Conditions, HeldCondition};
 pub(crate) use delivery::Deliveries;
 use signature::SigningKey;
 
@@ -67,7 +70,7 @@ pub(crate) struct Webhook {
 }
 
 /// The condition of a webhook.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) enum Condition {
     /// Each crossing.
     Crossing {
@@ -78,6 +81,15 @@ pub(crate) enum Condition {
     Occupancy { zone: Option<String>, at_least: u64 },
     /// A camera has no report for this time.
     Silent { after: Duration },
+}
+
+impl Webhook {
+    /// Returns a digest of everything but the key: it identifies the webhook in the store, where its
+    /// URL may hold a password.
+    fn digest(&self) -> String {
+        let text = json!([self.url.as_str(), self.camera, self.condition]).to_string();
+        STANDARD.encode(Sha256::digest(text))
+    }
 }
 
 impl WebhookEntry {

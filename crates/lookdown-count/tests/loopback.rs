@@ -185,6 +185,8 @@ async fn steps_add_up_and_a_gap_is_unknown() {
         assert!((150.0..260.0).contains(&seconds), "{seconds}");
         let (status, png) = companion.get("/counts/hall/heatmap.png").await;
         assert!(status == 200 && png.contains("PNG"));
+        let (status, png) = companion.get("/counts/hall/heatmap-frame.png").await;
+        assert!(status == 200 && png.contains("PNG"));
     })
     .await;
 }
@@ -262,9 +264,23 @@ async fn tracks_are_current_and_anonymous() {
             "id",
             "last_seen",
             "tail",
+            "tail_px",
             "velocity_m_s",
         ];
         assert_eq!(keys, expected);
+        let tail = track["tail_px"].as_array().unwrap();
+        assert_eq!(tail.len(), track["tail"].as_array().unwrap().len());
+        assert_eq!(tail.last(), Some(&track["frame_px"]));
+        let coordinates = |value: &Value| [0, 1].map(|axis| value[axis].as_f64().unwrap());
+        let [x_m, y_m] = coordinates(&track["floor_m"]);
+        let [x, y] = coordinates(&track["frame_px"]);
+        // The camera is 2.8 m above the floor.
+        let distance_m = x_m.hypot(y_m);
+        let scale = 318.3 * distance_m.atan2(2.8) / distance_m;
+        assert!((x - 500.0 - scale * x_m).abs() < 1.0, "{x}");
+        assert!((y - 500.0 - scale * y_m).abs() < 1.0, "{y}");
+        let zone = tracks["zones"][0]["outline_px"].as_array().unwrap();
+        assert_eq!(zone.first(), zone.last());
         let (_, metrics) = companion.get("/metrics").await;
         assert!(
             metrics.contains("lookdown_count_persons{camera=\"hall\"} 2"),
@@ -450,6 +466,50 @@ async fn crossings_reach_webhooks_signed_and_repeated() {
     assert_eq!(body(repeated)["type"], "crossing");
     assert_eq!(body(repeated)["data"]["direction"], "in");
     assert_eq!(body(second)["data"]["direction"], "out");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn condition_that_holds_is_not_repeated_by_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let secret = folder.path().join("secret");
+    std::fs::write(&secret, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n").unwrap();
+    let (url, requests) = receiver(&[]).await;
+    let settings = format!(
+        "[[webhooks]]\nurl = \"{url}\"\nsecret_file = {secret:?}\non = \"occupancy\"\ncamera = \"hall\"\n"
+    );
+    // A person stands in the hall for 10 s and is gone for 10 s. The restart is after 5 s.
+    let reports = |seconds: i64| {
+        let frames = (0..seconds * 5).map(|frame| {
+            let persons = [person(1.0, 0.5)];
+            let standing: &[String] = if frame < 50 { &persons } else { &[] };
+            event("hall", frame * 200, standing)
+        });
+        frames.collect::<Vec<_>>()
+    };
+    for (seconds, reports_of_run) in [(5, 25), (20, 75)] {
+        let server = Server::start(reports(seconds), Duration::ZERO, CALIBRATION).await;
+        with_companion(&server, &settings, folder.path(), async |companion| {
+            companion.until_counted(reports_of_run).await;
+            companion
+                .until("one message is delivered", async |companion: &Companion| {
+                    let (_, metrics) = companion.get("/metrics").await;
+                    metrics
+                        .contains("lookdown_count_webhooks_delivered_total 1")
+                        .then_some(())
+                })
+                .await;
+        })
+        .await;
+    }
+    let requests = requests.lock().unwrap();
+    let types = requests.iter().map(|request| {
+        let body: Value = serde_json::from_str(request.split("\r\n\r\n").nth(1).unwrap()).unwrap();
+        body["type"].as_str().unwrap().to_owned()
+    });
+    assert_eq!(
+        types.collect::<Vec<_>>(),
+        ["occupancy.reached", "occupancy.ended"]
+    );
 }
 
 #[test]

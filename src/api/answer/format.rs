@@ -1,17 +1,18 @@
 //! The format of a response: the parameter `format`, or content negotiation.
 
 use axum::http::HeaderMap;
+use lookdown_detect::parameter_table;
 use strum::VariantNames;
 
 use crate::{
     annotated_image::ImageFormat,
-    annotation_formats::AnnotationFormat,
+    annotation_formats::{AnnotationFormat, BoxKind},
     api::http::{
         accept::Accepted,
         problem::{Problem, ProblemKind},
     },
     pipeline::{
-        GivenParameters, Interface, ParameterDefault, ParameterKind, ParameterSpec, parameter_table,
+        GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
     },
 };
 
@@ -23,7 +24,7 @@ pub(super) enum AnswerFormat {
     /// The annotated image.
     Picture(ImageFormat),
     /// A file for annotation tools.
-    Annotations(AnnotationFormat),
+    Annotations(AnnotationFormat, BoxKind),
 }
 
 /// The names of the report and of the annotated image.
@@ -53,7 +54,19 @@ parameter_table! {
         example: None,
         interfaces: &[Interface::Http],
     };
+    ORIENTED = ParameterSpec {
+        name: "oriented",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Value("false"),
+        help: "Boxes rotated along the persons as the shapes of an annotation file: for `cvat`, \
+               `labelstudio` and `yolo` (YOLO OBB). `cepdof` and `geojson` always have them.",
+        example: None,
+        interfaces: &[Interface::Http],
+    };
 }
+
+const GEOJSON: AnswerFormat =
+    AnswerFormat::Annotations(AnnotationFormat::GeoJson, BoxKind::Oriented);
 
 const PICTURES: [(AnswerFormat, &str); 2] =
     [of_picture(ImageFormat::Jpeg), of_picture(ImageFormat::Png)];
@@ -63,10 +76,7 @@ const NEGOTIABLE: [(AnswerFormat, &str); 4] = [
     (AnswerFormat::Report, AnswerFormat::Report.media_type()),
     PICTURES[0],
     PICTURES[1],
-    (
-        AnswerFormat::Annotations(AnnotationFormat::GeoJson),
-        AnswerFormat::Annotations(AnnotationFormat::GeoJson).media_type(),
-    ),
+    (GEOJSON, GEOJSON.media_type()),
 ];
 
 const fn of_picture(format: ImageFormat) -> (AnswerFormat, &'static str) {
@@ -75,19 +85,36 @@ const fn of_picture(format: ImageFormat) -> (AnswerFormat, &'static str) {
 }
 
 impl AnswerFormat {
-    /// Reads the parameter `format`; without it, chooses the format that `Accept` prefers. The
+    /// Reads the parameters; without `format`, chooses the format that `Accept` prefers. The
     /// parameter overrules `Accept`, which then only chooses between JPEG and PNG.
     pub(super) fn read<'a>(
         given: impl IntoIterator<Item = (&'a str, &'a str)>,
         headers: &HeaderMap,
     ) -> Result<Self, Problem> {
         let accepted = Accepted::of(headers);
-        match GivenParameters::read(TABLE, given)?.text(&FORMAT) {
-            None => accepted.best_of(&NEGOTIABLE).ok_or_else(not_acceptable),
-            Some(REPORT) => Ok(Self::Report),
-            Some(PICTURE) => Ok(accepted.best_of(&PICTURES).unwrap_or(PICTURES[0].0)),
-            Some(name) => Ok(Self::Annotations(FORMAT.parse(name)?)),
+        let given = GivenParameters::read(TABLE, given)?;
+        let boxes = if given.value(&ORIENTED)? {
+            BoxKind::Oriented
+        } else {
+            BoxKind::AxisParallel
+        };
+        let format = match given.text(&FORMAT) {
+            None => accepted.best_of(&NEGOTIABLE).ok_or_else(not_acceptable)?,
+            Some(REPORT) => Self::Report,
+            Some(PICTURE) => accepted.best_of(&PICTURES).unwrap_or(PICTURES[0].0),
+            Some(name) => Self::Annotations(FORMAT.parse(name)?, boxes),
+        };
+        if boxes == BoxKind::Oriented && !format.has_oriented_boxes() {
+            let formats = AnnotationFormat::names_with_oriented_boxes();
+            let problem =
+                format!("the format has no oriented boxes: use format with one of {formats}");
+            return Err(ParameterError::bad_value(ORIENTED.name, problem).into());
         }
+        Ok(format)
+    }
+
+    fn has_oriented_boxes(self) -> bool {
+        matches!(self, Self::Annotations(format, _) if format.has_oriented_boxes())
     }
 
     /// Returns the media type of a response in this format.
@@ -96,7 +123,7 @@ impl AnswerFormat {
             Self::Report => "application/json",
             Self::Picture(ImageFormat::Jpeg) => "image/jpeg",
             Self::Picture(ImageFormat::Png) => "image/png",
-            Self::Annotations(format) => format.media_type(),
+            Self::Annotations(format, _) => format.media_type(),
         }
     }
 }

@@ -135,6 +135,14 @@ impl Problem {
         }
     }
 
+    /// Names the element of an input that has the problem.
+    pub(in crate::api) fn of_element(self, input: &str, index: usize) -> Self {
+        Self {
+            detail: format!("{input}[{index}]: {}", self.detail),
+            ..self
+        }
+    }
+
     /// Sets another status than that of the kind.
     pub(in crate::api) fn with_status(self, status: StatusCode) -> Self {
         Self { status, ..self }

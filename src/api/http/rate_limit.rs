@@ -84,6 +84,7 @@ impl RateLimiter {
         }
     }
 
+    /// Takes a token of a client.
     fn take(&self, client: Client) -> Standing {
         // The change under this lock cannot panic half-way.
         let mut buckets = self.buckets.lock();
@@ -91,18 +92,49 @@ impl RateLimiter {
     }
 }
 
+/// The tokens of the client of a request. Each further piece of work in it, as much as a request,
+/// takes one.
+#[derive(Clone)]
+pub(in crate::api) struct RequestTokens {
+    limiter: RateLimiter,
+    client: Client,
+    /// The state after the last token.
+    standing: Arc<Mutex<Standing>>,
+}
+
+impl RequestTokens {
+    /// Takes a further token.
+    pub(in crate::api) fn take(&self) -> Result<(), Problem> {
+        let standing = self.limiter.take(self.client.clone());
+        *self.standing.lock() = standing;
+        if standing.admitted {
+            Ok(())
+        } else {
+            Err(too_fast(standing.next_in))
+        }
+    }
+}
+
 /// Refuses requests beyond the rate limit and adds its headers to every response.
 pub(in crate::api) async fn apply(
     State(limiter): State<RateLimiter>,
-    request: Request,
+    mut request: Request,
     next: Next,
 ) -> Response {
-    let standing = limiter.take(limiter.client_of(&request));
+    let client = limiter.client_of(&request);
+    let standing = limiter.take(client.clone());
+    let last = Arc::new(Mutex::new(standing));
     let mut response = if standing.admitted {
+        request.extensions_mut().insert(RequestTokens {
+            limiter: limiter.clone(),
+            client,
+            standing: Arc::clone(&last),
+        });
         next.run(request).await
     } else {
         too_fast(standing.next_in).into_response()
     };
+    let standing = *last.lock();
     let remaining = format!(
         "\"default\";r={};t={}",
         standing.remaining,

@@ -1,139 +1,98 @@
 //! Examples in the OpenAPI document, for bodies whose schemas have none: files, forms and streams.
 
 use serde_json::{Value, json};
-use utoipa::openapi::{
-    OpenApi, RefOr,
-    path::{Operation, PathItem},
-};
+use utoipa::openapi::{OpenApi, RefOr, path::Operation};
 
 const JSON: &str = "application/json";
 const FORM: &str = "multipart/form-data";
 const EVENTS: &str = "text/event-stream";
 
-/// The place of a body.
-#[derive(Clone, Copy)]
-enum Body {
-    Request,
-    Response,
-}
+/// The method and path of an operation, the media type of a body of it, and an example of that.
+type Row = (&'static str, &'static str, &'static str, Value);
 
 /// Adds the examples.
 pub(super) fn add(document: &mut OpenApi) {
+    for (method, path, media_type, example) in requests() {
+        if let Some(operation) = operation(document, method, path)
+            && let Some(RefOr::T(body)) = &mut operation.request_body
+            && let Some(RefOr::T(content)) = body.content.get_mut(media_type)
+        {
+            content.example = Some(example);
+        }
+    }
+    for (method, path, media_type, example) in responses() {
+        if let Some(operation) = operation(document, method, path)
+            && let Some(RefOr::T(response)) = operation.responses.responses.get_mut("200")
+            && let Some(RefOr::T(content)) = response.content.get_mut(media_type)
+        {
+            content.example = Some(example);
+        }
+    }
+}
+
+fn requests() -> Vec<Row> {
     let frame = "the bytes of frame.jpg";
-    let events =
-        "id: 1763717400412345\ndata: {\"request_id\":\"0197a3c5-…\",\"camera\":\"lobby\"}\n\n";
-    for (method, path, body, media_type, example) in [
-        (
-            "get",
-            "/calibrations/{id}",
-            Body::Response,
-            JSON,
-            calibration(),
-        ),
-        (
-            "put",
-            "/calibrations/{id}",
-            Body::Request,
-            JSON,
-            calibration(),
-        ),
-        (
-            "post",
-            "/calibrations/{id}/views",
-            Body::Request,
-            JSON,
-            calibration(),
-        ),
+    vec![
+        ("put", "/calibrations/{id}", JSON, calibration()),
+        ("post", "/calibrations/{id}/views", JSON, calibration()),
         (
             "post",
             "/detect",
-            Body::Request,
             FORM,
             json!({"img": frame, "calibration": "lobby"}),
         ),
-        (
-            "post",
-            "/v1/vision/detection",
-            Body::Request,
-            FORM,
-            deepstack(frame),
-        ),
+        ("post", "/v1/vision/detection", FORM, deepstack(frame)),
         (
             "post",
             "/v1/vision/custom/{calibration}",
-            Body::Request,
             FORM,
             deepstack(frame),
         ),
-        ("get", "/events", Body::Response, EVENTS, json!(events)),
+        ("post", "/v2/repository/index", JSON, json!({"ready": true})),
+        ("post", "/v2/repository/models/{name}/load", JSON, json!({})),
         (
-            "get",
-            "/results/{camera}/events",
-            Body::Response,
-            EVENTS,
-            json!(events),
+            "post",
+            "/v2/repository/models/{name}/unload",
+            JSON,
+            json!({}),
         ),
+    ]
+}
+
+fn responses() -> Vec<Row> {
+    let events =
+        "id: 1763717400412345\ndata: {\"request_id\":\"0197a3c5-…\",\"camera\":\"lobby\"}\n\n";
+    vec![
+        ("get", "/calibrations/{id}", JSON, calibration()),
+        ("get", "/events", EVENTS, json!(events)),
+        ("get", "/results/{camera}/events", EVENTS, json!(events)),
         (
             "get",
             "/v2",
-            Body::Response,
             JSON,
             json!({
                 "name": "lookdown", "version": env!("CARGO_PKG_VERSION"),
                 "extensions": ["binary_tensor_data", "model_repository"]
             }),
         ),
+        ("get", "/v2/health/live", JSON, json!({"live": true})),
+        ("get", "/v2/health/ready", JSON, json!({"ready": true})),
+        ("get", "/v2/models/{name}/ready", JSON, model_ready()),
         (
-            "post",
-            "/v2/repository/index",
-            Body::Request,
+            "get",
+            "/v2/models/{name}/versions/{version}/ready",
             JSON,
-            json!({"ready": true}),
+            model_ready(),
         ),
-        (
-            "post",
-            "/v2/repository/models/{name}/load",
-            Body::Request,
-            JSON,
-            json!({}),
-        ),
-        (
-            "post",
-            "/v2/repository/models/{name}/unload",
-            Body::Request,
-            JSON,
-            json!({}),
-        ),
-    ] {
-        let item = document.paths.paths.get_mut(path);
-        let operation = item.and_then(|item| operation(item, method));
-        if let Some(operation) = operation {
-            set(operation, body, media_type, &example);
-        }
-    }
+    ]
 }
 
-fn operation<'a>(item: &'a mut PathItem, method: &str) -> Option<&'a mut Operation> {
+fn operation<'a>(document: &'a mut OpenApi, method: &str, path: &str) -> Option<&'a mut Operation> {
+    let item = document.paths.paths.get_mut(path)?;
     match method {
         "get" => item.get.as_mut(),
         "put" => item.put.as_mut(),
         _ => item.post.as_mut(),
-    }
-}
-
-fn set(operation: &mut Operation, body: Body, media_type: &str, example: &Value) {
-    let content = match body {
-        Body::Request => match &mut operation.request_body {
-            Some(RefOr::T(body)) => body.content.get_mut(media_type),
-            _ => None,
-        },
-        Body::Response => match operation.responses.responses.get_mut("200") {
-            Some(RefOr::T(response)) => response.content.get_mut(media_type),
-            _ => None,
-        },
-    };
-    if let Some(RefOr::T(content)) = content {
-        content.example = Some(example.clone());
     }
 }
 
@@ -152,6 +111,10 @@ fn calibration() -> Value {
 
 fn deepstack(frame: &str) -> Value {
     json!({"image": frame, "min_confidence": 0.4})
+}
+
+fn model_ready() -> Value {
+    json!({"name": "lookdown", "ready": true})
 }
 
 #[cfg(test)]

@@ -2,10 +2,11 @@
 //! (the extension `binary_tensor_data`). Source: the repository `open-inference-protocol`, and the
 //! extensions as Triton Inference Server describes them.
 //!
-//! The model `lookdown` accepts a frame and returns its persons. Each loaded detector accepts views
+//! The model `lookdown` accepts frames and returns their persons. Each loaded detector accepts views
 //! and returns its detections.
 
 mod answer;
+mod content_encoding;
 pub(in crate::api) mod describe;
 mod detector;
 mod document;

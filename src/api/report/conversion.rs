@@ -32,6 +32,7 @@ impl From<&DetectionReport> for Report {
             },
             model: ReportModel::from(&report.model),
             second_opinion: report.second_opinion.as_ref().map(ReportModel::from),
+            crop_model: report.crop_model.as_ref().map(ReportModel::from),
             profile: report.profile.name(),
             refinement: ReportRefinement {
                 name: refinement.refinement.name(),

@@ -49,6 +49,7 @@ use crate::{
             (Report = "application/json"),
             ("image/jpeg"), ("image/png"),
             (Object = "application/geo+json"), (Object = "application/x.coco+json"),
+            (Object = "application/x.cepdof+json"), (Object = "application/x.label-studio+json"),
             (String = "application/xml"), (String = "text/plain"),
          ),
          headers(

@@ -76,6 +76,7 @@ impl From<ListenError> for Problem {
     fn from(error: ListenError) -> Self {
         match error {
             ListenError::Ended => Self::shutting_down(),
+            ListenError::Unreachable(error) => error.into(),
             ListenError::Full { .. } | ListenError::ShareUsed { .. } => {
                 let detail = format!("{error}: omit wait, or retry later");
                 Self::new(ProblemKind::TooManyListeners, detail)

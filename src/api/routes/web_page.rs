@@ -4,8 +4,8 @@
 use std::sync::LazyLock;
 
 use axum::{
-    Router,
-    extract::Path,
+    Json, Router,
+    extract::{Path, State},
     http::{
         HeaderMap, HeaderValue, StatusCode, Uri,
         header::{CACHE_CONTROL, CONTENT_TYPE, ETAG},
@@ -14,6 +14,8 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+
+use serde::Serialize;
 
 use crate::{
     api::{
@@ -53,6 +55,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "index.html" from "web",
         "style.css" from "web",
         "panels.css" from "web",
+        "zones.css" from "web",
         "icon.svg" from "web",
         "main.js" from "web",
         "dom.js" from "web",
@@ -69,11 +72,24 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "views.js" from "web",
         "straighten.js" from "web",
         "live.js" from "web",
+        "counts.js" from "web",
+        "counts_drawing.js" from "web",
+        "counts.css" from "web",
         "plot.js" from "web",
         "floor.js" from "web",
         "lens.js" from "web",
         "calibrate.js" from "web",
         "circle_handles.js" from "web",
+        "zones.js" from "web",
+        "zone_surfaces.js" from "web",
+        "areas.js" from "web",
+        "area_editor.js" from "web",
+        "area_shapes.js" from "web",
+        "area_gestures.js" from "web",
+        "area_list.js" from "web",
+        "area_counts.js" from "web",
+        "edit_history.js" from "web",
+        "floor_map.js" from "web",
         "office.jpg" from "samples",
         "canteen.jpg" from "samples",
         "lounge.jpg" from "samples",
@@ -97,14 +113,27 @@ impl Asset {
     }
 }
 
+/// The server's settings that the page needs.
+#[derive(Serialize)]
+struct PageOptions<'a> {
+    /// The path of `lookdown count` on this origin.
+    counts_path: Option<&'a str>,
+}
+
 /// Returns the routes of the page and its files.
 pub(in crate::api) fn router() -> Router<ApiState> {
     let page = async |headers: HeaderMap| answer(PAGE, &headers, "/");
     let asset = async |Path(name): Path<String>, uri: Uri, headers: HeaderMap| {
         answer(&name, &headers, uri.path())
     };
+    let options = async |State(state): State<ApiState>| {
+        let counts_path = state.options.page_counts_path.as_deref();
+        let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
+        (no_store, Json(PageOptions { counts_path })).into_response()
+    };
     Router::new()
         .route("/", get(page))
+        .route("/assets/options.json", get(options))
         .route("/assets/{name}", get(asset))
         .route_layer(map_response(page_headers::of_web_page))
 }

@@ -5,16 +5,6 @@ use crate::{
     calibration_store::StoreError,
 };
 
-/// A calibration whose file in the store has never held a usable one, or holds several.
-#[derive(Debug, thiserror::Error)]
-#[error("{place}: {problem}")]
-pub struct UnusableCalibration {
-    /// The file.
-    pub place: String,
-    /// The field, its value and what would be right.
-    pub problem: String,
-}
-
 /// A calibration that was not changed, or that could not be read back afterwards. Every message is
 /// one sentence with the remedy.
 #[derive(Debug, thiserror::Error)]

@@ -20,7 +20,7 @@ use crate::{
     geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
     imaging::{
         MaskedPixels,
-        annotate::{encode_jpeg, sketch_areas, sketch_lens},
+        annotate::{encode_jpeg, sketch_areas, sketch_lens, sketch_lines},
     },
 };
 
@@ -219,6 +219,7 @@ fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<(
     };
     let CameraGeometry { lens, mount, areas } = &geometry;
     sketch_areas(&mut picture, &areas.zones, &areas.masks, lens, mount);
+    sketch_lines(&mut picture, &areas.lines, lens, mount);
     sketch_lens(&mut picture, lens, &views(calibration));
     fs::write(out, encode_jpeg(&picture, JPEG_QUALITY)?)
         .with_context(|| format!("--out: {} cannot be written", out.display()))

@@ -13,6 +13,7 @@ use crate::{
     calibration::{Calibration, CalibrationId},
     cli::{SettingsFile, parameters::one_of},
     evaluation::{DataSet, Scoring, Stratification},
+    pipeline::CalibrationLookup,
 };
 
 /// The flags that select a data set.

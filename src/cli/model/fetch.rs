@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 
 use crate::{
-    cli::{output::UNWRITABLE, settings_file::SettingsFile},
+    cli::{complete, output::UNWRITABLE, settings_file::SettingsFile},
     inference::{ModelManifest, ModelSource, fetch_weights, model_names},
     settings::Settings,
 };
@@ -21,7 +21,7 @@ const MEBIBYTE: f64 = 1_048_576.0;
 #[derive(Debug, Args)]
 pub(in super::super) struct Arguments {
     /// Name of a model in the repository
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", add = complete::of_model())]
     name: String,
     /// Place of converted models: NAME/model.onnx below a folder or an address. `make models`
     /// converts models

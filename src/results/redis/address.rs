@@ -24,6 +24,11 @@ impl RedisAddress {
     pub(super) fn client(&self) -> &Client {
         &self.client
     }
+
+    /// The number of the database.
+    pub(super) fn database(&self) -> i64 {
+        self.client.get_connection_info().redis_settings().db()
+    }
 }
 
 impl FromStr for RedisAddress {
@@ -53,7 +58,7 @@ impl fmt::Display for RedisAddress {
             let host = self.url.host_str().unwrap_or_default();
             write!(formatter, "{}://{host}:{port}", self.url.scheme())?;
         }
-        write!(formatter, "/{}", info.redis_settings().db())
+        write!(formatter, "/{}", self.database())
     }
 }
 

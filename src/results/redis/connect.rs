@@ -3,12 +3,17 @@
 use std::{io, time::Duration};
 
 use redis::{
-    AsyncConnectionConfig, ConnectionAddr, RedisResult,
+    AsyncConnectionConfig, ConnectionAddr, ProtocolVersion, RedisResult,
     aio::{AsyncStream, MultiplexedConnection},
 };
 use tokio::{net::TcpStream, spawn, time::timeout};
 
-use super::{RedisAddress, reply_limit::BoundedReplies};
+use super::{
+    RedisAddress,
+    node::Node,
+    pushes::{self, Pushes},
+    reply_limit::BoundedReplies,
+};
 use crate::tls::{ClientTls, TlsError};
 
 /// Longest time for the login, and for any reply of Redis.
@@ -16,7 +21,7 @@ pub(super) const TIMEOUT: Duration = Duration::from_secs(2);
 /// Most queries in flight on a connection, which bounds the memory of all replies together.
 const MAX_QUERIES: usize = 4;
 
-/// Opens connections to one Redis.
+/// Opens connections to one Redis, or to the nodes of a Redis Cluster.
 pub(super) struct Connector {
     address: RedisAddress,
     /// Present if the address asks for TLS.
@@ -41,15 +46,48 @@ impl Connector {
         })
     }
 
-    /// Connects and logs in. A reply may take `patience`.
-    pub(super) async fn connect(&self, patience: Duration) -> RedisResult<MultiplexedConnection> {
-        let config = AsyncConnectionConfig::new()
-            .set_response_timeout(Some(patience))
+    /// The host and port of the address.
+    pub(super) fn node(&self) -> Node {
+        match self.address.client().get_connection_info().addr() {
+            ConnectionAddr::Tcp(host, port) | ConnectionAddr::TcpTls { host, port, .. } => {
+                Node::new(host, *port)
+            }
+            // No address of this kind can be configured.
+            _ => Node::new("", 0),
+        }
+    }
+
+    /// Connects to a node and logs in.
+    pub(super) async fn connect(&self, node: &Node) -> RedisResult<MultiplexedConnection> {
+        self.open(node, ProtocolVersion::RESP2, AsyncConnectionConfig::new())
+            .await
+    }
+
+    /// Connects to a node for subscriptions, and logs in.
+    pub(super) async fn connect_for_pushes(
+        &self,
+        node: &Node,
+    ) -> RedisResult<(MultiplexedConnection, Pushes)> {
+        let (accept, pushes) = pushes::queue();
+        let config = AsyncConnectionConfig::new().set_push_sender(accept);
+        let connection = self.open(node, ProtocolVersion::RESP3, config).await?;
+        Ok((connection, pushes))
+    }
+
+    async fn open(
+        &self,
+        node: &Node,
+        protocol: ProtocolVersion,
+        config: AsyncConnectionConfig,
+    ) -> RedisResult<MultiplexedConnection> {
+        let config = config
+            .set_response_timeout(Some(TIMEOUT))
             .set_concurrency_limit(MAX_QUERIES);
         let login = self.address.client().get_connection_info().redis_settings();
+        let login = login.clone().set_protocol(protocol);
         let opened = async {
-            let replies = BoundedReplies::new(self.stream().await?, self.max_reply_bytes);
-            MultiplexedConnection::new_with_config(login, replies, config).await
+            let replies = BoundedReplies::new(self.stream(node).await?, self.max_reply_bytes);
+            MultiplexedConnection::new_with_config(&login, replies, config).await
         };
         let opened = timeout(TIMEOUT, opened).await;
         let (connection, driver) =
@@ -59,15 +97,9 @@ impl Connector {
         Ok(connection)
     }
 
-    async fn stream(&self) -> io::Result<Box<dyn AsyncStream + Send + Unpin>> {
-        let (host, port) = match self.address.client().get_connection_info().addr() {
-            ConnectionAddr::Tcp(host, port) | ConnectionAddr::TcpTls { host, port, .. } => {
-                (host.as_str(), *port)
-            }
-            // No address of this kind can be configured.
-            _ => return Err(io::Error::from(io::ErrorKind::Unsupported)),
-        };
-        let stream = TcpStream::connect((host, port)).await?;
+    async fn stream(&self, node: &Node) -> io::Result<Box<dyn AsyncStream + Send + Unpin>> {
+        let Node { host, port } = node;
+        let stream = TcpStream::connect((host.as_str(), *port)).await?;
         stream.set_nodelay(true)?;
         Ok(match &self.tls {
             Some(tls) => Box::new(tls.connect(host, stream).await?),

@@ -1,63 +1,91 @@
-//! The keys in Redis.
+//! The keys and channels in Redis. All of an installation share one hash tag, so that a Redis
+//! Cluster has them in one hash slot, and a script can change all of them in one atomic step.
 
-/// The keys of one installation. They all begin with the same prefix.
+use crate::results::Cameras;
+
+/// The keys and channels of one installation. They all begin with the same prefix.
 #[derive(Debug)]
 pub(super) struct Keys {
-    prefix: String,
+    /// The hash tag: the prefix in braces.
+    tag: String,
+    /// The database. Keys belong to a database, channels to all of them.
+    database: i64,
 }
 
 impl Keys {
-    pub(super) fn new(prefix: String) -> Self {
-        Self { prefix }
+    pub(super) fn new(prefix: &str, database: i64) -> Self {
+        Self {
+            tag: format!("{{{prefix}}}"),
+            database,
+        }
     }
 
-    /// A stream of all reports, with the camera and the size in bytes of each.
-    pub(super) fn reports(&self) -> String {
-        format!("{}:reports", self.prefix)
+    /// The keys of forget.lua, in its order.
+    pub(super) fn index(&self) -> [String; 5] {
+        [
+            self.earlier(),
+            self.cameras(),
+            self.key("latest"),
+            self.totals(),
+            self.pictures(),
+        ]
     }
 
-    /// A sorted set of the reports that are not their camera's latest.
+    /// A sorted set of the reports that are not their camera's latest: `ID:SIZE:CAMERA`.
     pub(super) fn earlier(&self) -> String {
-        format!("{}:earlier", self.prefix)
+        self.key("earlier")
     }
 
     /// A sorted set of the cameras by the ID of their latest report.
     pub(super) fn cameras(&self) -> String {
-        format!("{}:cameras", self.prefix)
+        self.key("cameras")
     }
 
     /// A hash of the newest ID (`last`) and the total size of all reports (`bytes`).
     pub(super) fn totals(&self) -> String {
-        format!("{}:totals", self.prefix)
+        self.key("totals")
     }
 
     /// A sorted set of the cameras that have an image, by the ID of its report.
     pub(super) fn pictures(&self) -> String {
-        format!("{}:pictures", self.prefix)
+        self.key("pictures")
     }
 
     /// A hash of a camera's image: the report's ID (`id`), `frame` and `sketch`.
     pub(super) fn picture(&self, camera: &str) -> String {
-        format!("{}{camera}", self.prefix_of_pictures())
+        self.prefix_of_pictures() + camera
     }
 
     /// The prefix of the keys of all images.
     pub(super) fn prefix_of_pictures(&self) -> String {
-        format!("{}:picture:", self.prefix)
+        self.key("picture:")
     }
 
-    /// The number of the last report that a server has sent.
-    pub(super) fn sender(&self, server: &str) -> String {
-        format!("{}:sender:{server}", self.prefix)
+    /// A sorted set of the servers by the number of the last report that each sent.
+    pub(super) fn senders(&self) -> String {
+        self.key("senders")
     }
 
     /// A stream of a camera's reports.
     pub(super) fn camera(&self, camera: &str) -> String {
-        format!("{}{camera}", self.prefix_of_cameras())
+        self.prefix_of_cameras() + camera
     }
 
     /// The prefix of the keys of all cameras.
     pub(super) fn prefix_of_cameras(&self) -> String {
-        format!("{}:camera:", self.prefix)
+        self.key("camera:")
+    }
+
+    /// The channel on which new reports of these cameras are published.
+    pub(super) fn channel(&self, cameras: &Cameras) -> String {
+        let Self { tag, database } = self;
+        match cameras {
+            Cameras::All => format!("{tag}:{database}:all"),
+            Cameras::One(camera) => format!("{tag}:{database}:camera:{camera}"),
+        }
+    }
+
+    fn key(&self, name: &str) -> String {
+        format!("{}:{name}", self.tag)
     }
 }

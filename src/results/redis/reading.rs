@@ -11,17 +11,16 @@ use redis::{
     streams::{StreamId, StreamRangeReply},
 };
 
-use super::keys::Keys;
-use crate::results::{NewPicture, NewReport, ReportId, ResultUse, StoredPicture, StoredReport};
+use super::{keys::Keys, message::is_one_line};
+use crate::results::{
+    Cameras, NewPicture, NewReport, ReportId, ResultUse, StoredPicture, StoredReport,
+};
 
 /// The script that deletes a camera.
-const DELETE: &str = include_str!("delete.lua");
+const DELETE: &str = concat!(include_str!("forget.lua"), include_str!("delete.lua"));
 
-/// An entry of the stream of all reports.
-pub(super) struct Entry {
-    pub(super) id: ReportId,
-    pub(super) camera: String,
-}
+/// The place of a report: its camera, and its ID in the stream of the camera.
+type Place = (ReportId, String);
 
 /// A connection to Redis, and its keys.
 pub(super) struct Reader<'a> {
@@ -49,17 +48,9 @@ impl Reader<'_> {
         let script = Script::new(DELETE);
         let keys = self.keys;
         let mut call = script.prepare_invoke();
-        for key in [
-            keys.reports(),
-            keys.earlier(),
-            keys.cameras(),
-            keys.totals(),
-            keys.pictures(),
-        ] {
-            call.key(key);
-        }
-        call.arg(keys.camera(camera));
-        call.arg(keys.picture(camera)).arg(camera);
+        call.key(&keys.index()[..]);
+        call.arg(keys.prefix_of_cameras());
+        call.arg(keys.prefix_of_pictures()).arg(camera);
         call.invoke_async(&mut self.connection).await
     }
 
@@ -76,38 +67,75 @@ impl Reader<'_> {
         Ok(latest)
     }
 
-    pub(super) async fn since_of(
+    /// The first reports after `after`, oldest first, at most `most`.
+    pub(super) async fn since(
+        &mut self,
+        cameras: &Cameras,
+        after: ReportId,
+        most: NonZeroUsize,
+    ) -> RedisResult<Vec<Arc<StoredReport>>> {
+        match cameras {
+            Cameras::One(camera) => self.since_of(camera, after, most).await,
+            Cameras::All => {
+                let places = self.places_after(after, most).await?;
+                self.reports_at(places).await
+            }
+        }
+    }
+
+    async fn since_of(
         &mut self,
         camera: &str,
         after: ReportId,
         most: NonZeroUsize,
     ) -> RedisResult<Vec<Arc<StoredReport>>> {
-        let key = self.keys.camera(camera);
-        let found = self.range(key, after, most).await?;
+        // An ID in Redis has two parts: the ID of the report, and 0. This range begins directly
+        // after it.
+        let mut range = cmd("XRANGE");
+        range.arg(self.keys.camera(camera));
+        range.arg(format!("{after}-1")).arg("+");
+        range.arg("COUNT").arg(most.get());
+        let found = range.query_async(&mut self.connection).await?;
         Ok(reports(camera, found))
     }
 
-    pub(super) async fn since(
+    /// The first reports of all cameras after `after`, in order. The latest of each camera are in
+    /// one set, all others in another.
+    async fn places_after(
         &mut self,
         after: ReportId,
         most: NonZeroUsize,
-    ) -> RedisResult<Vec<Arc<StoredReport>>> {
-        let found = self.range(self.keys.reports(), after, most).await?;
-        self.reports_at(entries(found.ids)).await
+    ) -> RedisResult<Vec<Place>> {
+        let mut both = atomic();
+        for key in [self.keys.earlier(), self.keys.cameras()] {
+            let first = both.cmd("ZRANGE").arg(key);
+            first.arg(format!("({after}")).arg("+inf").arg("BYSCORE");
+            first.arg("LIMIT").arg(0).arg(most.get()).arg("WITHSCORES");
+        }
+        let sets = both.query_async(&mut self.connection);
+        let [earlier, latest]: [Vec<(String, u64)>; 2] = sets.await?;
+        let earlier = earlier.into_iter().filter_map(|(element, micros)| {
+            // The ID, the size and the camera.
+            let camera = element.splitn(3, ':').nth(2)?.to_owned();
+            Some((ReportId::of_micros(micros), camera))
+        });
+        let latest = latest.into_iter();
+        let latest = latest.map(|(camera, micros)| (ReportId::of_micros(micros), camera));
+        let mut places: Vec<Place> = earlier.chain(latest).collect();
+        places.sort_unstable();
+        places.truncate(most.get());
+        Ok(places)
     }
 
-    /// The reports of these entries, as far as they are still kept.
-    pub(super) async fn reports_at(
-        &mut self,
-        entries: Vec<Entry>,
-    ) -> RedisResult<Vec<Arc<StoredReport>>> {
+    /// The reports at these places, as far as they are still kept.
+    async fn reports_at(&mut self, places: Vec<Place>) -> RedisResult<Vec<Arc<StoredReport>>> {
         let mut each = atomic();
-        for entry in &entries {
-            let id = format!("{}-0", entry.id);
-            let one = each.cmd("XRANGE").arg(self.keys.camera(&entry.camera));
+        for (id, camera) in &places {
+            let id = format!("{id}-0");
+            let one = each.cmd("XRANGE").arg(self.keys.camera(camera));
             one.arg(&id).arg(&id);
         }
-        let cameras = entries.into_iter().map(|entry| entry.camera);
+        let cameras = places.into_iter().map(|(_, camera)| camera);
         self.found(each, cameras.collect()).await
     }
 
@@ -143,32 +171,18 @@ impl Reader<'_> {
     pub(super) async fn usage(&mut self) -> RedisResult<ResultUse> {
         let mut counts = atomic();
         counts.cmd("ZCARD").arg(self.keys.cameras());
-        counts.cmd("XLEN").arg(self.keys.reports());
+        counts.cmd("ZCARD").arg(self.keys.earlier());
         counts.cmd("HGET").arg(self.keys.totals()).arg("bytes");
         counts.cmd("ZCARD").arg(self.keys.pictures());
         let counts = counts.query_async(&mut self.connection);
-        let (cameras, reports, bytes, pictures): (usize, usize, Option<usize>, usize) =
+        let (cameras, earlier, bytes, pictures): (usize, usize, Option<usize>, usize) =
             counts.await?;
         Ok(ResultUse {
             cameras,
-            reports,
+            reports: cameras + earlier,
             bytes: bytes.unwrap_or_default(),
             pictures,
         })
-    }
-
-    async fn range(
-        &mut self,
-        key: String,
-        after: ReportId,
-        most: NonZeroUsize,
-    ) -> RedisResult<StreamRangeReply> {
-        // An ID in Redis has two parts: the ID of the report, and 0. This range begins directly
-        // after it.
-        let mut range = cmd("XRANGE");
-        range.arg(key).arg(format!("{after}-1")).arg("+");
-        range.arg("COUNT").arg(most.get());
-        range.query_async(&mut self.connection).await
     }
 
     /// The reports that a pipeline with one query per camera returns. A camera whose key another
@@ -198,17 +212,6 @@ fn atomic() -> Pipeline {
     pipeline
 }
 
-/// The entries of a range of the stream of all reports.
-pub(super) fn entries(found: Vec<StreamId>) -> Vec<Entry> {
-    let entries = found.into_iter().filter_map(|entry| {
-        Some(Entry {
-            id: id_of(&entry)?,
-            camera: entry.get("camera")?,
-        })
-    });
-    entries.collect()
-}
-
 fn reports(camera: &str, found: StreamRangeReply) -> Vec<Arc<StoredReport>> {
     let found = found.ids.into_iter();
     found.filter_map(|entry| report(camera, entry)).collect()
@@ -219,8 +222,7 @@ fn report(camera: &str, mut entry: StreamId) -> Option<Arc<StoredReport>> {
     let Value::BulkString(json) = entry.map.remove("json")? else {
         return None;
     };
-    // Lines of their own would be events of their own in an event stream.
-    if json.iter().any(|byte| matches!(byte, b'\r' | b'\n')) {
+    if !is_one_line(&json) {
         return None;
     }
     Some(Arc::new(StoredReport {

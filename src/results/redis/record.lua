@@ -1,115 +1,117 @@
--- Stores a report and evicts what exceeds the limits, in one atomic step.
+-- Stores a report, publishes it to the servers that have listeners, and evicts what exceeds the
+-- limits, in one atomic step. It follows forget.lua.
 --
--- `reports`: a stream of all kept reports, with the camera and the size of each. `earlier`: the IDs
--- of those that are not their camera's latest. `cameras`: each camera with the ID of its latest
--- report. `totals`: the newest ID, and the size of all reports in bytes. `pictures`: the cameras
--- that have an image, with the ID of its report. `sender`: the number of the last report that this
--- server sent. The content of a report is in a stream of its camera, under the same ID.
-local reports, earlier, cameras, totals, pictures, sender = unpack(KEYS)
-local prefix_of_cameras, prefix_of_pictures, number = unpack(ARGV, 1, 3)
-local camera, received_at, persons, json, frame, sketch, bytes = unpack(ARGV, 4, 10)
-local most_cameras, most_of_camera = tonumber(ARGV[11]), tonumber(ARGV[12])
-local most_reports, most_bytes = tonumber(ARGV[13]), tonumber(ARGV[14])
-local most_pictures, max_age_seconds = tonumber(ARGV[15]), tonumber(ARGV[16])
--- Most expired reports that one call removes.
-local OLD_AT_A_TIME = 100
+-- `senders`: the number of the last report that each server sent.
+local senders = KEYS[6]
+local channel, channel_of_all, sender, number = unpack(ARGV, 4, 7)
+local received_at, persons, json, frame, sketch = unpack(ARGV, 8, 12)
+local bytes = tonumber(ARGV[13])
+local most_cameras, most_of_camera = tonumber(ARGV[14]), tonumber(ARGV[15])
+local most_reports, most_bytes = tonumber(ARGV[16]), tonumber(ARGV[17])
+local most_pictures, max_age_seconds = tonumber(ARGV[18]), tonumber(ARGV[19])
+-- Most expired reports that one call removes: more in the first call of a second than in others.
+local OLD_AT_A_TIME, OLD_IN_BETWEEN = 100, 2
+-- Most servers whose last number is kept. The one with the oldest goes first.
+local MOST_SENDERS = 4096
 
 -- The report was stored before, but the answer was lost.
-if redis.call('GET', sender) == number then
+if redis.call('ZADD', senders, 'GT', 'CH', number, sender) == 0 then
   return
 end
 
--- Redis may have evicted one of the two keys: start with an empty store then.
-if redis.call('EXISTS', reports, totals) < 2 then
-  redis.call('DEL', reports, earlier, cameras)
-  redis.call('HSET', totals, 'bytes', 0)
-end
-
-local function forget_picture(name)
-  redis.call('DEL', prefix_of_pictures .. name)
-  redis.call('ZREM', pictures, name)
-end
-
-local function forget(id)
-  local entry = redis.call('XRANGE', reports, id, id)[1]
-  if not entry then
-    return
-  end
-  local name, size = entry[2][2], entry[2][4]
-  local stream = prefix_of_cameras .. name
-  redis.call('XDEL', reports, id)
-  redis.call('ZREM', earlier, id)
-  redis.call('HINCRBY', totals, 'bytes', -size)
-  redis.call('XDEL', stream, id)
-  if redis.call('XLEN', stream) == 0 then
-    redis.call('DEL', stream)
-    redis.call('ZREM', cameras, name)
-    forget_picture(name)
-  end
-end
-
+local state = redis.call('HMGET', totals, 'last', 'bytes')
+local last, total = tonumber(state[1] or 0), tonumber(state[2] or 0)
 local time = redis.call('TIME')
 local now = time[1] * 1000000 + time[2]
-local last = tonumber(redis.call('HGET', totals, 'last') or 0)
 local micros = string.format('%.0f', math.max(now, last + 1))
-local id = micros .. '-0'
-local stream = prefix_of_cameras .. camera
-
-local before = redis.call('XREVRANGE', stream, '+', '-', 'COUNT', 1)[1]
-if before then
-  redis.call('ZADD', earlier, string.match(before[1], '%d+'), before[1])
-end
-redis.call('XADD', stream, id, 'received_at', received_at, 'persons', persons, 'json', json)
-redis.call('XADD', reports, id, 'camera', camera, 'bytes', bytes)
-redis.call('ZADD', cameras, micros, camera)
-redis.call('HSET', totals, 'last', micros)
-redis.call('HINCRBY', totals, 'bytes', bytes)
--- The image is that of the latest report. A report without an image removes it.
-forget_picture(camera)
-if frame ~= '' then
-  redis.call('HSET', prefix_of_pictures .. camera, 'id', micros, 'frame', frame, 'sketch', sketch)
-  redis.call('EXPIRE', prefix_of_pictures .. camera, max_age_seconds)
-  redis.call('ZADD', pictures, micros, camera)
-end
-redis.call('SET', sender, number, 'EX', max_age_seconds)
-
 local oldest = string.format('%.0f', now - max_age_seconds * 1000000)
-for _, old in ipairs(redis.call('XRANGE', reports, '-', oldest, 'COUNT', OLD_AT_A_TIME)) do
-  forget(old[1])
+-- Expiry is renewed once a second, and for keys that may be new.
+local is_new_second = math.floor(last / 1000000) ~= math.floor(now / 1000000)
+
+-- Redis may have evicted one of the keys: start with an empty store then.
+if is_new_second and redis.call('EXISTS', totals, cameras, latest) < 3 then
+  redis.call('DEL', earlier, cameras, latest)
+  total = 0
 end
-while redis.call('XLEN', stream) > most_of_camera do
+
+local stream = prefix_of_cameras .. camera
+redis.call('XADD', stream, micros .. '-0', 'received_at', received_at, 'persons', persons, 'json', json)
+local before = redis.call('HGET', latest, camera)
+if before then
+  redis.call('ZADD', earlier, string.match(before, '^%d+'), before .. ':' .. camera)
+end
+redis.call('HSET', latest, camera, micros .. ':' .. ARGV[13])
+redis.call('ZADD', cameras, micros, camera)
+
+local message = table.concat({micros, received_at, persons, json, camera}, '\n')
+redis.call('SPUBLISH', channel, message)
+redis.call('SPUBLISH', channel_of_all, message)
+
+-- The image is that of the latest report. A report without an image removes it.
+local is_first_picture = false
+if frame == '' then
+  forget_picture(camera)
+else
+  local picture = prefix_of_pictures .. camera
+  redis.call('DEL', picture)
+  redis.call('HSET', picture, 'id', micros, 'frame', frame, 'sketch', sketch)
+  redis.call('EXPIRE', picture, max_age_seconds)
+  redis.call('ZADD', pictures, micros, camera)
+  local count = redis.call('ZCARD', pictures)
+  is_first_picture = count == 1
+  for _ = most_pictures + 1, count do
+    forget_picture(redis.call('ZRANGE', pictures, 0, 0)[1])
+  end
+end
+
+local most_old = is_new_second and OLD_AT_A_TIME or OLD_IN_BETWEEN
+for _, old in ipairs(redis.call('ZRANGEBYSCORE', earlier, '-inf', oldest, 'LIMIT', 0, most_old)) do
+  redis.call('ZREM', earlier, old)
+  forget(old)
+end
+for _ = most_of_camera + 1, redis.call('XLEN', stream) do
   local first = redis.call('XRANGE', stream, '-', '+', 'COUNT', 1)[1][1]
-  forget(first)
-  redis.call('XDEL', stream, first)
-end
-while redis.call('ZCARD', cameras) > most_cameras do
-  local silent = redis.call('ZRANGE', cameras, 0, 0)[1]
-  for _, entry in ipairs(redis.call('XRANGE', prefix_of_cameras .. silent, '-', '+')) do
-    forget(entry[1])
+  local score = string.match(first, '^%d+')
+  local element = redis.call('ZRANGEBYSCORE', earlier, score, score)[1]
+  if element then
+    redis.call('ZREM', earlier, element)
+    forget(element)
+  else
+    redis.call('XDEL', stream, first)
   end
-  redis.call('ZREM', cameras, silent)
 end
-
-local function too_many()
-  local count = redis.call('XLEN', reports)
-  local size = tonumber(redis.call('HGET', totals, 'bytes'))
-  return count > most_reports or (count > 0 and size > most_bytes)
+if is_new_second or not before then
+  for _, old in ipairs(redis.call('ZRANGEBYSCORE', cameras, '-inf', oldest, 'LIMIT', 0, OLD_AT_A_TIME)) do
+    forget_camera(old)
+  end
+  for _ = most_cameras + 1, redis.call('ZCARD', cameras) do
+    forget_camera(redis.call('ZRANGE', cameras, 0, 0)[1])
+  end
 end
-
-while too_many() do
+local is_first_earlier = false
+while true do
+  local of_earlier, of_cameras = redis.call('ZCARD', earlier), redis.call('ZCARD', cameras)
+  is_first_earlier = is_first_earlier or of_earlier == 1
+  if of_earlier + of_cameras <= most_reports and total + bytes - freed <= most_bytes then
+    break
+  end
   local first = redis.call('ZPOPMIN', earlier)[1]
-  if not first then
-    -- All remaining reports are their cameras' latest, in order.
-    first = redis.call('XRANGE', reports, '-', '+', 'COUNT', 1)[1][1]
+  if first then
+    forget(first)
+  elseif of_cameras > 0 then
+    -- All remaining reports are their cameras' latest.
+    forget_camera(redis.call('ZRANGE', cameras, 0, 0)[1])
+  else
+    break
   end
-  forget(first)
 end
 
-redis.call('ZREMRANGEBYSCORE', pictures, '-inf', oldest)
-while redis.call('ZCARD', pictures) > most_pictures do
-  forget_picture(redis.call('ZRANGE', pictures, 0, 0)[1])
-end
-
-for _, key in ipairs({reports, earlier, cameras, totals, pictures, stream}) do
-  redis.call('EXPIRE', key, max_age_seconds)
+redis.call('HSET', totals, 'last', micros, 'bytes', string.format('%.0f', total + bytes - freed))
+redis.call('EXPIRE', stream, max_age_seconds)
+if is_new_second or is_first_earlier or is_first_picture or not before then
+  redis.call('ZREMRANGEBYSCORE', pictures, '-inf', oldest)
+  redis.call('ZREMRANGEBYRANK', senders, 0, -MOST_SENDERS - 1)
+  for _, key in ipairs({earlier, cameras, latest, totals, pictures, senders}) do
+    redis.call('EXPIRE', key, max_age_seconds)
+  end
 end

@@ -61,8 +61,8 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for BoundedReplies<S> {
     }
 }
 
-/// Follows the replies in a byte stream of RESP2, the protocol of Redis, and adds up the cost of
-/// each. Declared lengths count at once, so a huge one is refused before its bytes arrive.
+/// Follows the replies in a byte stream of RESP2 or RESP3, the protocols of Redis, and adds up the
+/// cost of each. Declared lengths count at once, so a huge one is refused before its bytes arrive.
 struct ReplyMeter {
     max_bytes: u64,
     /// The cost of the reply so far.
@@ -119,22 +119,27 @@ impl ReplyMeter {
         self.values_left -= 1;
         self.add(self.line.len() as u64)?;
         match self.line[0] {
-            b'+' | b'-' | b':' => {}
-            b'$' => {
+            b'+' | b'-' | b':' | b'_' | b'#' | b',' | b'(' => {}
+            b'$' | b'!' | b'=' => {
                 if let Some(length) = self.length()? {
                     self.add(length)?;
                     self.bulk_left = length + 2;
                 }
             }
-            b'*' => {
+            b'*' | b'~' | b'>' => {
                 if let Some(length) = self.length()? {
-                    self.add(length.saturating_mul(VALUE_BYTES))?;
-                    self.values_left += length;
+                    self.add_values(length)?;
+                }
+            }
+            // Each entry is a key and a value.
+            b'%' => {
+                if let Some(length) = self.length()? {
+                    self.add_values(length.saturating_mul(2))?;
                 }
             }
             other => {
                 let other = char::from(other);
-                return Err(refused(&format!("{other:?} instead of a value of RESP2")));
+                return Err(refused(&format!("{other:?} instead of a value of RESP")));
             }
         }
         Ok(())
@@ -146,6 +151,12 @@ impl ReplyMeter {
         let length = text.and_then(|text| text.trim().parse::<i64>().ok());
         let length = length.ok_or_else(|| refused("a length that is no number"))?;
         Ok(u64::try_from(length).ok())
+    }
+
+    fn add_values(&mut self, count: u64) -> io::Result<()> {
+        self.add(count.saturating_mul(VALUE_BYTES))?;
+        self.values_left += count;
+        Ok(())
     }
 
     fn add(&mut self, cost: u64) -> io::Result<()> {
@@ -173,20 +184,24 @@ fn refused(sent: &str) -> io::Error {
 mod tests {
     use super::*;
 
-    const REPLIES: &[u8] =
+    const RESP2: &[u8] =
         b"+OK\r\n*3\r\n$4\r\na\r\nb\r\n:7\r\n*2\r\n$-1\r\n*-1\r\n-ERR no\r\n$0\r\n\r\n";
+    const RESP3: &[u8] =
+        b"_\r\n#t\r\n,1.5\r\n(7\r\n>2\r\n+pong\r\n%1\r\n$1\r\na\r\n~1\r\n=5\r\ntxt:b\r\n!2\r\nno\r\n";
 
     #[test]
     fn replies_within_the_limit_pass_in_any_pieces() {
-        for size in 1..REPLIES.len() {
-            // The largest of the four has six values.
-            let mut meter = ReplyMeter::new(512);
-            for _ in 0..100 {
-                for piece in REPLIES.chunks(size) {
-                    meter.read(piece).unwrap();
+        for replies in [RESP2, RESP3] {
+            for size in 1..replies.len() {
+                // The largest reply has six values.
+                let mut meter = ReplyMeter::new(512);
+                for _ in 0..100 {
+                    for piece in replies.chunks(size) {
+                        meter.read(piece).unwrap();
+                    }
                 }
+                assert_eq!((meter.cost, meter.values_left), (0, 1), "pieces of {size}");
             }
-            assert_eq!((meter.cost, meter.values_left), (0, 1), "pieces of {size}");
         }
     }
 
@@ -196,6 +211,9 @@ mod tests {
             "$1000\r\n",
             "*20\r\n",
             "*1\r\n*15\r\n",
+            ">20\r\n",
+            "%10\r\n",
+            "%9223372036854775807\r\n",
             "$9223372036854775807\r\n",
             "*9223372036854775807\r\n",
         ] {

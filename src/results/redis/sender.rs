@@ -3,25 +3,30 @@
 
 use std::sync::Arc;
 
+use jiff::Timestamp;
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use uuid::Uuid;
 
 use super::{Shared, link::is_refusal, outbox::PendingReport};
-use crate::quoted::one_line;
+use crate::{quoted::one_line, results::Cameras};
 
 /// The script that stores a report in Redis.
-const RECORD: &str = include_str!("record.lua");
+const RECORD: &str = concat!(include_str!("forget.lua"), include_str!("record.lua"));
 
 /// Sends reports for as long as the server runs. The first of consecutive refusals is logged.
 pub(super) async fn run(shared: Arc<Shared>) {
     let sender = Sender {
         script: Script::new(RECORD),
-        key: shared.keys.sender(&Uuid::now_v7().to_string()),
+        id: Uuid::now_v7().into_bytes(),
         shared: &shared,
     };
     let mut last_was_refused = false;
-    for number in 1.. {
+    let mut number = 0;
+    loop {
         let parcel = shared.outbox.first().await;
+        // Increases also beyond the numbers of servers that have ended, so that theirs are
+        // forgotten first.
+        number = now_micros().max(number + 1);
         let refusal = sender.send(&parcel, number).await.err();
         if let Some(refusal) = &refusal
             && !last_was_refused
@@ -40,7 +45,8 @@ pub(super) async fn run(shared: Arc<Shared>) {
 
 struct Sender<'a> {
     script: Script,
-    key: String,
+    /// Identifies this server.
+    id: [u8; 16],
     shared: &'a Shared,
 }
 
@@ -68,19 +74,12 @@ impl Sender<'_> {
     ) -> RedisResult<()> {
         let (keys, limits) = (&self.shared.keys, &self.shared.limits);
         let mut call = self.script.prepare_invoke();
-        for key in [
-            keys.reports(),
-            keys.earlier(),
-            keys.cameras(),
-            keys.totals(),
-            keys.pictures(),
-        ] {
-            call.key(key);
-        }
-        call.key(&self.key);
+        call.key(&keys.index()[..]).key(keys.senders());
         call.arg(keys.prefix_of_cameras());
-        call.arg(keys.prefix_of_pictures()).arg(number);
-        call.arg(&report.camera);
+        call.arg(keys.prefix_of_pictures()).arg(&report.camera);
+        call.arg(keys.channel(&Cameras::One(report.camera.clone())));
+        call.arg(keys.channel(&Cameras::All));
+        call.arg(&self.id[..]).arg(number);
         call.arg(report.received_at.to_string());
         call.arg(report.persons).arg(&report.json[..]);
         // An empty image means that there is none.
@@ -100,4 +99,8 @@ impl Sender<'_> {
         call.arg(limits.max_age.as_secs());
         call.invoke_async(&mut connection).await
     }
+}
+
+fn now_micros() -> u64 {
+    u64::try_from(Timestamp::now().as_microsecond()).unwrap_or_default()
 }

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{RedisAddress, connect::Connector, keys::Keys, link::Link, outbox::Outbox};
+use super::{
+    RedisAddress, connect::Connector, followed::Followed, keys::Keys, link::Link, nodes::Nodes,
+    outbox::Outbox,
+};
 use crate::{
     metrics::IntCounter,
     results::{Listeners, ResultLimits},
@@ -21,9 +24,11 @@ pub struct RedisOptions {
 pub(super) struct Shared {
     pub(super) options: RedisOptions,
     pub(super) connector: Connector,
+    pub(super) nodes: Nodes,
     pub(super) limits: ResultLimits,
     pub(super) keys: Keys,
     pub(super) link: Link,
+    pub(super) followed: Followed,
     pub(super) outbox: Outbox,
     pub(super) listeners: Arc<Listeners>,
     pub(super) stored: IntCounter,

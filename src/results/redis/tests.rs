@@ -13,7 +13,7 @@ use super::*;
 /// Bytes that kernel buffers may take in addition to what the client reads.
 const SOCKET_BYTES: u64 = 16 << 20;
 
-/// A Redis that logs clients in, and sends `evil` to every other query, the last part forever if
+/// A Redis that logs clients in, and sends `evil` to every other query, again and again if
 /// `is_endless`.
 struct EvilRedis {
     port: u16,
@@ -24,8 +24,8 @@ struct Evil {
     reply: Vec<u8>,
     is_endless: bool,
     pause: Duration,
-    /// True to answer reads of new reports at once, instead of never.
-    is_hasty: bool,
+    /// True to send it without a query, to every connection for subscriptions.
+    is_pushed: bool,
 }
 
 impl Evil {
@@ -34,7 +34,7 @@ impl Evil {
             reply: reply.as_bytes().to_vec(),
             is_endless: false,
             pause: Duration::ZERO,
-            is_hasty: false,
+            is_pushed: false,
         }
     }
 }
@@ -83,17 +83,21 @@ fn named<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> thread
 
 fn serve(mut stream: TcpStream, evil: &Evil, sent: &AtomicU64) -> Option<()> {
     let mut buffer = vec![0; 64 << 10];
+    let mut is_for_pushes = false;
     loop {
         let count = stream.read(&mut buffer).ok().filter(|count| *count > 0)?;
         let text = String::from_utf8_lossy(&buffer[..count]);
         // A test sends one query at a time, except at the login.
-        if text.contains("XREAD\r\n") && !evil.is_hasty {
-            continue;
-        }
+        is_for_pushes |= text.contains("HELLO\r\n");
+        let is_check = text.contains("HGET\r\n") && text.contains("last");
         if text.contains("SETINFO") {
-            let replies = "+OK\r\n".repeat(text.matches("SETINFO").count());
-            stream.write_all(replies.as_bytes()).ok()?;
-        } else if text.contains("HGET\r\n") && text.contains("last") {
+            let replies = text.matches("SETINFO").count() + text.matches("HELLO\r\n").count();
+            stream
+                .write_all("+OK\r\n".repeat(replies).as_bytes())
+                .ok()?;
+        } else if text.contains("CLUSTER\r\n") {
+            stream.write_all(b"-ERR no cluster\r\n").ok()?;
+        } else if is_check && !(evil.is_pushed && is_for_pushes) {
             stream.write_all(b"$-1\r\n").ok()?;
         } else {
             loop {
@@ -127,7 +131,7 @@ async fn an_endless_reply_of_redis_is_cut_at_the_limit() {
             reply,
             is_endless: true,
             pause: Duration::ZERO,
-            is_hasty: false,
+            is_pushed: false,
         });
         let store = redis.store().await;
         let began = Instant::now();
@@ -150,7 +154,7 @@ async fn silence_and_a_slow_reply_end_in_time() {
             reply: reply.as_bytes().to_vec(),
             is_endless: !reply.is_empty(),
             pause: Duration::from_millis(20),
-            is_hasty: false,
+            is_pushed: false,
         });
         let store = redis.store().await;
         let began = Instant::now();
@@ -179,18 +183,24 @@ async fn garbage_of_redis_is_a_failure_in_one_line() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn reads_of_new_reports_are_paced_if_redis_never_waits() {
-    let reply = b"*-1\r\n";
+async fn a_flood_of_messages_of_redis_ends_the_connection() {
+    let text = "y".repeat(8 << 10);
+    let message = format!(
+        ">3\r\n$8\r\nsmessage\r\n$1\r\nx\r\n${}\r\n{text}\r\n",
+        text.len()
+    );
     let redis = EvilRedis::start(Evil {
-        reply: reply.to_vec(),
-        is_endless: false,
+        reply: message.into_bytes(),
+        is_endless: true,
         pause: Duration::ZERO,
-        is_hasty: true,
+        is_pushed: true,
     });
-    let _store = redis.store().await;
-    tokio::time::sleep(Duration::from_secs(1)).await;
-    let reads = redis.sent.load(Ordering::Relaxed) / reply.len() as u64;
-    assert!((1..=150).contains(&reads), "{reads} reads in a second");
+    let store = redis.store().await;
+    timeout(2 * TIMEOUT, store.shared.link.lost())
+        .await
+        .unwrap();
+    let sent = redis.sent.load(Ordering::Relaxed);
+    assert!(sent < 4 * SOCKET_BYTES, "{sent}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -27,7 +27,7 @@ async fn the_server_and_its_models_describe_themselves() {
     );
 
     let frames = service.get("/v2/models/lookdown").await.json();
-    let image = json!([{ "name": "image", "datatype": "BYTES", "shape": [1] }]);
+    let image = json!([{ "name": "image", "datatype": "BYTES", "shape": [-1] }]);
     assert_eq!(
         (&frames["inputs"], &frames["versions"]),
         (&image, &json!(["1"]))
@@ -38,7 +38,14 @@ async fn the_server_and_its_models_describe_themselves() {
         .collect();
     assert_eq!(
         outputs,
-        ["boxes", "scores", "oriented_boxes", "views", "report"]
+        [
+            "boxes",
+            "scores",
+            "oriented_boxes",
+            "views",
+            "counts",
+            "report"
+        ]
     );
 
     let detector = service.get("/v2/models/eager/versions/1").await.json();

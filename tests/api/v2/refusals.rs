@@ -25,17 +25,31 @@ async fn unusable_tensors_are_refused_in_one_sentence() {
             "no such input",
         ),
         (
-            json!([input(json!([2]), json!([image, image]))]),
-            "one frame at a time",
+            json!([input(json!([2]), json!([image]))]),
+            "1 elements, but its shape needs 2",
         ),
-        (json!([input(json!([0]), json!([]))]), "one frame at a time"),
-        (json!([input(json!([1]), json!([]))]), "empty"),
+        (json!([input(json!([0]), json!([]))]), "[1] to [16]"),
+        (
+            json!([input(json!([17]), json!(vec!["AA=="; 17]))]),
+            "[1] to [16]",
+        ),
+        (
+            json!([input(json!([1]), json!([]))]),
+            "0 elements, but its shape needs 1",
+        ),
         (
             json!([input(json!([1]), json!([image, image]))]),
-            "more than one",
+            "more elements than the 1",
+        ),
+        (
+            json!([input(json!([2]), json!([image, ""]))]),
+            "element 1 is empty",
         ),
         (json!([input(json!([1]), json!(["*"]))]), "not base64"),
-        (json!([input(json!([1]), json!([""]))]), "it is empty"),
+        (
+            json!([input(json!([1]), json!([""]))]),
+            "element 0 is empty",
+        ),
         (json!([input(json!([1]), json!(image))]), "not a list"),
         (
             json!([input(json!([65536, 65536, 65536, 65536, 2]), json!([]))]),
@@ -165,7 +179,9 @@ async fn invalid_requests_are_malformed() {
         (HEAD_LENGTH, "-1", "-1"),
         (HEAD_LENGTH, "many", "many"),
         (HEAD_LENGTH, "0", "EOF"),
-        ("content-encoding", "gzip", "compressed"),
+        ("content-encoding", "gzip", "cannot be decompressed"),
+        ("content-encoding", "deflate", "cannot be decompressed"),
+        ("content-encoding", "br", "send gzip, deflate"),
     ] {
         let request = Request::post(FRAMES).header(name, value);
         let answer = service

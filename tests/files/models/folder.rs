@@ -7,7 +7,7 @@ use std::{
 };
 
 use lookdown::inference::{
-    CandidateOptions, Device, InferenceError, Model, OnnxDetector, OnnxOptions,
+    CandidateOptions, Device, InferenceError, Model, OnnxDetector, OnnxOptions, onnx_loader,
 };
 use tempfile::TempDir;
 
@@ -43,9 +43,7 @@ pub(crate) fn options() -> OnnxOptions {
 /// A model with two sessions.
 pub(crate) fn model_of_two_sessions(path: &Path) -> Result<Model, InferenceError> {
     let two = NonZeroUsize::new(2).unwrap();
-    let (first, others) = OnnxDetector::load_sessions(&library(), path, &options(), two)?;
-    let others = others.into_iter().map(|session| Box::new(session) as _);
-    Ok(Model::of_sessions(Box::new(first), others.collect()))
+    onnx_loader(library(), options(), two)(path)
 }
 
 /// Writes a model folder: an ONNX file and a manifest with `name` and the fields in `more`.

@@ -15,7 +15,7 @@ use lookdown::{
         InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions,
         RepositoryRow,
     },
-    metrics::Metrics,
+    metrics::DetectMetrics,
     revision::sha256_of,
 };
 use tempfile::TempDir;
@@ -38,7 +38,7 @@ fn options_of(folder: &TempDir) -> RepositoryOptions {
 
 struct Models {
     repository: ModelRepository,
-    metrics: Arc<Metrics>,
+    metrics: Arc<DetectMetrics>,
     folder: TempDir,
 }
 
@@ -49,7 +49,7 @@ impl Models {
         for name in ["a", "b"] {
             write(&folder.path().join(name), name, "", &fixture("any_batch"));
         }
-        let metrics = Arc::<Metrics>::default();
+        let metrics = Arc::<DetectMetrics>::default();
         let (options, loader) = (options_of(&folder), Box::new(model_of_two_sessions));
         Self {
             repository: ModelRepository::new(options, loader, Arc::clone(&metrics)),

@@ -49,7 +49,7 @@ fn service(folder: &Path) -> Router {
             kept: vec!["person".to_owned()],
         },
         Box::new(model_of_two_sessions),
-        Arc::clone(&metrics),
+        Arc::clone(&metrics.detect),
     );
     models.load("person").unwrap();
     let engine = EngineOptions {
@@ -61,7 +61,7 @@ fn service(folder: &Path) -> Router {
         Arc::clone(models.registry()),
         None,
         engine,
-        Arc::clone(&metrics),
+        Arc::clone(&metrics.detect),
     )
     .unwrap();
     let workers = WorkerPool::start(&Arc::new(engine), two, NonZeroUsize::new(16).unwrap());

@@ -4,4 +4,6 @@ import "./agreement.js";
 import "./detect.js";
 import "./sections.js";
 import "./calibrate.js";
+import "./zones.js";
 import "./looks.js";
+import "./counts.js";

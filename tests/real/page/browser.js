@@ -22,13 +22,13 @@ after(() => browser?.close());
 
 /**
  * A test of a fresh page at `path`. Any error or warning of the browser fails it, unless `expected` matches.
- * Options: `viewport`, `colorScheme`, `server`, `expected`.
+ * Options: `viewport`, `hasTouch`, `colorScheme`, `server`, `expected`.
  */
 export function pageTest(name, path, act, options = {}) {
-  test(name, { timeout: 120_000 }, async () => {
+  test(name, { timeout: 240_000 }, async () => {
     browser ??= await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
-    const { viewport = WIDE, colorScheme = "light", server = SERVER, expected = /^$/ } = options;
-    const context = await browser.newContext({ viewport, colorScheme, reducedMotion: "reduce", baseURL: `${server}/`, acceptDownloads: true });
+    const { viewport = WIDE, hasTouch = false, colorScheme = "light", server = SERVER, expected = /^$/ } = options;
+    const context = await browser.newContext({ viewport, hasTouch, colorScheme, reducedMotion: "reduce", baseURL: `${server}/`, acceptDownloads: true });
     const page = await context.newPage();
     page.setDefaultTimeout(60_000);
     const complaints = [];

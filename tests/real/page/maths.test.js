@@ -47,7 +47,20 @@ test("lenses without a circle are left unchanged", () => {
   const file = calibrationOf({ id: "lobby", width: 10, height: 10, model: "equidistant", cx: 5, cy: 5, radius: 5, fieldOfView: 180 });
   assert.equal(circleOf({ ...file, lens: { ...file.lens, model: "mei" } }), null);
   assert.equal(circleOf({ ...file, mount: { world_up: [0, -1, 0] } }), null);
-  assert.equal(circleOf({ ...file, masks: [{}] }), null);
+});
+
+test("a changed circle keeps the rest of its calibration", () => {
+  const lens = { model: "equidistant", cx: 5, cy: 5, radius: 5, fieldOfView: 180, cameraHeight: 3 };
+  const base = {
+    ...calibrationOf({ id: "lobby", width: 10, height: 10, ...lens }),
+    zones: [{ name: "a", frame_px: [[1, 1], [5, 1], [5, 5]] }, { name: "b", floor_m: [[1, 1], [2, 1], [2, 2]] }],
+    detect: { profile: "fast" },
+  };
+  base.mount.site = "ground-floor";
+  const file = calibrationOf({ id: "lobby", width: 20, height: 20, ...lens, cameraHeight: null }, base);
+  assert.deepEqual(file.mount, { site: "ground-floor", world_up: [0, 0, -1] });
+  assert.deepEqual(file.zones, [{ name: "a", frame_px: [[2, 2], [10, 2], [10, 10]] }, base.zones[1]].map(({ name, ...corners }) => ({ ...corners, name })));
+  assert.deepEqual(file.detect, base.detect);
 });
 
 test("without a detected circle the largest one that fits is used", () => {

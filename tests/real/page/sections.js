@@ -14,6 +14,9 @@ pageTest("an address selects its section, and a section without a frame shows a 
   await go(page, "Calibrate");
   await page.getByText("Pick a frame of the camera in Detect first").waitFor();
   assert.match(page.url(), /#calibrate$/);
+  await go(page, "Zones");
+  await page.getByText("Pick a frame in Detect first: zones are drawn on it").waitFor();
+  await page.goBack();
   await page.goBack();
   await page.getByRole("heading", { name: "Floor", level: 1 }).waitFor();
 });

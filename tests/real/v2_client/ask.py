@@ -11,7 +11,7 @@ from tritonclient.utils import InferenceServerException
 
 MODEL = "lookdown"
 DETECTOR = "nanodet_g_416"
-OUTPUTS = ("boxes", "scores", "oriented_boxes", "views", "report")
+OUTPUTS = ("boxes", "scores", "oriented_boxes", "views", "counts", "report")
 FAST = {"calibration": "office", "profile": "fast"}
 
 
@@ -33,7 +33,9 @@ def main(address: str, frame: bytes) -> dict:
             f"{'bytes' if sent else 'JSON'} to {'bytes' if answered else 'JSON'}": found(client, frame, sent, answered)
             for sent in (True, False)
             for answered in (True, False)
-        },
+        }
+        | {"gzip": found(client, frame, True, True, request_compression_algorithm="gzip")},
+        "batch": {way: batch(client, frame, way) for way in ("gzip", "deflate", None)},
         "views": {datatype: views(client, datatype) for datatype in ("UINT8", "FP32")},
         "asynchronous": asynchronous(client, frame),
         "refused": refused(client, frame),
@@ -47,10 +49,27 @@ def image(content: bytes, binary: bool = True) -> InferInput:
     return tensor.set_data_from_numpy(np.array([element], dtype=np.object_), binary_data=binary)
 
 
-def found(client: InferenceServerClient, frame: bytes, sent: bool, answered: bool) -> dict:
+def images(*contents: bytes) -> InferInput:
+    """Frames as an input."""
+    tensor = InferInput("image", [len(contents)], "BYTES")
+    return tensor.set_data_from_numpy(np.array(contents, dtype=np.object_))
+
+
+def batch(client: InferenceServerClient, frame: bytes, compression: str | None) -> dict:
+    """The outputs for the same frame three times, in a compressed request."""
+    three = images(frame, frame, frame)
+    result = client.infer(MODEL, [three], parameters=FAST, request_compression_algorithm=compression)
+    return {
+        "counts": result.as_numpy("counts").tolist(),
+        "scores": result.as_numpy("scores").tolist(),
+        "reports": [json.loads(report)["persons"] for report in result.as_numpy("report")],
+    }
+
+
+def found(client: InferenceServerClient, frame: bytes, sent: bool, answered: bool, **options: str) -> dict:
     """The outputs for a frame that is sent and answered as bytes or in JSON."""
     outputs = [InferRequestedOutput(name, binary_data=answered) for name in OUTPUTS]
-    asked = {"priority": 3, "timeout": 60_000_000, "parameters": FAST}
+    asked = {"priority": 3, "timeout": 60_000_000, "parameters": FAST} | options
     result = client.infer(MODEL, [image(frame, sent)], outputs=outputs, request_id="17", **asked)
     arrays = {name: result.as_numpy(name) for name in OUTPUTS}
     report = arrays.pop("report")[0]
@@ -78,19 +97,18 @@ def asynchronous(client: InferenceServerClient, frame: bytes) -> list[int]:
 def refused(client: InferenceServerClient, frame: bytes) -> dict:
     """Status and sentence of requests that are refused."""
     good = [image(frame)]
-    two = InferInput("image", [2], "BYTES").set_data_from_numpy(np.array([frame, frame], dtype=np.object_))
     shared = InferInput("image", [1], "BYTES").set_shared_memory("region", len(frame))
     requests = {
         "unknown model": ("unknown", good, {}),
         "no picture": (MODEL, [image(b"no picture")], {}),
-        "two frames": (MODEL, [two], {}),
+        "no picture in a batch": (MODEL, [images(frame, b"no picture")], {"parameters": FAST}),
+        "too many frames": (MODEL, [images(*[b"no picture"] * 17)], {}),
         "unknown parameter": (MODEL, good, {"parameters": {"colour": "red"}}),
         "unknown calibration": (MODEL, good, {"parameters": {"calibration": "unknown-id"}}),
         "score out of range": (MODEL, good, {"parameters": {"score_threshold": 1.5}}),
         "sequence": (MODEL, good, {"sequence_id": 7, "sequence_start": True}),
         "shared memory": (MODEL, [shared], {}),
         "classes": (MODEL, good, {"outputs": [InferRequestedOutput("scores", class_count=2)]}),
-        "compressed": (MODEL, good, {"request_compression_algorithm": "gzip"}),
         "unknown output": (MODEL, good, {"outputs": [InferRequestedOutput("masks")]}),
     }
     return {name: refusal(client, *request) for name, request in requests.items()}

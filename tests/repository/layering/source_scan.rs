@@ -6,32 +6,38 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folders of the sources whose modules begin with `crate::` in the server: its own and the
-/// geometry that it re-exports.
-const ROOTS: [&str; 2] = ["src", "crates/lookdown-lens/src"];
+/// The folders with the sources of the crates whose files are checked.
+pub const CRATES: [&str; 4] = [
+    "src",
+    "crates/lookdown-lens/src",
+    "crates/lookdown-detect/src",
+    "crates/lookdown-eval/src",
+];
 
-/// Every source file of the libraries with its module path, such as `api::http::csrf`.
-pub fn sources() -> Vec<(String, PathBuf)> {
-    let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
+/// Every source file of a crate with its module path, such as `api::http::csrf`.
+pub fn sources(root: &str) -> Vec<(String, PathBuf)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(root);
     let mut files = Vec::new();
-    for root in ROOTS {
-        let root = repository.join(root);
-        let mut folders = vec![root.clone()];
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(folder).unwrap() {
-                let path = entry.unwrap().path();
-                if path.is_dir() {
-                    folders.push(path);
-                } else if path.extension().is_some_and(|ending| ending == "rs") {
-                    let below = path.strip_prefix(&root).unwrap().with_extension("");
-                    let parts: Vec<_> = below.iter().map(|part| part.to_str().unwrap()).collect();
-                    files.push((parts.join("::"), path));
-                }
+    let mut folders = vec![root.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                let below = path.strip_prefix(&root).unwrap().with_extension("");
+                let parts: Vec<_> = below.iter().map(|part| part.to_str().unwrap()).collect();
+                files.push((parts.join("::"), path));
             }
         }
     }
     files.retain(|(module, _)| module != "lib" && module != "main");
     files
+}
+
+/// The files of all crates.
+pub fn all_sources() -> Vec<(String, PathBuf)> {
+    CRATES.into_iter().flat_map(sources).collect()
 }
 
 /// Returns the code of a file without comments.

@@ -35,7 +35,7 @@ struct HeatMap {
     seconds: Vec<Vec<f64>>,
 }
 
-type Parameters = Result<Query<TimeParameters>, QueryRejection>;
+pub(super) type Parameters = Result<Query<TimeParameters>, QueryRejection>;
 
 pub(super) async fn json_of_camera(
     State(api): State<Shared>,
@@ -74,6 +74,27 @@ pub(super) async fn png_of_site(
 }
 
 async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<HeatMap, Problem> {
+    let (time, cells) = stored(api, owner, parameters).await?;
+    let day = |milliseconds: i64| {
+        let time = Timestamp::from_millisecond(milliseconds.div_euclid(DAY_MS) * DAY_MS);
+        time.unwrap_or(Timestamp::UNIX_EPOCH)
+    };
+    let (origin, seconds) = grid(&cells);
+    Ok(HeatMap {
+        from: day(time.0),
+        to: day(time.1 + DAY_MS - 1),
+        cell_m: CELL_M,
+        origin_m: origin.corner_m(),
+        seconds,
+    })
+}
+
+/// Returns the time of the parameters, and the milliseconds of presence per cell.
+pub(super) async fn stored(
+    api: &Shared,
+    owner: Owner,
+    parameters: Parameters,
+) -> Result<((i64, i64), BTreeMap<Cell, u64>), Problem> {
     let Query(parameters) = parameters.map_err(|_| unknown_parameter())?;
     let span = parameters.span()?;
     check_known(api, &owner).await?;
@@ -89,18 +110,7 @@ async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<
         Owner::Site(_) => owner,
     };
     let cells = query(api, move |store| store.cells(&owner, time)).await?;
-    let day = |milliseconds: i64| {
-        let time = Timestamp::from_millisecond(milliseconds.div_euclid(DAY_MS) * DAY_MS);
-        time.unwrap_or(Timestamp::UNIX_EPOCH)
-    };
-    let (origin, seconds) = grid(&cells);
-    Ok(HeatMap {
-        from: day(time.0),
-        to: day(time.1 + DAY_MS - 1),
-        cell_m: CELL_M,
-        origin_m: origin.corner_m(),
-        seconds,
-    })
+    Ok((time, cells))
 }
 
 /// Returns the least cell and the seconds of all cells around the one with the most time.
@@ -161,7 +171,12 @@ fn png(map: &HeatMap) -> Result<Response, Problem> {
             }
         }
     }
-    let file = encoded(&pixels, width, rows * CELL_PX).map_err(|problem| {
+    image(&pixels, width, rows * CELL_PX)
+}
+
+/// Returns pixels with red, green, blue and alpha as a PNG.
+pub(super) fn image(pixels: &[u8], width: usize, height: usize) -> Result<Response, Problem> {
+    let file = encoded(pixels, width, height).map_err(|problem| {
         tracing::error!("the heat map cannot be encoded: {problem}");
         Problem::internal()
     })?;
@@ -178,7 +193,8 @@ fn encoded(pixels: &[u8], width: usize, height: usize) -> Result<Vec<u8>, png::E
     Ok(file)
 }
 
-fn colour(seconds: f64, most: f64) -> [u8; 4] {
+/// Returns the colour of a time of presence, with the most of any cell.
+pub(super) fn colour(seconds: f64, most: f64) -> [u8; 4] {
     if seconds <= 0.0 {
         return [0; 4];
     }

@@ -14,7 +14,7 @@ use super::{Problem, Shared, check_known, now_ms};
 use crate::{
     engine::Engine,
     scene::{Scene, SceneCamera},
-    snapshot::LineSnapshot,
+    snapshot::{LineSnapshot, ZoneSnapshot},
     sums::Owner,
     tracking::{Plane, TailPoint, Track},
 };
@@ -22,7 +22,7 @@ use crate::{
 /// Longest tail of an answer, seconds.
 const TAIL_S: f64 = 5.0;
 
-/// Parts of a line in the frame: a straight line on the floor is a curve there.
+/// Parts of a line or of an edge of a zone in the frame: a straight line on the floor is a curve there.
 const OUTLINE_SEGMENTS: u32 = 16;
 
 /// The current tracks of a camera or a site.
@@ -41,7 +41,7 @@ pub(super) struct Tracks {
     zones: Vec<Value>,
 }
 
-/// A track. Places are on the floor in metres, or in frame pixels.
+/// A track. Places are on the floor in metres, or in frame pixels of the camera.
 #[derive(Serialize)]
 struct TrackRow {
     id: u64,
@@ -53,7 +53,11 @@ struct TrackRow {
     velocity_m_s: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     frame_px: Option<[f64; 2]>,
+    /// On the floor, or in the frame without the camera's height.
     tail: Vec<[f64; 2]>,
+    /// In the frame; absent for a site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tail_px: Option<Vec<[f64; 2]>>,
 }
 
 pub(super) async fn of_camera(
@@ -101,15 +105,13 @@ fn tracks(engine: &Engine, scene: &Scene, camera: Option<&str>) -> Tracks {
         last_report: presence
             .last_ms
             .and_then(|last_ms| Timestamp::from_millisecond(last_ms).ok()),
-        tracks: seen.filter(|_| is_current).map(|track| row(track, is_site)).collect(),
+        tracks: seen
+            .filter(|_| is_current)
+            .map(|track| row(track, of_camera.map(|(_, camera)| camera)))
+            .collect(),
         is_current,
         lines: of_camera.map_or_else(Vec::new, |(_, camera)| line_rows(camera, &lines)),
-        zones: zones
-            .into_iter()
-            .map(|zone| {
-                json!({ "zone": zone.zone, "persons": zone.persons, "entries": zone.entries })
-            })
-            .collect(),
+        zones: of_camera.map_or_else(Vec::new, |(_, camera)| zone_rows(camera, &zones)),
     }
 }
 
@@ -145,12 +147,38 @@ fn line_rows(camera: &SceneCamera, totals: &[LineSnapshot]) -> Vec<Value> {
             .collect();
         let outline = outline.into_iter().flatten();
         let outline: Vec<_> = outline.map(|point| rounded([point.x, point.y])).collect();
-        json!({ "line": line.name, "crossings": crossings, "outline_px": outline })
+        json!({
+            "line": line.name, "directions": line.directions, "crossings": crossings,
+            "outline_px": outline,
+        })
     });
     rows.collect()
 }
 
-fn row(track: &Track, is_site: bool) -> TrackRow {
+/// Returns the zones with their persons and their outlines in the frame.
+fn zone_rows(camera: &SceneCamera, current: &[ZoneSnapshot]) -> Vec<Value> {
+    let Some(geometry) = &camera.definition.geometry else {
+        return Vec::new();
+    };
+    let rows = current.iter().map(|zone| {
+        let mut drawn = geometry.areas.zones.iter();
+        let drawn = drawn.find(|drawn| drawn.name == zone.zone);
+        let outline = drawn.map(|zone| {
+            let outline = zone.outline(&geometry.lens, &geometry.mount, OUTLINE_SEGMENTS);
+            let seen = outline.into_iter().flatten();
+            seen.map(|point| rounded([point.x, point.y]))
+                .collect::<Vec<_>>()
+        });
+        json!({
+            "zone": zone.zone, "persons": zone.persons, "entries": zone.entries,
+            "outline_px": outline,
+        })
+    });
+    rows.collect()
+}
+
+/// Returns a track, with its places in the frame of `camera`.
+fn row(track: &Track, camera: Option<&SceneCamera>) -> TrackRow {
     let floor_m = track.place(Plane::FloorM);
     let plane = if floor_m.is_some() {
         Plane::FloorM
@@ -159,19 +187,29 @@ fn row(track: &Track, is_site: bool) -> TrackRow {
     };
     let since = track.seen_s() - TAIL_S;
     let recent = track.tail().filter(|point| point.at_s >= since);
-    let tail = recent.filter_map(|point: &TailPoint| point.place(plane));
+    let recent: Vec<&TailPoint> = recent.collect();
+    let tail = recent.iter().filter_map(|point| point.place(plane));
+    // A pixel of the track may be one of another camera of the site, a place on the floor is not.
+    let in_frame = |camera: &SceneCamera, floor_m: Option<[f64; 2]>, pixel: Option<[f64; 2]>| {
+        floor_m.map_or(pixel, |floor_m| camera.definition.pixel_of(floor_m))
+    };
+    let tail_px = camera.map(|camera| {
+        let pixels = recent
+            .iter()
+            .filter_map(|point| in_frame(camera, point.floor_m, Some(point.foot_px)));
+        pixels.map(rounded).collect()
+    });
     TrackRow {
         id: track.id().0,
         first_seen: time(track.first_seen_s()),
         last_seen: time(track.seen_s()),
         floor_m: floor_m.map(rounded),
         velocity_m_s: track.velocity_m_s().map(rounded),
-        // A place in the frame is one of the camera that saw the track last.
-        frame_px: track
-            .place(Plane::FramePx)
-            .filter(|_| !is_site)
+        frame_px: camera
+            .and_then(|camera| in_frame(camera, floor_m, track.place(Plane::FramePx)))
             .map(rounded),
         tail: tail.map(rounded).collect(),
+        tail_px,
     }
 }
 

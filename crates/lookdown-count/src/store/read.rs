@@ -10,7 +10,7 @@ use crate::{
     heat_map::Cell,
     scene::SceneState,
     sums::{DAY_MS, LineDirection, Owner, PresenceSum, ZoneOf, ZoneSum},
-    webhooks::Message,
+    webhooks::{HeldCondition, Message},
 };
 
 /// The content of the store at the start.
@@ -20,6 +20,7 @@ pub(crate) struct Resumed {
     pub(crate) scenes: Vec<SceneState>,
     pub(crate) calibrations: StoredCalibrations,
     pub(crate) messages: Vec<Message>,
+    pub(crate) held: Vec<HeldCondition>,
 }
 
 /// The calibrations by ID: the revision, and the content if the server has one.
@@ -61,6 +62,7 @@ impl Store {
             scenes: scenes(&connection)?,
             calibrations: calibrations(&connection)?,
             messages: messages(&connection)?,
+            held: held(&connection)?,
         })
     }
 
@@ -219,6 +221,17 @@ fn messages(connection: &Connection) -> rusqlite::Result<Vec<Message>> {
             url: row.get(1)?,
             body: row.get(2)?,
             created_s: row.get(3)?,
+        })
+    })?;
+    rows.collect()
+}
+
+fn held(connection: &Connection) -> rusqlite::Result<Vec<HeldCondition>> {
+    let mut statement = connection.prepare("SELECT webhook, camera FROM conditions")?;
+    let rows = statement.query_map([], |row| {
+        Ok(HeldCondition {
+            webhook: row.get(0)?,
+            camera: row.get(1)?,
         })
     })?;
     rows.collect()

@@ -33,6 +33,8 @@ CREATE TABLE IF NOT EXISTS zone_totals (
   PRIMARY KEY (camera, zone)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS outbox (
   id TEXT PRIMARY KEY, url TEXT NOT NULL, body TEXT NOT NULL, created_s INTEGER NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS conditions (
+  webhook TEXT, camera TEXT, PRIMARY KEY (webhook, camera)) WITHOUT ROWID;
 PRAGMA user_version = 1;
 COMMIT;
 ";

@@ -45,7 +45,7 @@ fn sums_of_batches_add_up_over_steps() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
     for minute in [0, 0, 1, 17] {
-        store.commit(&batch(minute, 7), &[]).unwrap();
+        store.commit(&batch(minute, 7), &[], None).unwrap();
     }
     let hall = Owner::Camera("hall".to_owned());
     let span = |step| Span {
@@ -86,8 +86,8 @@ fn sums_of_batches_add_up_over_steps() {
 fn old_sums_expire_and_totals_stay() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
-    store.commit(&batch(1, 7), &[]).unwrap();
-    store.commit(&batch(100, 8), &[]).unwrap();
+    store.commit(&batch(1, 7), &[], None).unwrap();
+    store.commit(&batch(100, 8), &[], None).unwrap();
     store.expire(60 * 60_000).unwrap();
     let hall = Owner::Camera("hall".to_owned());
     let span = Span {
@@ -123,7 +123,7 @@ fn messages_stay_until_they_are_removed() {
     };
     for _ in 0..2 {
         store
-            .commit(&Batch::empty(1), std::slice::from_ref(&message))
+            .commit(&Batch::empty(1), std::slice::from_ref(&message), None)
             .unwrap();
     }
     assert_eq!(store.resumed().unwrap().messages, [message]);

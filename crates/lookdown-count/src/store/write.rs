@@ -1,12 +1,14 @@
 //! Transactions of the store.
 
+use std::collections::BTreeSet;
+
 use rusqlite::{Transaction, params};
 
 use super::{Store, StoreError};
 use crate::{
     engine::Batch,
     sums::{DAY_MS, MINUTE_MS, Owner, Sums},
-    webhooks::Message,
+    webhooks::{HeldCondition, Message},
 };
 
 impl Owner {
@@ -20,9 +22,15 @@ impl Owner {
 }
 
 impl Store {
-    /// Stores sums, states, the ID of the last report and the messages that follow from them in one
-    /// transaction. Blocks.
-    pub(crate) fn commit(&self, batch: &Batch, messages: &[Message]) -> Result<(), StoreError> {
+    /// Stores sums, states, the ID of the last report, and the messages and conditions that follow
+    /// from them in one transaction. `held` are all conditions that hold, or `None` if they are as
+    /// stored. Blocks.
+    pub(crate) fn commit(
+        &self,
+        batch: &Batch,
+        messages: &[Message],
+        held: Option<&BTreeSet<HeldCondition>>,
+    ) -> Result<(), StoreError> {
         let mut connection = self.writer.lock();
         let transaction = connection.transaction()?;
         add(&transaction, &batch.sums)?;
@@ -48,6 +56,14 @@ impl Store {
                     message.body,
                     message.created_s
                 ])?;
+        }
+        if let Some(held) = held {
+            transaction.execute("DELETE FROM conditions", [])?;
+            for condition in held {
+                transaction
+                    .prepare_cached("INSERT INTO conditions VALUES (?, ?)")?
+                    .execute(params![condition.webhook, condition.camera])?;
+            }
         }
         transaction.execute(
             "INSERT OR REPLACE INTO progress VALUES (1, ?)",

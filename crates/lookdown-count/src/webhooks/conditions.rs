@@ -13,17 +13,59 @@ pub(crate) struct Conditions {
     webhooks: Vec<Webhook>,
     /// Webhook and camera of each condition that holds.
     holding: BTreeSet<(usize, String)>,
+    /// True if the stored state is another one.
+    is_changed: bool,
     /// Last report of each camera, milliseconds since the Unix epoch.
     reports: BTreeMap<String, i64>,
+    /// Time of the start, milliseconds since the Unix epoch. No camera is silent for longer: reports
+    /// of the time before may still arrive.
+    started_ms: i64,
+}
+
+/// A condition that holds, as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct HeldCondition {
+    /// The digest of the webhook.
+    pub(crate) webhook: String,
+    pub(crate) camera: String,
 }
 
 impl Conditions {
-    pub(crate) fn new(webhooks: Vec<Webhook>) -> Self {
-        Self {
-            webhooks,
-            holding: BTreeSet::new(),
-            reports: BTreeMap::new(),
+    /// Continues with the stored conditions that hold and the last report of each camera.
+    /// Conditions of webhooks that are gone are left out.
+    pub(crate) fn resumed(
+        webhooks: Vec<Webhook>,
+        held: &[HeldCondition],
+        reports: BTreeMap<String, i64>,
+        started_ms: i64,
+    ) -> Self {
+        let mut holding = BTreeSet::new();
+        for (index, webhook) in webhooks.iter().enumerate() {
+            let digest = webhook.digest();
+            let own = held.iter().filter(|held| held.webhook == digest);
+            holding.extend(own.map(|held| (index, held.camera.clone())));
         }
+        Self {
+            is_changed: holding.len() != held.len(),
+            webhooks,
+            holding,
+            reports,
+            started_ms,
+        }
+    }
+
+    /// Takes the conditions that hold, if they are to be stored again.
+    pub(crate) fn take_changed(&mut self) -> Option<BTreeSet<HeldCondition>> {
+        if !std::mem::take(&mut self.is_changed) {
+            return None;
+        }
+        let held = self.holding.iter().filter_map(|(index, camera)| {
+            Some(HeldCondition {
+                webhook: self.webhooks.get(*index)?.digest(),
+                camera: camera.clone(),
+            })
+        });
+        Some(held.collect())
     }
 
     /// Returns the messages of a counted report.
@@ -80,6 +122,7 @@ impl Conditions {
                     let names = ["occupancy.reached", "occupancy.ended"];
                     let id = format!("msg_{event}_{index}");
                     let changed = change(&mut self.holding, (index, camera), holds, names);
+                    self.is_changed |= changed.is_some();
                     messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
                 }
                 Condition::Silent { .. } if is_of(camera) => {
@@ -87,6 +130,7 @@ impl Conditions {
                     let names = ["camera.silent", "camera.back"];
                     let id = format!("msg_{event}_{index}");
                     let changed = change(&mut self.holding, (index, camera), false, names);
+                    self.is_changed |= changed.is_some();
                     messages.extend(changed.map(|name| message(id, webhook, name, at_ms, &data)));
                 }
                 Condition::Occupancy { .. } | Condition::Silent { .. } => {}
@@ -105,7 +149,8 @@ impl Conditions {
             };
             for (camera, last_ms) in &self.reports {
                 let is_of = webhook.camera.as_ref().is_none_or(|name| name == camera);
-                let silence = u128::from(now_ms.saturating_sub(*last_ms).max(0).unsigned_abs());
+                let since_ms = self.started_ms.max(*last_ms);
+                let silence = u128::from(now_ms.saturating_sub(since_ms).max(0).unsigned_abs());
                 if !is_of || silence < after.as_millis() {
                     continue;
                 }
@@ -113,6 +158,7 @@ impl Conditions {
                 let names = ["camera.silent", "camera.back"];
                 let id = format!("msg_{last_ms}_{index}_silent");
                 let changed = change(&mut self.holding, (index, camera), true, names);
+                self.is_changed |= changed.is_some();
                 messages.extend(changed.map(|name| message(id, webhook, name, now_ms, &data)));
             }
         }

@@ -39,6 +39,16 @@ impl OrientedBox {
         }
     }
 
+    /// Returns the corners, clockwise from the upper left one at no rotation, corner-origin frame
+    /// pixels.
+    #[must_use]
+    pub fn corners(&self) -> [Pixel; 4] {
+        let (sin, cos) = self.angle.sin_cos();
+        let right = Vector2::new(cos, sin) * (0.5 * self.width);
+        let down = Vector2::new(-sin, cos) * (0.5 * self.height);
+        [-right - down, right - down, right + down, down - right].map(|to| self.center + to)
+    }
+
     /// The middle of the lower short side: where the feet are. Corner-origin frame pixels.
     #[must_use]
     pub fn foot(&self) -> Pixel {

@@ -8,7 +8,7 @@
 
 import os
 
-# ONNX Runtime reads this when it is loaded; otherwise builds of its vendor send telemetry.
+# ONNX Runtime reads this when it is loaded; otherwise the builds on PyPI record telemetry.
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
 from lookdown._lookdown import Calibration, Lens, LookdownError, View

@@ -1,5 +1,7 @@
 //! The memory budget of requests: their bodies, and the tensors unpacked from them.
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 
 use crate::{
@@ -84,6 +86,33 @@ impl Held<Bytes> {
     /// Returns plain bytes that release the permit when their last clone is dropped.
     pub(in crate::api) fn into_bytes(self) -> Bytes {
         Bytes::from_owner(self)
+    }
+}
+
+impl Held<Vec<Bytes>> {
+    /// Returns plain bytes that release the permit when the last clone of the last element is
+    /// dropped.
+    pub(in crate::api) fn into_elements(self) -> Vec<Bytes> {
+        let all = Arc::new(self);
+        let elements = (0..all.content.len()).map(|index| {
+            Bytes::from_owner(HeldElement {
+                all: Arc::clone(&all),
+                index,
+            })
+        });
+        elements.collect()
+    }
+}
+
+/// An element in memory together with the permit of all elements.
+struct HeldElement {
+    all: Arc<Held<Vec<Bytes>>>,
+    index: usize,
+}
+
+impl AsRef<[u8]> for HeldElement {
+    fn as_ref(&self) -> &[u8] {
+        &self.all.content[self.index]
     }
 }
 

@@ -34,8 +34,8 @@ pub(super) struct Output {
 pub(super) enum OutputValues {
     Floats(Vec<f32>),
     Integers(Vec<i32>),
-    /// The single element of a `BYTES` tensor.
-    Text(Bytes),
+    /// The elements of a `BYTES` tensor.
+    Texts(Vec<Bytes>),
 }
 
 /// The model that responds.
@@ -50,8 +50,10 @@ impl OutputValues {
         Ok(match self {
             Self::Floats(values) => TensorValues::Floats(values),
             Self::Integers(values) => TensorValues::Integers(values),
-            Self::Text(text) => {
-                TensorValues::Text([str::from_utf8(text).map_err(Problem::internal)?])
+            Self::Texts(texts) => {
+                let texts = texts.iter().map(|text| str::from_utf8(text));
+                let texts = texts.collect::<Result<_, _>>();
+                TensorValues::Texts(texts.map_err(Problem::internal)?)
             }
         })
     }
@@ -72,7 +74,7 @@ impl InferAnswer {
             };
             let values = output.values.as_tensor()?;
             if binary {
-                behind.push(values);
+                behind.push(values.clone());
             }
             written.push(OutputTensor {
                 name: output.name.to_owned(),

@@ -89,7 +89,7 @@ fn pixels(views: Tensor, model: &Model) -> Result<Held<Vec<f32>>, Problem> {
             );
             Err(misfit(INPUT, &wrong))
         }
-        Values::Frame(_) => {
+        Values::Frames(_) => {
             let wrong = "send the datatype FP32 or UINT8: planes of red, green and blue, 0 to 255";
             Err(misfit(INPUT, wrong))
         }

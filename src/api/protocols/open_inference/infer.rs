@@ -3,6 +3,7 @@
 use axum::{Extension, extract::State, response::IntoResponse};
 
 use super::{
+    content_encoding::decompressed,
     detector,
     document::{InferRequestBody, InferResponseBody},
     persons,
@@ -10,15 +11,23 @@ use super::{
     requested_model::{ModelAddress, RequestedModel},
 };
 use crate::{
-    api::{ApiState, http::problem::Problem, openapi::RawBytes, upload::ReceivedRequest},
+    api::{
+        ApiState,
+        http::{problem::Problem, rate_limit::RequestTokens},
+        openapi::RawBytes,
+        upload::ReceivedRequest,
+    },
     telemetry::RequestTrace,
 };
 
 /// Run inference
 ///
-/// `lookdown` accepts `image` (`BYTES`, `[1]`): an encoded frame, base64 in JSON, or unchanged
-/// bytes after it. It returns `boxes` (`[persons, 4]`), `scores`, `oriented_boxes` (`[persons,
-/// 5]`), `views` and `report`. The parameters of `/detect` are parameters of the request. A
+/// `lookdown` accepts `image` (`BYTES`, `[frames]`): 1 to 16 encoded frames, base64 in JSON, or
+/// unchanged bytes after it. It returns `boxes` (`[persons, 4]`), `scores`, `oriented_boxes`
+/// (`[persons, 5]`) and `views` for the persons of all frames in order, and `counts` (persons) and
+/// `report` for each frame. The frames are processed one after another, each within the limits of
+/// a request. The parameters of `/detect` are parameters of the request. The body may be compressed
+/// (`Content-Encoding: gzip` or `deflate`). A
 /// detector accepts `views` (`FP32` or `UINT8`, `[views, 3, height, width]`, pixels 0 to 255) and
 /// returns `boxes` (`[views, candidates, 4]`) and `scores` (`[views, candidates]`), padded with
 /// zeros.
@@ -51,14 +60,21 @@ pub(in crate::api) async fn infer(
         arrival.deadline.began().into_std(),
         arrival.arrived,
     );
+    let tokens = arrival.parts.extensions.get::<RequestTokens>().cloned();
     let (headers, body) = (arrival.parts.headers, arrival.body.into_bytes());
     let caller = arrival.caller;
     let budget = state.uploads.of(&caller.client);
-    let read = move || InferRequest::read(&headers, &body, &budget);
+    let max_bytes = state.options.max_body_bytes;
+    let read = move || {
+        let body = decompressed(&headers, body, max_bytes, &budget)?;
+        InferRequest::read(&headers, &body, &budget)
+    };
     let read = arrival.deadline.blocking(read).await?;
     let times = (arrival.deadline, arrival.received_at, arrival.arrived);
     match model {
-        RequestedModel::Frames => persons::infer(&state, &caller, &trace, read, times).await,
+        RequestedModel::Frames => {
+            persons::infer(&state, &caller, &trace, read, times, tokens).await
+        }
         RequestedModel::Views(model) => {
             detector::infer(&state, &caller, &trace, (model, read), times).await
         }

@@ -1,7 +1,9 @@
-//! The model `lookdown`: accepts a frame and returns its persons.
+//! The model `lookdown`: accepts frames and returns their persons.
 
 use std::time::Instant;
 
+use axum::http::HeaderValue;
+use bytes::Bytes;
 use jiff::Timestamp;
 
 use super::{
@@ -16,13 +18,13 @@ use crate::{
         ApiState,
         caller::Caller,
         detect_parameters::detect_parameters,
-        http::{deadline::Deadline, problem::Problem, query::pairs},
+        http::{deadline::Deadline, problem::Problem, query::pairs, rate_limit::RequestTokens},
         report::ReportPerson,
-        report_headers::report_headers,
+        report_headers::{PERSON_COUNT, report_headers},
         run_detection::{DetectionOutcome, run_detection},
     },
     open_inference::{Datatype, metadata::ModelMetadata},
-    pipeline::DetectJob,
+    pipeline::{DetectJob, DetectionReport},
     telemetry::RequestTrace,
 };
 
@@ -31,92 +33,174 @@ pub(super) const FRAME_MODEL: &str = "lookdown";
 /// The version of its inputs and outputs.
 pub(super) const FRAME_MODEL_VERSION: &str = "1";
 const INPUT: &str = "image";
-const OUTPUTS: [&str; 5] = ["boxes", "scores", "oriented_boxes", "views", "report"];
+const OUTPUTS: [&str; 6] = [
+    "boxes",
+    "scores",
+    "oriented_boxes",
+    "views",
+    "counts",
+    "report",
+];
 
 /// Returns the inputs and outputs of the model.
 pub(super) fn metadata() -> ModelMetadata {
-    let [boxes, scores, oriented_boxes, views, report] = OUTPUTS;
+    let [boxes, scores, oriented_boxes, views, counts, report] = OUTPUTS;
     ModelMetadata {
         name: FRAME_MODEL.to_owned(),
         versions: vec![FRAME_MODEL_VERSION.to_owned()],
         platform: NAME.to_owned(),
-        inputs: vec![tensor(INPUT, Datatype::Bytes, [1])],
+        inputs: vec![tensor(INPUT, Datatype::Bytes, [-1])],
         outputs: vec![
             tensor(boxes, Datatype::Fp32, [-1, 4]),
             tensor(scores, Datatype::Fp32, [-1]),
             tensor(oriented_boxes, Datatype::Fp32, [-1, 5]),
             tensor(views, Datatype::Int32, [-1]),
-            tensor(report, Datatype::Bytes, [1]),
+            tensor(counts, Datatype::Int32, [-1]),
+            tensor(report, Datatype::Bytes, [-1]),
         ],
     }
 }
 
+/// Detects the persons in each frame of a request, one after another. A frame after the first is
+/// admitted like a request of its own. The first failure ends the request.
 pub(super) async fn infer(
     state: &ApiState,
     caller: &Caller,
     trace: &RequestTrace,
     mut request: InferRequest,
-    (deadline, received_at, arrived): (Deadline, Timestamp, Instant),
+    (deadline, mut received_at, mut arrived): (Deadline, Timestamp, Instant),
+    tokens: Option<RequestTokens>,
 ) -> Result<InferAnswer, Problem> {
     request.wanted.check(&OUTPUTS)?;
-    let Values::Frame(image) = request.only_input(INPUT)?.values else {
-        return Err(misfit(INPUT, "send the datatype BYTES: an encoded frame"));
+    let Values::Frames(frames) = request.only_input(INPUT)?.values else {
+        return Err(misfit(INPUT, "send the datatype BYTES: encoded frames"));
     };
-    if image.is_empty() {
-        return Err(misfit(INPUT, "it is empty: send an encoded frame"));
+    if let Some(index) = frames.iter().position(Bytes::is_empty) {
+        let wrong = format!("element {index} is empty: send an encoded frame");
+        return Err(misfit(INPUT, &wrong));
     }
     let given = as_texts(&request.parameters)?;
     let parameters = detect_parameters(state, pairs(&given).collect(), &[])?;
-    let ticket = caller.ticket_at(parameters.priority)?;
-    let job = DetectJob::sent(image, parameters, ticket, received_at, arrived);
-    let write = move |found: DetectionOutcome<'_>| {
+    let is_batch = frames.len() > 1;
+    let mut found = FrameOutputs::default();
+    let mut headers = Vec::new();
+    for (index, frame) in frames.into_iter().enumerate() {
+        let ticket = caller.ticket_at(parameters.priority)?;
+        let job = DetectJob::sent(frame, parameters.clone(), ticket, received_at, arrived);
+        let tokens = tokens.as_ref().filter(|_| index > 0);
+        let done = detect(state, trace, deadline, job, tokens).await;
+        let (report, of_frame) = done.map_err(|problem| {
+            if is_batch {
+                problem.of_element(INPUT, index)
+            } else {
+                problem
+            }
+        })?;
+        headers = report_headers(&report).into();
+        found.append(of_frame);
+        (received_at, arrived) = (Timestamp::now(), Instant::now());
+    }
+    if is_batch {
+        headers = vec![(PERSON_COUNT, HeaderValue::from(found.scores.len()))];
+    }
+    let write = move || {
         let answerer = Answerer {
             model: FRAME_MODEL,
             version: FRAME_MODEL_VERSION,
             id: request.id.as_deref(),
         };
-        let report = OutputValues::Text(found.json.clone());
-        let outputs = outputs(&found.report.persons, report);
-        InferAnswer::write(&answerer, &outputs, &request.wanted)
+        InferAnswer::write(&answerer, &found.into_outputs(), &request.wanted)
     };
-    let (report, mut answer) = run_detection(state, trace, deadline, job, write).await?;
-    answer.report_headers = report_headers(&report).into();
+    let mut answer = deadline.blocking(write).await?;
+    answer.report_headers = headers;
     Ok(answer)
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "FP32 outputs have this precision"
-)]
-fn outputs(persons: &[ReportPerson], report: OutputValues) -> Vec<Output> {
-    let count = persons.len();
-    let floats = |of: fn(&ReportPerson) -> Vec<f64>| {
-        let values = persons.iter().flat_map(of).map(|value| value as f32);
-        OutputValues::Floats(values.collect())
+/// Detects the persons in a frame, which takes one of the `tokens` of a rate limit.
+async fn detect(
+    state: &ApiState,
+    trace: &RequestTrace,
+    deadline: Deadline,
+    job: DetectJob,
+    tokens: Option<&RequestTokens>,
+) -> Result<(DetectionReport, FrameOutputs), Problem> {
+    if let Some(tokens) = tokens {
+        tokens.take()?;
+    }
+    let write = |found: DetectionOutcome<'_>| {
+        Ok(FrameOutputs::of(&found.report.persons, found.json.clone()))
     };
-    let boxes = floats(|person| {
-        let bbox = &person.bbox;
-        vec![bbox.x_min, bbox.y_min, bbox.x_max, bbox.y_max]
-    });
-    let oriented_boxes = floats(|person| {
-        let turned = &person.oriented_box;
-        let [cx, cy] = [turned.cx, turned.cy];
-        vec![cx, cy, turned.width, turned.height, turned.angle_deg]
-    });
-    let views = persons.iter().map(|person| person.views);
-    let views = views.map(|views| i32::try_from(views).unwrap_or(i32::MAX));
-    let shapes_and_values = [
-        (vec![count, 4], boxes),
-        (vec![count], floats(|person| vec![person.score])),
-        (vec![count, 5], oriented_boxes),
-        (vec![count], OutputValues::Integers(views.collect())),
-        (vec![1], report),
-    ];
-    let named = OUTPUTS.into_iter().zip(shapes_and_values);
-    let output = |(name, (shape, values))| Output {
-        name,
-        shape,
-        values,
-    };
-    named.map(output).collect()
+    run_detection(state, trace, deadline, job, write).await
+}
+
+/// The outputs for the persons of one frame or several.
+#[derive(Default)]
+struct FrameOutputs {
+    boxes: Vec<f32>,
+    scores: Vec<f32>,
+    oriented_boxes: Vec<f32>,
+    views: Vec<i32>,
+    /// The number of persons in each frame.
+    counts: Vec<i32>,
+    /// The report of each frame.
+    reports: Vec<Bytes>,
+}
+
+impl FrameOutputs {
+    /// Returns the outputs of one frame.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "FP32 outputs have this precision"
+    )]
+    fn of(persons: &[ReportPerson], report: Bytes) -> Self {
+        let floats = |of: fn(&ReportPerson) -> Vec<f64>| {
+            let values = persons.iter().flat_map(of);
+            values.map(|value| value as f32).collect()
+        };
+        let integer = |count| i32::try_from(count).unwrap_or(i32::MAX);
+        Self {
+            boxes: floats(|person| {
+                let bbox = &person.bbox;
+                vec![bbox.x_min, bbox.y_min, bbox.x_max, bbox.y_max]
+            }),
+            scores: floats(|person| vec![person.score]),
+            oriented_boxes: floats(|person| {
+                let turned = &person.oriented_box;
+                let [cx, cy] = [turned.cx, turned.cy];
+                vec![cx, cy, turned.width, turned.height, turned.angle_deg]
+            }),
+            views: persons.iter().map(|person| integer(person.views)).collect(),
+            counts: vec![integer(persons.len())],
+            reports: vec![report],
+        }
+    }
+
+    /// Adds the outputs of the next frame.
+    fn append(&mut self, mut next: Self) {
+        self.boxes.append(&mut next.boxes);
+        self.scores.append(&mut next.scores);
+        self.oriented_boxes.append(&mut next.oriented_boxes);
+        self.views.append(&mut next.views);
+        self.counts.append(&mut next.counts);
+        self.reports.append(&mut next.reports);
+    }
+
+    fn into_outputs(self) -> Vec<Output> {
+        let (persons, frames) = (self.scores.len(), self.reports.len());
+        let shapes_and_values = [
+            (vec![persons, 4], OutputValues::Floats(self.boxes)),
+            (vec![persons], OutputValues::Floats(self.scores)),
+            (vec![persons, 5], OutputValues::Floats(self.oriented_boxes)),
+            (vec![persons], OutputValues::Integers(self.views)),
+            (vec![frames], OutputValues::Integers(self.counts)),
+            (vec![frames], OutputValues::Texts(self.reports)),
+        ];
+        let named = OUTPUTS.into_iter().zip(shapes_and_values);
+        let output = |(name, (shape, values))| Output {
+            name,
+            shape,
+            values,
+        };
+        named.map(output).collect()
+    }
 }

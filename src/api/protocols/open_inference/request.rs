@@ -1,6 +1,6 @@
 //! A parsed inference request: its inputs, its requested outputs and its parameters.
 
-use axum::http::{HeaderMap, header::CONTENT_ENCODING};
+use axum::http::HeaderMap;
 use bytes::Bytes;
 use serde_json::value::RawValue;
 
@@ -44,11 +44,6 @@ impl InferRequest {
         body: &Bytes,
         budget: &UploadBudget,
     ) -> Result<Self, Problem> {
-        if let Some(encoding) = headers.get(CONTENT_ENCODING)
-            && encoding != "identity"
-        {
-            return Err(malformed("the body is compressed: send it uncompressed"));
-        }
         let (json, mut behind) = split(headers, body)?;
         let mut head = read_request(&json).map_err(|error| {
             let message: String = error.to_string().chars().take(MAX_MESSAGE_CHARS).collect();
@@ -150,6 +145,6 @@ fn binary_size(tensor: &str, parameters: &mut Parameters) -> Result<Option<usize
     Ok(size)
 }
 
-fn malformed(detail: &str) -> Problem {
+pub(super) fn malformed(detail: &str) -> Problem {
     Problem::new(ProblemKind::MalformedRequest, detail)
 }

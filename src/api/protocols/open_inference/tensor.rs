@@ -1,4 +1,4 @@
-//! Input tensors: a name, a shape, and one frame or many numbers.
+//! Input tensors: a name, a shape, and frames or numbers.
 
 use bytes::Bytes;
 
@@ -19,13 +19,15 @@ pub(super) struct Tensor {
     pub(super) values: Values,
 }
 
+/// Largest number of frames in a request.
+pub(super) const MAX_FRAMES: usize = 16;
 /// The prefix of the parameters of tensors in the shared memory of the server's machine.
 const SHARED_MEMORY: &str = "shared_memory";
 
 /// The values of a tensor, with their share of the memory budget.
 pub(super) enum Values {
-    /// The single element of a `BYTES` tensor.
-    Frame(Bytes),
+    /// The elements of a `BYTES` tensor, at least one.
+    Frames(Vec<Bytes>),
     /// Finite numbers, row-major.
     Numbers(Held<Vec<f32>>),
 }
@@ -64,9 +66,9 @@ fn elements(datatype: &str, shape: &[u32]) -> Result<(Datatype, usize), String> 
     let count = element_count(shape.iter().map(|side| *side as usize));
     let count =
         count.ok_or_else(|| format!("its shape {shape:?} has more elements than memory"))?;
-    if datatype == Datatype::Bytes && count != 1 {
+    if datatype == Datatype::Bytes && !(1..=MAX_FRAMES).contains(&count) {
         return Err(format!(
-            "its shape is {shape:?}: send one frame at a time, [1]"
+            "its shape is {shape:?}: send [1] to [{MAX_FRAMES}], the number of frames"
         ));
     }
     Ok((datatype, count))
@@ -80,7 +82,7 @@ fn unpacked(
     room: BudgetShare,
 ) -> Result<Values, String> {
     Ok(match datatype {
-        Datatype::Bytes => Values::Frame(Held::new(sent.element()?, room).into_bytes()),
+        Datatype::Bytes => Values::Frames(Held::new(sent.elements(count)?, room).into_elements()),
         _ => Values::Numbers(Held::new(sent.numbers(datatype, count)?, room)),
     })
 }

@@ -41,7 +41,7 @@ impl Feed {
         last_heard: Option<ReportId>,
     ) -> Result<Self, Problem> {
         // Subscribes before the first read, so no report is missed in between.
-        let listening = results.listeners().listen(client, cameras.clone())?;
+        let listening = results.listen(client, cameras.clone()).await?;
         let latest = match &cameras {
             Cameras::All => results.latest_of_all().await?,
             Cameras::One(camera) => results.latest(camera).await?.into_iter().collect(),

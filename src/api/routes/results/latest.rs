@@ -100,8 +100,8 @@ async fn wait_for_newer(
     limit: Deadline,
 ) -> Result<Option<Arc<StoredReport>>, Problem> {
     // Subscribes before the first read, so no report is missed in between.
-    let listeners = state.results.listeners();
-    let mut listening = listeners.listen(&caller.client, Cameras::One(camera.to_owned()))?;
+    let cameras = Cameras::One(camera.to_owned());
+    let mut listening = state.results.listen(&caller.client, cameras).await?;
     let mut report = state.results.latest(camera).await?;
     let is_new = |report: &StoredReport| {
         let known = is_unmodified(headers, &report.id.to_string());

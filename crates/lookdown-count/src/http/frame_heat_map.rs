@@ -1,0 +1,62 @@
+//! The heat map over the frame of a camera.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use axum::{
+    extract::{Path, State},
+    response::Response,
+};
+use tokio::task::spawn_blocking;
+
+use super::{
+    Problem, Shared,
+    heat_map::{Parameters, colour, image, stored},
+};
+use crate::{definition::CameraDefinition, heat_map::Cell, sums::Owner};
+
+/// Width of the image, pixels. Its height follows from the frame.
+const WIDTH: u32 = 480;
+
+pub(super) async fn png(
+    State(api): State<Shared>,
+    Path(camera): Path<String>,
+    parameters: Parameters,
+) -> Result<Response, Problem> {
+    let (_, cells) = stored(&api, Owner::Camera(camera.clone()), parameters).await?;
+    let definition = api.engine.lock().definition(&camera);
+    let Some(definition) = definition.filter(|definition| definition.geometry.is_some()) else {
+        let detail = "the camera has no calibration now: send frames with one".to_owned();
+        return Err(Problem::not_found(detail));
+    };
+    let drawn = spawn_blocking(move || drawn(&cells, &definition)).await;
+    // A task that panicked is logged by the panic hook.
+    let (pixels, height) = drawn.map_err(|_| Problem::internal())?;
+    image(&pixels, WIDTH as usize, height as usize)
+}
+
+/// Draws the map, transparent without presence. Returns the pixels and the height.
+fn drawn(cells: &BTreeMap<Cell, u64>, definition: &Arc<CameraDefinition>) -> (Vec<u8>, u32) {
+    let key = &definition.key;
+    let scale = f64::from(key.width) / f64::from(WIDTH);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at least one pixel and at most 16 times the width"
+    )]
+    let height = (f64::from(key.height) / scale)
+        .round()
+        .clamp(1.0, 16.0 * f64::from(WIDTH)) as u32;
+    #[expect(clippy::cast_precision_loss, reason = "exact for centuries")]
+    let seconds = |milliseconds: u64| milliseconds as f64 / 1000.0;
+    let most = cells.values().copied().max().map_or(0.0, seconds);
+    let mut pixels = Vec::with_capacity(WIDTH as usize * height as usize * 4);
+    for y in 0..height {
+        for x in 0..WIDTH {
+            let middle = [x, y].map(|pixel| (f64::from(pixel) + 0.5) * scale);
+            let cell = definition.floor_at(middle).and_then(Cell::of);
+            let time = cell.and_then(|cell| cells.get(&cell));
+            pixels.extend(colour(time.copied().map_or(0.0, seconds), most));
+        }
+    }
+    (pixels, height)
+}

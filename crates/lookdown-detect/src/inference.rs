@@ -1,0 +1,33 @@
+//! Person detectors: boxes with scores from rendered views.
+
+mod detector;
+mod device;
+mod error;
+mod fetch;
+mod head_output;
+pub mod heads;
+mod manifest;
+mod model;
+mod onnx;
+mod onnx_file;
+mod registry;
+mod remote;
+mod repository;
+mod signature;
+mod staging;
+
+pub use detector::Detector;
+pub use device::{Device, UnknownDevice};
+pub use error::InferenceError;
+pub use fetch::{FetchError, ModelSource, fetch_weights};
+pub use head_output::{HeadOutput, ViewDetection};
+pub use heads::CandidateOptions;
+pub use manifest::{Layout, ManifestInput, ModelManifest};
+pub use model::Model;
+pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor, onnx_loader};
+pub use registry::{ModelRegistry, RegistryFull};
+pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
+pub use repository::{
+    ModelFolder, ModelLoader, ModelRepository, RepositoryError, RepositoryOptions, RepositoryRow,
+    is_fetched, model_names,
+};

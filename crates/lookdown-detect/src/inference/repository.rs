@@ -1,0 +1,282 @@
+//! The model repository: models in a folder that are loaded and unloaded on request, and reloaded
+//! when their files change.
+//!
+//! A model is put into service only after it was loaded, checked and run once. If that fails, the
+//! previous model stays in service.
+
+mod error;
+mod folder;
+mod stamp;
+
+use std::{collections::BTreeMap, num::NonZeroUsize, path::Path, sync::Arc};
+
+use parking_lot::{Mutex, MutexGuard};
+
+use self::stamp::{files_of, stamp};
+use super::{InferenceError, Model, ModelRegistry, RemoteServer, model::ModelFiles};
+use crate::metrics::{DetectMetrics, replace_info, start_at_zero};
+
+pub use error::RepositoryError;
+pub use folder::{ModelFolder, is_fetched, model_names};
+pub(super) use stamp::Stamp;
+
+/// Loads a model from its folder or ONNX file.
+pub type ModelLoader = Box<dyn Fn(&Path) -> Result<Model, InferenceError> + Send + Sync>;
+
+/// Options of the repository.
+#[derive(Debug, Clone)]
+pub struct RepositoryOptions {
+    /// Folder of the models.
+    pub folder: ModelFolder,
+    /// Number of blank views in the warm-up of a model.
+    pub warm_up_views: NonZeroUsize,
+    /// Models used by requests that do not name one. They cannot be unloaded.
+    pub kept: Vec<String>,
+}
+
+/// The models of a folder, loaded or not.
+pub struct ModelRepository {
+    options: RepositoryOptions,
+    registry: Arc<ModelRegistry>,
+    loader: ModelLoader,
+    remote: Option<Arc<RemoteServer>>,
+    /// Locked while a model is loaded, so that only one is loaded at a time.
+    memory: Mutex<Memory>,
+    metrics: Arc<DetectMetrics>,
+}
+
+/// State of models in addition to the loaded ones.
+#[derive(Default)]
+struct Memory {
+    /// Error of the last load of each model.
+    failures: BTreeMap<String, String>,
+    /// State of changed files at the last check.
+    changed: BTreeMap<String, Stamp>,
+    /// State of files that failed to load and are not tried again.
+    refused: BTreeMap<String, Stamp>,
+}
+
+/// One model of the repository.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RepositoryRow {
+    /// Name of the model.
+    pub name: String,
+    /// Revision in service, if any.
+    pub revision: Option<String>,
+    /// Reason why it is not loaded, or error of its last load.
+    pub reason: Option<String>,
+}
+
+impl ModelRepository {
+    /// A repository with these options, without any loaded model.
+    #[must_use]
+    pub fn new(
+        options: RepositoryOptions,
+        loader: ModelLoader,
+        metrics: Arc<DetectMetrics>,
+    ) -> Self {
+        start_at_zero(&metrics.model_loads, &["success", "failure"]);
+        Self {
+            options,
+            registry: Arc::default(),
+            loader,
+            remote: None,
+            memory: Mutex::default(),
+            metrics,
+        }
+    }
+
+    /// Sets the server on which the networks run.
+    #[must_use]
+    pub fn on(self, remote: Arc<RemoteServer>) -> Self {
+        Self {
+            remote: Some(remote),
+            ..self
+        }
+    }
+
+    /// The server on which the networks run, or `None` if they run locally.
+    #[must_use]
+    pub fn remote(&self) -> Option<&Arc<RemoteServer>> {
+        self.remote.as_ref()
+    }
+
+    /// Returns false while the inference server is unavailable.
+    #[must_use]
+    pub fn is_remote_available(&self) -> bool {
+        self.remote
+            .as_ref()
+            .is_none_or(|remote| remote.is_available())
+    }
+
+    /// The loaded models.
+    #[must_use]
+    pub fn registry(&self) -> &Arc<ModelRegistry> {
+        &self.registry
+    }
+
+    /// Loads or reloads the model with that name. Blocks.
+    ///
+    /// # Errors
+    /// [`RepositoryError`] when there is no such model, it fails its check, the number of models is
+    /// at its limit, or another model is being loaded.
+    pub fn load(&self, name: &str) -> Result<Arc<Model>, RepositoryError> {
+        let mut memory = self.try_lock()?;
+        let path = self.options.folder.find(name)?;
+        self.replace(&mut memory, name, &path)
+    }
+
+    /// Returns true while a model is being loaded, checked or unloaded.
+    #[must_use]
+    pub fn is_loading(&self) -> bool {
+        self.try_lock().is_err()
+    }
+
+    /// Unloads a model. Frames in progress finish with it.
+    ///
+    /// # Errors
+    /// [`RepositoryError`] when it is not loaded, must be kept, or a model is being loaded, which
+    /// may be this one.
+    pub fn unload(&self, name: &str) -> Result<(), RepositoryError> {
+        if self.options.kept.iter().any(|kept| kept == name) {
+            return Err(RepositoryError::Kept {
+                name: name.to_owned(),
+            });
+        }
+        let _no_load = self.try_lock()?;
+        let removed = self.registry.remove(name);
+        let removed = removed.ok_or_else(|| RepositoryError::NotLoaded {
+            name: name.to_owned(),
+        })?;
+        let row = [removed.name(), removed.revision()];
+        // It was added when the model was put into service.
+        let _ = self.metrics.model_info.remove_label_values(&row);
+        tracing::info!(model = name, revision = removed.revision(), "unloaded");
+        Ok(())
+    }
+
+    /// Returns every model that is loaded or in the folder, sorted by name.
+    #[must_use]
+    pub fn rows(&self) -> Vec<RepositoryRow> {
+        let mut rows: BTreeMap<String, RepositoryRow> = BTreeMap::new();
+        let failures = self.lock().failures.clone();
+        let row = |name: &str, revision, reason: Option<String>| RepositoryRow {
+            name: name.to_owned(),
+            revision,
+            reason: failures.get(name).cloned().or(reason),
+        };
+        for name in self.options.folder.names() {
+            let reason = self.options.folder.why_not_loaded(&name);
+            rows.insert(name.clone(), row(&name, None, Some(reason)));
+        }
+        for model in self.registry.all() {
+            let revision = Some(model.revision().to_owned());
+            rows.insert(model.name().to_owned(), row(model.name(), revision, None));
+        }
+        rows.into_values().collect()
+    }
+
+    /// Reloads the models whose files have changed. Files must be unchanged between two checks, so
+    /// that no file is read while it is written. A model that failed is tried again only after its
+    /// files change.
+    pub fn reload_changed(&self) {
+        if !self.is_remote_available() {
+            return;
+        }
+        let mut memory = self.lock();
+        for model in self.registry.all() {
+            let Some(files) = model.files() else { continue };
+            let name = model.name();
+            let found = stamp(&files_of(&files.path));
+            let is_changed =
+                found.is_some() && found != files.stamp && memory.refused.get(name) != Some(&found);
+            if !is_changed {
+                memory.changed.remove(name);
+            } else if memory.changed.get(name) == Some(&found) {
+                memory.changed.remove(name);
+                // The error is already logged, and the rows report it.
+                let _ = self.replace(&mut memory, name, &files.path);
+            } else {
+                memory.changed.insert(name.to_owned(), found);
+            }
+        }
+    }
+
+    /// Loads, checks and warms up a model, then replaces the previous one.
+    fn replace(
+        &self,
+        memory: &mut Memory,
+        name: &str,
+        path: &Path,
+    ) -> Result<Arc<Model>, RepositoryError> {
+        // Taken before reading, so that a file that changes during the read is read again.
+        let stamp = stamp(&files_of(path));
+        let outcome = self.checked(name, path, &stamp).and_then(|model| {
+            let model = Arc::new(model);
+            let replaced = self.registry.put(Arc::clone(&model))?;
+            Ok((model, replaced))
+        });
+        match outcome {
+            Ok((model, replaced)) => {
+                self.count_load("success");
+                memory.failures.remove(name);
+                memory.refused.remove(name);
+                let replaced = replaced.as_ref().map(|replaced| replaced.revision());
+                let before = replaced.map(|revision| [name, revision]);
+                replace_info(
+                    &self.metrics.model_info,
+                    before.as_ref().map(<[_; 2]>::as_slice),
+                    &[name, model.revision()],
+                );
+                tracing::info!(
+                    model = name,
+                    revision = model.revision(),
+                    replaced,
+                    "loaded"
+                );
+                Ok(model)
+            }
+            Err(error) => {
+                self.count_load("failure");
+                memory.failures.insert(name.to_owned(), error.to_string());
+                if error.is_of_model() {
+                    memory.refused.insert(name.to_owned(), stamp);
+                }
+                tracing::error!(model = name, "not loaded: {error}");
+                Err(error)
+            }
+        }
+    }
+
+    fn checked(&self, name: &str, path: &Path, stamp: &Stamp) -> Result<Model, RepositoryError> {
+        let model = (self.loader)(path)?;
+        if model.name() != name {
+            return Err(RepositoryError::OtherName {
+                name: name.to_owned(),
+                found: model.name().to_owned(),
+                path: path.to_owned(),
+            });
+        }
+        let model = model.with_files(ModelFiles {
+            path: path.to_owned(),
+            stamp: stamp.clone(),
+        });
+        model.warm_up(self.options.warm_up_views)?;
+        Ok(model)
+    }
+
+    fn count_load(&self, result: &str) {
+        let loads = &self.metrics.model_loads;
+        loads.with_label_values(&[result]).inc();
+    }
+
+    /// Locks the state, or returns [`RepositoryError::Busy`] while a model is being loaded.
+    fn try_lock(&self) -> Result<MutexGuard<'_, Memory>, RepositoryError> {
+        self.memory.try_lock().ok_or(RepositoryError::Busy)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Memory> {
+        // After a panic the maps contain only complete entries.
+        self.memory.lock()
+    }
+}

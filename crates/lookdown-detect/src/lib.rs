@@ -1,0 +1,19 @@
+#![doc = include_str!("../README.md")]
+//!
+//! [`Detector`] is the entrance for one process. The parts below it are for servers: [`pipeline`] has
+//! the engine and the queue of frames, [`inference`] the networks, [`imaging`] the remap tables.
+
+pub mod detection;
+mod detector;
+pub mod fairness;
+pub mod imaging;
+pub mod inference;
+pub mod metrics;
+pub mod open_inference;
+pub mod parameters;
+pub mod pipeline;
+
+pub use detector::{
+    DEFAULT_MODELS, DEFAULT_ONNX_RUNTIME, Detections, Detector, DetectorError, DetectorOptions,
+};
+pub use lookdown_lens::{calibration, geometry, plain_name, quoted, revision, warning};

@@ -1,0 +1,191 @@
+//! Inference requests and responses: JSON, and the bytes of tensors after it.
+//!
+//! The types are written and read by both sides. `D` is the form of tensor data in the JSON:
+//! unparsed text ([`serde_json::value::RawValue`]) when they are read, [`TensorValues`] when they
+//! are written.
+
+use bytes::Bytes;
+use serde::{Deserialize, Serialize, ser::Error};
+
+use super::{
+    bounded_json::{Entries, Table},
+    parameters::Parameters,
+    tensor_values::TensorValues,
+};
+
+/// The JSON of an inference request. Unknown members are an error.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InferRequest<D> {
+    /// The ID of the request; the response repeats it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    /// The parameters of the model and of the protocol.
+    #[serde(default, skip_serializing_if = "Parameters::is_empty")]
+    pub parameters: Parameters,
+    /// The input tensors.
+    pub inputs: Entries<Table<InputTensor<D>>>,
+    /// The requested outputs; all of the model's by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outputs: Option<Entries<Table<RequestedOutput>>>,
+}
+
+/// An input tensor.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputTensor<D> {
+    /// The name.
+    pub name: String,
+    /// The size of each axis.
+    pub shape: Entries<u32>,
+    /// The name of the datatype.
+    pub datatype: String,
+    /// The parameters, such as `binary_data_size`.
+    #[serde(default, skip_serializing_if = "Parameters::is_empty")]
+    pub parameters: Parameters,
+    /// The values, unless they follow the JSON as bytes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data: Option<D>,
+}
+
+/// A requested output.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RequestedOutput {
+    /// The name.
+    pub name: String,
+    /// The parameters, such as `binary_data`.
+    #[serde(default, skip_serializing_if = "Parameters::is_empty")]
+    pub parameters: Parameters,
+}
+
+/// The JSON of an inference response. Unknown members are ignored, as servers differ.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct InferResponse<D> {
+    /// The name of the model.
+    #[serde(default)]
+    pub model_name: String,
+    /// The version of the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model_version: Option<String>,
+    /// The ID of the request, if it had one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    /// The output tensors.
+    pub outputs: Entries<OutputTensor<D>>,
+}
+
+/// An output tensor.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct OutputTensor<D> {
+    /// The name.
+    pub name: String,
+    /// The name of the datatype.
+    pub datatype: String,
+    /// The size of each axis.
+    pub shape: Entries<usize>,
+    /// The parameters of an output whose bytes follow the JSON.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameters: Option<OutputParameters>,
+    /// The values otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data: Option<D>,
+}
+
+/// The parameters of an output tensor.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct OutputParameters {
+    /// The number of bytes after the JSON.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub binary_data_size: Option<usize>,
+}
+
+/// A message as it is sent.
+#[derive(Debug, Clone)]
+pub struct Message {
+    /// The JSON, and the bytes of tensors after it.
+    pub body: Bytes,
+    /// The length of the JSON if bytes follow it: the header
+    /// [`HEAD_LENGTH`](super::HEAD_LENGTH).
+    pub head_length: Option<usize>,
+}
+
+impl Message {
+    /// Writes JSON and the tensors that follow it as bytes, in their order.
+    ///
+    /// # Errors
+    /// Returns an error if an element exceeds the length that the encoding has.
+    pub fn write(head: &impl Serialize, tensors: &[TensorValues<'_>]) -> serde_json::Result<Self> {
+        let mut body = serde_json::to_vec(head)?;
+        let head_length = (!tensors.is_empty()).then_some(body.len());
+        body.reserve_exact(tensors.iter().map(TensorValues::byte_count).sum());
+        for tensor in tensors {
+            tensor.put_bytes(&mut body).map_err(Error::custom)?;
+        }
+        Ok(Self {
+            body: body.into(),
+            head_length,
+        })
+    }
+
+    /// Splits the message into its JSON and the bytes after it; `None` if it is shorter than its
+    /// JSON should be.
+    #[must_use]
+    pub fn split(&self) -> Option<(Bytes, Bytes)> {
+        let length = self.head_length.unwrap_or(self.body.len());
+        (length <= self.body.len()).then(|| (self.body.slice(..length), self.body.slice(length..)))
+    }
+}
+
+/// Parses the JSON of a request, which must be an object.
+///
+/// # Errors
+/// Returns an error if the JSON is malformed or is not a request.
+pub fn read_request<'a, D: Deserialize<'a>>(json: &'a [u8]) -> serde_json::Result<InferRequest<D>> {
+    serde_json::from_slice(json).map(|Table(request)| request)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::value::RawValue;
+
+    use super::*;
+    use crate::open_inference::{Datatype, TensorData};
+
+    #[test]
+    fn a_written_response_is_read_with_the_same_values() {
+        let values = [0.1, -2.5];
+        let tensor = TensorValues::Floats(&values);
+        for as_bytes in [false, true] {
+            let output = OutputTensor {
+                name: "scores".to_owned(),
+                datatype: tensor.datatype().to_string(),
+                shape: Entries(vec![2]),
+                parameters: as_bytes.then(|| OutputParameters {
+                    binary_data_size: Some(tensor.byte_count()),
+                }),
+                data: (!as_bytes).then(|| tensor.clone()),
+            };
+            let response = InferResponse {
+                model_name: "model".to_owned(),
+                model_version: None,
+                id: None,
+                outputs: Entries(vec![output]),
+            };
+            let behind = [tensor.clone()];
+            let behind = if as_bytes { &behind[..] } else { &[] };
+            let message = Message::write(&response, behind).unwrap();
+            assert_eq!(message.head_length.is_some(), as_bytes);
+
+            let (json, mut behind) = message.split().unwrap();
+            let read: InferResponse<&RawValue> = serde_json::from_slice(&json).unwrap();
+            let output = &read.outputs.0[0];
+            assert_eq!(output.datatype, Datatype::Fp32.name());
+            let size = output.parameters.as_ref();
+            let size = size.and_then(|parameters| parameters.binary_data_size);
+            let sent = TensorData::take(output.data, size, &mut behind).unwrap();
+            assert_eq!(sent.floats(2).unwrap(), values);
+            assert!(behind.is_empty());
+        }
+    }
+}

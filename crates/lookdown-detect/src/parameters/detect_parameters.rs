@@ -1,0 +1,298 @@
+//! The parameters of a detection: the table of their specifications, and the checked values of a
+//! request. A new parameter needs a row in the table, a field of [`DetectParameters`] and a line in
+//! its parser.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+use strum::VariantNames;
+
+use super::{
+    DefaultSource, DefaultUsed, DetectDefaults, GivenParameters, Interface, ParameterDefault,
+    ParameterError, ParameterKind, ParameterSpec, Priority, Profile,
+};
+use crate::{
+    calibration::CalibrationId,
+    detection::{Refinement, RefinementParameters},
+    fairness::PriorityLevel,
+};
+
+/// The interfaces of every protocol. `lookdown detect` has its own `--calibration FILE|ID` for the
+/// first row.
+const REQUESTS: &[Interface] = &[Interface::Http, Interface::FrameModel];
+const EVERY_DETECTION: &[Interface] = &[
+    Interface::Http,
+    Interface::FrameModel,
+    Interface::CommandLine,
+];
+/// Those of the parameters whose defaults can be set for a camera or a server.
+const DETECTION_WITH_DEFAULTS: &[Interface] = &[
+    Interface::Http,
+    Interface::FrameModel,
+    Interface::CommandLine,
+    Interface::Defaults,
+];
+const REQUESTS_WITH_DEFAULTS: &[Interface] =
+    &[Interface::Http, Interface::FrameModel, Interface::Defaults];
+const EVERY_REQUEST: &[Interface] = &[Interface::Http, Interface::FrameModel, Interface::Detector];
+
+parameter_table! {
+    /// The parameters of a detection.
+    pub(super) const TABLE;
+
+    CALIBRATION = ParameterSpec {
+        name: "calibration",
+        kind: ParameterKind::Pattern {
+            regex: CalibrationId::PATTERN,
+            rule: CalibrationId::RULE,
+        },
+        default: ParameterDefault::Described("an ideal 180° lens on the circle found in the frame"),
+        help: "ID of the calibration of the camera.",
+        example: Some("lobby"),
+        interfaces: REQUESTS,
+    };
+    CAMERA = ParameterSpec {
+        name: "camera",
+        kind: ParameterKind::Name { max_chars: 128 },
+        default: ParameterDefault::Described("the ID of the calibration"),
+        help: "Name of the camera, under which its results are kept.",
+        example: Some("lobby-north"),
+        interfaces: EVERY_DETECTION,
+    };
+    PROFILE = ParameterSpec {
+        name: "profile",
+        kind: ParameterKind::Choice(Profile::VARIANTS),
+        default: ParameterDefault::Value("balanced"),
+        help: "Trade-off between accuracy and cost. `paper` is the published method with its 128 views, \
+               `direct` runs the detector on the frame itself.",
+        example: None,
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
+    REFINE = ParameterSpec {
+        name: "refine",
+        kind: ParameterKind::Choice(Refinement::VARIANTS),
+        default: ParameterDefault::Described(
+            "`fusion`; with the profile `paper` `soft_nms_gaussian`, with `direct` `nms`",
+        ),
+        help: "Method that merges overlapping boxes into persons.",
+        example: None,
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
+    MODEL = ParameterSpec {
+        name: "model",
+        kind: ParameterKind::Text,
+        default: ParameterDefault::Described("the model of the profile"),
+        help: "Name of the person detector.",
+        example: Some("ssdlite_mobilenet_v2"),
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
+    SCORE_THRESHOLD = ParameterSpec {
+        name: "score_threshold",
+        kind: ParameterKind::Fraction,
+        default: ParameterDefault::Value("0.3"),
+        help: "Minimum score of a person (`C_t`), with fusion a probability. Persons with a lower score are left out.",
+        example: None,
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
+    // Seidel et al. state "IoU > 0.5" for NMS in section IV; the boxes of fusion overlap as much.
+    IOU_THRESHOLD = ParameterSpec {
+        name: "iou_threshold",
+        kind: ParameterKind::Fraction,
+        default: ParameterDefault::Value("0.5"),
+        help: "Minimum IoU of boxes of the same person (`N_t`).",
+        example: None,
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
+    // The paper does not state the value that it used.
+    SIGMA = ParameterSpec {
+        name: "sigma",
+        kind: ParameterKind::Positive,
+        default: ParameterDefault::Value("0.3"),
+        help: "Width σ of `soft_nms_gaussian`.",
+        example: None,
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
+    MAX_DETECTIONS = ParameterSpec {
+        name: "max_detections",
+        kind: ParameterKind::Whole { min: 1, max: 10_000 },
+        default: ParameterDefault::Value("1000"),
+        help: "Maximum number of persons in the report, best first.",
+        example: None,
+        interfaces: DETECTION_WITH_DEFAULTS,
+    };
+    CAPTURED_AT = ParameterSpec {
+        name: "captured_at",
+        kind: ParameterKind::Time,
+        default: ParameterDefault::None,
+        help: "Time at which the frame was captured, RFC 3339.",
+        example: Some("2026-11-21T09:30:00Z"),
+        interfaces: EVERY_DETECTION,
+    };
+    MOTION = ParameterSpec {
+        name: "motion",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Value("false"),
+        help: "Skips views without motion since the last frame of this camera that the server \
+               processed, at most 10 s ago. The report counts them as unchanged. Needs `camera` or \
+               `calibration`; up to 256 cameras are cached.",
+        example: None,
+        interfaces: REQUESTS_WITH_DEFAULTS,
+    };
+    REMEMBER = ParameterSpec {
+        name: "remember",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Value("false"),
+        help: "Caches the detections in the views of this frame, and uses them if the same file was \
+               sent before with this parameter. Another refinement or threshold then needs no new \
+               inference, and the report counts all views as unchanged.",
+        example: None,
+        interfaces: REQUESTS,
+    };
+    STORE = ParameterSpec {
+        name: "store",
+        kind: ParameterKind::Switch,
+        default: ParameterDefault::Described("`true` with `camera` or `calibration`, else `false`"),
+        help: "Stores the report under the name of its camera, for `/results`, MQTT and the metrics \
+               of cameras. Without `camera` and `calibration` that name is `assumed`, which all such \
+               frames share.",
+        example: None,
+        interfaces: REQUESTS_WITH_DEFAULTS,
+    };
+    PRIORITY = ParameterSpec {
+        name: "priority",
+        kind: ParameterKind::Whole {
+            min: PriorityLevel::HIGHEST,
+            max: PriorityLevel::LOWEST,
+        },
+        default: ParameterDefault::Value(PriorityLevel::DEFAULT),
+        help: "Priority among queued frames: 1 to 3 are high, 4 to 6 normal, 7 to 9 low. Clients of \
+               the same priority take turns. A key may limit the priority (`highest_priority`).",
+        example: None,
+        interfaces: EVERY_REQUEST,
+    };
+    TIMEOUT_MILLIS = ParameterSpec {
+        name: "timeout_millis",
+        kind: ParameterKind::Whole { min: 1, max: 600_000 },
+        default: ParameterDefault::Described("`server.request_timeout_millis`"),
+        help: "Milliseconds from the arrival of the request after which the frame is dropped and \
+               answered with 504. The timeout of the server applies as well.",
+        example: Some("2000"),
+        interfaces: EVERY_REQUEST,
+    };
+}
+
+/// The checked parameters of one detection request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectParameters {
+    /// The calibration. Without one, the lens circle is detected in the frame.
+    pub calibration: Option<CalibrationId>,
+    /// The camera name under which results are stored.
+    pub camera: Option<String>,
+    /// The profile.
+    pub profile: Profile,
+    /// The required model; any model by default.
+    pub model: Option<String>,
+    /// The merge of overlapping boxes into persons.
+    pub refinement: RefinementParameters,
+    /// The time at which the frame was captured.
+    pub captured_at: Option<Timestamp>,
+    /// Skips views without motion since the last frame of the camera.
+    pub motion: bool,
+    /// Caches the detections in the views, and uses cached ones.
+    pub remember: bool,
+    /// Stores the report under the name of its camera.
+    pub store: bool,
+    /// The priority among queued frames.
+    pub priority: Priority,
+    /// The timeout, from the arrival of the request.
+    pub timeout: Option<Duration>,
+    /// The values that were defaults of the camera or the server.
+    pub defaults: Vec<DefaultUsed>,
+}
+
+impl DetectParameters {
+    /// The specifications, in the order in which they are listed to users.
+    pub const TABLE: &'static [ParameterSpec] = TABLE;
+    /// The parameter of the calibration.
+    pub const CALIBRATION: &'static str = CALIBRATION.name;
+    /// The parameter of the camera's name.
+    pub const CAMERA: &'static str = CAMERA.name;
+    /// The parameter of the model.
+    pub const MODEL: &'static str = MODEL.name;
+    /// The parameter of the least score.
+    pub const SCORE_THRESHOLD: &'static str = SCORE_THRESHOLD.name;
+
+    /// Checks `(name, value)` pairs.
+    ///
+    /// # Errors
+    /// [`ParameterError`] for an unknown or repeated name and for a value out of range.
+    pub fn parse<'a>(
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self, ParameterError> {
+        Self::parse_with(pairs, &[])
+    }
+
+    /// Checks `(name, value)` pairs of a request, and completes them with defaults, those with
+    /// precedence first.
+    ///
+    /// # Errors
+    /// [`ParameterError`] for an unknown or repeated name and for a value out of range.
+    pub fn parse_with<'a>(
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+        defaults: &[(DefaultSource, &'a DetectDefaults)],
+    ) -> Result<Self, ParameterError> {
+        let mut given = GivenParameters::read(TABLE, pairs)?.with_defaults(defaults);
+        let is_named = given.text(&CAMERA).or(given.text(&CALIBRATION)).is_some();
+        if !is_named {
+            given.drop_default(&MOTION);
+        }
+        let profile: Profile = given.value(&PROFILE)?;
+        let refinement = given.optional(&REFINE)?;
+        let max_detections: u32 = given.value(&MAX_DETECTIONS)?;
+        let timeout = given.optional(&TIMEOUT_MILLIS)?;
+        let parameters = Self {
+            calibration: given.optional(&CALIBRATION)?,
+            camera: given.optional(&CAMERA)?,
+            profile,
+            model: given.optional(&MODEL)?,
+            refinement: RefinementParameters {
+                refinement: refinement.unwrap_or(profile.default_refinement()),
+                score_threshold: given.value(&SCORE_THRESHOLD)?,
+                iou_threshold: given.value(&IOU_THRESHOLD)?,
+                sigma: given.value(&SIGMA)?,
+                max_detections: max_detections as usize,
+            },
+            captured_at: given.optional(&CAPTURED_AT)?,
+            motion: given.value(&MOTION)?,
+            remember: given.value(&REMEMBER)?,
+            store: given.optional(&STORE)?.unwrap_or(is_named),
+            priority: Priority::of_level(given.value(&PRIORITY)?),
+            timeout: timeout.map(Duration::from_millis),
+            defaults: given.defaults_used(),
+        };
+        if parameters.motion && !is_named {
+            let rule = "name the camera, or its calibration: without a name there is no last \
+                        frame to compare with";
+            return Err(ParameterError::bad_value(MOTION.name, rule.to_owned()));
+        }
+        Ok(parameters)
+    }
+
+    /// Returns the name of the camera, if the request gave it one.
+    #[must_use]
+    pub fn camera_name(&self) -> Option<&str> {
+        let calibration = self.calibration.as_ref().map(CalibrationId::as_str);
+        self.camera.as_deref().or(calibration)
+    }
+}
+
+/// Parses a value of the parameter `profile`.
+///
+/// # Errors
+/// [`ParameterError`] for an unknown profile.
+pub fn parse_profile(value: &str) -> Result<Profile, ParameterError> {
+    PROFILE.parse(value)
+}
+
+#[cfg(test)]
+mod tests;

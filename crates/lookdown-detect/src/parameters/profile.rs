@@ -1,0 +1,142 @@
+//! Profiles: named trade-offs between cost and accuracy.
+
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
+
+use crate::{
+    detection::Refinement,
+    geometry::{BackProjection, FieldOfViewReading, ViewPlan},
+};
+
+/// A profile: the views, models and refinement used for a frame.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Default,
+    serde::Serialize,
+    serde::Deserialize,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+    strum::VariantNames,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Profile {
+    /// The paper's 128 views with corner back-projection and Soft-NMS.
+    Paper,
+    /// Five wide views and up to 5 upright crops of the frame; on a CPU by a model in INT8.
+    Fast,
+    /// 18 views, wide around the nadir and narrow at the rim, and up to 12 upright crops of the
+    /// frame; on a CPU the crops by a model in INT8.
+    #[default]
+    Balanced,
+    /// 24 views, up to 40 zoom views, half of them by a second model, and up to 16 upright crops of
+    /// the frame.
+    Quality,
+    /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
+    Direct,
+}
+
+impl Profile {
+    /// Returns the name, as in requests and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Returns the view plan; `None` for [`Profile::Direct`]. `paper_reading` is the interpretation
+    /// of the paper's field of view.
+    #[must_use]
+    pub fn view_plan(self, paper_reading: FieldOfViewReading) -> Option<ViewPlan> {
+        match self {
+            Self::Paper => Some(ViewPlan::paper(paper_reading)),
+            Self::Fast => Some(ViewPlan::fast()),
+            Self::Balanced => Some(ViewPlan::balanced()),
+            Self::Quality => Some(ViewPlan::quality()),
+            Self::Direct => None,
+        }
+    }
+
+    /// Returns the zoom pass that follows the views of the plan, if any.
+    pub(crate) fn zoom_pass(self) -> Option<ZoomPass> {
+        (self == Self::Quality).then_some(ZoomPass {
+            most_views: 40,
+            fill: 1.0 / 3.0,
+        })
+    }
+
+    /// Returns the pass through upright crops that follows the views of the plan, if any.
+    pub(crate) fn crop_pass(self) -> Option<CropPass> {
+        let (max_crops, vote) = match self {
+            Self::Fast => (5, 1.0),
+            Self::Balanced => (12, 0.7),
+            Self::Quality => (16, 0.7),
+            Self::Paper | Self::Direct => return None,
+        };
+        Some(CropPass {
+            max_crops,
+            fill: 0.3,
+            vote,
+        })
+    }
+
+    /// Returns the maximum number of network inputs of the passes after the views of the plan.
+    pub(crate) fn max_second_pass_views(self) -> usize {
+        let zoom_views = self.zoom_pass().map_or(0, |zoom| zoom.most_views);
+        zoom_views + self.crop_pass().map_or(0, |crops| crops.max_crops)
+    }
+
+    /// Returns the method that projects boxes back to the frame.
+    #[must_use]
+    pub fn back_projection(self) -> BackProjection {
+        match self {
+            Self::Paper => BackProjection::CornerHull,
+            _ => BackProjection::TiltedEllipse,
+        }
+    }
+
+    /// Returns the score at which a person merged by fusion is as likely as not. The more views
+    /// see a person, the more of them must agree.
+    pub(crate) fn even_odds_score(self) -> f64 {
+        match self {
+            Self::Quality => 0.31,
+            Self::Fast | Self::Balanced => 0.28,
+            Self::Paper | Self::Direct => 0.25,
+        }
+    }
+
+    /// Returns the refinement for requests without one.
+    #[must_use]
+    pub fn default_refinement(self) -> Refinement {
+        match self {
+            Self::Paper => Refinement::SoftNmsGaussian,
+            Self::Direct => Refinement::Nms,
+            Self::Fast | Self::Balanced | Self::Quality => Refinement::Fusion,
+        }
+    }
+}
+
+/// A second pass through upright crops of the frame around possible persons.
+pub(crate) struct CropPass {
+    /// The maximum number of crops.
+    pub(crate) max_crops: usize,
+    /// The share of a crop's side that the larger side of a person's box fills.
+    pub(crate) fill: f64,
+    /// The factor for scores from crops, in which persons lean by up to 45° and more. Where many
+    /// upright views see a person, they give better scores, and crops give better extents.
+    pub(crate) vote: f64,
+}
+
+/// A second pass through zoom views of possible persons.
+pub(crate) struct ZoomPass {
+    /// The maximum number of zoom views.
+    pub(crate) most_views: usize,
+    /// The share of a view's shorter side that a person fills. A larger share confirms false
+    /// detections: at a high zoom, half a person or a poster resembles a whole person.
+    pub(crate) fill: f64,
+}

@@ -1,0 +1,356 @@
+//! The engine: converts the bytes of a frame to its report. The calling thread decodes the frame
+//! and merges detections; the network threads render views and run inference.
+
+mod camera;
+mod given_views;
+mod observation;
+mod second_pass;
+
+use std::{
+    num::NonZeroUsize,
+    sync::{Arc, atomic::AtomicUsize},
+    time::{Duration, Instant},
+};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+pub use self::observation::Observation;
+use super::{
+    BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectParameters, Detected,
+    DetectionReport, JobImage, Person, PipelineError, Profile, Stage, StageTimings,
+    inference_cache::{FrameKey, InferenceCache},
+    merge,
+    motion_cache::{CameraViews, MotionCache},
+    network::Network,
+    report::{ModelUsed, ZoneCount},
+    rig_cache::RigCache,
+};
+use crate::{
+    detection::RefinementParameters,
+    geometry::FieldOfViewReading,
+    imaging::{
+        Frame,
+        decode::{DecodeLimits, decode},
+    },
+    inference::{Model, ModelRegistry},
+    metrics::DetectMetrics,
+    warning::{Warning, WarningCode},
+};
+
+/// The smallest frame side that can hold a lens image, pixels.
+const MIN_FRAME_SIDE: u32 = 32;
+
+/// The options of the engine.
+#[derive(Debug, Clone)]
+pub struct EngineOptions {
+    /// Limits that are checked before a frame is decoded.
+    pub decode_limits: DecodeLimits,
+    /// The models for requests that name none.
+    pub default_models: DefaultModels,
+    /// Options for batches of views.
+    pub batches: BatchOptions,
+    /// Number of network threads, equal to the number of sessions of each model.
+    pub sessions: NonZeroUsize,
+    /// Number of threads that build remap tables and render batches of several views.
+    pub remap_threads: NonZeroUsize,
+    /// The interpretation of the paper's field of view.
+    pub paper_field_of_view: FieldOfViewReading,
+    /// Maximum memory of cached remap tables, bytes.
+    pub rig_cache_bytes: usize,
+    /// Maximum number of frames in the inference cache, which requests opt in to.
+    pub inference_cache_frames: usize,
+}
+
+impl EngineOptions {
+    /// The default memory of cached remap tables, bytes.
+    pub const RIG_CACHE_BYTES: usize = 256 << 20;
+
+    /// Returns options with `threads` sessions and as many threads that render, a view in each run,
+    /// and no inference cache.
+    #[must_use]
+    pub fn new(default_models: DefaultModels, threads: NonZeroUsize) -> Self {
+        Self {
+            decode_limits: DecodeLimits::default(),
+            default_models,
+            batches: BatchOptions {
+                max_views: NonZeroUsize::MIN,
+                max_delay: Duration::ZERO,
+            },
+            sessions: threads,
+            remap_threads: threads,
+            paper_field_of_view: FieldOfViewReading::default(),
+            rig_cache_bytes: Self::RIG_CACHE_BYTES,
+            inference_cache_frames: 0,
+        }
+    }
+
+    /// Returns options for tests: `model` for all profiles, one session, large batches.
+    #[must_use]
+    pub fn for_testing(model: &str) -> Self {
+        let mut options = Self::new(DefaultModels::One(model.to_owned()), NonZeroUsize::MIN);
+        options.batches.max_views = NonZeroUsize::MIN.saturating_add(127);
+        options.inference_cache_frames = 4;
+        options
+    }
+}
+
+/// Finds persons in frames.
+pub struct Engine {
+    models: Arc<ModelRegistry>,
+    network: Network,
+    remappers: Arc<ThreadPool>,
+    calibrations: Option<Arc<dyn CalibrationLookup>>,
+    rigs: RigCache,
+    motion_cache: MotionCache,
+    /// Round-robin counter for views that bypass the network's queue.
+    next_session: AtomicUsize,
+    inference_cache: InferenceCache,
+    options: EngineOptions,
+    metrics: Arc<DetectMetrics>,
+}
+
+impl Engine {
+    /// Creates an engine that runs `models`. Without `calibrations` every lens is assumed.
+    ///
+    /// # Errors
+    /// Fails if the operating system cannot start the threads.
+    pub fn new(
+        models: Arc<ModelRegistry>,
+        calibrations: Option<Arc<dyn CalibrationLookup>>,
+        options: EngineOptions,
+        metrics: Arc<DetectMetrics>,
+    ) -> std::io::Result<Self> {
+        let remappers = ThreadPoolBuilder::new()
+            .num_threads(options.remap_threads.get())
+            .thread_name(|index| format!("remap-{index}"))
+            .build()
+            .map_err(std::io::Error::other)?;
+        let remappers = Arc::new(remappers);
+        Ok(Self {
+            models,
+            network: Network::start(options.sessions, options.batches, &remappers)?,
+            remappers,
+            calibrations,
+            rigs: RigCache::new(options.rig_cache_bytes, Arc::clone(&metrics)),
+            motion_cache: MotionCache::default(),
+            next_session: AtomicUsize::new(0),
+            inference_cache: InferenceCache::new(
+                options.inference_cache_frames,
+                metrics.inference_cache_hits.clone(),
+            ),
+            options,
+            metrics,
+        })
+    }
+
+    /// Returns the default models.
+    #[must_use]
+    pub fn default_models(&self) -> &DefaultModels {
+        &self.options.default_models
+    }
+
+    /// Detects the persons in a frame. Blocks: do not call it on an async runtime thread.
+    ///
+    /// # Errors
+    /// Returns a [`PipelineError`], which distinguishes client and server faults.
+    pub fn detect(&self, job: &DetectJob) -> Result<Detected, PipelineError> {
+        let observation = self.observe(job)?;
+        let timeline = &job.ticket.timeline;
+        let parameters = &job.parameters;
+        timeline.enter(Stage::Refine, Instant::now());
+        let persons = self.persons(&observation, &parameters.refinement);
+        timeline.leave(Instant::now());
+        let views = observation.view_counts();
+        let zones = ZoneCount::of(&observation.camera.rig.geometry().areas.zones, &persons);
+        let calibration = observation.camera.used.clone();
+        let report = DetectionReport {
+            request_id: job.request_id.clone(),
+            camera: parameters
+                .camera
+                .clone()
+                .unwrap_or_else(|| calibration.id.clone()),
+            received_at: job.received_at,
+            captured_at: parameters.captured_at,
+            calibration,
+            image_width: observation.frame.width(),
+            image_height: observation.frame.height(),
+            second_opinion: observation.second_opinion().map(ModelUsed::from),
+            crop_model: observation.crop_model().map(ModelUsed::from),
+            model: ModelUsed::from(observation.model()),
+            profile: parameters.profile,
+            refinement: parameters.refinement,
+            defaults: parameters.defaults.clone(),
+            persons,
+            zones,
+            views,
+            batch_count: observation.batch_count,
+            non_finite: observation.non_finite,
+            timings: StageTimings {
+                total: job.arrived.elapsed(),
+                ..timeline.timings()
+            },
+            warnings: observation.warnings,
+        };
+        let mut rigs: Vec<_> = observation
+            .passes
+            .into_iter()
+            .map(|pass| pass.rig)
+            .collect();
+        // Two passes with different models may share a rig.
+        rigs.dedup_by(|one, other| Arc::ptr_eq(one, other));
+        let has_no_masks = observation.camera.rig.has_no_masks();
+        Ok(Detected {
+            withdrawn: job.ticket.withdrawn.clone(),
+            report,
+            frame: observation.frame,
+            encoded: match &job.image {
+                JobImage::Encoded(file) if has_no_masks => Some(file.clone()),
+                _ => None,
+            },
+            rigs,
+        })
+    }
+
+    /// Runs all stages up to and including inference.
+    ///
+    /// # Errors
+    /// Returns a [`PipelineError`], which distinguishes client and server faults.
+    pub fn observe(&self, job: &DetectJob) -> Result<Observation, PipelineError> {
+        let timeline = &job.ticket.timeline;
+        timeline.enter(Stage::Queue, job.arrived);
+        timeline.enter(Stage::Decode, Instant::now());
+        let model = self.model(&job.parameters)?;
+        let (mut frame, orientation_applied) = match &job.image {
+            JobImage::Encoded(file) => {
+                let decoded = decode(file, &self.options.decode_limits)?;
+                (Arc::new(decoded.frame), decoded.orientation_applied)
+            }
+            JobImage::Decoded(frame) => (Arc::clone(frame), false),
+        };
+        check_size(&frame)?;
+        timeline.enter(Stage::Calibrate, Instant::now());
+
+        let mut warnings = Vec::new();
+        if orientation_applied {
+            warnings.push(Warning::new(
+                WarningCode::FrameRotated,
+                "the frame was rotated according to its EXIF orientation; boxes are in pixels of the \
+                 rotated frame",
+            ));
+        }
+        let camera = self.camera(job, &frame, &model, &mut warnings)?;
+        if !camera.rig.has_no_masks() {
+            camera.rig.blank(Arc::make_mut(&mut frame));
+        }
+        let key = job.parameters.remember.then(|| FrameKey {
+            digest: job.image.digest(),
+            is_model_named: job.parameters.model.is_some(),
+            rig: Arc::clone(&camera.rig),
+            model: Arc::clone(&model),
+        });
+        let mut observation = Observation {
+            profile: job.parameters.profile,
+            passes: Vec::with_capacity(3),
+            unchanged_views: 0,
+            batch_count: 0,
+            non_finite: 0,
+            timeline: timeline.clone(),
+            frame,
+            camera,
+            model,
+            warnings,
+        };
+        let cached = key
+            .as_ref()
+            .and_then(|key| self.inference_cache.lookup(key, |model| self.serves(model)));
+        if let Some(passes) = cached {
+            observation.passes = passes;
+            observation.unchanged_views = observation.view_count();
+            timeline.leave(Instant::now());
+            return Ok(observation);
+        }
+        timeline.enter(Stage::Queue, Instant::now());
+        let first = self.network.queue_pass(
+            Arc::clone(&observation.camera.rig),
+            Arc::clone(&observation.model),
+            Arc::clone(&observation.frame),
+            job.ticket.clone(),
+            self.cached_views(job, &observation),
+        );
+        observation.wait_for(&[first])?;
+        let second = self.second_pass(job, &observation);
+        observation.wait_for(&second)?;
+        if let Some(key) = key {
+            self.inference_cache.store(key, &observation.passes);
+        }
+        Ok(observation)
+    }
+
+    /// Merges the detections of an observed frame into persons.
+    #[must_use]
+    pub fn persons(
+        &self,
+        observation: &Observation,
+        refinement: &RefinementParameters,
+    ) -> Vec<Person> {
+        merge::persons(&observation.passes, observation.profile, refinement)
+    }
+
+    /// Returns the camera's views in the motion cache, if the request enables motion detection.
+    fn cached_views(&self, job: &DetectJob, seen: &Observation) -> Option<Arc<CameraViews>> {
+        let parameters = &job.parameters;
+        let camera = parameters.camera_name().filter(|_| parameters.motion)?;
+        Some(self.motion_cache.of(camera, &seen.camera.rig, &seen.model))
+    }
+
+    pub(super) fn options(&self) -> &EngineOptions {
+        &self.options
+    }
+
+    pub(super) fn metrics(&self) -> &Arc<DetectMetrics> {
+        &self.metrics
+    }
+
+    /// Returns true if the registry still has this instance of the model under its name.
+    fn serves(&self, model: &Model) -> bool {
+        let now = self.models.get(model.name());
+        now.is_some_and(|now| std::ptr::eq(Arc::as_ptr(&now), model))
+    }
+
+    /// Returns the model for requests that name none.
+    pub(super) fn default_model(&self, profile: Profile) -> Result<Arc<Model>, PipelineError> {
+        let name = self.options.default_models.of(profile);
+        self.models.get(name).ok_or(PipelineError::ModelStarting)
+    }
+
+    /// Returns the model that the request names, or the default model of its profile.
+    fn model(&self, parameters: &DetectParameters) -> Result<Arc<Model>, PipelineError> {
+        let Some(name) = &parameters.model else {
+            return self.default_model(parameters.profile);
+        };
+        self.models.get(name).ok_or_else(|| {
+            let loaded = self.models.all();
+            let loaded: Vec<_> = loaded.iter().map(|model| model.name()).collect();
+            PipelineError::UnknownModel {
+                name: name.clone(),
+                loaded: loaded.join(", "),
+            }
+        })
+    }
+}
+
+fn check_size(frame: &Frame) -> Result<(), PipelineError> {
+    if frame.width().min(frame.height()) < MIN_FRAME_SIDE {
+        return Err(PipelineError::FrameTooSmall {
+            width: frame.width(),
+            height: frame.height(),
+            minimum: MIN_FRAME_SIDE,
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod area_tests;
+#[cfg(test)]
+mod tests;

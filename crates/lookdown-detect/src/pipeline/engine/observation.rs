@@ -1,0 +1,104 @@
+//! The result of inference on a frame.
+
+use std::sync::Arc;
+
+use super::camera::FrameCamera;
+use crate::{
+    imaging::Frame,
+    inference::Model,
+    pipeline::{
+        PipelineError, Profile, Stage, StageTimings, Timeline, ViewCounts,
+        network::{PassTask, Work},
+        pass::Pass,
+    },
+    warning::Warning,
+};
+
+/// A frame with its detections: the complete input of refinement, so that other refinements of the
+/// same frame need no inference.
+pub struct Observation {
+    /// The decoded frame, EXIF orientation applied.
+    pub frame: Arc<Frame>,
+    pub(super) camera: FrameCamera,
+    pub(super) model: Arc<Model>,
+    pub(super) profile: Profile,
+    pub(super) passes: Vec<Pass>,
+    pub(super) unchanged_views: usize,
+    pub(super) batch_count: usize,
+    pub(super) non_finite: usize,
+    pub(super) timeline: Timeline,
+    pub(super) warnings: Vec<Warning>,
+}
+
+impl Observation {
+    /// Returns the number of views with detections, from this frame's inference or from a cache.
+    #[must_use]
+    pub fn view_count(&self) -> usize {
+        self.passes.iter().map(|pass| pass.rig.view_count()).sum()
+    }
+
+    /// Returns the counts of inferred, unchanged, outside and masked views.
+    pub(super) fn view_counts(&self) -> ViewCounts {
+        ViewCounts {
+            inferred: self.view_count() - self.unchanged_views,
+            unchanged: self.unchanged_views,
+            outside: self.camera.rig.views_outside(),
+            masked: self.camera.rig.views_masked(),
+        }
+    }
+
+    /// Returns the stage timings so far, without `refine` and `total`.
+    #[must_use]
+    pub fn timings(&self) -> StageTimings {
+        self.timeline.timings()
+    }
+
+    /// Returns the model of the first pass.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Returns the second model of the zoom views, if they used one.
+    pub(super) fn second_opinion(&self) -> Option<&Model> {
+        self.other_model(|pass| !pass.is_of_crops())
+    }
+
+    /// Returns the model of the upright crops, if it is another one than that of the first pass.
+    pub(super) fn crop_model(&self) -> Option<&Model> {
+        self.other_model(Pass::is_of_crops)
+    }
+
+    /// Returns the model of a selected pass that is not the model of the first pass.
+    fn other_model(&self, is_selected: impl Fn(&Pass) -> bool) -> Option<&Model> {
+        let selected = self.passes.iter().filter(|pass| is_selected(pass));
+        let mut models = selected.map(|pass| &*pass.model);
+        models.find(|model| model.name() != self.model.name())
+    }
+
+    /// Waits for passes that were queued together, and adds their detections. Rendering and
+    /// inference overlap, so the total span is divided between these stages in proportion to their
+    /// work.
+    pub(super) fn wait_for(&mut self, tasks: &[Arc<PassTask>]) -> Result<(), PipelineError> {
+        let mut work: Option<Work> = None;
+        for task in tasks {
+            let output = task.wait()?;
+            work = Some(work.map_or(output.work, |others| others.and(output.work)));
+            self.passes.push(Pass {
+                rig: Arc::clone(&task.rig),
+                model: Arc::clone(&task.model),
+                per_view: output.per_view,
+            });
+        }
+        let Some(work) = work else { return Ok(()) };
+        self.batch_count += work.runs;
+        self.unchanged_views += work.still_views;
+        self.non_finite += work.non_finite;
+        let span = work.ended.saturating_duration_since(work.began);
+        let remap = span.mul_f64(work.remap_share());
+        self.timeline.enter(Stage::Remap, work.began);
+        self.timeline.enter(Stage::Inference, work.began + remap);
+        self.timeline.leave(work.ended);
+        Ok(())
+    }
+}

@@ -1,0 +1,332 @@
+use super::*;
+use crate::inference::InferenceError;
+use crate::pipeline::test_support::{BlobDetector, calibration, engine, frame_with_disc, job};
+
+fn engine_with_lobby() -> Engine {
+    engine(BlobDetector::default(), Some(calibration("")))
+}
+
+#[test]
+fn a_blob_is_found_at_its_position_in_every_profile() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    for profile in ["paper", "fast", "balanced", "quality", "direct"] {
+        let job = job(
+            image.clone(),
+            &[("profile", profile), ("calibration", "lobby")],
+        );
+        let report = engine.detect(&job).unwrap().report;
+        let best = report
+            .persons
+            .first()
+            .unwrap_or_else(|| panic!("{profile} found nothing"));
+        let [x, y] = best.bbox.center();
+        assert!(
+            (x - 420.0).abs() < 6.0 && (y - 300.0).abs() < 6.0,
+            "{profile}: {x}, {y}"
+        );
+        assert!(
+            (best.bbox.width() - 40.0).abs() < 14.0,
+            "{profile}: {}",
+            best.bbox.width()
+        );
+        assert!(best.views >= 1);
+        // To the right of the centre, 120 of 300 pixels out: 36° off axis.
+        let bearing = best.bearing.unwrap();
+        assert!((bearing.off_axis.to_degrees() - 36.0).abs() < 2.0);
+        assert!(bearing.azimuth.sin().abs() < 0.06);
+        let floor = best.floor.expect("the height is known");
+        assert!(
+            floor.x_m > 1.0 && floor.y_m.abs() < 0.3,
+            "{profile}: {floor:?}"
+        );
+    }
+}
+
+#[test]
+fn a_report_names_its_camera_calibration_and_model() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let named = engine
+        .detect(&job(
+            image.clone(),
+            &[("calibration", "lobby"), ("camera", "north")],
+        ))
+        .unwrap()
+        .report;
+    assert_eq!(named.camera, "north");
+    assert_eq!(named.calibration.id, "lobby");
+    assert!(named.calibration.assumed_circle.is_none() && named.warnings.is_empty());
+    assert_eq!((named.views.inferred, named.batch_count), (19, 5));
+    assert_eq!(named.model.name, "blob");
+
+    let assumed = engine.detect(&job(image, &[])).unwrap().report;
+    let circle = assumed.calibration.assumed_circle.unwrap();
+    let revision = format!("{:.0}-{:.0}-{:.0}", circle.cx, circle.cy, circle.radius);
+    assert_eq!(assumed.calibration.revision, revision);
+    assert_eq!(assumed.camera, "assumed");
+    assert_eq!(assumed.warnings[0].code, WarningCode::LensAssumed);
+    assert_eq!(assumed.persons[0].floor, None);
+}
+
+#[test]
+fn balanced_and_quality_have_a_second_pass() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let report = |profile| {
+        let named = [("calibration", "lobby"), ("profile", profile)];
+        engine.detect(&job(image.clone(), &named)).unwrap().report
+    };
+    let (balanced, quality) = (report("balanced"), report("quality"));
+    // One blob: a crop in both, and a zoomed view in quality.
+    assert_eq!((balanced.views.inferred, quality.views.inferred), (19, 26));
+    assert!(quality.persons[0].views > balanced.persons[0].views);
+}
+
+#[test]
+fn crops_make_boxes_exact_and_oriented_boxes_agree() {
+    let engine = engine_with_lobby();
+    for at in [[420.0, 300.0], [300.0, 450.0], [200.0, 190.0]] {
+        let image = frame_with_disc(600, at, 20.0);
+        let named = [("calibration", "lobby")];
+        let report = engine.detect(&job(image, &named)).unwrap().report;
+        let person = &report.persons[0];
+        let sides = [person.bbox.width(), person.bbox.height()];
+        assert!(
+            sides.iter().all(|side| (side - 40.0).abs() < 4.0),
+            "{sides:?}"
+        );
+        let oriented = &person.oriented_box;
+        let diagonal = oriented.width.hypot(oriented.height);
+        assert!(
+            (diagonal - sides[0].hypot(sides[1])).abs() < 0.5,
+            "{oriented:?}"
+        );
+        let center = oriented.center - nalgebra::Point2::from(person.bbox.center());
+        assert!(center.norm() < 0.5, "{oriented:?}");
+    }
+}
+
+#[test]
+fn an_empty_room_has_no_crops_in_the_second_pass() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 0.0);
+    let views = |profile| {
+        let named = [("calibration", "lobby"), ("profile", profile)];
+        let report = engine.detect(&job(image.clone(), &named)).unwrap().report;
+        assert!(report.persons.is_empty());
+        report.views.inferred
+    };
+    assert_eq!(
+        (views("fast"), views("balanced"), views("quality")),
+        (5, 18, 24)
+    );
+}
+
+#[test]
+fn views_without_motion_skip_inference() {
+    let engine = engine_with_lobby();
+    let report = |disc: [f64; 2], more: &[(&str, &str)]| {
+        let named = [("calibration", "lobby"), ("motion", "true")];
+        let named: Vec<_> = named.iter().chain(more).copied().collect();
+        let image = frame_with_disc(600, disc, 20.0);
+        engine.detect(&job(image, &named)).unwrap().report
+    };
+    let first = report([420.0, 300.0], &[]);
+    assert_eq!((first.views.inferred, first.views.unchanged), (19, 0));
+    let same = report([420.0, 300.0], &[]);
+    assert_eq!((same.views.inferred, same.views.unchanged), (0, 19));
+    assert_eq!(same.persons[0].bbox, first.persons[0].bbox);
+    assert_eq!(same.batch_count, 0);
+
+    let moved = report([420.0, 330.0], &[]);
+    assert!(moved.views.inferred > 0 && moved.views.unchanged > 6);
+    let [x, y] = moved.persons[0].bbox.center();
+    assert!((x - 420.0).abs() < 6.0 && (y - 330.0).abs() < 6.0);
+    assert_eq!(moved.persons.len(), 1);
+
+    // Another camera and the views of another profile are not in the motion cache.
+    let other = report([420.0, 330.0], &[("camera", "north")]);
+    assert_eq!(other.views.unchanged, 0);
+    let other = report([420.0, 330.0], &[("profile", "fast")]);
+    assert_eq!(other.views.unchanged, 0);
+}
+
+#[test]
+fn a_cached_frame_is_refined_without_inference() {
+    let engine = engine_with_lobby();
+    let report = |disc: [f64; 2], more: &[(&str, &str)]| {
+        let named = [("calibration", "lobby"), ("remember", "true")];
+        let named: Vec<_> = named.iter().chain(more).copied().collect();
+        let image = frame_with_disc(600, disc, 20.0);
+        engine.detect(&job(image, &named)).unwrap().report
+    };
+    let unchanged = |disc: [f64; 2], more: &[(&str, &str)]| report(disc, more).views.unchanged;
+    let first = report([420.0, 300.0], &[]);
+    assert_eq!((first.views.inferred, first.views.unchanged), (19, 0));
+    let again = report([420.0, 300.0], &[("refine", "nms")]);
+    assert_eq!((again.views.inferred, again.views.unchanged), (0, 19));
+    assert_eq!(
+        (again.batch_count, again.timings.inference.as_nanos()),
+        (0, 0)
+    );
+    assert_eq!(engine.metrics().inference_cache_hits.get(), 1);
+    // Inference without the cache gives the same result.
+    let parameters = [("calibration", "lobby"), ("refine", "nms")];
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let anew = engine.detect(&job(image, &parameters)).unwrap().report;
+    assert_eq!(anew.views.inferred, 19);
+    assert_eq!(anew.persons[0].bbox, again.persons[0].bbox);
+    assert_eq!(anew.persons[0].score, again.persons[0].score);
+
+    // Another frame and a named model are different cache keys.
+    assert_eq!(unchanged([420.0, 330.0], &[]), 0);
+    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 0);
+    // The cache holds two frames: the first one was evicted.
+    assert_eq!(unchanged([420.0, 300.0], &[]), 0);
+    assert_eq!(unchanged([420.0, 300.0], &[("model", "blob")]), 19);
+}
+
+#[test]
+fn the_threshold_applies_to_reported_scores() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let scores = |threshold: f64| {
+        let threshold = threshold.to_string();
+        let named = [("calibration", "lobby"), ("score_threshold", &*threshold)];
+        let report = engine.detect(&job(image.clone(), &named)).unwrap().report;
+        let scores: Vec<_> = report.persons.iter().map(|person| person.score).collect();
+        scores
+    };
+    let best = scores(0.1)[0];
+    assert_eq!(scores(best - 1e-9), [best]);
+    assert!(scores(best + 1e-9).is_empty());
+}
+
+#[test]
+fn an_assumed_lens_and_the_true_calibration_agree() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [300.0, 180.0], 25.0);
+    let named = engine
+        .detect(&job(image.clone(), &[("calibration", "lobby")]))
+        .unwrap()
+        .report;
+    let assumed = engine.detect(&job(image, &[])).unwrap().report;
+    assert!(named.persons[0].bbox.iou(&assumed.persons[0].bbox) > 0.9);
+}
+
+#[test]
+fn a_scaled_frame_is_accepted_and_another_aspect_is_refused() {
+    let engine = engine_with_lobby();
+    let larger = frame_with_disc(900, [630.0, 450.0], 30.0);
+    let report = engine
+        .detect(&job(larger, &[("calibration", "lobby")]))
+        .unwrap()
+        .report;
+    assert!((report.persons[0].bbox.center()[0] - 630.0).abs() < 8.0);
+
+    let wide = Frame::new(800, 600, vec![90; 800 * 600 * 3]).unwrap();
+    let wide = crate::imaging::annotate::encode_png(&wide).unwrap();
+    let error = engine
+        .detect(&job(wide.into(), &[("calibration", "lobby")]))
+        .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "image: the frame is 800×600 pixels, but calibration \"lobby\" was made for 600×600, \
+         which is a different aspect ratio: send an uncropped frame or name another calibration"
+    );
+}
+
+#[test]
+fn unknown_names_and_tiny_frames_are_refused() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(64, [30.0, 30.0], 5.0);
+    let refusal = |parameters: &[(&str, &str)]| {
+        engine
+            .detect(&job(image.clone(), parameters))
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(
+        refusal(&[("calibration", "yard")])
+            .starts_with("calibration: there is no calibration \"yard\"")
+    );
+    assert_eq!(
+        refusal(&[("model", "yolo")]),
+        "model: \"yolo\" is not loaded; use one of blob, or leave it out"
+    );
+    let tiny = frame_with_disc(16, [8.0, 8.0], 2.0);
+    let error = engine.detect(&job(tiny, &[])).unwrap_err().to_string();
+    assert!(
+        error.starts_with("image: the frame is 16×16 pixels"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_failed_inference_is_internal_and_the_next_frame_works() {
+    let mut failures = vec![InferenceError::Run("out of memory".to_owned())];
+    let detector = BlobDetector {
+        before: Box::new(move || failures.pop().map_or(Ok(()), Err)),
+        ..BlobDetector::default()
+    };
+    let engine = engine(detector, None);
+    let image = frame_with_disc(200, [60.0, 100.0], 12.0);
+    let error = engine.detect(&job(image.clone(), &[])).unwrap_err();
+    assert!(matches!(error, PipelineError::Internal(_)));
+    assert!(
+        !error.to_string().contains("memory"),
+        "the response must not contain the cause: {error}"
+    );
+    assert_eq!(
+        engine
+            .detect(&job(image, &[]))
+            .unwrap()
+            .report
+            .persons
+            .len(),
+        1
+    );
+}
+
+#[test]
+fn stages_are_disjoint_and_within_the_total() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let timings = engine.detect(&job(image, &[])).unwrap().report.timings;
+    let sum = timings.decode
+        + timings.calibrate
+        + timings.queue
+        + timings.remap
+        + timings.inference
+        + timings.refine;
+    assert!(sum <= timings.total, "{timings:?}");
+    assert!(
+        timings.decode > std::time::Duration::ZERO && timings.remap > std::time::Duration::ZERO
+    );
+}
+
+#[test]
+fn other_refinements_of_an_observation_need_no_inference() {
+    let engine = engine_with_lobby();
+    let image = frame_with_disc(600, [420.0, 300.0], 20.0);
+    let job = job(image, &[("calibration", "lobby")]);
+    let observation = engine.observe(&job).unwrap();
+    let parameters = |refinement| RefinementParameters {
+        refinement,
+        ..job.parameters.refinement
+    };
+    let fused = engine.persons(
+        &observation,
+        &parameters(crate::detection::Refinement::Fusion),
+    );
+    let soft = engine.persons(
+        &observation,
+        &parameters(crate::detection::Refinement::SoftNmsGaussian),
+    );
+    assert!(fused[0].views > 1, "several views see the blob");
+    assert!(
+        soft.iter().all(|person| person.views == 1),
+        "soft-NMS selects boxes and does not average them"
+    );
+}

@@ -1,0 +1,249 @@
+//! Merges boxes of views into persons of the frame.
+
+use super::{
+    Person, Profile,
+    camera_rig::CameraRig,
+    pass::{Pass, PassDetection, detections, views_holding},
+    plausibility::score_weight,
+    score_calibration::ScoreCalibration,
+};
+use crate::{
+    detection::{
+        BBox, Candidate, FramePixels, MergedDetection, Refinement, RefinementParameters,
+        ViewPixels, refine,
+    },
+    geometry::{
+        BackProjection, Footprint, OrientedBox, Ray,
+        crop_placement::CropTarget,
+        floor::{bearing, floor_position},
+        oriented_box::vertical_in_frame,
+    },
+    imaging::NetworkInput,
+};
+
+/// Distance to the view's border, as a share of the view's width, below which a box is considered
+/// cut off.
+const BORDER_SHARE: f64 = 0.0125;
+/// The weight of the coordinates of a cut-off box when boxes are averaged.
+const BORDER_WEIGHT: f64 = 0.1;
+/// The weight of the coordinates of a virtual view's box, relative to the exact box of a crop.
+const VIRTUAL_VIEW_WEIGHT: f64 = 0.1;
+
+/// A box of a view, with its footprint in the frame.
+struct Mapped {
+    candidate: Candidate,
+    footprint: Footprint,
+    cut_off: bool,
+    /// True for a box from a crop of the frame.
+    is_exact: bool,
+}
+
+impl Mapped {
+    /// Returns the candidate with its score weighted by its plausibility as a person, and with the
+    /// number of views that hold the whole person.
+    /// `crop_vote` is the factor for scores from crops.
+    fn weighted(&self, passes: &[Pass], rig: &CameraRig, crop_vote: f64) -> Candidate {
+        let mount = &rig.geometry().mount;
+        let height_ratio = self
+            .footprint
+            .extremities()
+            .and_then(|extremities| extremities.height_ratio(mount));
+        let holding = views_holding(passes, &self.footprint);
+        #[expect(clippy::cast_precision_loss, reason = "at most a few hundred views")]
+        let expected_views = holding.max(1) as f64;
+        let (vote, weight) = if self.is_exact {
+            (crop_vote, 1.0)
+        } else {
+            (1.0, VIRTUAL_VIEW_WEIGHT)
+        };
+        Candidate {
+            score: self.candidate.score * score_weight(self.cut_off, height_ratio, mount) * vote,
+            coordinate_weight: self.candidate.coordinate_weight * weight,
+            expected_views,
+            ..self.candidate
+        }
+    }
+}
+
+/// Maps the boxes of every view to the frame and merges them into persons.
+pub(super) fn persons(
+    passes: &[Pass],
+    profile: Profile,
+    parameters: &RefinementParameters,
+) -> Vec<Person> {
+    let Some(Pass { rig, .. }) = passes.first() else {
+        return Vec::new();
+    };
+    let calibration = ScoreCalibration::of(profile, parameters.refinement);
+    let parameters = RefinementParameters {
+        score_threshold: calibration.merged(parameters.score_threshold),
+        ..*parameters
+    };
+    let (mapped, merged) = merged(passes, rig, profile, &parameters);
+    merged
+        .into_iter()
+        .filter_map(|merged| {
+            let members: Vec<&Mapped> = merged
+                .members
+                .iter()
+                .map(|&member| &mapped[member])
+                .collect();
+            person(
+                merged.bbox,
+                calibration.reported(merged.score),
+                &members,
+                rig,
+            )
+        })
+        .collect()
+}
+
+/// The refinement that turns boxes of the first pass into targets of the second.
+const TARGET_REFINEMENT: RefinementParameters = RefinementParameters {
+    refinement: Refinement::Fusion,
+    iou_threshold: 0.5,
+    sigma: 0.3,
+    score_threshold: 0.03,
+    max_detections: 500,
+};
+
+/// Possible persons of the first pass, highest score first.
+pub(super) struct SecondPassTargets {
+    /// The outline (unit rays) of each person's best box.
+    pub(super) outlines: Vec<Vec<Ray>>,
+    /// The fused boxes within the frame.
+    pub(super) crop_targets: Vec<CropTarget>,
+}
+
+/// Merges the boxes of the first pass into targets of the second.
+pub(super) fn second_pass_targets(
+    passes: &[Pass],
+    rig: &CameraRig,
+    profile: Profile,
+) -> SecondPassTargets {
+    let (mapped, merged) = merged(passes, rig, profile, &TARGET_REFINEMENT);
+    let best = merged.iter().filter_map(|merged| merged.members.first());
+    let unit = |rays: &[Ray]| rays.iter().map(Ray::normalize).collect();
+    let outlines = best.map(|&member| unit(mapped[member].footprint.rays()));
+    let geometry = rig.geometry();
+    let crop_targets = merged.iter().filter_map(|merged| {
+        let bbox = merged.bbox.clipped_to(rig.frame())?;
+        let center = nalgebra::Point2::from(bbox.center());
+        Some(CropTarget {
+            bbox: bbox.corners(),
+            score: merged.score,
+            up: vertical_in_frame(center, &geometry.lens, &geometry.mount),
+        })
+    });
+    SecondPassTargets {
+        outlines: outlines.collect(),
+        crop_targets: crop_targets.collect(),
+    }
+}
+
+fn merged(
+    passes: &[Pass],
+    rig: &CameraRig,
+    profile: Profile,
+    parameters: &RefinementParameters,
+) -> (Vec<Mapped>, Vec<MergedDetection>) {
+    let is_fusion = parameters.refinement == Refinement::Fusion;
+    // Suppression only lowers scores. In fusion, boxes below the threshold still vote.
+    let matters = |score: f64| is_fusion || score >= parameters.score_threshold;
+    let mapped: Vec<Mapped> = detections(passes)
+        .filter(|find| matters(find.detection.score))
+        .filter_map(|find| map(&find, profile.back_projection()))
+        .collect();
+    // Suppression compares the detector's scores; fusion weights them.
+    let candidates: Vec<Candidate> = if is_fusion {
+        let crop_vote = profile.crop_pass().map_or(1.0, |pass| pass.vote);
+        let weighted = mapped
+            .iter()
+            .map(|one| one.weighted(passes, rig, crop_vote));
+        weighted.collect()
+    } else {
+        mapped.iter().map(|one| one.candidate).collect()
+    };
+    let merged = refine(&candidates, parameters);
+    (mapped, merged)
+}
+
+fn map(find: &PassDetection<'_>, back_projection: BackProjection) -> Option<Mapped> {
+    let Pass { rig, model, .. } = find.pass;
+    let found = find.detection;
+    let footprint = rig.footprint(find.view, &found.bbox, back_projection)?;
+    let is_exact = rig.is_exact();
+    let bbox = BBox::new(footprint.bounds()).ok()?;
+    let cut_off = touches_border(&found.bbox, model.input());
+    let candidate = Candidate {
+        bbox,
+        score: found.score,
+        view: find.number,
+        coordinate_weight: if cut_off { BORDER_WEIGHT } else { 1.0 },
+        expected_views: 1.0,
+    };
+    Some(Mapped {
+        candidate,
+        footprint,
+        cut_off,
+        is_exact,
+    })
+}
+
+fn touches_border(bbox: &BBox<ViewPixels>, input: &NetworkInput) -> bool {
+    let (width, height) = (f64::from(input.width), f64::from(input.height));
+    let margin = BORDER_SHARE * width;
+    bbox.x_min() < margin
+        || bbox.y_min() < margin
+        || bbox.x_max() > width - margin
+        || bbox.y_max() > height - margin
+}
+
+/// Builds a person from the members of a merged box. Returns `None` for a box outside the frame:
+/// lens images may be larger than frames.
+fn person(
+    bbox: BBox<FramePixels>,
+    score: f64,
+    members: &[&Mapped],
+    rig: &CameraRig,
+) -> Option<Person> {
+    let geometry = rig.geometry();
+    let bounds = bbox.corners();
+    let bbox = bbox.clipped_to(rig.frame())?;
+    let center = nalgebra::Point2::from(bbox.center());
+    let up = vertical_in_frame(center, &geometry.lens, &geometry.mount);
+    // Upright views determine the proportions, crops the extent.
+    let has_exact = members.iter().any(|member| member.is_exact);
+    let has_upright = members.iter().any(|member| !member.is_exact);
+    let proportioned = members
+        .iter()
+        .filter(|member| !(has_upright && member.is_exact));
+    let outlines = proportioned.map(|member| {
+        let weight = member.candidate.score.powi(3) * member.candidate.coordinate_weight;
+        // A score of 0 is valid, but the outline needs a weight above 0.
+        (weight.max(f64::MIN_POSITIVE), member.footprint.outline())
+    });
+    let averaged = OrientedBox::averaging(up, outlines)?;
+    let oriented_box = if has_exact {
+        averaged.fitted_to(bounds)
+    } else {
+        averaged
+    };
+    let mut views: Vec<usize> = members.iter().map(|member| member.candidate.view).collect();
+    views.sort_unstable();
+    views.dedup();
+    let foot = oriented_box.foot();
+    let floor = floor_position(foot, &geometry.lens, &geometry.mount);
+    Some(Person {
+        bbox,
+        score,
+        oriented_box,
+        bearing: bearing(center, &geometry.lens),
+        floor,
+        views: views.len(),
+        zones: Person::zones_of(&geometry.areas.zones, foot, floor),
+    })
+}
+
+#[cfg(test)]
+mod properties;

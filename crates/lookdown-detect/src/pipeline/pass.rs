@@ -1,0 +1,64 @@
+//! One pass over a frame: the views of a rig and the detections in each of them.
+
+use std::sync::Arc;
+
+use super::camera_rig::CameraRig;
+use crate::{
+    geometry::Footprint,
+    inference::{Model, ViewDetection},
+};
+
+/// One pass over a frame. All passes over a frame share its camera.
+pub(super) struct Pass {
+    /// The views.
+    pub(super) rig: Arc<CameraRig>,
+    /// The model that processed the views.
+    pub(super) model: Arc<Model>,
+    /// The detections in each view.
+    pub(super) per_view: Vec<Vec<ViewDetection>>,
+}
+
+impl Pass {
+    /// Returns true if the views are upright crops of the frame.
+    pub(super) fn is_of_crops(&self) -> bool {
+        self.rig.crops().next().is_some()
+    }
+}
+
+/// A detection in one view of a pass.
+#[derive(Clone, Copy)]
+pub(super) struct PassDetection<'a> {
+    pub(super) pass: &'a Pass,
+    /// The index of the view in its rig.
+    pub(super) view: usize,
+    /// The number of the view, unique over all passes.
+    pub(super) number: usize,
+    pub(super) detection: &'a ViewDetection,
+}
+
+/// Returns the detections of all passes.
+pub(super) fn detections(passes: &[Pass]) -> impl Iterator<Item = PassDetection<'_>> {
+    let numbered = passes.iter().scan(0, |before, pass| {
+        let first = *before;
+        *before += pass.per_view.len();
+        Some((first, pass))
+    });
+    numbered.flat_map(|(first, pass)| {
+        let views = pass.per_view.iter().enumerate();
+        views.flat_map(move |(view, found)| {
+            found.iter().map(move |detection| PassDetection {
+                pass,
+                view,
+                number: first + view,
+                detection,
+            })
+        })
+    })
+}
+
+/// Returns the number of views over all passes in which a person with this footprint is wholly
+/// visible.
+pub(super) fn views_holding(passes: &[Pass], footprint: &Footprint) -> usize {
+    let holding = passes.iter().map(|pass| pass.rig.views_holding(footprint));
+    holding.sum()
+}

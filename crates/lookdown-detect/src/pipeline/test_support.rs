@@ -1,0 +1,174 @@
+//! A small detector for tests. It detects bright blobs instead of persons, so that geometry,
+//! merging and scheduling can be tested without weights.
+
+use std::{
+    num::NonZeroUsize,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use bytes::Bytes;
+use jiff::Timestamp;
+
+use super::{
+    BatchOptions, CalibrationLookup, DetectJob, DetectParameters, Engine, EngineOptions, JobImage,
+    Ticket, UnusableCalibration,
+};
+use crate::{
+    calibration::{Calibration, CalibrationFile, CalibrationId},
+    detection::{BBox, ViewPixels},
+    imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png},
+    inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},
+};
+
+/// Returns the bounding box of all pixels in a view that are brighter than this.
+const BRIGHT: f32 = 200.0;
+
+pub(super) struct BlobDetector {
+    pub(super) input: NetworkInput,
+    /// Called before each batch.
+    pub(super) before: Box<dyn FnMut() -> Result<(), InferenceError> + Send>,
+}
+
+impl Default for BlobDetector {
+    fn default() -> Self {
+        Self {
+            input: NetworkInput::plain(96, 96),
+            before: Box::new(|| Ok(())),
+        }
+    }
+}
+
+impl Detector for BlobDetector {
+    fn name(&self) -> &'static str {
+        "blob"
+    }
+
+    fn revision(&self) -> &'static str {
+        "1"
+    }
+
+    fn input(&self) -> &NetworkInput {
+        &self.input
+    }
+
+    fn detect(&mut self, batch: &ViewBatch) -> Result<HeadOutput, InferenceError> {
+        (self.before)()?;
+        let views = batch.values().chunks_exact(self.input.view_len());
+        Ok(HeadOutput {
+            per_view: views.map(|view| self.find(view)).collect(),
+            non_finite: 0,
+        })
+    }
+}
+
+impl BlobDetector {
+    fn find(&self, view: &[f32]) -> Vec<ViewDetection> {
+        let width = self.input.width;
+        let bright = (0..)
+            .zip(&view[..self.input.plane_len()])
+            .filter(|&(_, &value)| value > BRIGHT)
+            .map(|(index, _)| [index % width, index / width].map(f64::from));
+        let hull = bright
+            .map(|[x, y]| [x, y, x + 1.0, y + 1.0])
+            .reduce(|a, b| {
+                [
+                    a[0].min(b[0]),
+                    a[1].min(b[1]),
+                    a[2].max(b[2]),
+                    a[3].max(b[3]),
+                ]
+            });
+        let found = hull.and_then(|sides| BBox::new(sides).ok());
+        // A blob cut off by the border gets a lower score, as from a real detector.
+        let whole = |bbox: &BBox<ViewPixels>| {
+            let sides = bbox.corners();
+            let right = f64::from(self.input.width);
+            sides.iter().all(|&side| side > 0.0 && side < right)
+        };
+        found
+            .map(|bbox| ViewDetection {
+                score: if whole(&bbox) { 0.9 } else { 0.2 },
+                bbox,
+            })
+            .into_iter()
+            .collect()
+    }
+}
+
+/// Returns the calibration `lobby` for frames of 600 × 600 pixels, 3 m above the floor, with these areas.
+pub(super) fn calibration(areas: &str) -> Arc<Calibration> {
+    let content = format!(
+        r#"{{ "id": "lobby", "image": {{"width": 600, "height": 600}},
+             "lens": {{"model": "equidistant", "focal": 190.9859, "cx": 299.5, "cy": 299.5,
+                       "max_theta": 1.5707}},
+             "mount": {{"world_up": [0, 0, -1], "height_m": 3}} {areas} }}"#
+    );
+    let file = CalibrationFile::parse(content.as_bytes()).unwrap();
+    let (_, checked) = file
+        .calibrations("lobby", content.as_bytes())
+        .swap_remove(0);
+    Arc::new(checked.unwrap())
+}
+
+/// A lookup that knows one calibration.
+impl CalibrationLookup for Calibration {
+    fn get(&self, id: &CalibrationId) -> Result<Option<Arc<Calibration>>, UnusableCalibration> {
+        Ok((self.id() == id).then(|| Arc::new(self.clone())))
+    }
+}
+
+pub(super) fn engine(
+    detector: BlobDetector,
+    calibrations: Option<Arc<dyn CalibrationLookup>>,
+) -> Engine {
+    let options = EngineOptions {
+        batches: BatchOptions {
+            max_views: NonZeroUsize::new(5).unwrap(),
+            max_delay: Duration::ZERO,
+        },
+        remap_threads: NonZeroUsize::new(2).unwrap(),
+        inference_cache_frames: 2,
+        ..EngineOptions::for_testing("blob")
+    };
+    let models = ModelRegistry::default();
+    models
+        .put(Arc::new(Model::new(Box::new(detector))))
+        .unwrap();
+    Engine::new(Arc::new(models), calibrations, options, Arc::default()).unwrap()
+}
+
+/// A grey lens image on black, `side` pixels wide, with a white disc.
+pub(super) fn frame_with_disc(side: u32, center: [f64; 2], radius: f64) -> Bytes {
+    let middle = f64::from(side) / 2.0;
+    let mut pixels = Vec::with_capacity(side as usize * side as usize * 3);
+    for y in 0..side {
+        for x in 0..side {
+            let at = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+            let within = |c: [f64; 2], r: f64| (at[0] - c[0]).hypot(at[1] - c[1]) <= r;
+            let value = if within(center, radius) {
+                255
+            } else if within([middle, middle], middle - 1.0) {
+                110
+            } else {
+                0
+            };
+            pixels.extend([value; 3]);
+        }
+    }
+    encode_png(&Frame::new(side, side, pixels).unwrap())
+        .unwrap()
+        .into()
+}
+
+pub(super) fn job(image: Bytes, parameters: &[(&str, &str)]) -> DetectJob {
+    DetectJob {
+        request_id: "test".to_owned(),
+        received_at: Timestamp::UNIX_EPOCH,
+        arrived: Instant::now(),
+        ticket: Ticket::default(),
+        image: JobImage::Encoded(image),
+        parameters: DetectParameters::parse(parameters.iter().copied()).unwrap(),
+        calibration: None,
+    }
+}

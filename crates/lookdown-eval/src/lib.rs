@@ -1,0 +1,38 @@
+#![doc = include_str!("../README.md")]
+//!
+//! [`DataSet`] reads the annotations, [`detect`] runs a detector on them, [`Summary`] has the figures.
+
+mod average_precision;
+mod data_set;
+mod ground_truth;
+mod in_order;
+mod matching;
+mod outline;
+mod plot;
+mod precision_recall;
+mod region;
+mod rotated_box;
+mod row;
+mod run;
+mod saved;
+mod strata;
+mod summary;
+pub mod sweep;
+
+use lookdown_detect::{detection, imaging, pipeline};
+use lookdown_lens::{calibration, geometry};
+
+pub use average_precision::AveragePrecision;
+pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch};
+pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};
+pub use matching::{MatchingRule, Outcome};
+pub use outline::{Outline, Scoring};
+pub use plot::{Line, LinePlot, PlotError, precision_recall_plot};
+pub use precision_recall::{OperatingPoint, PrecisionRecallCurve};
+pub use region::Region;
+pub use rotated_box::RotatedBox;
+pub use row::{DetectedRow, EvaluatedRow, FoundPerson, RowCost, RowName};
+pub use run::{EvaluationError, detect};
+pub use saved::SavedDetectionsError;
+pub use strata::{NoStrata, Stratification, Stratum, StratumFigures};
+pub use summary::{NoPersons, Summary};

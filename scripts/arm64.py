@@ -1,0 +1,106 @@
+"""Cross-builds Lookdown for arm64 and tests it with an emulator: `arm64.py [build|test]...`, both by default.
+
+Debian 12 on x86-64 has all parts: Rust with its arm64 library (`rustc-web`), the cross compiler and qemu. The arm64
+library is unpacked below .setup/arm64, so that the system needs no foreign architecture. ONNX Runtime comes from the
+pinned wheel. The tests are those of the libraries, then one frame through the whole program.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from assets.archives import extract
+from assets.downloads import fetch_wheel
+from assets.pins import read_pins
+from assets.places import Places
+from assets.steps import LIBRARY
+
+ROOT = Path(__file__).resolve().parents[1]
+OWN = ROOT / ".setup" / "arm64"
+TARGET = "aarch64-unknown-linux-gnu"
+PROGRAM = ROOT / "target" / TARGET / "release" / "lookdown"
+RUSTC = Path("/usr/bin/rustc")
+"""Of the package rustc-web; rustup's compiler cannot use Debian's library."""
+PACKAGES = ("rustc-web", "gcc-aarch64-linux-gnu", "libc6-dev-arm64-cross", "libstdc++6-arm64-cross", "qemu-user-static")
+EMULATOR = ("qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu")
+HIDE_CPU = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /sys && exec "$@"', "sh")
+"""Runs a command without /sys: in the emulator, ONNX Runtime ends with a segmentation fault while it reads there
+about the caches of the x86-64 processor. Needs root."""
+LIBRARIES = ("lookdown-lens", "lookdown-detect", "lookdown-eval")
+
+
+def main(arguments: list[str]) -> int:
+    """The exit status."""
+    subprocess.run([ROOT / "scripts" / "packages.sh", *PACKAGES], check=True)
+    install_rust_library()
+    wanted = arguments or ["build", "test"]
+    if "build" in wanted:
+        cargo("build", "--release", "--bin", "lookdown")
+        print(f"{PROGRAM.relative_to(ROOT)}: {PROGRAM.stat().st_size / 1e6:.1f} MB")
+    if "test" in wanted:
+        install_runtime()
+        packages = [word for name in LIBRARIES for word in ("--package", name)]
+        cargo("test", "--release", "--lib", *packages)
+        detect_in_sample()
+    return 0
+
+
+def install_rust_library() -> None:
+    """Unpacks Rust's standard library for arm64, of the version of the compiler, into .setup/arm64/usr."""
+    version = _output("dpkg-query", "--show", "--showformat", "${Version}", "rustc-web")
+    done = OWN / f"library-{version}"
+    if done.exists():
+        return
+    shutil.rmtree(OWN, ignore_errors=True)
+    (OWN / "lists" / "partial").mkdir(parents=True)
+    options = [f"Dir::State::Lists={OWN / 'lists'}", "APT::Architectures::=amd64", "APT::Architectures::=arm64"]
+    options = [word for option in (*options, f"Dir::Cache={OWN}") for word in ("-o", option)]
+    subprocess.run(["apt-get", *options, "update", "-q"], check=True)
+    package = f"libstd-rust-web-dev:arm64={version}"
+    subprocess.run(["apt-get", *options, "download", "-q", package], cwd=OWN, check=True)
+    (archive,) = OWN.glob("libstd-rust-web-dev_*.deb")
+    subprocess.run(["dpkg-deb", "--extract", archive, OWN], check=True)
+    archive.unlink()
+    shutil.rmtree(OWN / "lists")
+    done.touch()
+
+
+def install_runtime() -> None:
+    """Puts ONNX Runtime for arm64 into .setup/arm64/runtime."""
+    places, runtime = Places(ROOT), read_pins(ROOT / "scripts" / "pins.toml").runtime["aarch64"]
+    with places.locked(), places.temporary() as folder:
+        wheel = fetch_wheel(places, runtime, "arm64")
+        for member, file in zip(runtime.members, extract(wheel, runtime.members, folder), strict=True):
+            target = OWN / member.to
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, target)
+
+
+def cargo(command: str, *arguments: str) -> None:
+    """Runs cargo for arm64 with Debian's compiler; tests run in the emulator."""
+    prefix = f"CARGO_TARGET_{TARGET.upper().replace('-', '_')}"
+    environment = os.environ | {
+        "RUSTC": str(RUSTC),
+        f"{prefix}_LINKER": "aarch64-linux-gnu-gcc",
+        f"{prefix}_RUNNER": " ".join(EMULATOR),
+        f"{prefix}_RUSTFLAGS": f"--sysroot={OWN / 'usr'}",
+    }
+    words = ["cargo", command, "--locked", "--target", TARGET, "--target-dir", ROOT / "target", *arguments]
+    subprocess.run(words, cwd=ROOT, env=environment, check=True)
+
+
+def detect_in_sample() -> None:
+    """Detects the persons of the sample in the emulator."""
+    environment = os.environ | {"LOOKDOWN__INFERENCE__LIBRARY_PATH": str(OWN / LIBRARY)}
+    command = [*HIDE_CPU, *EMULATOR, PROGRAM, "detect", "samples/office.jpg"]
+    subprocess.run(command, cwd=ROOT, env=environment, check=True)
+
+
+def _output(*command: str) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,68 @@
+/** The section Live with counts of `lookdown count`, behind a proxy that forwards their path. */
+
+import assert from "node:assert/strict";
+import { readFile, readdir } from "node:fs/promises";
+import test from "node:test";
+import { PHONE, SERVER, WIDE, assertAccessible, assertFits, pageTest, picture } from "./browser.js";
+
+/** The address of the proxy, that of the server behind it, and a folder of frames of a walk. */
+const { LOOKDOWN_COUNTED_URL: COUNTED, LOOKDOWN_UNCOUNTED_URL: UNCOUNTED, LOOKDOWN_WALK: WALK } = process.env;
+const FRAMES_PER_SECOND = 5;
+
+/** Sends the frames like a camera, with their capture times; the last one is of now. */
+async function walk(camera) {
+  const names = (await readdir(WALK)).sort((one, other) => parseInt(one, 10) - parseInt(other, 10));
+  const first = Date.now() - (names.length / FRAMES_PER_SECOND) * 1000;
+  for (const [index, name] of names.entries()) {
+    const captured = new Date(first + (index / FRAMES_PER_SECOND) * 1000).toISOString();
+    const parameters = new URLSearchParams({ calibration: "walks", camera, profile: "fast", captured_at: captured });
+    const answer = await fetch(`${COUNTED}/detect?${parameters}`, { method: "POST", body: await readFile(`${WALK}/${name}`) });
+    assert.equal(answer.status, 200);
+  }
+}
+
+test("a camera sends frames of a walk", () => walk("hall"));
+
+for (const [device, viewport, colorScheme] of [["wide", WIDE, "light"], ["phone", PHONE, "dark"]]) {
+  pageTest(
+    `tracks, lines, zones and the heat map are drawn over a camera on a ${device} screen`,
+    "#live",
+    async (page) => {
+      const card = page.getByRole("article", { name: "Camera hall" });
+      await card.locator(".track").first().waitFor();
+      const tails = await card.locator(".track polyline").evaluateAll((nodes) => nodes.map((node) => node.getAttribute("points").split(" ").length));
+      assert.ok(Math.max(...tails) > 5, `${tails}`);
+      assert.equal(await card.locator(".count-line").count(), 2);
+      assert.equal(await card.locator(".count-zone").count(), 1);
+      const south = card.getByRole("listitem").filter({ hasText: "south" });
+      assert.match(await south.textContent(), /\d+ → clockwise, \d+ ← anticlockwise/);
+      await card.getByRole("listitem").filter({ hasText: /middle\d+ now, \d+ entered/ }).waitFor();
+      await assertFits(page);
+      await assertAccessible(page);
+      await page.getByLabel("Heat map").check();
+      await card.locator("image").waitFor();
+      if (device === "wide") await picture(page, "counts-wide");
+      await page.getByLabel("Heat map").uncheck();
+      await card.locator("image").waitFor({ state: "detached" });
+    },
+    { server: COUNTED, viewport, colorScheme },
+  );
+}
+
+pageTest(
+  "counts that cannot be reached are one sentence, and the cards stay",
+  "#live",
+  async (page) => {
+    await page.getByText("lookdown count at /counts cannot be reached: start it, and forward this path to it.").waitFor();
+    await page.getByRole("article", { name: "Camera hall" }).locator(".plot").waitFor();
+    assert.equal(await page.locator(".counts").count(), 0);
+    assert.equal(await page.getByLabel("Heat map").isVisible(), false);
+  },
+  { server: UNCOUNTED, expected: /status of 404/ },
+);
+
+pageTest("a page without a path of counts asks for none", "#live", async (page) => {
+  await page.getByRole("heading", { name: "Live", level: 1 }).waitFor();
+  await page.waitForTimeout(500);
+  assert.equal(await page.locator("#counts-bar").count(), 0);
+}, { server: SERVER });

@@ -1,0 +1,140 @@
+/** Draws areas with their names, the handles of the selected one, and the outline that is being drawn. */
+
+import { shape } from "./dom.js";
+import { points } from "./geometry.js";
+import { middles, titleOf } from "./areas.js";
+
+const capital = (text) => text[0].toUpperCase() + text.slice(1);
+
+/**
+ * Draws into `drawing`. `unit` is a pixel of the screen in drawing units; `countOf` returns the text of a zone's
+ * count; `invalid` is the key of the area that the server refused.
+ */
+export function drawAreas(drawing, { editor, surface, report, unit, countOf, invalid }) {
+  const focused = drawing.contains(document.activeElement) ? document.activeElement.dataset.node : null;
+  const { selected, draft } = editor;
+  const shownAreas = editor.areas.filter(({ space }) => space === surface.space);
+  // The selected area is above the others.
+  shownAreas.sort((one, other) => Number(one.key === selected?.key) - Number(other.key === selected?.key));
+  drawing.setAttribute("viewBox", surface.viewBox.join(" "));
+  drawing.classList.toggle("is-drawing", Boolean(draft));
+  const context = { editor, surface, unit, countOf, invalid };
+  const current = selected && shownAreas.find(({ key }) => key === selected.key);
+  drawing.replaceChildren(
+    shape("g", { class: "backdrop", "aria-hidden": "true" }, ...surface.backdrop(report, unit)),
+    ...shownAreas.map((area) => areaShape(area, context)),
+    ...shownAreas.flatMap((area) => captions(area, context)),
+    ...(current ? handles(current, context) : []),
+    ...(draft ? draftShapes(draft, context) : []),
+  );
+  if (focused) (drawing.querySelector(`[data-node="${focused}"]`) ?? drawing).focus({ preventScroll: true });
+}
+
+function areaShape(area, { editor, surface, unit, countOf, invalid }) {
+  const isSelected = editor.selected?.key === area.key;
+  const outline = points(area.corners.map(surface.toDrawing));
+  const name = area.kind === "line" ? "polyline" : "polygon";
+  const facts = [capital(titleOf(area, editor.areas)), countOf(area)].filter(Boolean).join(", ");
+  const part = (kind, width) => shape(name, { points: outline, class: kind, "stroke-width": width * unit });
+  return shape(
+    "g",
+    {
+      class: `area ${area.kind}${isSelected ? " selected" : ""}${invalid === area.key ? " invalid" : ""}`,
+      "data-node": `area-${area.key}`, "data-key": area.key,
+      tabindex: 0, role: "button", "aria-pressed": String(isSelected), "aria-label": facts,
+    },
+    part("hit", 22),
+    part("casing", 4.5),
+    part("outline", isSelected ? 2.8 : 2),
+  );
+}
+
+/** The middle of the corners. */
+const middleOf = (places) => [0, 1].map((axis) => places.reduce((sum, place) => sum + place[axis], 0) / places.length);
+
+function text(words, [x, y], unit, kind) {
+  const size = { "font-size": 12.5 * unit, "stroke-width": 3.5 * unit };
+  return shape("text", { x, y, class: `caption-text ${kind}`, ...size, "aria-hidden": "true" }, words);
+}
+
+function captions(area, { editor, surface, unit, countOf }) {
+  const places = area.corners.map(surface.toDrawing);
+  if (area.kind === "line") return lineCaptions(area, places, unit);
+  const words = [area.kind === "mask" ? capital(titleOf(area, editor.areas)) : area.name, countOf(area)?.split(" ")[0]];
+  return [text(words.filter(Boolean).join(" · "), middleOf(places), unit, area.kind)];
+}
+
+/** The name of a line at its first end, and its directions on the sides that they count towards. */
+function lineCaptions({ name, directions }, [from, to], unit) {
+  const along = [to[0] - from[0], to[1] - from[1]];
+  const length = Math.hypot(...along) || 1;
+  // The right side, seen along the line.
+  const right = [-along[1] / length, along[0] / length];
+  const middle = middleOf([from, to]);
+  const beside = (distance) => middle.map((value, axis) => value + right[axis] * distance * unit);
+  const arrow = [beside(-14), beside(14)];
+  const tip = [[-5, 8], [0, 14], [5, 8]].map(([across, ahead]) =>
+    beside(ahead).map((value, axis) => value + (along[axis] / length) * across * unit),
+  );
+  const before = (14 + 3.6 * name.length) * unit;
+  const behind = [0, 1].map((axis) => from[axis] - (along[axis] / length) * before);
+  return [
+    shape("polyline", { points: points(arrow), class: "arrow", "stroke-width": 2 * unit }),
+    shape("polyline", { points: points(tip), class: "arrow", "stroke-width": 2 * unit }),
+    text(name, behind, unit, "line"),
+    text(directions[0], beside(28), unit, "line direction"),
+    text(directions[1], beside(-28), unit, "line direction"),
+  ];
+}
+
+function handles(area, { editor, surface, unit }) {
+  const between = middles(area).map((place, index) =>
+    handle(surface.toDrawing(place), unit, {
+      kind: "middle", radius: 4, node: `middle-${area.key}-${index}`, key: area.key, attribute: { "data-before": index + 1 },
+      label: `Add a corner after corner ${index + 1}`,
+    }),
+  );
+  const places = area.corners.map((place, index) =>
+    handle(surface.toDrawing(place), unit, {
+      kind: editor.selected.corner === index ? "corner chosen" : "corner", radius: 6.5, node: `corner-${area.key}-${index}`, key: area.key,
+      attribute: { "data-corner": index }, label: `${area.kind === "line" ? "End" : "Corner"} ${index + 1}, ${surface.describe(place)}`,
+    }),
+  );
+  return [...between, ...places];
+}
+
+/** A handle with an area of a finger's width. */
+function handle([x, y], unit, { kind, radius, node, key, attribute, label }) {
+  return shape(
+    "g",
+    { class: `grip ${kind}`, "data-node": node, "data-key": key, ...attribute, tabindex: 0, role: "button", "aria-label": label },
+    shape("circle", { cx: x, cy: y, r: (radius + 8) * unit, class: "hit" }),
+    shape("circle", { cx: x, cy: y, r: radius * unit, class: "dot", "stroke-width": 2 * unit }),
+  );
+}
+
+function draftShapes({ kind, corners, cursor }, { editor, surface, unit }) {
+  const places = [...corners, cursor].map(surface.toDrawing);
+  const outline = points(places);
+  const name = kind === "line" ? "polyline" : "polygon";
+  return [
+    shape(
+      "g",
+      { class: `area draft ${kind}` },
+      shape(name, { points: outline, class: "casing", "stroke-width": 4.5 * unit }),
+      shape(name, { points: outline, class: "outline", "stroke-width": 2 * unit }),
+    ),
+    ...places.slice(0, -1).map(([cx, cy], index) => {
+      // A click on the first corner finishes.
+      const [kindOf, radius] = index === 0 && editor.canFinish ? ["draft-corner end", 8] : ["draft-corner", 4.5];
+      return shape("circle", { class: kindOf, cx, cy, r: radius * unit, "stroke-width": 2 * unit });
+    }),
+    cursorShape(places.at(-1), unit),
+  ];
+}
+
+function cursorShape([x, y], unit) {
+  const reach = 11 * unit;
+  const cross = `M${x - reach} ${y}h${2 * reach}M${x} ${y - reach}v${2 * reach}`;
+  return shape("path", { class: "cursor", d: cross, "stroke-width": 1.6 * unit });
+}

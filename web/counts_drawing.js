@@ -1,0 +1,60 @@
+/** Drawings of `lookdown count` over a frame: tracks with their tails, lines, zones and the heat map. */
+
+import { element, plural, shape } from "./dom.js";
+import { points } from "./geometry.js";
+
+/** The number of colours of tracks (counts.css). */
+const COLOURS = 6;
+/** The share of the frame's width that 1 unit of a drawing has. */
+const UNIT = 1 / 320;
+
+/** Draws an answer over the frame of a camera. `heat` is the address of its heat map, empty for none. */
+export function drawCounts(drawing, { camera, width, height, heat }, { tracks, lines = [], zones = [] }) {
+  const unit = width * UNIT;
+  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  drawing.setAttribute("aria-label", `${plural(tracks.length, "track")} of ${camera}`);
+  drawing.replaceChildren(
+    ...(heat ? [shape("image", { href: heat, width, height })] : []),
+    ...zones.filter(hasOutline).map(({ outline_px: outline }) => shape("polygon", { class: "count-zone", points: points(outline), "stroke-width": unit })),
+    ...lines.filter(hasOutline).flatMap((line) => drawnLine(line, unit)),
+    ...tracks.filter(({ frame_px: place }) => place).map((track) => drawnTrack(track, unit)),
+  );
+}
+
+const hasOutline = ({ outline_px: outline }) => outline?.length > 1;
+
+/** A line with its name, and an arrow in its first direction. */
+function drawnLine({ line, outline_px: outline }, unit) {
+  const [x, y] = outline[Math.floor(outline.length / 2)];
+  const [[x1, y1], [x2, y2]] = [outline[0], outline.at(-1)];
+  const degrees = (Math.atan2(x2 - x1, y1 - y2) * 180) / Math.PI;
+  const arrow = `M0 ${-5 * unit}L${9 * unit} 0L0 ${5 * unit}Z`;
+  return [
+    shape("polyline", { class: "count-line", points: points(outline), "stroke-width": 2.5 * unit }),
+    shape("path", { class: "count-arrow", d: arrow, transform: `translate(${x} ${y}) rotate(${degrees})` }),
+    shape("text", { class: "count-name", x: x2, y: y2, "font-size": 11 * unit, "stroke-width": 3 * unit, "text-anchor": "middle" }, line),
+  ];
+}
+
+function drawnTrack({ id, frame_px: [x, y], tail_px: tail }, unit) {
+  return shape(
+    "g",
+    { class: `track colour-${id % COLOURS}`, "data-track": id },
+    shape("polyline", { points: points(tail), "stroke-width": 2.5 * unit }),
+    shape("circle", { cx: x, cy: y, r: 4.5 * unit, "stroke-width": unit }),
+  );
+}
+
+/** The rows of the persons, of lines with their crossings, and of zones with their persons. */
+export function countRows({ is_current: isCurrent, tracks, lines = [], zones = [] }) {
+  const ofLine = ({ line, directions, crossings }) => {
+    const [first, second] = directions;
+    return row("line", line, number(crossings[first]), ` → ${first}, `, number(crossings[second]), ` ← ${second}`);
+  };
+  const ofZone = ({ zone, persons, entries }) => row("zone", zone, number(persons ?? "?"), " now, ", number(entries), " entered");
+  const persons = element("li", { class: "of-persons" }, number(isCurrent ? tracks.length : "?"), tracks.length === 1 ? " person followed" : " persons followed");
+  return [persons, ...lines.map(ofLine), ...zones.map(ofZone)];
+}
+
+const row = (kind, name, ...counts) => element("li", { class: `of-${kind}` }, element("span", { class: "count-of" }, name), element("span", {}, ...counts));
+const number = (count) => element("b", {}, String(count));

@@ -1,0 +1,58 @@
+/** The two surfaces of areas: the frame and the floor map, with the persons of a report. */
+
+import { shape } from "./dom.js";
+import { VIEW_BOX, floorDot, floorGrid, floorPlaces, reachOf, scaleOf } from "./floor_map.js";
+import { corners, foot, points } from "./geometry.js";
+
+/** Steps of the arrow keys: the share of the frame's longer side, and metres on the floor. */
+const FRAME_STEPS = 500;
+const FLOOR_STEP_M = 0.05;
+/** The maximum distance of corners on the floor, metres. */
+const FARTHEST_M = 1000;
+
+const numbers = (text) => text.split(" ").map(Number);
+
+/** The frame, in pixels of frames of the size `image`. */
+export function frameSurface(image) {
+  const { width, height } = image;
+  const scaled = (report) => ([x, y]) => [(x * width) / report.image.width, (y * height) / report.image.height];
+  return {
+    space: "frame_px",
+    viewBox: [0, 0, width, height],
+    bounds: [0, 0, width, height],
+    middle: [width / 2, height / 2],
+    step: Math.max(1, Math.round(Math.max(width, height) / FRAME_STEPS)),
+    toDrawing: (place) => place,
+    toPlace: (point) => point,
+    describe: ([x, y]) => `${x}, ${y} pixels`,
+    backdrop: (report, unit) =>
+      (report?.persons ?? []).flatMap((person) => {
+        const toDrawing = scaled(report);
+        const [x, y] = toDrawing(foot(person));
+        const outline = points(corners(person.oriented_box).map(toDrawing));
+        return [
+          shape("polygon", { points: outline, class: "person-box", "stroke-width": 1.4 * unit }),
+          shape("circle", { cx: x, cy: y, r: 4.5 * unit, class: "person-foot", "stroke-width": 1.5 * unit }),
+        ];
+      }),
+  };
+}
+
+/** The floor, in metres from the point below the camera, with room for these areas and the persons of `report`. */
+export function floorSurface(areas, report) {
+  const persons = floorPlaces(report?.persons ?? []);
+  const outlines = areas.filter(({ space }) => space === "floor_m").flatMap((area) => area.corners);
+  const reach = reachOf([...persons.filter(Boolean), ...outlines]);
+  const scale = scaleOf(reach);
+  return {
+    space: "floor_m",
+    viewBox: numbers(VIEW_BOX),
+    bounds: [-FARTHEST_M, -FARTHEST_M, FARTHEST_M, FARTHEST_M],
+    middle: [0, 0],
+    step: FLOOR_STEP_M,
+    toDrawing: (place) => place.map((value) => value * scale),
+    toPlace: (point) => point.map((value) => value / scale),
+    describe: ([x, y]) => `${x} m right, ${y} m down`,
+    backdrop: () => [...floorGrid(reach), ...persons.flatMap((place, index) => (place ? [floorDot(place, index, scale)] : []))],
+  };
+}
