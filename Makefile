@@ -30,9 +30,12 @@ models: ## download and convert every model with a manifest in models/ (228 MB o
 	@$(PYTHON) scripts/setup.py models
 
 serve: ## download ONNX Runtime and the default models, build what a first look needs, and run the server
-	@$(PYTHON) scripts/setup.py
+	@$(PYTHON) scripts/setup.py toolchain
+	@# Downloads while it compiles. The second set-up waits for the first one, or repeats its error.
 	@# Half the time of a release build: Cargo.toml, docs/adr/0010-quick-profile.md.
-	cargo build --profile quick --locked --target-dir target
+	@$(PYTHON) scripts/setup.py runtime model & trap 'kill $$!; exit 130' INT; \
+		cargo build --profile quick --locked --target-dir target
+	@$(PYTHON) scripts/setup.py runtime model
 	@# Makes glibc return the memory of replaced models: docs/models.md.
 	@MALLOC_MMAP_THRESHOLD_=131072 exec target/quick/lookdown serve
 

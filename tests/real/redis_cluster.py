@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Iterator
 
 from harness.processes import free_ports
+from hosts import Host
 from redis_server import RedisError, RedisServer
 from waiting import wait_until
 
@@ -40,6 +41,12 @@ class RedisCluster:
         """Returns true if a node serves the slot, and the cluster works."""
         return any(self._serves(node) for node in self.nodes)
 
+    def is_copy(self, node: RedisServer) -> bool:
+        """Returns true if the node answers that it copies another one."""
+        with contextlib.suppress(OSError, RedisError):
+            return b"role:slave" in node.ask("INFO", "replication")
+        return False
+
     def _serves(self, node: RedisServer) -> bool:
         with contextlib.suppress(OSError, RedisError):
             node.ask("HGET", KEY, "last")
@@ -63,14 +70,14 @@ class RedisCluster:
 
 
 @contextlib.contextmanager
-def redis_cluster() -> Iterator[RedisCluster]:
-    """Starts the nodes and joins them."""
+def redis_cluster(machines: list[Host]) -> Iterator[RedisCluster]:
+    """Starts a node on each of four hosts and joins them."""
     with contextlib.ExitStack() as stack:
         nodes = []
-        for bus_port in free_ports(4):
+        for machine, bus_port in zip(machines, free_ports(4), strict=True):
             options = ["--cluster-enabled", "yes", "--cluster-port", str(bus_port), "--cluster-node-timeout", "1500"]
             options += ["--repl-diskless-sync-delay", "0"]
-            node = stack.enter_context(RedisServer(*options))
+            node = stack.enter_context(RedisServer(*options, host=machine.address, inside=machine.inside))
             node.bus_port = bus_port
             nodes.append(node)
         yield RedisCluster(nodes)

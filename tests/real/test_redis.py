@@ -11,7 +11,7 @@ import threading
 import time
 import unittest
 import unittest.mock
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from harness.places import LOOKDOWN, ROOT
@@ -32,11 +32,16 @@ MOST_PICTURES = 2
 
 
 @contextlib.contextmanager
-def replica(name: str, url: str, **settings: str) -> Iterator[Server]:
-    """A server of that name with that Redis; its log is `{name}.log`."""
+def replica(
+    name: str, url: str, host: str = "127.0.0.1", inside: Sequence[str] = (), **settings: str
+) -> Iterator[Server]:
+    """A server of that name with that Redis; its log is `{name}.log`.
+
+    `host` is its address, and the command `inside` starts a program on the host with that address.
+    """
     (port,) = free_ports(1)
     wanted = {
-        "SERVER__LISTEN": f"127.0.0.1:{port}",
+        "SERVER__LISTEN": f"{host}:{port}",
         "SHUTDOWN__GRACE_MILLIS": "0",
         "CALIBRATIONS__PATH": str(SAMPLES / "calibrations"),
         "MODEL__PATH": str(TINY_MODEL),
@@ -44,7 +49,7 @@ def replica(name: str, url: str, **settings: str) -> Iterator[Server]:
         **settings,
     }
     environment = {f"LOOKDOWN__{key}": value for key, value in wanted.items()}
-    with running(name, [str(LOOKDOWN), "serve"], port, "/readyz", environment) as server:
+    with running(name, [*inside, str(LOOKDOWN), "serve"], port, "/readyz", environment, host=host) as server:
         wait_until(
             lambda: "store_problem" not in get(server, "/readyz").json()["results"] or "unreachable" in name,
             "Redis is connected",

@@ -4,18 +4,23 @@ import contextlib
 import http.client
 import itertools
 import json
+import os
 import threading
 import time
 import unittest
 from collections.abc import Iterator
 
 from harness.processes import Server
+from hosts import Host, hosts
 from redis_cluster import RedisCluster, redis_cluster
 from test_redis import Stream, detect, get, replica
 from waiting import PATIENCE_SECONDS, wait_until
 
 from metrics import metric
 
+NODES = ("n1", "n2", "n3", "n4")
+SERVERS = ("s1", "s2", "s3")
+OUTAGE_SECONDS = 60.0
 CAMERAS = ("hall", "lift", "yard")
 EVENTS_IN_A_ROW = 7
 """The events after which a listener moves to another server."""
@@ -71,17 +76,25 @@ class Sender(threading.Thread):
             time.sleep(0.05)
 
 
+@unittest.skipIf(os.geteuid(), "only root can make hosts")
 class Moves(unittest.TestCase):
-    """Listeners, a slot and a node that move while frames arrive."""
+    """Listeners, a slot and a node that move while frames arrive. Each node and each server has a host of its own."""
+
+    machines: dict[str, Host]
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Builds the hosts once for all tests."""
+        cls.machines = cls.enterClassContext(hosts(*NODES, *SERVERS))
 
     def test_moving_listeners_miss_no_report_and_get_none_twice(self) -> None:
         """The listeners move between the servers without a pause."""
-        with redis_cluster() as cluster, self._load(cluster, "moving"):
+        with self._cluster() as cluster, self._load(cluster, "moving"):
             time.sleep(10)
 
     def test_moving_a_slot_under_load_loses_no_report(self) -> None:
         """Twice, to two nodes."""
-        with redis_cluster() as cluster, self._load(cluster, "slot"):
+        with self._cluster() as cluster, self._load(cluster, "slot"):
             for _ in range(2):
                 time.sleep(3)
                 before = cluster.serving()
@@ -92,25 +105,41 @@ class Moves(unittest.TestCase):
 
     def test_killing_the_serving_node_loses_no_stored_report(self) -> None:
         """Its copy takes over."""
-        with redis_cluster() as cluster, self._load(cluster, "node"):
+        with self._cluster() as cluster, self._load(cluster, "node"):
             time.sleep(3)
             cluster.serving().kill()
             wait_until(cluster.is_served, "the copy serves the slot")
             time.sleep(3)
 
+    def test_cutting_off_the_serving_node_loses_no_stored_report(self) -> None:
+        """Packets from and to it are lost without an error. Its copy takes over, and it returns as a copy."""
+        with self._cluster() as cluster, self._load(cluster, "cable"):
+            time.sleep(3)
+            node = cluster.serving()
+            machine = next(machine for machine in self.machines.values() if machine.address == node.host)
+            machine.cut_off()
+            wait_until(cluster.is_served, "the copy serves the slot", OUTAGE_SECONDS)
+            time.sleep(3)
+            machine.back()
+            wait_until(lambda: cluster.is_copy(node), "the node that was cut off is a copy", OUTAGE_SECONDS)
+            time.sleep(3)
+
     def test_lost_subscriptions_are_caught_up_without_a_gap(self) -> None:
         """Redis closes the connections with subscriptions, again and again."""
-        with redis_cluster() as cluster, self._load(cluster, "lost"):
+        with self._cluster() as cluster, self._load(cluster, "lost"):
             for _ in range(10):
                 time.sleep(1)
                 cluster.serving().ask("CLIENT", "KILL", "TYPE", "pubsub")
+
+    def _cluster(self) -> contextlib.AbstractContextManager[RedisCluster]:
+        return redis_cluster([self.machines[name] for name in NODES])
 
     @contextlib.contextmanager
     def _load(self, cluster: RedisCluster, name: str) -> Iterator[None]:
         with contextlib.ExitStack() as stack:
             servers = [
-                stack.enter_context(replica(f"redis-cluster-{name}-{number}", node.url, **SETTINGS))
-                for number, node in enumerate(cluster.nodes[:3])
+                stack.enter_context(self._replica(f"redis-cluster-{name}-{server}", server, node.url))
+                for server, node in zip(SERVERS, cluster.nodes, strict=False)
             ]
             for camera in CAMERAS:
                 detect(servers[0], camera)
@@ -136,6 +165,10 @@ class Moves(unittest.TestCase):
                 listener.over.set()
             dropped = sum(metric(server, "results_dropped_total") for server in servers)
             self.assertEqual(dropped, 0.0)
+
+    def _replica(self, name: str, server: str, url: str) -> contextlib.AbstractContextManager[Server]:
+        machine = self.machines[server]
+        return replica(name, url, machine.address, machine.inside, **SETTINGS)
 
     def _compare(self, listeners: dict[str, Listener], everything: Listener, senders: dict[str, Sender]) -> None:
         sent = {camera: set(sender.sent) for camera, sender in senders.items()}

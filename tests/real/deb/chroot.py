@@ -3,32 +3,28 @@
 import os
 import shutil
 import subprocess
-from configparser import ConfigParser
 from dataclasses import dataclass
 from pathlib import Path
 
 from debian_base import debian_base
 
-AS_SERVICE = Path(__file__).with_name("as_service.sh")
 UNITS = "usr/lib/systemd/system"
 UNIT = f"{UNITS}/lookdown.service"
 WITH_PROC = 'mount --bind /proc "$1/proc" && exec chroot "$@"'
-DYNAMIC_USER = 61184
-"""The first of systemd's dynamic users, as in `as_service.sh`."""
 OWN_RECORDS = ("proc/", "sys/", "dev/", "tmp/", "var/cache/", "var/log/", "var/lib/apt/", "var/lib/dpkg/")
 """The records that Debian keeps of every installation."""
 
 
 @dataclass(frozen=True)
 class Chroot:
-    """A copy of a minimal Debian."""
+    """A copy of a minimal Debian with systemd."""
 
     root: Path
 
     @classmethod
     def create(cls, root: Path) -> "Chroot":
         """Copies the base."""
-        subprocess.run(["cp", "--archive", "--reflink=auto", debian_base(), root], check=True)
+        subprocess.run(["cp", "--archive", "--reflink=auto", debian_base("systemd-sysv"), root], check=True)
         return cls(root)
 
     def run(self, *command: str | Path) -> str:
@@ -66,25 +62,3 @@ class Chroot:
     def has(self, path: str) -> bool:
         """`True` if the path exists, even as a dangling link."""
         return os.path.lexists(self.root / path)
-
-    def unit(self) -> ConfigParser:
-        """The installed unit; of keys that occur several times, the last."""
-        parser = ConfigParser(strict=False, interpolation=None)
-        parser.optionxform = str
-        parser.read(self.root / UNIT, encoding="utf-8")
-        return parser
-
-    def service(self, state: Path, **variables: str) -> list[str]:
-        """The command line that runs the service of the unit with these variables, and with its state in a folder."""
-        service = self.unit()["Service"]
-        state.mkdir()
-        # The service needs the state folders of the unit.
-        for name in service["StateDirectory"].split():
-            folder = state / Path(name).relative_to("lookdown")
-            folder.mkdir(exist_ok=True)
-            os.chown(folder, DYNAMIC_USER, DYNAMIC_USER)
-        (self.root / "var/lib/lookdown").mkdir(exist_ok=True)
-        variables = {"PATH": "/usr/bin:/bin", **dict([service["Environment"].split("=", 1)]), **variables}
-        assignments = [f"{name}={value}" for name, value in variables.items()]
-        isolated = ["/usr/bin/unshare", "--mount", "/bin/sh", str(AS_SERVICE), str(self.root), str(state)]
-        return ["env", "-i", *assignments, *isolated, *service["ExecStart"].split()]

@@ -1,14 +1,19 @@
 //! Remap tables: where a view samples the frame, and the sampling itself.
 
+#[cfg(target_arch = "x86_64")]
+#[expect(unsafe_code, reason = "vector instructions")]
+mod avx2;
 mod band;
 mod block_size;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+mod frame_lines;
 mod frame_from_plane;
+#[cfg(target_arch = "aarch64")]
+#[expect(unsafe_code, reason = "vector instructions")]
+mod neon;
 mod node_grid;
 mod rendering;
 mod scalar;
-#[cfg(target_arch = "x86_64")]
-#[expect(unsafe_code, reason = "the one place for vector instructions")]
-mod vector;
 mod visibility;
 mod whole_patches;
 
@@ -16,6 +21,10 @@ use std::{collections::HashSet, sync::Arc};
 
 use rayon::prelude::*;
 
+#[cfg(target_arch = "x86_64")]
+use self::avx2 as vector;
+#[cfg(target_arch = "aarch64")]
+use self::neon as vector;
 use self::{
     band::Band,
     block_size::LANES,
@@ -174,12 +183,12 @@ impl RemapTable {
     /// into one view's slot `[3, height, width]` of the network's input (of the view's size).
     /// Pixels that see nothing of the lens image become black.
     pub fn render(&self, frame: &Frame, input: &NetworkInput, slot: &mut [f32]) {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = vector::Avx2::detect()
+        #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+        if let Some(supported) = vector::Supported::detect()
             && i32::try_from(frame.pixels().len()).is_ok()
         {
             self.render_bands(frame, input, slot, |source, band, planes| {
-                vector::render(avx2, source, band, planes);
+                vector::render(supported, source, band, planes);
             });
             return;
         }

@@ -129,7 +129,7 @@ proptest! {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
     #[test]
@@ -147,7 +147,7 @@ proptest! {
         spans in prop::collection::vec((0..40_u32, 0..40_u32), 8),
         spans_are_hidden: bool,
     ) {
-        let Some(avx2) = vector::Avx2::detect() else {
+        let Some(supported) = vector::Supported::detect() else {
             return Ok(());
         };
         let (x, y): (Vec<_>, Vec<_>) = nodes.into_iter().unzip();
@@ -171,7 +171,7 @@ proptest! {
             ..NetworkInput::plain(view_width, rows)
         };
         let with_vectors = rendered(&band, &frame, &input, |source, band, planes| {
-            vector::render(avx2, source, band, planes);
+            vector::render(supported, source, band, planes);
         });
         prop_assert_eq!(with_vectors, rendered(&band, &frame, &input, scalar::render));
     }

@@ -1,8 +1,8 @@
 //! Sampling eight pixels at a time with AVX2. To the bit what `scalar` does: the same operations in
 //! the same order, none of them fused.
 //!
-//! The only module with unsafe code. Pixels are read through slices; what is unsafe is to call
-//! functions that need AVX2, and to see a vector as an array.
+//! Pixels are read through slices; what is unsafe is to call functions that need AVX2,
+//! and to see a vector as an array.
 
 use std::{
     arch::x86_64::{
@@ -21,17 +21,15 @@ use std::{
 use super::{
     band::{Band, Block, Lanes, Seen},
     block_size::LANES,
+    frame_lines::{FrameLines, pair},
     rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
 };
 
-/// The bytes of two neighbouring pixels, and two more.
-const PAIR_BYTES: usize = 8;
-
 /// Exists only where the processor has AVX2.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Avx2(());
+pub(super) struct Supported(());
 
-impl Avx2 {
+impl Supported {
     /// Proof of AVX2, if the processor has it.
     pub(super) fn detect() -> Option<Self> {
         is_x86_feature_detected!("avx2").then_some(Self(()))
@@ -39,14 +37,14 @@ impl Avx2 {
 }
 
 /// As `scalar::render`, for frames of less than 2 GiB.
-pub(super) fn render(_proof: Avx2, source: &Source, band: &Band, planes: Planes) {
+pub(super) fn render(_proof: Supported, source: &Source, band: &Band, planes: Planes) {
     // SAFETY: there is proof that the processor has AVX2.
     unsafe { render_with_avx2(source, band, planes) }
 }
 
 #[target_feature(enable = "avx2")]
 fn render_with_avx2(source: &Source, band: &Band, planes: Planes) {
-    let frame_lines = Lines::of(source);
+    let frame_lines = FrameLines::of(source);
     let locate = |block: &Block, seen| match seen {
         Seen::Whole => whole_samples(source, block),
         Seen::Lanes(lanes) => samples(source, block, lanes),
@@ -57,25 +55,6 @@ fn render_with_avx2(source: &Source, band: &Band, planes: Planes) {
     };
     let announce = |place: &f32| _mm_prefetch::<_MM_HINT_T0>(ptr::from_ref(place).cast());
     render_band(source, band, planes, locate, sample, announce);
-}
-
-/// The frame seen from two places. Eight bytes from the first one's start are a pixel and its right
-/// neighbour and two more bytes; eight from the second one's are two bytes and then the pixels
-/// below these. So no read reaches beyond the frame: at its last pixels both end with a line.
-struct Lines<'a> {
-    upper: &'a [u8],
-    lower: &'a [u8],
-}
-
-impl<'a> Lines<'a> {
-    fn of(source: &Source<'a>) -> Self {
-        let line = 3 * source.width;
-        let lower = &source.pixels[line - 2..];
-        Self {
-            upper: &source.pixels[..lower.len()],
-            lower,
-        }
-    }
 }
 
 /// Sampling positions and weights of eight pixels.
@@ -90,7 +69,7 @@ struct Samples {
 }
 
 #[target_feature(enable = "avx2")]
-fn sample_block(source: &Source, frame_lines: &Lines, samples: &Samples) -> Values {
+fn sample_block(source: &Source, frame_lines: &FrameLines, samples: &Samples) -> Values {
     let [low, high] = pixel_pairs(frame_lines.upper, &samples.first_bytes);
     let upper = weighted_sums(
         low_halves(low, high),
@@ -223,14 +202,7 @@ fn split(start: f32, step: f32, count: usize) -> (Neighbours, __m256) {
 /// Eight bytes from each of the given ones: of pixels 0, 1, 4 and 5, and of 2, 3, 6 and 7.
 #[target_feature(enable = "avx2")]
 fn pixel_pairs(lines: &[u8], first_bytes: &[u32; LANES]) -> [__m256i; 2] {
-    let last = lines.len() - PAIR_BYTES;
-    let pair = |lane: usize| {
-        // Never more than the last one; said so for the sake of the compiler.
-        let first = (first_bytes[lane] as usize).min(last);
-        let mut bytes = [0; PAIR_BYTES];
-        bytes.copy_from_slice(&lines[first..first + PAIR_BYTES]);
-        i64::from_le_bytes(bytes)
-    };
+    let pair = |lane: usize| i64::from_le_bytes(pair(lines, first_bytes[lane]));
     [
         _mm256_setr_epi64x(pair(0), pair(1), pair(4), pair(5)),
         _mm256_setr_epi64x(pair(2), pair(3), pair(6), pair(7)),
