@@ -19,7 +19,7 @@ use super::{
     band::{Band, Block, Lanes, Seen},
     block_size::LANES,
     frame_lines::{FrameLines, PAIR_BYTES, pair},
-    rendering::{Planes, Source, Values, WEIGHT_ONE, render_band},
+    rendering::{Planes, Source, WEIGHT_ONE, render_band},
 };
 
 /// Pixels in a vector.
