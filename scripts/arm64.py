@@ -1,4 +1,5 @@
-"""Cross-builds Lookdown for arm64 and tests it with an emulator: `arm64.py [build|test]...`, both by default.
+"""Cross-builds Lookdown for arm64, tests it with an emulator and packs it into target/dist: `arm64.py [build|test|pack]...`,
+all by default.
 
 Debian 12 on x86-64 has all parts: Rust with its arm64 library (`rustc-web`), the cross compiler and qemu. The arm64
 library is unpacked below .setup/arm64, so that the system needs no foreign architecture. ONNX Runtime comes from the
@@ -16,9 +17,11 @@ from assets.downloads import fetch_wheel
 from assets.pins import read_pins
 from assets.places import Places
 from assets.steps import LIBRARY
+from dist import make_dist
 
 ROOT = Path(__file__).resolve().parents[1]
 OWN = ROOT / ".setup" / "arm64"
+CPU = "aarch64"
 TARGET = "aarch64-unknown-linux-gnu"
 PROGRAM = ROOT / "target" / TARGET / "release" / "lookdown"
 RUSTC = Path("/usr/bin/rustc")
@@ -35,15 +38,17 @@ def main(arguments: list[str]) -> int:
     """The exit status."""
     subprocess.run([ROOT / "scripts" / "packages.sh", *PACKAGES], check=True)
     install_rust_library()
-    wanted = arguments or ["build", "test"]
+    install_runtime()
+    wanted = arguments or ["build", "test", "pack"]
     if "build" in wanted:
         cargo("build", "--release", "--bin", "lookdown")
         print(f"{PROGRAM.relative_to(ROOT)}: {PROGRAM.stat().st_size / 1e6:.1f} MB")
     if "test" in wanted:
-        install_runtime()
         packages = [word for name in LIBRARIES for word in ("--package", name)]
         cargo("test", "--release", "--lib", *packages)
         detect_in_sample()
+    if "pack" in wanted:
+        make_dist(PROGRAM, CPU, OWN, EMULATOR)
     return 0
 
 
@@ -69,7 +74,7 @@ def install_rust_library() -> None:
 
 def install_runtime() -> None:
     """Puts ONNX Runtime for arm64 into .setup/arm64/runtime."""
-    places, runtime = Places(ROOT), read_pins(ROOT / "scripts" / "pins.toml").runtime["aarch64"]
+    places, runtime = Places(ROOT), read_pins(ROOT / "scripts" / "pins.toml").runtime[CPU]
     with places.locked(), places.temporary() as folder:
         wheel = fetch_wheel(places, runtime, "arm64")
         for member, file in zip(runtime.members, extract(wheel, runtime.members, folder), strict=True):

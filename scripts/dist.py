@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tarfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import sbom
@@ -27,15 +27,23 @@ COMPLETIONS = {"bash": "lookdown.bash", "zsh": "_lookdown", "fish": "lookdown.fi
 
 
 def main(arguments: list[str]) -> int:
-    """Makes the folder and the tarball."""
+    """Makes the folder and the tarball for this machine."""
     binary = Path(arguments[0]) if arguments else ROOT / "target" / "release" / "lookdown"
-    cpu = supported_cpu()
+    make_dist(binary, supported_cpu(), ROOT)
+    return 0
+
+
+def make_dist(binary: Path, cpu: str, runtime: Path, emulator: Sequence[str] = ()) -> None:
+    """Makes the folder and the tarball for a processor, with the ONNX Runtime below `runtime`.
+
+    The command `emulator` runs a binary of that processor here.
+    """
     manifest = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
     place = ROOT / "target" / "dist"
     folder = place / "lookdown"
     shutil.rmtree(place, ignore_errors=True)
-    copy_files(folder, binary, files_of(ROOT, read_pins(ROOT / "scripts" / "pins.toml"), cpu))
-    describe_commands(folder)
+    copy_files(folder, binary, files_of(ROOT, read_pins(ROOT / "scripts" / "pins.toml"), cpu, runtime))
+    describe_commands(folder, emulator)
     sbom.main([str(folder / BILL_OF_MATERIALS)])
     write_sums(folder)
     tarball = place / f"lookdown-{manifest['version']}-linux-{cpu}.tar.gz"
@@ -43,15 +51,14 @@ def main(arguments: list[str]) -> int:
     sums = tarball.with_name(f"{tarball.name}.sha256")
     sums.write_text(f"{sha256_of(tarball)}  {tarball.name}\n", encoding="utf-8")
     print(f"{tarball.relative_to(ROOT)}: {tarball.stat().st_size / 1e6:.1f} MB")
-    return 0
 
 
-def files_of(root: Path, pins: Pins, cpu: str) -> Iterator[tuple[Path, str]]:
+def files_of(root: Path, pins: Pins, cpu: str, runtime: Path) -> Iterator[tuple[Path, str]]:
     """The files of the set-up and of the repository, with their names in the folder."""
     for name in TEXTS:
         yield root / name, name
     for member in pins.runtime[cpu].members:
-        yield root / member.to, member.to
+        yield runtime / member.to, member.to
     yield from default_model_files(root, pins)
 
 
@@ -76,14 +83,14 @@ def copy_files(folder: Path, binary: Path, files: Iterator[tuple[Path, str]]) ->
         target.chmod(0o755 if source == binary else 0o644)
 
 
-def describe_commands(folder: Path) -> None:
+def describe_commands(folder: Path, emulator: Sequence[str] = ()) -> None:
     """Lets the binary write its manual and shell completions."""
-    binary = folder / "lookdown"
-    subprocess.run([binary, "manual", folder / "man" / "man1"], check=True)
+    binary = [*emulator, folder / "lookdown"]
+    subprocess.run([*binary, "manual", folder / "man" / "man1"], check=True)
     completions = folder / "completions"
     completions.mkdir()
     for shell, name in COMPLETIONS.items():
-        script = subprocess.run([binary, "completions", shell], check=True, capture_output=True).stdout
+        script = subprocess.run([*binary, "completions", shell], check=True, capture_output=True).stdout
         (completions / name).write_bytes(script)
 
 

@@ -25,7 +25,7 @@ class Dist(unittest.TestCase):
 
     def test_tarball_has_library_default_models_and_licences(self):
         pins = read_pins(ROOT / "scripts" / "pins.toml")
-        names = [name for _, name in files_of(ROOT, pins, supported_cpu())]
+        names = [name for _, name in files_of(ROOT, pins, supported_cpu(), ROOT)]
         for name in ("LICENSE", "NOTICE", "runtime/libonnxruntime.so", "runtime/ThirdPartyNotices.txt"):
             self.assertIn(name, names)
         models = {name.split("/")[1] for name in names if name.endswith("/model.onnx")}

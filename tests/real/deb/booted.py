@@ -34,16 +34,19 @@ class Booted:
         listed = subprocess.run(["ps", "-eo", "pid=,ppid=,comm="], capture_output=True, text=True, check=True).stdout
         processes = [line.split() for line in listed.splitlines()]
         # systemd-nspawn has a child that becomes the systemd inside.
-        return next(int(pid) for pid, parent, name, *_ in processes if (int(parent), name) == (self.process.pid, "systemd"))
+        return next(
+            int(pid) for pid, parent, name, *_ in processes if (int(parent), name) == (self.process.pid, "systemd")
+        )
 
 
 @contextlib.contextmanager
 def booted(root: Path, log: Path) -> Iterator[Booted]:
     """Boots, and powers off at the end. The console is written to `log`."""
     command = ["systemd-nspawn", "--register=no", "--keep-unit", "--console=pipe", f"--directory={root}", "--boot"]
-    with log.open("wb") as console, subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=console, stderr=subprocess.STDOUT
-    ) as process:
+    with (
+        log.open("wb") as console,
+        subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=console, stderr=subprocess.STDOUT) as process,
+    ):
         system = Booted(process)
         try:
             wait_until(lambda: _has_booted(system), "the system has booted", BOOT_SECONDS)
