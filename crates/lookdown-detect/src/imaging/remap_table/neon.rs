@@ -175,7 +175,7 @@ fn pixel_pairs(lines: &[u8], first_bytes: &[u32; QUARTET]) -> uint8x16x2_t {
     unsafe { transmute::<[[u8; PAIR_BYTES]; QUARTET], uint8x16x2_t>(pairs) }
 }
 
-/// Of each pair of pixels, what both have at `first_byte` and at the same channel of the right one.
+/// The weighted sums of pairs of pixels: the byte `first_byte` of each pair, and the same channel of its right pixel.
 #[target_feature(enable = "neon")]
 fn weighted_sum(pairs: uint8x16x2_t, first_byte: u8, samples: &Samples) -> float32x4_t {
     let left = bytes_of_pairs(pairs, first_byte);
