@@ -24,7 +24,7 @@ OUTAGE_SECONDS = 60.0
 CAMERAS = ("hall", "lift", "yard")
 EVENTS_IN_A_ROW = 7
 """The events after which a listener moves to another server."""
-SETTINGS = {"RESULTS__HISTORY_PER_CAMERA": "5000", "RESULTS__MAX_REPORTS": "20000"}
+SETTINGS = {"ACCESS__OPEN": "true", "RESULTS__HISTORY_PER_CAMERA": "5000", "RESULTS__MAX_REPORTS": "20000"}
 
 
 class Listener(threading.Thread):
