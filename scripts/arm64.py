@@ -6,6 +6,7 @@ library is unpacked below .setup/arm64, so that the system needs no foreign arch
 pinned wheel. The tests are those of the libraries, then one frame through the whole program.
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -27,10 +28,13 @@ PROGRAM = ROOT / "target" / TARGET / "release" / "lookdown"
 RUSTC = Path("/usr/bin/rustc")
 """Of the package rustc-web; rustup's compiler cannot use Debian's library."""
 PACKAGES = ("rustc-web", "gcc-aarch64-linux-gnu", "libc6-dev-arm64-cross", "libstdc++6-arm64-cross", "qemu-user-static")
-EMULATOR = ("qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu")
+EMULATOR = ("qemu-aarch64-static", "-E", "ORT_DISABLE_TELEMETRY=1", "-L", "/usr/aarch64-linux-gnu")
+"""The program would replace itself to set the variable, which the kernel cannot do with an emulated program."""
 HIDE_CPU = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /sys && exec "$@"', "sh")
 """Runs a command without /sys: in the emulator, ONNX Runtime ends with a segmentation fault while it reads there
 about the caches of the x86-64 processor. Needs root."""
+SAMPLE = "samples/office.jpg"
+LEAST_PERSONS = 6
 LIBRARIES = ("lookdown-lens", "lookdown-detect", "lookdown-eval")
 
 
@@ -99,8 +103,12 @@ def cargo(command: str, *arguments: str) -> None:
 def detect_in_sample() -> None:
     """Detects the persons of the sample in the emulator."""
     environment = os.environ | {"LOOKDOWN__INFERENCE__LIBRARY_PATH": str(OWN / LIBRARY)}
-    command = [*HIDE_CPU, *EMULATOR, PROGRAM, "detect", "samples/office.jpg"]
-    subprocess.run(command, cwd=ROOT, env=environment, check=True)
+    command = [*HIDE_CPU, *EMULATOR, PROGRAM, "detect", SAMPLE]
+    report = subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE).stdout
+    found = len(json.loads(report)["persons"])
+    if found < LEAST_PERSONS:
+        sys.exit(f"{found} persons were detected in {SAMPLE}, which has {LEAST_PERSONS}.")
+    print(f"{found} persons in {SAMPLE}")
 
 
 def _output(*command: str) -> str:
