@@ -1,7 +1,7 @@
 //! A ceiling camera whose detector misses, invents and misplaces persons as the measured one does.
 //!
-//! Every constant is derived from docs/results.md, profile `balanced` with `fusion`; docs/count.md
-//! has the derivation.
+//! The figures are measured with the profile `balanced` and `fusion`; docs/count-accuracy.md has the
+//! derivation.
 
 use lookdown_count::{CameraPose, Observation};
 use lookdown_lens::geometry::{
