@@ -25,7 +25,7 @@ const CORRELATION_S: f64 = 1.0;
 const SLOW_SHARE: f64 = 0.5;
 /// Share of the background's false alarms that come from fixed places (posters, coat stands).
 const FIXED_SHARE: f64 = 0.6;
-/// Share of the frames in which such a place has one.
+/// Most frames in which such a place has one, as a share.
 const FIXED_PRESENCE: f64 = 0.5;
 /// Time over which the score of such a place stays the same, seconds.
 const FIXED_CORRELATION_S: f64 = 3.0;
@@ -41,6 +41,8 @@ pub struct Camera {
     chance: Chance,
     errors: HashMap<u64, Errors>,
     fixed: Vec<(Vector2<f64>, Slow)>,
+    /// Share of the frames in which a fixed place has a false alarm.
+    fixed_presence: f64,
 }
 
 /// The slow errors of one person.
@@ -60,24 +62,29 @@ pub struct Shown {
 impl Camera {
     pub fn new(
         pose: CameraPose,
-        figures: Figures,
+        figures: &Figures,
         mut chance: Chance,
         reach_m: Vector2<f64>,
     ) -> Self {
         let centre = (FRAME_PX - 1.0) / 2.0;
         let lens = Lens::equidistant_circle(centre, centre, FRAME_PX / 2.0, 90_f64.to_radians());
-        let places = (figures.background.count * FIXED_SHARE / FIXED_PRESENCE).ceil();
-        let fixed = (0..places as usize).map(|_| {
+        let present = figures.background.count * FIXED_SHARE;
+        let places = (present / FIXED_PRESENCE).ceil();
+        let mut fixed = Vec::new();
+        let mut left = places;
+        while left > 0.0 {
             let x = chance.uniform(-reach_m.x, reach_m.x);
             let y = chance.uniform(-reach_m.y, reach_m.y);
-            (Vector2::new(x, y), Slow::default())
-        });
+            fixed.push((Vector2::new(x, y), Slow::default()));
+            left -= 1.0;
+        }
         Self {
             pose,
             lens: lens.expect("a valid lens"),
             mount: Mount::new(Unit::new_normalize(-Vector3::z()), pose.height_m),
-            figures,
-            fixed: fixed.collect(),
+            figures: *figures,
+            fixed_presence: present / places,
+            fixed,
             errors: HashMap::new(),
             chance,
         }
@@ -150,12 +157,11 @@ impl Camera {
 
     fn invent(&mut self, at_s: f64, found: &mut Vec<(Observation, OrientedBox)>) {
         let Figures { background, .. } = self.figures;
-        let each = background.count * FIXED_SHARE / self.fixed.len() as f64;
         for index in 0..self.fixed.len() {
             let (place, mut slow) = self.fixed[index];
             let value = slow.at(at_s, FIXED_CORRELATION_S, &mut self.chance);
             self.fixed[index].1 = slow;
-            if self.chance.happens(each)
+            if self.chance.happens(self.fixed_presence)
                 && let Some(shown) = self.show(0, place, 1.7)
             {
                 found.extend(self.observe(shown.oriented, background.logit_of(value)));

@@ -174,7 +174,7 @@ impl Scene {
         let camera = |(stream, &pose): (u64, _)| {
             Camera::new(
                 pose,
-                options.figures,
+                &options.figures,
                 Chance::new(options.seed, stream),
                 reach,
             )
