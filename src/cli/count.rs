@@ -1,6 +1,6 @@
 //! `lookdown count`
 
-use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
+use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
 
 use anyhow::Context;
 use clap::Args;
@@ -88,7 +88,10 @@ async fn count_until_changed(
 ) -> anyhow::Result<Option<CountOptions>> {
     let (snapshots, latest_snapshot) = watch::channel(Snapshot::default());
     let publisher = match &options.mqtt {
-        Some(entry) => Some(CountsPublisher::new(broker(entry)?, latest_snapshot)?),
+        Some(entry) => {
+            let publishing = publishing_options(entry, options.longest_gap)?;
+            Some(CountsPublisher::new(publishing, latest_snapshot)?)
+        }
         None => None,
     };
     let mut changed = None;
@@ -109,8 +112,9 @@ async fn count_until_changed(
     Ok(changed)
 }
 
-/// The broker of the settings, with its password.
-fn broker(entry: &MqttEntry) -> anyhow::Result<CountsOptions> {
+/// The broker of the settings, with its password. Topics of unknown cameras are withdrawn after the
+/// time for which the counts of a silent camera are known.
+fn publishing_options(entry: &MqttEntry, unknown_for: Duration) -> anyhow::Result<CountsOptions> {
     let broker: Broker = entry.url_with_password()?.parse().context("mqtt.url")?;
     let discovery = &entry.discovery_prefix;
     Ok(CountsOptions {
@@ -118,5 +122,6 @@ fn broker(entry: &MqttEntry) -> anyhow::Result<CountsOptions> {
         authorities: entry.authorities.clone(),
         topic_prefix: entry.topic_prefix.clone(),
         discovery_prefix: (!discovery.is_empty()).then(|| discovery.clone()),
+        unknown_for,
     })
 }

@@ -130,7 +130,9 @@ impl Cameras {
         if is_retained {
             // Without a time, the withdrawal of this connection is over.
             self.withdraw_at?;
-            return self.retained.note(&topic, known.is_some(), &self.topics);
+            let is_new = self.retained.note(topic.camera(), topic.zone());
+            let offline = || Message::retained(self.topics.availability(topic.camera()), OFFLINE);
+            return (is_new && known.is_none()).then(offline);
         }
         match (topic, known) {
             // Another server has this camera.

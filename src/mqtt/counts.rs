@@ -1,28 +1,34 @@
 //! Publishes the counts of `lookdown count`: totals, occupancy and dwell times.
 
+mod number;
+
 use std::{
     collections::BTreeMap,
     future::Future,
     path::PathBuf,
     pin::{Pin, pin},
+    time::Duration,
 };
 
 use lookdown_count::Snapshot;
+use rumqttc::Publish;
 use serde_json::{Value, json};
 use tokio::{
     sync::watch,
-    time::{Instant, sleep},
+    time::{Instant, sleep, sleep_until},
 };
 use uuid::Uuid;
 
 use super::{
     Broker,
-    discovery::{OFFLINE, ONLINE},
+    discovery::{OFFLINE, ONLINE, SENSOR},
     message::Message,
+    retained::RetainedTopics,
     session::{Session, SessionError, reconnect_backoff},
-    topics::level,
+    topics::{Topics, level},
 };
 use crate::tls::{ClientTls, TlsError};
+use number::{AVAILABILITY, Number, Owner};
 
 /// The broker of the counts, and the settings of the messages.
 pub struct CountsOptions {
@@ -34,10 +40,14 @@ pub struct CountsOptions {
     pub topic_prefix: String,
     /// The prefix of the topics of Home Assistant. `None` disables discovery.
     pub discovery_prefix: Option<String>,
+    /// Time after the connection until retained topics of unknown cameras, lines, zones and sites
+    /// are withdrawn.
+    pub unknown_for: Duration,
 }
 
 /// Publishes counts.
 pub struct CountsPublisher {
+    topics: Topics,
     options: CountsOptions,
     tls: Option<ClientTls>,
     client_id: String,
@@ -58,6 +68,7 @@ impl CountsPublisher {
     ) -> Result<Self, TlsError> {
         Ok(Self {
             tls: options.broker.tls(options.authorities.as_deref())?,
+            topics: Topics::new(&options.topic_prefix, options.discovery_prefix.as_deref()),
             client_id: format!("lookdown-count-{}", Uuid::new_v4().simple()),
             options,
             snapshots,
@@ -95,7 +106,7 @@ impl CountsPublisher {
         mut stop: Pin<&mut impl Future<Output = ()>>,
     ) -> Result<(), SessionError> {
         let broker = &self.options.broker;
-        let status = |status: &'static str| Message::retained(self.topic("counts/status"), status);
+        let status = |status: &'static str| Message::retained(self.topics.counts("status"), status);
         let (online, offline) = (status(ONLINE), status(OFFLINE));
         let opened = Session::open(broker, self.tls.as_ref(), &self.client_id, offline.clone());
         let mut session = tokio::select! {
@@ -105,12 +116,15 @@ impl CountsPublisher {
         tracing::info!("publishing to the broker {broker} (mqtt.url)");
         *has_warned = false;
         session.publish([online]).await?;
-        let birth = self.options.discovery_prefix.as_ref();
-        let birth = birth.map(|prefix| format!("{prefix}/status"));
-        if let Some(birth) = &birth {
-            session.subscribe([birth.clone()]).await?;
-        }
+        let birth = self.topics.birth();
+        let filters = ["cameras/#", "sites/#"].map(|rest| self.topics.counts(rest));
+        session
+            .subscribe(birth.clone().into_iter().chain(filters))
+            .await?;
         let mut published = Retained::new();
+        let mut unknown = RetainedTopics::default();
+        let connected = Instant::now();
+        let mut withdraw_at = Some(connected + self.options.unknown_for);
         loop {
             let snapshot = self.snapshots.borrow_and_update().clone();
             let wanted = self.retained(&snapshot);
@@ -121,7 +135,14 @@ impl CountsPublisher {
                     let message = message?;
                     if birth.as_ref() == Some(&message.topic) && message.payload == ONLINE {
                         published.clear();
+                    } else if withdraw_at.is_some() || !message.retain {
+                        let answer = self.compare(&message, &published, &mut unknown);
+                        session.publish(answer).await?;
                     }
+                }
+                () = sleep_until(withdraw_at.unwrap_or(connected)), if withdraw_at.is_some() => {
+                    withdraw_at = None;
+                    session.publish(self.withdrawals(&mut unknown, &published)).await?;
                 }
                 Ok(()) = self.snapshots.changed() => {}
                 () = &mut stop => return session.close(offline).await,
@@ -129,8 +150,76 @@ impl CountsPublisher {
         }
     }
 
-    fn topic(&self, rest: &str) -> String {
-        format!("{}/{rest}", self.options.topic_prefix)
+    /// Compares a message of the broker with the published state. Notes retained topics, and
+    /// returns the message that corrects an availability.
+    fn compare(
+        &self,
+        message: &Publish,
+        published: &Retained,
+        unknown: &mut RetainedTopics,
+    ) -> Option<Message> {
+        let (owner, rest) = Owner::of_topic(self.topics.below_counts(&message.topic)?)?;
+        // The echo of a message that removes a topic.
+        if message.payload.is_empty() {
+            return None;
+        }
+        let availability = self.topics.counts(&owner.availability());
+        let own = published.get(&availability);
+        if message.retain {
+            let is_new = unknown.note(&owner.path(), Some(rest));
+            return (is_new && own.is_none()).then(|| Message::retained(availability, OFFLINE));
+        }
+        let is_offline = rest == AVAILABILITY && message.payload == OFFLINE;
+        match own {
+            // Another companion has this camera or site.
+            None if !is_offline => unknown.keep(&owner.path()),
+            // Another companion does not have it.
+            Some(own) if is_offline && own == ONLINE => {
+                return Some(Message::retained(availability, ONLINE));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Returns the messages that remove the noted topics that are not published, with the
+    /// announcements of their entities. Forgets the noted topics.
+    fn withdrawals(&self, unknown: &mut RetainedTopics, published: &Retained) -> Vec<Message> {
+        let mut topics = Vec::new();
+        for (path, parts) in unknown.take() {
+            let first = format!("{path}/{AVAILABILITY}");
+            let Some((owner, _)) = Owner::of_topic(&first) else {
+                continue;
+            };
+            let numbers = parts.iter().filter_map(|part| Number::of_topic(part));
+            let numbers = numbers.flat_map(Number::with_companions);
+            for number in numbers.chain([Number::Persons]) {
+                topics.push(self.state_topic(owner, number));
+                topics.extend(self.config_topic(owner, number));
+            }
+            topics.push(self.topics.counts(&first));
+        }
+        let gone = topics
+            .into_iter()
+            .filter(|topic| !published.contains_key(topic));
+        gone.map(Message::forget).collect()
+    }
+
+    fn state_topic(&self, owner: Owner<'_>, number: Number<'_>) -> String {
+        let topic = format!("{}/{}", owner.path(), number.topic());
+        self.topics.counts(&topic)
+    }
+
+    fn device_id(&self, owner: Owner<'_>) -> String {
+        format!("{}_{}", level(&self.options.topic_prefix), owner.device())
+    }
+
+    fn entity_id(&self, owner: Owner<'_>, number: Number<'_>) -> String {
+        format!("{}_count_{}", self.device_id(owner), number.entity())
+    }
+
+    fn config_topic(&self, owner: Owner<'_>, number: Number<'_>) -> Option<String> {
+        self.topics.config(SENSOR, &self.entity_id(owner, number))
     }
 
     /// Returns all messages that the broker is to retain.
@@ -138,51 +227,33 @@ impl CountsPublisher {
         let mut retained = Retained::new();
         for camera in &snapshot.cameras {
             let name = level(&camera.name);
-            let base = self.topic(&format!("counts/cameras/{name}"));
-            let id = format!("{}_{name}", level(&self.options.topic_prefix));
-            let shown = camera.name.clone();
-            let mut device = Device::new(self, id, shown, &base, camera.persons, &mut retained);
+            let owner = Owner::Camera(&name);
+            let mut device = Device::new(self, owner, &camera.name, camera.persons, &mut retained);
             for line in &camera.lines {
-                let (line_level, direction) = (level(&line.line), level(&line.direction));
-                device.total(
-                    &format!("{} {}", line.line, line.direction),
-                    &format!("line_{line_level}_{direction}"),
-                    format!("{base}/lines/{line_level}/{direction}"),
-                    line.crossings,
-                    &json!({}),
-                );
+                let (of, direction) = (level(&line.line), level(&line.direction));
+                let number = Number::Crossings {
+                    line: &of,
+                    direction: &direction,
+                };
+                let shown = format!("{} {}", line.line, line.direction);
+                device.total(&shown, number, line.crossings, &json!({}));
             }
             for zone in &camera.zones {
                 let name = level(&zone.zone);
-                let topic = |rest: &str| format!("{base}/zones/{name}/{rest}");
-                device.state(
-                    &format!("Tracked persons in {}", zone.zone),
-                    &format!("tracked_in_{name}"),
-                    topic("persons"),
-                    zone.persons,
-                );
-                device.total(
-                    &format!("Entries into {}", zone.zone),
-                    &format!("entries_{name}"),
-                    topic("entries"),
-                    zone.entries,
-                    &json!({}),
-                );
-                device.total(
-                    &format!("Dwell time in {}", zone.zone),
-                    &format!("dwell_{name}"),
-                    topic("dwell_seconds"),
-                    zone.person_ms / 1000,
-                    &json!({ "device_class": "duration", "unit_of_measurement": "s" }),
-                );
+                let [persons, entries, dwell] = Number::of_zone(&name);
+                let shown = |what: &str| format!("{what} {}", zone.zone);
+                device.state(&shown("Tracked persons in"), persons, zone.persons);
+                device.total(&shown("Entries into"), entries, zone.entries, &json!({}));
+                let duration = json!({ "device_class": "duration", "unit_of_measurement": "s" });
+                let seconds = zone.person_ms / 1000;
+                device.total(&shown("Dwell time in"), dwell, seconds, &duration);
             }
         }
         for site in &snapshot.sites {
             let name = level(&site.name);
-            let base = self.topic(&format!("counts/sites/{name}"));
-            let id = format!("{}_site_{name}", level(&self.options.topic_prefix));
             let shown = format!("Site {}", site.name);
-            Device::new(self, id, shown, &base, site.persons, &mut retained);
+            let owner = Owner::Site(&name);
+            Device::new(self, owner, &shown, site.persons, &mut retained);
         }
         retained
     }
@@ -191,85 +262,76 @@ impl CountsPublisher {
 /// The entities of a camera or a site.
 struct Device<'a> {
     publisher: &'a CountsPublisher,
-    id: String,
-    name: String,
-    availability: String,
+    owner: Owner<'a>,
+    name: &'a str,
     retained: &'a mut Retained,
 }
 
 impl<'a> Device<'a> {
-    /// A device with its availability and the number of its persons, below the topic `base`.
+    /// A device with its availability and the number of its persons.
     fn new(
         publisher: &'a CountsPublisher,
-        id: String,
-        name: String,
-        base: &str,
+        owner: Owner<'a>,
+        name: &'a str,
         persons: Option<u64>,
         retained: &'a mut Retained,
     ) -> Self {
-        let availability = format!("{base}/availability");
+        let availability = publisher.topics.counts(&owner.availability());
         let is_known = if persons.is_some() { ONLINE } else { OFFLINE };
-        retained.insert(availability.clone(), is_known.to_owned());
+        retained.insert(availability, is_known.to_owned());
         let mut device = Self {
             publisher,
-            id,
+            owner,
             name,
-            availability,
             retained,
         };
-        let topic = format!("{base}/persons");
-        device.state("Tracked persons", "tracked", topic, persons);
+        device.state("Tracked persons", Number::Persons, persons);
         device
     }
 
     /// Adds a number that changes in both directions. An unknown one has no message.
-    fn state(&mut self, name: &str, entity: &str, topic: String, value: Option<u64>) {
+    fn state(&mut self, name: &str, number: Number<'_>, value: Option<u64>) {
         let config = json!({ "state_class": "measurement", "icon": "mdi:account-group" });
-        self.announce(name, entity, &topic, &config, true);
+        self.announce(name, number, &config, true);
         if let Some(value) = value {
+            let topic = self.publisher.state_topic(self.owner, number);
             self.retained.insert(topic, value.to_string());
         }
     }
 
     /// Adds a number that only grows.
-    fn total(&mut self, name: &str, entity: &str, topic: String, value: u64, config: &Value) {
+    fn total(&mut self, name: &str, number: Number<'_>, value: u64, config: &Value) {
         let mut config = config.clone();
         config["state_class"] = json!("total_increasing");
-        self.announce(name, entity, &topic, &config, false);
+        self.announce(name, number, &config, false);
+        let topic = self.publisher.state_topic(self.owner, number);
         self.retained.insert(topic, value.to_string());
     }
 
-    fn announce(
-        &mut self,
-        name: &str,
-        entity: &str,
-        topic: &str,
-        config: &Value,
-        is_current: bool,
-    ) {
-        let Some(prefix) = &self.publisher.options.discovery_prefix else {
+    fn announce(&mut self, name: &str, number: Number<'_>, config: &Value, is_current: bool) {
+        let (publisher, owner) = (self.publisher, self.owner);
+        let topics = &publisher.topics;
+        let Some(topic) = publisher.config_topic(owner, number) else {
             return;
         };
-        let id = format!("{}_count_{entity}", self.id);
         let version = env!("CARGO_PKG_VERSION");
-        let mut availability = vec![json!({ "topic": self.publisher.topic("counts/status") })];
+        let mut availability = vec![json!({ "topic": topics.counts("status") })];
         if is_current {
-            availability.push(json!({ "topic": self.availability }));
+            availability.push(json!({ "topic": topics.counts(&owner.availability()) }));
         }
         let mut config = config.clone();
         config["name"] = json!(name);
-        config["state_topic"] = json!(topic);
-        config["unique_id"] = json!(id);
+        config["state_topic"] = json!(publisher.state_topic(owner, number));
+        config["unique_id"] = json!(publisher.entity_id(owner, number));
         config["availability_mode"] = json!("all");
         config["availability"] = json!(availability);
         config["device"] = json!({
-            "identifiers": [self.id],
+            "identifiers": [publisher.device_id(owner)],
             "name": self.name,
             "manufacturer": "Lookdown",
             "sw_version": version,
         });
         config["origin"] = json!({ "name": "Lookdown", "sw_version": version });
-        let topic = format!("{prefix}/sensor/{id}/config");
         self.retained.insert(topic, config.to_string());
     }
 }

@@ -15,7 +15,8 @@ use super::{
 /// The status while the server is connected or a camera sends frames, and the one when it is not.
 pub(super) const ONLINE: &str = "online";
 pub(super) const OFFLINE: &str = "offline";
-const SENSOR: &str = "sensor";
+/// The component of numbers.
+pub(super) const SENSOR: &str = "sensor";
 const BINARY_SENSOR: &str = "binary_sensor";
 
 /// The parts of the announcements that the settings give.

@@ -1,58 +1,44 @@
-//! The retained topics of cameras that this server does not publish, such as those of a camera that
-//! was removed while no server was connected. They are withdrawn some time after the connection,
-//! unless another server publishes them.
+//! The retained topics that this client does not publish, such as those of a camera that was removed
+//! while no server was connected. They are withdrawn some time after the connection, unless another
+//! client publishes them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{
-    discovery::{OFFLINE, config_withdrawals},
-    message::Message,
-    topics::{CameraTopic, Topics},
-};
+use super::{discovery::config_withdrawals, message::Message, topics::Topics};
 
-/// Most zones and cameras that are noted. Further ones stay with the broker.
+/// Most owners and parts that are noted. Further ones stay with the broker.
 const MAX_NOTED: usize = 10_000;
 
-/// The cameras whose retained topics were received, by the levels of their topics, with their
-/// zones.
+/// The owners of the retained topics that were received, such as cameras, by the levels of their
+/// topics, with their parts, such as zones.
 #[derive(Debug, Default)]
 pub(super) struct RetainedTopics {
-    cameras: BTreeMap<String, BTreeSet<String>>,
+    owners: BTreeMap<String, BTreeSet<String>>,
     noted: usize,
 }
 
 impl RetainedTopics {
-    /// Notes a retained topic. Returns the message that makes an unknown camera unavailable, with
-    /// its first topic.
-    pub(super) fn note(
-        &mut self,
-        topic: &CameraTopic<'_>,
-        is_known: bool,
-        topics: &Topics,
-    ) -> Option<Message> {
+    /// Notes the owner of a retained topic, with the part that the topic names. Returns true for
+    /// the first topic of the owner.
+    pub(super) fn note(&mut self, owner: &str, part: Option<&str>) -> bool {
         if self.noted >= MAX_NOTED {
-            return None;
+            return false;
         }
-        let camera = topic.camera();
-        let is_new = !self.cameras.contains_key(camera);
-        let zones = self.cameras.entry(camera.to_owned()).or_default();
-        let is_noted = match topic {
-            CameraTopic::Zone { zone, .. } => zones.insert((*zone).to_owned()),
-            CameraTopic::Persons { .. } | CameraTopic::Availability { .. } => is_new,
-        };
-        self.noted += usize::from(is_noted);
-        let offline = || Message::retained(topics.availability(camera), OFFLINE);
-        (is_new && !is_known).then(offline)
+        let is_new = !self.owners.contains_key(owner);
+        let parts = self.owners.entry(owner.to_owned()).or_default();
+        let is_new_part = part.is_some_and(|part| parts.insert(part.to_owned()));
+        self.noted += usize::from(is_new || is_new_part);
+        is_new
     }
 
-    /// Forgets a camera that another server publishes.
-    pub(super) fn keep(&mut self, camera: &str) {
-        self.cameras.remove(camera);
+    /// Forgets an owner that another client publishes.
+    pub(super) fn keep(&mut self, owner: &str) {
+        self.owners.remove(owner);
     }
 
-    /// Returns the noted cameras with their zones, and forgets them.
+    /// Returns the noted owners with their parts, and forgets them.
     pub(super) fn take(&mut self) -> BTreeMap<String, BTreeSet<String>> {
-        std::mem::take(self).cameras
+        std::mem::take(self).owners
     }
 }
 

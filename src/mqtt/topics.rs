@@ -28,6 +28,17 @@ impl Topics {
         format!("{}/status", self.prefix)
     }
 
+    /// A topic of `lookdown count`.
+    pub(super) fn counts(&self, rest: &str) -> String {
+        format!("{}/counts/{rest}", self.prefix)
+    }
+
+    /// The rest of a topic of `lookdown count`.
+    pub(super) fn below_counts<'a>(&self, topic: &'a str) -> Option<&'a str> {
+        let rest = topic.strip_prefix(&self.prefix)?;
+        rest.strip_prefix("/counts/")
+    }
+
     /// The topic of the number of persons in a camera's frame.
     pub(super) fn persons(&self, camera: &str) -> String {
         format!("{}/persons", self.of_camera(camera))
@@ -120,6 +131,13 @@ impl<'a> CameraTopic<'a> {
             Self::Persons { camera }
             | Self::Availability { camera }
             | Self::Zone { camera, .. } => camera,
+        }
+    }
+
+    pub(super) fn zone(&self) -> Option<&'a str> {
+        match self {
+            Self::Zone { zone, .. } => Some(zone),
+            Self::Persons { .. } | Self::Availability { .. } => None,
         }
     }
 }

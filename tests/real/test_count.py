@@ -1,11 +1,13 @@
 """`lookdown count` with a real server and a real MQTT broker."""
 
 import contextlib
+import http.server
 import json
 import os
 import signal
 import subprocess
 import tempfile
+import threading
 import time
 import unittest
 import urllib.error
@@ -13,18 +15,24 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
-from harness.places import LOOKDOWN, SAMPLES
+from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import free_ports
 from mosquitto import PASSWORD, USER, broker
 from support.lookdown import lookdown
 from waiting import wait_until
 
+HERE = Path(__file__).resolve().parent
+VERIFIER = ROOT / ".setup" / "real" / "webhooks" / "bin" / "python"
+SECRET = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"
+OTHER_SECRET = "whsec_QSBzZWNyZXQgdGhhdCBpcyBub3Qgb25l"
 OFFICE = (SAMPLES / "office.jpg").read_bytes()
 DETECT = "/detect?calibration=office&profile=fast"
 FRAMES = 12
 ZONES = [{"name": "left", "frame_px": [[0, 0], [480, 0], [480, 960], [0, 960]]}]
 LINES = [{"name": "middle", "frame_px": [[480, 0], [480, 960]], "directions": ["east", "west"]}]
 TOPICS = "lookdown/counts/cameras/office"
+LONGEST_GAP = "4s"
+"""After this time, topics of unknown cameras are withdrawn."""
 
 
 class Count:
@@ -49,6 +57,38 @@ class Count:
         return self.process.wait(timeout=20)
 
 
+@contextlib.contextmanager
+def webhook_receiver() -> Iterator[tuple[str, list[dict]]]:
+    """Receives webhooks. Yields its URL, and the headers and bodies of the requests."""
+    received: list[dict] = []
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def log_message(self, *_):
+            """Logs nothing."""
+
+        def do_POST(self):
+            """Keeps a request."""
+            body = self.rfile.read(int(self.headers["Content-Length"])).decode()
+            received.append({"headers": dict(self.headers), "body": body})
+            self.send_response(204)
+            self.end_headers()
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}/hook", received
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def verified(secret: str, message: dict) -> subprocess.CompletedProcess:
+    """The verification of a webhook by `standardwebhooks`."""
+    command = [VERIFIER, HERE / "verify_webhook.py"]
+    given = json.dumps({"secret": secret, **message})
+    return subprocess.run(command, input=given, capture_output=True, text=True, check=False, timeout=60)
+
+
 class Counts(unittest.TestCase):
     """Counts of a camera."""
 
@@ -64,11 +104,12 @@ class Counts(unittest.TestCase):
         (self.port,) = free_ports(1)
         password = self.folder / "password"
         password.write_text(PASSWORD + "\n", encoding="utf-8")
-        self.settings = self.folder / "count.toml"
+        self.settings, self.store = self.folder / "count.toml", self.folder / "counts.sqlite"
         self.settings.write_text(
             f'[server]\nurl = "http://{self.server.address}"\n'
             f'[http]\nlisten = "127.0.0.1:{self.port}"\n'
-            f'[store]\npath = "{self.folder / "counts.sqlite"}"\ncommit_every = "200ms"\n'
+            f'[store]\npath = "{self.store}"\ncommit_every = "200ms"\n'
+            f'[counting]\nlongest_gap = "{LONGEST_GAP}"\n'
             f'[mqtt]\nurl = "mqtt://{USER}@localhost:{self.broker.port}"\npassword_file = "{password}"\n',
             encoding="utf-8",
         )
@@ -84,10 +125,10 @@ class Counts(unittest.TestCase):
         finally:
             count.stop(signal.SIGKILL)
 
-    def send_frames(self) -> int:
+    def send_frames(self, camera: str = "office") -> int:
         """Sends frames of people who stand, and returns the number of persons of the last report."""
         for _ in range(FRAMES):
-            persons = len(json.loads(self.server.post(DETECT, OFFICE))["persons"])
+            persons = len(json.loads(self.server.post(f"{DETECT}&camera={camera}", OFFICE))["persons"])
             time.sleep(0.1)
         return persons
 
@@ -128,6 +169,60 @@ class Counts(unittest.TestCase):
             self.assertGreater(more, before)
             self.assertEqual(0, count.stop())
         self.assertIn("continuing after the report of", (self.folder / "count.log").read_text(encoding="utf-8"))
+
+    def test_topics_of_cameras_removed_while_down_are_withdrawn(self):
+        def topics_of(camera: str) -> list[str]:
+            names = (f"/counts/cameras/{camera}/", f"_{camera}_count_")
+            return [topic for topic in self.broker.retained() if any(name in topic for name in names)]
+
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.send_frames()
+            wait_until(lambda: f"{TOPICS}/lines/middle/east" in self.broker.retained(), "the broker has the line")
+            self.assertGreater(len(topics_of("office")), 10)
+            count.stop(signal.SIGKILL)
+        for path in self.folder.glob("counts.sqlite*"):
+            path.unlink()
+        # A new store begins with the reports that the server still has.
+        self.server.delete("/results/office")
+        # A line of a camera that goes on is gone as well.
+        removed = [
+            "lookdown/counts/cameras/hall/lines/old/in",
+            "homeassistant/sensor/lookdown_hall_count_line_old_in/config",
+        ]
+        for topic in removed:
+            self.broker.client("pub", "-r", "-m", "{}", "-t", topic)
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers again")
+            unavailable = lambda: self.broker.retained().get(f"{TOPICS}/availability") == "offline"
+            wait_until(unavailable, "the unknown camera is unavailable")
+            self.send_frames("hall")
+            wait_until(lambda: not topics_of("office"), "the topics of the removed camera are withdrawn")
+            retained = self.broker.retained()
+            for topic in removed:
+                self.assertNotIn(topic, retained)
+            self.assertIn("lookdown/counts/cameras/hall/lines/middle/east", retained)
+            self.assertIn("homeassistant/sensor/lookdown_hall_count_line_middle_east/config", retained)
+            self.assertEqual("online", retained["lookdown/counts/status"])
+
+    def test_webhooks_are_verified_by_the_library_of_the_standard(self):
+        url, received = self.enterContext(webhook_receiver())
+        secret = self.folder / "hook.secret"
+        secret.write_text(SECRET + "\n", encoding="utf-8")
+        with open(self.settings, "a", encoding="utf-8") as settings:
+            settings.write(f'[[webhooks]]\nurl = "{url}"\nsecret_file = "{secret}"\non = "occupancy"\n')
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.send_frames()
+            message = wait_until(lambda: received and received[0], "a webhook is received")
+        right = verified(SECRET, message)
+        self.assertEqual(0, right.returncode, right.stderr)
+        self.assertEqual("occupancy.reached", json.loads(right.stdout)["type"])
+        changed = message | {"body": message["body"].replace("office", "0ffice")}
+        for secret, wrong in ((OTHER_SECRET, message), (SECRET, changed)):
+            refused = verified(secret, wrong)
+            self.assertNotEqual(0, refused.returncode)
+            self.assertIn("WebhookVerificationError", refused.stderr)
 
     def test_problems_are_one_clear_sentence(self):
         for text, problem in [

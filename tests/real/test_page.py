@@ -26,7 +26,6 @@ KEY = "a key that only this test knows"
 PICTURED = "gate,office,canteen,lounge"
 """Cameras whose images are kept."""
 WALKS = HERE.parent / "walks"
-WALK_SECONDS = 12
 ZONE = {"name": "middle", "floor_m": [[-2, -1], [2, -1], [2, 3], [-2, 3]]}
 
 
@@ -82,7 +81,7 @@ class Page(unittest.TestCase):
         frames.mkdir()
         calibration = json.loads((WALKS / "calibration.json").read_text(encoding="utf-8"))
         (calibrations / "walks.json").write_text(json.dumps(calibration | {"zones": [ZONE]}), encoding="utf-8")
-        clip = ["-t", str(WALK_SECONDS), "-i", WALKS / "walks.mp4", "-q:v", "3", frames / "%d.jpg"]
+        clip = ["-i", WALKS / "walks.mp4", "-q:v", "2", frames / "%d.jpg"]
         subprocess.run(["ffmpeg", "-v", "error", *clip], check=True)
         (port,) = free_ports(1)
         settings = folder / "count.toml"
@@ -100,6 +99,7 @@ class Page(unittest.TestCase):
                         "LOOKDOWN_COUNTED_URL": f"http://{proxy}",
                         "LOOKDOWN_UNCOUNTED_URL": f"http://{server.address}",
                         "LOOKDOWN_WALK": str(frames),
+                        "LOOKDOWN_WALK_TRUTH": str(WALKS / "truth.json"),
                     }
             finally:
                 count.stop(signal.SIGKILL)

@@ -270,15 +270,43 @@ class Cameras(unittest.TestCase):
                 return False
 
             wait_until(has_result, "there is a result", 30)
+            origin = f"http://127.0.0.1:{port}"
+            with urllib.request.urlopen(f"{origin}/", timeout=10) as page:
+                self.assertEqual(page.headers.get_content_type(), "text/html")
+                self.assertIn("<h1", page.read().decode())
+            with urllib.request.urlopen(f"{origin}/results/hall/events", timeout=10) as events:
+                self.assertEqual(events.headers.get_content_type(), "text/event-stream")
+                lines = iter(events.readline, b"")
+                data = next(line for line in lines if line.startswith(b"data:"))
+            self.assertEqual(json.loads(data.removeprefix(b"data:"))["camera"], "hall")
             process.send_signal(signal.SIGINT)
             self.assertEqual(process.wait(timeout=20), 0)
         finally:
             process.kill()
 
-    def test_detect_reads_videos_and_standard_input(self):
-        clip, out = self.folder / "clip.mp4", self.folder / "out.mp4"
+    def clip(self) -> Path:
+        """A video of the frames, one per second."""
+        path = self.folder / "clip.mp4"
         images = ["-framerate", "1", "-i", self.frames_folder / "%d.jpg"]
-        subprocess.run(["ffmpeg", "-v", "error", *images, "-r", "10", "-pix_fmt", "yuv420p", clip], check=True)
+        subprocess.run(["ffmpeg", "-v", "error", *images, "-r", "10", "-pix_fmt", "yuv420p", path], check=True)
+        return path
+
+    def test_a_video_file_is_watched_in_real_time_to_its_end(self):
+        started = time.monotonic()
+        command = [LOOKDOWN, "watch", self.clip(), "--name", "clip", "--every", "200ms"]
+        done = subprocess.run(
+            [*command, "--server", f"http://{self.server.address}"], capture_output=True, check=False, timeout=60
+        )
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreater(time.monotonic() - started, len(self.frames) - 1.0)
+        self.assertEqual(self.latest("clip")["image"]["width"], SIDE)
+        rows = json.loads(self.server.get("/results/clip/history"))
+        self.assertGreater(len(rows), 2 * len(self.frames))
+        times = [row["report"]["captured_at"] for row in rows]
+        self.assertEqual(len(set(times)), len(times))
+
+    def test_detect_reads_videos_and_standard_input(self):
+        clip, out = self.clip(), self.folder / "out.mp4"
         settings = {f"LOOKDOWN__{name}": value for name, value in TINY.items()}
 
         def reports(*arguments: object, given: bytes | None = None) -> list[dict]:

@@ -57,6 +57,8 @@ impl Follower {
     pub(crate) async fn run(&mut self) {
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
         let mut log = LogOnce::default();
+        // The counts of the store are there before the server answers.
+        self.tick().await;
         while !*self.stop.borrow() {
             let began = Instant::now();
             let error = self.follow(&mut log).await;

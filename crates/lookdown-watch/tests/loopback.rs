@@ -130,6 +130,31 @@ async fn a_challenge_is_answered_and_a_refusal_ends_the_attempts() {
 }
 
 #[tokio::test]
+async fn a_camera_with_basic_authentication_gets_its_login() {
+    // RFC 7617: user, a colon and the password, in base64.
+    let camera = serve(|request| {
+        if request
+            .head
+            .contains("authorization: Basic dXNlcjpzZWNyZXQ=\r\n")
+        {
+            snapshot()
+        } else {
+            Reply::status(401).with("WWW-Authenticate", "Basic realm=\"camera\"")
+        }
+    })
+    .await;
+    let server = serve(|_| report()).await;
+    let login = entry(&camera.url("").replace("//", "//user:secret@"));
+    watch_until(login, &server, || server.count() >= 3).await;
+    let heads: Vec<_> = (0..camera.count())
+        .map(|index| camera.request(index).head)
+        .collect();
+    assert!(!heads[0].contains("authorization"), "{}", heads[0]);
+    let without = heads.iter().filter(|head| !head.contains("authorization"));
+    assert_eq!(without.count(), 1);
+}
+
+#[tokio::test]
 async fn a_stream_is_read_and_damaged_parts_are_dropped() {
     let part = |body: &[u8]| [b"--b\r\nContent-Type: image/jpeg\r\n\r\n", body, b"\r\n"].concat();
     let stream = [part(JPEG), part(b"noise"), part(JPEG), b"--b\r\n".to_vec()].concat();

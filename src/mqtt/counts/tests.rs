@@ -8,6 +8,7 @@ fn publisher() -> CountsPublisher {
         authorities: None,
         topic_prefix: "lookdown".to_owned(),
         discovery_prefix: Some("homeassistant".to_owned()),
+        unknown_for: Duration::from_secs(10),
     };
     let (_, snapshots) = watch::channel(Snapshot::default());
     CountsPublisher::new(options, snapshots).unwrap()
@@ -84,4 +85,96 @@ fn unknown_occupancy_is_removed_and_totals_stay() {
     );
     assert!(!topics.contains(&format!("{base}/lines/door/in").as_str()));
     assert!(changes(&known, &known).is_empty());
+}
+
+/// A message of the broker.
+fn received(topic: &str, payload: &str, is_retained: bool) -> Publish {
+    let mut publish = Publish::new(topic, rumqttc::QoS::AtMostOnce, payload);
+    publish.retain = is_retained;
+    publish
+}
+
+#[test]
+fn unknown_retained_topics_are_withdrawn() {
+    let publisher = publisher();
+    let before = publisher.retained(&snapshot(Some(3)));
+    let mut unknown = RetainedTopics::default();
+    let nothing = Retained::new();
+    let mut answers = Vec::new();
+    for (topic, payload) in before
+        .iter()
+        .filter(|(topic, _)| !topic.contains("/config"))
+    {
+        let message = received(topic, payload, true);
+        answers.extend(publisher.compare(&message, &nothing, &mut unknown));
+    }
+    // What has no messages now is unavailable at once, and gone later, with its entities.
+    let unavailable: Vec<_> = answers.iter().map(|answer| answer.topic.as_str()).collect();
+    assert_eq!(
+        unavailable,
+        [
+            "lookdown/counts/cameras/hall/availability",
+            "lookdown/counts/sites/ground/availability"
+        ]
+    );
+    assert!(answers.iter().all(|answer| answer.payload == OFFLINE));
+    let withdrawn = publisher.withdrawals(&mut unknown, &nothing);
+    let withdrawn: std::collections::BTreeSet<_> =
+        withdrawn.into_iter().map(|message| message.topic).collect();
+    assert_eq!(withdrawn, before.into_keys().collect());
+    assert!(publisher.withdrawals(&mut unknown, &nothing).is_empty());
+}
+
+#[test]
+fn only_the_removed_line_of_a_known_camera_is_withdrawn() {
+    let publisher = publisher();
+    let before = publisher.retained(&snapshot(Some(3)));
+    let mut changed = snapshot(Some(3));
+    changed.cameras[0].lines.clear();
+    let own = publisher.retained(&changed);
+    let mut unknown = RetainedTopics::default();
+    for (topic, payload) in &before {
+        let message = received(topic, payload, true);
+        assert_eq!(
+            publisher.compare(&message, &own, &mut unknown),
+            None,
+            "{topic}"
+        );
+    }
+    let withdrawn = publisher.withdrawals(&mut unknown, &own);
+    let withdrawn: Vec<_> = withdrawn.into_iter().map(|message| message.topic).collect();
+    assert_eq!(
+        withdrawn,
+        [
+            "lookdown/counts/cameras/hall/lines/door/in",
+            "homeassistant/sensor/lookdown_hall_count_line_door_in/config"
+        ]
+    );
+}
+
+#[test]
+fn topics_of_another_companion_stay() {
+    let publisher = publisher();
+    let (nothing, own) = (Retained::new(), publisher.retained(&snapshot(Some(3))));
+    let mut unknown = RetainedTopics::default();
+    let topic = "lookdown/counts/cameras/gate/persons";
+    let retained = received(topic, "1", true);
+    assert!(
+        publisher
+            .compare(&retained, &nothing, &mut unknown)
+            .is_some()
+    );
+    // The echo of the message above, and then a message of the other companion.
+    let availability = "lookdown/counts/cameras/gate/availability";
+    let echo = received(availability, OFFLINE, false);
+    assert_eq!(publisher.compare(&echo, &nothing, &mut unknown), None);
+    let live = received(topic, "2", false);
+    assert_eq!(publisher.compare(&live, &nothing, &mut unknown), None);
+    assert!(publisher.withdrawals(&mut unknown, &nothing).is_empty());
+    // Another companion makes a camera of this one unavailable.
+    let other = received("lookdown/counts/cameras/hall/availability", OFFLINE, false);
+    let answer = publisher.compare(&other, &own, &mut unknown).unwrap();
+    assert_eq!(answer.payload, ONLINE);
+    let foreign = received("lookdown/cameras/hall/persons", "3", true);
+    assert_eq!(publisher.compare(&foreign, &own, &mut unknown), None);
 }

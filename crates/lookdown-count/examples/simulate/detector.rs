@@ -1,7 +1,6 @@
 //! A ceiling camera whose detector misses, invents and misplaces persons as the measured one does.
 //!
-//! Every constant is derived from docs/results.md, profile `balanced` with `fusion`; docs/count.md
-//! has the derivation.
+//! The figures of the detector are in `figures`; docs/count-accuracy.md has the assumptions.
 
 use lookdown_count::{CameraPose, Observation};
 use lookdown_lens::geometry::{
@@ -12,7 +11,10 @@ use lookdown_lens::geometry::{
 use nalgebra::{Point2, Unit, Vector2, Vector3};
 use std::collections::HashMap;
 
-use crate::chance::{Chance, Slow};
+use crate::{
+    chance::{Chance, Slow},
+    figures::{Figures, SCORE_FLOOR},
+};
 
 /// Side of the frame, pixels.
 pub const FRAME_PX: f64 = 1280.0;
@@ -21,56 +23,14 @@ const BODY_RADIUS_M: f64 = 0.25;
 /// Time over which scores and places stay wrong, seconds, and the share of the variance that does.
 const CORRELATION_S: f64 = 1.0;
 const SLOW_SHARE: f64 = 0.5;
-/// Score below which the server reports no person.
-const SCORE_FLOOR: f64 = 0.05;
-/// Mean and standard deviation of the logit of a false alarm's score: 32 % are 0.3 or more.
-const FALSE_LOGIT: (f64, f64) = (-1.4, 1.2);
-/// Share of false alarms at the default threshold of 0.3 with these logits.
-const FALSE_SHARE_AT_THRESHOLD: f64 = 0.32;
 /// Share of the background's false alarms that come from fixed places (posters, coat stands).
 const FIXED_SHARE: f64 = 0.6;
-const FIXED_PLACES: u32 = 4;
+/// Most frames in which such a place has one, as a share.
+const FIXED_PRESENCE: f64 = 0.5;
+/// Time over which the score of such a place stays the same, seconds.
+const FIXED_CORRELATION_S: f64 = 3.0;
 /// Loss of the logit of a person who is half hidden behind another one.
 const HIDDEN_LOGIT: f64 = 2.0;
-
-/// Measured figures of a detector on one data set.
-#[derive(Clone, Copy)]
-pub struct Figures {
-    /// Up to this angle off the axis, degrees: recall at a score of 0.3 and of 0.05.
-    pub recall: [(f64, f64, f64); 4],
-    /// Standard deviation of each edge of the oriented box, as a share of its extent.
-    pub edge: f64,
-    /// False alarms of the background per frame, from a score of 0.3 on.
-    pub background: f64,
-    /// Parts and duplicates per visible person, from a score of 0.3 on.
-    pub parts: f64,
-}
-
-/// The 34 rendered rooms.
-pub const RENDERED: Figures = Figures {
-    recall: [
-        (30.0, 0.696, 0.99),
-        (50.0, 0.982, 0.99),
-        (70.0, 0.941, 0.99),
-        (90.0, 0.90, 0.98),
-    ],
-    edge: 0.066,
-    background: 0.5,
-    parts: 0.08,
-};
-
-/// The 10 photographs.
-pub const PHOTOGRAPHS: Figures = Figures {
-    recall: [
-        (30.0, 0.950, 0.99),
-        (50.0, 0.951, 0.99),
-        (70.0, 0.782, 0.957),
-        (90.0, 0.691, 0.958),
-    ],
-    edge: 0.077,
-    background: 1.35,
-    parts: 0.23,
-};
 
 /// A camera with its detector.
 pub struct Camera {
@@ -81,6 +41,8 @@ pub struct Camera {
     chance: Chance,
     errors: HashMap<u64, Errors>,
     fixed: Vec<(Vector2<f64>, Slow)>,
+    /// Share of the frames in which a fixed place has a false alarm.
+    fixed_presence: f64,
 }
 
 /// The slow errors of one person.
@@ -100,23 +62,29 @@ pub struct Shown {
 impl Camera {
     pub fn new(
         pose: CameraPose,
-        figures: Figures,
+        figures: &Figures,
         mut chance: Chance,
         reach_m: Vector2<f64>,
     ) -> Self {
         let centre = (FRAME_PX - 1.0) / 2.0;
         let lens = Lens::equidistant_circle(centre, centre, FRAME_PX / 2.0, 90_f64.to_radians());
-        let fixed = (0..FIXED_PLACES).map(|_| {
+        let present = figures.background.count * FIXED_SHARE;
+        let places = (present / FIXED_PRESENCE).ceil();
+        let mut fixed = Vec::new();
+        let mut left = places;
+        while left > 0.0 {
             let x = chance.uniform(-reach_m.x, reach_m.x);
             let y = chance.uniform(-reach_m.y, reach_m.y);
-            (Vector2::new(x, y), Slow::default())
-        });
+            fixed.push((Vector2::new(x, y), Slow::default()));
+            left -= 1.0;
+        }
         Self {
             pose,
             lens: lens.expect("a valid lens"),
             mount: Mount::new(Unit::new_normalize(-Vector3::z()), pose.height_m),
-            figures,
-            fixed: fixed.collect(),
+            figures: *figures,
+            fixed_presence: present / places,
+            fixed,
             errors: HashMap::new(),
             chance,
         }
@@ -166,22 +134,20 @@ impl Camera {
         for person in shown {
             let hidden = self.is_hidden(person, shown);
             let mut errors = self.errors.get(&person.id).copied().unwrap_or_default();
-            let (mean, deviation) = self.logit_of(&person.oriented);
             let slow = self.mixed(&mut errors.score, at_s);
-            let logit = mean + deviation * slow - if hidden { HIDDEN_LOGIT } else { 0.0 };
+            let lost = if hidden { HIDDEN_LOGIT } else { 0.0 };
+            let logit = self.logit_of(&person.oriented, slow) - lost;
             let mut edges = [0.0; 4];
             for (edge, slow) in edges.iter_mut().zip(&mut errors.edges) {
                 *edge = self.figures.edge * self.mixed(slow, at_s);
             }
             self.errors.insert(person.id, errors);
             found.extend(self.observe(moved(&person.oriented, edges), logit));
-            let parts = self
-                .chance
-                .count(self.figures.parts / FALSE_SHARE_AT_THRESHOLD);
-            for _ in 0..parts {
+            let Figures { parts, .. } = self.figures;
+            for _ in 0..self.chance.count(parts.count) {
                 let shift = self.chance.uniform(-0.4, 0.4);
                 let part = moved(&person.oriented, [shift, shift, shift * 0.3, shift * 0.3]);
-                let logit = self.false_logit();
+                let logit = parts.logit_of(self.chance.normal());
                 found.extend(self.observe(part, logit));
             }
         }
@@ -190,35 +156,28 @@ impl Camera {
     }
 
     fn invent(&mut self, at_s: f64, found: &mut Vec<(Observation, OrientedBox)>) {
-        let mean = self.figures.background / FALSE_SHARE_AT_THRESHOLD;
-        let each = (mean * FIXED_SHARE / f64::from(FIXED_PLACES)).min(0.95);
+        let Figures { background, .. } = self.figures;
         for index in 0..self.fixed.len() {
             let (place, mut slow) = self.fixed[index];
-            let value = slow.at(at_s, 3.0, &mut self.chance);
+            let value = slow.at(at_s, FIXED_CORRELATION_S, &mut self.chance);
             self.fixed[index].1 = slow;
-            // Present for a share of the time, in spells of some seconds.
-            if self.chance.happens(each)
+            if self.chance.happens(self.fixed_presence)
                 && let Some(shown) = self.show(0, place, 1.7)
             {
-                let logit = FALSE_LOGIT.0 + FALSE_LOGIT.1 * value;
-                found.extend(self.observe(shown.oriented, logit));
+                found.extend(self.observe(shown.oriented, background.logit_of(value)));
             }
         }
-        for _ in 0..self.chance.count(mean * (1.0 - FIXED_SHARE)) {
+        for _ in 0..self.chance.count(background.count * (1.0 - FIXED_SHARE)) {
             let reach = 6.0;
             let place = Vector2::new(
                 self.chance.uniform(-reach, reach),
                 self.chance.uniform(-reach, reach),
             );
             if let Some(shown) = self.show(0, place, 1.7) {
-                let logit = self.false_logit();
+                let logit = background.logit_of(self.chance.normal());
                 found.extend(self.observe(shown.oriented, logit));
             }
         }
-    }
-
-    fn false_logit(&mut self) -> f64 {
-        FALSE_LOGIT.0 + FALSE_LOGIT.1 * self.chance.normal()
     }
 
     fn mixed(&mut self, slow: &mut Slow, at_s: f64) -> f64 {
@@ -226,14 +185,10 @@ impl Camera {
         SLOW_SHARE.sqrt() * slow + (1.0 - SLOW_SHARE).sqrt() * self.chance.normal()
     }
 
-    /// Mean and standard deviation of the score's logit, from the two recalls of the angle.
-    fn logit_of(&self, oriented: &OrientedBox) -> (f64, f64) {
+    /// The logit of the score of a person, for a standard normal number.
+    fn logit_of(&self, oriented: &OrientedBox, normal: f64) -> f64 {
         let angle = bearing(oriented.center, &self.lens).map_or(90.0, |b| b.off_axis.to_degrees());
-        let rows = &self.figures.recall;
-        let row = rows.iter().find(|row| angle <= row.0).unwrap_or(&rows[3]);
-        let (at_threshold, at_floor) = (quantile(row.1), quantile(row.2));
-        let deviation = (logit(0.3) - logit(SCORE_FLOOR)) / (at_floor - at_threshold);
-        (logit(0.3) + deviation * at_threshold, deviation)
+        self.figures.logit_of_person(angle, normal)
     }
 
     fn is_hidden(&self, person: &Shown, shown: &[Shown]) -> bool {
@@ -324,42 +279,4 @@ pub fn bounds(oriented: &OrientedBox) -> [f64; 4] {
         centre.x + half.x,
         centre.y + half.y,
     ]
-}
-
-fn logit(probability: f64) -> f64 {
-    (probability / (1.0 - probability)).ln()
-}
-
-/// The quantile of the standard normal distribution (bisection of its distribution function, as in
-/// Abramowitz and Stegun (1964), 26.2.17).
-fn quantile(probability: f64) -> f64 {
-    let (mut low, mut high) = (-6.0, 6.0);
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if distribution(middle) < probability {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    f64::midpoint(low, high)
-}
-
-fn distribution(x: f64) -> f64 {
-    if x < 0.0 {
-        return 1.0 - distribution(-x);
-    }
-    let t = 1.0 / (1.0 + 0.231_641_9 * x);
-    let factors = [
-        0.319_381_530,
-        -0.356_563_782,
-        1.781_477_937,
-        -1.821_255_978,
-        1.330_274_429,
-    ];
-    let sum = factors
-        .iter()
-        .rev()
-        .fold(0.0, |sum, factor| (sum + factor) * t);
-    1.0 - (-x * x / 2.0).exp() / std::f64::consts::TAU.sqrt() * sum
 }

@@ -11,6 +11,7 @@
 
 mod chance;
 mod detector;
+mod figures;
 mod people;
 mod scene;
 

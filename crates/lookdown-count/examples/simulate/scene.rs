@@ -15,7 +15,8 @@ use std::{
 
 use crate::{
     chance::Chance,
-    detector::{Camera, FRAME_PX, Figures, PHOTOGRAPHS, RENDERED, Shown, bounds},
+    detector::{Camera, FRAME_PX, Shown, bounds},
+    figures::Figures,
     people::{Hall, People, STEP_S},
 };
 
@@ -59,11 +60,7 @@ impl Options {
             seed: number(given.get("--seed"), 1),
             seconds: number(given.get("--seconds"), 300.0),
             persons: number(given.get("--persons"), 8),
-            figures: match detector {
-                "rendered" => RENDERED,
-                "photographs" => PHOTOGRAPHS,
-                other => panic!("--detector {other}: give rendered or photographs"),
-            },
+            figures: Figures::of_name(detector).expect("--detector is a name of figures"),
             is_site: given.contains_key("--site"),
             settings: given
                 .get("--settings")
@@ -177,7 +174,7 @@ impl Scene {
         let camera = |(stream, &pose): (u64, _)| {
             Camera::new(
                 pose,
-                options.figures,
+                &options.figures,
                 Chance::new(options.seed, stream),
                 reach,
             )
