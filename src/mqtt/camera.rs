@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use serde::Deserialize;
+use serde_json::json;
 use tokio::time::Instant;
 
 use super::{
@@ -30,6 +31,7 @@ pub(super) struct Camera {
     persons: usize,
     occupancy: Occupancy,
     zones: Vec<Zone>,
+    attributes: Attributes,
     /// The time at which it becomes unavailable.
     expires_at: Option<Instant>,
     is_available: bool,
@@ -42,11 +44,43 @@ struct Zone {
     occupancy: Occupancy,
 }
 
+/// The attributes of its entities: what a report was made with. Nothing in them changes with each
+/// frame, because Home Assistant records every change of an attribute.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Attributes {
+    calibration: Option<String>,
+    model: Option<String>,
+    profile: Option<String>,
+}
+
+/// The changes by a report.
+pub(super) struct Changes {
+    /// The names of removed zones.
+    pub(super) removed_zones: Vec<String>,
+    /// True if there are other entities than before.
+    pub(super) entities: bool,
+    /// True if the attributes are others than before.
+    pub(super) attributes: bool,
+}
+
 /// The parts of a report's JSON that are read.
-#[derive(Deserialize)]
-struct Zones {
+#[derive(Default, Deserialize)]
+struct ReportParts {
     #[serde(default)]
     zones: Vec<ZoneCount>,
+    calibration: Option<CalibrationPart>,
+    model: Option<ModelPart>,
+    profile: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct CalibrationPart {
+    id: String,
+}
+
+#[derive(Deserialize)]
+struct ModelPart {
+    name: String,
 }
 
 #[derive(Deserialize)]
@@ -63,26 +97,33 @@ impl Camera {
             persons: 0,
             occupancy: Occupancy::default(),
             zones: Vec::new(),
+            attributes: Attributes::default(),
             expires_at: None,
             is_available: false,
         }
     }
 
-    /// Updates the state with a report of age `age`. Returns the names of removed zones, and true
-    /// if the entities have changed.
+    /// Updates the state with a report of age `age`.
     pub(super) fn update(
         &mut self,
         report: &NewReport,
         age: Duration,
         now: Instant,
         delays: &Delays,
-    ) -> (Vec<String>, bool) {
+    ) -> Changes {
         // Reports come from a server of this version or an earlier one, and are always JSON.
-        let counts = serde_json::from_slice(&report.json);
-        let counts = counts.map_or(Vec::new(), |Zones { zones }| zones);
+        let parts: ReportParts = serde_json::from_slice(&report.json).unwrap_or_default();
+        let attributes = Attributes {
+            calibration: parts.calibration.map(|calibration| calibration.id),
+            model: parts.model.map(|model| model.name),
+            profile: parts.profile,
+        };
+        let has_other_attributes = attributes != self.attributes;
+        self.attributes = attributes;
+        let counts = parts.zones;
         let mut earlier = std::mem::take(&mut self.zones);
         let names = earlier.iter().map(|zone| zone.name.as_str());
-        let has_changed = !names.eq(counts.iter().map(|zone| zone.name.as_str()));
+        let has_other_zones = !names.eq(counts.iter().map(|zone| zone.name.as_str()));
         for ZoneCount { name, persons } in counts {
             let known = earlier.iter().position(|zone| zone.name == name);
             let known = known.map(|index| earlier.swap_remove(index));
@@ -100,8 +141,11 @@ impl Camera {
         let rest = delays.expire.map(|expire| expire.saturating_sub(age));
         self.expires_at = rest.map(|rest| now + rest);
         self.is_available = rest != Some(Duration::ZERO);
-        let removed = earlier.into_iter().map(|zone| zone.name).collect();
-        (removed, has_changed)
+        Changes {
+            removed_zones: earlier.into_iter().map(|zone| zone.name).collect(),
+            entities: has_other_zones,
+            attributes: has_other_attributes,
+        }
     }
 
     /// Changes what has changed by now without a report. Returns the messages.
@@ -162,6 +206,17 @@ impl Camera {
         // The last one: entities become available with their new state.
         messages.push(self.availability(topics));
         messages
+    }
+
+    /// The attributes of all its entities.
+    pub(super) fn attributes(&self, topics: &Topics) -> Message {
+        let Attributes {
+            calibration,
+            model,
+            profile,
+        } = &self.attributes;
+        let attributes = json!({"calibration": calibration, "model": model, "profile": profile});
+        Message::retained(topics.attributes(&self.name), attributes.to_string())
     }
 
     pub(super) fn availability(&self, topics: &Topics) -> Message {

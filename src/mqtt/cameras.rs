@@ -80,14 +80,17 @@ impl Cameras {
             return Vec::new();
         }
         let camera = self.known.entry(key).or_insert_with(|| Camera::new(name));
-        let (removed, has_changed) = camera.update(report, age, now, &self.delays);
+        let changes = camera.update(report, age, now, &self.delays);
         let topics = &self.topics;
         let mut messages = Vec::new();
-        for zone in removed {
+        for zone in changes.removed_zones {
             messages.extend(zone_withdrawal(topics, name, &zone));
         }
-        if has_changed || !is_known {
+        if changes.entities || !is_known {
             messages.extend(camera.announced(topics, &self.discovery));
+        }
+        if changes.attributes || !is_known {
+            messages.push(camera.attributes(topics));
         }
         messages.extend(camera.state(topics));
         let json = report.json.clone();
@@ -102,6 +105,7 @@ impl Cameras {
         let messages = known.flat_map(|camera| {
             camera.expire(now, topics);
             let mut messages = camera.announced(topics, &self.discovery);
+            messages.push(camera.attributes(topics));
             messages.extend(camera.state(topics));
             messages
         });

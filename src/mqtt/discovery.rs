@@ -73,6 +73,7 @@ impl Discovery {
             {"topic": topics.status()},
             {"topic": topics.availability(camera)},
         ]);
+        config["json_attributes_topic"] = json!(topics.attributes(camera));
         config["device"] = json!({
             "identifiers": [topics.device_id(camera)],
             "name": camera,
@@ -185,6 +186,8 @@ mod tests {
             ]);
             assert_eq!(config["availability"], availability);
             assert_eq!(config["availability_mode"], "all");
+            let attributes = format!("{state}/attributes");
+            assert_eq!(config["json_attributes_topic"], attributes);
             assert_eq!(config["device"]["name"], "north gate");
             assert_eq!(config["device"]["identifiers"][0], device);
             let version = env!("CARGO_PKG_VERSION");

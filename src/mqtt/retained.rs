@@ -52,6 +52,7 @@ pub(super) fn withdrawal(
     let of_camera = [
         topics.persons(camera),
         topics.occupancy(camera),
+        topics.attributes(camera),
         topics.availability(camera),
     ];
     let mut messages = config_withdrawals(topics, camera, None);

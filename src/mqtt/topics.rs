@@ -64,6 +64,11 @@ impl Topics {
         format!("{}/availability", self.of_camera(camera))
     }
 
+    /// The topic of the attributes of a camera's entities.
+    pub(super) fn attributes(&self, camera: &str) -> String {
+        format!("{}/attributes", self.of_camera(camera))
+    }
+
     /// Filters for the topics that [`Topics::camera_topic`] recognises.
     pub(super) fn camera_filters(&self) -> [String; 3] {
         ["+/persons", "+/availability", "+/zones/+"]
@@ -205,6 +210,7 @@ mod tests {
         for other in [
             topics.status(),
             topics.report(camera),
+            topics.attributes(camera),
             topics.zone_occupancy(camera, zone),
             "lookdown/cameras/lobby/persons".to_owned(),
         ] {

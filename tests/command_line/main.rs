@@ -13,7 +13,11 @@ mod shell;
 mod systemd;
 mod telemetry;
 
-use std::process::{Command, Output, Stdio};
+use std::{
+    io::{BufRead, BufReader},
+    net::TcpStream,
+    process::{Command, Output, Stdio},
+};
 
 pub(crate) fn lookdown(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookdown"));
@@ -85,6 +89,52 @@ fn a_closed_pipe_is_no_error() {
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success());
     assert!(output.stderr.is_empty(), "{output:?}");
+}
+
+#[test]
+fn reports_may_be_read_up_to_a_line() {
+    let office = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lookdown"))
+        .args(["detect", "--profile", "fast", office, office, office])
+        .env("LOOKDOWN__LOG__FILTER", "warn")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // As `head -1` does.
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    let report: serde_json::Value = serde_json::from_str(&line).unwrap();
+    assert_eq!(report["request_id"], office);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert!(output.stderr.is_empty(), "{output:?}");
+}
+
+#[test]
+fn serve_listens_at_the_address_of_the_flag() {
+    let mut server = Command::new(env!("CARGO_BIN_EXE_lookdown"))
+        .args(["serve", "--listen", "127.0.0.1:0"])
+        .env("LOOKDOWN__SERVER__LISTEN", "127.0.0.1:1")
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let log = BufReader::new(server.stderr.take().unwrap());
+    let mut addresses = log.lines().map_while(Result::ok).filter_map(|line| {
+        let (_, rest) = line.split_once("listening on http://")?;
+        Some(rest.split_once(',')?.0.to_owned())
+    });
+    let address = addresses.next();
+    let connection = address.as_ref().map(TcpStream::connect);
+    server.kill().unwrap();
+    server.wait().unwrap();
+    assert!(
+        connection.is_some_and(|result| result.is_ok()),
+        "{address:?}"
+    );
+    assert_ne!(address.unwrap(), "127.0.0.1:1");
 }
 
 #[test]

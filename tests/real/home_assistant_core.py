@@ -43,6 +43,8 @@ def snapshot(hass) -> dict:
         found[entry.unique_id] = {
             "entity": entry.entity_id,
             "state": state.state if state else None,
+            "calibration": state.attributes.get("calibration") if state else None,
+            "profile": state.attributes.get("profile") if state else None,
             "device": device.name if device else None,
             "sw_version": device.sw_version if device else None,
             "configuration_url": device.configuration_url if device else None,

@@ -127,6 +127,7 @@ class Entities(unittest.TestCase):
             version = server.get("/openapi.json")
             for entity in entities.values():
                 self.assertEqual(entity["device"], "office")
+                self.assertEqual((entity["calibration"], entity["profile"]), ("office", "fast"))
                 self.assertEqual(entity["sw_version"], json.loads(version)["info"]["version"])
                 self.assertEqual(entity["configuration_url"], PAGE)
             server.post(NO_PERSONS, OFFICE)

@@ -7,7 +7,7 @@ import unittest
 
 from harness.places import LOOKDOWN, ROOT
 from harness.processes import free_ports
-from kubernetes.tools import manifests, only, read_yaml
+from kubernetes.tools import PYTHON, VALIDATE, Refused, manifests, only, read_yaml, run
 
 OVERLAYS = ("overlays/cpu", "overlays/gpu", "overlays/ha", "overlays/keda", "examples/gateway", "examples/ingress")
 
@@ -120,6 +120,28 @@ class Manifests(unittest.TestCase):
         settings = {variable["name"]: variable["value"] for variable in container["env"]}
         (port,) = container["ports"]
         self.assertEqual(settings["LOOKDOWN__SERVER__LISTEN"], f"0.0.0.0:{port['containerPort']}")
+
+    def test_kserve_refuses_what_its_models_do_not_declare(self):
+        text = run([PYTHON / "kubectl", "kustomize", ROOT / "k8s" / "examples" / "kserve"])
+        for right, wrong, problem in (
+            ("protocolVersion: v2", "protocol: v2", "V1beta1ModelSpec has no field 'protocol'"),
+            (
+                "minReplicas: 1",
+                'minReplicas: "1"',
+                "InferenceService.spec.predictor.minReplicas: '1' is not of the type",
+            ),
+            ("multiModel: false", 'multiModel: "no"', "ServingRuntime.spec.multiModel: 'no' is not of the type"),
+            ("containerPort:", "port:", "ServingRuntime.spec.containers[0]:"),
+            (
+                "apiVersion: serving.kserve.io/v1beta1",
+                "apiVersion: serving.kserve.io/v1",
+                "no model 'V1InferenceService'",
+            ),
+        ):
+            self.assertIn(right, text)
+            with self.assertRaises(Refused) as refused:
+                run([PYTHON / "python", VALIDATE], text.replace(right, wrong))
+            self.assertIn(problem, str(refused.exception))
 
     @staticmethod
     def container(documents: list[dict]) -> dict:

@@ -21,6 +21,13 @@ SELECTOR = re.compile(r"\b(lookdown_\w+|process_\w+)(?:\{([^}]*)\})?")
 MATCHER = re.compile(r'(\w+)="([^"]+)"')
 # Labels that Prometheus adds to what it scrapes.
 ITS_OWN = ("job", "instance", "namespace", "pod")
+# A replica whose frames wait for a quarter of a second, and one without frames.
+QUEUES = {
+    'lookdown_queue_duration_seconds_sum{job="lookdown", pod="a"}': "0+30x10",
+    'lookdown_queue_duration_seconds_count{job="lookdown", pod="a"}': "0+120x10",
+    'lookdown_queue_duration_seconds_sum{job="lookdown", pod="b"}': "7x10",
+    'lookdown_queue_duration_seconds_count{job="lookdown", pod="b"}': "9x10",
+}
 
 
 class Monitoring(unittest.TestCase):
@@ -32,6 +39,7 @@ class Monitoring(unittest.TestCase):
         dashboards = [json.loads((MONITORING / name).read_text(encoding="utf-8")) for name in DASHBOARDS]
         panels = [panel for dashboard in dashboards for panel in dashboard["panels"]]
         cls.panels = [target["expr"] for panel in panels for target in panel["targets"]]
+        cls.keda = only(manifests("overlays/keda"), "ScaledObject")["spec"]["triggers"]
         (cls.adapter,) = read_yaml(MONITORING / "prometheus-adapter.yaml")["rules"]
 
     def setUp(self):
@@ -73,13 +81,21 @@ class Monitoring(unittest.TestCase):
 
     def test_the_autoscalers_metric_is_the_mean_queue_time(self):
         query = self.adapter["metricsQuery"].replace("<<.GroupBy>>", "pod").replace("<<.LabelMatchers>>", 'pod=~"a|b"')
-        series = {
-            'lookdown_queue_duration_seconds_sum{pod="a"}': "0+30x10",
-            'lookdown_queue_duration_seconds_count{pod="a"}': "0+120x10",
-            'lookdown_queue_duration_seconds_sum{pod="b"}': "7x10",
-            'lookdown_queue_duration_seconds_count{pod="b"}': "9x10",
-        }
         samples = [{"labels": '{pod="a"}', "value": 0.25}, {"labels": '{pod="b"}', "value": 0}]
+        self.check_query(query, QUEUES, samples)
+
+    def test_the_query_of_keda_is_the_mean_queue_time(self):
+        self.check_query(self.keda_query(), QUEUES, [{"labels": "{}", "value": 0.25}])
+        # Without frames it is zero.
+        self.check_query(self.keda_query(), dict.fromkeys(QUEUES, "7x10"), [{"labels": "{}", "value": 0}])
+
+    def keda_query(self) -> str:
+        """The query of the overlay `keda`."""
+        (query,) = [trigger["metadata"]["query"] for trigger in self.keda if trigger["type"] == "prometheus"]
+        return query
+
+    def check_query(self, query: str, series: dict[str, str], samples: list[dict]) -> None:
+        """Asserts the result of a query after eight minutes of one sample each."""
         test = {
             "interval": "1m",
             "input_series": [{"series": name, "values": values} for name, values in series.items()],
@@ -91,7 +107,7 @@ class Monitoring(unittest.TestCase):
     def test_every_queried_metric_and_label_is_in_a_scrape(self):
         scrape = self.scrape() + self.scrape_without_the_inference_server()
         queries = [rule["expr"] for rule in self.rules] + self.panels
-        queries += [self.adapter["seriesQuery"], self.adapter["metricsQuery"]]
+        queries += [self.adapter["seriesQuery"], self.adapter["metricsQuery"], self.keda_query()]
         asked = {found.groups() for query in queries for found in SELECTOR.finditer(query)}
         self.assertGreater(len(asked), 20)
         for name, labels in asked:

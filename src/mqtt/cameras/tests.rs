@@ -7,6 +7,7 @@ use crate::results::{NewReport, ReportId};
 
 const HOLD: Duration = Duration::from_secs(5);
 const EXPIRY: Duration = Duration::from_mins(10);
+const NO_ATTRIBUTES: &str = r#"{"calibration":null,"model":null,"profile":null}"#;
 
 fn topics() -> Topics {
     Topics::new("lookdown", Some("homeassistant"))
@@ -62,6 +63,7 @@ fn the_first_report_announces_a_camera_and_each_updates_it() {
     let mut cameras = cameras(10);
     let messages = update(&mut cameras, &report("lobby", 2, ""));
     let wanted = expected(&[
+        ("lobby/attributes", NO_ATTRIBUTES),
         ("lobby/persons", "2"),
         ("lobby/occupancy", "ON"),
         ("lobby/availability", "online"),
@@ -69,7 +71,7 @@ fn the_first_report_announces_a_camera_and_each_updates_it() {
     ]);
     assert_eq!(published(&messages), (wanted, 2));
     let kept: Vec<_> = messages.iter().map(|message| message.retained).collect();
-    assert_eq!(kept, [true, true, true, true, true, false]);
+    assert_eq!(kept, [true, true, true, true, true, true, false]);
 
     let (published, announcements) = published(&update(&mut cameras, &report("lobby", 0, "")));
     assert_eq!((published[0].1.as_str(), announcements), ("0", 0));
@@ -87,7 +89,7 @@ fn zones_come_and_go_with_the_calibration() {
         ("lobby/zones/till", "0"),
         ("lobby/zones/till/occupancy", "OFF"),
     ]);
-    assert_eq!(first[2..6], wanted);
+    assert_eq!(first[3..7], wanted);
 
     let zones = ",\"zones\":[{\"name\":\"till\",\"persons\":1}]";
     let messages = update(&mut cameras, &report("lobby", 1, zones));
@@ -112,9 +114,30 @@ fn retained_messages_are_repeated_without_reports() {
     let messages = cameras.all(Instant::now());
     assert!(messages.iter().all(|message| message.retained));
     let (published, announcements) = published(&messages);
-    assert_eq!((published.len(), announcements), (6, 4));
-    assert_eq!(published[0], expected(&[("gate/persons", "3")])[0]);
-    assert_eq!(published[3], expected(&[("lobby/persons", "2")])[0]);
+    assert_eq!((published.len(), announcements), (8, 4));
+    assert_eq!(published[1], expected(&[("gate/persons", "3")])[0]);
+    assert_eq!(published[5], expected(&[("lobby/persons", "2")])[0]);
+}
+
+#[test]
+fn attributes_are_published_when_they_change() {
+    let mut cameras = cameras(10);
+    let mut attributes = |profile: &str| {
+        let parts = format!(
+            ",\"request_id\":\"{profile}\",\"calibration\":{{\"id\":\"hall\",\"revision\":\"a\"}},\
+             \"model\":{{\"name\":\"yolox\"}},\"profile\":\"{profile}\""
+        );
+        let (published, announcements) =
+            published(&update(&mut cameras, &report("lobby", 1, &parts)));
+        let mut found = published.into_iter();
+        let found = found.find(|(topic, _)| topic.ends_with("/attributes"));
+        (found.map(|(_, payload)| payload), announcements)
+    };
+    let fast = r#"{"calibration":"hall","model":"yolox","profile":"fast"}"#;
+    assert_eq!(attributes("fast"), (Some(fast.to_owned()), 2));
+    assert_eq!(attributes("fast"), (None, 0));
+    let careful = fast.replace("fast", "careful");
+    assert_eq!(attributes("careful"), (Some(careful), 0));
 }
 
 #[test]
@@ -125,7 +148,7 @@ fn only_the_first_cameras_up_to_the_limit_are_published() {
         assert_eq!(published, camera != "c", "{camera}");
     }
     assert!(!update(&mut cameras, &report("a", 2, "")).is_empty());
-    assert_eq!(published(&cameras.all(Instant::now())).0.len(), 6);
+    assert_eq!(published(&cameras.all(Instant::now())).0.len(), 8);
 }
 
 #[test]
@@ -145,7 +168,7 @@ fn occupancy_ends_after_the_hold_availability_at_expiry() {
     let messages = update(&mut cameras, &report("lobby", 0, ""));
     assert_eq!(published(&messages).0[2].1, "online");
     let messages = cameras.update(&report("gate", 0, ""), EXPIRY, begin);
-    assert_eq!(published(&messages).0[2].1, "offline");
+    assert_eq!(published(&messages).0[3].1, "offline");
 }
 
 #[test]
@@ -203,6 +226,7 @@ fn unknown_retained_cameras_are_withdrawn_after_a_time() {
         "homeassistant/sensor/lookdown_old_zone_door/config",
         "lookdown/cameras/lobby/zones/gone",
         "lookdown/cameras/lobby/zones/gone/occupancy",
+        "lookdown/cameras/old/attributes",
         "lookdown/cameras/old/availability",
         "lookdown/cameras/old/occupancy",
         "lookdown/cameras/old/persons",

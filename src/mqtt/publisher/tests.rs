@@ -117,10 +117,12 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
             .all(|(topic, ..)| topic.starts_with("homeassistant/"))
     );
     let camera = "lookdown/cameras/lobby";
+    let none = r#"{"calibration":null,"model":null,"profile":null}"#;
+    let attributes = said(&format!("{camera}/attributes"), none, true);
     let count = said(&format!("{camera}/persons"), "2", true);
     let occupancy = said(&format!("{camera}/occupancy"), "ON", true);
     let availability = said(&format!("{camera}/availability"), "online", true);
-    for expected in [&count, &occupancy, &availability] {
+    for expected in [&attributes, &count, &occupancy, &availability] {
         assert_eq!(heard(&mut client).await, *expected);
     }
     assert_eq!(
@@ -136,12 +138,12 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     for config in configs {
         assert_eq!(heard(&mut client).await, config);
     }
-    for expected in [&count, &occupancy, &availability] {
+    for expected in [&attributes, &count, &occupancy, &availability] {
         assert_eq!(heard(&mut client).await, *expected);
     }
     // Home Assistant withdraws a camera whose reports are deleted.
     assert!(setup.results.delete("lobby").await.unwrap());
-    for _ in 0..5 {
+    for _ in 0..6 {
         let (_, payload, is_retained) = heard(&mut client).await;
         assert!(payload.is_empty() && is_retained);
     }
@@ -199,12 +201,12 @@ async fn a_new_connection_publishes_the_current_state() {
     let (mut client, _) = accept(&setup.listener).await;
     welcome(&mut client).await;
     let mut said = Vec::new();
-    while said.len() < 4 {
+    while said.len() < 5 {
         said.push(heard(&mut client).await);
     }
     assert_eq!(said[0].1, "online");
     assert_eq!(
-        said[3],
+        said[4],
         (
             "lookdown/cameras/lobby/persons".to_owned(),
             "7".to_owned(),

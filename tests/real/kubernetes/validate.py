@@ -1,6 +1,7 @@
 """Validates manifests (YAML) and prints them as a list (JSON). It is run by the Python that has the schemas.
 
-Kubernetes' own kinds are validated strictly against its schemas, custom resources against the schema in this folder.
+Kubernetes' own kinds are validated strictly against its schemas, KServe's with the models of its package, other custom
+resources against the schema in this folder.
 """
 
 import json
@@ -8,6 +9,7 @@ import sys
 from pathlib import Path
 
 import jsonschema
+import kserve_models
 import kubernetes_validate
 import yaml
 
@@ -18,12 +20,16 @@ def problem_of(document: dict) -> str | None:
     """The problem of a manifest, or None."""
     schema = Path(__file__).with_name(f"{document['kind']}.schema.json")
     try:
-        if schema.exists():
+        if document["apiVersion"].startswith(f"{kserve_models.GROUP}/"):
+            kserve_models.validate(document, VERSION)
+        elif schema.exists():
             jsonschema.validate(document, json.loads(schema.read_text(encoding="utf-8")))
         else:
             kubernetes_validate.validate(document, VERSION, strict=True)
     except (jsonschema.ValidationError, kubernetes_validate.ValidationError) as error:
         return f"{'.'.join(str(part) for part in error.path)}: {error.message}"
+    except kserve_models.InvalidResource as error:
+        return str(error)
     except kubernetes_validate.SchemaNotFoundError:
         return "there is no schema of this kind"
     return None

@@ -22,7 +22,51 @@ pub(in crate::api) struct VersionStatus {
     /// Always false: the server looks for no updates.
     update_available: bool,
     /// The version that runs.
-    version: &'static str,
+    version: VersionNumbers,
+    /// The version that runs.
+    current: VersionNumbers,
+    /// The version that runs: no newer one is known.
+    latest: VersionNumbers,
+}
+
+/// A version.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(rename_all = "camelCase")]
+struct VersionNumbers {
+    /// The first number.
+    major: u32,
+    /// The second number.
+    minor: u32,
+    /// The third number.
+    patch: u32,
+    /// The name of a version before a release; empty for a release.
+    pre_release: &'static str,
+    /// Always 0.
+    build: u32,
+    /// Always false.
+    security_update: bool,
+    /// Always empty.
+    file: &'static str,
+    /// Always empty.
+    release_notes: &'static str,
+}
+
+impl VersionNumbers {
+    /// The version that runs.
+    fn current() -> Self {
+        // Cargo writes numbers.
+        let number = |text: &str| text.parse().unwrap_or_default();
+        Self {
+            major: number(env!("CARGO_PKG_VERSION_MAJOR")),
+            minor: number(env!("CARGO_PKG_VERSION_MINOR")),
+            patch: number(env!("CARGO_PKG_VERSION_PATCH")),
+            pre_release: env!("CARGO_PKG_VERSION_PRE"),
+            build: 0,
+            security_update: false,
+            file: "",
+            release_notes: "",
+        }
+    }
 }
 
 /// Ping the server (CodeProject.AI)
@@ -60,6 +104,8 @@ pub(in crate::api) async fn update_available() -> Json<VersionStatus> {
         success: true,
         message: "Lookdown does not look for updates.",
         update_available: false,
-        version: env!("CARGO_PKG_VERSION"),
+        version: VersionNumbers::current(),
+        current: VersionNumbers::current(),
+        latest: VersionNumbers::current(),
     })
 }
