@@ -31,6 +31,16 @@ class Dist(unittest.TestCase):
         models = {name.split("/")[1] for name in names if name.endswith("/model.onnx")}
         self.assertEqual(models, {model.name for model in pins.models + pins.derived if model.default})
 
+    def test_another_processor_has_its_own_library_and_emulator(self):
+        pins = read_pins(ROOT / "scripts" / "pins.toml")
+        sources = {name: source for source, name in files_of(ROOT, pins, "aarch64", self.here)}
+        self.assertEqual(sources["runtime/libonnxruntime.so"], self.here / "runtime/libonnxruntime.so")
+        self.assertEqual(sources["LICENSE"], ROOT / "LICENSE")
+        copy_files(self.folder, self.binary, iter(()))
+        (self.folder / "lookdown").chmod(0o644)
+        describe_commands(self.folder, ["sh"])
+        self.assertTrue((self.folder / "man/man1/lookdown.1").is_file())
+
     def test_a_file_that_is_missing_is_named(self):
         with self.assertRaises(SystemExit) as refused:
             copy_files(self.folder, self.binary, iter([(self.here / "gone.so", "gone.so")]))
