@@ -1,4 +1,4 @@
-"""Training samples out of composed frames: quarter-turn tiles and crops. Numpy and OpenCV only.
+"""Training samples out of composed frames: quarter-turn tiles, crops, and upright perspective views. Numpy and OpenCV only.
 
 A frame is turned by a multiple of 90°, so that axis-parallel boxes stay exact; persons who then stand farther than
 `UPRIGHT_LIMIT` from upright are ignored, since another turn has them upright.
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from generator.geometry import circle_radius
+from generator.geometry import circle_radius, radius_of
 
 UPRIGHT_LIMIT = 62.0
 """Degrees between a person's foot-to-head direction and the sample's up."""
@@ -21,6 +21,11 @@ BELOW_CAMERA = 12.0
 """Degrees from straight down within which a person has no upright direction and counts in every turn."""
 TILE_WIDTH = 1.5
 """Side of a tile in radii of the lens circle: from the rim down to half a radius beyond the centre."""
+
+RINGS = ((0.05, 75.0, 0.15), (0.85, 90.0, 0.45), (1.25, 45.0, 0.4))
+"""Perspective views as the profiles have them: angle from straight down (radians), field of view (degrees), share."""
+VIEW_MARGIN = 0.5
+"""Persons are followed this far beyond each border of a view, in its width, to know how much of them it cuts off."""
 
 
 def turned(width, height, boxes, angles, quarter):
@@ -37,13 +42,17 @@ def cut(image, boxes, ignore, x, y, scale, size):
     matrix = np.array([[scale, 0, -x * scale + 0.5 * scale - 0.5], [0, scale, -y * scale + 0.5 * scale - 0.5]])
     source = cv2.GaussianBlur(image, (0, 0), 0.45 / scale) if scale < 0.75 else image
     sample = cv2.warpAffine(source, matrix, (size, size), flags=cv2.INTER_LINEAR, borderValue=(0, 0, 0))
-    moved = (boxes - (x, y, x, y)) * scale
+    return sample, *kept((boxes - (x, y, x, y)) * scale, ignore, size)
+
+
+def kept(moved, ignore, size):
+    """Boxes of a sample, clipped to it, and ignore flags. Scraps are ignored, and less than those dropped."""
     clipped = np.clip(moved, 0, size)
     area = lambda b: np.clip(b[:, 2] - b[:, 0], 0, None) * np.clip(b[:, 3] - b[:, 1], 0, None)
     left = area(clipped) / np.maximum(area(moved), 1e-6)
     sides = np.minimum(clipped[:, 2] - clipped[:, 0], clipped[:, 3] - clipped[:, 1])
     keep = (left > 0.05) & (sides > 1)
-    return sample, clipped[keep].astype(np.float32), (ignore | (left < 0.5) | (sides < 5))[keep]
+    return clipped[keep].astype(np.float32), (ignore | (left < 0.5) | (sides < 5))[keep]
 
 
 def jitter(image, rng):
@@ -52,6 +61,35 @@ def jitter(image, rng):
     if rng.random() < 0.15:
         out = np.repeat(out.mean(2, keepdims=True), 3, 2)
     return np.clip(out * rng.uniform(0.93, 1.07, 3), 0, 255).astype(np.uint8)
+
+
+def view_rays(up, theta, phi, field_of_view, roll, size, margin):
+    """Rays in the camera of the pixels of an upright perspective view, as an array of rows × columns × 3.
+
+    `up`: the world's up in the camera. The view looks `theta` away from straight down, at azimuth `phi`; angles in radians.
+    The array reaches `margin` pixels beyond each border.
+    """
+    down = -np.asarray(up, float)
+    across = np.cross(down, [1.0, 0, 0] if abs(down[0]) < 0.9 else [0, 1.0, 0])
+    across /= np.linalg.norm(across)
+    outward = math.cos(phi) * across + math.sin(phi) * np.cross(down, across)
+    ahead = math.cos(theta) * down + math.sin(theta) * outward
+    below = math.sin(theta) * down - math.cos(theta) * outward
+    right = np.cross(below, ahead)
+    right, below = math.cos(roll) * right + math.sin(roll) * below, math.cos(roll) * below - math.sin(roll) * right
+    at = (np.arange(-margin, size + margin) + 0.5 - size / 2) * (2 * math.tan(field_of_view / 2) / size)
+    return ahead + at[None, :, None] * right + at[:, None, None] * below
+
+
+def frame_maps(rays, native_lens):
+    """Columns and rows of the frame at these rays, as cv2.remap takes them; outside the frame beyond the lens circle."""
+    lens = dict(native_lens, focal=native_lens.get("focal", native_lens.get("fx")))
+    rho = np.hypot(rays[..., 0], rays[..., 1])
+    theta = np.arctan2(rho, rays[..., 2])
+    scale = radius_of(lens, np.minimum(theta, lens["max_theta"])) / np.maximum(rho, 1e-12)
+    scale[theta > lens["max_theta"]] = np.nan
+    maps = [lens[centre] + scale * rays[..., k] for k, centre in enumerate(("cx", "cy"))]
+    return [np.nan_to_num(m, nan=-1e4).astype(np.float32) for m in maps]
 
 
 class Frames:
@@ -82,8 +120,49 @@ class Frames:
             (lens["cx"], lens["cy"], radius),
         )
 
-    def sample(self, rng, size, tile_share=0.5):
+    def view(self, k, size, theta, phi, field_of_view, roll=0.0):
+        """An upright perspective view of frame `k`: image (size × size × 3), boxes, ignore flags. Angles in radians."""
+        about = self.images[k]
+        native = json.loads((self.folder / "calibrations" / f"{about['calibration']}.json").read_text())
+        margin = round(VIEW_MARGIN * size)
+        rays = view_rays(native["mount"]["world_up"], theta, phi, field_of_view, roll, size, margin)
+        columns, rows = frame_maps(rays, native["lens"])
+        ids = cv2.remap(
+            cv2.imread(str(self.folder / about["id_mask"]), cv2.IMREAD_UNCHANGED), columns, rows, cv2.INTER_NEAREST
+        )
+        inner = slice(margin, margin + size)
+        frame = cv2.imread(str(self.folder / "images" / about["file_name"]))
+        image = cv2.remap(frame, columns[inner, inner], rows[inner, inner], cv2.INTER_LINEAR)
+        boxes, ignore = [], []
+        for annotation in self.annotations[about["id"]]:
+            ys, xs = np.nonzero(ids == annotation["id_value"])
+            if len(xs):
+                boxes.append((xs.min(), ys.min(), xs.max() + 1, ys.max() + 1))
+                ignore.append(annotation["ignore"])
+        boxes, ignore = kept(np.array(boxes, float).reshape(-1, 4) - margin, np.array(ignore, bool), size)
+        return cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, ignore
+
+    def random_view(self, rng, size):
+        """A random upright perspective view."""
+        theta, field_of_view, _ = RINGS[rng.choice(len(RINGS), p=[share for _, _, share in RINGS])]
+        theta, phi = theta + rng.normal() * 0.12, rng.uniform(0, 2 * math.pi)
+        field_of_view = math.radians(field_of_view * rng.uniform(0.85, 1.15))
+        k = int(rng.integers(len(self.images)))
+        return self.view(k, size, theta, phi, field_of_view, roll=rng.normal() * 0.04)
+
+    def sample(self, rng, size, tile_share=0.5, view_share=0.0):
         """One random sample: image (size × size × 3), boxes, ignore flags."""
+        if rng.random() < view_share:
+            image, boxes, ignore = self.random_view(rng, size)
+        else:
+            image, boxes, ignore = self.turned_sample(rng, size, tile_share)
+        if rng.random() < 0.5:
+            image = image[:, ::-1]
+            boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
+        return jitter(image, rng), boxes, ignore
+
+    def turned_sample(self, rng, size, tile_share):
+        """A random tile or crop of a turned frame."""
         image, boxes, angles, ignore, (cx, cy, radius) = self.load(int(rng.integers(len(self.images))))
         quarter = int(rng.integers(4))
         centre = np.array([[cx, cy, cx, cy]]) + 0.5  # Boxes count from a pixel's corner.
@@ -108,11 +187,7 @@ class Frames:
                 (x0 + x1) / 2 - size / scale * rng.uniform(0.25, 0.75),
                 (y0 + y1) / 2 - size / scale * rng.uniform(0.25, 0.75),
             )
-        sample, boxes, ignore = cut(image, boxes, ignore, x, y, scale, size)
-        if rng.random() < 0.5:
-            sample = sample[:, ::-1]
-            boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
-        return jitter(sample, rng), boxes, ignore
+        return cut(image, boxes, ignore, x, y, scale, size)
 
 
 class Pack:
@@ -125,7 +200,7 @@ class Pack:
             id(f): {name: f[name] for name in ("bytes", "start", "boxes", "ignore", "first")} for f in self.files
         }
 
-    def sample(self, rng, size, tile_share=None):
+    def sample(self, rng, size, tile_share=None, view_share=None):
         file, k = self.where[int(rng.integers(len(self.where)))]
         c = self.cache[id(file)]
         image = cv2.imdecode(c["bytes"][c["start"][k] : c["start"][k + 1]], cv2.IMREAD_COLOR)[..., ::-1]

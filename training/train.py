@@ -36,6 +36,7 @@ def options_of():
     parser.add_argument(
         "--tiles", type=float, default=0.5, help="share of whole quarter-turn tiles; the rest are crops"
     )
+    parser.add_argument("--views", type=float, default=0.0, help="share of upright perspective views among all samples")
     parser.add_argument("--share", type=float, default=0.5, help="share of the tuned weights in the average")
     parser.add_argument("--seed", type=int, default=1_000_000)
     parser.add_argument("--threads", type=int, default=1)
@@ -50,7 +51,7 @@ def feeder(source, o, workers=1):
     def fill(number):
         rng = np.random.default_rng([o.seed, number, time.time_ns() % 2**31])
         while True:
-            drawn = [source.sample(rng, o.size, o.tiles) for _ in range(o.batch)]
+            drawn = [source.sample(rng, o.size, o.tiles, o.views) for _ in range(o.batch)]
             batches.put((np.stack([d[0] for d in drawn]), [d[1] for d in drawn], [d[2] for d in drawn]))
 
     for number in range(workers):

@@ -89,6 +89,12 @@ def scores(frames):
     }
 
 
+def with_persons_off(frames):
+    """The scores, and the mean difference of the numbers of persons and tracks: in sum, and without its sign."""
+    difference = [len(found_ids) - len(true_ids) for true_ids, found_ids, _ in frames]
+    return scores(frames) | {"persons": float(np.mean(np.abs(difference))), "more": float(np.mean(difference))}
+
+
 def box_scores(frames, matches):
     """Scores of tracks given as (track, index of the detection) of each frame, on the detections' boxes."""
     rows = []
@@ -96,7 +102,7 @@ def box_scores(frames, matches):
         truth = [person["box"] for person in frame["truth"]]
         found = [frame["persons"][index]["box"] for _, index in pairs]
         rows.append(([p["id"] for p in frame["truth"]], [track for track, _ in pairs], overlap(truth, found)))
-    return scores(rows)
+    return with_persons_off(rows)
 
 
 def floor_scores(frames, places):
@@ -106,9 +112,7 @@ def floor_scores(frames, places):
         everyone = frame["everyone"]
         near = nearness([p[1:] for p in everyone], [t[1:] for t in tracks])
         rows.append(([p[0] for p in everyone], [t[0] for t in tracks], near))
-    result = scores(rows)
-    result["persons"] = float(np.mean([abs(len(row[0]) - len(row[1])) for row in rows]))
-    return result
+    return with_persons_off(rows)
 
 
 def line_crossings(frames, matches, line_x, band):
@@ -211,7 +215,7 @@ def main():
         "lost_track_buffer": given.lost,
     }
     options = {"persons": given.persons, "seconds": given.seconds, "settings": given.settings}
-    header = ["scene", "detector", "frames/s", "tracks", "HOTA", "IDF1", "worst", "MOTA", "switches", "persons off"]
+    header = ["scene", "detector", "frames/s", "tracks", "HOTA", "IDF1", "worst", "MOTA", "switches", "persons off", "more"]
     header += ["crossings", "% totals", "% each"]
     print("| " + " | ".join(header) + " |\n" + "|---" * len(header) + "|")
     jobs = defaultdict(list)
@@ -227,7 +231,7 @@ def main():
             for name, row in summary([run.result() for run in runs]).items():
                 cells = [scene, detector, rate, name, f"{row['HOTA']:.3f}", f"{row['IDF1']:.3f}"]
                 cells += [f"{row['IDF1 worst']:.3f}", f"{row['MOTA']:.3f}", f"{row['switches']:.1f}"]
-                cells += [f"{row['persons']:.2f}" if "persons" in row else "", int(row["crossings"])]
+                cells += [f"{row['persons']:.2f}", f"{row['more']:+.2f}", int(row["crossings"])]
                 cells += [f"{row['total']:.1f}", f"{row['wrong']:.1f}"]
                 print("| " + " | ".join(map(str, cells)) + " |")
                 sys.stdout.flush()

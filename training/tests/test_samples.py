@@ -1,11 +1,12 @@
 """Tests of the training samples: quarter turns and cuts keep boxes exact."""
 
+import math
 import unittest
 
 import numpy as np
 from generator.boxes import axis_box
 
-from samples import cut, turned
+from samples import cut, frame_maps, kept, turned, view_rays
 
 
 class Samples(unittest.TestCase):
@@ -40,6 +41,35 @@ class Samples(unittest.TestCase):
             60,
         )
         self.assertEqual(list(ignore), [True, False])
+
+    def test_a_view_looks_where_it_is_told(self):
+        up = np.array([0, 0.6, -0.8])
+        rays = view_rays(up, math.radians(50), 1.0, math.radians(90), 0.0, 101, 20)
+        middle = rays[70, 70] / np.linalg.norm(rays[70, 70])
+        self.assertAlmostEqual(math.degrees(math.acos(middle @ -up)), 50, places=9)
+        right, left = rays[70, 120] - rays[70, 70], rays[70, 20] - rays[70, 70]
+        self.assertAlmostEqual(np.linalg.norm(right), 100 / 101, places=9)
+        np.testing.assert_allclose(right, -left, atol=1e-12)
+
+    def test_up_in_a_view_is_up_in_the_world(self):
+        up = np.array([0, 0.6, -0.8])
+        rays = view_rays(up, math.radians(50), 1.0, math.radians(90), 0.0, 100, 0)
+        rise = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)) @ up
+        self.assertTrue((np.diff(rise, axis=0) < 0).all())
+        np.testing.assert_allclose(rise[:, 0], rise[:, -1], atol=1e-12)
+
+    def test_rays_meet_the_pixels_of_the_lens(self):
+        lens = {"model": "equidistant", "focal": 100.0, "cx": 200.0, "cy": 210.0, "max_theta": 1.5}
+        rays = np.array([[[math.sin(0.5), 0, math.cos(0.5)], [0, math.sin(1.6), math.cos(1.6)]]])
+        columns, rows = frame_maps(rays, lens)
+        np.testing.assert_allclose([columns[0, 0], rows[0, 0]], [250, 210], atol=1e-4)
+        self.assertLess(columns[0, 1], 0)
+
+    def test_boxes_beyond_a_sample_are_clipped_ignored_or_dropped(self):
+        boxes = np.array([[10.0, 10, 30, 30], [-15, 10, 5, 30], [-50, 0, -10, 20]])
+        clipped, ignore = kept(boxes, np.zeros(3, bool), 100)
+        np.testing.assert_array_equal(clipped, [[10, 10, 30, 30], [0, 10, 5, 30]])
+        self.assertEqual(list(ignore), [False, True])
 
 
 if __name__ == "__main__":

@@ -24,9 +24,9 @@ const BODY_RADIUS_M: f64 = 0.25;
 const CORRELATION_S: f64 = 1.0;
 const SLOW_SHARE: f64 = 0.5;
 /// Share of the background's false alarms that come from fixed places (posters, coat stands).
-const FIXED_SHARE: f64 = 0.6;
-/// Most frames in which such a place has one, as a share.
-const FIXED_PRESENCE: f64 = 0.5;
+const FIXED_SHARE: f64 = 0.85;
+/// Share of the variance of their scores between such places; the rest changes over time.
+const FIXED_BETWEEN: f64 = 0.75;
 /// Time over which the score of such a place stays the same, seconds.
 const FIXED_CORRELATION_S: f64 = 3.0;
 /// Loss of the logit of a person who is half hidden behind another one.
@@ -40,9 +40,15 @@ pub struct Camera {
     figures: Figures,
     chance: Chance,
     errors: HashMap<u64, Errors>,
-    fixed: Vec<(Vector2<f64>, Slow)>,
-    /// Share of the frames in which a fixed place has a false alarm.
-    fixed_presence: f64,
+    fixed: Vec<FixedPlace>,
+}
+
+/// A thing that is taken for a person.
+struct FixedPlace {
+    place: Vector2<f64>,
+    /// Standard normal numbers: the part of the score that stays, and the part that changes.
+    lasting: f64,
+    changing: Slow,
 }
 
 /// The slow errors of one person.
@@ -68,22 +74,21 @@ impl Camera {
     ) -> Self {
         let centre = (FRAME_PX - 1.0) / 2.0;
         let lens = Lens::equidistant_circle(centre, centre, FRAME_PX / 2.0, 90_f64.to_radians());
-        let present = figures.background.count * FIXED_SHARE;
-        let places = (present / FIXED_PRESENCE).ceil();
-        let mut fixed = Vec::new();
-        let mut left = places;
-        while left > 0.0 {
-            let x = chance.uniform(-reach_m.x, reach_m.x);
-            let y = chance.uniform(-reach_m.y, reach_m.y);
-            fixed.push((Vector2::new(x, y), Slow::default()));
-            left -= 1.0;
-        }
+        let places = chance.count(figures.background.count * FIXED_SHARE);
+        let fixed = (0..places).map(|_| FixedPlace {
+            place: Vector2::new(
+                chance.uniform(-reach_m.x, reach_m.x),
+                chance.uniform(-reach_m.y, reach_m.y),
+            ),
+            lasting: chance.normal(),
+            changing: Slow::default(),
+        });
+        let fixed = fixed.collect();
         Self {
             pose,
             lens: lens.expect("a valid lens"),
             mount: Mount::new(Unit::new_normalize(-Vector3::z()), pose.height_m),
             figures: *figures,
-            fixed_presence: present / places,
             fixed,
             errors: HashMap::new(),
             chance,
@@ -158,12 +163,14 @@ impl Camera {
     fn invent(&mut self, at_s: f64, found: &mut Vec<(Observation, OrientedBox)>) {
         let Figures { background, .. } = self.figures;
         for index in 0..self.fixed.len() {
-            let (place, mut slow) = self.fixed[index];
-            let value = slow.at(at_s, FIXED_CORRELATION_S, &mut self.chance);
-            self.fixed[index].1 = slow;
-            if self.chance.happens(self.fixed_presence)
-                && let Some(shown) = self.show(0, place, 1.7)
-            {
+            let fixed = &mut self.fixed[index];
+            let changing = fixed
+                .changing
+                .at(at_s, FIXED_CORRELATION_S, &mut self.chance);
+            let value =
+                FIXED_BETWEEN.sqrt() * fixed.lasting + (1.0 - FIXED_BETWEEN).sqrt() * changing;
+            let place = fixed.place;
+            if let Some(shown) = self.show(0, place, 1.7) {
                 found.extend(self.observe(shown.oriented, background.logit_of(value)));
             }
         }

@@ -57,6 +57,12 @@ impl Motion {
             .map(|tangent| Matrix3::from(tangent) * Vector3::z())
     }
 
+    /// Returns the place on the floor (z is 0), or the direction in the camera's frame.
+    pub fn place(&self) -> Vector3<f64> {
+        self.direction()
+            .unwrap_or_else(|| self.kalman.place().push(0.0))
+    }
+
     /// Returns the place on the floor expected at `at_s`, metres; `None` in bearing space.
     pub fn floor_at(&self, at_s: f64) -> Option<[f64; 2]> {
         let state = self.on_floor()?;

@@ -81,6 +81,8 @@ pub struct PlaneSettings {
     pub velocity_sd: f64,
     /// Density of false and new persons: number per square unit of a frame.
     pub clutter_density: f64,
+    /// A person who has moved this far looks different, units.
+    pub independent_distance: f64,
 }
 
 impl TrackerSettings {
@@ -96,28 +98,30 @@ impl TrackerSettings {
 impl Default for TrackerSettings {
     fn default() -> Self {
         Self {
-            high_score: 0.1,
+            high_score: 0.08,
             low_score: 0.06,
             new_track_score: 0.35,
-            least_score_in_line: 0.6,
+            least_score_in_line: 0.47,
             new_track_score_in_line: 0.85,
             max_unseen_s: 2.0,
             max_missed: 3,
             max_silent_s: 10.0,
             max_lateness_s: 2.0,
             max_tracks: 512,
-            score_share: 0.3,
+            score_share: 0.4,
             noise: MeasurementNoise::default(),
             evidence: EvidenceSettings::default(),
             floor: PlaneSettings {
-                acceleration_density: 0.7,
-                velocity_sd: 1.2,
-                clutter_density: 0.02,
+                acceleration_density: 0.6,
+                velocity_sd: 0.9,
+                clutter_density: 0.025,
+                independent_distance: 0.5,
             },
             bearing: PlaneSettings {
-                acceleration_density: 0.038,
+                acceleration_density: 0.034,
                 velocity_sd: 0.35,
-                clutter_density: 0.15,
+                clutter_density: 0.19,
+                independent_distance: 0.17,
             },
         }
     }
@@ -127,16 +131,16 @@ impl Default for MeasurementNoise {
     fn default() -> Self {
         Self {
             body_m: 0.08,
-            below_m: 0.25,
+            below_m: 0.22,
             below_range_m: 0.8,
-            angle_deg: 1.5,
-            across_deg: 0.3,
+            angle_deg: 1.1,
+            across_deg: 0.2,
             foot_offset_m: 0.12,
             bearing_along_deg: 1.3,
             bearing_across_deg: 0.8,
             low_score_factor: 2.0,
             same_person_m: 0.4,
-            same_person_share: 0.16,
+            same_person_share: 0.19,
             same_person_along_deg: 12.0,
             same_person_across_deg: 4.3,
         }

@@ -83,6 +83,46 @@ fn low_scores_continue_tracks_but_start_none() {
 }
 
 #[test]
+fn a_weak_thing_that_stands_still_is_no_person() {
+    let mut tracker = floor_tracker();
+    let mut ended = Vec::new();
+    for frame in 0..300 {
+        let at_s = f64::from(frame) / 5.0;
+        // A poster, now and then as clear as a person.
+        let poster = with_score(2.0, 2.0, if frame % 10 == 0 { 0.6 } else { 0.3 });
+        ended.extend(tracker.update(0, at_s, &[poster]).unwrap());
+        assert_eq!(ids(&tracker), [0; 0], "{at_s}");
+    }
+    assert_eq!(ended, []);
+}
+
+#[test]
+fn a_weak_person_who_walks_is_one() {
+    let mut tracker = floor_tracker();
+    for frame in 0..30 {
+        let at_s = f64::from(frame) / 5.0;
+        let person = with_score(at_s - 3.0, 1.0, 0.36);
+        tracker.update(0, at_s, &[person]).unwrap();
+    }
+    assert_eq!(ids(&tracker), [1]);
+}
+
+#[test]
+fn a_track_that_stays_on_a_weak_thing_ends() {
+    let mut tracker = floor_tracker();
+    walk(&mut tracker, 0..15, |_| true);
+    assert_eq!(ids(&tracker), [1]);
+    let mut ended = Vec::new();
+    for frame in 15..150 {
+        let at_s = f64::from(frame) / 5.0;
+        let poster = with_score(-0.2, 1.0, 0.2);
+        ended.extend(tracker.update(0, at_s, &[poster]).unwrap());
+    }
+    assert_eq!(ended.len(), 1);
+    assert_eq!(ids(&tracker), [0; 0]);
+}
+
+#[test]
 fn persons_who_pass_each_other_keep_their_tracks() {
     let mut tracker = floor_tracker();
     for frame in 0..30 {

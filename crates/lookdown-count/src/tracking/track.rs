@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -20,6 +21,8 @@ pub struct Track {
     first_seen_s: f64,
     seen_s: f64,
     pub(super) evidence: Evidence,
+    /// The place at which the present evidence began.
+    evidence_place: [f64; 3],
     pub(super) missed: u32,
     confirmed: bool,
     last_person: PersonOfReport,
@@ -74,9 +77,11 @@ impl Track {
     /// Returns a new track, not confirmed yet.
     pub(super) fn new(id: TrackId, seen: &Sighting, settings: &TrackerSettings) -> Self {
         let plane = settings.plane_of(&seen.measured.place);
+        let motion = Motion::new(seen.measured, seen.at_s, plane);
         let mut track = Self {
             id,
-            motion: Motion::new(seen.measured, seen.at_s, plane),
+            evidence_place: motion.place().into(),
+            motion,
             first_seen_s: seen.at_s,
             seen_s: seen.at_s,
             evidence: Evidence::first(seen.measured.score, &settings.evidence),
@@ -95,10 +100,15 @@ impl Track {
     pub(super) fn update(&mut self, seen: &Sighting, settings: &TrackerSettings) {
         let plane = settings.plane_of(&seen.measured.place);
         self.motion.update(seen.measured, seen.at_s, plane);
-        let score = seen.measured.score;
+        let settings = &settings.evidence;
+        let place = self.motion.place();
+        if (place - Vector3::from(self.evidence_place)).norm() >= plane.independent_distance {
+            self.evidence_place = place.into();
+            self.evidence.move_on(settings);
+        }
         self.evidence
-            .add_hit(score, seen.interval_s, &settings.evidence);
-        self.confirmed |= self.evidence.confirms(&settings.evidence);
+            .add_hit(seen.measured.score, seen.interval_s, settings);
+        self.confirmed |= self.evidence.confirms(settings);
         self.record(seen);
     }
 

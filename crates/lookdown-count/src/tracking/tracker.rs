@@ -262,7 +262,7 @@ impl Tracker {
             return -1.0;
         }
         let is_person = self.settings.score_share * log_odds(measured.score);
-        let is_there = track.evidence.log_probability();
+        let is_there = track.evidence.log_probability(&self.settings.evidence);
         innovation.log_density() - plane.clutter_density.ln() + is_person + is_there
     }
 
@@ -308,7 +308,8 @@ impl Tracker {
             let unseen_s = now_s - track.seen_s();
             let is_missed = track.missed >= settings.max_missed && unseen_s > settings.max_unseen_s;
             let is_refuted = track.evidence.refutes(&settings.evidence) && track.missed > 0;
-            is_missed || is_refuted || unseen_s > settings.max_silent_s
+            let is_revoked = track.is_confirmed() && track.evidence.revokes(&settings.evidence);
+            is_missed || is_refuted || is_revoked || unseen_s > settings.max_silent_s
         };
         self.tracks.extract_if(.., is_over).collect()
     }
