@@ -43,6 +43,7 @@ def snapshot(hass) -> dict:
         found[entry.unique_id] = {
             "entity": entry.entity_id,
             "state": state.state if state else None,
+            "state_class": (entry.capabilities or {}).get("state_class"),
             "calibration": state.attributes.get("calibration") if state else None,
             "profile": state.attributes.get("profile") if state else None,
             "device": device.name if device else None,

@@ -89,8 +89,8 @@ def verified(secret: str, message: dict) -> subprocess.CompletedProcess:
     return subprocess.run(command, input=given, capture_output=True, text=True, check=False, timeout=60)
 
 
-class Counts(unittest.TestCase):
-    """Counts of a camera."""
+class CountedCamera(unittest.TestCase):
+    """A server, a broker, and `lookdown count` between them."""
 
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
@@ -131,6 +131,10 @@ class Counts(unittest.TestCase):
             persons = len(json.loads(self.server.post(f"{DETECT}&camera={camera}", OFFICE))["persons"])
             time.sleep(0.1)
         return persons
+
+
+class Counts(CountedCamera):
+    """Counts of a camera."""
 
     def known_seconds(self, count: Count) -> float:
         """The time with reports of the last hour."""

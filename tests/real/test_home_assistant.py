@@ -1,4 +1,4 @@
-"""Lookdown with Home Assistant and mosquitto: the entities of cameras and zones."""
+"""Lookdown with Home Assistant and mosquitto: the entities of cameras, zones and counts."""
 
 import contextlib
 import json
@@ -13,6 +13,7 @@ from pathlib import Path
 from harness.places import ROOT, SAMPLES
 from mosquitto import PASSWORD, USER, Broker, broker
 from support.lookdown import lookdown
+from test_count import CountedCamera
 from waiting import wait_until
 
 HERE = Path(__file__).resolve().parent
@@ -167,6 +168,42 @@ class Entities(unittest.TestCase):
             self.assertEqual(self.home.state(PERSONS), "unavailable")
             wait_until(lambda: self.home.entities() == {}, "the camera is withdrawn", STALE_SECONDS)
             self.until_found(server)
+
+
+class CountEntities(CountedCamera):
+    """Entities of `lookdown count`."""
+
+    PREFIX = "lookdown_office_count"
+
+    def setUp(self):
+        super().setUp()
+        self.home = self.enterContext(home_assistant(self.folder / "home", self.broker))
+
+    def counts(self) -> dict[str, str]:
+        """The states of its entities."""
+        states = {name: entity["state"] for name, entity in self.home.entities().items()}
+        return {name: state for name, state in states.items() if name.startswith(self.PREFIX)}
+
+    def test_counts_appear_and_survive_a_kill(self):
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.send_frames()
+            tracks = wait_until(lambda: (count.get("/counts/office/tracks") or {}).get("tracks"), "there are tracks")
+            crossings = {f"{self.PREFIX}_line_middle_{direction}": "0" for direction in ("east", "west")}
+            self.home.until(crossings | {f"{self.PREFIX}_tracked": str(len(tracks))}, 60)
+            entities = self.home.entities()
+            print("\n" + json.dumps({name: entities[name] for name in self.counts()}, indent=1))
+            for line in crossings:
+                self.assertEqual(entities[line]["state_class"], "total_increasing")
+            self.assertEqual({entities[name]["device"] for name in self.counts()}, {"office"})
+            entries = int(entities[f"{self.PREFIX}_entries_left"]["state"])
+            self.assertGreater(entries, 0)
+            count.stop(signal.SIGKILL)
+        wait_until(lambda: set(self.counts().values()) == {"unavailable"}, "all entities are unavailable", 60)
+        with self.counting():
+            self.send_frames()
+            self.home.until(crossings)
+            self.assertGreaterEqual(int(self.home.state(f"{self.PREFIX}_entries_left")), entries)
 
 
 if __name__ == "__main__":
