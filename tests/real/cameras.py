@@ -19,6 +19,7 @@ HERE = Path(__file__).resolve().parent
 USER, PASSWORD = "viewer", "s@cret/of:gate"
 REALM = "camera"
 CHUNK = 4096
+CLOCK_BITS = 24
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
@@ -105,8 +106,21 @@ def http_camera(frames: list[bytes], rate: float) -> Iterator[int]:
 @contextlib.contextmanager
 def rtsp_camera(folder: Path, rate: int, *login: str) -> Iterator[int]:
     """Serves the files `0.jpg`, `1.jpg` … of a folder over RTSP, and yields the port."""
+    with _rtsp_server("rtsp_server.py", folder, str(rate), *login) as port:
+        yield port
+
+
+@contextlib.contextmanager
+def rtsp_clock(rate: int) -> Iterator[int]:
+    """Serves pictures that show the time over RTSP, and yields the port."""
+    with _rtsp_server("rtsp_clock.py", str(rate)) as port:
+        yield port
+
+
+@contextlib.contextmanager
+def _rtsp_server(script: str, *arguments: object) -> Iterator[int]:
     (port,) = free_ports(1)
-    command = ["/usr/bin/python3", HERE / "rtsp_server.py", str(port), folder, str(rate), *login]
+    command = ["/usr/bin/python3", HERE / script, str(port), *arguments]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def answers() -> bool:
@@ -120,6 +134,14 @@ def rtsp_camera(folder: Path, rate: int, *login: str) -> Iterator[int]:
     finally:
         process.kill()
         process.wait()
+
+
+def shown_milliseconds(image: bytes) -> int:
+    """The lowest bits of the time that a picture of `rtsp_clock` shows."""
+    strip = ["-vf", f"scale={CLOCK_BITS}:12:flags=area,crop={CLOCK_BITS}:1:0:0,format=gray", "-f", "rawvideo", "-"]
+    command = ["ffmpeg", "-v", "error", "-i", "-", *strip]
+    row = subprocess.run(command, input=image, capture_output=True, check=True).stdout
+    return int("".join("1" if value > 127 else "0" for value in row), 2)
 
 
 class Proxy:

@@ -13,9 +13,11 @@ import time
 import unittest
 import urllib.request
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
+from statistics import median
 
-from cameras import PASSWORD, USER, http_camera, proxy, rtsp_camera
+from cameras import CLOCK_BITS, PASSWORD, USER, http_camera, proxy, rtsp_camera, rtsp_clock, shown_milliseconds
 from harness.places import LOOKDOWN, SAMPLES
 from harness.processes import free_ports
 from support.lookdown import TINY, lookdown
@@ -28,6 +30,10 @@ FAULT_SECONDS = 4.0
 RATE = 5
 SIDE = 480
 CHILDREN_SECONDS = 15.0
+STREAM_RATE = 15
+RECENT_FRAMES = 15
+RECENT_MILLIS = 1000
+"""The interval. A decoder or encoder that holds a frame back until the next one makes frames older than this."""
 
 
 class Watch:
@@ -290,6 +296,24 @@ class Cameras(unittest.TestCase):
         images = ["-framerate", "1", "-i", self.frames_folder / "%d.jpg"]
         subprocess.run(["ffmpeg", "-v", "error", *images, "-r", "10", "-pix_fmt", "yuv420p", path], check=True)
         return path
+
+    def test_frames_of_a_live_stream_are_recent(self):
+        ages = []
+        with (
+            rtsp_clock(STREAM_RATE) as port,
+            lookdown(TINY | {"RESULTS__PICTURES": "clock"}) as self.server,
+            self.watching(f"rtsp://127.0.0.1:{port}/stream", "--name", "clock", "--every", f"{RECENT_MILLIS}ms") as watch,
+        ):
+            watch.wait_for("clock", 1)
+            while len(ages) < RECENT_FRAMES:
+                watch.wait_for("clock", 1)
+                report = self.latest("clock")
+                image = self.server.get("/results/clock/latest.jpg?draw=none")
+                if self.latest("clock")["request_id"] == report["request_id"]:
+                    captured = datetime.fromisoformat(report["captured_at"]).timestamp()
+                    ages.append((round(captured * 1000) - shown_milliseconds(image)) % 2**CLOCK_BITS)
+        print(f"\nage of a frame when `watch` has it: median {median(ages)} ms, greatest {max(ages)} ms")
+        self.assertLess(median(ages), RECENT_MILLIS)
 
     def test_a_video_file_is_watched_in_real_time_to_its_end(self):
         started = time.monotonic()

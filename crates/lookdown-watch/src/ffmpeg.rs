@@ -49,6 +49,8 @@ impl Ffmpeg {
         command
             .args(["-max_pixels", MAX_PIXELS])
             .args(arguments)
+            // With several threads the encoder holds each frame back until the next one comes.
+            .args(["-threads", "1"])
             .args(["-f", "image2pipe", "-c:v", "mjpeg", "-q:v", "3"])
             .args(["-pix_fmt", "yuvj420p", "pipe:1"])
             .stdin(Stdio::piped())
