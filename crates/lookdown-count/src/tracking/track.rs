@@ -101,9 +101,9 @@ impl Track {
         let plane = settings.plane_of(&seen.measured.place);
         self.motion.update(seen.measured, seen.at_s, plane);
         let settings = &settings.evidence;
-        let place = self.motion.place();
-        if (place - Vector3::from(self.evidence_place)).norm() >= plane.independent_distance {
-            self.evidence_place = place.into();
+        let here = self.motion.place();
+        if (here - Vector3::from(self.evidence_place)).norm() >= plane.independent_distance {
+            self.evidence_place = here.into();
             self.evidence.move_on(settings);
         }
         self.evidence
