@@ -215,8 +215,8 @@ def main():
         "lost_track_buffer": given.lost,
     }
     options = {"persons": given.persons, "seconds": given.seconds, "settings": given.settings}
-    header = ["scene", "detector", "frames/s", "tracks", "HOTA", "IDF1", "worst", "MOTA", "switches", "persons off", "more"]
-    header += ["crossings", "% totals", "% each"]
+    header = ["scene", "detector", "frames/s", "tracks", "HOTA", "IDF1", "worst", "MOTA", "switches"]
+    header += ["persons off", "more", "crossings", "% totals", "% each"]
     print("| " + " | ".join(header) + " |\n" + "|---" * len(header) + "|")
     jobs = defaultdict(list)
     with ProcessPoolExecutor(2) as pool:

@@ -302,7 +302,9 @@ class Cameras(unittest.TestCase):
         with (
             rtsp_clock(STREAM_RATE) as port,
             lookdown(TINY | {"RESULTS__PICTURES": "clock"}) as self.server,
-            self.watching(f"rtsp://127.0.0.1:{port}/stream", "--name", "clock", "--every", f"{RECENT_MILLIS}ms") as watch,
+            self.watching(
+                f"rtsp://127.0.0.1:{port}/stream", "--name", "clock", "--every", f"{RECENT_MILLIS}ms"
+            ) as watch,
         ):
             watch.wait_for("clock", 1)
             while len(ages) < RECENT_FRAMES:
