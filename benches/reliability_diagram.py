@@ -1,0 +1,89 @@
+"""Draws how often persons of a score are right: `reliability_diagram.py OUT.svg DATASET DETECTIONS...`.
+
+DETECTIONS are files of `lookdown eval DATASET --save-detections FOLDER`. A person is right with an IoU of 0.5 or more with
+a true box that no better one has; those in a crowd do not count. Prints the expected calibration error of each file: the
+mean difference between score and share of right persons in ten bins, weighted by their persons (Guo et al., "On Calibration
+of Modern Neural Networks", ICML 2017). Needs the packages of benches/count/requirements.txt.
+"""
+
+import json
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from count.measure_detector import common, corners
+from matplotlib import pyplot
+
+FLOOR, RIGHT, BINS = 0.05, 0.5, 10
+
+
+def judged(dataset, detections):
+    """The scores of the persons from the floor on, and whether each is right."""
+    truth = json.loads((Path(dataset) / "annotations.json").read_text(encoding="utf-8"))
+    persons, found = defaultdict(list), defaultdict(list)
+    for one in truth["annotations"]:
+        persons[one["image_id"]].append(one)
+    for one in detections:
+        if one["score"] >= FLOOR:
+            found[one["image_id"]].append(one)
+    scores, right = [], []
+    for image, ones in found.items():
+        ones.sort(key=lambda one: -one["score"])
+        true = persons[image]
+        crowd = np.array([one.get("iscrowd", 0) for one in true], bool)
+        both, areas, others = common(corners([one["bbox"] for one in ones]), corners([one["bbox"] for one in true]))
+        iou, free = both / (areas + others - both), ~crowd
+        for row, one in enumerate(ones):
+            candidates = np.where(free, iou[row], 0)
+            is_right = candidates.max(initial=0) >= RIGHT
+            if is_right:
+                free[candidates.argmax()] = False
+            elif (both[row] / areas[row])[crowd].max(initial=0) >= RIGHT:
+                continue
+            scores.append(one["score"])
+            right.append(is_right)
+    return np.array(scores), np.array(right)
+
+
+def binned(scores, right):
+    """Of each bin with persons: the number, the mean score, and the share of right ones."""
+    bins = np.minimum((scores * BINS).astype(int), BINS - 1)
+    return np.array([[(bins == b).sum(), scores[bins == b].mean(), right[bins == b].mean()] for b in np.unique(bins)])
+
+
+def error_of(scores, right):
+    """The expected calibration error."""
+    counts, means, shares = binned(scores, right).T
+    return np.average(np.abs(means - shares), weights=counts)
+
+
+def error_by_chance(scores):
+    """The mean error of a detector whose scores are exact probabilities, with as many persons."""
+    chance = np.random.default_rng(1)
+    return np.mean([error_of(scores, chance.random(len(scores)) < scores) for _ in range(500)])
+
+
+def main():
+    """Prints the errors and writes the diagram."""
+    out, dataset, *files = sys.argv[1:]
+    # The same figures give the same file.
+    mpl.rcParams.update({"svg.hashsalt": "lookdown", "svg.fonttype": "none"})
+    figure, axes = pyplot.subplots(figsize=(4.6, 4.4), layout="constrained")
+    axes.plot([0, 1], [0, 1], color="0.6", linestyle="--", linewidth=1)
+    for path in files:
+        scores, right = judged(dataset, json.loads(Path(path).read_text(encoding="utf-8")))
+        _, means, shares = binned(scores, right).T
+        error, name = error_of(scores, right), Path(path).name.split(".")[0]
+        print(
+            f"{name}: expected calibration error {error:.3f} ({error_by_chance(scores):.3f} by chance), {len(scores)} persons"
+        )
+        axes.plot(means, shares, marker="o", markersize=4, label=f"{name}, ECE {error:.3f}")
+    axes.set(xlabel="score", ylabel="share of right persons", xlim=(0, 1), ylim=(0, 1))
+    axes.legend(loc="upper left", frameon=False)
+    figure.savefig(out, metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    main()
