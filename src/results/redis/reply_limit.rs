@@ -90,9 +90,12 @@ impl ReplyMeter {
         while !bytes.is_empty() {
             if self.bulk_left > 0 {
                 let length = usize::try_from(self.bulk_left).unwrap_or(usize::MAX);
-                let length = length.min(bytes.len());
-                self.bulk_left -= length as u64;
-                bytes = &bytes[length..];
+                let (part, rest) = bytes.split_at(length.min(bytes.len()));
+                if !self.has_line_end(part) {
+                    return Err(refused("a string without its line end"));
+                }
+                self.bulk_left -= part.len() as u64;
+                bytes = rest;
                 self.end_if_complete();
                 continue;
             }
@@ -112,6 +115,15 @@ impl ReplyMeter {
             }
         }
         Ok(())
+    }
+
+    /// Returns false if `part`, the next bytes of a bulk string, reaches its line end and differs.
+    fn has_line_end(&self, part: &[u8]) -> bool {
+        [(2, b'\r'), (1, b'\n')].into_iter().all(|(left, byte)| {
+            let index = self.bulk_left.checked_sub(left);
+            let found = index.and_then(|index| part.get(usize::try_from(index).ok()?));
+            found.is_none_or(|&found| found == byte)
+        })
     }
 
     /// Counts the value that the current line begins.
@@ -220,6 +232,22 @@ mod tests {
             let error = ReplyMeter::new(1000).read(header.as_bytes()).unwrap_err();
             let message = error.to_string();
             assert!(message.contains("more than 1000 bytes"), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_string_without_its_line_end_is_refused_at_once() {
+        for reply in ["$1\r\nxy", "$1\r\nx\rx", "$0\r\n\n"].map(str::as_bytes) {
+            for size in 1..=reply.len() {
+                let mut meter = ReplyMeter::new(1000);
+                let mut pieces = reply.chunks(size);
+                let refused = pieces.find_map(|piece| meter.read(piece).err());
+                let message = refused.unwrap().to_string();
+                assert!(
+                    message.contains("line end"),
+                    "{reply:?} in {size}: {message}"
+                );
+            }
         }
     }
 
