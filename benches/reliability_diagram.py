@@ -8,42 +8,22 @@ of Modern Neural Networks", ICML 2017). Needs the packages of benches/count/requ
 
 import json
 import sys
-from collections import defaultdict
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from count.measure_detector import common, corners
+from count.measure_detector import FLOOR, judged
 from matplotlib import pyplot
 
-FLOOR, RIGHT, BINS = 0.05, 0.5, 10
+BINS = 10
 
 
-def judged(dataset, detections):
+def persons_of(dataset, path):
     """The scores of the persons from the floor on, and whether each is right."""
-    truth = json.loads((Path(dataset) / "annotations.json").read_text(encoding="utf-8"))
-    persons, found = defaultdict(list), defaultdict(list)
-    for one in truth["annotations"]:
-        persons[one["image_id"]].append(one)
-    for one in detections:
-        if one["score"] >= FLOOR:
-            found[one["image_id"]].append(one)
-    scores, right = [], []
-    for image, ones in found.items():
-        ones.sort(key=lambda one: -one["score"])
-        true = persons[image]
-        crowd = np.array([one.get("iscrowd", 0) for one in true], bool)
-        both, areas, others = common(corners([one["bbox"] for one in ones]), corners([one["bbox"] for one in true]))
-        iou, free = both / (areas + others - both), ~crowd
-        for row, one in enumerate(ones):
-            candidates = np.where(free, iou[row], 0)
-            is_right = candidates.max(initial=0) >= RIGHT
-            if is_right:
-                free[candidates.argmax()] = False
-            elif (both[row] / areas[row])[crowd].max(initial=0) >= RIGHT:
-                continue
-            scores.append(one["score"])
-            right.append(is_right)
+    detections = json.loads(Path(path).read_text(encoding="utf-8"))
+    kept = [one for one in detections if one["score"] >= FLOOR]
+    rows = [(score, overlap is not None) for score, overlap, _ in judged(dataset, kept)]
+    scores, right = zip(*rows, strict=True)
     return np.array(scores), np.array(right)
 
 
@@ -73,7 +53,7 @@ def main():
     figure, axes = pyplot.subplots(figsize=(4.6, 4.4), layout="constrained")
     axes.plot([0, 1], [0, 1], color="0.6", linestyle="--", linewidth=1)
     for path in files:
-        scores, right = judged(dataset, json.loads(Path(path).read_text(encoding="utf-8")))
+        scores, right = persons_of(dataset, path)
         _, means, shares = binned(scores, right).T
         error, name = error_of(scores, right), Path(path).name.split(".")[0]
         print(

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from generator.geometry import circle_radius, radius_of
+from generator.boxes import axis_box
+from generator.geometry import circle_radius, lens_of, pixels_of
 
 UPRIGHT_LIMIT = 62.0
 """Degrees between a person's foot-to-head direction and the sample's up."""
@@ -26,6 +27,8 @@ RINGS = ((0.05, 75.0, 0.15), (0.85, 90.0, 0.45), (1.25, 45.0, 0.4))
 """Perspective views as the profiles have them: angle from straight down (radians), field of view (degrees), share."""
 VIEW_MARGIN = 0.5
 """Persons are followed this far beyond each border of a view, in its width, to know how much of them it cuts off."""
+OUTSIDE = -1e4
+"""A column and row outside of every frame."""
 
 
 def turned(width, height, boxes, angles, quarter):
@@ -56,11 +59,19 @@ def kept(moved, ignore, size):
 
 
 def jitter(image, rng):
-    """Small changes of colour; mirrored half of the time by the caller."""
+    """Small changes of colour."""
     out = image.astype(np.float32) * rng.uniform(0.75, 1.3) + rng.uniform(-18, 18)
     if rng.random() < 0.15:
         out = np.repeat(out.mean(2, keepdims=True), 3, 2)
     return np.clip(out * rng.uniform(0.93, 1.07, 3), 0, 255).astype(np.uint8)
+
+
+def varied(image, boxes, rng):
+    """A square sample with its boxes, mirrored half of the time, with small changes of colour."""
+    if rng.random() < 0.5:
+        image, size = image[:, ::-1], image.shape[1]
+        boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
+    return jitter(image, rng), boxes
 
 
 def view_rays(up, theta, phi, field_of_view, roll, size, margin):
@@ -83,13 +94,10 @@ def view_rays(up, theta, phi, field_of_view, roll, size, margin):
 
 def frame_maps(rays, native_lens):
     """Columns and rows of the frame at these rays, as cv2.remap takes them; outside the frame beyond the lens circle."""
-    lens = dict(native_lens, focal=native_lens.get("focal", native_lens.get("fx")))
-    rho = np.hypot(rays[..., 0], rays[..., 1])
-    theta = np.arctan2(rho, rays[..., 2])
-    scale = radius_of(lens, np.minimum(theta, lens["max_theta"])) / np.maximum(rho, 1e-12)
-    scale[theta > lens["max_theta"]] = np.nan
-    maps = [lens[centre] + scale * rays[..., k] for k, centre in enumerate(("cx", "cy"))]
-    return [np.nan_to_num(m, nan=-1e4).astype(np.float32) for m in maps]
+    lens = lens_of(native_lens)
+    columns, rows, theta = pixels_of(lens, lens["cx"], lens["cy"], rays)
+    outside = theta > lens["max_theta"]
+    return [np.where(outside, OUTSIDE, at).astype(np.float32) for at in (columns, rows)]
 
 
 class Frames:
@@ -127,19 +135,16 @@ class Frames:
         margin = round(VIEW_MARGIN * size)
         rays = view_rays(native["mount"]["world_up"], theta, phi, field_of_view, roll, size, margin)
         columns, rows = frame_maps(rays, native["lens"])
-        ids = cv2.remap(
-            cv2.imread(str(self.folder / about["id_mask"]), cv2.IMREAD_UNCHANGED), columns, rows, cv2.INTER_NEAREST
-        )
+        mask = cv2.imread(str(self.folder / about["id_mask"]), cv2.IMREAD_UNCHANGED)
+        ids = cv2.remap(mask, columns, rows, cv2.INTER_NEAREST)
         inner = slice(margin, margin + size)
         frame = cv2.imread(str(self.folder / "images" / about["file_name"]))
         image = cv2.remap(frame, columns[inner, inner], rows[inner, inner], cv2.INTER_LINEAR)
-        boxes, ignore = [], []
-        for annotation in self.annotations[about["id"]]:
-            ys, xs = np.nonzero(ids == annotation["id_value"])
-            if len(xs):
-                boxes.append((xs.min(), ys.min(), xs.max() + 1, ys.max() + 1))
-                ignore.append(annotation["ignore"])
-        boxes, ignore = kept(np.array(boxes, float).reshape(-1, 4) - margin, np.array(ignore, bool), size)
+        found = [(axis_box(ids == a["id_value"]), a["ignore"]) for a in self.annotations[about["id"]]]
+        found = [(box, ignore) for box, ignore in found if box]
+        boxes = np.array([box for box, _ in found], float).reshape(-1, 4)
+        boxes[:, 2:] += boxes[:, :2]
+        boxes, ignore = kept(boxes - margin, np.array([ignore for _, ignore in found], bool), size)
         return cv2.cvtColor(image, cv2.COLOR_BGR2RGB), boxes, ignore
 
     def random_view(self, rng, size):
@@ -156,10 +161,7 @@ class Frames:
             image, boxes, ignore = self.random_view(rng, size)
         else:
             image, boxes, ignore = self.turned_sample(rng, size, tile_share)
-        if rng.random() < 0.5:
-            image = image[:, ::-1]
-            boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
-        return jitter(image, rng), boxes, ignore
+        return *varied(image, boxes, rng), ignore
 
     def turned_sample(self, rng, size, tile_share):
         """A random tile or crop of a turned frame."""
@@ -208,10 +210,8 @@ class Pack:
         if image.shape[0] != size:
             boxes = boxes * (size / image.shape[0])
             image = cv2.resize(np.ascontiguousarray(image), (size, size), interpolation=cv2.INTER_AREA)
-        if rng.random() < 0.5:
-            image = image[:, ::-1]
-            boxes = np.stack([size - boxes[:, 2], boxes[:, 1], size - boxes[:, 0], boxes[:, 3]], 1)
-        return jitter(image, rng), boxes.astype(np.float32), ignore
+        image, boxes = varied(image, boxes, rng)
+        return image, boxes.astype(np.float32), ignore
 
 
 def pack(frames, out, count, size, seed, per_file=500, quality=88):

@@ -1,7 +1,7 @@
 """Measures a detector for the simulation of walks: `measure_detector.py LOOKDOWN DATASET DETECTIONS`.
 
 LOOKDOWN is the program, and DETECTIONS a file of `lookdown eval DATASET --save-detections FOLDER`. Prints the constants
-of crates/lookdown-count/examples/simulate/detector.rs: misses by the angle off the axis, false alarms and the error of
+of crates/lookdown-count/examples/simulate/figures.rs: misses by the angle off the axis, false alarms and the error of
 the edges of boxes.
 """
 
@@ -55,38 +55,41 @@ def common(ones, others):
     return size.prod(-1), *areas
 
 
-def matched(dataset, detections):
-    """IoUs of right boxes from the threshold on, scores of parts and of background, and the number of persons."""
+def judged(dataset, detections):
+    """Each detection by falling score in its image, with the IoU of the person that it is right for, if any, and whether it
+    overlaps a person; without those in a crowd."""
     truth = json.loads((Path(dataset) / "annotations.json").read_text(encoding="utf-8"))
     persons, found = defaultdict(list), defaultdict(list)
     for one in truth["annotations"]:
         persons[one["image_id"]].append(one)
     for one in detections:
         found[one["image_id"]].append(one)
-    overlaps, parts, background, count = [], [], [], 0
-    for image in truth["images"]:
-        true = persons[image["id"]]
+    for image, ones in found.items():
+        best, true = sorted(ones, key=lambda one: -one["score"]), persons[image]
         crowd = np.array([one.get("iscrowd", 0) for one in true], bool)
-        count += int((~crowd).sum())
-        best = sorted(found[image["id"]], key=lambda one: -one["score"])
-        if not best:
-            continue
         both, areas, others = common(corners([one["bbox"] for one in best]), corners([one["bbox"] for one in true]))
-        iou = both / (areas + others - both)
+        iou, inside = both / (areas + others - both), both / areas
         free = ~crowd
         for row, one in enumerate(best):
             candidates = np.where(free, iou[row], 0)
-            person = int(candidates.argmax()) if len(candidates) else 0
-            if len(candidates) and candidates[person] >= RIGHT:
-                free[person] = False
-                if one["score"] >= THRESHOLD:
-                    overlaps.append(candidates[person])
-            elif len(candidates) and (both[row] / areas[row])[crowd].max(initial=0) >= RIGHT:
-                continue
-            elif len(candidates) and (iou[row].max() >= PART or (both[row] / areas[row]).max() >= RIGHT):
-                parts.append(one["score"])
-            else:
-                background.append(one["score"])
+            overlap = candidates.max(initial=0)
+            if overlap >= RIGHT:
+                free[candidates.argmax()] = False
+                yield one["score"], overlap, True
+            elif inside[row][crowd].max(initial=0) < RIGHT:
+                yield one["score"], None, iou[row].max(initial=0) >= PART or inside[row].max(initial=0) >= RIGHT
+
+
+def matched(dataset, detections):
+    """IoUs of right boxes from the threshold on, scores of parts and of background, persons and images."""
+    truth = json.loads((Path(dataset) / "annotations.json").read_text(encoding="utf-8"))
+    overlaps, parts, background = [], [], []
+    for score, overlap, is_part in judged(dataset, detections):
+        if overlap is None:
+            (parts if is_part else background).append(score)
+        elif score >= THRESHOLD:
+            overlaps.append(overlap)
+    count = sum(not one.get("iscrowd", 0) for one in truth["annotations"])
     return np.array(overlaps), np.array(parts), np.array(background), count, len(truth["images"])
 
 

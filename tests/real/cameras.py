@@ -20,6 +20,7 @@ USER, PASSWORD = "viewer", "s@cret/of:gate"
 REALM = "camera"
 CHUNK = 4096
 CLOCK_BITS = 24
+"""Bits of the milliseconds that `rtsp_clock` shows: 4.6 hours."""
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
@@ -113,7 +114,7 @@ def rtsp_camera(folder: Path, rate: int, *login: str) -> Iterator[int]:
 @contextlib.contextmanager
 def rtsp_clock(rate: int) -> Iterator[int]:
     """Serves pictures that show the time over RTSP, and yields the port."""
-    with _rtsp_server("rtsp_clock.py", str(rate)) as port:
+    with _rtsp_server("rtsp_clock.py", str(rate), str(CLOCK_BITS)) as port:
         yield port
 
 

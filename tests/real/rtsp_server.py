@@ -13,20 +13,29 @@ gi.require_version("GstRtspServer", "1.0")
 from gi.repository import GLib, Gst, GstRtsp, GstRtspServer  # noqa: E402
 
 ROLE = "viewer"
+# One thread writes one slice for each frame. rtph264pay repeats the parameter sets before every slice of a key frame,
+# which would end the frame after its first slice.
+ENCODED = (
+    "x264enc tune=zerolatency speed-preset=ultrafast key-int-max=10 threads=1 ! rtph264pay name=pay0 config-interval=-1"
+)
+"""The end of a pipeline, from raw pictures on."""
+
+
+def serve(server: GstRtspServer.RTSPServer, factory: GstRtspServer.RTSPMediaFactory) -> None:
+    """Serves `/stream` until the process is stopped."""
+    server.get_mount_points().add_factory("/stream", factory)
+    server.attach(None)
+    GLib.MainLoop().run()
 
 
 def main(port: str, folder: str, rate: str, *login: str) -> None:
-    """Serves `/stream` until the process is stopped."""
+    """Serves the files of a folder."""
     Gst.init(None)
     server = GstRtspServer.RTSPServer(service=port, address="127.0.0.1")
     factory = GstRtspServer.RTSPMediaFactory(shared=True)
-    # One thread writes one slice for each frame. rtph264pay repeats the parameter sets before every slice of a key frame,
-    # which would end the frame after its first slice.
     factory.set_launch(
         f"( multifilesrc location={folder}/%d.jpg loop=true caps=image/jpeg,framerate={rate}/1 ! jpegdec"
-        " ! videoconvert ! video/x-raw,format=I420 ! identity sync=true"
-        " ! x264enc tune=zerolatency speed-preset=ultrafast key-int-max=10 threads=1"
-        " ! rtph264pay name=pay0 config-interval=-1 )"
+        f" ! videoconvert ! video/x-raw,format=I420 ! identity sync=true ! {ENCODED} )"
     )
     if login:
         user, password = login
@@ -40,9 +49,8 @@ def main(port: str, folder: str, rate: str, *login: str) -> None:
         for permission in ("media.factory.access", "media.factory.construct"):
             permissions.add_permission_for_role(ROLE, permission, True)
         factory.set_permissions(permissions)
-    server.get_mount_points().add_factory("/stream", factory)
-    server.attach(None)
-    GLib.MainLoop().run()
+    serve(server, factory)
 
 
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -57,10 +57,24 @@ def camera_rotation(yaw, tilt=0.0, roll=0.0):
     return np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]]) @ tilted
 
 
+def lens_of(native_lens):
+    """The lens of a native calibration, as `radius_of` takes it."""
+    return dict(native_lens, focal=native_lens.get("focal", native_lens.get("fx")))
+
+
 def circle_radius(native_lens):
     """The radius in pixels of the circle that a native calibration's lens fills."""
-    lens = dict(native_lens, focal=native_lens.get("focal", native_lens.get("fx")))
+    lens = lens_of(native_lens)
     return float(radius_of(lens, lens["max_theta"]))
+
+
+def pixels_of(lens, cx, cy, rays):
+    """Columns and rows of rays in the camera (… × 3), and their angles from the axis. Rays beyond the lens's largest angle
+    land just outside the circle: polynomials fold back there."""
+    rho = np.hypot(rays[..., 0], rays[..., 1])
+    theta = np.arctan2(rho, rays[..., 2])
+    scale = radius_of(lens, np.minimum(theta, lens["max_theta"] + 0.05)) / np.maximum(rho, 1e-12)
+    return cx + scale * rays[..., 0], cy + scale * rays[..., 1], theta
 
 
 @dataclass
@@ -76,13 +90,10 @@ class Calibration:
     height_m: float = 3.0
 
     def project(self, points):
-        """World points (n × 3, metres) to pixels (n × 2) and angles from the axis. Points beyond the lens's largest angle
-        land just outside the circle: polynomials fold back there."""
+        """World points (n × 3, metres) to pixels (n × 2) and angles from the axis, as `pixels_of`."""
         rays = (np.atleast_2d(points) - np.array([0, 0, self.height_m])) @ self.rotation.T
-        rho = np.hypot(rays[:, 0], rays[:, 1])
-        theta = np.arctan2(rho, rays[:, 2])
-        scale = radius_of(self.lens, np.minimum(theta, self.lens["max_theta"] + 0.05)) / np.maximum(rho, 1e-12)
-        return np.stack([self.cx + scale * rays[:, 0], self.cy + scale * rays[:, 1]], 1), theta
+        columns, rows, theta = pixels_of(self.lens, self.cx, self.cy, rays)
+        return np.stack([columns, rows], 1), theta
 
     def rays(self, x, y):
         """World directions of pixels (arrays of one shape); NaN outside the lens circle."""
