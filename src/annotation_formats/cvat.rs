@@ -1,16 +1,14 @@
 //! CVAT for images 1.1: one XML document. An oriented box is written unrotated, with its clockwise
 //! `rotation` about its centre in degrees, from 0 to below 360.
 
+use lookdown_lens::geometry::OrientedBox;
 use serde::Serialize;
 
 use super::{
     AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes,
     xml::{self, Text},
 };
-use crate::{
-    geometry::OrientedBox,
-    rounding::{pixels, share},
-};
+use crate::rounding::{pixels, share};
 
 #[derive(Serialize)]
 struct Annotations {

@@ -3,11 +3,9 @@
 use std::{fs, path::Path};
 
 use anyhow::Context;
+use lookdown_detect::pipeline::Detected;
 
-use crate::{
-    annotated_image::{AnnotationOptions, ImageFormat, annotated_image},
-    pipeline::Detected,
-};
+use crate::annotated_image::{AnnotationOptions, ImageFormat, annotated_image};
 
 /// Draws the persons, and returns a JPEG.
 pub(super) fn jpeg(detected: Detected, options: &AnnotationOptions) -> anyhow::Result<Vec<u8>> {

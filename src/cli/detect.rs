@@ -19,6 +19,11 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
+use lookdown_detect::{
+    parameters::DetectParameters,
+    pipeline::{DetectJob, Detected, Engine, JobImage},
+};
+use lookdown_lens::calibration::{Calibration, CalibrationId};
 use strum::VariantArray;
 
 use self::{
@@ -36,8 +41,6 @@ use crate::{
     annotation_formats::{AnnotationFormat, BoxKind},
     api::Report,
     app::engine_for,
-    calibration::{Calibration, CalibrationId},
-    pipeline::{DetectJob, DetectParameters, Detected, Engine, JobImage},
 };
 
 /// Arguments of `lookdown detect`.

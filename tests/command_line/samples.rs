@@ -2,12 +2,12 @@
 
 use std::{path::Path, process::Command, sync::Arc};
 
-use lookdown::{
-    calibration::Calibration,
+use lookdown_detect::{
+    Detector, DetectorOptions,
     imaging::decode::{DecodeLimits, decode},
     parameters::DetectParameters,
 };
-use lookdown_detect::{Detector, DetectorOptions};
+use lookdown_lens::calibration::Calibration;
 use serde_json::Value;
 
 /// `x_min, y_min, x_max, y_max`.

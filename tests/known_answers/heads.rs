@@ -1,7 +1,7 @@
 //! Output heads against a reference implementation in another language
 //! (`tests/fixtures/heads/make_head_vectors.py`).
 
-use lookdown::{
+use lookdown_detect::{
     imaging::NetworkInput,
     inference::heads::{Head, OutputShape, TensorView},
 };

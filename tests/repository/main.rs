@@ -6,4 +6,3 @@ mod documentation;
 mod fuzz_corpus;
 mod layering;
 mod openapi;
-mod public_api;

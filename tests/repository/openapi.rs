@@ -2,9 +2,8 @@
 
 use std::{collections::BTreeSet, fs};
 
-use lookdown::{
-    annotated_image::AnnotationOptions, api::openapi_document, pipeline::DetectParameters,
-};
+use lookdown::{annotated_image::AnnotationOptions, api::openapi_document};
+use lookdown_detect::parameters::DetectParameters;
 use serde_json::Value;
 
 fn document() -> Value {

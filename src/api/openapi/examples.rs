@@ -119,8 +119,9 @@ fn model_ready() -> Value {
 
 #[cfg(test)]
 mod tests {
+    use lookdown_lens::calibration::CalibrationFile;
+
     use super::*;
-    use crate::calibration::CalibrationFile;
 
     #[test]
     fn the_example_calibration_is_accepted() {

@@ -2,6 +2,9 @@
 //! Defaults are in the descriptions alone: generated clients would send a `default`, in the query
 //! and in the form, and a repeated parameter is refused.
 
+use lookdown_detect::parameters::{
+    DetectParameters, Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec,
+};
 use serde_json::Value;
 use utoipa::{
     IntoParams, PartialSchema, ToSchema,
@@ -12,13 +15,7 @@ use utoipa::{
     },
 };
 
-use crate::{
-    annotated_image::AnnotationOptions,
-    api::parameters,
-    pipeline::{
-        DetectParameters, Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec,
-    },
-};
+use crate::{annotated_image::AnnotationOptions, api::parameters};
 
 /// The parameters of `POST /detect` in the query.
 pub(in crate::api) struct DetectQuery;

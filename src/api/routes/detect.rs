@@ -6,6 +6,7 @@ use axum::{
     http::{HeaderValue, header::CONTENT_TYPE},
     response::{AppendHeaders, IntoResponse},
 };
+use lookdown_detect::pipeline::DetectJob;
 
 use crate::{
     api::{
@@ -19,7 +20,6 @@ use crate::{
         run_detection::{DetectionOutcome, run_detection},
         upload::Upload,
     },
-    pipeline::DetectJob,
     telemetry::RequestTrace,
 };
 

@@ -12,6 +12,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_lens::{
+    geometry::FieldOfViewReading,
+    warning::{Warning, WarningCode},
+};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use self::observation::Observation;
@@ -27,14 +31,12 @@ use super::{
 };
 use crate::{
     detection::RefinementParameters,
-    geometry::FieldOfViewReading,
     imaging::{
         Frame,
         decode::{DecodeLimits, decode},
     },
     inference::{Model, ModelRegistry},
     metrics::DetectMetrics,
-    warning::{Warning, WarningCode},
 };
 
 /// The smallest frame side that can hold a lens image, pixels.

@@ -1,5 +1,12 @@
 //! Merges boxes of views into persons of the frame.
 
+use lookdown_lens::geometry::{
+    BackProjection, Footprint, OrientedBox, Ray,
+    crop_placement::CropTarget,
+    floor::{bearing, floor_position},
+    oriented_box::vertical_in_frame,
+};
+
 use super::{
     Person, Profile,
     camera_rig::CameraRig,
@@ -11,12 +18,6 @@ use crate::{
     detection::{
         BBox, Candidate, FramePixels, MergedDetection, Refinement, RefinementParameters,
         ViewPixels, refine,
-    },
-    geometry::{
-        BackProjection, Footprint, OrientedBox, Ray,
-        crop_placement::CropTarget,
-        floor::{bearing, floor_position},
-        oriented_box::vertical_in_frame,
     },
     imaging::NetworkInput,
 };

@@ -11,14 +11,12 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_detect::detection::BBox;
+use lookdown_lens::calibration::{Calibration, CalibrationError, CalibrationId};
 use serde::Deserialize;
 
 use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
-use crate::{
-    AnnotatedPerson, Outline, RotatedBox, Scoring,
-    calibration::{Calibration, CalibrationError, CalibrationId},
-    detection::BBox,
-};
+use crate::{AnnotatedPerson, Outline, RotatedBox, Scoring};
 
 /// The largest common file, that of COCO's training set, has 450 MB.
 const MAX_BYTES: u64 = 1024 * 1024 * 1024;
