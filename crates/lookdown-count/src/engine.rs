@@ -5,12 +5,13 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_tracking::MAX_CAMERAS;
+
 use crate::{
     definition::{CameraDefinition, DefinitionKey},
     report::Report,
     scene::{NamedCrossing, Scene, SceneState},
     sums::{DAY_MS, LineDirection, Owner, Sums, ZoneOf},
-    tracking::MAX_CAMERAS,
 };
 
 /// The limits of counting.

@@ -2,16 +2,17 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use lookdown_tracking::{
+    Observation, RefusedReport, SiteError, Track, Tracker, TrackerSettings,
+    heat_map::HeatMap,
+    lines::{Direction, LineCounter, LineState},
+    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Observation,
     definition::{CameraDefinition, DefinitionKey},
-    heat_map::HeatMap,
-    lines::{Direction, LineCounter, LineState},
     sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, Sums, ZoneOf, minutes},
-    tracking::{RefusedReport, SiteError, Track, Tracker, TrackerSettings},
-    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
 };
 
 /// A tracker, the counters of its cameras, and the state of their sums.

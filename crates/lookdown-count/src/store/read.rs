@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_tracking::heat_map::Cell;
 use rusqlite::{Connection, OptionalExtension, params};
 
 use super::{Store, StoreError};
 use crate::{
     engine::{Totals, ZoneTotal},
-    heat_map::Cell,
     scene::SceneState,
     sums::{DAY_MS, LineDirection, Owner, PresenceSum, ZoneOf, ZoneSum},
     webhooks::{HeldCondition, Message},

@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
-use super::MeasurementNoise;
+use crate::MeasurementNoise;
 use crate::{CameraPose, Observation};
 
 /// A measured place.

@@ -9,7 +9,7 @@ use lookdown_lens::geometry::Polygon;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use crate::tracking::{Plane, TailPoint, Track, TrackId};
+use crate::{Plane, TailPoint, Track, TrackId};
 
 /// Most zones of a counter.
 pub const MAX_ZONES: usize = 64;

@@ -1,9 +1,8 @@
 //! The scene: a hall with its cameras, the trackers that follow it, and a line in its middle.
 
-use lookdown_count::{
-    CameraPose, Observation,
+use lookdown_tracking::{
+    CameraPose, Observation, Plane, Track, Tracker, TrackerSettings,
     lines::{Crossing, DEFAULT_BAND_M, Direction, Line, LineCounter},
-    tracking::{Plane, Track, Tracker, TrackerSettings},
 };
 use nalgebra::Vector2;
 use serde_json::{Value, json};

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::tracking::{Plane, TailPoint, Track, TrackId};
+use crate::{Plane, TailPoint, Track, TrackId};
 use crossings::{distance, signed_crossings};
 
 /// Most points of a line.

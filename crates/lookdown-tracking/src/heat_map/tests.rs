@@ -1,8 +1,5 @@
 use super::*;
-use crate::{
-    CameraPose, Observation,
-    tracking::{Tracker, TrackerSettings},
-};
+use crate::{CameraPose, Observation, Tracker, TrackerSettings};
 
 fn person(x: f64, y: f64) -> Observation {
     Observation {

@@ -34,7 +34,8 @@ impl CameraPose {
     }
 
     /// Returns the floor place of this camera at the site's coordinates, metres.
-    pub(crate) fn of_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    #[must_use]
+    pub fn of_site(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (x, y) = (x - self.position_m[0], y - self.position_m[1]);
         let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
         [cos * x + sin * y, cos * y - sin * x]

@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{
+use crate::Observation;
+use crate::{
     Plane, TrackId, TrackerSettings, evidence::Evidence, measurement::Measurement, motion::Motion,
 };
-use crate::Observation;
 
 /// Most places that a track keeps.
 pub const MAX_TAIL_POINTS: usize = 64;

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{
+use crate::{
     kalman::{Innovation, Kalman},
     measurement::{Measurement, Place},
     settings::PlaneSettings,

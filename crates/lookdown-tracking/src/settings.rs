@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{evidence::EvidenceSettings, measurement::Place};
+use crate::{evidence::EvidenceSettings, measurement::Place};
 
 /// Settings of a tracker. The defaults are tuned on simulated walks (`docs/count-accuracy.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

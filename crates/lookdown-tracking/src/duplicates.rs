@@ -1,6 +1,6 @@
 //! Two tracks of one person: cameras of a site that place the person differently.
 
-use super::Track;
+use crate::Track;
 
 /// Tracks nearer than this may be one person, metres.
 const MERGE_DISTANCE_M: f64 = 0.8;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::tracking::{Plane, Track, TrackId};
+use crate::{Plane, Track, TrackId};
 
 /// Side of a cell, metres.
 pub const CELL_M: f64 = 0.25;

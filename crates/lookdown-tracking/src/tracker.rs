@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
+use crate::{CameraPose, Observation};
+use crate::{
     Track, TrackId, TrackerSettings,
     assignment::best_pairs,
     camera::Camera,
@@ -11,7 +12,6 @@ use super::{
     measurement::Measurement,
     track::{PersonOfReport, Sighting},
 };
-use crate::{CameraPose, Observation};
 
 /// Most cameras of a tracker.
 pub const MAX_CAMERAS: usize = 64;

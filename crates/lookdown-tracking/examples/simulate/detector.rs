@@ -2,12 +2,12 @@
 //!
 //! The figures of the detector are in `figures`; docs/count-accuracy.md has the assumptions.
 
-use lookdown_count::{CameraPose, Observation};
 use lookdown_lens::geometry::{
     Lens, Mount, OrientedBox, Pixel, Ray,
     floor::{FloorPosition, bearing, floor_position, pixel_of},
     oriented_box::vertical_in_frame,
 };
+use lookdown_tracking::{CameraPose, Observation};
 use nalgebra::{Point2, Unit, Vector2, Vector3};
 use std::collections::HashMap;
 

@@ -1,9 +1,6 @@
 //! Persons and trackers for tests.
 
-use crate::{
-    CameraPose, Observation,
-    tracking::{Tracker, TrackerSettings},
-};
+use crate::{CameraPose, Observation, Tracker, TrackerSettings};
 
 /// Height of the test cameras, metres.
 pub(crate) const CAMERA_M: f64 = 3.0;
