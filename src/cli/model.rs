@@ -24,7 +24,7 @@ use crate::cli::output::UNWRITABLE;
 use crate::{
     annotated_image::AnnotationOptions,
     app::{engine_for, onnx_options},
-    settings::{Settings, find_beside_executable},
+    settings::{Settings, find_installed},
 };
 
 /// The default sample image: a fisheye frame.
@@ -95,7 +95,7 @@ fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let given = arguments.sample.as_deref();
     let Some((sample, profile)) = given
         .map(|path| (path.to_owned(), "direct"))
-        .or_else(|| Some((find_beside_executable(Path::new(SAMPLE))?, "fast")))
+        .or_else(|| Some((find_installed(Path::new(SAMPLE))?, "fast")))
     else {
         writeln!(out, "sample       none: give one with --sample").context(UNWRITABLE)?;
         return Ok(ExitCode::SUCCESS);

@@ -20,8 +20,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use self::observation::Observation;
 use super::{
-    BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectParameters, Detected,
-    DetectionReport, JobImage, Person, PipelineError, Profile, Stage, StageTimings,
+    BatchOptions, CalibrationLookup, DefaultModels, DetectJob, Detected, DetectionReport, JobImage,
+    Person, PipelineError, Stage, StageTimings,
     inference_cache::{FrameKey, InferenceCache},
     merge,
     motion_cache::{CameraViews, MotionCache},
@@ -37,6 +37,7 @@ use crate::{
     },
     inference::{Model, ModelRegistry},
     metrics::DetectMetrics,
+    parameters::{DetectParameters, Profile},
 };
 
 /// The smallest frame side that can hold a lens image, pixels.

@@ -7,10 +7,11 @@ use jiff::Timestamp;
 use lookdown_lens::{calibration::Calibration, geometry::Pixel, revision::sha256_of};
 use tokio_util::sync::CancellationToken;
 
-use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
+use super::{DetectionReport, Ticket, camera_rig::CameraRig};
 use crate::{
     imaging::{Frame, annotate::ZoneOutline, decode::declared_size},
     inference::Model,
+    parameters::DetectParameters,
 };
 
 /// The frame of a job.

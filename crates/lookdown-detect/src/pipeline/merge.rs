@@ -8,7 +8,7 @@ use lookdown_lens::geometry::{
 };
 
 use super::{
-    Person, Profile,
+    Person,
     camera_rig::CameraRig,
     pass::{Pass, PassDetection, detections, views_holding},
     plausibility::score_weight,
@@ -20,6 +20,7 @@ use crate::{
         ViewPixels, refine,
     },
     imaging::NetworkInput,
+    parameters::Profile,
 };
 
 /// Distance to the view's border, as a share of the view's width, below which a box is considered

@@ -9,8 +9,8 @@ use lookdown_lens::{
     },
 };
 
-use super::{Engine, PipelineError, Profile, outline::view_outline};
-use crate::imaging::MaskedPixels;
+use super::{Engine, PipelineError, outline::view_outline};
+use crate::{imaging::MaskedPixels, parameters::Profile};
 
 /// Steps along each side of a view between the rays that test whether it covers the lens image.
 const SIGHT_STEPS: u32 = 64;

@@ -11,11 +11,11 @@ use lookdown_lens::{
     warning::Warning,
 };
 
-use super::{DefaultUsed, Profile};
 use crate::{
     detection::{BBox, FramePixels, RefinementParameters},
     imaging::lens_circle::LensCircle,
     inference::Model,
+    parameters::{DefaultUsed, Profile},
 };
 
 /// The persons in one frame.

@@ -12,13 +12,14 @@ use jiff::Timestamp;
 use lookdown_lens::calibration::{Calibration, CalibrationFile, CalibrationId};
 
 use super::{
-    BatchOptions, CalibrationLookup, DetectJob, DetectParameters, Engine, EngineOptions, JobImage,
-    Ticket, UnusableCalibration,
+    BatchOptions, CalibrationLookup, DetectJob, Engine, EngineOptions, JobImage, Ticket,
+    UnusableCalibration,
 };
 use crate::{
     detection::{BBox, ViewPixels},
     imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png},
     inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},
+    parameters::DetectParameters,
 };
 
 /// Returns the bounding box of all pixels in a view that are brighter than this.
