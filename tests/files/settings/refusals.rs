@@ -366,6 +366,25 @@ fn the_password_of_a_broker_is_neither_shown_nor_repeated() {
 }
 
 #[test]
+fn the_password_of_a_broker_has_a_variable_of_its_own() {
+    let url = ("LOOKDOWN__MQTT__URL", "mqtt://home@broker");
+    let password = ("LOOKDOWN__MQTT__PASSWORD", "s3cret");
+    let settings = load(None, environment(&[url, password])).unwrap();
+    assert!(settings.mqtt.is_some());
+    assert!(!format!("{settings:?}").contains("s3cret"));
+    for (url, remedy) in [
+        ("mqtt://broker", "mqtt://user@host"),
+        ("mqtt://home:other@broker", "remove one"),
+    ] {
+        let variables = [("LOOKDOWN__MQTT__URL", url), password];
+        let refused = refusal(load(None, environment(&variables)));
+        let names_key = refused.contains("mqtt.password");
+        assert!(names_key && refused.contains(remedy), "{refused}");
+        assert!(!refused.contains("s3cret"), "{refused}");
+    }
+}
+
+#[test]
 fn an_inference_server_url_must_not_have_a_password() {
     let with_url = |url: &str| {
         let text = format!("[inference]\nbackend = \"v2\"\nmodel = \"m\"\nurl = \"{url}\"\n");
