@@ -203,14 +203,14 @@ fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
             &sent,
             &read,
         )))
-        .layer(option_layer(for_other_origins))
         .layer(CatchPanicLayer::custom(envelope::of_panic))
         .layer(from_fn_with_state(body_limits, drain_body::discard))
         .layer(from_fn_with_state(
             header_limits,
             header_limits::within_bounds,
         ))
-        .layer(from_fn(host::require));
+        .layer(from_fn(host::require))
+        .layer(option_layer(for_other_origins));
     router.with_state(state).layer(layers)
 }
 
