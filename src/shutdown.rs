@@ -42,8 +42,8 @@ impl Shutdown {
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
         // A handler stays for the life of the process: without one these signals would end it at once.
-        signal(SignalKind::user_defined1())?;
-        signal(SignalKind::user_defined2())?;
+        drop(signal(SignalKind::user_defined1())?);
+        drop(signal(SignalKind::user_defined2())?);
         let asked = shutdown.clone();
         tokio::spawn(async move {
             while asked.stage() < Stage::AtOnce {

@@ -171,9 +171,24 @@ async fn pages_of_other_sites_get_no_images_without_keys() {
             assert_refused(&answer, "access.cors_origins");
         }
         for headers in [
-            [host, site, image, ("referer", "https://dashboard.example/x")],
-            [host, site, ("sec-fetch-dest", "document"), ("accept", "*/*")],
-            [host, ("sec-fetch-site", "same-origin"), image, ("accept", "*/*")],
+            [
+                host,
+                site,
+                image,
+                ("referer", "https://dashboard.example/x"),
+            ],
+            [
+                host,
+                site,
+                ("sec-fetch-dest", "document"),
+                ("accept", "*/*"),
+            ],
+            [
+                host,
+                ("sec-fetch-site", "same-origin"),
+                image,
+                ("accept", "*/*"),
+            ],
         ] {
             let answer = service.ask("GET", path, &headers).await;
             assert_eq!(answer.status, 200, "{headers:?}");

@@ -167,7 +167,9 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
     let referrer = headers.get(REFERER).and_then(|value| value.to_str().ok());
     if is(SEC_FETCH_SITE, "cross-site")
         && !is(SEC_FETCH_DEST, "document")
-        && !referrer.and_then(origin_of).is_some_and(|origin| is_allowed(&origin))
+        && !referrer
+            .and_then(origin_of)
+            .is_some_and(|origin| is_allowed(&origin))
     {
         return forbidden(
             "without keys (access.keys_file), this server sends nothing to pages of other sites: open \
@@ -195,13 +197,10 @@ fn matches(pattern: &str, host: &str) -> bool {
 
 /// Returns the first header that a forwarding proxy adds.
 fn forwarding_header(headers: &HeaderMap) -> Option<&str> {
-    headers
-        .keys()
-        .map(HeaderName::as_str)
-        .find(|name| {
-            let begins = |prefix: &&str| name.starts_with(prefix);
-            FORWARDING_HEADERS.contains(name) || FORWARDING_PREFIXES.iter().any(begins)
-        })
+    headers.keys().map(HeaderName::as_str).find(|name| {
+        let begins = |prefix: &&str| name.starts_with(prefix);
+        FORWARDING_HEADERS.contains(name) || FORWARDING_PREFIXES.iter().any(begins)
+    })
 }
 
 /// Returns `true` if an origin has this host.
@@ -226,9 +225,7 @@ fn is_private(host: &str) -> bool {
     let name = host.trim_end_matches('.').to_ascii_lowercase();
     let address = name.trim_start_matches('[').trim_end_matches(']');
     let is_local = |suffix: &&str| name.ends_with(suffix);
-    address.parse::<IpAddr>().is_ok()
-        || !name.contains('.')
-        || LOCAL_SUFFIXES.iter().any(is_local)
+    address.parse::<IpAddr>().is_ok() || !name.contains('.') || LOCAL_SUFFIXES.iter().any(is_local)
 }
 
 fn shown(text: &str) -> String {
