@@ -4,7 +4,7 @@ use std::{collections::HashMap, path::Path};
 
 use lookdown::settings::load;
 
-use crate::settings::{from_environment, from_file, refusal};
+use crate::settings::{environment, from_environment, from_file, refusal};
 
 #[test]
 fn an_unknown_key_is_refused_by_name() {
