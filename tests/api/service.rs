@@ -88,6 +88,7 @@ pub(crate) struct Bounds {
     pub(crate) conceal_pictures: Option<Concealment>,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
+    pub(crate) hosts: Vec<String>,
     pub(crate) tracer: Tracer,
 }
 
@@ -110,6 +111,7 @@ impl Default for Bounds {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
+            hosts: Vec::new(),
             tracer: Tracer::default(),
         }
     }
@@ -254,6 +256,7 @@ impl Service {
                 request_rate: bounds.request_rate,
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),
+                hosts: bounds.hosts.clone(),
                 tracer: bounds.tracer.clone(),
                 ..ApiOptions::for_testing()
             },

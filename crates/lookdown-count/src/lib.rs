@@ -9,14 +9,19 @@
 //! the state and the ID of the last report, and the HTTP API answers from both.
 
 mod calibrations;
+#[cfg(test)]
+mod clock_simulation;
 mod definition;
+mod drops;
 mod engine;
 mod event_parser;
 mod event_stream;
 mod follower;
 mod http;
 mod metrics;
+mod now;
 mod options;
+mod presence;
 mod report;
 mod run;
 mod scene;
