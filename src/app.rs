@@ -236,6 +236,7 @@ impl App {
                 }),
             access,
             cors_origins: settings.access.cors_origins.clone(),
+            hosts: settings.access.hosts.clone(),
             page_counts_path: settings.page.counts_path.clone(),
             tracer: tracer.clone(),
         };

@@ -85,6 +85,7 @@ pub(crate) struct Bounds {
     pub(crate) conceal_pictures: Option<Concealment>,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
+    pub(crate) hosts: Vec<String>,
     pub(crate) tracer: Tracer,
 }
 
@@ -107,6 +108,7 @@ impl Default for Bounds {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
+            hosts: Vec::new(),
             tracer: Tracer::default(),
         }
     }
@@ -251,6 +253,7 @@ impl Service {
                 request_rate: bounds.request_rate,
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),
+                hosts: bounds.hosts.clone(),
                 tracer: bounds.tracer.clone(),
                 ..ApiOptions::for_testing()
             },
