@@ -30,11 +30,12 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
 /// The label, which makes the classes of the file explicit.
 #[derive(Serialize)]
 struct Meta {
-    job: Job,
+    task: Task,
 }
 
+/// Importers expect a task or a project here.
 #[derive(Serialize)]
-struct Job {
+struct Task {
     labels: Labels,
 }
 
@@ -139,7 +140,7 @@ fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
     let annotations = Annotations {
         version: "1.1",
         meta: Meta {
-            job: Job {
+            task: Task {
                 labels: Labels { label },
             },
         },

@@ -36,7 +36,7 @@ use super::{
     parameters::{ParameterFlags, PictureFlags},
     progress::Progress,
 };
-use crate::cli::output::UNWRITABLE;
+use crate::cli::output::{UNWRITABLE, with_causes};
 use crate::{
     annotation_formats::{AnnotationFormat, BoxKind},
     api::Report,
@@ -100,8 +100,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let pictures = pictures(&arguments.images)?;
     if arguments.annotate.is_some() && pictures.len() > 1 {
-        bail!("--annotate draws one picture: give a single IMAGE, or leave it out");
+        bail!("--annotate draws one image: give a single IMAGE, or leave it out");
     }
+    arguments
+        .annotate
+        .as_deref()
+        .map(annotate::format_of)
+        .transpose()?;
     let (parameters, calibration) = parameters(arguments)?;
     let options = arguments.picture.check()?;
     let mut labels = labels(arguments, &pictures)?;
@@ -130,7 +135,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
                 }
             }
             Err(error) => {
-                eprintln!("lookdown: {}: {error:#}", path.display());
+                eprintln!("lookdown: {}: {}", path.display(), with_causes(&error));
                 code = ExitCode::FAILURE;
             }
         }
@@ -196,7 +201,7 @@ fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode
                 }
             }
             Err(error) => {
-                eprintln!("lookdown: {name}: {error:#}");
+                eprintln!("lookdown: {name}: {}", with_causes(&error));
                 code = ExitCode::FAILURE;
             }
         }

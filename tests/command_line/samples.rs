@@ -225,3 +225,28 @@ fn the_library_detects_the_persons_that_the_command_reports() {
         }
     }
 }
+
+#[test]
+fn the_samples_are_a_data_set() {
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/samples");
+    let arguments = [
+        "eval",
+        samples,
+        "--profile",
+        "direct",
+        "--refine",
+        "nms",
+        "--json",
+    ];
+    let output = crate::lookdown(&arguments, &[]);
+    assert!(output.status.success(), "{output:?}");
+    let row: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&row["images"], &row["persons"]), (&3.into(), &18.into()));
+}
+
+#[test]
+fn an_annotated_image_of_another_format_is_refused() {
+    let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
+    let output = crate::lookdown(&["detect", sample, "--annotate", "drawn.gif"], &[]);
+    crate::assert_fails_with(&output, &["--annotate", "drawn.gif", ".png"]);
+}

@@ -47,7 +47,7 @@ use crate::{
         (status = OK, description = "The persons found, possibly none.",
          content(
             (Report = "application/json"),
-            ("image/jpeg"), ("image/png"),
+            (inline(RawBytes) = "image/jpeg"), (inline(RawBytes) = "image/png"),
             (Object = "application/geo+json"), (Object = "application/x.coco+json"),
             (Object = "application/x.cepdof+json"), (Object = "application/x.label-studio+json"),
             (String = "application/xml"), (String = "text/plain"),

@@ -54,16 +54,18 @@ struct CocoCategory {
     name: String,
 }
 
-/// Reads the annotations of a folder with `images/` and `calibrations/`.
+/// Reads the annotations of a folder with `calibrations/`, whose images are in `images/` or beside
+/// the annotations.
 pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, DataSetError> {
     let mut calibrations = Calibrations::new(folder.join("calibrations"));
-    let pictures = folder.join("images");
+    let images = folder.join("images");
+    let images = if images.is_dir() {
+        images
+    } else {
+        folder.to_owned()
+    };
     let mut reader = Reader::default();
-    reader.read(
-        file,
-        Some(&mut calibrations),
-        |name| Ok(pictures.join(name)),
-    )?;
+    reader.read(file, Some(&mut calibrations), |name| Ok(images.join(name)))?;
     Ok(reader.data_set())
 }
 
