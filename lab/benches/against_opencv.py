@@ -15,7 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SIDES = (300, 416)
 # The scaling of `answer_rounds` in remap.rs.
 SCALE = 1 / 57

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "src" / "results" / "redis"
+SCRIPTS = Path(__file__).resolve().parents[2] / "src" / "results" / "redis"
 SCRIPT = "".join((SCRIPTS / name).read_text(encoding="utf-8") for name in ("forget.lua", "record.lua"))
 SHA = hashlib.sha1(SCRIPT.encode(), usedforsecurity=False).hexdigest()
 TAG = "{lookdown}"

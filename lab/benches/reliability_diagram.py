@@ -3,7 +3,7 @@
 DETECTIONS are files of `lookdown eval DATASET --save-detections FOLDER`. A person is right with an IoU of 0.5 or more with
 a true box that no better one has; those in a crowd do not count. Prints the expected calibration error of each file: the
 mean difference between score and share of right persons in ten bins, weighted by their persons (Guo et al., "On Calibration
-of Modern Neural Networks", ICML 2017). Needs the packages of benches/count/requirements.txt.
+of Modern Neural Networks", ICML 2017). Needs the packages of lab/benches/count/requirements.txt.
 """
 
 import json

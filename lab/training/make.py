@@ -1,6 +1,6 @@
 """The generator's commands: textures, persons, rooms, frames, walks, sheets, statistics. Everything is made below --work and can be resumed.
 
-nice -n 19 python training/make.py persons --work WORK --first-seed 1000000 --count 200
+nice -n 19 python lab/training/make.py persons --work WORK --first-seed 1000000 --count 200
 """
 
 import argparse

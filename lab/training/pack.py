@@ -1,6 +1,6 @@
 """Packs the weights of a tuned model that differ from those of its source, in half precision.
 
-    python training/pack.py --base models/nanodet_g_416/model.onnx --tuned WORK/runs/first/averaged.onnx --out weights.npz
+    python lab/training/pack.py --base models/nanodet_g_416/model.onnx --tuned WORK/runs/first/averaged.onnx --out weights.npz
 
 The set-up puts them into the graph of the source again (scripts/convert/replace_weights.py). The same files give the
 same bytes.

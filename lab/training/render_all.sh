@@ -1,7 +1,7 @@
 #!/bin/sh
 # Renders in turns: persons, rooms, then a few of the unseen split. One process at a time, at the lowest priority.
 # Stop it at any time; the next start goes on behind the last finished file.
-#   training/render_all.sh WORK PYTHON [ROUNDS]
+#   lab/training/render_all.sh WORK PYTHON [ROUNDS]
 set -u
 work=$1 python=$2 rounds=${3:-60}
 make="nice -n 19 $python $(dirname "$0")/make.py"

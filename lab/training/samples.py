@@ -3,7 +3,7 @@
 A frame is turned by a multiple of 90°, so that axis-parallel boxes stay exact; persons who then stand farther than
 `UPRIGHT_LIMIT` from upright are ignored, since another turn has them upright.
 
-    python training/samples.py pack --frames WORK/frames/train --out WORK/packs/train --count 4000 --size 416
+    python lab/training/samples.py pack --frames WORK/frames/train --out WORK/packs/train --count 4000 --size 416
 """
 
 import argparse

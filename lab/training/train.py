@@ -1,6 +1,6 @@
 """Tunes NanoDet-g on composed frames, averages with the COCO weights, and exports ONNX.
 
-    python training/train.py --source WORK/frames/train --model models/nanodet_g_416/model.onnx --out WORK/runs/first --minutes 60
+    python lab/training/train.py --source WORK/frames/train --model models/nanodet_g_416/model.onnx --out WORK/runs/first --minutes 60
 
 `--source` is a folder of frames or of packed samples (samples.py). Stopped runs go on from `OUT/last.pt`. Results: the tuned
 weights (`tuned.onnx`, an exponential moving average) and their average with the given model (`averaged.onnx`).

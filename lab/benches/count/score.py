@@ -17,7 +17,7 @@ import supervision as sv
 from trackers import ByteTrackTracker
 from trackeval.metrics import CLEAR, HOTA, Identity
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 RATES = (1, 2, 5, 10)
 # Persons farther apart than this on the floor are not the same, metres: a similarity of one half.
 FLOOR_MATCH_M = 1.0

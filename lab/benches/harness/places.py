@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 BENCHES = Path(__file__).resolve().parents[1]
-ROOT = BENCHES.parent
+ROOT = BENCHES.parents[1]
 RAW = BENCHES / "raw"
 CHARTS = BENCHES / "charts"
 RESULTS = BENCHES / "RESULTS.md"
