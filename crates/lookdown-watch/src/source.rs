@@ -23,6 +23,7 @@ use tokio::time::sleep;
 
 use crate::{
     Camera, Frame, FrameError, Location,
+    credentials::Login,
     metrics::{CameraMetrics, Failure},
     slot::Slot,
 };
@@ -58,6 +59,11 @@ pub enum SourceError {
         "the camera requires an authentication other than Basic and Digest: select one of them in the camera"
     )]
     UnknownAuthentication,
+    /// A challenge for the password in plain text, after one for its digest.
+    #[error(
+        "the camera asks for the password in plain text (Basic), although it asked for its digest before: check that it is the camera, and restart this program"
+    )]
+    BasicAfterDigest,
     /// Another status than 200.
     #[error(
         "the camera answered with the status {0}: check the path of the URL in the camera's manual"
@@ -80,6 +86,24 @@ pub enum SourceError {
     /// A frame beyond the limit.
     #[error("the camera's image has more than 32 MiB: reduce its resolution or quality")]
     TooLarge,
+    /// The frames of all cameras exceed their budget.
+    #[error(
+        "the frames of all cameras together take more than 512 MiB: reduce their resolution or quality"
+    )]
+    Memory,
+    /// The decoders of all cameras exceed their budget.
+    #[error(
+        "the decoders of all cameras take more than half of the memory, and that of this camera the most: reduce its resolution"
+    )]
+    DecoderMemory,
+    /// A decoder exceeds its share of CPU time.
+    #[error("the decoder of the camera uses {0:.1} cores: reduce its resolution or frame rate")]
+    DecoderTime(f64),
+    /// A file that names other files, or of an unknown format.
+    #[error(
+        "the file is not a video: playlists and unknown formats are not read: give an MP4, MKV, AVI or TS file"
+    )]
+    NotAVideo,
     /// No frame within the limit.
     #[error("no whole frame arrived within {0:?}: check the camera, or raise stall_after")]
     Stalled(Duration),
@@ -115,6 +139,7 @@ impl SourceError {
             Self::CredentialsRefused { .. }
                 | Self::CredentialsMissing
                 | Self::UnknownAuthentication
+                | Self::BasicAfterDigest
         )
     }
 }
@@ -190,7 +215,9 @@ pub(crate) async fn supervise(
     let (first, longest) = LOGIN_PAUSES;
     let mut login_backoff = Backoff::new(first, longest);
     let log = Mutex::new(LogOnce::default());
+    let mut login = Login::new(camera.credentials.clone());
     loop {
+        login.restart();
         let sink = Sink {
             slot,
             metrics,
@@ -199,7 +226,7 @@ pub(crate) async fn supervise(
             is_failing: &log,
         };
         let outcome = tokio::select! {
-            outcome = run(camera, client, &sink) => outcome,
+            outcome = run(camera, client, &mut login, &sink) => outcome,
             error = stalled(camera, &sink) => Err(error),
         };
         let pause = match outcome {
@@ -226,10 +253,15 @@ pub(crate) async fn supervise(
 }
 
 /// Reads frames until the source ends.
-async fn run(camera: &Camera, client: &Client, sink: &Sink<'_>) -> Result<(), SourceError> {
+async fn run(
+    camera: &Camera,
+    client: &Client,
+    login: &mut Login,
+    sink: &Sink<'_>,
+) -> Result<(), SourceError> {
     let ended: Infallible = match &camera.location {
-        Location::Http(url) => http::run(camera, url, client, sink).await?,
-        Location::Rtsp(url) => video::run_stream(camera, url, sink).await?,
+        Location::Http(url) => http::run(camera, url, client, login, sink).await?,
+        Location::Rtsp(url) => video::run_stream(camera, url, login, sink).await?,
         Location::Folder(path) => folder::run(camera, path, sink).await?,
         Location::Video(path) => return video::run_file(camera, path, sink).await,
         Location::StandardInput => return standard_input::run(sink).await,
