@@ -25,6 +25,7 @@ use axum::{
     middleware::{from_fn, from_fn_with_state, map_response},
     routing::get,
 };
+use lookdown_detect::open_inference::HEAD_LENGTH;
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -52,7 +53,6 @@ use self::{
         web_page,
     },
 };
-use crate::open_inference::HEAD_LENGTH;
 
 pub use self::{
     http::{access::Access, rate_limit::RequestRate},

@@ -8,6 +8,13 @@ use std::{
 };
 
 use axum::extract::FromRef;
+use lookdown_detect::{
+    fairness::{Client, SharedBudget},
+    imaging::annotate::Concealment,
+    inference::ModelRepository,
+    parameters::DetectDefaults,
+    pipeline::{PipelineError, WorkerPool},
+};
 
 use super::{
     http::{
@@ -23,11 +30,7 @@ use super::{
 };
 use crate::{
     calibration_store::Calibrations,
-    fairness::{Client, SharedBudget},
-    imaging::annotate::Concealment,
-    inference::ModelRepository,
     metrics::Metrics,
-    pipeline::{DetectDefaults, PipelineError, WorkerPool},
     results::{PicturesOf, ResultStore},
     telemetry::Tracer,
 };

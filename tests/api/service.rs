@@ -19,15 +19,18 @@ use lookdown::{
     api::{self, Access, ApiOptions, ApiState, Readiness, RequestRate},
     app::Assembly,
     calibration_store::{Calibrations, FolderStore},
+    metrics::Metrics,
+    results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
+    telemetry::Tracer,
+};
+use lookdown_detect::{
     imaging::{
         Frame, NetworkInput,
         annotate::{Concealment, encode_png},
     },
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
-    metrics::Metrics,
-    pipeline::{DetectDefaults, Engine, EngineOptions, WorkerPool},
-    results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
-    telemetry::Tracer,
+    parameters::DetectDefaults,
+    pipeline::{Engine, EngineOptions, WorkerPool},
 };
 use serde_json::Value;
 use tempfile::TempDir;

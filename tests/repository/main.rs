@@ -6,5 +6,4 @@ mod documentation;
 mod fuzz_corpus;
 mod layering;
 mod openapi;
-mod public_api;
 mod variables;

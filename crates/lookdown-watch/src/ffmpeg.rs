@@ -22,11 +22,11 @@ use crate::{
         self, Task,
         usage::{self, Usage},
     },
+    jpeg_splitter::JpegSplitter,
     memory_budget::Reservation,
-    source::JpegSplitter,
     stderr_line::LastLine,
 };
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
 
 /// Most pixels of a frame that `ffmpeg` decodes: those that the server accepts.
 const MAX_PIXELS: &str = "50000000";
@@ -37,8 +37,8 @@ const FILE_FORMATS: &str = "mov,matroska,avi,mpegts,mpeg,mpegvideo,flv,asf,ogg,i
                             m4v,mjpeg,mxf,nut,dhav,gif";
 /// Threads of the decoder of a file. Each holds frames in memory.
 const FILE_THREADS: usize = 8;
-/// The words of `ffmpeg` for a format that is not in the list.
-const REFUSED_FORMAT: &str = "not on whitelist";
+/// The last words of `ffmpeg` about a file whose format is not in the list.
+const REFUSED_FORMAT: &str = "Invalid argument";
 
 /// A running `ffmpeg`.
 pub(crate) struct Ffmpeg {

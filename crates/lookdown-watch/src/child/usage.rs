@@ -90,7 +90,7 @@ fn half_of_memory() -> u64 {
 
 /// Returns the resident bytes and the CPU seconds of a process.
 fn read(pid: u32) -> Option<(u64, f64)> {
-    let stat = lookdown_files::read(format!("/proc/{pid}/stat").as_ref(), 4096).ok()?;
+    let stat = lookdown_common::files::read(format!("/proc/{pid}/stat").as_ref(), 4096).ok()?;
     let stat = String::from_utf8_lossy(&stat).into_owned();
     // The name before the bracket may contain spaces.
     let (_, fields) = stat.rsplit_once(')')?;

@@ -7,9 +7,9 @@ use std::{convert::Infallible, ffi::OsString, fmt::Write as _, path::Path, time:
 
 use reqwest::Url;
 
-use super::{Sink, SourceError};
+use super::Sink;
 use crate::{
-    Camera,
+    Camera, SourceError,
     credentials::Login,
     ffmpeg::{Ffmpeg, Input, decoding, file_input},
     rtsp_relay::Relay,
