@@ -32,10 +32,10 @@ struct Uses {
 
 /// Returns the row of a path: its top module, or the part of it that has a row.
 fn row_of(path: &str) -> String {
-    let is_in = |part: &&str| path == *part || path.starts_with(&format!("{part}::"));
-    let part = PARTS.iter().find(is_in);
-    let top = || path.split("::").next().unwrap_or_default();
-    part.map_or_else(|| top().to_owned(), |part| (*part).to_owned())
+    let mut parts = PARTS.into_iter();
+    let part = parts.find(|part| path == *part || path.starts_with(&format!("{part}::")));
+    let top = || path.split("::").next().unwrap_or_default().to_owned();
+    part.map_or_else(top, str::to_owned)
 }
 
 /// Returns the first sentence of a file's documentation.
