@@ -6,7 +6,7 @@ use bytes::Bytes;
 use jiff::Timestamp;
 use tokio_util::sync::CancellationToken;
 
-use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
+use super::{DetectParameters, DetectionReport, Person, Ticket, camera_rig::CameraRig};
 use crate::{
     calibration::Calibration,
     geometry::Pixel,
@@ -128,6 +128,8 @@ pub struct Detected {
     pub encoded: Option<Bytes>,
     /// Cancelled when the client is gone. Drawing then stops.
     pub withdrawn: CancellationToken,
+    /// Persons outside of all areas and their margins, or in an ignored place.
+    pub(super) outside: Vec<Person>,
     pub(super) rigs: Vec<Arc<CameraRig>>,
 }
 
@@ -138,6 +140,19 @@ impl Detected {
     pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let rigs = self.rigs.iter();
         rigs.flat_map(|rig| rig.view_outlines()).collect()
+    }
+
+    /// Returns the boxes (corner-origin frame pixels) that hide people who are in no result: those
+    /// that were found, and all pixels in which none are looked for.
+    #[must_use]
+    pub fn boxes_of_others(&self) -> Vec<[f64; 4]> {
+        let margin = self.report.margin.iter().flatten();
+        let found = margin.chain(&self.outside);
+        let found = found.map(|person| person.bbox.corners());
+        // All rigs belong to one camera.
+        let camera = self.rigs.first();
+        let unsearched = camera.into_iter().flat_map(|rig| rig.unsearched());
+        found.chain(unsearched).collect()
     }
 
     /// Returns the outlines of the calibration's zones in the frame.
