@@ -91,9 +91,7 @@ impl Report {
         let margin = self.margin.iter().map(|person| (person, true));
         persons
             .chain(margin)
-            .filter_map(|(person, is_in_margin)| {
-                self.observation(person, is_in_margin, definition)
-            })
+            .filter_map(|(person, is_in_margin)| self.observation(person, is_in_margin, definition))
             .collect()
     }
 

@@ -117,7 +117,7 @@ impl SceneCamera {
     }
 
     /// Changes what is counted. Visits and approaches begin again.
-    pub(crate) fn redefine(&mut self, definition: Arc<CameraDefinition>) {
+    fn redefine(&mut self, definition: Arc<CameraDefinition>) {
         let presence = self.presence;
         *self = Self::new(&self.name, definition);
         self.presence = presence;
@@ -260,6 +260,12 @@ impl Scene {
         }
     }
 
+    /// Changes what is counted of a camera. Visits and approaches begin again.
+    pub(crate) fn redefine(&mut self, camera: usize, definition: Arc<CameraDefinition>) {
+        self.tracker.limit(camera, definition.areas.clone());
+        self.cameras[camera].redefine(definition);
+    }
+
     /// Returns the state to be stored.
     pub(crate) fn state(&self) -> SceneState {
         let cameras = self.cameras.iter().map(|camera| CameraState {
@@ -377,3 +383,6 @@ fn milliseconds(seconds: f64) -> i64 {
     let milliseconds = (seconds * 1000.0).round() as i64;
     milliseconds
 }
+
+#[cfg(test)]
+mod tests;

@@ -205,9 +205,14 @@ fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, Strin
         ("  masks", text)
     });
     let counted = |title, areas: &[ZoneArea]| {
-        let on_floor = areas.iter().filter(|area| matches!(area, ZoneArea::Floor(_)));
+        let on_floor = areas
+            .iter()
+            .filter(|area| matches!(area, ZoneArea::Floor(_)));
         let on_floor = on_floor.count();
-        let text = format!("{on_floor} on the floor, {} in the frame", areas.len() - on_floor);
+        let text = format!(
+            "{on_floor} on the floor, {} in the frame",
+            areas.len() - on_floor
+        );
         (!areas.is_empty()).then_some((title, text))
     };
     let areas = counted("  areas", &foot_filter.areas);
