@@ -122,35 +122,23 @@ const OTHER_SIDE: &str = r#", "areas": [{"floor_m": [[-4, -1], [-2.5, -1], [-2.5
 fn persons_outside_areas_and_in_ignored_places_do_not_count() {
     let engine = engine(BlobDetector::default(), None);
     for profile in ["paper", "fast", "balanced", "quality", "direct"] {
-        let found = |areas| {
+        let found = |areas: &str| {
             let detected = detected(&engine, areas, profile, 1, [420.0, 300.0]);
             let report = detected.report;
             let zones: usize = report.zones.iter().map(|zone| zone.persons).sum();
-            let margin = report.margin.map(|margin| margin.len() > 0);
-            (report.persons.len() > 0, margin, zones > 0)
+            let margin = report.margin.map(|margin| !margin.is_empty());
+            (!report.persons.is_empty(), margin, zones > 0)
         };
-        let with_zones = |areas: &str| format!("{areas}{ZONES}");
-        assert_eq!(found(&with_zones("")), (true, None, true), "{profile}");
-        assert_eq!(
-            found(&with_zones(AROUND_FOOT)),
-            (true, Some(false), true),
-            "{profile}"
-        );
-        assert_eq!(
-            found(&with_zones(BEFORE_FOOT)),
-            (false, Some(true), false),
-            "{profile}"
-        );
-        assert_eq!(
-            found(&with_zones(IGNORED_FOOT)),
-            (false, None, false),
-            "{profile}"
-        );
-        assert_eq!(
-            found(&with_zones(OTHER_SIDE)),
-            (false, Some(false), false),
-            "{profile}"
-        );
+        for (areas, expected) in [
+            ("", (true, None, true)),
+            (AROUND_FOOT, (true, Some(false), true)),
+            (BEFORE_FOOT, (false, Some(true), false)),
+            (IGNORED_FOOT, (false, None, false)),
+            (OTHER_SIDE, (false, Some(false), false)),
+        ] {
+            let areas = format!("{areas}{ZONES}");
+            assert_eq!(found(&areas), expected, "{profile}: {areas}");
+        }
     }
 }
 
