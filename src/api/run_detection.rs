@@ -4,6 +4,10 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
+use lookdown_detect::{
+    imaging::annotate::Concealment,
+    pipeline::{DetectJob, Detected, DetectionReport},
+};
 
 use crate::{
     annotated_image::StoredFrame,
@@ -13,9 +17,7 @@ use crate::{
         limit::Limit,
         report::Report,
     },
-    imaging::annotate::Concealment,
     metrics::Metrics,
-    pipeline::{DetectJob, Detected, DetectionReport},
     results::{NewPicture, NewReport},
     telemetry::RequestTrace,
 };

@@ -182,8 +182,8 @@ fn lobby_with(areas: &Value, ignore: &Value) -> Value {
 async fn people_outside_areas_are_in_no_result() {
     let service = Service::start();
     let report = async |query: &str| {
-        let answer = service.post_raw(&format!("calibration=lobby&{query}"), frame());
-        answer.await
+        let query = format!("calibration=lobby&{query}");
+        service.post_raw(&query, frame()).await
     };
     let whole = json!([{ "frame_px": [[0, 0], [200, 0], [200, 200], [0, 200]] }]);
     let far = json!([{ "floor_m": [[80, 80], [90, 80], [90, 90]] }]);

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use lookdown_client::{LogOnce, ServerClient};
+use lookdown_common::{LogOnce, ServerClient};
 use reqwest::{StatusCode, header::CONTENT_TYPE};
 use tokio::{
     sync::watch,

@@ -4,7 +4,7 @@ use std::{future::Future, path::PathBuf, sync::Arc, time::Duration};
 
 use hyper_util::service::TowerToHyperService;
 use jiff::Timestamp;
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient, http_server};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,

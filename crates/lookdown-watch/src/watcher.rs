@@ -19,7 +19,7 @@ use crate::{
     slot::{Slot, Writer},
     source,
 };
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry, http_server};
 
 /// Interval of the checks for a changed file.
 const FILE_CHECK: Duration = Duration::from_secs(2);

@@ -18,6 +18,7 @@ use axum::{
     response::IntoResponse,
 };
 use jiff::Timestamp;
+use lookdown_lens::quoted::Quoted;
 
 use self::row::CameraRow;
 use crate::{
@@ -26,7 +27,6 @@ use crate::{
         http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
     },
-    quoted::Quoted,
     results::{Headline, ListenError, Unreachable},
 };
 

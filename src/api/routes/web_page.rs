@@ -14,20 +14,18 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
 
-use crate::{
-    api::{
-        ApiState,
-        http::{
-            entity_tags::{entity_tag, is_unmodified},
-            page_headers,
-            problem::{Problem, ProblemKind},
-        },
-        require_scope::RequireAdmin,
+use crate::api::{
+    ApiState,
+    http::{
+        entity_tags::{entity_tag, is_unmodified},
+        page_headers,
+        problem::{Problem, ProblemKind},
     },
-    revision::revision_of,
+    require_scope::RequireAdmin,
 };
 
 /// A file of the page.

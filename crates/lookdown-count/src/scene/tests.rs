@@ -1,6 +1,20 @@
-use super::*;
-use crate::test_walks::person;
 use lookdown_lens::calibration::CalibrationFile;
+
+use super::*;
+
+/// A surely seen person at a place of the floor, 3 m below the camera.
+fn person(x: f64, y: f64) -> Observation {
+    let px = [500.0 + 100.0 * x, 500.0 + 100.0 * y];
+    Observation {
+        floor_m: Some([x, y]),
+        azimuth_deg: y.atan2(x).to_degrees() + 90.0,
+        off_axis_deg: x.hypot(y).atan2(3.0).to_degrees(),
+        centre_px: px,
+        foot_px: px,
+        score: 0.95,
+        is_in_margin: false,
+    }
+}
 
 /// A camera whose area ends at the line "door", x = 0.
 const CALIBRATION: &str = r#"{

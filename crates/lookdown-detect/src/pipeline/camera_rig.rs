@@ -4,13 +4,16 @@
 
 use std::sync::Arc;
 
-use super::outline::{crop_outline, view_outline};
-use crate::{
+use lookdown_lens::{
     calibration::CameraGeometry,
-    detection::{BBox, FramePixels, ViewPixels},
     geometry::{
         BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView, foot_filter::AreaReach,
     },
+};
+
+use super::outline::{crop_outline, view_outline};
+use crate::{
+    detection::{BBox, FramePixels, ViewPixels},
     imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable},
 };
 

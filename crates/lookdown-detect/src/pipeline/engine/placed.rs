@@ -1,9 +1,8 @@
 //! The persons of a frame by the places of their feet.
 
-use crate::{
-    geometry::{FootFilter, FootPlace},
-    pipeline::Person,
-};
+use lookdown_lens::geometry::{FootFilter, FootPlace};
+
+use crate::pipeline::Person;
 
 /// The persons of a frame by the places of their feet.
 #[derive(Default)]
