@@ -185,8 +185,8 @@ async fn people_outside_areas_are_in_no_result() {
         let query = format!("calibration=lobby&{query}");
         service.post_raw(&query, frame()).await
     };
-    let whole = json!([{ "frame_px": [[0, 0], [200, 0], [200, 200], [0, 200]] }]);
-    let far = json!([{ "floor_m": [[80, 80], [90, 80], [90, 90]] }]);
+    let whole = json!([{ "frame_px": [[0.0, 0.0], [200.0, 0.0], [200.0, 200.0], [0.0, 200.0]] }]);
+    let far = json!([{ "floor_m": [[80.0, 80.0], [90.0, 80.0], [90.0, 90.0]] }]);
     for (areas, ignore, is_left_out) in [
         (json!([]), json!([]), false),
         (whole.clone(), json!([]), false),
@@ -210,6 +210,6 @@ async fn people_outside_areas_are_in_no_result() {
         let exported = coco["annotations"].as_array().unwrap().len();
         assert_eq!(exported, persons);
         let rows = service.get("/results").await.json();
-        assert_eq!(rows[0]["persons"], json!(persons));
+        assert_eq!(rows[0]["frame_persons"], json!(persons));
     }
 }

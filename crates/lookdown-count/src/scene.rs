@@ -152,12 +152,7 @@ impl SceneCamera {
 
     /// Adds the crossings, entries and visits of the tracks to the sums.
     /// Lines have all tracks, zones those that count.
-    fn count(
-        &mut self,
-        tracks: &[&Track],
-        counted: &[&Track],
-        sums: &mut Sums,
-    ) -> Vec<NamedCrossing> {
+    fn count(&mut self, [tracks, counted]: [&[&Track]; 2], sums: &mut Sums) -> Vec<NamedCrossing> {
         let mut named = Vec::new();
         for crossing in self.lines.update(tracks.iter().copied()) {
             let line = &self.lines.lines()[crossing.line];
@@ -315,7 +310,7 @@ impl Scene {
         let counted = tracks.iter().copied().filter(|track| track.counts());
         let counted: Vec<&Track> = counted.collect();
         for camera in &mut self.cameras {
-            crossings.extend(camera.count(&tracks, &counted, sums));
+            crossings.extend(camera.count([&tracks, &counted], sums));
         }
         let tracks = counted;
         self.heat_map.update(tracks.iter().copied());
