@@ -7,7 +7,8 @@ use lookdown_lens::calibration::{Calibration, CalibrationFile};
 use reqwest::{StatusCode, header::ETAG};
 
 use crate::{
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
     store::{Store, StoreError, StoredCalibrations},
 };
 
