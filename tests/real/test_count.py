@@ -199,6 +199,7 @@ class Counts(CountedCamera):
 
         with self.counting() as count:
             wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.server.post(DETECT, OFFICE)
             deadline = time.monotonic() + 60
             while not is_one(numbers := self.shown_numbers(count)):
                 self.assertLess(time.monotonic(), deadline, numbers)

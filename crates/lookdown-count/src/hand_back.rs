@@ -28,11 +28,11 @@ pub(crate) async fn hand_back(client: ServerClient, mut snapshots: watch::Receiv
         let snapshot = snapshots.borrow_and_update().clone();
         let pause = match send(&client, &snapshot, &mut sent).await {
             Ok(()) => {
-                log.settle();
+                log.clear();
                 REPEAT
             }
             Err(problem) => {
-                if log.is_changed(&problem) {
+                if log.should_log(&problem) {
                     tracing::warn!("the server has its own numbers of persons only: {problem}");
                 }
                 sleep(PAUSE).await;
