@@ -13,10 +13,10 @@ const MAX_BYTES: u64 = 1 << 20;
 /// writer, and no later version of the file would be read.
 ///
 /// # Errors
-/// If it cannot be read, is no regular file, or is larger.
+/// If it cannot be read, is not a regular file, or is larger.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is no regular file"));
+        return Err(io::Error::other("it is not a regular file"));
     }
     let mut content = Vec::new();
     let read = File::open(path)?
@@ -52,7 +52,7 @@ mod tests {
             reading.spawn(move || done.send(read(&own))).unwrap();
             let outcome = outcome.recv_timeout(Duration::from_secs(5));
             let error = outcome.expect("the read waits").unwrap_err();
-            assert!(error.to_string().contains("no regular file"), "{error}");
+            assert!(error.to_string().contains("not a regular file"), "{error}");
         }
     }
 }

@@ -99,7 +99,7 @@ impl WebhookEntry {
         let Some(url) = url else {
             // It may hold a password.
             let shown = self.url.rsplit('@').next().unwrap_or_default();
-            let remedy = "is no URL of a receiver: write it like https://example.com/hook";
+            let remedy = "is not a URL of a receiver: write it like https://example.com/hook";
             return Err(ConfigError::value(&field("url"), shown, remedy));
         };
         let secret = read_secret(&field("secret_file"), &self.secret_file)?;

@@ -362,9 +362,9 @@ async fn refusals_are_problem_documents() {
             (
                 "/counts/hall?step=90s",
                 422,
-                "step: it is no duration of whole minutes",
+                "step: it is not a duration of whole minutes",
             ),
-            ("/counts/hall?from=yesterday", 422, "from: it is no time"),
+            ("/counts/hall?from=yesterday", 422, "from: it is not a time"),
             (
                 "/counts/hall?from=2020-01-01T00:00:00Z&step=1m",
                 422,
@@ -528,11 +528,11 @@ fn invalid_settings_name_field_value_and_remedy() {
         ),
         (
             "[counting]\nlongest_gap = \"1h\"",
-            "counting.longest_gap: \"1h\" is no duration from 1 s to 600 s",
+            "counting.longest_gap: \"1h\" is not a duration from 1 s to 600 s",
         ),
         (
             "[server]\nurl = \"ftp://x\"",
-            "server.url: \"ftp://x\" is no URL of a server",
+            "server.url: \"ftp://x\" is not a URL of a server",
         ),
         ("[stores]\n", "stores: unknown field `stores`"),
         (

@@ -114,7 +114,7 @@ impl CalibrationStore for FolderStore {
                 return Err(self.failed(&problem));
             }
             let entry = entry.map_err(|error| self.failed(&error))?;
-            // A link to nothing, as while files are being replaced, is no file.
+            // A link to nothing, as while files are being replaced, is not a file.
             if let (Ok(name), Some(stamp)) = (entry.file_name().into_string(), stamp(&entry.path()))
             {
                 files.push(StoredFile { name, stamp });

@@ -22,7 +22,7 @@ const LIBRARIES: [&str; 7] = [
     "lookdown_watch",
 ];
 
-/// What a module uses: other modules of its crate, and crates of the workspace.
+/// The purpose of a module, and the modules and crates that it uses.
 #[derive(Default)]
 struct Uses {
     purpose: String,

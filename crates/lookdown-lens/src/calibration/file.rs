@@ -130,7 +130,7 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
 fn mount(raw: &NativeMount) -> Result<Mount, String> {
     let up = Vector3::from(raw.world_up);
     let length = up.norm();
-    // Written so that a length that is no number is refused, too.
+    // Written so that a length that is not a number is refused, too.
     let is_unit = (length - 1.0).abs() <= UNIT_TOLERANCE;
     if !is_unit {
         let [x, y, z] = raw.world_up;

@@ -172,7 +172,7 @@ impl CameraEntry {
         };
         let length = name.chars().count();
         if length == 0 || length > MAX_NAME_CHARS || name.chars().any(char::is_control) {
-            let remedy = "is no name of 1 to 128 characters without control characters";
+            let remedy = "is not a name of 1 to 128 characters without control characters";
             return Err(ConfigError::value(field, name, remedy));
         }
         Ok(name.clone())

@@ -75,7 +75,7 @@ fn errors_name_the_field_the_value_and_the_remedy() {
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\nevery='1 parsec'",
-            "cameras[0].every: \"1 parsec\" is no duration from 0.04 s to 1 h: write it like 1s, 500ms or 2m",
+            "cameras[0].every: \"1 parsec\" is not a duration from 0.04 s to 3600 s: write it like 10s or 500ms",
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\n[[cameras]]\nname='a'\nurl='http://d/'",
@@ -87,7 +87,7 @@ fn errors_name_the_field_the_value_and_the_remedy() {
         ),
         (
             "[server]\nurl='ftp://x:y@host'\n[[cameras]]\nname='a'\nurl='http://c/'",
-            "server.url: \"host\" is no URL of a server: write it like http://127.0.0.1:8080",
+            "server.url: \"host\" is not a URL of a server: write it like http://127.0.0.1:8080",
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\nhwaccel='-x y'",
