@@ -53,9 +53,10 @@ use self::{
     declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
     threads::ThreadKeys, tls::TlsKeys, values::Values,
 };
+use lookdown_http::server::ConnectionLimits;
+
 use crate::{
-    mqtt::MqttOptions, parameters::DetectDefaults, results::ResultLimits, server::ConnectionLimits,
-    tls::TlsOptions,
+    mqtt::MqttOptions, parameters::DetectDefaults, results::ResultLimits, tls::TlsOptions,
 };
 
 /// All settings, checked.

@@ -8,12 +8,13 @@ use std::{
 
 use axum::{extract::FromRequestParts, http::request::Parts};
 
+use lookdown_http::request_id::RequestId;
+
 use super::{
     ApiState,
     http::{
         access::Access,
         problem::{Problem, ProblemKind},
-        request_id::RequestId,
     },
 };
 use crate::{

@@ -8,13 +8,13 @@ use std::{
 };
 
 use axum::extract::FromRef;
+use lookdown_http::header_limits::HeaderLimits;
 
 use super::{
     http::{
         access::Access,
         deadline::{Deadline, RequestTimeout},
         drain_body::BodyLimits,
-        header_limits::HeaderLimits,
         problem::{Problem, ProblemKind},
         rate_limit::RequestRate,
         request_body::{BodyReader, UploadBudget},

@@ -82,7 +82,6 @@ const SERVER: Table = &[
     ("watched_file", &[]),
     ("access", &["fairness", "plain_name", "watched_file"]),
     ("rounding", &[]),
-    ("shutdown", &[]),
     ("poller", &[]),
     ("results", &["fairness", "metrics", "quoted", "tls"]),
     (
@@ -99,7 +98,6 @@ const SERVER: Table = &[
         ],
     ),
     ("tls", &["metrics", "watched_file"]),
-    ("server", &["metrics", "shutdown", "tls"]),
     ("mqtt", &["fairness", "metrics", "results", "tls"]),
     (
         "settings",
@@ -111,7 +109,6 @@ const SERVER: Table = &[
             "parameters",
             "pipeline",
             "results",
-            "server",
             "tls",
         ],
     ),
@@ -209,9 +206,7 @@ const SERVER: Table = &[
             "mqtt",
             "poller",
             "results",
-            "server",
             "settings",
-            "shutdown",
             "telemetry",
             "tls",
             "api",
@@ -234,7 +229,6 @@ const SERVER: Table = &[
             "fairness",
             "probe",
             "settings",
-            "shutdown",
             "telemetry",
             "mqtt",
             "api",
@@ -247,13 +241,11 @@ const SERVER: Table = &[
 const WITH_INDEPENDENT_PARTS: [&str; 2] = ["api::routes", "api::protocols"];
 
 /// Crates for external systems, and the only modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 30] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 28] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
     ("base64", &["open_inference"]),
-    ("hyper", &["server"]),
-    ("hyper_util", &["server"]),
     ("tower_http", &["api"]),
     ("utoipa", &["api", "open_inference"]),
     ("utoipa_axum", &["api"]),

@@ -1,11 +1,10 @@
 //! The parts that the companions of a Lookdown server share: settings files, the server and its key,
-//! HTTP requests with limits, an HTTP server with limits, backoff, and logging.
+//! HTTP requests with limits, backoff, and logging.
 
 mod abort_on_drop;
 mod backoff;
 mod config;
 mod http_client;
-pub mod http_server;
 mod log_once;
 mod server_entry;
 pub mod text;

@@ -14,6 +14,7 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+use lookdown_http::page_headers;
 
 use serde::Serialize;
 
@@ -22,7 +23,6 @@ use crate::{
         ApiState,
         http::{
             entity_tags::{entity_tag, is_unmodified},
-            page_headers,
             problem::{Problem, ProblemKind},
         },
     },

@@ -53,10 +53,11 @@ fn sums_of_batches_add_up_over_steps() {
         to: 30,
         step,
     };
-    let steps = store.steps(&hall, span(15)).unwrap();
+    let steps = store.steps(&hall, span(15), 100).unwrap().unwrap();
     assert_eq!(steps.keys().copied().collect::<Vec<_>>(), [0, 1]);
     assert_eq!(steps[&0].presence.known_ms, 90_000);
-    let whole = &store.steps(&hall, span(30)).unwrap()[&0];
+    assert!(store.steps(&hall, span(15), 3).unwrap().is_none());
+    let whole = &store.steps(&hall, span(30), 100).unwrap().unwrap()[&0];
     assert_eq!(
         (whole.presence.person_ms, whole.presence.most),
         (240_000, 3)
@@ -96,7 +97,7 @@ fn old_sums_expire_and_totals_stay() {
         step: 200,
     };
     assert_eq!(
-        store.steps(&hall, span).unwrap()[&0].presence.known_ms,
+        store.steps(&hall, span, 100).unwrap().unwrap()[&0].presence.known_ms,
         30_000
     );
     assert_eq!(

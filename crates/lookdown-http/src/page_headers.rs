@@ -36,12 +36,12 @@ const ALWAYS: [(HeaderName, HeaderValue); 4] = [
 ];
 
 /// Adds the policy of the web page.
-pub(in crate::api) async fn of_web_page(response: Response) -> Response {
+pub async fn of_web_page(response: Response) -> Response {
     with_policy(response, WEB_PAGE_POLICY)
 }
 
 /// Adds the policy of the API page.
-pub(in crate::api) async fn of_api_page(response: Response) -> Response {
+pub async fn of_api_page(response: Response) -> Response {
     with_policy(response, API_PAGE_POLICY)
 }
 
@@ -52,7 +52,7 @@ fn with_policy(mut response: Response, policy: HeaderValue) -> Response {
 }
 
 /// Adds default headers that the response does not set itself.
-pub(in crate::api) fn complete(headers: &mut HeaderMap) {
+pub fn complete(headers: &mut HeaderMap) {
     for (name, value) in ALWAYS {
         headers.entry(name).or_insert(value);
     }

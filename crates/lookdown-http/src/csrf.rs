@@ -5,7 +5,7 @@
 //! server.
 //!
 //! So a request that may make changes is refused unless its `Origin` is the server itself or one of
-//! `access.cors_origins`. A server that only its own machine reaches also refuses requests for a
+//! the allowed ones. A server that only its own machine reaches also refuses requests for a
 //! public host name, and requests that a proxy forwarded: the clients of a proxy are on other
 //! machines. API keys make these checks unnecessary: browsers do not add them on their own.
 
@@ -18,10 +18,9 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::{
-    access::Access,
+use crate::{
     host::host_of,
-    problem::{Problem, ProblemKind},
+    problem::{Kind, Problem},
 };
 
 /// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` and
@@ -41,29 +40,28 @@ const FORWARDING_PREFIX: &str = "x-forwarded-";
 /// Largest number of characters of a header that an error message repeats.
 const MAX_SHOWN_CHARS: usize = 128;
 
-/// The origins that may make changes.
-#[derive(Clone)]
-pub(in crate::api) struct AllowedOrigins {
-    own_machine_only: bool,
-    /// The origins in `access.cors_origins`.
-    allowed: Arc<[String]>,
+/// The origins that may make changes on a listener without keys.
+#[derive(Debug, Clone)]
+pub struct AllowedOrigins {
+    /// `true` if only clients on the same machine reach the listener.
+    pub own_machine_only: bool,
+    /// Origins of other web pages that may make changes.
+    pub allowed: Arc<[String]>,
+    /// The names of the settings, for the remedies.
+    pub settings: SettingNames,
 }
 
-impl AllowedOrigins {
-    /// Returns `None` if there are API keys.
-    pub(in crate::api) fn of(access: &Access, cors_origins: &[String]) -> Option<Self> {
-        match access {
-            Access::Open { own_machine_only } => Some(Self {
-                own_machine_only: *own_machine_only,
-                allowed: cors_origins.into(),
-            }),
-            Access::Keys(_) => None,
-        }
-    }
+/// The settings that the remedies name.
+#[derive(Debug, Clone, Copy)]
+pub struct SettingNames {
+    /// The setting of the keys.
+    pub keys: &'static str,
+    /// The end of the sentence about another host or origin: where to add a trusted one.
+    pub origins: &'static str,
 }
 
 /// Refuses requests of other origins.
-pub(in crate::api) async fn refuse(
+pub async fn refuse(
     State(own_pages): State<AllowedOrigins>,
     request: Request,
     next: Next,
@@ -78,13 +76,14 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
     let AllowedOrigins {
         own_machine_only,
         allowed,
+        settings: SettingNames { keys, origins },
     } = own_pages;
     if *own_machine_only && let Some(header) = forwarding_header(request.headers()) {
         let detail = format!(
-            "without keys (access.keys_file), this server answers clients on its own machine only, \
-             and {header} shows that a proxy passed this request on: set access.keys_file"
+            "without keys ({keys}), this server answers clients on its own machine only, and \
+             {header} shows that a proxy passed this request on: set {keys}"
         );
-        return Err(Problem::new(ProblemKind::Forbidden, detail));
+        return Err(Problem::new(Kind::Forbidden, detail));
     }
     // Every browser sends a host, so a client without one is not a browser.
     let host = host_of(request.uri(), request.headers());
@@ -95,11 +94,10 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
     {
         let host = shown(host.as_str());
         let detail = format!(
-            "without keys (access.keys_file), this server answers on its own machine only, and \
-             {host} may be another machine: use localhost, or add the origin to \
-             access.cors_origins"
+            "without keys ({keys}), this server answers on its own machine only, and {host} may be \
+             another machine: use localhost, or {origins}"
         );
-        return Err(Problem::new(ProblemKind::Forbidden, detail));
+        return Err(Problem::new(Kind::Forbidden, detail));
     }
     let Some(origin) = request.headers().get(ORIGIN) else {
         return Ok(());
@@ -111,10 +109,10 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
     }
     let origin = shown(origin);
     let detail = format!(
-        "without keys (access.keys_file), web pages of other origins may only read, and this \
-         request is from a page of {origin}: add a trusted origin to access.cors_origins"
+        "without keys ({keys}), web pages of other origins may only read, and this request is from \
+         a page of {origin}: {origins}"
     );
-    Err(Problem::new(ProblemKind::Forbidden, detail))
+    Err(Problem::new(Kind::Forbidden, detail))
 }
 
 /// Returns the first header that a forwarding proxy adds.
