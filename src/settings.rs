@@ -38,6 +38,7 @@ pub use limits::LimitSettings;
 pub use locate::{
     PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
 };
+use lookdown_detect::parameters::DetectDefaults;
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
 pub use page::PageSettings;
@@ -55,9 +56,7 @@ use self::{
 };
 use lookdown_http::server::ConnectionLimits;
 
-use crate::{
-    mqtt::MqttOptions, parameters::DetectDefaults, results::ResultLimits, tls::TlsOptions,
-};
+use crate::{mqtt::MqttOptions, results::ResultLimits, tls::TlsOptions};
 
 /// All settings, checked.
 #[derive(Debug, Clone, PartialEq)]

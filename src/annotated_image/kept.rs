@@ -4,10 +4,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use strum::VariantArray;
-
-use super::{AnnotationError, AnnotationOptions, ImageFormat, Layer, drawn, sketch::Sketch};
-use crate::{
+use lookdown_detect::{
     imaging::{
         Frame,
         annotate::{Concealment, EncodeError, conceal, encode_jpeg},
@@ -16,6 +13,9 @@ use crate::{
     },
     pipeline::Detected,
 };
+use strum::VariantArray;
+
+use super::{AnnotationError, AnnotationOptions, ImageFormat, Layer, drawn, sketch::Sketch};
 
 /// Wider frames are scaled down to the first of these widths, and to the next one while their files
 /// are too large.

@@ -7,6 +7,11 @@ use std::{
 };
 
 use axum::{extract::FromRequestParts, http::request::Parts};
+use lookdown_detect::{
+    fairness::{Client, PriorityLevel},
+    parameters::Priority,
+    pipeline::Ticket,
+};
 
 use lookdown_http::request_id::RequestId;
 
@@ -17,11 +22,7 @@ use super::{
         problem::{Problem, ProblemKind},
     },
 };
-use crate::{
-    access::Holder,
-    fairness::{Client, PriorityLevel},
-    pipeline::{Priority, Ticket},
-};
+use crate::access::Holder;
 
 /// The caller of a request.
 #[derive(Debug, Clone)]

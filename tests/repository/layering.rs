@@ -263,7 +263,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 28] = [
             "mqtt",
         ],
     ),
-    ("lookdown_client", &["cli", "mqtt"]),
+    ("lookdown_common", &["cli", "mqtt"]),
     ("lookdown_count", &["cli", "mqtt"]),
     ("lookdown_watch", &["cli"]),
     ("clap", &["cli"]),

@@ -8,15 +8,14 @@ use lookdown_lens::{
         polygon::MAX_CORNERS,
     },
 };
-use serde::{Deserialize, Serialize};
-
-use crate::{
-    CameraPose,
+use lookdown_tracking::{
+    CameraPose, Plane,
     lines::{DEFAULT_BAND_M, Line},
-    report::Report,
-    tracking::Plane,
     zones::Zone,
 };
+use serde::{Deserialize, Serialize};
+
+use crate::report::Report;
 
 /// Half the width of the hysteresis band of a line in the frame, as a share of the frame's width.
 const BAND_OF_FRAME: f64 = 0.02;

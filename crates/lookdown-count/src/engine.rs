@@ -6,7 +6,8 @@ use std::{
     time::Duration,
 };
 
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
+use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
     definition::{CameraDefinition, DefinitionKey},
@@ -15,7 +16,6 @@ use crate::{
     report::Report,
     scene::{NamedCrossing, Scene, SceneState},
     sums::{DAY_MS, Owner, Sums, Totals},
-    tracking::MAX_CAMERAS,
 };
 
 /// Times that are this much after the own clock are logged, milliseconds.

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use lookdown_client::{Backoff, LogOnce, ServerClient};
+use lookdown_common::{Backoff, LogOnce, ServerClient};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,

@@ -12,13 +12,16 @@ use std::{collections::BTreeMap, sync::Arc};
 use axum::{
     Json, Router,
     extract::State,
-    http::{HeaderValue, header::{CACHE_CONTROL, CONTENT_TYPE}},
+    http::{
+        HeaderValue,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
+    },
     middleware,
     response::Response,
     routing::get,
 };
 use jiff::Timestamp;
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
 use lookdown_http::problem::{Kind, Problem};
 use parking_lot::Mutex;
 use serde::Serialize;

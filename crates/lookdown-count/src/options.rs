@@ -7,7 +7,7 @@ use std::{
 };
 
 use jiff::SignedDuration;
-use lookdown_client::{
+use lookdown_common::{
     ConfigError, ServerEntry, ServerOptions, parse_toml, read_file, read_secret,
 };
 use reqwest::Url;

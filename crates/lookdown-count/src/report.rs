@@ -2,10 +2,11 @@
 
 use jiff::Timestamp;
 use lookdown_lens::geometry::{Pixel, oriented_box::vertical_in_frame};
+use lookdown_tracking::Observation;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Observation, definition::CameraDefinition};
+use crate::definition::CameraDefinition;
 
 /// The capture time of a camera alone may be this much after and before the arrival, milliseconds.
 const MAX_AHEAD_MS: i64 = 5_000;

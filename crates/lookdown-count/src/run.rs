@@ -3,7 +3,7 @@
 use std::{future::Future, path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient};
 use lookdown_http::{
     protect::{self, Access, Routes},
     server::bind,

@@ -7,7 +7,7 @@ mod signature;
 use std::{path::PathBuf, time::Duration};
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
-use lookdown_client::{ConfigError, read_secret};
+use lookdown_common::{ConfigError, read_secret};
 use reqwest::Url;
 use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};

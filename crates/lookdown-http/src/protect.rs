@@ -16,7 +16,7 @@ use tower_http::catch_panic::CatchPanicLayer;
 
 use crate::{
     Shutdown,
-    csrf::{self, AllowedOrigins, SettingNames},
+    csrf::{self, AllowedOrigins, Remedies},
     header_limits::{self, HeaderLimits},
     host, keys,
     problem::{self, Kind, Problem},
@@ -75,9 +75,11 @@ pub async fn serve(
     let origins = AllowedOrigins {
         own_machine_only: matches!(access, Access::OwnMachine),
         allowed: Arc::default(),
-        settings: SettingNames {
+        hosts: Arc::default(),
+        remedies: Remedies {
             keys: keys_setting,
-            origins: "send the key of the settings",
+            hosts: "protect it with a key",
+            origins: "protect it with a key",
         },
     };
     let protected = match access {
@@ -120,11 +122,7 @@ fn of_panic(_: Box<dyn Any + Send>) -> Response {
     Problem::internal().into_response()
 }
 
-async fn check_key(
-    State(key): State<Arc<SecretString>>,
-    request: Request,
-    next: Next,
-) -> Response {
+async fn check_key(State(key): State<Arc<SecretString>>, request: Request, next: Next) -> Response {
     match keys::check(request.headers(), &key) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),

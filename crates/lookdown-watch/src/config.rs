@@ -6,7 +6,7 @@ mod file;
 pub use entry::{CameraEntry, parse_duration};
 pub use file::load;
 
-use lookdown_client::{ConfigError, ServerOptions};
+use lookdown_common::{ConfigError, ServerOptions};
 
 use crate::Camera;
 

@@ -3,7 +3,9 @@
 use std::{sync::Arc, time::Instant};
 
 use parking_lot::Mutex;
-use prometheus::{Encoder, GaugeVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry, TextEncoder};
+use prometheus::{
+    Encoder, GaugeVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry, TextEncoder,
+};
 
 /// The reason why a frame did not become a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use crate::{
     server::{Answer, Server},
     slot::Slot,
 };
-use lookdown_client::{Backoff, LogOnce};
+use lookdown_common::{Backoff, LogOnce};
 
 /// First and longest pause after a failure of the server.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(15));

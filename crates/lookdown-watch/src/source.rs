@@ -26,7 +26,7 @@ use crate::{
     metrics::{CameraMetrics, Failure},
     slot::Slot,
 };
-use lookdown_client::{Backoff, LogOnce};
+use lookdown_common::{Backoff, LogOnce};
 
 /// First and longest pause before a source is started again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));

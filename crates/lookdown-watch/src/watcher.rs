@@ -19,7 +19,7 @@ use crate::{
     slot::{Slot, Writer},
     source,
 };
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry};
 use lookdown_http::server::bind;
 
 /// Interval of the checks for a changed file.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use axum::http::HeaderMap;
 use lookdown_http::{
-    csrf::{AllowedOrigins, SettingNames},
+    csrf::{AllowedOrigins, Remedies},
     keys::{only_key, presented},
 };
 
@@ -65,14 +65,20 @@ impl Access {
     }
 
     /// Returns the origins that may make changes; `None` if there are keys.
-    pub(in crate::api) fn allowed_origins(&self, cors_origins: &[String]) -> Option<AllowedOrigins> {
+    pub(in crate::api) fn allowed_origins(
+        &self,
+        cors_origins: &[String],
+        hosts: &[String],
+    ) -> Option<AllowedOrigins> {
         match self {
             Self::Open { own_machine_only } => Some(AllowedOrigins {
                 own_machine_only: *own_machine_only,
                 allowed: cors_origins.into(),
-                settings: SettingNames {
+                hosts: hosts.into(),
+                remedies: Remedies {
                     keys: "access.keys_file",
-                    origins: "add the trusted origin to access.cors_origins",
+                    hosts: "add the name to access.hosts",
+                    origins: "add a trusted origin to access.cors_origins",
                 },
             }),
             Self::Keys(_) => None,

@@ -100,7 +100,10 @@ impl Problem {
         if let Some(problem) = response.extensions_mut().remove::<Self>() {
             return Some(problem);
         }
-        if let Some(problem) = response.extensions_mut().remove::<lookdown_http::problem::Problem>() {
+        if let Some(problem) = response
+            .extensions_mut()
+            .remove::<lookdown_http::problem::Problem>()
+        {
             return Some(problem.into());
         }
         match response.status() {
@@ -110,7 +113,10 @@ impl Problem {
             )),
             StatusCode::METHOD_NOT_ALLOWED => Some(Self::new(
                 ProblemKind::MethodNotAllowed,
-                format!("{path} does not support {method}: use a method of the header Allow"),
+                format!(
+                    "{path} does not support {method}: use {}",
+                    remedy_for_method(method, path)
+                ),
             )),
             status if status.is_client_error() => Some(Self::new(
                 ProblemKind::MalformedRequest,
@@ -214,5 +220,13 @@ impl IntoResponse for Problem {
         }
         response.extensions_mut().insert(self);
         response
+    }
+}
+/// Names the resource that a client probably means, or the header with the methods.
+fn remedy_for_method(method: &str, path: &str) -> String {
+    let camera = path.strip_prefix("/results/");
+    match camera.filter(|camera| method == "GET" && !camera.contains('/')) {
+        Some(camera) => format!("/results/{camera}/latest"),
+        None => "a method of the header Allow".to_owned(),
     }
 }

@@ -15,18 +15,16 @@ use axum::{
     routing::get,
 };
 use lookdown_http::page_headers;
+use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
 
-use crate::{
-    api::{
-        ApiState,
-        http::{
-            entity_tags::{entity_tag, is_unmodified},
-            problem::{Problem, ProblemKind},
-        },
+use crate::api::{
+    ApiState,
+    http::{
+        entity_tags::{entity_tag, is_unmodified},
+        problem::{Problem, ProblemKind},
     },
-    revision::revision_of,
 };
 
 /// A file of the page.

@@ -1,7 +1,8 @@
+use lookdown_tracking::heat_map::Cell;
+
 use super::*;
 use crate::{
     engine::Batch,
-    heat_map::Cell,
     sums::{LineDirection, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
     webhooks::Message,
 };
@@ -97,7 +98,9 @@ fn old_sums_expire_and_totals_stay() {
         step: 200,
     };
     assert_eq!(
-        store.steps(&hall, span, 100).unwrap().unwrap()[&0].presence.known_ms,
+        store.steps(&hall, span, 100).unwrap().unwrap()[&0]
+            .presence
+            .known_ms,
         30_000
     );
     assert_eq!(

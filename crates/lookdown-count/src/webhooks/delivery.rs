@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use lookdown_client::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
+use lookdown_common::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
 use reqwest::{Client, StatusCode, header::CONTENT_TYPE};
 use tokio::{
     sync::mpsc::{self, error::TrySendError},

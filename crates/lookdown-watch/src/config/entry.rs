@@ -7,7 +7,7 @@ use secrecy::SecretString;
 use serde::Deserialize;
 
 use crate::{Camera, Credentials, Location, Transport, VideoOptions};
-use lookdown_client::{ConfigError, read_secret};
+use lookdown_common::{ConfigError, read_secret};
 
 /// Shortest interval between two frames.
 const MIN_EVERY: Duration = Duration::from_millis(40);

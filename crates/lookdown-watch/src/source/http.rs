@@ -3,7 +3,7 @@
 
 use std::convert::Infallible;
 
-use lookdown_client::text::with_causes;
+use lookdown_common::text::with_causes;
 
 use bytes::{Bytes, BytesMut};
 use reqwest::{

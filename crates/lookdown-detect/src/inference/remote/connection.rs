@@ -3,6 +3,7 @@
 use std::{error::Error, io::Read, time::Duration};
 
 use bytes::Bytes;
+use lookdown_lens::quoted::one_line;
 use reqwest::{
     blocking::{Client, RequestBuilder, Response},
     header::{AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER},
@@ -11,10 +12,7 @@ use reqwest::{
 use url::Url;
 
 use super::RemoteOptions;
-use crate::{
-    open_inference::{HEAD_LENGTH, message::Message},
-    quoted::one_line,
-};
+use crate::open_inference::{HEAD_LENGTH, message::Message};
 
 /// Connect timeout.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);

@@ -1,5 +1,9 @@
 //! Metadata of a model on a server.
 
+use lookdown_lens::{
+    quoted::{Quoted, one_line},
+    revision::revision_of,
+};
 use serde::Deserialize;
 
 use super::server::{RemoteServer, refusal};
@@ -15,8 +19,6 @@ use crate::{
         bounded_json::MAX_ENTRIES,
         metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
     },
-    quoted::{Quoted, one_line},
-    revision::revision_of,
 };
 
 /// Longest name of a tensor or a datatype.
