@@ -132,7 +132,8 @@ impl Follower {
             skipped("malformed");
             return Ok(());
         };
-        let Ok(report) = serde_json::from_slice::<Report>(&event.data) else {
+        let report = serde_json::from_slice::<Report>(&event.data).ok();
+        let Some(report) = report.filter(Report::has_valid_names) else {
             skipped("malformed");
             return Ok(());
         };

@@ -227,11 +227,11 @@ fn calibrations(connection: &Connection) -> rusqlite::Result<StoredCalibrations>
 
 fn messages(connection: &Connection) -> rusqlite::Result<Vec<Message>> {
     let mut statement =
-        connection.prepare("SELECT id, url, body, created_s FROM outbox ORDER BY created_s, id")?;
+        connection.prepare("SELECT id, webhook, body, created_s FROM deliveries ORDER BY created_s, id")?;
     let rows = statement.query_map([], |row| {
         Ok(Message {
             id: row.get(0)?,
-            url: row.get(1)?,
+            webhook: row.get(1)?,
             body: row.get(2)?,
             created_s: row.get(3)?,
         })

@@ -186,7 +186,7 @@ fn message(id: String, webhook: &Webhook, kind: &str, at_ms: i64, data: &Value) 
     let body = json!({ "type": kind, "timestamp": time(at_ms), "data": data });
     Message {
         id,
-        url: webhook.url.to_string(),
+        webhook: webhook.digest(),
         body: body.to_string(),
         created_s: at_ms.div_euclid(1000),
     }
