@@ -6,16 +6,16 @@ pub struct LogOnce(Option<String>);
 
 impl LogOnce {
     /// Returns true if this problem is to be logged: it is not the last one.
-    pub fn is_changed(&mut self, problem: &str) -> bool {
-        let is_changed = self.0.as_deref() != Some(problem);
-        if is_changed {
+    pub fn should_log(&mut self, problem: &str) -> bool {
+        let is_new = self.0.as_deref() != Some(problem);
+        if is_new {
             self.0 = Some(problem.to_owned());
         }
-        is_changed
+        is_new
     }
 
     /// Clears the problem. Returns true if there was one.
-    pub fn settle(&mut self) -> bool {
+    pub fn clear(&mut self) -> bool {
         self.0.take().is_some()
     }
 }
@@ -27,11 +27,11 @@ mod tests {
     #[test]
     fn a_problem_is_logged_once_until_it_changes_or_ends() {
         let mut log = LogOnce::default();
-        assert!(log.is_changed("refused"));
-        assert!(!log.is_changed("refused"));
-        assert!(log.is_changed("stalled"));
-        assert!(log.settle());
-        assert!(!log.settle());
-        assert!(log.is_changed("stalled"));
+        assert!(log.should_log("refused"));
+        assert!(!log.should_log("refused"));
+        assert!(log.should_log("stalled"));
+        assert!(log.clear());
+        assert!(!log.clear());
+        assert!(log.should_log("stalled"));
     }
 }

@@ -7,7 +7,8 @@ use lookdown_lens::calibration::{Calibration, CalibrationFile};
 use reqwest::{StatusCode, header::ETAG};
 
 use crate::{
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
     store::{Store, StoreError, StoredCalibrations},
 };
 
@@ -173,7 +174,8 @@ mod tests {
     #[test]
     fn calibrations_beyond_the_limits_are_forgotten() {
         let content = vec![b' '; CalibrationFile::MAX_BYTES];
-        let stored = (0..400).map(|number| (number.to_string(), ("1".to_owned(), Some(content.clone()))));
+        let stored =
+            (0..400).map(|number| (number.to_string(), ("1".to_owned(), Some(content.clone()))));
         let mut calibrations = Calibrations::resumed(stored.collect());
         let forgotten = calibrations.forget_oldest("7");
         let kept = MAX_TOTAL_BYTES / CalibrationFile::MAX_BYTES;

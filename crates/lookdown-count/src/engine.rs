@@ -10,7 +10,8 @@ use lookdown_common::text::one_line;
 use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
     drops::{DropReason, Drops},
     now::{LogPause, Now},
     report::Report,

@@ -12,6 +12,7 @@ mod calibrations;
 #[cfg(test)]
 mod clock_simulation;
 mod definition;
+mod definition_key;
 mod drops;
 mod engine;
 mod event_parser;

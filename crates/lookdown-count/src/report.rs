@@ -9,7 +9,7 @@ use lookdown_tracking::Observation;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-use crate::definition::CameraDefinition;
+use crate::{definition::CameraDefinition, definition_key::DefinitionKey};
 
 /// The capture time of a camera alone may be this much after and before the arrival, milliseconds.
 const MAX_AHEAD_MS: i64 = 5_000;
@@ -127,6 +127,17 @@ impl Report {
         }
     }
 
+    /// Returns what identifies the definition of the camera for this report.
+    pub(crate) fn definition_key(&self) -> DefinitionKey {
+        let used = &self.calibration;
+        DefinitionKey {
+            calibration: (!used.assumed).then(|| used.id.clone()),
+            revision: used.revision.clone(),
+            width: self.image.width,
+            height: self.image.height,
+        }
+    }
+
     /// Returns the persons as the tracker needs them. A person without a direction is left out.
     pub(crate) fn observations(&self, definition: &CameraDefinition) -> Vec<Observation> {
         let persons = self.persons.iter();
@@ -224,8 +235,12 @@ mod tests {
         };
         assert!(change(|_| ()));
         assert!(!change(|report| report.camera = "n".repeat(129)));
-        assert!(!change(|report| report.calibration.id = "../results".to_owned()));
-        assert!(!change(|report| report.calibration.revision = "1".repeat(129)));
+        assert!(!change(
+            |report| report.calibration.id = "../results".to_owned()
+        ));
+        assert!(!change(
+            |report| report.calibration.revision = "1".repeat(129)
+        ));
     }
 
     #[test]

@@ -81,9 +81,9 @@ impl Origin {
             sleep(FILE_CHECK).await;
             match self.load().await {
                 Ok(options) if options != *current => return options,
-                Ok(_) => drop(log.settle()),
+                Ok(_) => drop(log.clear()),
                 Err(problem) => {
-                    if log.is_changed(&problem.to_string()) {
+                    if log.should_log(&problem.to_string()) {
                         tracing::warn!("{problem}; the last valid settings stay in use");
                     }
                 }

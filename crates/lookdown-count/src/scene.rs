@@ -16,7 +16,8 @@ use lookdown_tracking::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
     now::{LogPause, Now},
     presence::Presence,
     report::ReportKey,

@@ -3,7 +3,7 @@
 mod entry;
 mod file;
 
-pub use entry::{CameraEntry, parse_duration};
+pub use entry::CameraEntry;
 pub use file::load;
 
 use lookdown_common::{ConfigError, ServerOptions};

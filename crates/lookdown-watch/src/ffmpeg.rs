@@ -17,7 +17,7 @@ use tokio::{
 };
 
 use crate::{
-    MAX_FRAME_BYTES, SourceError, VideoOptions, source::JpegSplitter, stderr_line::LastLine,
+    MAX_FRAME_BYTES, SourceError, VideoOptions, jpeg_splitter::JpegSplitter, stderr_line::LastLine,
 };
 use lookdown_common::text::one_line;
 

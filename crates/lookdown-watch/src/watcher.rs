@@ -186,8 +186,8 @@ impl Watcher {
                 Err(error) => Err(error.to_string()),
             };
             match outcome {
-                Ok(()) => drop(log.settle()),
-                Err(problem) if log.is_changed(&problem) => {
+                Ok(()) => drop(log.clear()),
+                Err(problem) if log.should_log(&problem) => {
                     tracing::warn!("{problem}; the last valid settings stay in use");
                 }
                 Err(_) => {}

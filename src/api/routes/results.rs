@@ -17,7 +17,7 @@ use axum::{
     response::IntoResponse,
 };
 use jiff::Timestamp;
-use lookdown_lens::quoted::Quoted;
+use lookdown_common::text::Quoted;
 
 use self::row::CameraRow;
 use crate::{

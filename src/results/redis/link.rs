@@ -1,6 +1,6 @@
 //! The state of the link to Redis: one shared connection, or the reason why there is none.
 
-use lookdown_lens::quoted::one_line;
+use lookdown_common::text::one_line;
 use redis::{RedisError, RetryMethod, aio::MultiplexedConnection};
 use tokio::sync::watch;
 

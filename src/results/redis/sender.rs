@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
-use lookdown_lens::quoted::one_line;
+use lookdown_common::text::one_line;
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use uuid::Uuid;
 

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use lookdown_lens::quoted::one_line;
+use lookdown_common::text::one_line;
 use redis::{RedisResult, aio::MultiplexedConnection};
 use tokio::time::{Instant, sleep};
 

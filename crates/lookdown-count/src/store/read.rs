@@ -226,8 +226,8 @@ fn calibrations(connection: &Connection) -> rusqlite::Result<StoredCalibrations>
 }
 
 fn messages(connection: &Connection) -> rusqlite::Result<Vec<Message>> {
-    let mut statement =
-        connection.prepare("SELECT id, webhook, body, created_s FROM deliveries ORDER BY created_s, id")?;
+    let mut statement = connection
+        .prepare("SELECT id, webhook, body, created_s FROM deliveries ORDER BY created_s, id")?;
     let rows = statement.query_map([], |row| {
         Ok(Message {
             id: row.get(0)?,

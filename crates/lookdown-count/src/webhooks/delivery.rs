@@ -139,11 +139,11 @@ impl Receiver {
         loop {
             let problem = match self.attempt(message).await {
                 Attempt::Delivered => {
-                    self.log.settle();
+                    self.log.clear();
                     return true;
                 }
                 Attempt::Refused(problem) => {
-                    if self.log.is_changed(&problem) {
+                    if self.log.should_log(&problem) {
                         tracing::warn!("{problem}; the message is dropped");
                     }
                     return false;
@@ -151,7 +151,7 @@ impl Receiver {
                 Attempt::Failed(problem) => problem,
             };
             let pause = pauses.next();
-            if self.log.is_changed(&problem) {
+            if self.log.should_log(&problem) {
                 tracing::warn!("{problem}");
             }
             match pause {

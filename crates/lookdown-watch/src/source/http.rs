@@ -12,8 +12,8 @@ use reqwest::{
 };
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::{Sink, SourceError, multipart::PartReader};
-use crate::{Camera, MAX_FRAME_BYTES, credentials::Login};
+use super::{Sink, multipart::PartReader};
+use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login};
 
 /// Requests for one answer: the second one answers the challenge of the first.
 const ATTEMPTS: usize = 2;

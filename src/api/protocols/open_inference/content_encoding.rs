@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read};
 use axum::http::{HeaderMap, header::CONTENT_ENCODING};
 use bytes::Bytes;
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
-use lookdown_lens::quoted::Quoted;
+use lookdown_common::text::Quoted;
 
 use super::request::malformed;
 use crate::api::http::{

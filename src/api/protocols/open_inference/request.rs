@@ -2,13 +2,13 @@
 
 use axum::http::HeaderMap;
 use bytes::Bytes;
+use lookdown_common::text::{Quoted, shortened};
 use lookdown_detect::open_inference::{
     BINARY_SIZE, HEAD_LENGTH, TensorData,
     bounded_json::Table,
     message::{InputTensor, Message, read_request},
     parameters::{Parameter, Parameters},
 };
-use lookdown_lens::quoted::{Quoted, shortened};
 use serde_json::value::RawValue;
 
 use super::{

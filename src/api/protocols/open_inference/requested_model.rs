@@ -6,8 +6,8 @@ use axum::{
     extract::{FromRequestParts, Path, rejection::PathRejection},
     http::request::Parts,
 };
+use lookdown_common::text::Quoted;
 use lookdown_detect::{inference::Model, open_inference::metadata::ModelMetadata};
-use lookdown_lens::quoted::Quoted;
 use serde::Deserialize;
 
 use super::{

@@ -1,11 +1,11 @@
 //! Input tensors: a name, a shape, and frames or numbers.
 
 use bytes::Bytes;
+use lookdown_common::text::{Quoted, shortened};
 use lookdown_detect::{
     fairness::BudgetShare,
     open_inference::{Datatype, TensorData, element_count, parameters::Parameters},
 };
-use lookdown_lens::quoted::{Quoted, shortened};
 
 use crate::api::http::{
     problem::{Problem, ProblemKind},

@@ -1,11 +1,11 @@
 //! The requested outputs of an inference request and their encoding.
 
+use lookdown_common::text::Quoted;
 use lookdown_detect::open_inference::{
     BINARY_OUTPUT,
     message::RequestedOutput,
     parameters::{Parameter, Parameters},
 };
-use lookdown_lens::quoted::Quoted;
 
 use super::tensor::{misfit, refuse_others};
 use crate::api::http::problem::{Problem, ProblemKind};

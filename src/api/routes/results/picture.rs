@@ -9,7 +9,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use bytes::Bytes;
-use lookdown_lens::quoted::{Quoted, one_line};
+use lookdown_common::text::{Quoted, one_line};
 
 use super::{address::CameraAddress, unknown};
 use crate::{

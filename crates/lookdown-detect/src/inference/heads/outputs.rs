@@ -1,6 +1,6 @@
 //! Selection of a head's outputs among all outputs of a model.
 
-use lookdown_lens::quoted::Quoted;
+use lookdown_common::text::Quoted;
 
 use super::tensor::Output;
 

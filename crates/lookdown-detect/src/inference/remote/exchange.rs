@@ -1,6 +1,6 @@
 //! Inference requests with views, and their responses.
 
-use lookdown_lens::quoted::{Quoted, one_line};
+use lookdown_common::text::{Quoted, one_line};
 use serde::ser::Error;
 use serde_json::value::RawValue;
 

@@ -4,11 +4,10 @@
 //! are skipped up to the start of the next file.
 
 use bytes::{Bytes, BytesMut};
+use lookdown_common::JPEG_START;
 
 /// Bytes that are read at once.
 const CHUNK_BYTES: usize = 64 << 10;
-/// First bytes of a file.
-const START: &[u8] = &[0xff, 0xd8, 0xff];
 
 /// A parser that takes bytes as they arrive, and returns whole files.
 #[derive(Debug)]
@@ -94,7 +93,7 @@ impl JpegSplitter {
     }
 
     fn find_start(&mut self) -> Step {
-        match memchr::memmem::find(&self.buffer, START) {
+        match memchr::memmem::find(&self.buffer, JPEG_START) {
             Some(0) => {
                 self.parsed = 2;
                 self.state = State::Marker;
@@ -105,7 +104,7 @@ impl JpegSplitter {
                 Step::Continue
             }
             None => {
-                let certain = self.buffer.len().saturating_sub(START.len() - 1);
+                let certain = self.buffer.len().saturating_sub(JPEG_START.len() - 1);
                 self.skip(certain);
                 Step::NeedsMore
             }
