@@ -19,6 +19,7 @@ use crate::{
     calibrations::Calibrations,
     engine::{CountingOptions, Engine},
     follower::Follower,
+    hand_back::hand_back,
     http::{Api, metrics_router, probes, router},
     metrics::Metrics,
     options::{CountEntry, CountOptions, load},
@@ -150,6 +151,8 @@ pub async fn count(
         protect::serve(listener, routes, access, "http.api_key_file", &open).await;
     });
     let _serving = AbortOnDrop(serving.abort_handle());
+    let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
+    let _handing_back = AbortOnDrop(handing_back.abort_handle());
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(&options.webhooks, resumed.messages, &store, &metrics)?,
