@@ -72,7 +72,7 @@ const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 /// The use of the response in the browser, such as `image`. A `document` is a link that was
 /// followed.
 const SEC_FETCH_DEST: HeaderName = HeaderName::from_static("sec-fetch-dest");
-/// The names that the public DNS delegates to nobody (RFC 6761, 6762, 8375; the private-use name of
+/// The names that the public DNS does not delegate (RFC 6761, 6762, 8375; the private-use name of
 /// ICANN).
 const LOCAL_SUFFIXES: [&str; 4] = [".localhost", ".local", ".internal", ".home.arpa"];
 /// Largest number of characters of a header that an error message repeats.
