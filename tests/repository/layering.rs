@@ -18,13 +18,11 @@ const CHECKED: [&str; 3] = [
 ];
 
 /// Crates for external systems, and the only modules that may use them.
-const MAY_USE_CRATE: [(&str, &[&str]); 29] = [
+const MAY_USE_CRATE: [(&str, &[&str]); 27] = [
     ("ort", &["inference"]),
     ("image", &["imaging"]),
     ("axum", &["api"]),
     ("base64", &["open_inference"]),
-    ("hyper", &["server"]),
-    ("hyper_util", &["server"]),
     ("tower_http", &["api"]),
     ("utoipa", &["api", "open_inference"]),
     ("utoipa_axum", &["api"]),

@@ -4,16 +4,17 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use uuid::Uuid;
 
 /// The header of the ID, in requests and responses.
-pub(in crate::api) const HEADER: HeaderName = HeaderName::from_static("x-request-id");
+pub const HEADER: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_CHARS: usize = 128;
 
 /// Identifies a request in logs, reports and problems: 1 to 128 visible ASCII characters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::api) struct RequestId(String);
+pub struct RequestId(String);
 
 impl RequestId {
     /// Returns the ID of the request with these headers.
-    pub(in crate::api) fn of(headers: &HeaderMap) -> Self {
+    #[must_use]
+    pub fn of(headers: &HeaderMap) -> Self {
         let given = headers.get(HEADER).and_then(|value| value.to_str().ok());
         match given {
             Some(id) if is_sane(id) => Self(id.to_owned()),
@@ -21,11 +22,15 @@ impl RequestId {
         }
     }
 
-    pub(in crate::api) fn as_str(&self) -> &str {
+    /// Returns the ID as text.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    pub(in crate::api) fn header_value(&self) -> HeaderValue {
+    /// Returns the ID as the value of the header.
+    #[must_use]
+    pub fn header_value(&self) -> HeaderValue {
         // Visible ASCII is always a header value.
         HeaderValue::from_str(&self.0).unwrap_or(HeaderValue::from_static("invalid"))
     }

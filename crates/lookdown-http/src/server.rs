@@ -8,13 +8,15 @@ mod connection_permits;
 mod connection_timeouts;
 mod instrumented_io;
 
-use std::{convert::Infallible, sync::Arc, time::Duration};
+use std::{convert::Infallible, future::Future, net::SocketAddr, sync::Arc, time::Duration};
 
 use hyper::{
     Request, Response,
     body::{Body, Incoming},
 };
+use prometheus::IntGauge;
 use tokio::{
+    io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
     task::JoinSet,
 };
@@ -26,14 +28,14 @@ use self::{
     connection::Rules,
     connection_permits::{ConnectionPermit, ConnectionPermits},
 };
-use crate::{metrics::Metrics, shutdown::Shutdown, tls::Tls};
+use crate::Shutdown;
 
 /// Longest time for the handshake, and for the head, on a connection beyond the limit. A probe
 /// needs milliseconds.
 const TIMEOUT_BEYOND_LIMIT: Duration = Duration::from_millis(500);
 
-/// The services that answer. Each request carries the address of its client, a [`std::net::SocketAddr`], among its
-/// extensions.
+/// The services that answer. Each request carries the address of its client, a
+/// [`SocketAddr`], among its extensions.
 #[derive(Debug, Clone)]
 pub struct Services<S> {
     /// The service for connections within the limit.
@@ -42,25 +44,62 @@ pub struct Services<S> {
     pub beyond_limit: S,
 }
 
+/// The handshake at the beginning of each connection.
+pub trait Handshake: Send + Sync + 'static {
+    /// The encrypted connection.
+    type Stream: AsyncRead + AsyncWrite + Send + Unpin;
+
+    /// Returns the connection, or `None` if the handshake fails or takes longer than `max_duration`.
+    fn accept(
+        &self,
+        connection: TcpStream,
+        max_duration: Duration,
+    ) -> impl Future<Output = Option<Self::Stream>> + Send;
+}
+
+/// Connections without a handshake.
+#[derive(Debug, Clone, Copy)]
+pub enum Plain {}
+
+impl Handshake for Plain {
+    type Stream = TcpStream;
+
+    async fn accept(&self, connection: TcpStream, _: Duration) -> Option<TcpStream> {
+        Some(connection)
+    }
+}
+
+/// Listens on an address. `setting` names it in the error.
+///
+/// # Errors
+/// One sentence, for an address that is in use or not one of this machine.
+pub async fn bind(setting: &str, address: SocketAddr) -> Result<TcpListener, String> {
+    TcpListener::bind(address).await.map_err(|error| {
+        format!("{setting}: {address} cannot be used: {error}: give a free address of this machine")
+    })
+}
+
 /// Serves until `shutdown` reaches draining. Then connections in the backlog are accepted, idle
 /// ones are closed, and those with a request in flight are closed after its response. The function
 /// returns when none is left. Dropping it closes all connections at once. With `tls`, every
 /// connection begins with a handshake.
-pub async fn serve<S, B>(
+/// `open` counts the open connections.
+pub async fn serve<H, S, B>(
     listener: TcpListener,
-    tls: Option<&Arc<Tls>>,
+    tls: Option<&Arc<H>>,
     services: Services<S>,
     limits: &ConnectionLimits,
-    metrics: &Arc<Metrics>,
+    open: &IntGauge,
     shutdown: &Shutdown,
 ) where
+    H: Handshake,
     S: Service<Request<Incoming>, Response = Response<B>, Error = Infallible>,
     S: Clone + Send + Sync + 'static,
     S::Future: Send,
     B: Body<Data: Send, Error: Into<BoxError>> + Send + Unpin + 'static,
 {
     let mut acceptor = Acceptor::new(listener);
-    let permits = ConnectionPermits::new(limits.max_connections, metrics);
+    let permits = ConnectionPermits::new(limits.max_connections, open);
     let mut connections = JoinSet::new();
     let serve_on = |stream: TcpStream, permit: ConnectionPermit| {
         let is_regular = permit.is_regular();

@@ -7,22 +7,22 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::problem::{Problem, ProblemKind};
+use crate::problem::{Kind, Problem};
 
 /// Bytes of a header line besides name and value: `: ` and the line end.
 const SEPARATORS: usize = 4;
 
 /// The limits of request heads.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::api) struct HeaderLimits {
+pub struct HeaderLimits {
     /// Largest number of headers.
-    pub(in crate::api) max_headers: usize,
+    pub max_headers: usize,
     /// Largest head, bytes.
-    pub(in crate::api) max_header_bytes: usize,
+    pub max_header_bytes: usize,
 }
 
 /// Refuses a request with too many headers or too large a head.
-pub(in crate::api) async fn within_bounds(
+pub async fn within_bounds(
     State(limits): State<HeaderLimits>,
     request: Request,
     next: Next,
@@ -36,7 +36,7 @@ pub(in crate::api) async fn within_bounds(
     };
     if let Some((what, most)) = too_large {
         let detail = format!("the request has more than {most} {what}: send fewer");
-        return Problem::new(ProblemKind::HeadersTooLarge, detail).into_response();
+        return Problem::new(Kind::HeadersTooLarge, detail).into_response();
     }
     next.run(request).await
 }

@@ -41,18 +41,18 @@ const ALWAYS: [(HeaderName, HeaderValue); 5] = [
 ];
 
 /// Adds the policy of the web page.
-pub(in crate::api) async fn of_web_page(response: Response) -> Response {
+pub async fn of_web_page(response: Response) -> Response {
     with_policy(response, WEB_PAGE_POLICY)
 }
 
 /// Adds the policy of the API page.
-pub(in crate::api) async fn of_api_page(response: Response) -> Response {
+pub async fn of_api_page(response: Response) -> Response {
     with_policy(response, API_PAGE_POLICY)
 }
 
 /// Permits pages of other origins to show a response. A server with `access.cors_origins` refuses the
 /// requests of other pages itself.
-pub(in crate::api) async fn for_other_origins(mut response: Response) -> Response {
+pub async fn for_other_origins(mut response: Response) -> Response {
     let policy = HeaderValue::from_static("cross-origin");
     response.headers_mut().insert(RESOURCE_POLICY, policy);
     response
@@ -65,7 +65,7 @@ fn with_policy(mut response: Response, policy: HeaderValue) -> Response {
 }
 
 /// Adds default headers that the response does not set itself.
-pub(in crate::api) fn complete(headers: &mut HeaderMap) {
+pub fn complete(headers: &mut HeaderMap) {
     for (name, value) in ALWAYS {
         headers.entry(name).or_insert(value);
     }

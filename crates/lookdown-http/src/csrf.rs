@@ -5,8 +5,8 @@
 //! server.
 //!
 //! So a request that may make changes is refused unless its `Origin` is the server itself or one of
-//! `access.cors_origins`. Requests for a public host name are refused unless `access.hosts` lists it,
-//! and images for pages of other sites unless their origin is allowed. A server that only its own
+//! the allowed ones. Requests for a public host name are refused unless the settings list it, and
+//! images for pages of other sites unless their origin is allowed. A server that only its own
 //! machine reaches also refuses requests that a proxy forwarded: the clients of a proxy are on other
 //! machines. API keys make these checks unnecessary: browsers do not add them on their own.
 
@@ -23,10 +23,9 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::{
-    access::Access,
+use crate::{
     host::host_of,
-    problem::{Problem, ProblemKind},
+    problem::{Kind, Problem},
 };
 
 /// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` by
@@ -79,36 +78,32 @@ const LOCAL_SUFFIXES: [&str; 4] = [".localhost", ".local", ".internal", ".home.a
 /// Largest number of characters of a header that an error message repeats.
 const MAX_SHOWN_CHARS: usize = 128;
 
-/// The origins that may make changes, and the names of the server.
-#[derive(Clone)]
-pub(in crate::api) struct AllowedOrigins {
-    own_machine_only: bool,
-    /// The origins in `access.cors_origins`.
-    allowed: Arc<[String]>,
-    /// The names in `access.hosts`.
-    hosts: Arc<[String]>,
+/// The origins that may make changes, and the names of a listener without keys.
+#[derive(Debug, Clone)]
+pub struct AllowedOrigins {
+    /// `true` if only clients on the same machine reach the listener.
+    pub own_machine_only: bool,
+    /// Origins of other web pages that may make changes.
+    pub allowed: Arc<[String]>,
+    /// Public names of the listener.
+    pub hosts: Arc<[String]>,
+    /// The remedies.
+    pub remedies: Remedies,
 }
 
-impl AllowedOrigins {
-    /// Returns `None` if there are API keys.
-    pub(in crate::api) fn of(
-        access: &Access,
-        cors_origins: &[String],
-        hosts: &[String],
-    ) -> Option<Self> {
-        match access {
-            Access::Open { own_machine_only } => Some(Self {
-                own_machine_only: *own_machine_only,
-                allowed: cors_origins.into(),
-                hosts: hosts.into(),
-            }),
-            Access::Keys(_) => None,
-        }
-    }
+/// The ends of the sentences about a refused request: what to set.
+#[derive(Debug, Clone, Copy)]
+pub struct Remedies {
+    /// The setting of the keys.
+    pub keys: &'static str,
+    /// The remedy for an unknown host name.
+    pub hosts: &'static str,
+    /// The remedy for an unknown origin.
+    pub origins: &'static str,
 }
 
 /// Refuses requests of other origins.
-pub(in crate::api) async fn refuse(
+pub async fn refuse(
     State(own_pages): State<AllowedOrigins>,
     request: Request,
     next: Next,
@@ -120,17 +115,19 @@ pub(in crate::api) async fn refuse(
 }
 
 fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
-    let forbidden = |detail| Err(Problem::new(ProblemKind::Forbidden, detail));
+    let forbidden = |detail| Err(Problem::new(Kind::Forbidden, detail));
     let AllowedOrigins {
         own_machine_only,
         allowed,
         hosts,
+        remedies,
     } = own_pages;
+    let keys = remedies.keys;
     let headers = request.headers();
     if *own_machine_only && let Some(header) = forwarding_header(headers) {
         return forbidden(format!(
-            "without keys (access.keys_file), this server answers clients on its own machine only, \
-             and {header} shows that a proxy passed this request on: set access.keys_file"
+            "without keys ({keys}), this server answers clients on its own machine only, and {header} \
+             shows that a proxy passed this request on: set {keys}"
         ));
     }
     // Every browser sends a host, so a client without one is not a browser.
@@ -140,11 +137,10 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
         && !hosts.iter().any(|pattern| matches(pattern, host.host()))
         && !allowed.iter().any(|origin| names(origin, host))
     {
-        let host = shown(host.as_str());
+        let (host, remedy) = (shown(host.as_str()), remedies.hosts);
         return forbidden(format!(
-            "without keys (access.keys_file), this server answers to names that no stranger can own, \
-             and the owner of {host} can make it resolve to any machine: use an address, or add the \
-             name to access.hosts"
+            "without keys ({keys}), this server answers to names that no stranger can own, and the \
+             owner of {host} can make it resolve to any machine: use an address, or {remedy}"
         ));
     }
     let is_allowed = |origin: &str| {
@@ -156,10 +152,10 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
         if request.method().is_safe() || is_allowed(origin) {
             return Ok(());
         }
-        let origin = shown(origin);
+        let (origin, remedy) = (shown(origin), remedies.origins);
         return forbidden(format!(
-            "without keys (access.keys_file), web pages of other origins may only read, and this \
-             request is from a page of {origin}: add a trusted origin to access.cors_origins"
+            "without keys ({keys}), web pages of other origins may only read, and this request is \
+             from a page of {origin}: {remedy}"
         ));
     }
     // Browsers send no origin with the request of an image or a script.
@@ -171,11 +167,11 @@ fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
             .and_then(origin_of)
             .is_some_and(|origin| is_allowed(&origin))
     {
-        return forbidden(
-            "without keys (access.keys_file), this server sends nothing to pages of other sites: open \
-             its address directly, or add the origin of the page to access.cors_origins"
-                .to_owned(),
-        );
+        let remedy = remedies.origins;
+        return forbidden(format!(
+            "without keys ({keys}), this server sends nothing to pages of other sites: open its \
+             address directly, or {remedy}"
+        ));
     }
     Ok(())
 }
@@ -186,7 +182,7 @@ fn origin_of(url: &str) -> Option<String> {
     Some(format!("{}://{}", url.scheme_str()?, url.authority()?))
 }
 
-/// Returns `true` if a host name is that of a pattern in `access.hosts`.
+/// Returns `true` if a host name is that of a pattern in the settings.
 fn matches(pattern: &str, host: &str) -> bool {
     let name = host.trim_end_matches('.').to_ascii_lowercase();
     match pattern.strip_prefix('*') {

@@ -21,7 +21,7 @@ use super::{
     connection_timeouts::ConnectionTimeouts,
     instrumented_io::{InstrumentedBody, InstrumentedStream},
 };
-use crate::shutdown::Shutdown;
+use crate::Shutdown;
 
 /// The connection passes heads of up to this multiple of the limit to the service, which refuses
 /// them with a description.

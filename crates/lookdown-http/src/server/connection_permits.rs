@@ -4,10 +4,9 @@
 use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc};
 
 use parking_lot::Mutex;
+use prometheus::IntGauge;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::CancellationToken;
-
-use crate::metrics::Metrics;
 
 /// Most connections beyond the limit at the same time. They are answered with 503, except for
 /// probes.
@@ -22,7 +21,8 @@ pub(super) struct ConnectionPermits {
     regular: Arc<Semaphore>,
     /// Tokens that close the latest connections beyond the limit, oldest first.
     beyond_limit: Mutex<VecDeque<CancellationToken>>,
-    metrics: Arc<Metrics>,
+    /// The open connections.
+    open: IntGauge,
 }
 
 /// The permit of a connection. The connection counts as open until the permit is dropped.
@@ -31,15 +31,15 @@ pub(super) struct ConnectionPermit {
     regular: Option<OwnedSemaphorePermit>,
     /// Cancelled to close the connection in favour of a newer one.
     pub(super) closed: CancellationToken,
-    metrics: Arc<Metrics>,
+    open: IntGauge,
 }
 
 impl ConnectionPermits {
-    pub(super) fn new(limit: NonZeroUsize, metrics: &Arc<Metrics>) -> Self {
+    pub(super) fn new(limit: NonZeroUsize, open: &IntGauge) -> Self {
         Self {
             regular: Arc::new(Semaphore::new(limit.get())),
             beyond_limit: Mutex::default(),
-            metrics: Arc::clone(metrics),
+            open: open.clone(),
         }
     }
 
@@ -49,19 +49,19 @@ impl ConnectionPermits {
         let regular = Arc::clone(&self.regular).try_acquire_owned().ok();
         let closed = CancellationToken::new();
         if regular.is_none() {
-            let mut open = self.beyond_limit.lock();
-            open.push_back(closed.clone());
-            if open.len() > MAX_BEYOND_LIMIT
-                && let Some(oldest) = open.pop_front()
+            let mut beyond = self.beyond_limit.lock();
+            beyond.push_back(closed.clone());
+            if beyond.len() > MAX_BEYOND_LIMIT
+                && let Some(oldest) = beyond.pop_front()
             {
                 oldest.cancel();
             }
         }
-        self.metrics.connections.inc();
+        self.open.inc();
         ConnectionPermit {
             regular,
             closed,
-            metrics: Arc::clone(&self.metrics),
+            open: self.open.clone(),
         }
     }
 }
@@ -75,7 +75,7 @@ impl ConnectionPermit {
 
 impl Drop for ConnectionPermit {
     fn drop(&mut self) {
-        self.metrics.connections.dec();
+        self.open.dec();
     }
 }
 
@@ -85,8 +85,8 @@ mod tests {
 
     #[test]
     fn oldest_connection_beyond_the_limit_makes_room() {
-        let metrics = Arc::default();
-        let permits = ConnectionPermits::new(NonZeroUsize::MIN, &metrics);
+        let open = IntGauge::new("connections", "Open connections.").unwrap();
+        let permits = ConnectionPermits::new(NonZeroUsize::MIN, &open);
         let regular = permits.take();
         let beyond: Vec<_> = (0..=MAX_BEYOND_LIMIT).map(|_| permits.take()).collect();
         assert!(regular.is_regular() && !regular.closed.is_cancelled());

@@ -10,21 +10,22 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::problem::{Problem, ProblemKind};
+use crate::problem::{Kind, Problem};
 
 /// Refuses HTTP/1.1 requests without exactly one valid `Host`.
-pub(in crate::api) async fn require(request: Request, next: Next) -> Response {
+pub async fn require(request: Request, next: Next) -> Response {
     if request.version() == Version::HTTP_11 && only_host(request.headers()).is_none() {
         let detail = "an HTTP/1.1 request needs exactly one Host header with a valid host, such as \
                       localhost:8080 (RFC 9112, section 3.2)";
-        return Problem::new(ProblemKind::MalformedRequest, detail).into_response();
+        return Problem::new(Kind::MalformedRequest, detail).into_response();
     }
     next.run(request).await
 }
 
 /// Returns the host of the request: that of the request target, or else the only `Host` header.
 /// HTTP/1.0 requires none.
-pub(in crate::api) fn host_of(uri: &Uri, headers: &HeaderMap) -> Option<Authority> {
+#[must_use]
+pub fn host_of(uri: &Uri, headers: &HeaderMap) -> Option<Authority> {
     uri.authority().cloned().or_else(|| only_host(headers))
 }
 
