@@ -16,12 +16,13 @@ use crate::{
     engine::{Accepted, Batch, Engine},
     event_parser::Event,
     event_stream::{EventStream, StreamError},
+    message::Message,
     metrics::Metrics,
     now::Now,
     report::Report,
     snapshot::Snapshot,
     store::Store,
-    webhooks::{Conditions, Deliveries, Message},
+    webhooks::{Conditions, Deliveries},
 };
 
 /// Pauses between connections.

@@ -1,9 +1,10 @@
 //! The parameters `from`, `to` and `step`.
 
 use jiff::{SignedDuration, Timestamp};
+use lookdown_http::problem::Problem;
 use serde::Deserialize;
 
-use super::{Problem, now_ms};
+use super::shared::now_ms;
 use crate::{store::Span, sums::MINUTE_MS};
 
 /// Most steps of an answer.
@@ -73,7 +74,8 @@ fn step(text: &str) -> Result<i64, Problem> {
     });
     let minutes = minutes.filter(|minutes| (1..=MAX_STEP).contains(minutes));
     minutes.ok_or_else(|| {
-        let fault = "it is not a duration of whole minutes from 1m to 168h: write it like 15m or 24h";
+        let fault =
+            "it is not a duration of whole minutes from 1m to 168h: write it like 15m or 24h";
         Problem::of_parameter("step", fault)
     })
 }

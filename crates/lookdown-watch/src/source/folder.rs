@@ -16,7 +16,7 @@ use jiff::Timestamp;
 use lookdown_common::text::one_line;
 use tokio::{task::spawn_blocking, time::sleep};
 
-use super::Sink;
+use super::sink::Sink;
 use crate::{Camera, MAX_FRAME_BYTES, SourceError};
 
 /// Shortest and longest interval of the checks for new files.
