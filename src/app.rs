@@ -1,6 +1,7 @@
 //! The composition root: settings → engine → workers → service.
 
 mod check;
+mod exclusive;
 mod models;
 mod pollers;
 mod reload;
@@ -12,9 +13,15 @@ use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
 
+use axum::body::Body;
+use exclusive::Exclusive;
+use lookdown_client::{InProcess, ServerClient, ServerOptions};
+use parking_lot::Mutex;
+use tower::ServiceExt;
+
 use crate::{
     access::AccessKeys,
-    api::{Access, ApiOptions, ApiState, Readiness, RequestRate},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
     calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     geometry::FieldOfViewReading,
     imaging::decode::DecodeLimits,
@@ -24,7 +31,7 @@ use crate::{
     pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
-        AccessSettings, CalibrationPlace, LimitSettings, ResultSettings, Settings,
+        AccessSettings, CalibrationPlace, CountSettings, LimitSettings, ResultSettings, Settings,
         find_calibrations,
     },
     telemetry::Tracer,
@@ -163,6 +170,7 @@ pub struct App {
     /// The MQTT publisher, if a broker is configured.
     publisher: Option<Publisher>,
     tracer: Tracer,
+    companions: Companions,
     state: ApiState,
     settings: Box<Settings>,
 }
@@ -214,6 +222,7 @@ impl App {
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
+        let companions = companions(&settings.counts)?;
         let options = ApiOptions {
             max_body_bytes: settings.server.max_body_bytes,
             max_upload_bytes: settings.limits.max_upload_bytes,
@@ -237,6 +246,7 @@ impl App {
             access,
             cors_origins: settings.access.cors_origins.clone(),
             page_counts_path: settings.page.counts_path.clone(),
+            companions: companions.clone(),
             tracer: tracer.clone(),
         };
         let state = ApiState::new(
@@ -260,8 +270,31 @@ impl App {
             tls,
             publisher: publisher.transpose()?,
             tracer,
+            companions,
             state,
             settings: Box::new(settings),
+        })
+    }
+
+    /// The cameras and counts of this process.
+    #[must_use]
+    pub fn companions(&self) -> Companions {
+        self.companions.clone()
+    }
+
+    /// Returns the connection of parts of this process to the server.
+    #[must_use]
+    pub fn in_process(&self) -> InProcess {
+        let router = api::in_process_router(self.state.clone());
+        InProcess::new(move |request| {
+            let answered = router.clone().oneshot(request.map(Body::new));
+            async {
+                let response = match answered.await {
+                    Ok(response) => response,
+                    Err(never) => match never {},
+                };
+                response.map(|body| reqwest::Body::wrap(Exclusive(Mutex::new(body))))
+            }
         })
     }
 
@@ -336,4 +369,21 @@ fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>
     }
     let keys = AccessKeys::open(settings.keys.clone(), settings.keys_file.as_deref())?;
     Ok(Some(Arc::new(keys)))
+}
+
+/// The counts of another host, if the settings name one.
+fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
+    let companions = Companions::default();
+    if let Some(url) = &settings.url {
+        let key = settings.api_key_file.as_deref();
+        let key = key.map(lookdown_count::read_key).transpose()?;
+        let options = ServerOptions {
+            url: url.clone(),
+            api_key: key,
+            authorities: None,
+            in_process: None,
+        };
+        companions.forward_counts(ServerClient::new(&options)?);
+    }
+    Ok(companions)
 }

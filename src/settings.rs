@@ -6,6 +6,7 @@
 
 mod access;
 mod calibrations;
+mod counts;
 mod declare;
 mod detect;
 mod entry;
@@ -13,6 +14,7 @@ mod error;
 mod form;
 mod inference;
 mod limits;
+mod lists;
 mod locate;
 mod model;
 mod mqtt;
@@ -25,16 +27,21 @@ mod results;
 mod server;
 mod threads;
 mod tls;
+mod upstream;
 mod values;
 mod variables;
 
 use std::{path::Path, time::Duration};
 
+use lookdown_client::ServerEntry;
+
 pub use access::AccessSettings;
 pub use calibrations::{CalibrationPlace, CalibrationSettings};
+pub use counts::CountSettings;
 pub use error::SettingsError;
 pub use inference::InferenceSettings;
 pub use limits::LimitSettings;
+pub use lists::ListSettings;
 pub use locate::{PackagedFiles, find_beside_executable, find_calibrations, use_packaged_files};
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
@@ -49,7 +56,7 @@ pub(crate) use variables::variable_of;
 
 use self::{
     declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
-    threads::ThreadKeys, tls::TlsKeys, values::Values,
+    threads::ThreadKeys, tls::TlsKeys, upstream::UpstreamKeys, values::Values,
 };
 use crate::{
     mqtt::MqttOptions, parameters::DetectDefaults, results::ResultLimits, server::ConnectionLimits,
@@ -89,6 +96,12 @@ pub struct Settings {
     pub results: ResultSettings,
     /// The MQTT broker; `None` for none.
     pub mqtt: Option<MqttOptions>,
+    /// The server of `watch` and `count`.
+    pub upstream: ServerEntry,
+    /// The counts.
+    pub counts: CountSettings,
+    /// Cameras and webhooks.
+    pub lists: ListSettings,
     /// The log.
     pub log: LogSettings,
     /// Traces.
@@ -125,6 +138,9 @@ impl Settings {
             remote,
             results: ResultKeys::read(values)?.checked(ResultLimits::read(values)?)?,
             mqtt: MqttKeys::read(values)?.checked()?,
+            upstream: UpstreamKeys::read(values)?.entry(),
+            counts: CountSettings::read(values)?,
+            lists: values.lists.clone(),
             log: LogSettings::read(values)?,
             traces: TraceSettings::read(values)?,
         })
@@ -150,6 +166,8 @@ fn entries() -> Vec<Entry> {
         ResultKeys::entries(),
         ResultLimits::entries(),
         MqttKeys::entries(),
+        CountSettings::entries(),
+        UpstreamKeys::entries(),
         LogSettings::entries(),
         TraceSettings::entries(),
     ]

@@ -2,6 +2,7 @@
 //! endpoint needs its handler and a row of the table here.
 
 pub(super) mod calibrations;
+pub(super) mod counts;
 pub(super) mod detect;
 pub(super) mod health;
 pub(super) mod openapi;

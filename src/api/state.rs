@@ -10,6 +10,7 @@ use std::{
 use axum::extract::FromRef;
 
 use super::{
+    companions::Companions,
     http::{
         access::Access,
         deadline::{Deadline, RequestTimeout},
@@ -70,6 +71,8 @@ pub struct ApiOptions {
     pub cors_origins: Vec<String>,
     /// The path of `lookdown count` on the origin of the web page; `None` for none.
     pub page_counts_path: Option<String>,
+    /// The cameras and counts of this process, and the counts of another host.
+    pub companions: Companions,
     /// Creates the spans of requests.
     pub tracer: Tracer,
 }
@@ -121,6 +124,7 @@ impl ApiOptions {
             },
             cors_origins: Vec::new(),
             page_counts_path: None,
+            companions: Companions::default(),
             tracer: Tracer::default(),
         }
     }

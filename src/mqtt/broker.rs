@@ -3,6 +3,7 @@
 use std::{fmt, path::Path, str::FromStr};
 
 use percent_encoding::percent_decode_str;
+use secrecy::{ExposeSecret, SecretString};
 use url::Url;
 
 use crate::tls::{ClientTls, TlsError};
@@ -31,11 +32,25 @@ impl Broker {
     }
 }
 
+impl Broker {
+    /// Sets the password of the login.
+    ///
+    /// # Errors
+    /// [`BrokerError`] if there is no user name, or a password already.
+    pub fn with_password(mut self, password: &SecretString) -> Result<Self, BrokerError> {
+        match &mut self.login {
+            Some((_, own)) if own.is_empty() => password.expose_secret().clone_into(own),
+            _ => return Err(BrokerError),
+        }
+        Ok(self)
+    }
+}
+
 /// The text is no URL of a broker. The text is not repeated, as it may hold a password.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "not a URL of a broker: give one such as mqtt://user:password@host:1883, or mqtts:// for TLS, \
-     with other characters than letters and digits in the password percent-encoded"
+    "not a URL of a broker: give one such as mqtt://user:password@host:1883, or mqtts:// for TLS (with \
+     a mqtt.password_file: mqtt://user@host:1883), with other characters than letters and digits in the password percent-encoded"
 )]
 pub struct BrokerError;
 

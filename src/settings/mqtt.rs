@@ -2,13 +2,14 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
+use lookdown_client::read_secret;
 use secrecy::{ExposeSecret, SecretString};
 use url::Url;
 
 use super::{
     SettingsError,
     declare::settings,
-    form::{Form, Refusal, count, optional, parsed, path, seconds, secret, text, zero_is_none},
+    form::{Form, count, optional, path, seconds, secret, text, web_address, zero_is_none},
 };
 use crate::mqtt::{Broker, BrokerError, Discovery, MqttOptions};
 
@@ -25,6 +26,9 @@ settings! {
         /// `mqtt://user:password@192.168.1.10:1883`, or `mqtts://` for TLS. Empty: none. A URL with
         /// a password is better kept in the variable than in a file.
         url: Option<SecretString> = None => secret("URL of a broker");
+        /// The file with the password of the broker, on its first line. The URL then has the user
+        /// name alone. Empty: none.
+        password_file: Option<PathBuf> = None => optional(path());
         /// The PEM file of the certificate authorities of a broker with TLS. Empty: those that the
         /// system trusts.
         authorities: Option<PathBuf> = None => optional(path());
@@ -56,7 +60,16 @@ settings! {
 impl MqttKeys {
     /// The options of the publisher; `None` where there is no broker.
     pub(super) fn checked(self) -> Result<Option<MqttOptions>, SettingsError> {
-        let broker = self.url.map(|url| url.expose_secret().parse::<Broker>());
+        let password = self.password_file.as_deref();
+        let password = password.map(|path| read_secret("mqtt.password_file", path));
+        let password = password.transpose()?;
+        let broker = self.url.map(|url| {
+            let broker = url.expose_secret().parse::<Broker>()?;
+            match &password {
+                Some(password) => broker.with_password(password),
+                None => Ok(broker),
+            }
+        });
         let broker = broker
             .transpose()
             .map_err(|error: BrokerError| SettingsError::Hidden {
@@ -77,20 +90,6 @@ impl MqttKeys {
             },
         }))
     }
-}
-
-fn web_address() -> Form<Url> {
-    parsed(
-        "URL",
-        |text| {
-            let url = text.parse::<Url>().ok();
-            let url = url.filter(|url| matches!(url.scheme(), "http" | "https"));
-            url.ok_or_else(|| {
-                Refusal::Shown("give an address such as http://lookdown.local:8080".to_owned())
-            })
-        },
-        Url::to_string,
-    )
 }
 
 /// The beginning of topics (MQTT 3.1.1, section 4.7): no wildcard, no empty level, and none of the

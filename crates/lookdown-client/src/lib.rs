@@ -6,7 +6,9 @@ mod backoff;
 mod config;
 mod http_client;
 pub mod http_server;
+mod in_process;
 mod log_once;
+mod reload;
 mod server_entry;
 pub mod text;
 
@@ -14,5 +16,7 @@ pub use abort_on_drop::AbortOnDrop;
 pub use backoff::Backoff;
 pub use config::{ConfigError, parse_toml, read_file, read_secret};
 pub use http_client::{ClientError, ServerClient, client_builder, read_body, retry_after};
+pub use in_process::InProcess;
 pub use log_once::LogOnce;
+pub use reload::Reload;
 pub use server_entry::{ServerEntry, ServerOptions};

@@ -30,6 +30,11 @@ pub(crate) struct Engine {
     owners: BTreeMap<String, Owner>,
     sums: Sums,
     totals: Totals,
+    /// The totals of the last transaction. Only these are shown, so that no count that was shown is
+    /// lost with the process.
+    stored_totals: Totals,
+    /// True if a crossing or an entry is not stored yet.
+    is_urgent: bool,
     /// ID of the last report that the sums contain.
     last_event: u64,
     /// Scenes that changed since the last commit, and those that are gone.
@@ -56,6 +61,8 @@ pub(crate) struct ZoneTotal {
 /// The content of the next transaction of the store.
 pub(crate) struct Batch {
     pub(crate) last_event: u64,
+    /// The totals with these sums.
+    pub(crate) totals: Totals,
     pub(crate) sums: Sums,
     /// Changed scenes; `None` for those that are gone.
     pub(crate) scenes: Vec<(Owner, Option<SceneState>)>,
@@ -81,7 +88,9 @@ impl Engine {
             scenes: BTreeMap::new(),
             owners: BTreeMap::new(),
             sums: Sums::default(),
+            stored_totals: totals.clone(),
             totals,
+            is_urgent: false,
             last_event,
             changed: BTreeSet::new(),
             has_news: false,
@@ -106,8 +115,19 @@ impl Engine {
         self.last_event
     }
 
+    /// Returns the totals that are stored.
     pub(crate) fn totals(&self) -> &Totals {
-        &self.totals
+        &self.stored_totals
+    }
+
+    /// Returns true if a crossing or an entry waits for a transaction.
+    pub(crate) fn is_urgent(&self) -> bool {
+        self.is_urgent
+    }
+
+    /// Shows the totals of a batch that is stored.
+    pub(crate) fn stored(&mut self, batch: &Batch) {
+        self.stored_totals.clone_from(&batch.totals);
     }
 
     pub(crate) fn scenes(&self) -> impl Iterator<Item = &Scene> {
@@ -171,6 +191,8 @@ impl Engine {
         self.changed.insert(owner);
         match accepted {
             Ok(crossings) => {
+                let has_entries = sums.zones.values().any(|sum| sum.entries > 0);
+                self.is_urgent |= has_entries || !sums.crossings.is_empty();
                 self.totals.add(&sums);
                 self.sums.add(sums);
                 Accepted::Counted(crossings)
@@ -264,6 +286,7 @@ impl Engine {
         if !std::mem::take(&mut self.has_news) {
             return None;
         }
+        self.is_urgent = false;
         let changed = std::mem::take(&mut self.changed).into_iter();
         let scenes = changed.map(|owner| {
             let state = self.scenes.get(&owner).map(Scene::state);
@@ -271,6 +294,7 @@ impl Engine {
         });
         Some(Batch {
             last_event: self.last_event,
+            totals: self.totals.clone(),
             scenes: scenes.collect(),
             sums: std::mem::take(&mut self.sums),
         })
@@ -279,9 +303,10 @@ impl Engine {
 
 impl Batch {
     /// Returns a batch without news.
-    pub(crate) fn empty(last_event: u64) -> Self {
+    pub(crate) fn empty(last_event: u64, totals: Totals) -> Self {
         Self {
             last_event,
+            totals,
             sums: Sums::default(),
             scenes: Vec::new(),
         }

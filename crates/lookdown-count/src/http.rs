@@ -39,12 +39,18 @@ pub(crate) struct Api {
     pub(crate) api_key: Option<SecretString>,
 }
 
-type Shared = Arc<Api>;
+pub(crate) type Shared = Arc<Api>;
 
-/// Returns the routes.
-pub(crate) fn router(api: Api) -> Router {
-    let api = Arc::new(api);
-    let with_key = Router::new()
+impl Api {
+    /// Returns all metrics in the text format of Prometheus.
+    pub(crate) fn metrics_text(&self) -> Vec<u8> {
+        self.metrics.text(&self.engine.lock(), now_ms())
+    }
+}
+
+/// Returns the routes of the counts, without access control.
+pub(crate) fn routes() -> Router<Shared> {
+    Router::new()
         .route("/counts", get(cameras))
         .route("/counts/{camera}", get(counts::of_camera))
         .route("/counts/{camera}/tracks", get(tracks::of_camera))
@@ -62,11 +68,6 @@ pub(crate) fn router(api: Api) -> Router {
         .route("/sites/{site}/heatmap.json", get(heat_map::json_of_site))
         .route("/sites/{site}/heatmap.png", get(heat_map::png_of_site))
         .route("/sites/{site}/floor.svg", get(floor::svg))
-        .route("/metrics", get(metrics))
-        .layer(middleware::from_fn_with_state(Arc::clone(&api), check_key));
-    Router::new()
-        .route("/livez", get(async || "ok\n"))
-        .merge(with_key)
         .fallback(async |request: Request| {
             Problem::not_found(format!(
                 "there is no resource at {}: docs/count.md lists all paths",
@@ -75,6 +76,15 @@ pub(crate) fn router(api: Api) -> Router {
         })
         .method_not_allowed_fallback(async |method: Method| Problem::method(&method))
         .layer(middleware::map_response(without_cache))
+}
+
+/// Returns the router of an API of its own.
+pub(crate) fn router(api: Shared) -> Router {
+    let with_key = routes()
+        .route("/metrics", get(metrics))
+        .route_layer(middleware::from_fn_with_state(Arc::clone(&api), check_key));
+    with_key
+        .route("/livez", get(async || "ok\n"))
         .with_state(api)
 }
 
@@ -127,7 +137,7 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
 }
 
 async fn metrics(State(api): State<Shared>) -> Response {
-    let text = api.metrics.text(&api.engine.lock(), now_ms());
+    let text = api.metrics_text();
     ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response()
 }
 

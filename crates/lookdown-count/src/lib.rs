@@ -35,10 +35,8 @@ mod webhooks;
 pub mod zones;
 
 pub use observation::Observation;
-pub use options::{
-    CountEntry, CountOptions, CountingEntry, HttpEntry, MqttEntry, StoreEntry, load,
-};
-pub use run::{CountError, Origin, count};
+pub use options::{CountEntry, CountOptions, read_key};
+pub use run::{CountError, Started, count};
 pub use site::CameraPose;
 pub use snapshot::{CameraSnapshot, LineSnapshot, SiteSnapshot, Snapshot, ZoneSnapshot};
 pub use store::StoreError;

@@ -1,41 +1,39 @@
 //! The companion: follows the server, stores the sums, answers requests.
 
-use std::{future::Future, path::PathBuf, sync::Arc, time::Duration};
+use std::{future::Future, sync::Arc, time::Duration};
 
+use axum::Router;
 use hyper_util::service::TowerToHyperService;
 use jiff::Timestamp;
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient, http_server};
+use lookdown_client::{AbortOnDrop, ClientError, ConfigError, ServerClient, http_server};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,
     task::spawn_blocking,
-    time::{Instant, sleep, timeout},
+    time::{Instant, timeout},
 };
 
 use crate::{
     calibrations::Calibrations,
     engine::{CountingOptions, Engine},
     follower::Follower,
-    http::{Api, router},
+    http::{Api, router, routes},
     metrics::Metrics,
-    options::{CountEntry, CountOptions, load},
+    options::CountOptions,
     snapshot::Snapshot,
     store::{Store, StoreError},
     webhooks::{Conditions, Deliveries},
 };
 
-/// Interval of the checks for changed settings.
-const FILE_CHECK: Duration = Duration::from_secs(2);
 /// Longest time for the last transaction.
 const LAST_COMMIT: Duration = Duration::from_secs(10);
 
-/// The origin of the settings.
-#[derive(Debug, Clone)]
-pub struct Origin {
-    /// A file that is read again when it changes.
-    pub file: Option<PathBuf>,
-    /// Flags, which have precedence.
-    pub flags: CountEntry,
+/// The running counts, for a server that answers with them.
+pub struct Started {
+    /// The routes below `/counts` and `/sites`, without access control.
+    pub routes: Router,
+    /// Returns all metrics in the text format of Prometheus.
+    pub metrics: Box<dyn Fn() -> Vec<u8> + Send + Sync>,
 }
 
 /// The reason why nothing is counted.
@@ -58,50 +56,26 @@ pub enum CountError {
     Address(String),
 }
 
-impl Origin {
-    /// Reads and checks the settings without blocking the runtime.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
-    pub async fn load(&self) -> Result<CountOptions, ConfigError> {
-        let Self { file, flags } = self.clone();
-        let loaded = spawn_blocking(move || load(file.as_deref(), &flags)).await;
-        loaded.unwrap_or_else(|error| Err(ConfigError::problem("settings", &error)))
-    }
-
-    /// Waits until the settings differ, and returns them. Invalid settings are logged once.
-    ///
-    /// The store and the address stay in use while settings are invalid.
-    pub async fn changed(&self, current: &CountOptions) -> CountOptions {
-        let mut log = LogOnce::default();
-        loop {
-            sleep(FILE_CHECK).await;
-            match self.load().await {
-                Ok(options) if options != *current => return options,
-                Ok(_) => drop(log.settle()),
-                Err(problem) => {
-                    if log.is_changed(&problem.to_string()) {
-                        tracing::warn!("{problem}; the last valid settings stay in use");
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Counts with these settings until `stop` ends. `snapshots` receives the current counts.
+/// Counts with these settings until `stop` ends. `snapshots` receives the current counts, and
+/// `started` the routes.
 ///
 /// # Errors
 /// [`CountError`].
 pub async fn count(
     options: &CountOptions,
     snapshots: watch::Sender<Snapshot>,
+    started: impl FnOnce(Started),
     stop: impl Future<Output = ()>,
 ) -> Result<(), CountError> {
     let metrics = Arc::new(Metrics::new()?);
     let client = ServerClient::new(&options.server)?;
-    let listener = http_server::bind("http.listen", options.listen).await;
-    let listener = listener.map_err(CountError::Address)?;
+    let listener = match options.listen {
+        Some(address) => {
+            let listener = http_server::bind("counts.listen", address).await;
+            Some(listener.map_err(CountError::Address)?)
+        }
+        None => None,
+    };
     let path = options.store.clone();
     let opened = spawn_blocking(move || {
         let store = Store::open(&path)?;
@@ -133,12 +107,18 @@ pub async fn count(
         metrics: Arc::clone(&metrics),
         api_key: options.api_key.clone(),
     };
-    if let Ok(address) = listener.local_addr() {
-        tracing::info!("counts at http://{address}/counts");
-    }
-    let service = TowerToHyperService::new(router(api));
-    let serving = tokio::spawn(http_server::serve(listener, service));
-    let _serving = AbortOnDrop(serving.abort_handle());
+    let api = Arc::new(api);
+    let _serving = listener.map(|listener| {
+        if let Ok(address) = listener.local_addr() {
+            tracing::info!("counts at http://{address}/counts");
+        }
+        let service = TowerToHyperService::new(router(Arc::clone(&api)));
+        AbortOnDrop(tokio::spawn(http_server::serve(listener, service)).abort_handle())
+    });
+    started(Started {
+        routes: routes().with_state(Arc::clone(&api)),
+        metrics: Box::new(move || api.metrics_text()),
+    });
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(&options.webhooks, resumed.messages, &store, &metrics)?,

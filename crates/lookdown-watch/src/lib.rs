@@ -22,11 +22,12 @@ mod video;
 mod watcher;
 
 pub use camera::{Camera, Transport, VideoOptions};
-pub use config::{CameraEntry, WatchOptions, load, parse_duration};
+pub use config::{CameraEntry, WatchEntry, WatchOptions, parse_duration};
 pub use credentials::Credentials;
 pub use frame::{Frame, FrameError, ImageFormat, MAX_FRAME_BYTES};
 pub use location::{InvalidLocation, Location};
 pub use metrics::Metrics;
+pub use metrics_server::serve_metrics;
 pub use source::{ImageReader, SourceError};
 pub use video::{VideoFrames, VideoWriter, video_duration};
 pub use watcher::{Origin, WatchError, watch};

@@ -16,7 +16,7 @@ use tokio::net::TcpListener;
 use crate::Metrics;
 
 /// Serves the metrics. Never ends.
-pub(crate) async fn serve(listener: TcpListener, metrics: Arc<Metrics>) {
+pub async fn serve_metrics(listener: TcpListener, metrics: Arc<Metrics>) {
     let service = service_fn(move |request: Request<Incoming>| {
         let response = response(&request, &metrics);
         async move { Ok::<_, Infallible>(response) }

@@ -127,7 +127,8 @@ pub(in crate::api) fn router() -> Router<ApiState> {
         answer(&name, &headers, uri.path())
     };
     let options = async |State(state): State<ApiState>| {
-        let counts_path = state.options.page_counts_path.as_deref();
+        let own_counts = state.options.companions.has_counts().then_some("/counts");
+        let counts_path = state.options.page_counts_path.as_deref().or(own_counts);
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
         (no_store, Json(PageOptions { counts_path })).into_response()
     };

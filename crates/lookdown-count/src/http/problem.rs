@@ -47,7 +47,7 @@ impl Problem {
         Self {
             status: StatusCode::UNAUTHORIZED,
             title: "Authentication required",
-            detail: "the request has no valid key: send the key of http.api_key_file as \
+            detail: "the request has no valid key: send the key of counts.api_key_file as \
                      Authorization: Bearer KEY or X-API-Key: KEY"
                 .to_owned(),
         }

@@ -1,13 +1,13 @@
 use super::*;
 use crate::{
-    engine::Batch,
+    engine::{Batch, Totals},
     heat_map::Cell,
     sums::{LineDirection, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
     webhooks::Message,
 };
 
 fn batch(minute: i64, last_event: u64) -> Batch {
-    let mut batch = Batch::empty(last_event);
+    let mut batch = Batch::empty(last_event, Totals::default());
     let hall = Owner::Camera("hall".to_owned());
     let presence = PresenceSum {
         known_ms: 30_000,
