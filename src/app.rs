@@ -245,7 +245,6 @@ impl App {
                 }),
             access,
             cors_origins: settings.access.cors_origins.clone(),
-            page_counts_path: settings.page.counts_path.clone(),
             companions: companions.clone(),
             tracer: tracer.clone(),
         };

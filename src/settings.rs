@@ -19,7 +19,6 @@ mod locate;
 mod model;
 mod mqtt;
 mod observability;
-mod page;
 #[cfg(test)]
 mod reference;
 mod remote;
@@ -47,7 +46,6 @@ pub use locate::{
 };
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
-pub use page::PageSettings;
 pub use remote::RemoteSettings;
 pub use results::ResultSettings;
 pub use server::{ServerSettings, ShutdownSettings};
@@ -78,8 +76,6 @@ pub struct Settings {
     pub shutdown: ShutdownSettings,
     /// API keys, and the web pages that may call the server.
     pub access: AccessSettings,
-    /// The web page.
-    pub page: PageSettings,
     /// The calibration store.
     pub calibrations: CalibrationSettings,
     /// The defaults of detection parameters.
@@ -131,7 +127,6 @@ impl Settings {
             tls: TlsKeys::read(values)?.checked()?,
             shutdown: ShutdownSettings::read(values)?,
             access: AccessSettings::read(values)?,
-            page: PageSettings::read(values)?,
             calibrations: CalibrationSettings::read(values)?,
             detect: DetectDefaults::read(values)?,
             threads: ThreadKeys::read(values)?.plan(inference.device, is_remote),
@@ -157,7 +152,6 @@ fn entries() -> Vec<Entry> {
         TlsKeys::entries(),
         ShutdownSettings::entries(),
         AccessSettings::entries(),
-        PageSettings::entries(),
         CalibrationSettings::entries(),
         DetectDefaults::entries(),
         ModelSettings::entries(),

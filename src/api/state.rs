@@ -69,8 +69,6 @@ pub struct ApiOptions {
     pub access: Access,
     /// Origins of web pages that may call the server from a browser.
     pub cors_origins: Vec<String>,
-    /// The path of `lookdown count` on the origin of the web page; `None` for none.
-    pub page_counts_path: Option<String>,
     /// The cameras and counts of this process, and the counts of another host.
     pub companions: Companions,
     /// Creates the spans of requests.
@@ -123,7 +121,6 @@ impl ApiOptions {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
-            page_counts_path: None,
             companions: Companions::default(),
             tracer: Tracer::default(),
         }

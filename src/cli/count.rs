@@ -1,15 +1,19 @@
 //! `lookdown count`
 
-use std::process::ExitCode;
+mod recording;
 
-use anyhow::Context;
+use std::{path::PathBuf, process::ExitCode};
+
+use anyhow::{Context, bail};
 use clap::Args;
 use lookdown_client::{ConfigError, Reload, ServerEntry, ServerOptions};
 use lookdown_count::{CountEntry, CountOptions, Snapshot, Started, count};
 use tokio::{runtime, sync::watch};
 
 use super::{
-    SettingsFile, serve,
+    SettingsFile,
+    detect::stream::is_video,
+    serve,
     server_flags::{ServerFlags, given},
     settings_file::SettingsSource,
 };
@@ -25,9 +29,12 @@ const RUNTIME_THREADS: usize = 2;
 /// Arguments of `lookdown count`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A settings file (docs/count.md) [default: none]
-    #[arg(value_name = "SETTINGS.toml")]
-    file: Option<String>,
+    /// A settings file (docs/count.md); or recordings of one camera in their order, such as
+    /// clip.mp4, which are counted without a server [default: none]
+    #[arg(value_name = "SETTINGS.toml|CLIP")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    recording: recording::RecordingFlags,
     #[command(flatten)]
     server: ServerFlags,
     /// The address of the counts (`counts.listen`) [default: 127.0.0.1:8090]
@@ -50,13 +57,26 @@ pub(super) struct Counting {
 
 /// Counts until a stop is requested. Changed settings apply at once.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    if arguments.files.iter().any(|file| is_video(file)) {
+        return recording::run(arguments);
+    }
+    if arguments.recording.is_given() {
+        bail!("flags of a recording need one: give a video such as clip.mp4");
+    }
+    let file = match arguments.files.as_slice() {
+        [] => None,
+        [file] => Some(file.to_string_lossy()),
+        [_, other, ..] => bail!(
+            "{}: it is no recording: give one settings file, or recordings such as clip.mp4",
+            other.display()
+        ),
+    };
     let own = given(&[
         ("counts.listen", arguments.listen.as_deref()),
         ("counts.path", arguments.store.as_deref()),
     ]);
     let flags = [arguments.server.settings(), own].concat();
-    let file = arguments.file.as_deref();
-    let settings = arguments.settings_file.source(file, &flags)?;
+    let settings = arguments.settings_file.source(file.as_deref(), &flags)?;
     settings.load()?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(RUNTIME_THREADS)

@@ -81,11 +81,7 @@ fn runtime_threads() -> usize {
 }
 
 /// Runs the server with these settings until a stop is requested.
-async fn serve(
-    settings: Settings,
-    commit: Option<&str>,
-    shutdown: Shutdown,
-) -> anyhow::Result<()> {
+async fn serve(settings: Settings, commit: Option<&str>, shutdown: Shutdown) -> anyhow::Result<()> {
     let (app, sockets) = open(settings, commit).await?;
     serve_app(app, sockets, shutdown).await
 }

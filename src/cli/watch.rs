@@ -5,7 +5,9 @@ use std::{net::SocketAddr, process::ExitCode, sync::Arc};
 use anyhow::{Context, bail};
 use clap::Args;
 use lookdown_client::{AbortOnDrop, ConfigError, Reload, ServerEntry, ServerOptions, http_server};
-use lookdown_watch::{CameraEntry, Metrics, Origin, WatchEntry, WatchOptions, serve_metrics, watch};
+use lookdown_watch::{
+    CameraEntry, Metrics, Origin, WatchEntry, WatchOptions, serve_metrics, watch,
+};
 use tokio::runtime;
 
 use super::{

@@ -27,6 +27,10 @@ pub struct ListSettings {
 impl ListSettings {
     /// The lists in the text of a settings file.
     pub(super) fn read(text: &str) -> Result<Self, SettingsError> {
-        Ok(parse_toml(text, "the settings file", "docs/configuration.md")?)
+        Ok(parse_toml(
+            text,
+            "the settings file",
+            "docs/configuration.md",
+        )?)
     }
 }

@@ -35,7 +35,9 @@ impl Values {
         if let Some(path) = file {
             let text = read(path)?;
             let mut table = parse(path, &text)?;
-            let lists = lists::NAMES.iter().filter(|name| table.remove(**name).is_some());
+            let lists = lists::NAMES
+                .iter()
+                .filter(|name| table.remove(**name).is_some());
             if lists.count() > 0 {
                 values.lists = ListSettings::read(&text)?;
             }

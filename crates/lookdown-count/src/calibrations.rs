@@ -123,7 +123,9 @@ async fn request(client: &ServerClient, id: &str) -> Result<Option<Vec<u8>>, Str
                 Ok(Some(body))
             } else {
                 let address = client.address();
-                Err(format!("{address} is no Lookdown server: check upstream.url"))
+                Err(format!(
+                    "{address} is no Lookdown server: check upstream.url"
+                ))
             }
         }
         StatusCode::NOT_FOUND => Ok(None),

@@ -28,6 +28,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::{engine::Engine, metrics::Metrics, store::Store, sums::Owner};
+pub(crate) use counts::table;
 use problem::Problem;
 
 /// Everything that requests read.

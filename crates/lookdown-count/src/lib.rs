@@ -21,6 +21,7 @@ pub mod lines;
 mod metrics;
 mod observation;
 mod options;
+mod recording;
 mod report;
 mod run;
 mod scene;
@@ -36,6 +37,7 @@ pub mod zones;
 
 pub use observation::Observation;
 pub use options::{CountEntry, CountOptions, read_key};
+pub use recording::{Recording, RecordingError};
 pub use run::{CountError, Started, count};
 pub use site::CameraPose;
 pub use snapshot::{CameraSnapshot, LineSnapshot, SiteSnapshot, Snapshot, ZoneSnapshot};

@@ -70,6 +70,15 @@ struct Floor {
 }
 
 impl Report {
+    /// Returns the report of a frame that was captured at this time, whenever it arrived.
+    pub(crate) fn captured(self, at: Timestamp) -> Self {
+        Self {
+            received_at: at,
+            captured_at: None,
+            ..self
+        }
+    }
+
     /// Returns the time of the frame in milliseconds since the Unix epoch: the capture time if it
     /// is plausible, else the arrival.
     pub(crate) fn at_ms(&self) -> i64 {

@@ -29,5 +29,5 @@ pub use location::{InvalidLocation, Location};
 pub use metrics::Metrics;
 pub use metrics_server::serve_metrics;
 pub use source::{ImageReader, SourceError};
-pub use video::{VideoFrames, VideoWriter, video_duration};
+pub use video::{VideoFrames, VideoWriter, video_created_at, video_duration};
 pub use watcher::{Origin, WatchError, watch};

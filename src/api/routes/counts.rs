@@ -1,11 +1,13 @@
 //! Counts on the port of the server: those of this process, or of a `lookdown count` on another host.
 
+use std::time::Duration;
+
 use axum::{
     Router,
     body::{Body, to_bytes},
     extract::{Request, State},
     http::{
-        StatusCode, Uri,
+        HeaderValue, StatusCode, Uri,
         header::{ACCEPT, CACHE_CONTROL, CONTENT_TYPE},
     },
     response::Response,
@@ -22,6 +24,8 @@ use crate::api::{
     require_scope::RequireRead,
 };
 
+/// Longest time for an answer of another host.
+const TIMEOUT: Duration = Duration::from_secs(20);
 /// Largest problem document that is read.
 const MAX_PROBLEM_BYTES: usize = 64 << 10;
 
@@ -50,7 +54,10 @@ async fn answer(
             Ok(response) => response,
             Err(never) => match never {},
         },
-        Counts::Elsewhere(client) => forward(&client, &request).await?,
+        Counts::Elsewhere(client) => {
+            let accept = request.headers().get(ACCEPT).cloned();
+            forward(&client, url(&client, request.uri()), accept).await?
+        }
         Counts::Starting => return Err(unavailable("the counts are being started: retry")),
         Counts::None => {
             let detail = "this server has no counts: start `lookdown run`, or set counts.url to \
@@ -66,9 +73,13 @@ async fn answer(
 
 /// Requests the counts of another host with the key of that host: the key of the caller was checked
 /// here.
-async fn forward(client: &ServerClient, request: &Request) -> Result<Response, Problem> {
-    let mut outgoing = client.get(url(client, request.uri()));
-    if let Some(accept) = request.headers().get(ACCEPT) {
+async fn forward(
+    client: &ServerClient,
+    url: reqwest::Url,
+    accept: Option<HeaderValue>,
+) -> Result<Response, Problem> {
+    let mut outgoing = client.get(url).timeout(TIMEOUT);
+    if let Some(accept) = accept {
         outgoing = outgoing.header(ACCEPT, accept);
     }
     let answered = client.send(outgoing).await.map_err(|error| {

@@ -115,9 +115,9 @@ impl Asset {
 
 /// The server's settings that the page needs.
 #[derive(Serialize)]
-struct PageOptions<'a> {
-    /// The path of `lookdown count` on this origin.
-    counts_path: Option<&'a str>,
+struct PageOptions {
+    /// True if this server answers `/counts`.
+    has_counts: bool,
 }
 
 /// Returns the routes of the page and its files.
@@ -127,10 +127,9 @@ pub(in crate::api) fn router() -> Router<ApiState> {
         answer(&name, &headers, uri.path())
     };
     let options = async |State(state): State<ApiState>| {
-        let own_counts = state.options.companions.has_counts().then_some("/counts");
-        let counts_path = state.options.page_counts_path.as_deref().or(own_counts);
+        let has_counts = state.options.companions.has_counts();
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
-        (no_store, Json(PageOptions { counts_path })).into_response()
+        (no_store, Json(PageOptions { has_counts })).into_response()
     };
     Router::new()
         .route("/", get(page))

@@ -104,7 +104,10 @@ pub(in crate::settings) fn seconds(range: RangeInclusive<u64>) -> Form<Duration>
 
 /// A time with its unit, such as `10s`.
 pub(in crate::settings) fn duration(range: RangeInclusive<Duration>) -> Form<Duration> {
-    let (least, most) = (written_duration(range.start()), written_duration(range.end()));
+    let (least, most) = (
+        written_duration(range.start()),
+        written_duration(range.end()),
+    );
     let remedy = format!("give a duration from {least} to {most}, such as 10s or 500ms");
     parsed(
         format!("duration from {least} to {most}"),
@@ -120,7 +123,9 @@ pub(in crate::settings) fn duration(range: RangeInclusive<Duration>) -> Form<Dur
 fn written_duration(duration: &Duration) -> String {
     let millis = duration.as_millis();
     let units = [(3_600_000, "h"), (60_000, "m"), (1000, "s")];
-    let unit = units.iter().find(|(size, _)| millis > 0 && millis % size == 0);
+    let unit = units
+        .iter()
+        .find(|(size, _)| millis > 0 && millis % size == 0);
     match unit {
         Some((size, unit)) => format!("{}{unit}", millis / size),
         None => format!("{millis}ms"),

@@ -19,6 +19,7 @@ use serde::Serialize;
 
 use super::{Problem, Shared, check_known, query, time::TimeParameters};
 use crate::{
+    definition::CameraDefinition,
     store::{Span, Step},
     sums::{MINUTE_MS, Owner},
 };
@@ -132,7 +133,11 @@ fn current_names(api: &Shared, owner: &Owner) -> Names {
     let Owner::Camera(camera) = owner else {
         return Names::default();
     };
-    let Some(definition) = api.engine.lock().definition(camera) else {
+    names(api.engine.lock().definition(camera).as_deref())
+}
+
+fn names(definition: Option<&CameraDefinition>) -> Names {
+    let Some(definition) = definition else {
         return Names::default();
     };
     let directions = definition.lines.iter().zip(&definition.directions);
@@ -142,6 +147,16 @@ fn current_names(api: &Shared, owner: &Owner) -> Names {
     });
     let zones = definition.zones.iter().map(|zone| zone.name.clone());
     (lines.collect(), zones.collect())
+}
+
+/// Returns the counts of a time as CSV.
+pub(crate) fn table(
+    owner: Owner,
+    span: Span,
+    sums: &BTreeMap<i64, Step>,
+    definition: Option<&CameraDefinition>,
+) -> String {
+    csv(&counts(owner, span, sums, names(definition)))
 }
 
 fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) -> Counts {
