@@ -18,6 +18,7 @@ use crate::{
     event_parser::Event,
     event_stream::{EventStream, StreamError},
     metrics::Metrics,
+    now::Now,
     report::Report,
     snapshot::Snapshot,
     store::Store,
@@ -157,26 +158,18 @@ impl Follower {
             self.calibrations.definition(key)
         };
         let mut engine = self.engine.lock();
-        match engine.accept(id, &report, &definition) {
+        match engine.accept(id, &report, &definition, Now::read()) {
             Accepted::Counted(crossings) => {
                 self.metrics.reports.inc();
                 if let Some(scene) = engine.scene_of(&report.camera) {
-                    let at_ms = report.at_ms();
+                    let at_ms = report.at_ms(definition.site.is_some());
                     let messages =
                         self.conditions
                             .of_report(id, &report.camera, at_ms, &crossings, scene);
                     self.messages.extend(messages);
                 }
             }
-            Accepted::Repeated => {}
-            Accepted::OutOfOrder(reason) => {
-                tracing::debug!(
-                    camera = report.camera,
-                    "the report is not counted: {reason}"
-                );
-                skipped("out_of_order");
-            }
-            Accepted::TooManyCameras => skipped("too_many_cameras"),
+            Accepted::Dropped(reason) => skipped(reason.label()),
         }
         Ok(())
     }

@@ -10,7 +10,10 @@
 //! the state and the ID of the last report, and the HTTP API answers from both.
 
 mod calibrations;
+#[cfg(test)]
+mod clock_simulation;
 mod definition;
+mod drops;
 mod engine;
 mod event_parser;
 mod event_stream;
@@ -19,8 +22,10 @@ pub mod heat_map;
 mod http;
 pub mod lines;
 mod metrics;
+mod now;
 mod observation;
 mod options;
+mod presence;
 mod recording;
 mod report;
 mod run;

@@ -14,6 +14,7 @@ use crate::{
     definition::{CameraDefinition, DefinitionKey},
     engine::{CountingOptions, Engine},
     http::table,
+    now::Now,
     report::Report,
     snapshot::LineSnapshot,
     store::{Span, Store, StoreError},
@@ -31,6 +32,9 @@ pub struct Recording {
     engine: Engine,
     store: Store,
     next_commit: Instant,
+    began: Instant,
+    /// The time of the first frame that this process counts.
+    first: Option<Timestamp>,
 }
 
 /// A report that is not counted.
@@ -77,6 +81,8 @@ impl Recording {
             engine,
             store,
             next_commit: Instant::now() + COMMIT_EVERY,
+            began: Instant::now(),
+            first: None,
         })
     }
 
@@ -108,11 +114,21 @@ impl Recording {
             })
         });
         let event = u64::try_from(at.as_microsecond()).unwrap_or_default();
-        self.engine.accept(event, &report, &definition);
+        self.engine.accept(event, &report, &definition, self.clocks(at));
         if Instant::now() >= self.next_commit {
             self.commit()?;
         }
         Ok(())
+    }
+
+    /// Returns clocks that run with the recording.
+    fn clocks(&mut self, at: Timestamp) -> Now {
+        let first = *self.first.get_or_insert(at);
+        let position = Duration::try_from(at.duration_since(first));
+        Now {
+            unix_ms: at.as_millisecond(),
+            instant: self.began + position.unwrap_or_default(),
+        }
     }
 
     /// Stores all counts. Blocks.

@@ -137,10 +137,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         &camera,
         calibration.clone(),
     )?;
-    if let Some(until) = recording
-        .counted_until()
-        .filter(|until| *until >= first.start)
-    {
+    let until = recording.counted_until();
+    if let Some(until) = until.filter(|until| *until >= first.start) {
+        if until >= last.start + last.duration.unwrap_or_default() {
+            bail!(
+                "--store: {} has counts up to {until}, after the end of the recordings: they are \
+                 counted already, or give another --store",
+                counts.path.display()
+            );
+        }
         tracing::info!("continuing after {until}: earlier frames are counted already");
     }
     let every = flags.every.unwrap_or(DEFAULT_EVERY);
