@@ -114,7 +114,8 @@ impl Recording {
             })
         });
         let event = u64::try_from(at.as_microsecond()).unwrap_or_default();
-        self.engine.accept(event, &report, &definition, self.clocks(at));
+        let now = self.clocks(at);
+        self.engine.accept(event, &report, &definition, now);
         if Instant::now() >= self.next_commit {
             self.commit()?;
         }

@@ -100,6 +100,7 @@ struct Counting<'a> {
     /// Frames that are processed at the same time.
     at_once: usize,
     video: Option<(VideoWriter, &'a Path)>,
+    drawing: AnnotationOptions,
     progress: Progress,
 }
 
@@ -168,6 +169,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         every,
         at_once: settings.threads.frame_workers.get(),
         video,
+        drawing: AnnotationOptions::parse([])?,
         progress: Progress::start(&camera, usize::try_from(frames).unwrap_or(usize::MAX)),
     };
     let mut end = last.start;
@@ -195,7 +197,8 @@ impl Counting<'_> {
     fn count(&mut self, clip: &Clip) -> anyhow::Result<Timestamp> {
         let name = clip.path.display().to_string();
         let counted_until = self.recording.counted_until();
-        let frames = VideoFrames::open(&clip.path, self.every, &VideoOptions::default());
+        let options = VideoOptions::default();
+        let frames = VideoFrames::open(&clip.path, self.every, &options);
         let mut frames = self.runtime.block_on(frames)?;
         let mut end = clip.start;
         loop {
@@ -220,7 +223,7 @@ impl Counting<'_> {
                 let report = serde_json::to_vec(&Report::from(&detected.report))?;
                 self.recording.count(at, &report)?;
                 if let Some((writer, path)) = &mut self.video {
-                    let jpeg = annotate::jpeg(detected, &AnnotationOptions::default())?;
+                    let jpeg = annotate::jpeg(detected, &self.drawing)?;
                     let written = self.runtime.block_on(writer.write(&jpeg));
                     written.with_context(|| unwritable(path))?;
                 }

@@ -1,8 +1,8 @@
 use super::*;
 use crate::{
-    engine::{Batch, Totals},
+    engine::Batch,
     heat_map::Cell,
-    sums::{LineDirection, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
+    sums::{LineDirection, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
     webhooks::Message,
 };
 
@@ -123,7 +123,11 @@ fn messages_stay_until_they_are_removed() {
     };
     for _ in 0..2 {
         store
-            .commit(&Batch::empty(1), std::slice::from_ref(&message), None)
+            .commit(
+                &Batch::empty(1, Totals::default()),
+                std::slice::from_ref(&message),
+                None,
+            )
             .unwrap();
     }
     assert_eq!(store.resumed().unwrap().messages, [message]);
