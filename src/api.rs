@@ -6,6 +6,7 @@ mod caller;
 mod companions;
 mod detect_parameters;
 mod http;
+mod in_process;
 mod limit;
 mod openapi;
 mod parameters;
@@ -58,6 +59,7 @@ use crate::open_inference::HEAD_LENGTH;
 pub use self::{
     companions::Companions,
     http::{access::Access, rate_limit::RequestRate},
+    in_process::in_process,
     readiness::{Phase, Readiness},
     report::Report,
     routes::problems::problem_table,
@@ -138,7 +140,7 @@ pub fn router(state: ApiState) -> Router {
 }
 
 /// The router for requests of this process: without a rate limit.
-pub fn in_process_router(state: ApiState) -> Router {
+fn in_process_router(state: ApiState) -> Router {
     limited_router(state, None)
 }
 

@@ -1,7 +1,6 @@
 //! The composition root: settings → engine → workers → service.
 
 mod check;
-mod exclusive;
 mod models;
 mod pollers;
 mod reload;
@@ -13,11 +12,7 @@ use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
 
-use axum::body::Body;
-use exclusive::Exclusive;
 use lookdown_client::{InProcess, ServerClient, ServerOptions};
-use parking_lot::Mutex;
-use tower::ServiceExt;
 
 use crate::{
     access::AccessKeys,
@@ -284,17 +279,7 @@ impl App {
     /// Returns the connection of parts of this process to the server.
     #[must_use]
     pub fn in_process(&self) -> InProcess {
-        let router = api::in_process_router(self.state.clone());
-        InProcess::new(move |request| {
-            let answered = router.clone().oneshot(request.map(Body::new));
-            async {
-                let response = match answered.await {
-                    Ok(response) => response,
-                    Err(never) => match never {},
-                };
-                response.map(|body| reqwest::Body::wrap(Exclusive(Mutex::new(body))))
-            }
-        })
+        api::in_process(self.state.clone())
     }
 
     /// The readiness of the app. Clones share its state.

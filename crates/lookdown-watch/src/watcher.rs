@@ -103,7 +103,7 @@ impl Watcher {
     }
 
     fn start(&mut self, camera: Camera) {
-        let metrics = self.metrics.add(&camera.name);
+        let metrics = self.metrics.add(&camera.name, camera.location.to_string());
         let slot = Arc::new(Slot::default());
         let span = tracing::info_span!("camera", camera = camera.name);
         span.in_scope(|| tracing::info!("watching {}", camera.location));

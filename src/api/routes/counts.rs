@@ -16,6 +16,7 @@ use axum::{
 use lookdown_client::ServerClient;
 use serde::Deserialize;
 use tower::ServiceExt;
+use url::Url;
 
 use crate::api::{
     ApiState,
@@ -50,7 +51,7 @@ async fn answer(
     request: Request,
 ) -> Result<Response, Problem> {
     let response = match state.options.companions.counts() {
-        Counts::Here(routes) => match routes.oneshot(request).await {
+        Counts::Here(routes) => match routes.oneshot(without_extensions(request)).await {
             Ok(response) => response,
             Err(never) => match never {},
         },
@@ -71,11 +72,21 @@ async fn answer(
     }
 }
 
+/// Returns the request without the parameters of its path here, which the routes would add theirs to.
+fn without_extensions(request: Request) -> Request {
+    let (parts, body) = request.into_parts();
+    let mut request = Request::new(body);
+    *request.method_mut() = parts.method;
+    *request.uri_mut() = parts.uri;
+    *request.headers_mut() = parts.headers;
+    request
+}
+
 /// Requests the counts of another host with the key of that host: the key of the caller was checked
 /// here.
 async fn forward(
     client: &ServerClient,
-    url: reqwest::Url,
+    url: Url,
     accept: Option<HeaderValue>,
 ) -> Result<Response, Problem> {
     let mut outgoing = client.get(url).timeout(TIMEOUT);
@@ -99,7 +110,7 @@ async fn forward(
 }
 
 /// Returns the URL of a path and a query on the other host.
-fn url(client: &ServerClient, uri: &Uri) -> reqwest::Url {
+fn url(client: &ServerClient, uri: &Uri) -> Url {
     let mut url = client.route([]);
     let path = format!("{}{}", url.path().trim_end_matches('/'), uri.path());
     url.set_path(&path);
