@@ -11,19 +11,22 @@ mod systemd;
 use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
+use lookdown_detect::{
+    imaging::decode::DecodeLimits,
+    inference::ModelRepository,
+    parameters::DetectParameters,
+    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+};
+use lookdown_lens::geometry::FieldOfViewReading;
 
-use lookdown_client::{InProcess, ServerClient, ServerOptions};
+use lookdown_common::{InProcess, ServerClient, ServerOptions};
 
 use crate::{
     access::AccessKeys,
     api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
     calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
-    geometry::FieldOfViewReading,
-    imaging::decode::DecodeLimits,
-    inference::ModelRepository,
     metrics::Metrics,
     mqtt::Publisher,
-    pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
         AccessSettings, CalibrationPlace, CountSettings, LimitSettings, ResultSettings, Settings,
@@ -240,6 +243,7 @@ impl App {
                 }),
             access,
             cors_origins: settings.access.cors_origins.clone(),
+            hosts: settings.access.hosts.clone(),
             companions: companions.clone(),
             tracer: tracer.clone(),
         };

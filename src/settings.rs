@@ -32,7 +32,7 @@ mod variables;
 
 use std::{path::Path, time::Duration};
 
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 
 pub use access::AccessSettings;
 pub use calibrations::{CalibrationPlace, CalibrationSettings};
@@ -44,6 +44,7 @@ pub use lists::ListSettings;
 pub use locate::{
     PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
 };
+use lookdown_detect::parameters::DetectDefaults;
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
 pub use remote::RemoteSettings;
@@ -58,10 +59,7 @@ use self::{
     declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
     threads::ThreadKeys, tls::TlsKeys, upstream::UpstreamKeys, values::Values,
 };
-use crate::{
-    mqtt::MqttOptions, parameters::DetectDefaults, results::ResultLimits, server::ConnectionLimits,
-    tls::TlsOptions,
-};
+use crate::{mqtt::MqttOptions, results::ResultLimits, server::ConnectionLimits, tls::TlsOptions};
 
 /// All settings, checked.
 #[derive(Debug, Clone, PartialEq)]

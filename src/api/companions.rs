@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fmt, sync::Arc};
 
 use axum::Router;
-use lookdown_client::ServerClient;
+use lookdown_common::ServerClient;
 use parking_lot::RwLock;
 
 /// Returns metrics in the text format of Prometheus.

@@ -8,7 +8,7 @@ use std::{
 use axum::body::Body;
 use bytes::Bytes;
 use http_body::{Body as HttpBody, Frame, SizeHint};
-use lookdown_client::InProcess;
+use lookdown_common::InProcess;
 use parking_lot::Mutex;
 use tower::ServiceExt;
 

@@ -8,6 +8,13 @@ use std::{
 };
 
 use axum::extract::FromRef;
+use lookdown_detect::{
+    fairness::{Client, SharedBudget},
+    imaging::annotate::Concealment,
+    inference::ModelRepository,
+    parameters::DetectDefaults,
+    pipeline::{PipelineError, WorkerPool},
+};
 
 use super::{
     companions::Companions,
@@ -24,11 +31,7 @@ use super::{
 };
 use crate::{
     calibration_store::Calibrations,
-    fairness::{Client, SharedBudget},
-    imaging::annotate::Concealment,
-    inference::ModelRepository,
     metrics::Metrics,
-    pipeline::{DetectDefaults, PipelineError, WorkerPool},
     results::{PicturesOf, ResultStore},
     telemetry::Tracer,
 };
@@ -69,6 +72,8 @@ pub struct ApiOptions {
     pub access: Access,
     /// Origins of web pages that may call the server from a browser.
     pub cors_origins: Vec<String>,
+    /// Further names of a server without keys.
+    pub hosts: Vec<String>,
     /// The cameras and counts of this process, and the counts of another host.
     pub companions: Companions,
     /// Creates the spans of requests.
@@ -121,6 +126,7 @@ impl ApiOptions {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
+            hosts: Vec::new(),
             companions: Companions::default(),
             tracer: Tracer::default(),
         }

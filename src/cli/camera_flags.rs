@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, builder::PossibleValuesParser};
+use lookdown_detect::parameters::Profile;
 use lookdown_watch::{CameraEntry, Transport};
 use strum::VariantNames;
-
-use crate::pipeline::Profile;
 
 /// Settings of a single camera, as in a file of cameras.
 #[derive(Debug, Args)]

@@ -6,7 +6,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_client::{ConfigError, Reload, ServerEntry, ServerOptions};
+use lookdown_common::{ConfigError, Reload, ServerEntry, ServerOptions};
 use lookdown_count::{CountEntry, CountOptions, Snapshot, Started, count};
 use tokio::{runtime, sync::watch};
 

@@ -4,7 +4,7 @@ use std::{process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_client::ServerOptions;
+use lookdown_common::ServerOptions;
 use lookdown_count::Started;
 use lookdown_watch::{CameraEntry, Metrics, Origin, watch as watch_cameras};
 use secrecy::SecretString;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use lookdown_client::ConfigError;
+use lookdown_common::ConfigError;
 
 use crate::{
     settings::{self, Settings, SettingsError},

@@ -4,7 +4,7 @@ use std::{net::SocketAddr, process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_client::{AbortOnDrop, ConfigError, Reload, ServerEntry, ServerOptions, http_server};
+use lookdown_common::{AbortOnDrop, ConfigError, Reload, ServerEntry, ServerOptions, http_server};
 use lookdown_watch::{
     CameraEntry, Metrics, Origin, WatchEntry, WatchOptions, serve_metrics, watch,
 };

@@ -63,7 +63,7 @@ pub enum SettingsError {
     },
     /// A camera, a webhook or a secret that cannot be used.
     #[error(transparent)]
-    Part(#[from] lookdown_client::ConfigError),
+    Part(#[from] lookdown_common::ConfigError),
     /// A file or folder that is not there.
     #[error("{key}: there is no {what} at {}: {remedy}", path.display())]
     Missing {

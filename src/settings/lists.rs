@@ -1,6 +1,6 @@
 //! The tables of the settings file that are lists: cameras and webhooks.
 
-use lookdown_client::parse_toml;
+use lookdown_common::parse_toml;
 use lookdown_count::WebhookEntry;
 use lookdown_watch::CameraEntry;
 use serde::Deserialize;

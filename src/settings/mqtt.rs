@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
-use lookdown_client::read_secret;
+use lookdown_common::read_secret;
 use secrecy::{ExposeSecret, SecretString};
 use url::Url;
 
@@ -23,11 +23,13 @@ settings! {
     #[derive(Debug, Clone)]
     pub(super) struct MqttKeys in "mqtt" {
         /// The broker that counts and reports are published to (docs/home-automation.md), such as
-        /// `mqtt://user:password@192.168.1.10:1883`, or `mqtts://` for TLS. Empty: none. A URL with
-        /// a password is better kept in the variable than in a file.
+        /// `mqtt://user@192.168.1.10:1883`, or `mqtts://` for TLS. Empty: none. It may hold the
+        /// password, percent-encoded: `mqtt://user:password@…`.
         url: Option<SecretString> = None => secret("URL of a broker");
-        /// The file with the password of the broker, on its first line. The URL then has the user
-        /// name alone. Empty: none.
+        /// The password of the user in that URL, as it is. Empty: the password of the URL. It is
+        /// better kept in the variable than in a file that others can read.
+        password: Option<SecretString> = None => secret("password");
+        /// The file with that password on its first line, instead of `mqtt.password`. Empty: none.
         password_file: Option<PathBuf> = None => optional(path());
         /// The PEM file of the certificate authorities of a broker with TLS. Empty: those that the
         /// system trusts.
@@ -60,22 +62,20 @@ settings! {
 impl MqttKeys {
     /// The options of the publisher; `None` where there is no broker.
     pub(super) fn checked(self) -> Result<Option<MqttOptions>, SettingsError> {
-        let password = self.password_file.as_deref();
-        let password = password.map(|path| read_secret("mqtt.password_file", path));
-        let password = password.transpose()?;
-        let broker = self.url.map(|url| {
-            let broker = url.expose_secret().parse::<Broker>()?;
-            match &password {
-                Some(password) => broker.with_password(password),
-                None => Ok(broker),
-            }
-        });
-        let broker = broker
+        let refusal = |key, problem| SettingsError::Hidden { key, problem };
+        let broker = self.url.map(|url| url.expose_secret().parse::<Broker>());
+        let mut broker = broker
             .transpose()
-            .map_err(|error: BrokerError| SettingsError::Hidden {
-                key: "mqtt.url",
-                problem: error.to_string(),
-            })?;
+            .map_err(|error: BrokerError| refusal("mqtt.url", error.to_string()))?;
+        let in_file = self.password_file.as_deref();
+        let in_file = in_file.map(|path| read_secret("mqtt.password_file", path));
+        if let Some(password) = self.password.or(in_file.transpose()?) {
+            let with_password = |broker: Broker| broker.with_password(password.expose_secret());
+            broker = broker
+                .map(with_password)
+                .transpose()
+                .map_err(|error| refusal("mqtt.password", error.to_string()))?;
+        }
         Ok(broker.map(|broker| MqttOptions {
             broker,
             authorities: self.authorities,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 
 use super::{
     declare::settings,

@@ -271,7 +271,10 @@ const MAY_USE_CRATE: [(&str, &[&str]); 30] = [
             "mqtt",
         ],
     ),
-    ("lookdown_client", &["api", "app", "cli", "mqtt", "settings"]),
+    (
+        "lookdown_common",
+        &["api", "app", "cli", "mqtt", "settings"],
+    ),
     ("lookdown_count", &["app", "cli", "mqtt", "settings"]),
     ("lookdown_watch", &["cli", "settings"]),
     ("clap", &["cli"]),

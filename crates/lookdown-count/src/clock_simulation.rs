@@ -8,18 +8,16 @@ use std::{
 };
 
 use jiff::Timestamp;
+use lookdown_tracking::{CameraPose, Plane, lines::Line};
 use proptest::prelude::*;
 
 use crate::{
-    CameraPose,
     definition::CameraDefinition,
     engine::{Accepted, CountingOptions, Engine},
-    lines::Line,
     now::Now,
     report::Report,
     scene::LATE_LIMIT,
     store::Store,
-    tracking::Plane,
 };
 
 const START_MS: i64 = 1_795_262_400_000;

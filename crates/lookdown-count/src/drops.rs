@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt, time::Duration};
 
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
 
 use crate::now::{LogPause, Now};
 

@@ -6,16 +6,17 @@ use std::{
     time::Duration,
 };
 
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
+use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
     drops::{DropReason, Drops},
     now::{LogPause, Now},
     report::Report,
     scene::{NamedCrossing, Scene, SceneState},
     sums::{DAY_MS, Owner, Sums, Totals},
-    tracking::MAX_CAMERAS,
 };
 
 /// Times that are this much after the own clock are logged, milliseconds.

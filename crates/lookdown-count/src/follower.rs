@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use lookdown_client::{Backoff, LogOnce, ServerClient};
+use lookdown_common::{Backoff, LogOnce, ServerClient};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,
@@ -13,7 +13,6 @@ use tokio::{
 
 use crate::{
     calibrations::{CalibrationProblem, Calibrations},
-    definition::DefinitionKey,
     engine::{Accepted, Batch, Engine},
     event_parser::Event,
     event_stream::{EventStream, StreamError},
@@ -64,7 +63,7 @@ impl Follower {
             let began = Instant::now();
             let error = self.follow(&mut log).await;
             self.metrics.connected.set(0);
-            if !error.message.is_empty() && log.is_changed(&error.message) {
+            if !error.message.is_empty() && log.should_log(&error.message) {
                 tracing::warn!("{}", error.message);
             }
             backoff.reset_if_stable(began.elapsed());
@@ -97,7 +96,7 @@ impl Follower {
             Err(error) => return error,
         };
         self.metrics.connected.set(1);
-        log.settle();
+        log.clear();
         tracing::info!("following the reports of {}", client.address());
         let mut next_tick = Instant::now();
         loop {
@@ -138,7 +137,7 @@ impl Follower {
             return Ok(());
         };
         let definition = self.engine.lock().definition(&report.camera);
-        let key = DefinitionKey::of(&report);
+        let key = report.definition_key();
         let known = definition.filter(|definition| definition.key == key);
         let definition = if let Some(definition) = known {
             definition
@@ -229,7 +228,7 @@ impl Follower {
                 Ok(Err(problem)) => {
                     self.metrics.commits_failed.inc();
                     let problem = problem.to_string();
-                    if log.is_changed(&problem) {
+                    if log.should_log(&problem) {
                         tracing::error!("{problem}: free space, or correct counts.path");
                     }
                 }
@@ -245,7 +244,7 @@ impl Follower {
             sleep(backoff.next_pause()).await;
         }
         self.engine.lock().stored(&batch.0);
-        if log.settle() {
+        if log.clear() {
             tracing::info!("the store is written again");
         }
         self.deliveries.send(batch.1.clone());

@@ -219,11 +219,11 @@ async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Problem> {
     Err(match owner {
         Owner::Camera(camera) => Problem::not_found(format!(
             "there is no camera {}: GET /counts lists them",
-            lookdown_client::text::one_line(camera)
+            lookdown_common::text::one_line(camera)
         )),
         Owner::Site(site) => Problem::not_found(format!(
             "there is no site {}: give a mount.site of a calibration in use",
-            lookdown_client::text::one_line(site)
+            lookdown_common::text::one_line(site)
         )),
     })
 }

@@ -6,8 +6,7 @@ use std::{
     time::Duration,
 };
 
-use jiff::SignedDuration;
-use lookdown_client::{ConfigError, ServerEntry, ServerOptions, read_secret};
+use lookdown_common::{ConfigError, ServerEntry, ServerOptions, read_secret};
 use secrecy::{ExposeSecret, SecretString};
 
 use crate::webhooks::{Webhook, WebhookEntry};
@@ -137,22 +136,4 @@ pub fn read_key(path: &Path) -> Result<SecretString, ConfigError> {
         return Err(ConfigError::problem("counts.api_key_file", &problem));
     }
     Ok(key)
-}
-
-/// Parses a duration with limits, such as `500ms` or `15m`.
-pub(crate) fn duration(
-    field: &str,
-    text: Option<String>,
-    (least, most): (Duration, Duration),
-) -> Result<Option<Duration>, ConfigError> {
-    let Some(text) = text else { return Ok(None) };
-    let parsed = text.parse::<SignedDuration>().ok();
-    let parsed = parsed.and_then(|parsed| Duration::try_from(parsed).ok());
-    let parsed = parsed.filter(|parsed| (least..=most).contains(parsed));
-    parsed.map(Some).ok_or_else(|| {
-        let (least, most) = (least.as_secs_f64(), most.as_secs_f64());
-        let remedy =
-            format!("is no duration from {least} s to {most} s: write it like 10s or 500ms");
-        ConfigError::value(field, &text, &remedy)
-    })
 }

@@ -8,10 +8,11 @@ use std::{
 
 use jiff::Timestamp;
 use lookdown_lens::calibration::Calibration;
+use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
     calibrations::Calibrations,
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
     engine::{CountingOptions, Engine},
     http::table,
     now::Now,
@@ -19,7 +20,6 @@ use crate::{
     snapshot::LineSnapshot,
     store::{Span, Store, StoreError},
     sums::{MINUTE_MS, Owner},
-    tracking::MAX_CAMERAS,
 };
 
 /// Interval of the transactions.
@@ -102,7 +102,7 @@ impl Recording {
     pub fn count(&mut self, at: Timestamp, report: &[u8]) -> Result<(), RecordingError> {
         let mut report = serde_json::from_slice::<Report>(report)?.captured(at);
         report.camera.clone_from(&self.camera);
-        let key = DefinitionKey::of(&report);
+        let key = report.definition_key();
         let known = self.engine.definition(&self.camera);
         let known = known.filter(|definition| definition.key == key);
         let definition = known.unwrap_or_else(|| {

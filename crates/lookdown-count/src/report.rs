@@ -2,10 +2,11 @@
 
 use jiff::Timestamp;
 use lookdown_lens::geometry::{Pixel, oriented_box::vertical_in_frame};
+use lookdown_tracking::Observation;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Observation, definition::CameraDefinition};
+use crate::{definition::CameraDefinition, definition_key::DefinitionKey};
 
 /// The capture time of a camera alone may be this much after and before the arrival, milliseconds.
 const MAX_AHEAD_MS: i64 = 5_000;
@@ -117,6 +118,17 @@ impl Report {
         ReportKey {
             event,
             received_ms: self.received_at.as_millisecond(),
+        }
+    }
+
+    /// Returns what identifies the definition of the camera for this report.
+    pub(crate) fn definition_key(&self) -> DefinitionKey {
+        let used = &self.calibration;
+        DefinitionKey {
+            calibration: (!used.assumed).then(|| used.id.clone()),
+            revision: used.revision.clone(),
+            width: self.image.width,
+            height: self.image.height,
         }
     }
 

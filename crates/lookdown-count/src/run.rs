@@ -5,7 +5,7 @@ use std::{future::Future, sync::Arc, time::Duration};
 use axum::Router;
 use hyper_util::service::TowerToHyperService;
 use jiff::Timestamp;
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, ServerClient, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, ServerClient, http_server};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,

@@ -6,20 +6,22 @@ use std::{
     time::{Duration, Instant},
 };
 
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
+use lookdown_tracking::{
+    Observation, RefusedReport, SiteError, Track, Tracker, TrackerSettings,
+    heat_map::HeatMap,
+    lines::{Direction, LineCounter, LineState},
+    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Observation,
-    definition::{CameraDefinition, DefinitionKey},
-    heat_map::HeatMap,
-    lines::{Direction, LineCounter, LineState},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
     now::{LogPause, Now},
     presence::Presence,
     report::ReportKey,
     sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, Sums, ZoneOf, minutes},
-    tracking::{RefusedReport, SiteError, Track, Tracker, TrackerSettings},
-    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
 };
 
 /// Reports of a camera that are late for this long mean that a clock was set back: tracks begin again

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_tracking::heat_map::Cell;
 use serde::{Deserialize, Serialize};
-
-use crate::heat_map::Cell;
 
 /// Milliseconds of a minute and of a day.
 pub(crate) const MINUTE_MS: i64 = 60_000;

@@ -11,7 +11,7 @@ use std::{
 };
 
 use events::{CALIBRATION, START_MS, Server, event, person, walks};
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 use lookdown_count::{CountEntry, Snapshot, WebhookEntry, count};
 use reqwest::Client;
 use serde_json::{Value, json};
@@ -106,7 +106,7 @@ async fn with_companion<T>(
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
     let companion = Companion {
         url: format!("http://{address}"),
-        client: lookdown_client::client_builder().build().unwrap(),
+        client: lookdown_common::client_builder().build().unwrap(),
     };
     let mut outcome = None;
     let stop = async {

@@ -109,7 +109,10 @@ mod tests {
         assert_eq!(slow.len(), 2);
         assert!(slow[0].is_server_slow && !slow[0].is_camera_slow);
         let warning = slow[0].warning().unwrap();
-        assert!(warning.starts_with("3.2 of 5.0 frames per second"), "{warning}");
+        assert!(
+            warning.starts_with("3.2 of 5.0 frames per second"),
+            "{warning}"
+        );
         for remedy in ["faster profile", "longer `every`", "more cores"] {
             assert!(warning.contains(remedy), "{warning}");
         }
@@ -120,7 +123,12 @@ mod tests {
         let millis = Duration::from_millis;
         let slow = rates(millis(500), millis(100));
         assert!(slow[0].is_camera_slow && !slow[0].is_server_slow);
-        assert!(slow[0].warning().unwrap().contains("frame rate of the camera"));
+        assert!(
+            slow[0]
+                .warning()
+                .unwrap()
+                .contains("frame rate of the camera")
+        );
         let reached = rates(millis(210), millis(150));
         assert_eq!(reached[0].warning(), None);
     }

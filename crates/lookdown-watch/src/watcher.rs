@@ -14,7 +14,7 @@ use crate::{
     slot::{Slot, Writer},
     source,
 };
-use lookdown_client::{ClientError, ConfigError, LogOnce, Reload};
+use lookdown_common::{ClientError, ConfigError, LogOnce, Reload};
 
 /// Longest time that the end waits for the reports of frames that were sent.
 const LAST_REPORTS: Duration = Duration::from_secs(5);
@@ -146,8 +146,8 @@ impl Watcher {
         loop {
             let options = settings.changed(&self.options).await;
             match self.change(options) {
-                Ok(()) => drop(log.settle()),
-                Err(problem) if log.is_changed(&problem.to_string()) => {
+                Ok(()) => drop(log.clear()),
+                Err(problem) if log.should_log(&problem.to_string()) => {
                     tracing::warn!("{problem}; the last valid settings stay in use");
                 }
                 Err(_) => {}

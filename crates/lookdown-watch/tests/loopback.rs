@@ -12,7 +12,7 @@ use std::{
 };
 
 use exchange::{Exchange, Reply, serve};
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 use lookdown_watch::{
     CameraEntry, Metrics, Origin, VideoFrames, VideoOptions, WatchError, WatchOptions, watch,
 };

@@ -13,7 +13,7 @@ use axum::{
     response::Response,
     routing::get,
 };
-use lookdown_client::ServerClient;
+use lookdown_common::ServerClient;
 use serde::Deserialize;
 use tower::ServiceExt;
 use url::Url;

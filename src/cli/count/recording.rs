@@ -16,6 +16,11 @@ use bytes::Bytes;
 use clap::Args;
 use jiff::Timestamp;
 use lookdown_count::Recording;
+use lookdown_detect::{
+    parameters::DetectParameters,
+    pipeline::{CalibrationLookup, DetectJob, Detected, Engine, JobImage},
+};
+use lookdown_lens::calibration::{Calibration, CalibrationId};
 use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
 use tokio::runtime::{self, Runtime};
 
@@ -24,7 +29,6 @@ use crate::{
     annotated_image::AnnotationOptions,
     api::Report,
     app::{engine_for, open_calibrations},
-    calibration::{Calibration, CalibrationId},
     cli::{
         annotate,
         detect::stream::{interval, is_video},
@@ -33,7 +37,6 @@ use crate::{
         progress::Progress,
         server_flags::given,
     },
-    pipeline::{CalibrationLookup, DetectJob, DetectParameters, Detected, Engine, JobImage},
     settings::Settings,
 };
 

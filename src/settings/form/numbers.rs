@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use lookdown_watch::parse_duration;
+use lookdown_common::parse_duration;
 use toml::Value;
 
 use super::{Form, Refusal, parsed};

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_tracking::heat_map::Cell;
 use rusqlite::{Connection, OptionalExtension, params};
 
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
-    heat_map::Cell,
     scene::SceneState,
     sums::{DAY_MS, LineDirection, Owner, PresenceSum, Totals, ZoneOf, ZoneSum, ZoneTotal},
     webhooks::{HeldCondition, Message},

@@ -1,6 +1,6 @@
 //! The cameras as they are written, and their checks.
 
-use lookdown_client::{ConfigError, ServerEntry};
+use lookdown_common::{ConfigError, ServerEntry};
 
 use super::{CameraEntry, WatchOptions};
 

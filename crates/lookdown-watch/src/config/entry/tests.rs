@@ -1,6 +1,6 @@
 use std::{fs, path::Path};
 
-use lookdown_client::{ServerEntry, parse_toml};
+use lookdown_common::{ServerEntry, parse_toml};
 use serde::Deserialize;
 
 use super::CameraEntry;
