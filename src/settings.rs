@@ -24,6 +24,7 @@ mod reference;
 mod remote;
 mod results;
 mod server;
+mod state;
 mod threads;
 mod tls;
 mod upstream;
@@ -50,6 +51,7 @@ pub use observability::{LogFormat, LogSettings, TraceSettings};
 pub use remote::RemoteSettings;
 pub use results::ResultSettings;
 pub use server::{ServerSettings, ShutdownSettings};
+pub use state::StateSettings;
 pub use threads::ThreadPlan;
 pub use variables::environment;
 
@@ -96,6 +98,8 @@ pub struct Settings {
     pub upstream: ServerEntry,
     /// The counts.
     pub counts: CountSettings,
+    /// The state of `lookdown run`.
+    pub state: StateSettings,
     /// Cameras and webhooks.
     pub lists: ListSettings,
     /// The log.
@@ -135,6 +139,7 @@ impl Settings {
             mqtt: MqttKeys::read(values)?.checked()?,
             upstream: UpstreamKeys::read(values)?.entry(),
             counts: CountSettings::read(values)?,
+            state: StateSettings::read(values)?,
             lists: values.lists.clone(),
             log: LogSettings::read(values)?,
             traces: TraceSettings::read(values)?,
@@ -161,6 +166,7 @@ fn entries() -> Vec<Entry> {
         ResultLimits::entries(),
         MqttKeys::entries(),
         CountSettings::entries(),
+        StateSettings::entries(),
         UpstreamKeys::entries(),
         LogSettings::entries(),
         TraceSettings::entries(),

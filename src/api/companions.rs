@@ -6,6 +6,8 @@ use axum::Router;
 use lookdown_common::ServerClient;
 use parking_lot::RwLock;
 
+use crate::cameras::Cameras;
+
 /// Returns metrics in the text format of Prometheus.
 type MetricsText = Arc<dyn Fn() -> Vec<u8> + Send + Sync>;
 
@@ -17,6 +19,7 @@ pub struct Companions(Arc<RwLock<Parts>>);
 #[derive(Default)]
 struct Parts {
     counts: Counts,
+    cameras: Option<Arc<Cameras>>,
     metrics: BTreeMap<&'static str, MetricsText>,
 }
 
@@ -43,6 +46,15 @@ impl Companions {
     /// Answers requests to `/counts` and `/sites` with these routes.
     pub fn set_counts(&self, routes: Router) {
         self.0.write().counts = Counts::Here(routes);
+    }
+
+    /// Answers requests to `/cameras` with these cameras.
+    pub fn set_cameras(&self, cameras: Arc<Cameras>) {
+        self.0.write().cameras = Some(cameras);
+    }
+
+    pub(super) fn cameras(&self) -> Option<Arc<Cameras>> {
+        self.0.read().cameras.clone()
     }
 
     /// Forwards requests to `/counts` and `/sites`.

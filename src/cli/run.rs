@@ -22,6 +22,7 @@ use super::{
 use crate::{
     access::{KeyDigest, KeyList, new_key},
     api::{Companions, Readiness},
+    cameras::Cameras,
     probe,
     settings::Settings,
     shutdown::Shutdown,
@@ -135,8 +136,12 @@ impl Parts {
     /// counts, then the server.
     async fn run(self, settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
         let url = format!("http://{}", probe::reachable(settings.server.listen));
+        let state = settings.state.path.clone();
         let (app, sockets) = serve::open(settings, commit).await?;
         let (companions, readiness) = (app.companions(), app.readiness());
+        let metrics = Arc::new(Metrics::new()?);
+        let stored = Arc::new(Cameras::new(state, Arc::clone(&metrics)));
+        companions.set_cameras(Arc::clone(&stored));
         companions.expect_counts();
         let server = ServerOptions {
             url: url.parse()?,
@@ -149,7 +154,10 @@ impl Parts {
         let (counted, after_counting) = watch::channel(false);
         let serving = self.ends_all(serve::serve_app(app, sockets, stop_of_server.clone()));
         let watching = async {
-            let watching = self.watch_when_ready(&server, &companions, readiness);
+            let shown = Arc::clone(&metrics);
+            companions.set_metrics("cameras", move || shown.text());
+            let run = (Arc::clone(&stored), server.clone());
+            let watching = self.watch_when_ready(run, metrics, readiness);
             let outcome = self.ends_all(watching).await;
             let _ = watched.send(true);
             outcome
@@ -180,18 +188,15 @@ impl Parts {
     /// Watches the cameras once the server accepts frames.
     async fn watch_when_ready(
         &self,
-        server: &ServerOptions,
-        companions: &Companions,
+        run: (Arc<Cameras>, ServerOptions),
+        metrics: Arc<Metrics>,
         readiness: Readiness,
     ) -> anyhow::Result<()> {
         tokio::select! {
             () = readiness.ready() => {}
             () = self.shutdown.requested() => return Ok(()),
         }
-        let metrics = Arc::new(Metrics::new()?);
-        let shown = Arc::clone(&metrics);
-        companions.set_metrics("cameras", move || shown.text());
-        let cameras = cameras(&self.settings, self.camera.clone(), Some(server.clone()));
+        let cameras = cameras(&self.settings, self.camera.clone(), Some(run));
         let stop = self.shutdown.requested();
         Ok(watch_cameras(Origin::Reload(cameras), metrics, stop).await?)
     }

@@ -17,7 +17,7 @@ use super::{
     server_flags::ServerFlags,
     settings_file::{SettingsSource, is_settings_file},
 };
-use crate::{settings::Settings, shutdown::Shutdown};
+use crate::{cameras::Cameras, settings::Settings, shutdown::Shutdown};
 
 /// Threads for all cameras. Frames are not decoded here.
 const RUNTIME_THREADS: usize = 2;
@@ -107,23 +107,23 @@ async fn listen(address: SocketAddr, metrics: &Arc<Metrics>) -> anyhow::Result<A
     Ok(AbortOnDrop(serving.abort_handle()))
 }
 
-/// Returns the cameras of the settings and of the command line. `server` replaces that of the
-/// settings.
+/// Returns the cameras of the settings and of the command line. In `lookdown run`, the stored cameras
+/// are added, and its own server replaces that of the settings.
 pub(super) fn cameras(
     settings: &SettingsSource,
     camera: Option<CameraEntry>,
-    server: Option<ServerOptions>,
+    run: Option<(Arc<Cameras>, ServerOptions)>,
 ) -> Reload<WatchOptions> {
     let settings = settings.clone();
     Reload::new(move || {
-        let mut settings = settings.again()?;
-        if server.is_some() {
-            settings.upstream = ServerEntry::default();
-        }
-        let mut options = entry(settings, camera.clone()).check()?;
-        if let Some(server) = &server {
-            options.server = server.clone();
-        }
+        let mut entry = entry(settings.again()?, camera.clone());
+        let Some((stored, server)) = &run else {
+            return entry.check();
+        };
+        stored.add_to(&mut entry.cameras)?;
+        entry.server = ServerEntry::default();
+        let mut options = entry.check()?;
+        options.server = server.clone();
         Ok::<_, ConfigError>(options)
     })
 }

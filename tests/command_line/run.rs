@@ -52,6 +52,20 @@ impl Running {
         }
     }
 
+    /// Sends a request with a JSON body, and returns the response.
+    fn ask(&self, request: &str, body: &str) -> String {
+        let length = body.len();
+        let head = format!(
+            "{request} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
+             Content-Type: application/json\r\nContent-Length: {length}\r\n\r\n{body}"
+        );
+        let mut connection = TcpStream::connect(&self.address).unwrap();
+        connection.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        connection.read_to_string(&mut answer).unwrap();
+        answer
+    }
+
     /// Sends a GET request with these header lines, and returns the response.
     fn get(&self, path: &str, headers: &str) -> String {
         let head =
@@ -174,6 +188,45 @@ fn cameras_of_the_settings_file_are_counted() {
     let text = format!("{text}[[cameras]]\nname = \"gate\"\nurl = {frames:?}\n");
     fs::write(&settings, text).unwrap();
     running.until("/counts", "", "\"gate\"", drop_frames(&frames));
+    running.interrupt();
+}
+
+#[test]
+fn a_camera_that_is_added_is_there_after_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("state");
+    let store = folder.path().join("counts.sqlite");
+    let variables = [
+        ("LOOKDOWN__STATE__PATH", state.to_str().unwrap()),
+        ("LOOKDOWN__COUNTS__PATH", store.to_str().unwrap()),
+    ];
+    // Nothing listens there.
+    let unused = TcpListener::bind("127.0.0.1:0").unwrap();
+    let source = format!("http://{}/snapshot.jpg", unused.local_addr().unwrap());
+    drop(unused);
+    let body = format!(r#"{{"url": "{source}", "user": "viewer", "password": "geheim"}}"#);
+    let running = Running::start(&["run"], &variables);
+    let added = running.ask("PUT /cameras/hall", &body);
+    assert!(added.starts_with("HTTP/1.1 201 "), "{added}");
+    let refused = running.ask("PUT /cameras/gate", r#"{"url": "file:///etc/passwd"}"#);
+    assert!(refused.starts_with("HTTP/1.1 422 "), "{refused}");
+    let tested = running.ask("POST /cameras/test", &body);
+    assert!(tested.contains("the camera cannot be reached"), "{tested}");
+    running.interrupt();
+
+    let running = Running::start(&["run"], &variables);
+    let cameras = running.until("/cameras", "", "cannot be reached", || {});
+    assert!(
+        cameras.contains(&source) && !cameras.contains("geheim"),
+        "{cameras}"
+    );
+    let deleted = running.ask("DELETE /cameras/hall", "");
+    assert!(deleted.starts_with("HTTP/1.1 204 "), "{deleted}");
+    assert!(
+        running
+            .get("/cameras/hall", "")
+            .starts_with("HTTP/1.1 404 ")
+    );
     running.interrupt();
 }
 

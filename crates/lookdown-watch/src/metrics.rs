@@ -65,6 +65,7 @@ pub(crate) struct CameraMetrics {
     /// The source, without credentials.
     source: String,
     rate: Mutex<Option<Rate>>,
+    warning: Mutex<Option<String>>,
     problem: Mutex<Option<String>>,
 }
 
@@ -79,6 +80,8 @@ pub struct CameraState {
     pub last_frame_age: Duration,
     /// The rate of the last whole minute.
     pub rate: Option<Rate>,
+    /// The reason and the remedies, if less than 80 % of the wanted rate is reached.
+    pub warning: Option<String>,
     /// The reason why the source gives no frames.
     pub problem: Option<String>,
 }
@@ -150,6 +153,7 @@ impl Metrics {
             reconnects: of(&self.reconnects),
             source,
             rate: Mutex::default(),
+            warning: Mutex::default(),
             problem: Mutex::default(),
         });
         let mut cameras = self.cameras.lock();
@@ -181,6 +185,7 @@ impl Metrics {
             source: camera.source.clone(),
             last_frame_age: camera.last_frame.lock().elapsed(),
             rate: *camera.rate.lock(),
+            warning: camera.warning.lock().clone(),
             problem: camera.problem.lock().clone(),
         });
         states.collect()
@@ -223,8 +228,9 @@ impl CameraMetrics {
     }
 
     /// Stores the rate of a minute.
-    pub(crate) fn measured(&self, rate: Rate) {
+    pub(crate) fn measured(&self, rate: Rate, warning: Option<String>) {
         *self.rate.lock() = Some(rate);
+        *self.warning.lock() = warning;
     }
 
     /// Stores the reason why the source gives no frames.

@@ -42,7 +42,6 @@ pub(crate) async fn run(
         let answer = server.detect(camera, &frame).await;
         let now = Instant::now();
         if let Some(rate) = meter.add(answer == Answer::Report, now - sent_at, now) {
-            metrics.measured(rate);
             // A folder, and a snapshot that does not change, have no rate of their own.
             let has_own_rate = matches!(camera.location, Location::Rtsp(_));
             let warning = rate.warning();
@@ -53,6 +52,7 @@ pub(crate) async fn run(
                 _ => {}
             }
             is_slow = warning.is_some();
+            metrics.measured(rate, warning);
         }
         let (failure, message, pause) = match answer {
             Answer::Report => {

@@ -97,6 +97,9 @@ problems! {
     /// The calibration shares its file with other calibrations.
     CalibrationConflict = CONFLICT "calibration-conflict" "Calibration conflict"
         => "Change the file itself.";
+    /// The camera is one of the settings.
+    CameraConflict = CONFLICT "camera-conflict" "Camera conflict"
+        => "Change the camera in the settings file.";
     /// The models that are loaded do not allow the change.
     ModelConflict = CONFLICT "model-conflict" "Model conflict"
         => "Unload another model first; the models of the profiles cannot be unloaded.";
