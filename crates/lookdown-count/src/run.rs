@@ -17,6 +17,7 @@ use crate::{
     calibrations::Calibrations,
     engine::{CountingOptions, Engine},
     follower::Follower,
+    hand_back::hand_back,
     http::{Api, router, routes},
     metrics::Metrics,
     options::CountOptions,
@@ -119,6 +120,8 @@ pub async fn count(
         routes: routes().with_state(Arc::clone(&api)),
         metrics: Box::new(move || api.metrics_text()),
     });
+    let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
+    let _handing_back = AbortOnDrop(handing_back.abort_handle());
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(&options.webhooks, resumed.messages, &store, &metrics)?,

@@ -25,6 +25,7 @@ use crate::api::{
         page_headers,
         problem::{Problem, ProblemKind},
     },
+    require_scope::RequireAdmin,
 };
 
 /// A file of the page.
@@ -55,6 +56,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "panels.css" from "web",
         "zones.css" from "web",
         "icon.svg" from "web",
+        "ignore_place.js" from "web",
         "main.js" from "web",
         "dom.js" from "web",
         "server.js" from "web",
@@ -116,6 +118,8 @@ impl Asset {
 struct PageOptions {
     /// True if this server answers `/counts`.
     has_counts: bool,
+    /// True if the request may change calibrations.
+    can_change: bool,
 }
 
 /// Returns the routes of the page and its files.
@@ -124,10 +128,13 @@ pub(in crate::api) fn router() -> Router<ApiState> {
     let asset = async |Path(name): Path<String>, uri: Uri, headers: HeaderMap| {
         answer(&name, &headers, uri.path())
     };
-    let options = async |State(state): State<ApiState>| {
-        let has_counts = state.options.companions.has_counts();
+    let options = async |State(state): State<ApiState>, headers: HeaderMap| {
+        let options = PageOptions {
+            has_counts: state.options.companions.has_counts(),
+            can_change: RequireAdmin::check(&state, &headers).is_ok(),
+        };
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
-        (no_store, Json(PageOptions { has_counts })).into_response()
+        (no_store, Json(options)).into_response()
     };
     Router::new()
         .route("/", get(page))
