@@ -15,6 +15,7 @@ use lookdown_detect::{
     parameters::DetectDefaults,
     pipeline::{PipelineError, WorkerPool},
 };
+use lookdown_http::header_limits::HeaderLimits;
 
 use super::{
     companions::Companions,
@@ -22,7 +23,6 @@ use super::{
         access::Access,
         deadline::{Deadline, RequestTimeout},
         drain_body::BodyLimits,
-        header_limits::HeaderLimits,
         problem::{Problem, ProblemKind},
         rate_limit::RequestRate,
         request_body::{BodyReader, UploadBudget},

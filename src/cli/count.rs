@@ -8,6 +8,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use lookdown_common::{ConfigError, Reload, ServerEntry, ServerOptions};
 use lookdown_count::{CountEntry, CountOptions, Snapshot, Started, count};
+use lookdown_http::Shutdown;
 use tokio::{runtime, sync::watch};
 
 use super::{
@@ -20,7 +21,6 @@ use super::{
 use crate::{
     mqtt::{CountsOptions, CountsPublisher},
     settings::Settings,
-    shutdown::Shutdown,
 };
 
 /// Threads for all cameras.

@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use lookdown_common::ServerOptions;
 use lookdown_count::Started;
+use lookdown_http::Shutdown;
 use lookdown_watch::{CameraEntry, Metrics, Origin, watch as watch_cameras};
 use secrecy::SecretString;
 use tokio::{runtime, sync::watch};
@@ -25,7 +26,6 @@ use crate::{
     cameras::Cameras,
     probe,
     settings::Settings,
-    shutdown::Shutdown,
 };
 
 /// The name of the key with which cameras and counts use the server of this process.

@@ -4,7 +4,8 @@ use std::{net::SocketAddr, process::ExitCode, sync::Arc};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_common::{AbortOnDrop, ConfigError, Reload, ServerEntry, ServerOptions, http_server};
+use lookdown_common::{AbortOnDrop, ConfigError, Reload, ServerEntry, ServerOptions};
+use lookdown_http::{Shutdown, server::bind};
 use lookdown_watch::{
     CameraEntry, Metrics, Origin, WatchEntry, WatchOptions, serve_metrics, watch,
 };
@@ -17,7 +18,7 @@ use super::{
     server_flags::ServerFlags,
     settings_file::{SettingsSource, is_settings_file},
 };
-use crate::{cameras::Cameras, settings::Settings, shutdown::Shutdown};
+use crate::{cameras::Cameras, settings::Settings};
 
 /// Threads for all cameras. Frames are not decoded here.
 const RUNTIME_THREADS: usize = 2;
@@ -98,7 +99,7 @@ pub(super) fn separate(argument: Option<&str>) -> (Option<&str>, Option<&str>) {
 
 /// Serves the metrics until the value is dropped.
 async fn listen(address: SocketAddr, metrics: &Arc<Metrics>) -> anyhow::Result<AbortOnDrop> {
-    let listener = http_server::bind("--metrics-listen", address).await;
+    let listener = bind("--metrics-listen", address).await;
     let listener = listener.map_err(anyhow::Error::msg)?;
     if let Ok(address) = listener.local_addr() {
         tracing::info!("metrics at http://{address}/metrics");

@@ -8,7 +8,7 @@ use url::Url;
 
 use super::{
     declare::settings,
-    form::{address, duration, optional, path, web_address, whole},
+    form::{address, duration, flag, optional, path, web_address, whole},
 };
 
 settings! {
@@ -38,6 +38,9 @@ settings! {
         /// The file with the key of `lookdown count`, at least 16 characters on the first line:
         /// `count` requires it of its clients, and `serve` sends it to `counts.url`. Empty: none.
         api_key_file: Option<PathBuf> = None => optional(path());
+        /// Lets every client of a `counts.listen` that other machines reach read the counts without
+        /// a key.
+        open: bool = false => flag();
     }
 }
 
@@ -48,6 +51,7 @@ impl CountSettings {
         CountEntry {
             listen: Some(self.listen),
             api_key_file: self.api_key_file.clone(),
+            open: self.open,
             store: self.path.clone(),
             retention: Duration::from_hours(24) * self.retention_days,
             commit_every: self.commit_every,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hyper::body::Body as _;
+use http_body::Body as _;
 use reqwest::{
     Body, Certificate, Client, RequestBuilder, Response, Url,
     header::{AUTHORIZATION, CONTENT_LENGTH, HOST, HeaderMap, HeaderValue, RETRY_AFTER},
@@ -125,7 +125,7 @@ impl ServerClient {
         let Some((server, own_headers)) = &self.in_process else {
             return request.send().await;
         };
-        let mut request: hyper::Request<Body> = request.build()?.try_into()?;
+        let mut request: http::Request<Body> = request.build()?.try_into()?;
         let length = request.body().size_hint().exact();
         let headers = request.headers_mut();
         headers.extend(own_headers.clone());

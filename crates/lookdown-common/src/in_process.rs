@@ -2,7 +2,7 @@
 
 use std::{fmt, future::Future, pin::Pin, sync::Arc};
 
-use hyper::{Request, Response};
+use http::{Request, Response};
 use reqwest::Body;
 
 type Answer = Pin<Box<dyn Future<Output = Response<Body>> + Send>>;

@@ -25,6 +25,8 @@ pub struct CountEntry {
     pub listen: Option<SocketAddr>,
     /// A file with the key that requests must have.
     pub api_key_file: Option<PathBuf>,
+    /// True to answer every client of an address that other machines reach, without a key.
+    pub open: bool,
     /// The file of the store.
     pub store: PathBuf,
     /// The time after which sums are removed.
@@ -45,6 +47,7 @@ impl Default for CountEntry {
             server: ServerEntry::default(),
             listen: Some(SocketAddr::from(([127, 0, 0, 1], 8090))),
             api_key_file: None,
+            open: false,
             store: "counts.sqlite".into(),
             retention: Duration::from_hours(90 * 24),
             commit_every: Duration::from_secs(2),
@@ -109,12 +112,19 @@ impl CountEntry {
             let remedy = "webhooks are too many: give at most 32";
             return Err(ConfigError::value("webhooks", &self.webhooks.len(), remedy));
         }
+        let api_key = self.api_key_file.as_deref().map(read_key).transpose()?;
+        let exposed = self.listen.filter(|listen| !listen.ip().is_loopback());
+        if let Some(listen) = exposed.filter(|_| api_key.is_none() && !self.open) {
+            let remedy = "is reached by other machines: set counts.api_key_file, or set counts.open \
+                          to true to let every client read the counts";
+            return Err(ConfigError::value("counts.listen", &listen, remedy));
+        }
         let webhooks = self.webhooks.into_iter().enumerate();
         let webhooks = webhooks.map(|(index, entry)| entry.check(&format!("webhooks[{index}].")));
         Ok(CountOptions {
             server: self.server.check()?,
             listen: self.listen,
-            api_key: self.api_key_file.as_deref().map(read_key).transpose()?,
+            api_key,
             store: self.store,
             retention: self.retention,
             commit_every: self.commit_every,

@@ -14,7 +14,7 @@ use crate::{
     calibrations::Calibrations,
     definition::CameraDefinition,
     engine::{CountingOptions, Engine},
-    http::table,
+    http::{MAX_VALUES, table},
     now::Now,
     report::Report,
     snapshot::LineSnapshot,
@@ -154,7 +154,8 @@ impl Recording {
         own.next().map(|camera| camera.lines).unwrap_or_default()
     }
 
-    /// Returns the stored counts of a time as CSV, one row per step of whole minutes. Blocks.
+    /// Returns the stored counts of a time as CSV, one row per step of whole minutes, or `None` if
+    /// there are too many. Blocks.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -162,14 +163,16 @@ impl Recording {
         &self,
         (from, to): (Timestamp, Timestamp),
         step_minutes: u32,
-    ) -> Result<String, StoreError> {
+    ) -> Result<Option<String>, StoreError> {
         let span = Span {
             from: from.as_millisecond().div_euclid(MINUTE_MS),
             to: (to.as_millisecond() + MINUTE_MS - 1).div_euclid(MINUTE_MS),
             step: i64::from(step_minutes.max(1)),
         };
         let owner = Owner::Camera(self.camera.clone());
-        let sums = self.store.steps(&owner, span)?;
+        let Some(sums) = self.store.steps(&owner, span, MAX_VALUES)? else {
+            return Ok(None);
+        };
         let definition = self.engine.definition(&self.camera);
         Ok(table(owner, span, &sums, definition.as_deref()))
     }

@@ -3,9 +3,12 @@
 use std::{future::Future, sync::Arc, time::Duration};
 
 use axum::Router;
-use hyper_util::service::TowerToHyperService;
 use jiff::Timestamp;
-use lookdown_common::{AbortOnDrop, ClientError, ConfigError, ServerClient, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, ServerClient};
+use lookdown_http::{
+    protect::{self, Access, Routes},
+    server::bind,
+};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,
@@ -18,7 +21,7 @@ use crate::{
     engine::{CountingOptions, Engine},
     follower::Follower,
     hand_back::hand_back,
-    http::{Api, router, routes},
+    http::{Api, metrics_router, probes, router},
     metrics::Metrics,
     options::CountOptions,
     snapshot::Snapshot,
@@ -72,7 +75,7 @@ pub async fn count(
     let client = ServerClient::new(&options.server)?;
     let listener = match options.listen {
         Some(address) => {
-            let listener = http_server::bind("counts.listen", address).await;
+            let listener = bind("counts.listen", address).await;
             Some(listener.map_err(CountError::Address)?)
         }
         None => None,
@@ -105,20 +108,34 @@ pub async fn count(
     let api = Api {
         engine: Arc::clone(&engine),
         store: store.clone(),
-        metrics: Arc::clone(&metrics),
-        api_key: options.api_key.clone(),
     };
-    let api = Arc::new(api);
+    let counts = router(api);
     let _serving = listener.map(|listener| {
-        if let Ok(address) = listener.local_addr() {
+        let address = listener.local_addr().ok();
+        if let Some(address) = address {
             tracing::info!("counts at http://{address}/counts");
         }
-        let service = TowerToHyperService::new(router(Arc::clone(&api)));
-        AbortOnDrop(tokio::spawn(http_server::serve(listener, service)).abort_handle())
+        let access = match (&options.api_key, address) {
+            (Some(key), _) => Access::Key(key.clone()),
+            (None, Some(address)) => Access::without_key(address),
+            (None, None) => Access::OwnMachine,
+        };
+        let routes = Routes {
+            protected: counts.clone().merge(metrics_router(&engine, &metrics)),
+            probes: probes(),
+        };
+        let open = metrics.connections.clone();
+        let serving = tokio::spawn(async move {
+            protect::serve(listener, routes, access, "counts.api_key_file", &open).await;
+        });
+        AbortOnDrop(serving.abort_handle())
     });
+    let (shown, shown_engine) = (Arc::clone(&metrics), Arc::clone(&engine));
     started(Started {
-        routes: routes().with_state(Arc::clone(&api)),
-        metrics: Box::new(move || api.metrics_text()),
+        routes: counts,
+        metrics: Box::new(move || {
+            shown.text(&shown_engine.lock(), Timestamp::now().as_millisecond())
+        }),
     });
     let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
     let _handing_back = AbortOnDrop(handing_back.abort_handle());

@@ -134,7 +134,19 @@ async fn problem(status: StatusCode, response: Response) -> Problem {
             return unavailable("the counts refuse the request: check counts.api_key_file");
         }
     };
+    if let Some(problem) = response
+        .extensions()
+        .get::<lookdown_http::problem::Problem>()
+    {
+        return Problem::new(kind, problem.detail.clone());
+    }
     let body = to_bytes(response.into_body(), MAX_PROBLEM_BYTES).await;
     let failure: Failure = serde_json::from_slice(&body.unwrap_or_default()).unwrap_or_default();
+    if failure.detail.is_empty() {
+        return Problem::new(
+            kind,
+            "there is no such resource: docs/count.md lists all paths",
+        );
+    }
     Problem::new(kind, failure.detail)
 }

@@ -182,7 +182,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let span = (first.start, end);
     let recording = counting.finish()?;
     let step = flags.step_minutes.map_or(15, NonZeroU32::get);
-    write(&recording.csv(span, step)?, flags.csv.as_deref())?;
+    let csv = recording.csv(span, step)?;
+    let csv = csv.context("--step-minutes: the CSV has too many values: give a longer step")?;
+    write(&csv, flags.csv.as_deref())?;
     let crossings = recording.lines().into_iter();
     let crossings =
         crossings.map(|line| format!("{} {} {}", line.line, line.direction, line.crossings));
