@@ -1,6 +1,7 @@
 //! The flags of the companions for the server that they are clients of.
 
 use clap::Args;
+use lookdown_common::ServerEntry;
 
 /// The server of a companion.
 #[derive(Debug, Args)]
@@ -18,6 +19,15 @@ pub(super) struct ServerFlags {
 }
 
 impl ServerFlags {
+    /// Returns the server of the flags alone.
+    pub(super) fn entry(&self) -> ServerEntry {
+        ServerEntry {
+            url: self.server.clone(),
+            api_key_file: self.api_key_file.as_ref().map(Into::into),
+            authorities: self.authorities.as_ref().map(Into::into),
+        }
+    }
+
     /// Returns the settings that the flags give.
     pub(super) fn settings(&self) -> Vec<(String, String)> {
         given(&[
