@@ -193,7 +193,7 @@ pub struct ReportViews {
     pub outside: usize,
     /// Views that the masks of the calibration hide completely.
     pub masked: usize,
-    /// Views that can show no person in an area of the calibration.
+    /// Views that cannot show a person in an area of the calibration.
     pub outside_areas: usize,
 }
 

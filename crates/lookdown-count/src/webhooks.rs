@@ -22,7 +22,7 @@ use signature::SigningKey;
 const SILENT_AFTER: Duration = Duration::from_mins(1);
 
 /// A webhook as it is written.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WebhookEntry {
     url: String,

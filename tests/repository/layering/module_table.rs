@@ -23,7 +23,7 @@ const LIBRARIES: [&str; 8] = [
     "lookdown_watch",
 ];
 
-/// The purpose of a module, and the modules and crates that it uses.
+/// The dependencies of a module: other modules of its crate, and crates of the workspace.
 #[derive(Default)]
 struct Uses {
     purpose: String,

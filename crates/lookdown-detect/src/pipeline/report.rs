@@ -76,7 +76,7 @@ pub struct ViewCounts {
     pub outside: usize,
     /// Views wholly hidden by the masks of the camera.
     pub masked: usize,
-    /// Views that can show no person in an area of the camera.
+    /// Views that cannot show a person in an area of the camera.
     pub outside_areas: usize,
 }
 
