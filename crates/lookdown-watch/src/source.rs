@@ -17,11 +17,8 @@ use reqwest::Client;
 use tokio::time::sleep;
 
 use crate::{
-    Camera, Frame, FrameError, Location, Metrics, SourceError,
-    credentials::Login,
-    metrics::{CameraMetrics, Failure},
-    server::camera_client,
-    slot::Slot,
+    Camera, Frame, Location, Metrics, SourceError, credentials::Login, metrics::CameraMetrics,
+    server::camera_client, slot::Slot,
 };
 use lookdown_common::{Backoff, LogOnce};
 
@@ -85,13 +82,7 @@ pub async fn first_frame(camera: &Camera, limit: Duration) -> Result<Frame, Sour
     let metrics = all.add(&camera.name, camera.location.to_string());
     let (slot, log) = (Slot::default(), Mutex::new(LogOnce::default()));
     let mut login = Login::new(camera.credentials.clone());
-    let sink = Sink {
-        slot: &slot,
-        metrics: &metrics,
-        started: Instant::now(),
-        alive: Mutex::default(),
-        is_failing: &log,
-    };
+    let sink = Sink::new(&slot, &metrics, &log);
     tokio::select! {
         biased;
         frame = slot.take() => frame.ok_or(SourceError::Closed),
