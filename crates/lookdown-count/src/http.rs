@@ -25,16 +25,10 @@ use jiff::Timestamp;
 use parking_lot::Mutex;
 use serde::Serialize;
 
-use crate::{engine::Engine, metrics::Metrics, store::Store, sums::Owner};
+use crate::{engine::Engine, metrics::Metrics, sums::Owner};
 pub(crate) use counts::{MAX_VALUES, table};
-
-/// Everything that requests read.
-pub(crate) struct Api {
-    pub(crate) engine: Arc<Mutex<Engine>>,
-    pub(crate) store: Store,
-}
-
-type Shared = Arc<Api>;
+pub(crate) use shared::Api;
+use shared::{Shared, now_ms};
 
 /// Returns the routes, without protection: a listener adds it.
 pub(crate) fn router(api: Api) -> Router {
