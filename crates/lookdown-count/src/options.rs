@@ -58,8 +58,11 @@ pub struct HttpEntry {
     pub listen: Option<SocketAddr>,
     /// A file with the key that requests must have.
     pub api_key_file: Option<PathBuf>,
-    /// True to answer every client of an address that other machines reach, without a key.
+    /// True to answer every client that reaches the address, without a key, also through a proxy.
     pub open: Option<bool>,
+    /// Public names of the address, which requests without a key may use.
+    #[serde(default)]
+    pub hosts: Vec<String>,
 }
 
 /// The store as it is written.
@@ -143,6 +146,10 @@ pub struct CountOptions {
     pub listen: SocketAddr,
     /// The key that requests to the HTTP API must have.
     pub api_key: Option<SecretString>,
+    /// True if every client may read without a key.
+    pub open: bool,
+    /// Public names of the address, in lower case.
+    pub hosts: Vec<String>,
     /// The file of the store.
     pub store: PathBuf,
     /// The time after which sums are removed.
@@ -171,6 +178,7 @@ impl PartialEq for CountOptions {
                 options.store.clone(),
                 [options.retention, options.commit_every, options.longest_gap],
                 options.max_cameras,
+                (options.open, options.hosts.clone()),
             )
         };
         self.server == other.server
@@ -206,6 +214,11 @@ impl CountEntry {
                 listen: self.http.listen.or(other.http.listen),
                 api_key_file: self.http.api_key_file.or(other.http.api_key_file),
                 open: self.http.open.or(other.http.open),
+                hosts: if self.http.hosts.is_empty() {
+                    other.http.hosts
+                } else {
+                    self.http.hosts
+                },
             },
             store: StoreEntry {
                 path: self.store.path.or(other.store.path),
@@ -280,6 +293,13 @@ impl CountEntry {
         Ok(CountOptions {
             server: self.server.check()?,
             listen,
+            open: is_open,
+            hosts: self
+                .http
+                .hosts
+                .iter()
+                .map(|host| host.to_ascii_lowercase())
+                .collect(),
             api_key,
             store: self.store.path.unwrap_or_else(|| STORE.into()),
             retention: seconds(u64::from(retention_days) * 86_400),

@@ -140,6 +140,7 @@ pub async fn count(
     }
     let access = match &options.api_key {
         Some(key) => Access::Key(key.clone()),
+        None if options.open => Access::Everyone(options.hosts.clone().into()),
         None => Access::without_key(options.listen),
     };
     let routes = Routes {

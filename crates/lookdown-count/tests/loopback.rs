@@ -528,7 +528,7 @@ fn invalid_settings_name_field_value_and_remedy() {
         ),
         (
             "[counting]\nlongest_gap = \"1h\"",
-            "counting.longest_gap: \"1h\" is no duration from 1 s to 600 s",
+            "counting.longest_gap: \"1h\" is not a duration from 1 s to 600 s",
         ),
         (
             "[server]\nurl = \"ftp://x\"",
@@ -543,4 +543,21 @@ fn invalid_settings_name_field_value_and_remedy() {
         let error = error_of(text);
         assert!(error.starts_with(expected), "{error}");
     }
+}
+
+#[test]
+fn an_address_of_the_network_needs_a_key_or_consent() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("count.toml");
+    let load = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        load(Some(&path), &lookdown_count::CountEntry::default())
+    };
+    let error = load("[http]\nlisten = \"0.0.0.0:8090\"").unwrap_err();
+    let error = error.to_string();
+    let expected =
+        "http.listen: \"0.0.0.0:8090\" is reached by other machines: set http.api_key_file";
+    assert!(error.starts_with(expected), "{error}");
+    assert!(load("[http]\nlisten = \"0.0.0.0:8090\"\nopen = true").is_ok());
+    assert!(load("[http]\nlisten = \"127.0.0.1:8090\"").is_ok());
 }
