@@ -94,7 +94,8 @@ impl Detector {
     /// [`DetectorError::Threads`].
     pub fn new(options: &DetectorOptions) -> Result<Self, DetectorError> {
         let fetched = |name: &str| is_fetched(&options.models.join(name));
-        let default_models = DefaultModels::per_profile(options.device, fetched);
+        let int8 = Int8Use::on(options.device, PrecisionChoice::Auto);
+        let default_models = DefaultModels::per_profile(int8, fetched);
         let metrics = Arc::<DetectMetrics>::default();
         let onnx = OnnxOptions {
             device: options.device,

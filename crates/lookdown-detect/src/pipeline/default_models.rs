@@ -5,27 +5,27 @@ use std::iter;
 use strum::VariantArray;
 
 use super::{DetectParameters, Profile};
-use crate::inference::Device;
+use crate::inference::Int8Use;
 
 /// Returns the models of a profile, in order of preference. This is the only table of them. Models
 /// that were not fetched are skipped; [`FALLBACK`] is the last choice.
-fn preferred(profile: Profile, device: Device) -> &'static [&'static str] {
-    match (profile, device) {
-        (Profile::Paper | Profile::Direct, Device::Cpu) => &[SSDLITE_INT8],
-        (Profile::Paper | Profile::Direct, _) => &[FALLBACK],
-        (Profile::Fast, Device::Cpu) => &[NANODET_INT8, NANODET],
-        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[NANODET],
+fn preferred(profile: Profile, int8: Int8Use) -> &'static [&'static str] {
+    match (profile, int8) {
+        (Profile::Paper | Profile::Direct, Int8Use::None) => &[FALLBACK],
+        (Profile::Paper | Profile::Direct, _) => &[SSDLITE_INT8],
+        (Profile::Fast, Int8Use::SmallProfiles) | (_, Int8Use::All) => &[NANODET_INT8, NANODET],
+        (_, Int8Use::None | Int8Use::SmallProfiles) => &[NANODET],
     }
 }
 
 /// Returns the models of a profile's upright crops, in order of preference. They are trained on
 /// rendered fisheye frames; the profile's own model is the last choice. Packages include the model
 /// in INT8 only.
-fn preferred_for_crops(profile: Profile, device: Device) -> &'static [&'static str] {
-    match (profile, device) {
+fn preferred_for_crops(profile: Profile, int8: Int8Use) -> &'static [&'static str] {
+    match (profile, int8) {
         (Profile::Paper | Profile::Direct, _) => &[],
-        (_, Device::Cpu) => &[FISHEYE_INT8],
-        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[FISHEYE],
+        (_, Int8Use::None) => &[FISHEYE],
+        (_, Int8Use::SmallProfiles | Int8Use::All) => &[FISHEYE_INT8],
     }
 }
 
@@ -36,15 +36,12 @@ fn second_model_profile(profile: Profile) -> Option<Profile> {
 
 const NANODET: &str = "nanodet_g_416";
 
-/// ONNX Runtime has integer kernels for this model on CPUs only.
 const NANODET_INT8: &str = "nanodet_g_416_int8";
 
 const FISHEYE: &str = "nanodet_g_fisheye_416";
 
-/// ONNX Runtime has integer kernels for this model on CPUs only.
 const FISHEYE_INT8: &str = "nanodet_g_fisheye_416_int8";
 
-/// ONNX Runtime has integer kernels for this model on CPUs only.
 const SSDLITE_INT8: &str = "ssdlite_mobilenet_v2_int8";
 
 /// The fallback for models that were not fetched: every installation includes it.
@@ -57,29 +54,29 @@ pub enum DefaultModels {
     One(String),
     /// One model for each profile, or the fallback that every installation includes.
     PerProfile {
-        /// The device that runs the models.
-        device: Device,
+        /// The models in INT8.
+        int8: Int8Use,
         /// The preferred models that were not fetched.
         missing: Vec<&'static str>,
     },
 }
 
 impl DefaultModels {
-    /// Selects the model of each profile for this device from those that `is_fetched` accepts.
+    /// Selects the model of each profile from those that `is_fetched` accepts.
     #[must_use]
-    pub fn per_profile(device: Device, is_fetched: impl Fn(&str) -> bool) -> Self {
+    pub fn per_profile(int8: Int8Use, is_fetched: impl Fn(&str) -> bool) -> Self {
         let mut missing: Vec<_> = Profile::VARIANTS
             .iter()
             .flat_map(|&profile| {
-                let crops = preferred_for_crops(profile, device);
-                preferred(profile, device).iter().chain(crops)
+                let crops = preferred_for_crops(profile, int8);
+                preferred(profile, int8).iter().chain(crops)
             })
             .copied()
             .filter(|name| *name != FALLBACK && !is_fetched(name))
             .collect();
         missing.sort_unstable();
         missing.dedup();
-        Self::PerProfile { device, missing }
+        Self::PerProfile { int8, missing }
     }
 
     /// Returns the model of a profile.
@@ -87,8 +84,8 @@ impl DefaultModels {
     pub fn of(&self, profile: Profile) -> &str {
         match self {
             Self::One(name) => name,
-            Self::PerProfile { device, missing } => {
-                let mut models = preferred(profile, *device).iter();
+            Self::PerProfile { int8, missing } => {
+                let mut models = preferred(profile, *int8).iter();
                 let fetched = models.find(|name| !missing.contains(name));
                 fetched.copied().unwrap_or(FALLBACK)
             }
@@ -106,10 +103,10 @@ impl DefaultModels {
     /// Returns the model of a profile's upright crops, if it differs from the profile's own model.
     #[must_use]
     pub fn crop_model(&self, profile: Profile) -> Option<&str> {
-        let Self::PerProfile { device, missing } = self else {
+        let Self::PerProfile { int8, missing } = self else {
             return None;
         };
-        let mut models = preferred_for_crops(profile, *device).iter();
+        let mut models = preferred_for_crops(profile, *int8).iter();
         models.find(|name| !missing.contains(name)).copied()
     }
 
@@ -150,36 +147,41 @@ mod tests {
 
     #[test]
     fn a_model_that_was_not_fetched_has_a_fallback() {
-        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
+        let all = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
         assert_eq!(
             all.names(),
             [NANODET, FISHEYE_INT8, SSDLITE_INT8, NANODET_INT8]
         );
-        let without = DefaultModels::per_profile(Device::Cpu, |name| name != NANODET_INT8);
+        let without = DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != NANODET_INT8);
         assert_eq!(without.of(Profile::Fast), NANODET);
-        let few = DefaultModels::per_profile(Device::Cpu, |_| false);
+        let few = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| false);
         assert_eq!(few.names(), [FALLBACK]);
     }
 
     #[test]
-    fn int8_models_are_selected_on_cpus_only() {
-        let gpu = DefaultModels::per_profile(Device::Cuda(0), |_| true);
+    fn int8_models_are_selected_by_profile_and_cpu() {
+        let gpu = DefaultModels::per_profile(Int8Use::None, |_| true);
         assert_eq!(gpu.of(Profile::Paper), FALLBACK);
-        let cpu = DefaultModels::per_profile(Device::Cpu, |_| true);
+        let cpu = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
         assert_eq!(cpu.of(Profile::Paper), SSDLITE_INT8);
         assert_eq!(
             (cpu.of(Profile::Fast), gpu.of(Profile::Fast)),
             (NANODET_INT8, NANODET)
         );
-        assert_eq!(cpu.of(Profile::Quality), gpu.of(Profile::Quality));
+        assert_eq!(cpu.of(Profile::Balanced), gpu.of(Profile::Balanced));
+        let vnni = DefaultModels::per_profile(Int8Use::All, |_| true);
+        assert_eq!(vnni.of(Profile::Balanced), NANODET_INT8);
+        assert_eq!(vnni.crop_model(Profile::Balanced), Some(FISHEYE_INT8));
+        let not_fetched = DefaultModels::per_profile(Int8Use::All, |name| name != NANODET_INT8);
+        assert_eq!(not_fetched.of(Profile::Balanced), NANODET);
     }
 
     #[test]
     fn second_model_differs_from_the_profile_s_own_model() {
-        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
+        let all = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
         assert_eq!(all.second_opinion(Profile::Quality), Some(SSDLITE_INT8));
         assert_eq!(all.second_opinion(Profile::Balanced), None);
-        let few = DefaultModels::per_profile(Device::Cpu, |_| false);
+        let few = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| false);
         assert_eq!(few.second_opinion(Profile::Quality), None);
         let one = DefaultModels::One("mine".to_owned());
         assert_eq!(one.second_opinion(Profile::Quality), None);
@@ -187,7 +189,7 @@ mod tests {
 
     #[test]
     fn crops_have_a_model_of_their_own_if_it_was_fetched() {
-        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
+        let all = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
         let crop_models = [
             Profile::Fast,
             Profile::Balanced,
@@ -204,9 +206,9 @@ mod tests {
                 None
             ]
         );
-        let without = DefaultModels::per_profile(Device::Cpu, |name| name != FISHEYE_INT8);
+        let without = DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != FISHEYE_INT8);
         assert_eq!(without.crop_model(Profile::Fast), None);
-        let gpu = DefaultModels::per_profile(Device::Cuda(0), |_| true);
+        let gpu = DefaultModels::per_profile(Int8Use::None, |_| true);
         assert_eq!(gpu.crop_model(Profile::Fast), Some(FISHEYE));
         let one = DefaultModels::One("mine".to_owned());
         assert_eq!(one.crop_model(Profile::Balanced), None);
