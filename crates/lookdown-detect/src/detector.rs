@@ -8,8 +8,8 @@ use crate::{
     calibration::Calibration,
     imaging::Frame,
     inference::{
-        CandidateOptions, Device, ModelFolder, ModelRepository, OnnxOptions, RepositoryError,
-        RepositoryOptions, is_fetched, onnx_loader,
+        CandidateOptions, Device, Int8Use, ModelFolder, ModelRepository, OnnxOptions,
+        PrecisionChoice, RepositoryError, RepositoryOptions, is_fetched, onnx_loader,
     },
     metrics::DetectMetrics,
     parameters::DetectParameters,

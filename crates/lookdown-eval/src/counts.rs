@@ -67,9 +67,7 @@ impl Counts {
                 persons: image.truth.person_count(),
                 detections: judged
                     .filter(|(_, outcome)| *outcome != Outcome::Ignored)
-                    .map(|(detection, outcome)| {
-                        (detection.score, outcome == Outcome::TruePositive)
-                    })
+                    .map(|(detection, outcome)| (detection.score, outcome == Outcome::TruePositive))
                     .collect(),
             }
         });

@@ -3,8 +3,8 @@
 use std::{fmt, time::Duration};
 
 use super::{
-    Counts, DataSet, EvaluatedImage, MatchingRule, NoPersons, NoStrata, Outline, PrecisionRecallCurve,
-    ScoredBox, Stratification, Stratum, Summary,
+    Counts, DataSet, EvaluatedImage, MatchingRule, NoPersons, NoStrata, Outline,
+    PrecisionRecallCurve, ScoredBox, Stratification, Stratum, Summary,
 };
 use crate::{
     detection::{BBox, FramePixels, Refinement, RefinementParameters},

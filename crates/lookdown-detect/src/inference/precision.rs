@@ -1,23 +1,11 @@
 //! The precision of the networks: 8-bit integers or 32-bit floating point.
 
-use strum::{Display, EnumString, VariantArray};
+use strum::{IntoStaticStr, VariantArray};
 
 use super::Device;
 
 /// The precision that a user requests.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    Display,
-    EnumString,
-    VariantArray,
-    strum::VariantNames,
-)]
-#[strum(serialize_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, VariantArray)]
 pub enum PrecisionChoice {
     /// The fastest one on this CPU.
     #[default]
@@ -29,7 +17,7 @@ pub enum PrecisionChoice {
 }
 
 /// The default models that are in INT8.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Display)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Int8Use {
     /// No model.
@@ -42,6 +30,25 @@ pub enum Int8Use {
 }
 
 impl Int8Use {
+    /// Returns a description for the log.
+    #[must_use]
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::None => "all default models use FP32",
+            Self::SmallProfiles => {
+                "balanced and quality use FP32, the other default models INT8 (this CPU has no \
+                 VNNI or dotprod)"
+            }
+            Self::All => "all default models use INT8",
+        }
+    }
+
+    /// Returns the name, as in metadata and metrics.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
     /// Returns the models that are in INT8 on this machine. ONNX Runtime has integer kernels for
     /// them on CPUs only.
     #[must_use]
@@ -86,8 +93,14 @@ mod tests {
 
     #[test]
     fn a_requested_precision_is_used_and_gpus_use_fp32() {
-        assert_eq!(Int8Use::on(Device::Cpu, PrecisionChoice::Int8), Int8Use::All);
-        assert_eq!(Int8Use::on(Device::Cpu, PrecisionChoice::Fp32), Int8Use::None);
+        assert_eq!(
+            Int8Use::on(Device::Cpu, PrecisionChoice::Int8),
+            Int8Use::All
+        );
+        assert_eq!(
+            Int8Use::on(Device::Cpu, PrecisionChoice::Fp32),
+            Int8Use::None
+        );
         for choice in PrecisionChoice::VARIANTS {
             assert_eq!(Int8Use::on(Device::Cuda(0), *choice), Int8Use::None);
         }

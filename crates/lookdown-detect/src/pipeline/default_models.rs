@@ -79,6 +79,15 @@ impl DefaultModels {
         Self::PerProfile { int8, missing }
     }
 
+    /// Returns the models in INT8; `None` for one model for all profiles.
+    #[must_use]
+    pub fn int8(&self) -> Option<Int8Use> {
+        match self {
+            Self::One(_) => None,
+            Self::PerProfile { int8, .. } => Some(*int8),
+        }
+    }
+
     /// Returns the model of a profile.
     #[must_use]
     pub fn of(&self, profile: Profile) -> &str {
@@ -152,7 +161,8 @@ mod tests {
             all.names(),
             [NANODET, FISHEYE_INT8, SSDLITE_INT8, NANODET_INT8]
         );
-        let without = DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != NANODET_INT8);
+        let without =
+            DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != NANODET_INT8);
         assert_eq!(without.of(Profile::Fast), NANODET);
         let few = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| false);
         assert_eq!(few.names(), [FALLBACK]);
@@ -206,7 +216,8 @@ mod tests {
                 None
             ]
         );
-        let without = DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != FISHEYE_INT8);
+        let without =
+            DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != FISHEYE_INT8);
         assert_eq!(without.crop_model(Profile::Fast), None);
         let gpu = DefaultModels::per_profile(Int8Use::None, |_| true);
         assert_eq!(gpu.crop_model(Profile::Fast), Some(FISHEYE));
