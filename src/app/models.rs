@@ -2,16 +2,18 @@
 
 use std::{path::Path, sync::Arc};
 
-use crate::{
+use lookdown_detect::{
     inference::{
         CandidateOptions, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
         OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, is_fetched,
         onnx_loader,
     },
     metrics::{DetectMetrics, replace_info},
-    pipeline::{DefaultModels, Profile},
-    settings::{InferenceSettings, RemoteSettings, Settings, SettingsError, is_installed},
+    parameters::Profile,
+    pipeline::DefaultModels,
 };
+
+use crate::settings::{InferenceSettings, RemoteSettings, Settings, SettingsError, is_installed};
 
 /// Opens the repository without loading a model. Also returns the default models.
 ///

@@ -2,13 +2,14 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
+use lookdown_detect::inference::{CandidateOptions, Device, PrecisionChoice, UnknownDevice};
+
 use super::{
     SettingsError,
     declare::settings,
     form::{Form, Refusal, choice, count, millis, parsed, path, share},
     locate::{DEFAULT_LIBRARY, locate},
 };
-use crate::inference::{CandidateOptions, Device, PrecisionChoice, UnknownDevice};
 
 /// A second: a server whose batches take longer to fill has no traffic to fill them.
 const MAX_QUEUE_DELAY_MILLIS: u64 = 1_000;
@@ -28,9 +29,10 @@ settings! {
         /// For a GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
         /// `onnxruntime-gpu`. GPUs are experimental: none has been tested.
         device: Device = Device::Cpu => device();
-        /// The precision of the default models on the CPU. `auto`: 8-bit integers for all profiles if
-        /// the CPU has instructions for them (VNNI, or `dotprod` on arm64), otherwise for `fast`,
-        /// upright crops, `paper` and `direct` only. A GPU uses `fp32`.
+        /// The precision of the default models on the CPU. `auto`: 8-bit integers for upright
+        /// crops and all profiles except `quality`, and for `balanced` only if the CPU has
+        /// instructions for them (VNNI, or `dotprod` on arm64). `int8`: also for `balanced` on any
+        /// CPU. A GPU uses `fp32`.
         precision: PrecisionChoice = PrecisionChoice::Auto => choice(&[
             ("auto", PrecisionChoice::Auto),
             ("int8", PrecisionChoice::Int8),

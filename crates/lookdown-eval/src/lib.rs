@@ -20,9 +20,6 @@ mod strata;
 mod summary;
 pub mod sweep;
 
-use lookdown_detect::{detection, imaging, pipeline};
-use lookdown_lens::{calibration, geometry};
-
 pub use average_precision::AveragePrecision;
 pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD};
 pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch};

@@ -5,7 +5,5 @@
 
 pub mod calibration;
 pub mod geometry;
-pub mod plain_name;
-pub mod quoted;
 pub mod revision;
 pub mod warning;

@@ -2,16 +2,12 @@
 
 use std::fmt;
 
-use serde::Serialize;
-
-use crate::{
-    detection::Refinement,
-    evaluation::{
-        AveragePrecision, Counts, DEFAULT_COUNT_THRESHOLD, DetectedRow, EvaluatedRow,
-        Stratification, Stratum,
-    },
-    pipeline::Profile,
+use lookdown_detect::{detection::Refinement, parameters::Profile};
+use lookdown_eval::{
+    AveragePrecision, Counts, DEFAULT_COUNT_THRESHOLD, DetectedRow, EvaluatedRow, Stratification,
+    Stratum,
 };
+use serde::Serialize;
 
 /// One row: a JSON object, or a line of the table by its `Display`. Unknown values of detections
 /// from a file are null, or a dash.

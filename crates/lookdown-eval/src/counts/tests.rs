@@ -1,10 +1,9 @@
 //! Counts calculated by hand.
 
+use lookdown_detect::detection::{BBox, FramePixels};
+
 use super::{CalibrationError, Counts};
-use crate::{
-    EvaluatedImage, GroundTruth, MatchingRule, ScoredBox,
-    detection::{BBox, FramePixels},
-};
+use crate::{EvaluatedImage, GroundTruth, MatchingRule, ScoredBox};
 
 fn bbox(left: f64) -> BBox<FramePixels> {
     BBox::new([left, 0.0, left + 5.0, 5.0]).unwrap()
