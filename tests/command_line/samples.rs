@@ -5,6 +5,7 @@ use std::{path::Path, process::Command, sync::Arc};
 use lookdown_detect::{
     Detector, DetectorOptions,
     imaging::decode::{DecodeLimits, decode},
+    inference::cpu_has_integer_dot_product,
     parameters::DetectParameters,
 };
 use lookdown_lens::calibration::Calibration;
@@ -175,6 +176,14 @@ fn report_names_the_models_of_first_pass_zoom_views_and_crops() {
             some("nanodet_g_fisheye_416_int8")
         ]
     );
+    // The CPU decides on INT8 for `balanced`.
+    let balanced = detect("office", &[]);
+    let expected = if cpu_has_integer_dot_product() {
+        "nanodet_g_416_int8"
+    } else {
+        "nanodet_g_416"
+    };
+    assert_eq!(names(&balanced)[0], some(expected));
     let fast = detect("office", &["--profile", "fast"]);
     assert_eq!(
         names(&fast),

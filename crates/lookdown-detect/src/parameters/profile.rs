@@ -98,12 +98,13 @@ impl Profile {
         }
     }
 
-    /// Returns the score at which a person merged by fusion is as likely as not. The more views
-    /// see a person, the more of them must agree.
+    /// Returns the score at which a person merged by fusion is as likely as not. `docs/results.md`
+    /// has the error of the number of persons and of the probabilities with these values.
     pub(crate) fn even_odds_score(self) -> f64 {
         match self {
-            Self::Quality => 0.31,
-            Self::Fast | Self::Balanced => 0.28,
+            Self::Fast => 0.26,
+            Self::Balanced => 0.25,
+            Self::Quality => 0.30,
             Self::Paper | Self::Direct => 0.25,
         }
     }
