@@ -32,11 +32,6 @@ fn preferred_for_crops(profile: Profile, int8: Int8Use) -> &'static [&'static st
     }
 }
 
-/// Returns the profile whose model processes half of the zoom views of `profile`.
-fn second_model_profile(profile: Profile) -> Option<Profile> {
-    (profile == Profile::Quality).then_some(Profile::Paper)
-}
-
 const NANODET: &str = "nanodet_g_416";
 
 const NANODET_INT8: &str = "nanodet_g_416_int8";
@@ -104,14 +99,6 @@ impl DefaultModels {
         }
     }
 
-    /// Returns the second model of a profile's zoom views, if the profile has one and it differs
-    /// from the profile's own model.
-    #[must_use]
-    pub fn second_opinion(&self, profile: Profile) -> Option<&str> {
-        let name = self.of(second_model_profile(profile)?);
-        (name != self.of(profile)).then_some(name)
-    }
-
     /// Returns the model of a profile's upright crops, if it differs from the profile's own model.
     #[must_use]
     pub fn crop_model(&self, profile: Profile) -> Option<&str> {
@@ -145,11 +132,9 @@ impl DefaultModels {
         names
     }
 
-    /// Returns the profile's own model, that of half of its zoom views, and that of its crops.
+    /// Returns the profile's own model and that of its crops.
     fn of_profile(&self, profile: Profile) -> impl Iterator<Item = &str> {
-        iter::once(self.of(profile))
-            .chain(self.second_opinion(profile))
-            .chain(self.crop_model(profile))
+        iter::once(self.of(profile)).chain(self.crop_model(profile))
     }
 }
 
@@ -188,17 +173,6 @@ mod tests {
         let not_fetched =
             DefaultModels::per_profile(Int8Use::AllButQuality, |name| name != NANODET_INT8);
         assert_eq!(not_fetched.of(Profile::Balanced), NANODET);
-    }
-
-    #[test]
-    fn second_model_differs_from_the_profile_s_own_model() {
-        let all = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
-        assert_eq!(all.second_opinion(Profile::Quality), Some(SSDLITE_INT8));
-        assert_eq!(all.second_opinion(Profile::Balanced), None);
-        let few = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| false);
-        assert_eq!(few.second_opinion(Profile::Quality), None);
-        let one = DefaultModels::One("mine".to_owned());
-        assert_eq!(one.second_opinion(Profile::Quality), None);
     }
 
     #[test]
