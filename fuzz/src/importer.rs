@@ -77,6 +77,8 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
         zones: camera.zones.clone(),
         lines: camera.lines.clone(),
         masks: camera.masks.clone(),
+        areas: camera.areas.clone(),
+        ignore: camera.ignore.clone(),
         detect: camera.detect.clone(),
     });
     let Ok(Exported { content, .. }) = written else {

@@ -1,4 +1,5 @@
-//! The parts that the crates of Lookdown share: texts of clients, names, problems that are logged once.
+//! The parts that the crates of Lookdown share: texts of clients, names, files, problems
+//! that are logged once.
 //!
 //! With the feature `companion` also those of a client of the server: settings files, the server and
 //! its key, HTTP requests with limits, an HTTP server with limits, durations and backoff.
@@ -11,6 +12,7 @@ mod backoff;
 mod config;
 #[cfg(feature = "companion")]
 mod duration;
+pub mod files;
 #[cfg(feature = "companion")]
 mod http_client;
 #[cfg(feature = "companion")]

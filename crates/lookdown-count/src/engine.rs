@@ -282,7 +282,7 @@ impl Engine {
                 return Some(owner);
             }
             if known.definition.pose == definition.pose {
-                scene.cameras[index].redefine(Arc::clone(definition));
+                scene.redefine(index, Arc::clone(definition));
                 return Some(owner);
             }
         }

@@ -27,6 +27,9 @@ pub(crate) struct Report {
     pub(crate) calibration: UsedCalibration,
     pub(crate) image: Image,
     pub(crate) persons: Vec<Person>,
+    /// Persons in the margin around the areas of the calibration.
+    #[serde(default)]
+    margin: Vec<Person>,
 }
 
 /// The ID and the arrival of a report: the same for each time that the server sends it.
@@ -123,15 +126,23 @@ impl Report {
         }
     }
 
-    /// Returns the persons as the tracker needs them. A person without a direction is left out.
+    /// Returns the persons as the tracker needs them, then those in the margin. A person without a
+    /// direction is left out.
     pub(crate) fn observations(&self, definition: &CameraDefinition) -> Vec<Observation> {
-        let persons = self.persons.iter();
+        let persons = self.persons.iter().map(|person| (person, false));
+        let margin = self.margin.iter().map(|person| (person, true));
         persons
-            .filter_map(|person| self.observation(person, definition))
+            .chain(margin)
+            .filter_map(|(person, is_in_margin)| self.observation(person, is_in_margin, definition))
             .collect()
     }
 
-    fn observation(&self, person: &Person, definition: &CameraDefinition) -> Option<Observation> {
+    fn observation(
+        &self,
+        person: &Person,
+        is_in_margin: bool,
+        definition: &CameraDefinition,
+    ) -> Option<Observation> {
         let bearing = person.bearing?;
         let OrientedBox {
             cx,
@@ -162,6 +173,7 @@ impl Report {
             centre_px: [cx, cy],
             foot_px: [foot.x, foot.y],
             score: person.score,
+            is_in_margin,
         })
     }
 }

@@ -16,6 +16,7 @@ use crate::{
     calibrations::Calibrations,
     engine::{CountingOptions, Engine},
     follower::Follower,
+    hand_back::hand_back,
     http::{Api, router},
     metrics::Metrics,
     options::{CountEntry, CountOptions, load},
@@ -139,6 +140,8 @@ pub async fn count(
     let service = TowerToHyperService::new(router(api));
     let serving = tokio::spawn(http_server::serve(listener, service));
     let _serving = AbortOnDrop(serving.abort_handle());
+    let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
+    let _handing_back = AbortOnDrop(handing_back.abort_handle());
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(&options.webhooks, resumed.messages, &store, &metrics)?,

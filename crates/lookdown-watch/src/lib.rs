@@ -5,15 +5,18 @@
 //! This crate is a client of the public HTTP API. It does not depend on the server.
 
 mod camera;
+mod child;
 mod config;
 mod credentials;
 mod ffmpeg;
 mod frame;
 mod jpeg_splitter;
 mod location;
+mod memory_budget;
 mod metrics;
 mod metrics_server;
 mod pace;
+mod rtsp_relay;
 mod sender;
 mod server;
 mod slot;

@@ -21,6 +21,7 @@ use tokio::time::sleep;
 
 use crate::{
     Camera, Frame, FrameError, Location, SourceError,
+    credentials::Login,
     metrics::{CameraMetrics, Failure},
     slot::Slot,
 };
@@ -106,7 +107,9 @@ pub(crate) async fn supervise(
     let (first, longest) = LOGIN_PAUSES;
     let mut login_backoff = Backoff::new(first, longest);
     let log = Mutex::new(LogOnce::default());
+    let mut login = Login::new(camera.credentials.clone());
     loop {
+        login.restart();
         let sink = Sink {
             slot,
             metrics,
@@ -115,7 +118,7 @@ pub(crate) async fn supervise(
             is_failing: &log,
         };
         let outcome = tokio::select! {
-            outcome = run(camera, client, &sink) => outcome,
+            outcome = run(camera, client, &mut login, &sink) => outcome,
             error = stalled(camera, &sink) => Err(error),
         };
         let pause = match outcome {
@@ -142,10 +145,15 @@ pub(crate) async fn supervise(
 }
 
 /// Reads frames until the source ends.
-async fn run(camera: &Camera, client: &Client, sink: &Sink<'_>) -> Result<(), SourceError> {
+async fn run(
+    camera: &Camera,
+    client: &Client,
+    login: &mut Login,
+    sink: &Sink<'_>,
+) -> Result<(), SourceError> {
     let ended: Infallible = match &camera.location {
-        Location::Http(url) => http::run(camera, url, client, sink).await?,
-        Location::Rtsp(url) => video::run_stream(camera, url, sink).await?,
+        Location::Http(url) => http::run(camera, url, client, login, sink).await?,
+        Location::Rtsp(url) => video::run_stream(camera, url, login, sink).await?,
         Location::Folder(path) => folder::run(camera, path, sink).await?,
         Location::Video(path) => return video::run_file(camera, path, sink).await,
         Location::StandardInput => return standard_input::run(sink).await,

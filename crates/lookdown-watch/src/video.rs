@@ -11,7 +11,8 @@ use tokio::{
 
 use crate::{
     SourceError, VideoOptions,
-    ffmpeg::{Ffmpeg, command, decoding, file_input, file_url},
+    child::{self, Task},
+    ffmpeg::{Ffmpeg, Input, command, decoding, file_input, file_restrictions, file_url},
     stderr_line::LastLine,
 };
 
@@ -40,7 +41,7 @@ impl VideoFrames {
         let filter = format!("fps=fps=1000/{}", every.as_millis().max(1));
         arguments.extend(["-vf", &filter].map(OsString::from));
         Ok(Self {
-            ffmpeg: Ffmpeg::start(options, &arguments, "", None).await?,
+            ffmpeg: Ffmpeg::start(options, &arguments, Input::File).await?,
             every,
             count: 0,
         })
@@ -62,14 +63,17 @@ impl VideoFrames {
 
 /// Returns the duration of a video file, if `ffprobe` can read it.
 pub async fn video_duration(path: &Path, options: &VideoOptions) -> Option<Duration> {
-    let mut command = tokio::process::Command::new(options.ffmpeg.with_file_name("ffprobe"));
+    let mut command = child::command(options.ffmpeg.with_file_name("ffprobe"));
     command
-        .args(["-v", "error", "-protocol_whitelist", "file"])
+        .args(["-v", "error"])
+        .args(file_restrictions())
         .args(["-show_entries", "format=duration", "-of", "csv=p=0"])
         .arg(file_url(path))
         .stdin(Stdio::null())
-        .kill_on_drop(true);
-    let output = timeout(DURATION_TIMEOUT, command.output())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let child = child::spawn(&mut command, Task::Decode).ok()?;
+    let output = timeout(DURATION_TIMEOUT, child.wait_with_output())
         .await
         .ok()?
         .ok()?;
@@ -118,8 +122,7 @@ impl VideoWriter {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
-        let mut child = command
-            .spawn()
+        let mut child = child::spawn(&mut command, Task::Encode)
             .map_err(|error| no_ffmpeg(error.to_string()))?;
         let (Some(input), Some(errors)) = (child.stdin.take(), child.stderr.take()) else {
             return Err(no_ffmpeg("it has no pipes".to_owned()));

@@ -231,6 +231,7 @@ impl Camera {
                 centre_px: [oriented.center.x, oriented.center.y],
                 foot_px: [foot.x, foot.y],
                 score,
+                is_in_margin: false,
             };
             (observation, oriented)
         })
