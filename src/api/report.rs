@@ -31,6 +31,7 @@ use utoipa::ToSchema;
         },
         "bearing": {"azimuth_deg": 349.87, "off_axis_deg": 41.71},
         "floor": {"x_m": 1.873, "y_m": -0.334},
+        "height_m": 1.74, "height_sd_m": 0.21,
         "views": 3,
         "zones": ["entrance"]
     }],
@@ -187,7 +188,7 @@ pub struct ReportViews {
     pub outside: usize,
     /// Views that the masks of the calibration hide completely.
     pub masked: usize,
-    /// Views that can show nobody who stands in an area of the calibration.
+    /// Views that cannot show a person in an area of the calibration.
     pub outside_areas: usize,
 }
 
@@ -214,6 +215,15 @@ pub struct ReportPerson {
     pub bearing: Option<ReportBearing>,
     /// Position of the person on the floor; null when the height of the camera is unknown.
     pub floor: Option<ReportFloor>,
+    /// Height of the person above the floor in meters; absent when the height of the camera is
+    /// unknown, below the camera, and far away.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub height_m: Option<f64>,
+    /// Standard deviation of `height_m` in meters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub height_sd_m: Option<f64>,
     /// Number of views that detected the person.
     pub views: usize,
     /// Names of the zones that contain the person's foot point; absent without zones.

@@ -1,7 +1,10 @@
 //! The parts of a report of the server that are used.
 
 use jiff::Timestamp;
-use lookdown_lens::geometry::{Pixel, oriented_box::vertical_in_frame};
+use lookdown_lens::{
+    calibration::CalibrationId,
+    geometry::{Pixel, oriented_box::vertical_in_frame},
+};
 use lookdown_tracking::Observation;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -15,6 +18,10 @@ const MAX_BEHIND_MS: i64 = 3_600_000;
 /// `TrackerSettings::max_lateness_s`, so that the clock of one camera never makes others late.
 const MAX_AHEAD_ON_SITE_MS: i64 = 500;
 const MAX_BEHIND_ON_SITE_MS: i64 = 1_000;
+
+/// The server's limits of names.
+const MAX_CAMERA_CHARS: usize = 128;
+const MAX_REVISION_BYTES: usize = 128;
 
 /// A report of the server.
 #[derive(Debug, Clone, Deserialize)]
@@ -84,6 +91,14 @@ struct Floor {
 }
 
 impl Report {
+    /// Returns true if the names are as long as the server permits at most.
+    pub(crate) fn has_valid_names(&self) -> bool {
+        let used = &self.calibration;
+        self.camera.chars().count() <= MAX_CAMERA_CHARS
+            && (used.assumed || used.id.parse::<CalibrationId>().is_ok())
+            && used.revision.len() <= MAX_REVISION_BYTES
+    }
+
     /// Returns the time of the frame in milliseconds since the Unix epoch: the capture time if it
     /// is plausible, else the arrival.
     pub(crate) fn at_ms(&self, is_on_site: bool) -> i64 {
@@ -218,6 +233,26 @@ mod tests {
                 assert_eq!(is_used, offset != 0, "{captured}");
             }
         }
+    }
+
+    #[test]
+    fn names_are_limited_as_those_of_the_server() {
+        let report = report("null", "");
+        assert!(report.has_valid_names());
+        let change = |change: fn(&mut Report)| {
+            let mut changed = report.clone();
+            changed.calibration.assumed = false;
+            change(&mut changed);
+            changed.has_valid_names()
+        };
+        assert!(change(|_| ()));
+        assert!(!change(|report| report.camera = "n".repeat(129)));
+        assert!(!change(
+            |report| report.calibration.id = "../results".to_owned()
+        ));
+        assert!(!change(
+            |report| report.calibration.revision = "1".repeat(129)
+        ));
     }
 
     #[test]

@@ -131,6 +131,8 @@ impl From<&pipeline::Person> for ReportPerson {
                 x_m: metres(floor.x_m),
                 y_m: metres(floor.y_m),
             }),
+            height_m: person.height.map(|height| metres(height.height_m)),
+            height_sd_m: person.height.map(|height| metres(height.sd_m)),
             views: person.views,
             zones: person.zones.clone(),
         }

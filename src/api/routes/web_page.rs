@@ -14,6 +14,7 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+use lookdown_http::page_headers;
 use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
@@ -22,7 +23,6 @@ use crate::api::{
     ApiState,
     http::{
         entity_tags::{entity_tag, is_unmodified},
-        page_headers,
         problem::{Problem, ProblemKind},
     },
     require_scope::RequireAdmin,

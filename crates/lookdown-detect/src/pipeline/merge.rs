@@ -1,7 +1,7 @@
 //! Merges boxes of views into persons of the frame.
 
 use lookdown_lens::geometry::{
-    BackProjection, Footprint, OrientedBox,
+    BackProjection, Footprint, OrientedBox, PersonHeight,
     crop_placement::CropTarget,
     floor::{bearing, floor_position},
     oriented_box::vertical_in_frame,
@@ -250,6 +250,7 @@ fn person(
         bearing: bearing(center, &geometry.lens),
         floor,
         views: views.len(),
+        height: PersonHeight::of(&oriented_box, &geometry.lens, &geometry.mount),
         zones: Person::zones_of(&geometry.areas.zones, foot, floor),
     })
 }

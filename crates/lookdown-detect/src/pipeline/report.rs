@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use lookdown_lens::{
     geometry::{
-        OrientedBox, Pixel, Zone,
+        OrientedBox, PersonHeight, Pixel, Zone,
         floor::{Bearing, FloorPosition},
     },
     warning::Warning,
@@ -74,7 +74,7 @@ pub struct ViewCounts {
     pub outside: usize,
     /// Views wholly hidden by the masks of the camera.
     pub masked: usize,
-    /// Views that can show nobody who stands in an area of the camera.
+    /// Views that cannot show a person in an area of the camera.
     pub outside_areas: usize,
 }
 
@@ -143,6 +143,8 @@ pub struct Person {
     pub bearing: Option<Bearing>,
     /// The floor position of the person, when the height of the camera is known.
     pub floor: Option<FloorPosition>,
+    /// The height of the person, where the boxes and the height of the camera give it.
+    pub height: Option<PersonHeight>,
     /// The number of supporting views.
     pub views: usize,
     /// The names of the zones that the person's foot is in; `None` when the calibration has none.
