@@ -88,7 +88,7 @@ impl Profile {
         }
     }
 
-    /// Returns the score at which a person merged by fusion is as likely as not. `docs/results.md`
+    /// Returns the score at which a person merged by fusion is as likely as not. `docs/lab/results.md`
     /// has the error of the number of persons and of the probabilities with these values.
     pub(crate) fn even_odds_score(self) -> f64 {
         match self {
