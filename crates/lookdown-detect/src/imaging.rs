@@ -4,6 +4,7 @@
 pub mod annotate;
 mod buffer_pool;
 pub mod decode;
+pub mod edge_curves;
 pub mod frame;
 pub mod image_grid;
 pub mod lens_circle;

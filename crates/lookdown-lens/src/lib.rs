@@ -8,4 +8,5 @@ pub mod geometry;
 pub mod plain_name;
 pub mod quoted;
 pub mod revision;
+pub mod self_calibration;
 pub mod warning;
