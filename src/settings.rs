@@ -35,7 +35,9 @@ pub use calibrations::{CalibrationPlace, CalibrationSettings};
 pub use error::SettingsError;
 pub use inference::InferenceSettings;
 pub use limits::LimitSettings;
-pub use locate::{PackagedFiles, find_beside_executable, find_calibrations, use_packaged_files};
+pub use locate::{
+    PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
+};
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
 pub use page::PageSettings;

@@ -10,7 +10,7 @@ use crate::{
     },
     metrics::DetectMetrics,
     pipeline::{DefaultModels, Profile},
-    settings::{RemoteSettings, Settings, SettingsError},
+    settings::{RemoteSettings, Settings, SettingsError, is_installed},
 };
 
 /// Opens the repository without loading a model. Also returns the default models.
@@ -61,7 +61,26 @@ pub(super) fn open(
 fn local_loader(settings: &Settings) -> Result<ModelLoader, SettingsError> {
     let library = settings.inference.find_library()?;
     let options = onnx_options(settings);
-    Ok(onnx_loader(library, options, settings.threads.sessions))
+    let load = onnx_loader(library, options, settings.threads.sessions);
+    Ok(Box::new(move |path| {
+        warn_of_missing_sum(path);
+        load(path)
+    }))
+}
+
+/// Logs a warning if a model outside the installation has no sum: anyone who can write there can
+/// replace it.
+fn warn_of_missing_sum(model: &Path) {
+    // The loader reports a manifest that cannot be read.
+    let has_sum = |manifest: ModelManifest| manifest.sha256.is_some();
+    if !is_installed(model) && ModelManifest::locate(model).is_ok_and(|manifest| !has_sum(manifest))
+    {
+        tracing::warn!(
+            model = %model.display(),
+            "this model is not part of the installation and its manifest has no sha256, so changes of \
+             its file are not noticed: enter the sum that `lookdown model check` prints"
+        );
+    }
 }
 
 /// Returns the loader of models that run on an inference server.

@@ -21,7 +21,7 @@ use crate::{
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
     pipeline::{DetectJob, DetectParameters, Detected, JobImage},
-    settings::{Settings, find_beside_executable},
+    settings::{Settings, find_installed},
 };
 
 /// The default sample image: a fisheye frame.
@@ -92,7 +92,7 @@ fn check(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let given = arguments.sample.as_deref();
     let Some((sample, profile)) = given
         .map(|path| (path.to_owned(), "direct"))
-        .or_else(|| Some((find_beside_executable(Path::new(SAMPLE))?, "fast")))
+        .or_else(|| Some((find_installed(Path::new(SAMPLE))?, "fast")))
     else {
         writeln!(out, "sample       none: give one with --sample").context(UNWRITABLE)?;
         return Ok(ExitCode::SUCCESS);

@@ -20,8 +20,9 @@ settings! {
         /// The longest time that a view waits for others to fill its batch. 0: none.
         max_queue_delay as "max_queue_delay_millis": Duration = Duration::ZERO
             => millis(0..=MAX_QUEUE_DELAY_MILLIS);
-        /// The ONNX Runtime library. The default path is also searched for in the folders above the
-        /// executable.
+        /// The ONNX Runtime library. The default path is searched for beside the executable, in
+        /// the repository that it was built in, and in `/usr/lib/lookdown`, never in the current
+        /// folder.
         library_path: PathBuf = DEFAULT_LIBRARY.into() => path();
         /// The device that runs models: `cpu`, or a GPU by its number as `cuda:0` or `tensorrt:0`.
         /// For a GPU, `inference.library_path` must be the `libonnxruntime.so` of the package

@@ -32,40 +32,84 @@ pub fn use_packaged_files(files: PackagedFiles) {
     let _ = PACKAGED_FILES.set(files);
 }
 
+/// Folder of the files of the Debian package, which other installations may use, too.
+const SYSTEM_FOLDER: &str = "/usr/lib/lookdown";
+
+/// Returns the folders that may contain the files of this installation, best first: that of the
+/// executable, the repository that it was built in, and the folder of the Debian package. The current
+/// folder is not one of them: whoever can write there would choose the code that this program runs.
+fn installation_folders() -> Vec<PathBuf> {
+    let executable = std::env::current_exe().unwrap_or_default();
+    let mut folders: Vec<_> = executable
+        .parent()
+        .map(Path::to_owned)
+        .into_iter()
+        .collect();
+    folders.extend(repository_of(&executable));
+    folders.push(SYSTEM_FOLDER.into());
+    folders
+}
+
+/// Returns the repository whose `target` folder contains the executable.
+fn repository_of(executable: &Path) -> Option<PathBuf> {
+    let mut above = executable.ancestors().skip(1);
+    let target = above.find(|folder| folder.file_name().is_some_and(|name| name == "target"))?;
+    let repository = target.parent()?;
+    let is_repository = ["Cargo.toml", "crates/lookdown-detect/Cargo.toml"]
+        .iter()
+        .all(|file| repository.join(file).is_file());
+    is_repository.then(|| repository.to_owned())
+}
+
 /// Returns the folder of calibrations; `None` if none is set and the default folder does not exist.
+/// The default folder is searched for in the current folder first, because calibrations are data.
 ///
 /// # Errors
 /// [`SettingsError::Missing`] when the given folder does not exist.
 pub fn find_calibrations(folder: &Path) -> Result<Option<PathBuf>, SettingsError> {
-    let found = locate(folder, DEFAULT_CALIBRATIONS);
-    if found.is_none() && folder != Path::new(DEFAULT_CALIBRATIONS) {
-        return Err(SettingsError::Missing {
-            key: "calibrations.path",
-            what: "folder",
-            path: folder.to_owned(),
-            remedy: "create it, or set LOOKDOWN__CALIBRATIONS__PATH to another".to_owned(),
-        });
+    if folder.exists() {
+        return Ok(Some(folder.to_owned()));
     }
-    Ok(found)
+    if folder == Path::new(DEFAULT_CALIBRATIONS) {
+        return Ok(find_installed(folder));
+    }
+    Err(SettingsError::Missing {
+        key: "calibrations.path",
+        what: "folder",
+        path: folder.to_owned(),
+        remedy: "create it, or set LOOKDOWN__CALIBRATIONS__PATH to another".to_owned(),
+    })
 }
 
-/// Returns the existing file or folder at `path` in the current directory, or else beside the
-/// executable or in the folders above it.
+/// Returns the existing file or folder of the installation at a relative path.
 #[must_use]
-pub fn find_beside_executable(path: &Path) -> Option<PathBuf> {
-    if path.exists() {
-        return Some(path.to_owned());
-    }
-    let executable = std::env::current_exe().ok()?;
-    let mut candidates = executable.ancestors().skip(1).map(|above| above.join(path));
+pub fn find_installed(path: &Path) -> Option<PathBuf> {
+    let mut candidates = installation_folders()
+        .into_iter()
+        .map(|folder| folder.join(path));
     candidates.find(|candidate| candidate.exists())
+}
+
+/// Returns true if a file is one of the installation, of [`PackagedFiles`] included.
+#[must_use]
+pub fn is_installed(path: &Path) -> bool {
+    let Ok(path) = path.canonicalize() else {
+        return false;
+    };
+    let packaged = PACKAGED_FILES.get().map(|files| files.models.clone());
+    let mut folders = installation_folders().into_iter().chain(packaged);
+    folders.any(|folder| {
+        folder
+            .canonicalize()
+            .is_ok_and(|folder| path.starts_with(folder))
+    })
 }
 
 /// Returns the existing file or folder for `path`.
 ///
 /// A given path is used unchanged. The default path is that of [`PackagedFiles`]. Without them it is
-/// searched for in the current directory, then beside the executable and in the folders above it. So
-/// `/anywhere/lookdown/target/release/lookdown` finds its files from any current directory.
+/// searched for in the folders of the installation only, so that no library or model of the current
+/// folder is used unless a setting names it.
 pub(super) fn locate(path: &Path, default: &str) -> Option<PathBuf> {
     if path != Path::new(default) {
         return path.exists().then(|| path.to_owned());
@@ -75,5 +119,5 @@ pub(super) fn locate(path: &Path, default: &str) -> Option<PathBuf> {
         DEFAULT_REPOSITORY => Some(files.models.clone()),
         _ => None,
     });
-    packaged.or_else(|| find_beside_executable(path))
+    packaged.or_else(|| find_installed(path))
 }

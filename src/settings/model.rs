@@ -19,8 +19,9 @@ settings! {
         /// One model for all profiles: a model folder or an ONNX file. Empty: each profile has its
         /// own.
         path: Option<PathBuf> = None => optional(path());
-        /// The folder of models, each in a folder of its name. The default folder is also searched
-        /// for in the folders above the executable.
+        /// The folder of models, each in a folder of its name. The default folder is
+        /// searched for beside the executable, in the repository that it was built in, and in
+        /// `/usr/lib/lookdown`, never in the current folder.
         repository: PathBuf = DEFAULT_REPOSITORY.into() => path();
         /// Names of models to load at the start in addition to those of the profiles.
         also_load: Vec<String> = Vec::new() => names();

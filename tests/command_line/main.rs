@@ -7,6 +7,7 @@ mod evaluation;
 mod health;
 mod keys;
 mod models;
+mod planted;
 mod samples;
 mod serve;
 mod shell;
