@@ -16,7 +16,8 @@ use super::{
 use crate::geometry::Ray;
 
 /// Standard deviation of a point across its edge, in pixels.
-const SIGMA_PIXELS: f64 = 0.5;
+pub(super) fn ev(n:&str,d:f64)->f64{ use std::sync::OnceLock; use std::collections::HashMap; use std::sync::Mutex; static M:OnceLock<Mutex<HashMap<String,f64>>>=OnceLock::new(); *M.get_or_init(Default::default).lock().unwrap().entry(n.to_string()).or_insert_with(||std::env::var(n).ok().and_then(|v|v.parse().ok()).unwrap_or(d)) }
+const SIGMA_PIXELS: f64 = 0.2;
 /// Standard deviation of the direction of an edge from that of the room, radians.
 const SIGMA_DIRECTION: f64 = 0.004;
 /// Share of curves along none of the directions, before they are seen.
@@ -80,6 +81,7 @@ pub(super) fn evaluate(
         shares: vec![0.0; directions.len()],
         explained: Vec::with_capacity(curves.len()),
     };
+    let (sp,sd)=(ev("SP",SIGMA_PIXELS),ev("SD",SIGMA_DIRECTION));
     let mut rays: Vec<SeenRay> = Vec::new();
     let mut total = 0.0;
     #[expect(clippy::cast_precision_loss, reason = "a few directions")]
@@ -92,7 +94,7 @@ pub(super) fn evaluate(
         #[expect(clippy::cast_precision_loss, reason = "a few points")]
         let count = rays.len() as f64;
         let lever = length / 12.0_f64.sqrt();
-        let sigma = blur * SIGMA_PIXELS.hypot(SIGMA_DIRECTION * lever);
+        let sigma = blur * sp.hypot(sd * lever);
         // The prior density of an edge's angle is uniform over half a turn.
         let sigma_angle = sigma / (lever * count.sqrt());
         let gain = (PI / (TAU.sqrt() * sigma_angle)).max(1.0);
@@ -243,7 +245,7 @@ fn add_prior(result: &mut Evaluation, camera: &RoomCamera, prior: &Prior, angles
     }
     add(&[(2, 1.0)], camera.k2_offset, prior.k2_sigma);
     // Between orthographic and stereographic.
-    add(&[(1, 1.0)], camera.k1 + 0.03, 0.08);
+    add(&[(1, 1.0)], camera.k1 + 0.03, ev("K1S",0.15));
     let theta = angles.theta(prior.radius / camera.focal);
     let (radius, slope) = camera.curve(theta);
     let ideal = ideal_shape_slope(camera.k1);

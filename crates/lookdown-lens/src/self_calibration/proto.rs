@@ -15,8 +15,17 @@ fn out(c:&RoomCamera,e:&Evaluation,n:usize,prior:&Prior)->Out{
 }
 pub fn distance(a:&Out,b:&Out)->(f64,f64){ let r=a.radii.iter().zip(&b.radii).map(|(x,y)|(x/y-1.0).abs()).fold(0.0,f64::max); let l=(0..3).map(|i|a.down[i]*b.down[i]).sum::<f64>().min(1.0).acos().to_degrees(); (r,l)}
 
+pub fn truth(curves:&[EdgeCurve],center:[f64;2],center_sigma:f64,radius:f64,tc:[f64;2],down:[f64;3],fk:[f64;3])->Option<Out>{
+    let prior=Prior{center,center_sigma,radius,k2_sigma:ev("K2S",0.003),rim:(FRAC_PI_2,ev("RIM",0.22))};
+    let ones=vec![1.0;curves.len()];
+    let d=nalgebra::Vector3::from(down); let a=nalgebra::Vector3::y().cross(&d).normalize(); let b=d.cross(&a);
+    let mut best:Option<(RoomCamera,Evaluation)>=None;
+    for h in 0..90 { let h=(h as f64).to_radians(); let x=a*h.cos()+b*h.sin(); let room=Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[x,d.cross(&x),d]));
+      let c=RoomCamera{focal:fk[0],k1:fk[1],k2_offset:fk[2]-ideal_shape(fk[1])[1],center:tc,room,headings:vec![]};
+      let Some(e)=evaluate(&c,curves,&ones,&prior,1.0,true) else {continue}; if best.as_ref().is_none_or(|b|e.evidence>b.1.evidence){best=Some((c,e));} }
+    let (c,e)=best?; Some(out(&c,&e,curves.len(),&prior)) }
 pub fn fit(curves:&[EdgeCurve],center:[f64;2],center_sigma:f64,radius:f64)->Vec<Out>{
-    let prior=Prior{center,center_sigma,radius,k2_sigma:0.01,rim:(FRAC_PI_2,0.22)};
+    let prior=Prior{center,center_sigma,radius,k2_sigma:ev("K2S",0.003),rim:(FRAC_PI_2,ev("RIM",0.22))};
     let starts=search::starts(curves,&prior,None);
     let mut longest=curves.to_vec(); longest.sort_by(|a,b|b.points.len().cmp(&a.points.len())); longest.truncate(300);
     let ones=vec![1.0;curves.len()];
