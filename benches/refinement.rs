@@ -10,7 +10,7 @@ mod times;
 
 use std::{error::Error, hint::black_box};
 
-use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
+use lookdown_detect::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
 use strum::VariantArray;
 
 use self::times::times;

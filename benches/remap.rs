@@ -20,10 +20,8 @@ use std::{
     time::Instant,
 };
 
-use lookdown::{
-    geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
-    imaging::{Frame, NetworkInput, RemapTable},
-};
+use lookdown_detect::imaging::{Frame, NetworkInput, RemapTable};
+use lookdown_lens::geometry::{FieldOfViewReading, Lens, Mount, ViewPlan};
 
 use self::times::{times, times_after};
 

@@ -8,7 +8,8 @@ mod sketch;
 
 use std::sync::Arc;
 
-use crate::{
+pub use kept::{StoredFrame, StoredFrameError};
+use lookdown_detect::{
     imaging::{
         Frame,
         annotate::{
@@ -18,8 +19,6 @@ use crate::{
     },
     pipeline::Detected,
 };
-
-pub use kept::{StoredFrame, StoredFrameError};
 pub use options::{AnnotationOptions, Layer};
 use sketch::Sketch;
 

@@ -25,6 +25,7 @@ use axum::{
     middleware::{from_fn, from_fn_with_state, map_response},
     routing::get,
 };
+use lookdown_detect::open_inference::HEAD_LENGTH;
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -52,7 +53,6 @@ use self::{
         web_page,
     },
 };
-use crate::open_inference::HEAD_LENGTH;
 
 pub use self::{
     http::{access::Access, rate_limit::RequestRate},
@@ -130,7 +130,7 @@ fn metrics() -> OpenApiRouter<ApiState> {
 pub fn router(state: ApiState) -> Router {
     let options = &state.options;
     let access = &options.access;
-    let own_pages = AllowedOrigins::of(access, &options.cors_origins);
+    let own_pages = AllowedOrigins::of(access, &options.cors_origins, &options.hosts);
     let own_pages = own_pages.map(|own| from_fn_with_state(own, csrf::refuse));
     let limiter = options
         .request_rate
@@ -193,6 +193,9 @@ fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
     let head_length = HeaderName::from_static(HEAD_LENGTH);
     let sent = [LAST_EVENT_ID, head_length.clone()];
     let read = [SERVER_TIMING, PERSON_COUNT, head_length];
+    let has_other_origins = !options.cors_origins.is_empty();
+    let for_other_origins =
+        has_other_origins.then(|| map_response(page_headers::for_other_origins));
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(surroundings, envelope::wrap))
         .layer(option_layer(cors::layer(
@@ -206,7 +209,8 @@ fn surrounded(router: Router<ApiState>, state: ApiState) -> Router {
             header_limits,
             header_limits::within_bounds,
         ))
-        .layer(from_fn(host::require));
+        .layer(from_fn(host::require))
+        .layer(option_layer(for_other_origins));
     router.with_state(state).layer(layers)
 }
 

@@ -11,17 +11,20 @@ mod systemd;
 use std::{sync::Arc, time::Duration};
 
 use anyhow::Context;
+use lookdown_detect::{
+    imaging::decode::DecodeLimits,
+    inference::ModelRepository,
+    parameters::DetectParameters,
+    pipeline::{BatchOptions, DefaultModels, Engine, EngineOptions, WorkerPool},
+};
+use lookdown_lens::geometry::FieldOfViewReading;
 
 use crate::{
     access::AccessKeys,
     api::{Access, ApiOptions, ApiState, Readiness, RequestRate},
     calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
-    geometry::FieldOfViewReading,
-    imaging::decode::DecodeLimits,
-    inference::ModelRepository,
     metrics::Metrics,
     mqtt::Publisher,
-    pipeline::{BatchOptions, DefaultModels, DetectParameters, Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
         AccessSettings, CalibrationPlace, LimitSettings, ResultSettings, Settings,
@@ -236,6 +239,7 @@ impl App {
                 }),
             access,
             cors_origins: settings.access.cors_origins.clone(),
+            hosts: settings.access.hosts.clone(),
             page_counts_path: settings.page.counts_path.clone(),
             tracer: tracer.clone(),
         };

@@ -29,7 +29,7 @@ use anyhow::Context;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::{
-    output::{UNWRITABLE, is_closed_pipe},
+    output::{UNWRITABLE, is_closed_pipe, with_causes},
     settings_file::SettingsFile,
 };
 use crate::api;
@@ -108,7 +108,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             // Printed directly: the log may not be started, or may filter this out.
-            eprintln!("lookdown: {error:#}");
+            eprintln!("lookdown: {}", with_causes(&error));
             ExitCode::FAILURE
         }
     }

@@ -24,9 +24,3 @@ pub mod shutdown;
 pub mod telemetry;
 pub mod tls;
 pub mod watched_file;
-
-pub use lookdown_detect::{
-    detection, fairness, imaging, inference, open_inference, parameters, pipeline,
-};
-pub use lookdown_eval as evaluation;
-pub use lookdown_lens::{calibration, geometry, plain_name, quoted, revision, warning};

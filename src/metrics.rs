@@ -7,7 +7,7 @@ mod camera_gauges;
 use std::sync::Arc;
 
 use lookdown_detect::metric_set;
-pub use lookdown_detect::metrics::{DetectMetrics, gauge_value, replace_info, start_at_zero};
+use lookdown_detect::metrics::DetectMetrics;
 use prometheus::{
     Encoder, HistogramVec, IntCounterVec, IntGaugeVec, Registry, TextEncoder,
     process_collector::ProcessCollector,

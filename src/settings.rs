@@ -38,6 +38,7 @@ pub use limits::LimitSettings;
 pub use locate::{
     PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
 };
+use lookdown_detect::parameters::DetectDefaults;
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
 pub use page::PageSettings;
@@ -53,10 +54,7 @@ use self::{
     declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
     threads::ThreadKeys, tls::TlsKeys, values::Values,
 };
-use crate::{
-    mqtt::MqttOptions, parameters::DetectDefaults, results::ResultLimits, server::ConnectionLimits,
-    tls::TlsOptions,
-};
+use crate::{mqtt::MqttOptions, results::ResultLimits, server::ConnectionLimits, tls::TlsOptions};
 
 /// All settings, checked.
 #[derive(Debug, Clone, PartialEq)]

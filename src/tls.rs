@@ -21,7 +21,9 @@ pub use error::TlsError;
 pub use options::TlsOptions;
 
 use self::{files::TlsFiles, handshake::shake_hands, identity::Identity};
-use crate::{metrics::Metrics, watched_file::LogOnce};
+use lookdown_common::LogOnce;
+
+use crate::metrics::Metrics;
 
 /// The current certificate and private key.
 pub struct Tls {
@@ -29,7 +31,7 @@ pub struct Tls {
     metrics: Arc<Metrics>,
     serving: RwLock<Arc<Identity>>,
     /// The last logged problem of the files. Locked while the files are read.
-    complaint: Mutex<LogOnce>,
+    problem_log: Mutex<LogOnce>,
 }
 
 impl Tls {
@@ -46,7 +48,7 @@ impl Tls {
             options,
             metrics,
             serving: RwLock::new(Arc::new(identity)),
-            complaint: Mutex::default(),
+            problem_log: Mutex::default(),
         })
     }
 
@@ -59,18 +61,18 @@ impl Tls {
     /// Reads the files again. If they cannot be used, the current certificate stays in use, and the
     /// reason is logged once. Open connections are not affected.
     pub fn refresh(&self) {
-        let mut complaint = self.complaint.lock();
+        let mut problem_log = self.problem_log.lock();
         match self.newer() {
-            Ok(None) => complaint.settle(),
+            Ok(None) => drop(problem_log.clear()),
             Ok(Some(identity)) => {
-                complaint.settle();
+                problem_log.clear();
                 tracing::info!("the TLS certificate has changed: new connections get the new one");
                 show(&identity, &self.options, &self.metrics);
                 *self.serving.write() = Arc::new(identity);
             }
             Err(error) => {
                 let problem = error.to_string();
-                if complaint.is_changed(&problem) {
+                if problem_log.should_log(&problem) {
                     tracing::error!("{problem}; the previous certificate stays in use");
                     let loads = &self.metrics.tls_certificate_loads;
                     loads.with_label_values(&["failure"]).inc();

@@ -1,5 +1,4 @@
-//! Small files that operators change while the server runs. They are polled, and each problem with
-//! them is reported once.
+//! Small files that operators change while the server runs. They are polled.
 
 use std::{
     fs::{self, File},
@@ -29,26 +28,6 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(content)
 }
 
-/// The last reported reason why the newest version of a file is not used.
-#[derive(Debug, Default)]
-pub struct LogOnce(Option<String>);
-
-impl LogOnce {
-    /// Clears the problem: the next one is reported, even if it is the same.
-    pub fn settle(&mut self) {
-        self.0 = None;
-    }
-
-    /// Returns true if this problem is to be reported: it is not the last one reported.
-    pub fn is_changed(&mut self, problem: &str) -> bool {
-        let is_changed = self.0.as_deref() != Some(problem);
-        if is_changed {
-            self.0 = Some(problem.to_owned());
-        }
-        is_changed
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::{process::Command, sync::mpsc::sync_channel, thread, time::Duration};
@@ -75,15 +54,5 @@ mod tests {
             let error = outcome.expect("the read waits").unwrap_err();
             assert!(error.to_string().contains("no regular file"), "{error}");
         }
-    }
-
-    #[test]
-    fn a_problem_is_reported_once_until_it_changes_or_ends() {
-        let mut complaint = LogOnce::default();
-        let reported =
-            ["empty", "empty", "damaged", "empty"].map(|problem| complaint.is_changed(problem));
-        assert_eq!(reported, [true, false, true, true]);
-        complaint.settle();
-        assert!(complaint.is_changed("empty"));
     }
 }

@@ -15,7 +15,7 @@ use tokio::{
     time::{sleep_until, timeout},
 };
 
-use crate::{pace::Pace, tally::Tally};
+use crate::{outcome::Outcome, pace::Pace, tally::Tally};
 
 /// The request and its server.
 pub struct Target {
@@ -29,16 +29,6 @@ pub struct Target {
     pub body: Bytes,
     /// The timeout of a response.
     pub timeout: Duration,
-}
-
-/// The outcome of a request.
-pub enum Outcome {
-    /// The complete response, with its number of bytes.
-    Answered(StatusCode, usize),
-    /// No connection, or a broken one.
-    Broken,
-    /// The response timed out.
-    TimedOut,
 }
 
 /// Sends requests one after the other.

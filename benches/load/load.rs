@@ -9,6 +9,7 @@
 //! the number of requests.
 
 mod client;
+mod outcome;
 mod pace;
 mod tally;
 

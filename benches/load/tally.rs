@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, ops::Range, time::Duration};
 use serde_json::{Value, json};
 use tokio::time::Instant;
 
-use crate::client::Outcome;
+use crate::outcome::Outcome;
 
 /// The relative resolution of latencies.
 const RESOLUTION: f64 = 0.005;

@@ -1,6 +1,6 @@
 //! Fuzzes calibration files, one importer at a time, with all uses of their cameras in the server.
 
-use lookdown::{
+use lookdown_lens::{
     calibration::{
         Calibration, CalibrationFile, FormatError,
         export::{Exported, Target},

@@ -1,6 +1,6 @@
 //! Fuzzes all refinements with arbitrary candidates: results are finite, in range and sorted.
 
-use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
+use lookdown_detect::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
 use strum::VariantArray;
 
 /// The marker of an arbitrary float in the next eight bytes. Other numbers are two bytes, in

@@ -1,6 +1,6 @@
 //! Fuzzes the decoding of images within limits.
 
-use lookdown::imaging::decode::{DecodeLimits, decode};
+use lookdown_detect::imaging::decode::{DecodeLimits, decode};
 
 /// Small limits, to decode thousands of images per second with the same checks.
 const LIMITS: DecodeLimits = DecodeLimits {
@@ -22,8 +22,8 @@ pub fn read(bytes: &[u8]) -> bool {
             assert!(!error.to_string().is_empty());
             !matches!(
                 error,
-                lookdown::imaging::decode::DecodeError::Empty
-                    | lookdown::imaging::decode::DecodeError::UnsupportedFormat { .. }
+                lookdown_detect::imaging::decode::DecodeError::Empty
+                    | lookdown_detect::imaging::decode::DecodeError::UnsupportedFormat { .. }
             )
         }
     }

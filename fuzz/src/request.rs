@@ -20,14 +20,16 @@ use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
     calibration_store::{CalibrationStore, Calibrations, Replaces, StoreError, StoredFile},
+    metrics::Metrics,
+    results::{MemoryResults, ResultLimits, ResultStore},
+};
+use lookdown_detect::{
     imaging::{NetworkInput, ViewBatch, decode::DecodeLimits},
     inference::{
         Detector, HeadOutput, InferenceError, Model, ModelFolder, ModelRepository,
         RepositoryOptions,
     },
-    metrics::Metrics,
     pipeline::{Engine, EngineOptions, WorkerPool},
-    results::{MemoryResults, ResultLimits, ResultStore},
 };
 use tokio::runtime::{self, Runtime};
 use tower::ServiceExt;

@@ -2,7 +2,7 @@
 
 use std::{io, path::PathBuf};
 
-use crate::fairness::PriorityLevel;
+use lookdown_detect::fairness::PriorityLevel;
 
 /// Keys that cannot be used. No message repeats the input: it may be a key in the wrong position.
 #[derive(Debug, thiserror::Error)]

@@ -2,11 +2,11 @@
 
 use std::{collections::BTreeMap, str::FromStr};
 
+use lookdown_detect::fairness::PriorityLevel;
 use serde::Deserialize;
 use subtle::{Choice, ConditionallySelectable};
 
 use super::{KeyDigest, KeyError, KeyName, Scope, Scopes};
-use crate::fairness::PriorityLevel;
 
 /// Most keys: every request is compared with all of them.
 const MAX_KEYS: usize = 1000;

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::plain_name::is_plain;
+use lookdown_common::plain_name::is_plain;
 
 /// The name of a key: 1 to 64 of a-z, 0-9, `_` and `-`, a bare key in TOML.
 #[derive(Debug, Clone, PartialEq, Eq)]

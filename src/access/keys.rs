@@ -9,7 +9,9 @@ use std::{
 use parking_lot::{Mutex, RwLock};
 
 use super::{Holder, KeyError, KeyList};
-use crate::watched_file::{self, LogOnce};
+use lookdown_common::LogOnce;
+
+use crate::watched_file;
 
 /// The current keys.
 #[derive(Debug)]
@@ -19,7 +21,7 @@ pub struct AccessKeys {
     file: Option<PathBuf>,
     known: RwLock<Arc<KeyList>>,
     /// The last logged problem of the file. Locked while the file is read.
-    complaint: Mutex<LogOnce>,
+    problem_log: Mutex<LogOnce>,
 }
 
 impl AccessKeys {
@@ -37,7 +39,7 @@ impl AccessKeys {
             lasting,
             file: file.map(Path::to_owned),
             known: RwLock::new(Arc::new(known)),
-            complaint: Mutex::default(),
+            problem_log: Mutex::default(),
         })
     }
 
@@ -45,10 +47,10 @@ impl AccessKeys {
     /// logged once.
     pub fn refresh(&self) {
         let Some(file) = &self.file else { return };
-        let mut complaint = self.complaint.lock();
+        let mut problem_log = self.problem_log.lock();
         match read(file, &self.lasting) {
             Ok(list) => {
-                complaint.settle();
+                problem_log.clear();
                 if *self.known() != list {
                     tracing::info!(keys = list.len(), "the keys have changed");
                     *self.known.write() = Arc::new(list);
@@ -56,7 +58,7 @@ impl AccessKeys {
             }
             Err(error) => {
                 let problem = error.to_string();
-                if complaint.is_changed(&problem) {
+                if problem_log.should_log(&problem) {
                     tracing::error!("{problem}; the previous keys stay in use");
                 }
             }

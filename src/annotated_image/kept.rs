@@ -4,10 +4,8 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use strum::VariantArray;
-
-use super::{AnnotationError, AnnotationOptions, ImageFormat, Layer, drawn, sketch::Sketch};
-use crate::{
+use lookdown_common::JPEG_START;
+use lookdown_detect::{
     imaging::{
         Frame,
         annotate::{Concealment, EncodeError, conceal, encode_jpeg},
@@ -16,6 +14,9 @@ use crate::{
     },
     pipeline::Detected,
 };
+use strum::VariantArray;
+
+use super::{AnnotationError, AnnotationOptions, ImageFormat, Layer, drawn, sketch::Sketch};
 
 /// Wider frames are scaled down to the first of these widths, and to the next one while their files
 /// are too large.
@@ -24,9 +25,6 @@ const WIDTHS: [u32; 3] = [2560, 1280, 640];
 const QUALITY: u8 = 92;
 /// 4 MiB: cameras deliver smaller frames.
 const MAX_BYTES: usize = 4 << 20;
-
-/// The first bytes of a JPEG (ITU-T T.81, B.2.1).
-const JPEG_START: [u8; 2] = [0xFF, 0xD8];
 
 /// A kept frame. Areas that the calibration masks are masked in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,7 +58,6 @@ pub enum StoredFrameError {
 impl StoredFrame {
     /// Keeps a frame, with its persons concealed if `concealment` is given: its original JPEG, if
     /// that is small enough and nothing is masked or concealed, else a new one. A new one takes tens of milliseconds for a large frame: keep it off the async runtime.
-    ///
     ///
     /// # Errors
     /// [`StoredFrameError`] for a frame that cannot be kept.
@@ -115,7 +112,7 @@ impl StoredFrame {
 }
 
 fn is_kept_as_it_is(encoded: &[u8], frame: &Frame) -> bool {
-    encoded.starts_with(&JPEG_START) && encoded.len() <= MAX_BYTES && frame.width() <= WIDTHS[0]
+    encoded.starts_with(JPEG_START) && encoded.len() <= MAX_BYTES && frame.width() <= WIDTHS[0]
 }
 
 /// Encodes a frame as JPEG, scaled down until it is small enough.

@@ -1,10 +1,10 @@
 //! The mark of a person in the frame.
 
-use crate::{
-    geometry::OrientedBox,
+use lookdown_detect::{
     imaging::annotate::{Head, Mark, OrientedMark},
     pipeline::Person,
 };
+use lookdown_lens::geometry::OrientedBox;
 
 /// The person's mark, with the score on its label.
 pub(super) fn mark(person: &Person) -> Mark {

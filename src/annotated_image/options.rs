@@ -2,12 +2,13 @@
 
 use std::str::FromStr;
 
-use lookdown_detect::parameter_table;
-use strum::{EnumString, VariantArray, VariantNames};
-
-use crate::pipeline::{
-    GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+use lookdown_detect::{
+    parameter_table,
+    parameters::{
+        GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+    },
 };
+use strum::{EnumString, VariantArray, VariantNames};
 
 const NO_LAYER: &str = "none";
 const INTERFACES: &[Interface] = &[Interface::Http, Interface::CommandLine];
@@ -125,8 +126,9 @@ impl FromStr for Layers {
 
 #[cfg(test)]
 mod tests {
+    use lookdown_detect::parameters::ParameterFault;
+
     use super::*;
-    use crate::pipeline::ParameterFault;
 
     #[test]
     fn every_layer_is_read_by_its_name_once() {

@@ -1,12 +1,12 @@
 //! The drawings for a frame, stored separately from the frame.
 
-use serde::{Deserialize, Serialize};
-
-use super::{Layer, marks};
-use crate::{
+use lookdown_detect::{
     imaging::annotate::{Drawing, Mark, ZoneOutline},
     pipeline::{Detected, DetectionReport},
 };
+use serde::{Deserialize, Serialize};
+
+use super::{Layer, marks};
 
 /// The drawings for a frame. All positions are corner-origin pixels of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,10 +1,9 @@
 //! The persons of images, and the files that describe them.
 
-use crate::{
-    detection::{BBox, FramePixels},
-    geometry::{OrientedBox, floor::FloorPosition},
-    rounding::pixels,
-};
+use lookdown_detect::detection::{BBox, FramePixels};
+use lookdown_lens::geometry::{OrientedBox, floor::FloorPosition};
+
+use crate::rounding::pixels;
 
 /// The class of every box.
 pub(super) const LABEL: &str = "person";

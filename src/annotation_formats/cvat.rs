@@ -1,16 +1,14 @@
 //! CVAT for images 1.1: one XML document. An oriented box is written unrotated, with its clockwise
 //! `rotation` about its centre in degrees, from 0 to below 360.
 
+use lookdown_lens::geometry::OrientedBox;
 use serde::Serialize;
 
 use super::{
     AnnotatedImage, BoxKind, FormatSpec, LABEL, Layout, SupportedBoxes,
     xml::{self, Text},
 };
-use crate::{
-    geometry::OrientedBox,
-    rounding::{pixels, share},
-};
+use crate::rounding::{pixels, share};
 
 #[derive(Serialize)]
 struct Annotations {
@@ -32,11 +30,12 @@ pub(super) const FORMAT: FormatSpec = FormatSpec {
 /// The label, which makes the classes of the file explicit.
 #[derive(Serialize)]
 struct Meta {
-    job: Job,
+    task: Task,
 }
 
+/// Importers expect a task or a project here.
 #[derive(Serialize)]
-struct Job {
+struct Task {
     labels: Labels,
 }
 
@@ -141,7 +140,7 @@ fn document(images: &[AnnotatedImage], boxes: BoxKind) -> String {
     let annotations = Annotations {
         version: "1.1",
         meta: Meta {
-            job: Job {
+            task: Task {
                 labels: Labels { label },
             },
         },

@@ -1,7 +1,8 @@
 //! Converts a report to an annotated image.
 
+use lookdown_detect::pipeline::{DetectionReport, Person};
+
 use super::{AnnotatedBox, AnnotatedImage};
-use crate::pipeline::{DetectionReport, Person};
 
 impl AnnotatedImage {
     /// Returns the persons of a report as annotations of the image with this file name.

@@ -1,8 +1,7 @@
+use lookdown_detect::detection::BBox;
+use lookdown_lens::geometry::{OrientedBox, Pixel, floor::FloorPosition};
+
 use super::*;
-use crate::{
-    detection::BBox,
-    geometry::{OrientedBox, Pixel, floor::FloorPosition},
-};
 
 fn person(corners: [f64; 4], angle_deg: f64) -> AnnotatedBox {
     AnnotatedBox {

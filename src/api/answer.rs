@@ -5,6 +5,7 @@ mod format;
 
 use axum::http::HeaderMap;
 use bytes::Bytes;
+use lookdown_detect::pipeline::{Detected, PipelineError};
 
 use self::format::AnswerFormat;
 pub(super) use self::format::TABLE;
@@ -15,7 +16,6 @@ use crate::{
         problem::{Problem, ProblemKind},
         query::{pairs, take},
     },
-    pipeline::{Detected, PipelineError},
 };
 
 /// The name of a frame that was sent without a file name.

@@ -7,6 +7,11 @@ use std::{
 };
 
 use axum::{extract::FromRequestParts, http::request::Parts};
+use lookdown_detect::{
+    fairness::{Client, PriorityLevel},
+    parameters::Priority,
+    pipeline::Ticket,
+};
 
 use super::{
     ApiState,
@@ -16,11 +21,7 @@ use super::{
         request_id::RequestId,
     },
 };
-use crate::{
-    access::Holder,
-    fairness::{Client, PriorityLevel},
-    pipeline::{Priority, Ticket},
-};
+use crate::access::Holder;
 
 /// The caller of a request.
 #[derive(Debug, Clone)]

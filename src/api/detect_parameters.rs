@@ -1,11 +1,10 @@
 //! The parameters of a detection request: those that it gives, completed with the defaults of its
 //! calibration and of the server.
 
+use lookdown_detect::parameters::{DefaultSource, DetectParameters, ParameterError};
+use lookdown_lens::calibration::CalibrationId;
+
 use super::ApiState;
-use crate::{
-    calibration::CalibrationId,
-    pipeline::{DefaultSource, DetectParameters, ParameterError},
-};
 
 /// Checks the parameters of a request. `protocol` has the defaults of the request's protocol, which
 /// apply where neither the calibration nor the server has one.

@@ -3,6 +3,7 @@
 
 use std::{future::Future, time::Duration, time::Instant};
 
+use lookdown_detect::pipeline::{PipelineError, Timeline};
 use tokio::time::timeout_at;
 
 use crate::{
@@ -10,7 +11,6 @@ use crate::{
         deadline::Deadline,
         problem::{Problem, ProblemKind},
     },
-    pipeline::{PipelineError, Timeline},
     telemetry::RequestTrace,
 };
 

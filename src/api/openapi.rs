@@ -42,6 +42,7 @@ pub(super) struct Common;
 
 /// Adds the failures, and the operations that need no key, to the document of the routes.
 pub(super) fn complete(mut document: openapi::OpenApi) -> openapi::OpenApi {
+    parameters::add_choices(document.components.get_or_insert_default());
     failures::describe(&mut document);
     examples::add(&mut document);
     security::state_public_operations(&mut document);

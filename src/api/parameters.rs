@@ -3,11 +3,9 @@
 #[cfg(test)]
 mod reference;
 
-use crate::{
-    annotated_image::AnnotationOptions,
-    api::answer,
-    pipeline::{DetectParameters, ParameterSpec},
-};
+use lookdown_detect::parameters::{DetectParameters, ParameterSpec};
+
+use crate::{annotated_image::AnnotationOptions, api::answer};
 
 /// Lists all parameters in the order of the documentation.
 pub(super) fn all() -> impl Iterator<Item = &'static ParameterSpec> {

@@ -1,9 +1,9 @@
 //! The headers of a response about its report: the number of persons and the times of the stages.
 
 use axum::http::{HeaderName, HeaderValue};
+use lookdown_detect::pipeline::DetectionReport;
 
 use super::report::ReportTimings;
-use crate::pipeline::DetectionReport;
 
 pub(super) const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 pub(super) const PERSON_COUNT: HeaderName = HeaderName::from_static("x-person-count");

@@ -8,6 +8,7 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use lookdown_detect::fairness::{BudgetError, Client};
 
 use super::{
     ApiState,
@@ -17,7 +18,6 @@ use super::{
         request_body::Held,
     },
 };
-use crate::fairness::{BudgetError, Client};
 
 /// Responses of at most this size, in bytes, take no share: all connections together hold 32 MiB
 /// of them at the default limit.

@@ -5,6 +5,10 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_detect::{
+    imaging::annotate::Concealment,
+    pipeline::{DetectJob, Detected, DetectionReport},
+};
 
 use crate::{
     annotated_image::StoredFrame,
@@ -14,9 +18,7 @@ use crate::{
         limit::Limit,
         report::Report,
     },
-    imaging::annotate::Concealment,
     metrics::Metrics,
-    pipeline::{DetectJob, Detected, DetectionReport},
     results::{NewPicture, NewReport},
     telemetry::RequestTrace,
 };

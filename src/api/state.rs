@@ -8,6 +8,13 @@ use std::{
 };
 
 use axum::extract::FromRef;
+use lookdown_detect::{
+    fairness::{Client, SharedBudget},
+    imaging::annotate::Concealment,
+    inference::ModelRepository,
+    parameters::DetectDefaults,
+    pipeline::{PipelineError, WorkerPool},
+};
 
 use super::{
     http::{
@@ -23,11 +30,7 @@ use super::{
 };
 use crate::{
     calibration_store::Calibrations,
-    fairness::{Client, SharedBudget},
-    imaging::annotate::Concealment,
-    inference::ModelRepository,
     metrics::Metrics,
-    pipeline::{DetectDefaults, PipelineError, WorkerPool},
     results::{PicturesOf, ResultStore},
     telemetry::Tracer,
 };
@@ -68,6 +71,8 @@ pub struct ApiOptions {
     pub access: Access,
     /// Origins of web pages that may call the server from a browser.
     pub cors_origins: Vec<String>,
+    /// Further names of a server without keys.
+    pub hosts: Vec<String>,
     /// The path of `lookdown count` on the origin of the web page; `None` for none.
     pub page_counts_path: Option<String>,
     /// Creates the spans of requests.
@@ -120,6 +125,7 @@ impl ApiOptions {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
+            hosts: Vec::new(),
             page_counts_path: None,
             tracer: Tracer::default(),
         }

@@ -15,6 +15,7 @@ use axum::{
 };
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_detect::{parameters::DetectParameters, pipeline::DetectJob};
 
 pub(super) use received_request::ReceivedRequest;
 
@@ -32,7 +33,6 @@ use crate::{
             request_body::UploadBudget,
         },
     },
-    pipeline::{DetectJob, DetectParameters},
 };
 
 /// A frame in memory with the parameters of its request.

@@ -3,9 +3,10 @@
 use std::{fmt::Write as _, thread};
 
 use anyhow::bail;
+use lookdown_detect::parameters::Priority;
 
 use super::{App, CALIBRATIONS_CHECK};
-use crate::{access::Scope, pipeline::Priority};
+use crate::access::Scope;
 
 impl App {
     /// Loads every model that is served, and describes the server that could start: a line on models

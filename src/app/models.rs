@@ -2,16 +2,18 @@
 
 use std::{path::Path, sync::Arc};
 
-use crate::{
+use lookdown_detect::{
     inference::{
         CandidateOptions, Device, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
         OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, is_fetched,
         onnx_loader,
     },
     metrics::DetectMetrics,
-    pipeline::{DefaultModels, Profile},
-    settings::{RemoteSettings, Settings, SettingsError, is_installed},
+    parameters::Profile,
+    pipeline::DefaultModels,
 };
+
+use crate::settings::{RemoteSettings, Settings, SettingsError, is_installed};
 
 /// Opens the repository without loading a model. Also returns the default models.
 ///

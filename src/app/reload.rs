@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use lookdown_detect::inference::ModelRepository;
+
 use super::App;
-use crate::{
-    access::AccessKeys, calibration_store::Calibrations, inference::ModelRepository, tls::Tls,
-};
+use crate::{access::AccessKeys, calibration_store::Calibrations, tls::Tls};
 
 /// Reads again what may change while the server runs. Clones share it.
 #[derive(Clone)]

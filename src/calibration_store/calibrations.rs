@@ -20,15 +20,16 @@ use std::{
     time::Duration,
 };
 
+use lookdown_detect::{
+    metrics::start_at_zero,
+    pipeline::{CalibrationLookup, UnusableCalibration},
+};
+use lookdown_lens::calibration::{Calibration, CalibrationId};
 use parking_lot::{Mutex, MutexGuard, RwLock};
 
 use self::{file_reader::FileReader, snapshot::Snapshot};
 use super::{CalibrationStore, StoreError};
-use crate::{
-    calibration::{Calibration, CalibrationId},
-    metrics::{Metrics, start_at_zero},
-    pipeline::{CalibrationLookup, UnusableCalibration},
-};
+use crate::metrics::Metrics;
 
 pub use change::{Put, WriteCondition};
 pub use content::{CalibrationEntry, Reading, defaults};

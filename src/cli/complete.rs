@@ -11,11 +11,9 @@ use clap_complete::{
     engine::ArgValueCompleter,
     env::{EnvCompleter, Shells},
 };
+use lookdown_detect::inference::model_names;
 
-use crate::{
-    inference::model_names,
-    settings::{self},
-};
+use crate::settings;
 
 /// The variable that the scripts set: the name of the shell.
 const VARIABLE: &str = "LOOKDOWN_COMPLETE";

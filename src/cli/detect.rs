@@ -19,6 +19,11 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
+use lookdown_detect::{
+    parameters::DetectParameters,
+    pipeline::{DetectJob, Detected, Engine, JobImage},
+};
+use lookdown_lens::calibration::{Calibration, CalibrationId};
 use strum::VariantArray;
 
 use self::{
@@ -31,13 +36,11 @@ use super::{
     parameters::{ParameterFlags, PictureFlags},
     progress::Progress,
 };
-use crate::cli::output::UNWRITABLE;
+use crate::cli::output::{UNWRITABLE, with_causes};
 use crate::{
     annotation_formats::{AnnotationFormat, BoxKind},
     api::Report,
     app::engine_for,
-    calibration::{Calibration, CalibrationId},
-    pipeline::{DetectJob, DetectParameters, Detected, Engine, JobImage},
 };
 
 /// Arguments of `lookdown detect`.
@@ -97,8 +100,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     let pictures = pictures(&arguments.images)?;
     if arguments.annotate.is_some() && pictures.len() > 1 {
-        bail!("--annotate draws one picture: give a single IMAGE, or leave it out");
+        bail!("--annotate draws one image: give a single IMAGE, or leave it out");
     }
+    arguments
+        .annotate
+        .as_deref()
+        .map(annotate::format_of)
+        .transpose()?;
     let (parameters, calibration) = parameters(arguments)?;
     let options = arguments.picture.check()?;
     let mut labels = labels(arguments, &pictures)?;
@@ -127,7 +135,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
                 }
             }
             Err(error) => {
-                eprintln!("lookdown: {}: {error:#}", path.display());
+                eprintln!("lookdown: {}: {}", path.display(), with_causes(&error));
                 code = ExitCode::FAILURE;
             }
         }
@@ -193,7 +201,7 @@ fn run_stream(arguments: &Arguments, stream: &Stream) -> anyhow::Result<ExitCode
                 }
             }
             Err(error) => {
-                eprintln!("lookdown: {name}: {error:#}");
+                eprintln!("lookdown: {name}: {}", with_causes(&error));
                 code = ExitCode::FAILURE;
             }
         }

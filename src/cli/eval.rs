@@ -15,10 +15,11 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use lookdown_eval::DetectedRow;
 
 pub(super) use self::arguments::Arguments;
 use self::{detect_group::detect_group, output::Output};
-use crate::{app::evaluation_engine, evaluation::DetectedRow};
+use crate::app::evaluation_engine;
 
 /// Scores every profile with every refinement.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {

@@ -7,13 +7,11 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use lookdown_detect::fairness::PriorityLevel;
 
 use super::parameters::one_of;
+use crate::access::{KeyDigest, KeyName, Scope, Scopes, new_key};
 use crate::cli::output::UNWRITABLE;
-use crate::{
-    access::{KeyDigest, KeyName, Scope, Scopes, new_key},
-    fairness::PriorityLevel,
-};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {

@@ -12,15 +12,18 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use lookdown_detect::{
+    imaging::ViewBatch,
+    inference::{Detector, InferenceError, OnnxDetector},
+    parameters::DetectParameters,
+    pipeline::{DetectJob, Detected, JobImage},
+};
 
 use super::{SettingsFile, annotate};
 use crate::cli::output::UNWRITABLE;
 use crate::{
     annotated_image::AnnotationOptions,
     app::{engine_for, onnx_options},
-    imaging::ViewBatch,
-    inference::{Detector, InferenceError, OnnxDetector},
-    pipeline::{DetectJob, DetectParameters, Detected, JobImage},
     settings::{Settings, find_installed},
 };
 

@@ -7,15 +7,12 @@ use clap::{
     Arg, ArgMatches, Args, Command, FromArgMatches,
     builder::{PossibleValuesParser, TypedValueParser},
 };
+use lookdown_detect::parameters::{
+    DetectParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+};
 use strum::VariantNames;
 
-use crate::{
-    annotated_image::AnnotationOptions,
-    cli::complete,
-    pipeline::{
-        DetectParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
-    },
-};
+use crate::{annotated_image::AnnotationOptions, cli::complete};
 
 /// The flag that the flags of an annotated image need.
 const ANNOTATE: &str = "annotate";

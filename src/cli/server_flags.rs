@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 
 /// The server of a companion.
 #[derive(Debug, Args)]

@@ -10,11 +10,12 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
+use lookdown_detect::{inference::Device, parameters::Profile};
 
 use self::trial::{Choice, Trial};
 use super::{SettingsFile, parameters::one_of};
 use crate::cli::output::UNWRITABLE;
-use crate::{inference::Device, pipeline::Profile, settings::Settings};
+use crate::settings::Settings;
 
 /// Minimum speed-up over the present settings. A smaller one may be due to chance.
 const WORTH_WHILE: f64 = 1.03;

@@ -9,13 +9,13 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::{Args, builder::PossibleValuesParser};
+use lookdown_detect::parameters::Profile;
 use lookdown_watch::{CameraEntry, Origin, Transport, WatchOptions, watch};
 use strum::VariantNames;
 use tokio::{runtime, time::sleep};
 
 use super::{SettingsFile, serve, server_flags::ServerFlags};
 use crate::{
-    pipeline::Profile,
     probe::{self, Probe},
     settings::Settings,
     shutdown::Shutdown,

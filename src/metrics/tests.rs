@@ -1,3 +1,5 @@
+use lookdown_detect::metrics::replace_info;
+
 use super::*;
 
 #[test]

@@ -23,6 +23,21 @@ pub struct Broker {
 }
 
 impl Broker {
+    /// Sets the password of the user in the URL.
+    ///
+    /// # Errors
+    /// [`PasswordError`] if the URL has no user, or a password of its own.
+    pub(crate) fn with_password(mut self, password: &str) -> Result<Self, PasswordError> {
+        match &mut self.login {
+            None => Err(PasswordError::NoUser),
+            Some((_, own)) if !own.is_empty() => Err(PasswordError::TwoPasswords),
+            Some((_, own)) => {
+                password.clone_into(own);
+                Ok(self)
+            }
+        }
+    }
+
     /// Returns the client side of TLS if the connection uses it. `authorities` is a PEM file; `None`
     /// trusts those of the system.
     pub(super) fn tls(&self, authorities: Option<&Path>) -> Result<Option<ClientTls>, TlsError> {
@@ -38,6 +53,17 @@ impl Broker {
      with other characters than letters and digits in the password percent-encoded"
 )]
 pub struct BrokerError;
+
+/// A password that does not fit the URL of its broker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum PasswordError {
+    /// The URL has no user.
+    #[error("the URL of the broker has no user: give it as mqtt://user@host:1883")]
+    NoUser,
+    /// The URL has a password, too.
+    #[error("the URL of the broker has a password, too: remove one of them")]
+    TwoPasswords,
+}
 
 impl FromStr for Broker {
     type Err = BrokerError;
@@ -115,6 +141,20 @@ mod tests {
         ] {
             let refused = url.parse::<Broker>();
             assert_eq!(refused, Err(BrokerError), "{url}");
+        }
+    }
+
+    #[test]
+    fn a_separate_password_belongs_to_the_user_of_the_url() {
+        let broker: Broker = "mqtt://home@broker".parse().unwrap();
+        let login = broker.with_password("s@cret/").unwrap().login;
+        assert_eq!(login, Some(("home".to_owned(), "s@cret/".to_owned())));
+        for (url, error) in [
+            ("mqtt://broker", PasswordError::NoUser),
+            ("mqtt://home:other@broker", PasswordError::TwoPasswords),
+        ] {
+            let broker: Broker = url.parse().unwrap();
+            assert_eq!(broker.with_password("secret"), Err(error), "{url}");
         }
     }
 

@@ -4,6 +4,7 @@
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use lookdown_detect::fairness::Client;
 use rumqttc::Publish;
 use tokio::{
     sync::broadcast::{self, error::RecvError},
@@ -20,7 +21,6 @@ use super::{
     topics::Topics,
 };
 use crate::{
-    fairness::Client,
     metrics::Metrics,
     results::{self, ListenError, ResultStore, StoredReport},
     tls::{ClientTls, TlsError},

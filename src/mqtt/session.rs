@@ -4,7 +4,7 @@
 use std::{future::Future, io, time::Duration};
 
 use futures_util::{SinkExt, StreamExt};
-use lookdown_client::Backoff;
+use lookdown_common::Backoff;
 use rumqttc::{
     Codec, ConnAck, Connect, ConnectReturnCode, LastWill, Packet, Publish, QoS, Subscribe,
     SubscribeFilter,

@@ -3,14 +3,12 @@
 
 use std::{collections::HashMap, num::NonZeroUsize, sync::Arc};
 
+use lookdown_detect::fairness::{BudgetError, BudgetShare, Client, SharedBudget};
 use parking_lot::{Mutex, MutexGuard};
 use tokio::sync::{mpsc, watch};
 
 use super::{Cameras, StoredReport, Unreachable};
-use crate::{
-    fairness::{BudgetError, BudgetShare, Client, SharedBudget},
-    metrics::Metrics,
-};
+use crate::metrics::Metrics;
 
 /// Most reports that wait for a listener.
 const QUEUE: usize = 64;

@@ -7,6 +7,7 @@ use std::{num::NonZeroUsize, sync::Arc};
 
 use async_trait::async_trait;
 use jiff::Timestamp;
+use lookdown_detect::fairness::Client;
 use parking_lot::{Mutex, MutexGuard};
 
 use self::kept::Kept;
@@ -14,7 +15,7 @@ use super::{
     Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, ResultLimits,
     ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
-use crate::{fairness::Client, metrics::Metrics};
+use crate::metrics::Metrics;
 
 /// Keeps reports in memory, within limits. They are lost when the process ends.
 #[derive(Debug)]

@@ -27,6 +27,7 @@ mod tests;
 use std::{io, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
+use lookdown_detect::fairness::Client;
 use redis::RedisResult;
 use tokio::{task::JoinSet, time::timeout};
 
@@ -46,7 +47,7 @@ use super::{
     Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, ResultLimits,
     ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
-use crate::{fairness::Client, metrics::Metrics, tls::TlsError};
+use crate::{metrics::Metrics, tls::TlsError};
 
 /// Longest time that the shutdown waits for reports that Redis has not stored yet.
 const LAST_WAIT: Duration = Duration::from_secs(2);

@@ -3,12 +3,12 @@
 use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
+use lookdown_detect::fairness::Client;
 
 use super::{
     Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, StoredPicture,
     StoredReport, Unreachable,
 };
-use crate::fairness::Client;
 
 /// A result store. Its return values are shared, not copied.
 #[async_trait]

@@ -30,6 +30,11 @@ settings! {
         /// Such a server needs it to start on an address that is not loopback. Has no effect when
         /// there are keys.
         open: bool = false => flag();
+        /// Names of a server without keys, beside those that no stranger can own: addresses, names
+        /// without a dot, and names below `.local`, `.internal`, `.home.arpa` and `.localhost`. A
+        /// request for another name may come from a web page whose owner made its name resolve to this
+        /// server (DNS rebinding). `"*.example.org"` is every name below it, `"*"` every name.
+        hosts: Vec<String> = Vec::new() => hosts();
         /// Origins of web pages that may call the server from a browser, such as
         /// `https://dashboard.example`.
         cors_origins: Vec<String> = Vec::new() => origins();
@@ -73,6 +78,31 @@ fn keys() -> Form<KeyList> {
         // No key is a default.
         |_| Vec::new(),
     )
+}
+
+/// Host names without a port, or patterns of them.
+fn hosts() -> Form<Vec<String>> {
+    list(
+        "host names",
+        |texts| texts.iter().map(|&text| host(text)).collect(),
+        Vec::clone,
+    )
+}
+
+fn host(text: &str) -> Result<String, Refusal> {
+    let name = text.strip_prefix("*.").unwrap_or(text);
+    let is_label = |label: &str| {
+        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        !label.is_empty() && label.chars().all(is_word)
+    };
+    if text == "*" || name.split('.').all(is_label) {
+        return Ok(text.to_ascii_lowercase());
+    }
+    Err(Refusal::Part(
+        format!("{text:?}"),
+        "give a host name without scheme and port, such as lookdown.example or *.example.org"
+            .to_owned(),
+    ))
 }
 
 /// Origins as browsers write them: any other text would never match.

@@ -2,6 +2,7 @@
 
 use std::{fmt, num::NonZeroU64, path::PathBuf};
 
+use lookdown_detect::pipeline::EngineOptions;
 use url::Url;
 
 use super::{
@@ -9,7 +10,6 @@ use super::{
     form::{Form, MAX_BYTES, Refusal, flag, parsed, poll_seconds, whole},
     locate::DEFAULT_CALIBRATIONS,
 };
-use crate::pipeline::EngineOptions;
 
 settings! {
     /// The calibration store.

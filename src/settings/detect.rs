@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use lookdown_detect::parameters::{DetectDefaults, ParameterSpec};
+
 use super::{
     SettingsError,
     declare::Table,
@@ -9,7 +11,6 @@ use super::{
     form::{Form, Refusal, optional_text},
     values::Values,
 };
-use crate::parameters::{DetectDefaults, ParameterSpec};
 
 /// The parameters with their keys.
 static KEYS: LazyLock<Vec<(&'static ParameterSpec, String)>> = LazyLock::new(|| {

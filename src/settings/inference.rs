@@ -2,13 +2,14 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
+use lookdown_detect::inference::{CandidateOptions, Device, UnknownDevice};
+
 use super::{
     SettingsError,
     declare::settings,
     form::{Form, Refusal, count, millis, parsed, path, share},
     locate::{DEFAULT_LIBRARY, locate},
 };
-use crate::inference::{CandidateOptions, Device, UnknownDevice};
 
 /// A second: a server whose batches take longer to fill has no traffic to fill them.
 const MAX_QUEUE_DELAY_MILLIS: u64 = 1_000;

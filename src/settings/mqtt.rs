@@ -22,9 +22,12 @@ settings! {
     #[derive(Debug, Clone)]
     pub(super) struct MqttKeys in "mqtt" {
         /// The broker that counts and reports are published to (docs/home-automation.md), such as
-        /// `mqtt://user:password@192.168.1.10:1883`, or `mqtts://` for TLS. Empty: none. A URL with
-        /// a password is better kept in the variable than in a file.
+        /// `mqtt://user@192.168.1.10:1883`, or `mqtts://` for TLS. Empty: none. It may hold the
+        /// password, percent-encoded: `mqtt://user:password@…`.
         url: Option<SecretString> = None => secret("URL of a broker");
+        /// The password of the user in that URL, as it is. Empty: the password of the URL. It is
+        /// better kept in the variable than in a file that others can read.
+        password: Option<SecretString> = None => secret("password");
         /// The PEM file of the certificate authorities of a broker with TLS. Empty: those that the
         /// system trusts.
         authorities: Option<PathBuf> = None => optional(path());
@@ -56,13 +59,18 @@ settings! {
 impl MqttKeys {
     /// The options of the publisher; `None` where there is no broker.
     pub(super) fn checked(self) -> Result<Option<MqttOptions>, SettingsError> {
+        let refusal = |key, problem| SettingsError::Hidden { key, problem };
         let broker = self.url.map(|url| url.expose_secret().parse::<Broker>());
-        let broker = broker
+        let mut broker = broker
             .transpose()
-            .map_err(|error: BrokerError| SettingsError::Hidden {
-                key: "mqtt.url",
-                problem: error.to_string(),
-            })?;
+            .map_err(|error: BrokerError| refusal("mqtt.url", error.to_string()))?;
+        if let Some(password) = self.password {
+            let with_password = |broker: Broker| broker.with_password(password.expose_secret());
+            broker = broker
+                .map(with_password)
+                .transpose()
+                .map_err(|error| refusal("mqtt.password", error.to_string()))?;
+        }
         Ok(broker.map(|broker| MqttOptions {
             broker,
             authorities: self.authorities,

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use lookdown_detect::inference::{BearerToken, InvalidToken};
 use secrecy::{ExposeSecret, SecretString};
 use url::Url;
 
@@ -10,7 +11,6 @@ use super::{
     declare::settings,
     form::{Form, MAX_TIMEOUT_MILLIS, Refusal, choice, millis, optional, parsed, secret, text},
 };
-use crate::inference::{BearerToken, InvalidToken};
 
 /// The remedy for an address that cannot be used, or that is missing.
 const ADDRESS: &str = "give the address of the inference server, such as http://127.0.0.1:8000, without \

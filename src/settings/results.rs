@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeSet, ops::RangeInclusive};
 
+use lookdown_detect::imaging::annotate::Concealment;
 use secrecy::{ExposeSecret, SecretString};
 
 use super::{
@@ -9,10 +10,7 @@ use super::{
     declare::settings,
     form::{Form, MAX_BYTES, choice, count, flag, list, seconds, secret, text, whole},
 };
-use crate::{
-    imaging::annotate::Concealment,
-    results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits},
-};
+use crate::results::{PicturesOf, RedisAddress, RedisAddressError, RedisOptions, ResultLimits};
 
 /// 8 MiB: enough for any single report.
 const MIN_BYTES: u64 = 8 << 20;

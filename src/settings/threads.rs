@@ -13,8 +13,9 @@
 
 use std::num::NonZeroUsize;
 
+use lookdown_detect::inference::Device;
+
 use super::{declare::settings, form::count};
-use crate::inference::Device;
 
 /// Two sessions: one uploads and renders while the other one computes.
 const SESSIONS_ELSEWHERE: NonZeroUsize = NonZeroUsize::new(2).unwrap();

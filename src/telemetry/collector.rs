@@ -2,12 +2,12 @@
 //! an outage is logged.
 
 use std::{
-    error::Error,
     sync::atomic::{AtomicBool, Ordering},
     time::Duration,
 };
 
 use async_trait::async_trait;
+use lookdown_common::text::with_causes;
 use opentelemetry_http::{Bytes, HttpClient, HttpError, Request, Response};
 use reqwest::{Client, redirect};
 use tokio::runtime::Handle;
@@ -92,11 +92,4 @@ async fn deliver(client: Client, request: Request<Bytes>) -> Result<Response<Byt
     let mut response = Response::new(body.into());
     *response.status_mut() = answer.status();
     Ok(response)
-}
-
-/// The error with its causes, in one line.
-fn with_causes(error: &(dyn Error + 'static)) -> String {
-    let causes = std::iter::successors(Some(error), |error| (*error).source());
-    let causes: Vec<_> = causes.map(ToString::to_string).collect();
-    causes.join(": ")
 }

@@ -3,7 +3,7 @@
 use std::fs;
 
 use axum::{body::Body, http::Request};
-use lookdown::geometry::{FieldOfViewReading, ViewPlan};
+use lookdown_lens::geometry::{FieldOfViewReading, ViewPlan};
 use serde_json::{Value, json};
 
 use crate::service::{Service, frame};

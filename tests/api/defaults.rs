@@ -1,6 +1,6 @@
 //! Defaults of detection parameters, of a camera and of the server.
 
-use lookdown::pipeline::DetectDefaults;
+use lookdown_detect::parameters::DetectDefaults;
 use serde_json::{Value, json};
 
 use crate::service::{Bounds, Service, frame};

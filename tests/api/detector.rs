@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use lookdown::{
+use lookdown_detect::{
     detection::BBox,
     imaging::{NetworkInput, ViewBatch},
     inference::{Detector, HeadOutput, InferenceError, ViewDetection},

@@ -3,13 +3,11 @@
 use std::collections::BTreeSet;
 
 use bytes::Bytes;
-use lookdown::{
-    imaging::{
-        Frame,
-        annotate::{Concealment, encode_jpeg},
-        decode::{DecodeLimits, decode},
-    },
-    results::{NewPicture, NewReport, PicturesOf, ResultStore},
+use lookdown::results::{NewPicture, NewReport, PicturesOf, ResultStore};
+use lookdown_detect::imaging::{
+    Frame,
+    annotate::{Concealment, encode_jpeg},
+    decode::{DecodeLimits, decode},
 };
 use serde_json::json;
 

@@ -16,9 +16,11 @@ use std::{
 
 use lookdown::{
     calibration_store::{BucketStore, CalibrationStore},
-    inference::{CandidateOptions, InferenceError, RemoteDetector, RemoteOptions, RemoteServer},
     settings::TraceSettings,
     telemetry::{IncomingTrace, Tracer},
+};
+use lookdown_detect::inference::{
+    CandidateOptions, InferenceError, RemoteDetector, RemoteOptions, RemoteServer,
 };
 use tokio::task::spawn_blocking;
 

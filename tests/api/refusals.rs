@@ -211,3 +211,23 @@ async fn an_invalid_request_id_is_replaced() {
     let given = answer.problem()["request_id"].clone();
     assert_ne!(given, Value::from("two words"));
 }
+
+#[tokio::test]
+async fn a_file_name_instead_of_a_file_is_recognized() {
+    let service = Service::start();
+    let body = "--B\r\nContent-Disposition: form-data; name=\"img\"\r\n\r\nframe.JPG\r\n--B--\r\n";
+    let request = Request::post("/detect")
+        .header(CONTENT_TYPE, "multipart/form-data; boundary=B")
+        .body(Body::from(body))
+        .unwrap();
+    let answer = service.send(request).await;
+    assert_refused(&answer, 400, "missing-image", "-F img=@frame.jpg");
+    assert_eq!(answer.problem()["parameter"], "img");
+}
+
+#[tokio::test]
+async fn a_camera_without_a_view_names_its_latest_report() {
+    let service = Service::start();
+    let answer = service.get("/results/hall").await;
+    assert_refused(&answer, 405, "method-not-allowed", "/results/hall/latest");
+}

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lookdown::inference::InferenceError;
+use lookdown_detect::inference::InferenceError;
 
 use crate::service::{Service, frame};
 

@@ -3,16 +3,18 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
-use lookdown::{
-    api::Report,
+use lookdown::api::Report;
+use lookdown_detect::{
     detection::{BBox, Refinement, RefinementParameters},
+    parameters::Profile,
+    pipeline::{
+        CalibrationUsed, DetectionReport, ModelUsed, Person, StageTimings, ViewCounts, ZoneCount,
+    },
+};
+use lookdown_lens::{
     geometry::{
         OrientedBox, Pixel,
         floor::{Bearing, FloorPosition},
-    },
-    pipeline::{
-        CalibrationUsed, DetectionReport, ModelUsed, Person, Profile, StageTimings, ViewCounts,
-        ZoneCount,
     },
     warning::{Warning, WarningCode},
 };

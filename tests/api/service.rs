@@ -19,15 +19,18 @@ use lookdown::{
     api::{self, Access, ApiOptions, ApiState, Readiness, RequestRate},
     app::Assembly,
     calibration_store::{Calibrations, FolderStore},
+    metrics::Metrics,
+    results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
+    telemetry::Tracer,
+};
+use lookdown_detect::{
     imaging::{
         Frame, NetworkInput,
         annotate::{Concealment, encode_png},
     },
     inference::{InferenceError, Model, ModelFolder, ModelRepository, RepositoryOptions},
-    metrics::Metrics,
-    pipeline::{DetectDefaults, Engine, EngineOptions, WorkerPool},
-    results::{MemoryResults, PicturesOf, ResultLimits, ResultStore},
-    telemetry::Tracer,
+    parameters::DetectDefaults,
+    pipeline::{Engine, EngineOptions, WorkerPool},
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -85,6 +88,7 @@ pub(crate) struct Bounds {
     pub(crate) conceal_pictures: Option<Concealment>,
     pub(crate) access: Access,
     pub(crate) cors_origins: Vec<String>,
+    pub(crate) hosts: Vec<String>,
     pub(crate) tracer: Tracer,
 }
 
@@ -107,6 +111,7 @@ impl Default for Bounds {
                 own_machine_only: true,
             },
             cors_origins: Vec::new(),
+            hosts: Vec::new(),
             tracer: Tracer::default(),
         }
     }
@@ -251,6 +256,7 @@ impl Service {
                 request_rate: bounds.request_rate,
                 access: bounds.access.clone(),
                 cors_origins: bounds.cors_origins.clone(),
+                hosts: bounds.hosts.clone(),
                 tracer: bounds.tracer.clone(),
                 ..ApiOptions::for_testing()
             },

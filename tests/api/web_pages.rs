@@ -18,6 +18,7 @@ fn open(own_machine_only: bool) -> Service {
     Service::within(&Bounds {
         access: Access::Open { own_machine_only },
         cors_origins: vec!["https://dashboard.example".to_owned()],
+        hosts: vec!["*.lookdown.example".to_owned()],
         ..Bounds::default()
     })
 }
@@ -77,6 +78,13 @@ async fn forwarded_requests_are_refused_on_loopback() {
         "True-Client-IP",
         "CF-Connecting-IP",
         "CDN-Loop",
+        "X-Envoy-External-Address",
+        "Fly-Client-IP",
+        "CF-Ray",
+        "X-Original-Host",
+        "X-Azure-ClientIP",
+        "X-Amzn-Trace-Id",
+        "Fastly-Client-IP",
     ] {
         for (method, path) in [("GET", "/calibrations"), CHANGING[0], CHANGING[1]] {
             let answer = service.ask(method, path, &[(header, "203.0.113.9")]).await;
@@ -112,8 +120,13 @@ async fn requests_without_exactly_one_valid_host_are_refused() {
 }
 
 #[tokio::test]
-async fn dns_rebinding_is_refused_on_loopback() {
-    let service = open(true);
+async fn dns_rebinding_is_refused_without_keys() {
+    for own_machine_only in [true, false] {
+        refuses_dns_rebinding(&open(own_machine_only)).await;
+    }
+}
+
+async fn refuses_dns_rebinding(service: &Service) {
     let rebound = [
         ("host", "evil.example:8080"),
         ("origin", "http://evil.example:8080"),
@@ -129,6 +142,8 @@ async fn dns_rebinding_is_refused_on_loopback() {
         "[::1]:8080",
         "localhost",
         "dashboard.example",
+        "hall.lookdown.example",
+        "lookdown.local",
     ] {
         let answer = service.ask("GET", "/calibrations", &[("host", host)]).await;
         assert_eq!(answer.status, 200, "{host}");
@@ -140,14 +155,45 @@ async fn dns_rebinding_is_refused_on_loopback() {
             "{path}"
         );
     }
-    // A server that other machines reach may have any name.
-    assert_eq!(
-        open(false)
-            .ask("GET", "/calibrations", &rebound)
-            .await
-            .status,
-        200
-    );
+}
+
+#[tokio::test]
+async fn pages_of_other_sites_get_no_images_without_keys() {
+    let host = ("host", "localhost:8080");
+    let site = ("sec-fetch-site", "cross-site");
+    for own_machine_only in [true, false] {
+        let service = open(own_machine_only);
+        let image = ("sec-fetch-dest", "image");
+        let path = "/calibrations";
+        for referrer in ["https://evil.example/", ""] {
+            let headers = [host, site, image, ("referer", referrer)];
+            let answer = service.ask("GET", path, &headers).await;
+            assert_refused(&answer, "access.cors_origins");
+        }
+        for headers in [
+            [
+                host,
+                site,
+                image,
+                ("referer", "https://dashboard.example/x"),
+            ],
+            [
+                host,
+                site,
+                ("sec-fetch-dest", "document"),
+                ("accept", "*/*"),
+            ],
+            [
+                host,
+                ("sec-fetch-site", "same-origin"),
+                image,
+                ("accept", "*/*"),
+            ],
+        ] {
+            let answer = service.ask("GET", path, &headers).await;
+            assert_eq!(answer.status, 200, "{headers:?}");
+        }
+    }
 }
 
 #[tokio::test]
@@ -165,6 +211,8 @@ async fn every_response_has_the_security_headers() {
         assert_eq!(answer.header("x-content-type-options"), "nosniff", "{path}");
         assert_eq!(answer.header("referrer-policy"), "no-referrer", "{path}");
         assert_eq!(answer.header("x-frame-options"), "DENY", "{path}");
+        let policy = answer.header("cross-origin-resource-policy");
+        assert_eq!(policy, "same-origin", "{path}");
         let policy = answer.header("content-security-policy");
         for part in ["default-src 'none'", "frame-ancestors 'none'"] {
             assert!(policy.contains(part), "{path}: {policy}");
@@ -189,6 +237,8 @@ async fn allowed_pages_may_read_every_response_header() {
     ];
     let answer = service.ask(CHANGING[0].0, CHANGING[0].1, &page).await;
     assert_eq!(answer.status, 200);
+    let policy = answer.header("cross-origin-resource-policy");
+    assert_eq!(policy, "cross-origin");
     let exposed = answer
         .header("access-control-expose-headers")
         .to_lowercase();

@@ -85,7 +85,7 @@ fn calibrations_of_other_programs_are_checked_and_converted() {
         &[],
     );
     assert!(converted.status.success());
-    let calibration = lookdown::calibration::Calibration::read(native.as_ref()).unwrap();
+    let calibration = lookdown_lens::calibration::Calibration::read(native.as_ref()).unwrap();
     assert_eq!(calibration.id().as_str(), "hall");
     assert_eq!(calibration.image_size(), (512, 512));
 }
@@ -130,8 +130,8 @@ fn a_preview_shows_the_lens_in_the_frame() {
         &[],
     );
     assert!(output.status.success());
-    let limits = lookdown::imaging::decode::DecodeLimits::default();
-    let frame = lookdown::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits)
+    let limits = lookdown_detect::imaging::decode::DecodeLimits::default();
+    let frame = lookdown_detect::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits)
         .unwrap()
         .frame;
     assert_eq!((frame.width(), frame.height()), (960, 960));
@@ -168,8 +168,8 @@ fn zones_and_masks_are_listed_and_drawn_in_the_preview() {
     ] {
         assert!(report.contains(line), "{report}");
     }
-    let limits = lookdown::imaging::decode::DecodeLimits::default();
-    let picture = lookdown::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
+    let limits = lookdown_detect::imaging::decode::DecodeLimits::default();
+    let picture = lookdown_detect::imaging::decode::decode(&std::fs::read(out).unwrap(), &limits);
     let picture = picture.unwrap().frame;
     // Between the rings and lines of the drawing the frame is black.
     let black = (0..240)

@@ -2,12 +2,12 @@
 
 use std::{path::Path, process::Command, sync::Arc};
 
-use lookdown::{
-    calibration::Calibration,
+use lookdown_detect::{
+    Detector, DetectorOptions,
     imaging::decode::{DecodeLimits, decode},
     parameters::DetectParameters,
 };
-use lookdown_detect::{Detector, DetectorOptions};
+use lookdown_lens::calibration::Calibration;
 use serde_json::Value;
 
 /// `x_min, y_min, x_max, y_max`.
@@ -224,4 +224,29 @@ fn the_library_detects_the_persons_that_the_command_reports() {
             assert!((side - expected).abs() < 0.01, "{person:?}, {reported}");
         }
     }
+}
+
+#[test]
+fn the_samples_are_a_data_set() {
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/samples");
+    let arguments = [
+        "eval",
+        samples,
+        "--profile",
+        "direct",
+        "--refine",
+        "nms",
+        "--json",
+    ];
+    let output = crate::lookdown(&arguments, &[]);
+    assert!(output.status.success(), "{output:?}");
+    let row: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&row["images"], &row["persons"]), (&3.into(), &18.into()));
+}
+
+#[test]
+fn an_annotated_image_of_another_format_is_refused() {
+    let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/samples/office.jpg");
+    let output = crate::lookdown(&["detect", sample, "--annotate", "drawn.gif"], &[]);
+    crate::assert_fails_with(&output, &["--annotate", "drawn.gif", ".png"]);
 }

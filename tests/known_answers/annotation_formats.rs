@@ -2,12 +2,10 @@
 
 use std::{fs, path::Path};
 
-use lookdown::{
-    annotation_formats::{AnnotatedBox, AnnotatedImage, AnnotationFormat, BoxKind},
-    detection::BBox,
-    evaluation::{AnnotatedPerson, DataSet, Outline, RotatedBox},
-    geometry::{OrientedBox, Pixel},
-};
+use lookdown::annotation_formats::{AnnotatedBox, AnnotatedImage, AnnotationFormat, BoxKind};
+use lookdown_detect::detection::BBox;
+use lookdown_eval::{AnnotatedPerson, DataSet, Outline, RotatedBox};
+use lookdown_lens::geometry::{OrientedBox, Pixel};
 
 fn image(file_name: &str, left: f64) -> AnnotatedImage {
     AnnotatedImage {

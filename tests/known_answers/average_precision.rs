@@ -6,12 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use lookdown::{
-    detection::{BBox, FramePixels},
-    evaluation::{
-        AnnotatedPerson, EvaluatedImage, GroundTruth, MatchingRule, PrecisionRecallCurve,
-        ScoredBox, Summary,
-    },
+use lookdown_detect::detection::{BBox, FramePixels};
+use lookdown_eval::{
+    AnnotatedPerson, EvaluatedImage, GroundTruth, MatchingRule, PrecisionRecallCurve, ScoredBox,
+    Summary,
 };
 use serde::Deserialize;
 

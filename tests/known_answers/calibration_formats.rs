@@ -10,7 +10,7 @@ mod traps;
 
 use std::path::PathBuf;
 
-use lookdown::{
+use lookdown_lens::{
     calibration::{CalibrationFile, formats::Camera},
     geometry::{Lens, Ray},
 };

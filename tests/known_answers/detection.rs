@@ -3,7 +3,7 @@
 //! `fixtures/pipeline_nms.json` comes from an independent Python implementation that was itself
 //! compared with `OpenCV`'s Soft-NMS: see `fixtures/make_detection_vectors.py`.
 
-use lookdown::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
+use lookdown_detect::detection::{BBox, Candidate, Refinement, RefinementParameters, refine};
 use serde::Deserialize;
 
 const TOLERANCE: f64 = 1e-12;

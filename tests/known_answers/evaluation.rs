@@ -3,12 +3,10 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
-use lookdown::{
-    detection::BBox,
-    evaluation::{
-        AnnotatedPerson, DataSetImage, EvaluatedImage, GroundTruth, ImageId, MatchingRule, Outline,
-        Region, RotatedBox, ScoredBox, Stratification, Summary,
-    },
+use lookdown_detect::detection::BBox;
+use lookdown_eval::{
+    AnnotatedPerson, DataSetImage, EvaluatedImage, GroundTruth, ImageId, MatchingRule, Outline,
+    Region, RotatedBox, ScoredBox, Stratification, Summary,
 };
 use serde::Deserialize;
 
@@ -136,7 +134,7 @@ fn average_precision_of_rotated_boxes_agrees_with_pycocotools() {
     let images: Vec<_> = images.collect();
     let summary = Summary::of_images(&images, MatchingRule::Coco).unwrap();
     let known = &fixture.pycocotools;
-    let ap = |ap: lookdown::evaluation::AveragePrecision| ap.coco_101_point;
+    let ap = |ap: lookdown_eval::AveragePrecision| ap.coco_101_point;
     assert_within(TOLERANCE, ap(summary.ap50), known.ap50, "AP50");
     assert_within(TOLERANCE, ap(summary.ap75), known.ap75, "AP75");
     assert_within(TOLERANCE, ap(summary.ap50_95), known.ap50_95, "AP50:95");

@@ -1,7 +1,7 @@
 //! The paper's virtual views against known answers (`tests/fixtures/vectors/pipeline_views.json`,
 //! which agree with OpenCV's undistortion maps).
 
-use lookdown::geometry::{FieldOfViewReading, Lens, Mount, Pixel, ViewPlan};
+use lookdown_lens::geometry::{FieldOfViewReading, Lens, Mount, Pixel, ViewPlan};
 use serde_json::Value;
 
 #[test]

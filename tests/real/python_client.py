@@ -15,9 +15,8 @@ from lookdown_client.models import (
     DeepStackAnswer,
     DeepStackForm,
     DetectForm,
-    DetectFormProfile,
-    DetectPersonsProfile,
     Problem,
+    Profile,
     PutCalibrationJsonBody,
     Report,
 )
@@ -35,16 +34,16 @@ def main(address: str, key: str, image: str) -> None:
         client=client,
         body=DetectForm(img=picture()),
         calibration="office",
-        profile=DetectPersonsProfile.FAST,
+        profile=Profile.FAST,
         captured_at=taken,
         motion=False,
     )
     assert isinstance(by_arguments, Report), by_arguments
     assert by_arguments.captured_at == taken
-    form = DetectForm(img=picture(), calibration="office", profile=DetectFormProfile.FAST, score_threshold=0.3)
+    form = DetectForm(img=picture(), calibration="office", profile=Profile.FAST, score_threshold=0.3)
     by_form = detect_persons.sync(client=client, body=form)
     assert isinstance(by_form, Report), by_form
-    alone = detect_persons.sync(client=client, body=picture(), calibration="office", profile=DetectPersonsProfile.FAST)
+    alone = detect_persons.sync(client=client, body=picture(), calibration="office", profile=Profile.FAST)
     assert isinstance(alone, Report), alone
     refused = detect_persons.sync(client=client, body=DetectForm(img=picture()), calibration="unknown-id")
     assert isinstance(refused, Problem), refused

@@ -4,7 +4,8 @@
 
 use std::{env, fs, path::Path};
 
-use lookdown::{api::problem_table, warning::warning_table};
+use lookdown::api::problem_table;
+use lookdown_lens::warning::warning_table;
 
 /// A generated part of a file.
 struct Section {

@@ -271,7 +271,7 @@ const MAY_USE_CRATE: [(&str, &[&str]); 30] = [
             "mqtt",
         ],
     ),
-    ("lookdown_client", &["cli", "mqtt"]),
+    ("lookdown_common", &["cli", "mqtt"]),
     ("lookdown_count", &["cli", "mqtt"]),
     ("lookdown_watch", &["cli"]),
     ("clap", &["cli"]),

@@ -1,9 +1,9 @@
-//! The repository: its documentation, layers, OpenAPI document, the libraries' API and the fuzzing
-//! corpus.
+//! The repository: its documentation, documented variables, layers, OpenAPI document, the libraries'
+//! API and the fuzzing corpus.
 #![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 mod documentation;
 mod fuzz_corpus;
 mod layering;
 mod openapi;
-mod public_api;
+mod variables;

@@ -2,9 +2,8 @@
 
 use std::{collections::BTreeSet, fs};
 
-use lookdown::{
-    annotated_image::AnnotationOptions, api::openapi_document, pipeline::DetectParameters,
-};
+use lookdown::{annotated_image::AnnotationOptions, api::openapi_document};
+use lookdown_detect::parameters::DetectParameters;
 use serde_json::Value;
 
 fn document() -> Value {
@@ -120,7 +119,9 @@ fn each_body_has_a_schema_and_no_parameter_has_a_default() {
     let document = document();
     for (path, operation) in operations(&document) {
         let bodies = operation["requestBody"]["content"].as_object();
-        for (media_type, body) in bodies.into_iter().flatten() {
+        let responses = operation["responses"].as_object().unwrap().values();
+        let responses = responses.filter_map(|response| response["content"].as_object());
+        for (media_type, body) in bodies.into_iter().chain(responses).flatten() {
             assert!(body["schema"].is_object(), "{path} {media_type}");
         }
     }
@@ -142,7 +143,13 @@ fn choices_list_their_names() {
     let schema = |name: &str| {
         let mut parameters = parameters.as_array().unwrap().iter();
         let named = parameters.find(|parameter| parameter["name"] == name);
-        named.unwrap()["schema"].clone()
+        let schema = &named.unwrap()["schema"];
+        let component = schema["$ref"].as_str();
+        component
+            .map_or(schema, |path| {
+                document.pointer(path.trim_start_matches('#')).unwrap()
+            })
+            .clone()
     };
     let formats = [
         "json",

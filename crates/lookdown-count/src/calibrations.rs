@@ -2,12 +2,13 @@
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use lookdown_client::{ServerClient, read_body, text::one_line};
+use lookdown_common::{ServerClient, read_body, text::one_line};
 use lookdown_lens::calibration::{Calibration, CalibrationFile};
 use reqwest::{StatusCode, header::ETAG};
 
 use crate::{
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
     store::{Store, StoreError, StoredCalibrations},
 };
 

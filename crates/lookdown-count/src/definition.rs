@@ -8,29 +8,16 @@ use lookdown_lens::{
         polygon::MAX_CORNERS,
     },
 };
-use serde::{Deserialize, Serialize};
-
-use crate::{
-    CameraPose,
+use lookdown_tracking::{
+    CameraPose, Plane,
     lines::{DEFAULT_BAND_M, Line},
-    report::Report,
-    tracking::Plane,
     zones::Zone,
 };
 
+use crate::definition_key::DefinitionKey;
+
 /// Half the width of the hysteresis band of a line in the frame, as a share of the frame's width.
 const BAND_OF_FRAME: f64 = 0.02;
-
-/// The calibration and the frame size that a definition belongs to.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct DefinitionKey {
-    /// The ID of the calibration; `None` without one.
-    pub(crate) calibration: Option<String>,
-    /// Its revision.
-    pub(crate) revision: String,
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-}
 
 /// The lines and zones of a camera, and its place.
 #[derive(Debug, Clone)]
@@ -48,18 +35,6 @@ pub(crate) struct CameraDefinition {
     pub(crate) directions: Vec<[String; 2]>,
     /// The zones in the plane of the tracker.
     pub(crate) zones: Vec<Zone>,
-}
-
-impl DefinitionKey {
-    pub(crate) fn of(report: &Report) -> Self {
-        let used = &report.calibration;
-        Self {
-            calibration: (!used.assumed).then(|| used.id.clone()),
-            revision: used.revision.clone(),
-            width: report.image.width,
-            height: report.image.height,
-        }
-    }
 }
 
 impl CameraDefinition {

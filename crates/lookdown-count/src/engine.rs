@@ -3,15 +3,26 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
+    time::Duration,
 };
 
+use lookdown_common::text::one_line;
+use lookdown_tracking::MAX_CAMERAS;
+
 use crate::{
-    definition::{CameraDefinition, DefinitionKey},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
+    drops::{DropReason, Drops},
+    now::{LogPause, Now},
     report::Report,
     scene::{NamedCrossing, Scene, SceneState},
-    sums::{DAY_MS, LineDirection, Owner, Sums, ZoneOf},
-    tracking::MAX_CAMERAS,
+    sums::{DAY_MS, Owner, Sums, Totals},
 };
+
+/// Times that are this much after the own clock are logged, milliseconds.
+const MAX_AHEAD_MS: i64 = 300_000;
+/// Pause between two equal log lines.
+const LOG_PAUSE: Duration = Duration::from_mins(10);
 
 /// The limits of counting.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,27 +41,18 @@ pub(crate) struct Engine {
     owners: BTreeMap<String, Owner>,
     sums: Sums,
     totals: Totals,
-    /// ID of the last report that the sums contain.
+    /// ID of the last report that was accepted or refused.
     last_event: u64,
+    /// Number of times that the IDs of the server went back.
+    position_resets: u64,
+    drops: Drops,
+    position_log: LogPause,
+    tracks_log: LogPause,
+    ahead_log: LogPause,
     /// Scenes that changed since the last commit, and those that are gone.
     changed: BTreeSet<Owner>,
     /// True if reports arrived since the last commit.
     has_news: bool,
-}
-
-/// Counts since the store was created.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Totals {
-    pub(crate) crossings: BTreeMap<LineDirection, u64>,
-    pub(crate) zones: BTreeMap<ZoneOf, ZoneTotal>,
-}
-
-/// The counts of a zone since the store was created.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct ZoneTotal {
-    pub(crate) entries: u64,
-    /// Time that persons spent in the zone, milliseconds.
-    pub(crate) person_ms: u64,
 }
 
 /// The content of the next transaction of the store.
@@ -66,12 +68,8 @@ pub(crate) struct Batch {
 pub(crate) enum Accepted {
     /// The report is counted.
     Counted(Vec<NamedCrossing>),
-    /// The report was counted before.
-    Repeated,
-    /// The report came too late or too early for its camera.
-    OutOfOrder(String),
-    /// The report is of a camera beyond the limit.
-    TooManyCameras,
+    /// The report is not counted.
+    Dropped(DropReason),
 }
 
 impl Engine {
@@ -83,6 +81,11 @@ impl Engine {
             sums: Sums::default(),
             totals,
             last_event,
+            position_resets: 0,
+            drops: Drops::default(),
+            position_log: LogPause::default(),
+            tracks_log: LogPause::default(),
+            ahead_log: LogPause::default(),
             changed: BTreeSet::new(),
             has_news: false,
         }
@@ -143,40 +146,125 @@ impl Engine {
         Some(Arc::clone(&camera.definition))
     }
 
-    /// Counts a report. Reports are counted once, in the order of their IDs.
+    /// Returns the number of times that the IDs of the server went back.
+    pub(crate) fn position_resets(&self) -> u64 {
+        self.position_resets
+    }
+
+    /// Returns the reports that were not counted.
+    pub(crate) fn drops(&self) -> &Drops {
+        &self.drops
+    }
+
+    /// Counts a report unless it was counted before.
+    ///
+    /// IDs increase as long as the server's clock is not set back between two of its starts. A
+    /// smaller ID that is not a repeated report becomes the new position.
     pub(crate) fn accept(
         &mut self,
         event: u64,
         report: &Report,
         definition: &Arc<CameraDefinition>,
+        now: Now,
     ) -> Accepted {
-        if event <= self.last_event {
-            return Accepted::Repeated;
+        let counted = self.count(event, report, definition, now);
+        match &counted {
+            Ok(_) => self.drops.end(&report.camera),
+            Err(reason) => self.drops.add(&report.camera, *reason, now),
         }
-        self.last_event = event;
-        self.has_news = true;
-        let Some(owner) = self.place(&report.camera, definition) else {
-            return Accepted::TooManyCameras;
-        };
-        let Some(scene) = self.scenes.get_mut(&owner) else {
-            return Accepted::TooManyCameras;
-        };
-        let Some((index, _)) = scene.camera(&report.camera) else {
-            return Accepted::TooManyCameras;
-        };
-        let time = (report.at_ms(), self.options.longest_gap_ms);
+        counted.map_or_else(Accepted::Dropped, Accepted::Counted)
+    }
+
+    fn count(
+        &mut self,
+        event: u64,
+        report: &Report,
+        definition: &Arc<CameraDefinition>,
+        now: Now,
+    ) -> Result<Vec<NamedCrossing>, DropReason> {
+        let key = report.key(event);
+        let scene = self.scene_of(&report.camera);
+        let last = scene.and_then(|scene| scene.camera(&report.camera)?.1.last_report);
+        if last == Some(key) {
+            return Err(DropReason::Repeated);
+        }
+        self.warn_of_clock(event, report, now);
+        self.advance_to(event, now);
+        let owner = self.place(&report.camera, definition);
+        let owner = owner.ok_or(DropReason::TooManyCameras)?;
+        self.changed.insert(owner.clone());
+        let is_on_site = definition.site.is_some();
+        let time = (report.at_ms(is_on_site), self.options.longest_gap_ms);
+        let (scene, index) = self.scene_at(&owner, &report.camera)?;
+        scene.cameras[index].last_report = Some(key);
+        if let Some(ahead_ms) = report.clock_difference_ms(is_on_site) {
+            scene.cameras[index].warn_of_clock(ahead_ms, now);
+        }
+        let may_begin_again = std::mem::take(&mut scene.may_begin_again);
         let persons = report.observations(definition);
         let mut sums = Sums::default();
-        let accepted = scene.accept(index, time, &persons, &mut sums);
-        self.changed.insert(owner);
-        match accepted {
-            Ok(crossings) => {
-                self.totals.add(&sums);
-                self.sums.add(sums);
-                Accepted::Counted(crossings)
+        let mut accepted = scene.accept(index, time, &persons, &mut sums);
+        if let Err(refused) = &accepted {
+            let is_set_back = scene.cameras[index].is_set_back(now.instant);
+            if !may_begin_again && !is_set_back {
+                return Err(DropReason::OutOfOrder);
             }
-            Err(refused) => Accepted::OutOfOrder(refused.to_string()),
+            let camera = report.camera.as_str();
+            if self.tracks_log.is_over(LOG_PAUSE, now) {
+                let shown = one_line(camera);
+                tracing::warn!("tracks of {shown} begin again: a clock was set back: {refused}");
+            }
+            self.rebuild(&owner, |_| ());
+            let (scene, index) = self.scene_at(&owner, camera)?;
+            accepted = scene.accept(index, time, &persons, &mut sums);
         }
+        let crossings = accepted.map_err(|_| DropReason::OutOfOrder)?;
+        self.totals.add(&sums);
+        self.sums.add(sums);
+        Ok(crossings)
+    }
+
+    /// Makes the report of this ID the position. A smaller ID than before means that the server has
+    /// started with another clock: its reports may have earlier times.
+    fn advance_to(&mut self, event: u64, now: Now) {
+        self.has_news = true;
+        let last = std::mem::replace(&mut self.last_event, event);
+        if event >= last {
+            return;
+        }
+        self.position_resets += 1;
+        let seconds = (last - event) / 1_000_000;
+        if self.position_log.is_over(LOG_PAUSE, now) {
+            tracing::warn!(
+                "the IDs of the server went back by {seconds} s: counting continues with the new \
+                 ones; set the clock of the server"
+            );
+        }
+        for scene in self.scenes.values_mut() {
+            scene.may_begin_again = true;
+        }
+    }
+
+    /// Logs once that reports are dated after the own clock.
+    fn warn_of_clock(&mut self, event: u64, report: &Report, now: Now) {
+        let stored_ms = i64::try_from(event / 1000).unwrap_or(i64::MAX);
+        let ahead_ms = stored_ms
+            .max(report.at_ms(true))
+            .saturating_sub(now.unix_ms);
+        if ahead_ms > MAX_AHEAD_MS && self.ahead_log.is_over(LOG_PAUSE, now) {
+            let seconds = ahead_ms / 1000;
+            tracing::warn!(
+                "the reports of the server are dated {seconds} s after the own clock: set both clocks"
+            );
+        }
+    }
+
+    fn scene_at(&mut self, owner: &Owner, camera: &str) -> Result<(&mut Scene, usize), DropReason> {
+        let scene = self.scenes.get_mut(owner);
+        let scene = scene.ok_or(DropReason::TooManyCameras)?;
+        let found = scene.camera(camera).map(|(index, _)| index);
+        let index = found.ok_or(DropReason::TooManyCameras)?;
+        Ok((scene, index))
     }
 
     /// Returns the scene of a camera with this definition. Creates or changes it first.
@@ -246,7 +334,8 @@ impl Engine {
         change: impl FnOnce(&mut BTreeMap<String, Arc<CameraDefinition>>),
     ) {
         let before = self.scenes.remove(owner);
-        let mut cameras = before.map(|scene| scene.definitions()).unwrap_or_default();
+        let cameras = before.as_ref().map(Scene::definitions);
+        let mut cameras = cameras.unwrap_or_default();
         change(&mut cameras);
         self.changed.insert(owner.clone());
         if cameras.is_empty() {
@@ -254,7 +343,15 @@ impl Engine {
         }
         let cameras = cameras.into_iter().collect();
         match Scene::new(owner.clone(), cameras) {
-            Ok(scene) => drop(self.scenes.insert(owner.clone(), scene)),
+            Ok(mut scene) => {
+                for camera in &mut scene.cameras {
+                    let before = before
+                        .as_ref()
+                        .and_then(|before| before.camera(&camera.name));
+                    camera.last_report = before.and_then(|(_, before)| before.last_report);
+                }
+                self.scenes.insert(owner.clone(), scene);
+            }
             Err(problem) => tracing::warn!("{owner:?} is not followed: {problem}"),
         }
     }
@@ -284,46 +381,6 @@ impl Batch {
             last_event,
             sums: Sums::default(),
             scenes: Vec::new(),
-        }
-    }
-}
-
-impl Totals {
-    /// Adds sums.
-    fn add(&mut self, sums: &Sums) {
-        for ((of, _), crossings) in &sums.crossings {
-            *self.crossings.entry(of.clone()).or_default() += crossings;
-        }
-        for ((of, _), sum) in &sums.zones {
-            let total = self.zones.entry(of.clone()).or_default();
-            total.entries += sum.entries;
-            total.person_ms += sum.person_ms;
-        }
-    }
-}
-
-impl Sums {
-    /// Adds other sums.
-    pub(crate) fn add(&mut self, other: Self) {
-        for (key, sum) in other.presence {
-            let own = self.presence.entry(key).or_default();
-            own.known_ms += sum.known_ms;
-            own.person_ms += sum.person_ms;
-            own.most = own.most.max(sum.most);
-        }
-        for (key, crossings) in other.crossings {
-            *self.crossings.entry(key).or_default() += crossings;
-        }
-        for (key, sum) in other.zones {
-            let own = self.zones.entry(key).or_default();
-            own.entries += sum.entries;
-            own.visits += sum.visits;
-            own.visit_ms += sum.visit_ms;
-            own.person_ms += sum.person_ms;
-            own.most = own.most.max(sum.most);
-        }
-        for (key, milliseconds) in other.cells {
-            *self.cells.entry(key).or_default() += milliseconds;
         }
     }
 }

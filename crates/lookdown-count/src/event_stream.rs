@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lookdown_client::{ServerClient, retry_after};
+use lookdown_common::{ServerClient, retry_after};
 use reqwest::{Response, StatusCode};
 use tokio::time::timeout;
 

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use lookdown_client::{Backoff, LogOnce, ServerClient};
+use lookdown_common::{Backoff, LogOnce, ServerClient};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,
@@ -13,11 +13,11 @@ use tokio::{
 
 use crate::{
     calibrations::{CalibrationProblem, Calibrations},
-    definition::DefinitionKey,
     engine::{Accepted, Batch, Engine},
     event_parser::Event,
     event_stream::{EventStream, StreamError},
     metrics::Metrics,
+    now::Now,
     report::Report,
     snapshot::Snapshot,
     store::Store,
@@ -63,7 +63,7 @@ impl Follower {
             let began = Instant::now();
             let error = self.follow(&mut log).await;
             self.metrics.connected.set(0);
-            if !error.message.is_empty() && log.is_changed(&error.message) {
+            if !error.message.is_empty() && log.should_log(&error.message) {
                 tracing::warn!("{}", error.message);
             }
             backoff.reset_if_stable(began.elapsed());
@@ -96,7 +96,7 @@ impl Follower {
             Err(error) => return error,
         };
         self.metrics.connected.set(1);
-        log.settle();
+        log.clear();
         tracing::info!("following the reports of {}", client.address());
         let mut next_tick = Instant::now();
         loop {
@@ -136,7 +136,7 @@ impl Follower {
             return Ok(());
         };
         let definition = self.engine.lock().definition(&report.camera);
-        let key = DefinitionKey::of(&report);
+        let key = report.definition_key();
         let known = definition.filter(|definition| definition.key == key);
         let definition = if let Some(definition) = known {
             definition
@@ -156,26 +156,18 @@ impl Follower {
             self.calibrations.definition(key)
         };
         let mut engine = self.engine.lock();
-        match engine.accept(id, &report, &definition) {
+        match engine.accept(id, &report, &definition, Now::read()) {
             Accepted::Counted(crossings) => {
                 self.metrics.reports.inc();
                 if let Some(scene) = engine.scene_of(&report.camera) {
-                    let at_ms = report.at_ms();
+                    let at_ms = report.at_ms(definition.site.is_some());
                     let messages =
                         self.conditions
                             .of_report(id, &report.camera, at_ms, &crossings, scene);
                     self.messages.extend(messages);
                 }
             }
-            Accepted::Repeated => {}
-            Accepted::OutOfOrder(reason) => {
-                tracing::debug!(
-                    camera = report.camera,
-                    "the report is not counted: {reason}"
-                );
-                skipped("out_of_order");
-            }
-            Accepted::TooManyCameras => skipped("too_many_cameras"),
+            Accepted::Dropped(reason) => skipped(reason.label()),
         }
         Ok(())
     }
@@ -233,7 +225,7 @@ impl Follower {
                 Ok(Err(problem)) => {
                     self.metrics.commits_failed.inc();
                     let problem = problem.to_string();
-                    if log.is_changed(&problem) {
+                    if log.should_log(&problem) {
                         tracing::error!("{problem}: free space, or correct store.path");
                     }
                 }
@@ -248,7 +240,7 @@ impl Follower {
             }
             sleep(backoff.next_pause()).await;
         }
-        if log.settle() {
+        if log.clear() {
             tracing::info!("the store is written again");
         }
         self.deliveries.send(batch.1.clone());

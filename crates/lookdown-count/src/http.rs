@@ -8,7 +8,7 @@ mod problem;
 mod time;
 mod tracks;
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use axum::{
     Json, Router,
@@ -109,21 +109,60 @@ struct CameraRow {
     last_report: Option<Timestamp>,
     persons: Option<u64>,
     site: Option<String>,
+    /// Reports that were not counted since the start.
+    dropped_reports: u64,
+    /// Since when none was counted.
+    dropping: Option<Dropping>,
+}
+
+/// Reports of a camera that are not counted now.
+#[derive(Serialize)]
+struct Dropping {
+    since: Option<Timestamp>,
+    reason: &'static str,
+}
+
+impl CameraRow {
+    /// Returns the row of a camera without a counted report.
+    fn new(name: &str, engine: &Engine) -> Self {
+        let drops = engine.drops().of(name);
+        let since_ms = drops.and_then(|drops| drops.since_ms);
+        let dropping = drops.zip(since_ms).map(|(drops, since_ms)| Dropping {
+            since: Timestamp::from_millisecond(since_ms).ok(),
+            reason: drops.reason.label(),
+        });
+        Self {
+            name: name.to_owned(),
+            last_report: None,
+            persons: None,
+            site: None,
+            dropped_reports: drops.map_or(0, |drops| drops.reports),
+            dropping,
+        }
+    }
 }
 
 async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
     let engine = api.engine.lock();
     let snapshot = engine.snapshot(now_ms());
-    let rows = snapshot.cameras.into_iter().map(|camera| CameraRow {
-        last_report: Timestamp::from_millisecond(camera.last_report_ms).ok(),
-        persons: camera.persons,
-        site: match engine.scene_of(&camera.name).map(|scene| &scene.owner) {
-            Some(Owner::Site(site)) => Some(site.clone()),
-            _ => None,
-        },
-        name: camera.name,
-    });
-    Json(rows.collect())
+    let mut rows = BTreeMap::new();
+    for camera in snapshot.cameras {
+        let row = CameraRow {
+            last_report: Timestamp::from_millisecond(camera.last_report_ms).ok(),
+            persons: camera.persons,
+            site: match engine.scene_of(&camera.name).map(|scene| &scene.owner) {
+                Some(Owner::Site(site)) => Some(site.clone()),
+                _ => None,
+            },
+            ..CameraRow::new(&camera.name, &engine)
+        };
+        rows.insert(camera.name, row);
+    }
+    for (name, _) in engine.drops().iter() {
+        let entry = rows.entry(name.to_owned());
+        entry.or_insert_with(|| CameraRow::new(name, &engine));
+    }
+    Json(rows.into_values().collect())
 }
 
 async fn metrics(State(api): State<Shared>) -> Response {
@@ -169,11 +208,11 @@ async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Problem> {
     Err(match owner {
         Owner::Camera(camera) => Problem::not_found(format!(
             "there is no camera {}: GET /counts lists them",
-            lookdown_client::text::one_line(camera)
+            lookdown_common::text::one_line(camera)
         )),
         Owner::Site(site) => Problem::not_found(format!(
             "there is no site {}: give a mount.site of a calibration in use",
-            lookdown_client::text::one_line(site)
+            lookdown_common::text::one_line(site)
         )),
     })
 }

@@ -12,6 +12,7 @@ pub(crate) struct Metrics {
     pub(crate) connected: IntGauge,
     pub(crate) reports: IntCounter,
     pub(crate) reports_skipped: IntCounterVec,
+    position_resets: IntCounter,
     pub(crate) commits_failed: IntCounter,
     pub(crate) webhooks_delivered: IntCounter,
     pub(crate) webhooks_dropped: IntCounter,
@@ -46,7 +47,7 @@ impl Metrics {
         let reports_skipped = IntCounterVec::new(
             Opts::new(
                 name("reports_skipped_total"),
-                "Reports that were not counted, by reason: malformed, out_of_order, too_many_cameras.",
+                "Reports that were not counted, by reason: malformed, out_of_order, repeated, too_many_cameras.",
             ),
             &["reason"],
         )?;
@@ -60,6 +61,10 @@ impl Metrics {
             connected,
             reports: counter("reports_total", "Counted reports.")?,
             reports_skipped,
+            position_resets: counter(
+                "position_resets_total",
+                "Times that the IDs of the server went back.",
+            )?,
             commits_failed: counter("commits_failed_total", "Failed transactions of the store.")?,
             webhooks_delivered: counter("webhooks_delivered_total", "Delivered messages.")?,
             webhooks_dropped: counter("webhooks_dropped_total", "Messages that were given up.")?,
@@ -101,6 +106,8 @@ impl Metrics {
     /// Returns all metrics in the text format of Prometheus.
     pub(crate) fn text(&self, engine: &Engine, now_ms: i64) -> Vec<u8> {
         let snapshot = engine.snapshot(now_ms);
+        self.position_resets.reset();
+        self.position_resets.inc_by(engine.position_resets());
         for counters in [
             &self.crossings,
             &self.zone_entries,

@@ -6,9 +6,8 @@ use std::{
     time::Duration,
 };
 
-use jiff::SignedDuration;
-use lookdown_client::{
-    ConfigError, ServerEntry, ServerOptions, parse_toml, read_file, read_secret,
+use lookdown_common::{
+    ConfigError, ServerEntry, ServerOptions, optional_duration, parse_toml, read_file, read_secret,
 };
 use reqwest::Url;
 use secrecy::{ExposeSecret, SecretString};
@@ -226,8 +225,8 @@ impl CountEntry {
     /// Checks the entry and reads its files.
     fn check(self) -> Result<CountOptions, ConfigError> {
         let seconds = Duration::from_secs;
-        let longest_gap = (seconds(1), seconds(600));
-        let commit_every = (Duration::from_millis(100), seconds(60));
+        let longest_gap = seconds(1)..=seconds(600);
+        let commit_every = Duration::from_millis(100)..=seconds(60);
         let retention_days = self.store.retention_days.unwrap_or(RETENTION_DAYS);
         if !(1..=3660).contains(&retention_days) {
             let remedy = "is out of range: give 1 to 3660 days";
@@ -274,11 +273,15 @@ impl CountEntry {
             api_key,
             store: self.store.path.unwrap_or_else(|| STORE.into()),
             retention: seconds(u64::from(retention_days) * 86_400),
-            commit_every: duration("store.commit_every", self.store.commit_every, commit_every)?
-                .unwrap_or(COMMIT_EVERY),
-            longest_gap: duration(
+            commit_every: optional_duration(
+                "store.commit_every",
+                self.store.commit_every.as_deref(),
+                commit_every,
+            )?
+            .unwrap_or(COMMIT_EVERY),
+            longest_gap: optional_duration(
                 "counting.longest_gap",
-                self.counting.longest_gap,
+                self.counting.longest_gap.as_deref(),
                 longest_gap,
             )?
             .unwrap_or(LONGEST_GAP),
@@ -287,22 +290,4 @@ impl CountEntry {
             webhooks: webhooks.collect::<Result<_, _>>()?,
         })
     }
-}
-
-/// Parses a duration with limits, such as `500ms` or `15m`.
-pub(crate) fn duration(
-    field: &str,
-    text: Option<String>,
-    (least, most): (Duration, Duration),
-) -> Result<Option<Duration>, ConfigError> {
-    let Some(text) = text else { return Ok(None) };
-    let parsed = text.parse::<SignedDuration>().ok();
-    let parsed = parsed.and_then(|parsed| Duration::try_from(parsed).ok());
-    let parsed = parsed.filter(|parsed| (least..=most).contains(parsed));
-    parsed.map(Some).ok_or_else(|| {
-        let (least, most) = (least.as_secs_f64(), most.as_secs_f64());
-        let remedy =
-            format!("is no duration from {least} s to {most} s: write it like 10s or 500ms");
-        ConfigError::value(field, &text, &remedy)
-    })
 }

@@ -2,15 +2,19 @@
 
 use jiff::Timestamp;
 use lookdown_lens::geometry::{Pixel, oriented_box::vertical_in_frame};
+use lookdown_tracking::Observation;
 use nalgebra::Vector2;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use crate::{Observation, definition::CameraDefinition};
+use crate::{definition::CameraDefinition, definition_key::DefinitionKey};
 
-/// The capture time may be this much after the arrival, milliseconds: clocks differ.
+/// The capture time of a camera alone may be this much after and before the arrival, milliseconds.
 const MAX_AHEAD_MS: i64 = 5_000;
-/// The capture time may be this much before the arrival, milliseconds.
 const MAX_BEHIND_MS: i64 = 3_600_000;
+/// The same for a camera of a site, whose cameras share one time. Together they are less than
+/// `TrackerSettings::max_lateness_s`, so that the clock of one camera never makes others late.
+const MAX_AHEAD_ON_SITE_MS: i64 = 500;
+const MAX_BEHIND_ON_SITE_MS: i64 = 1_000;
 
 /// A report of the server.
 #[derive(Debug, Clone, Deserialize)]
@@ -23,6 +27,13 @@ pub(crate) struct Report {
     pub(crate) calibration: UsedCalibration,
     pub(crate) image: Image,
     pub(crate) persons: Vec<Person>,
+}
+
+/// The ID and the arrival of a report: the same for each time that the server sends it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct ReportKey {
+    event: u64,
+    received_ms: i64,
 }
 
 /// The calibration of a report.
@@ -72,14 +83,44 @@ struct Floor {
 impl Report {
     /// Returns the time of the frame in milliseconds since the Unix epoch: the capture time if it
     /// is plausible, else the arrival.
-    pub(crate) fn at_ms(&self) -> i64 {
-        let received = self.received_at.as_millisecond();
-        let plausible =
-            received.saturating_sub(MAX_BEHIND_MS)..=received.saturating_add(MAX_AHEAD_MS);
-        let captured = self.captured_at.map(Timestamp::as_millisecond);
-        captured
-            .filter(|captured| plausible.contains(captured))
-            .unwrap_or(received)
+    pub(crate) fn at_ms(&self, is_on_site: bool) -> i64 {
+        let arrival = self.received_at.as_millisecond();
+        match self.ahead_ms() {
+            Some(ahead_ms) if is_plausible(ahead_ms, is_on_site) => arrival + ahead_ms,
+            _ => arrival,
+        }
+    }
+
+    /// Returns by how much the clock of a camera differs from the server's, milliseconds, if its
+    /// capture times are therefore not used.
+    pub(crate) fn clock_difference_ms(&self, is_on_site: bool) -> Option<i64> {
+        let ahead_ms = self.ahead_ms();
+        ahead_ms.filter(|ahead_ms| !is_plausible(*ahead_ms, is_on_site))
+    }
+
+    /// Returns the time from the arrival to the capture: less than 0 unless clocks differ.
+    fn ahead_ms(&self) -> Option<i64> {
+        let captured = self.captured_at?.as_millisecond();
+        Some(captured - self.received_at.as_millisecond())
+    }
+
+    /// Returns what identifies the report among those of its camera.
+    pub(crate) fn key(&self, event: u64) -> ReportKey {
+        ReportKey {
+            event,
+            received_ms: self.received_at.as_millisecond(),
+        }
+    }
+
+    /// Returns what identifies the definition of the camera for this report.
+    pub(crate) fn definition_key(&self) -> DefinitionKey {
+        let used = &self.calibration;
+        DefinitionKey {
+            calibration: (!used.assumed).then(|| used.id.clone()),
+            revision: used.revision.clone(),
+            width: self.image.width,
+            height: self.image.height,
+        }
     }
 
     /// Returns the persons as the tracker needs them. A person without a direction is left out.
@@ -125,6 +166,15 @@ impl Report {
     }
 }
 
+fn is_plausible(ahead_ms: i64, is_on_site: bool) -> bool {
+    let (behind, ahead) = if is_on_site {
+        (MAX_BEHIND_ON_SITE_MS, MAX_AHEAD_ON_SITE_MS)
+    } else {
+        (MAX_BEHIND_MS, MAX_AHEAD_MS)
+    };
+    (-behind..=ahead).contains(&ahead_ms)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,18 +190,21 @@ mod tests {
 
     #[test]
     fn an_implausible_capture_time_is_replaced_by_the_arrival() {
-        let received = report("null", "").at_ms();
-        for (captured, offset) in [
-            ("\"2026-11-22T09:59:58.5Z\"", -1500),
-            ("\"2026-11-22T10:00:04Z\"", 4000),
-            ("\"2026-11-22T11:00:00Z\"", 0),
-            ("\"2020-01-01T00:00:00Z\"", 0),
+        let received = report("null", "").at_ms(false);
+        for (captured, alone, on_site) in [
+            ("09:59:59.5Z", -500, -500),
+            ("09:59:58.5Z", -1500, 0),
+            ("10:00:00.4Z", 400, 400),
+            ("10:00:04Z", 4000, 0),
+            ("11:00:00Z", 0, 0),
+            ("08:00:00Z", 0, 0),
         ] {
-            assert_eq!(
-                report(captured, "").at_ms() - received,
-                offset,
-                "{captured}"
-            );
+            let report = report(&format!("\"2026-11-22T{captured}\""), "");
+            for (offset, is_on_site) in [(alone, false), (on_site, true)] {
+                assert_eq!(report.at_ms(is_on_site) - received, offset, "{captured}");
+                let is_used = report.clock_difference_ms(is_on_site).is_none();
+                assert_eq!(is_used, offset != 0, "{captured}");
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use std::{future::Future, path::PathBuf, sync::Arc, time::Duration};
 
 use hyper_util::service::TowerToHyperService;
 use jiff::Timestamp;
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient, http_server};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,
@@ -78,9 +78,9 @@ impl Origin {
             sleep(FILE_CHECK).await;
             match self.load().await {
                 Ok(options) if options != *current => return options,
-                Ok(_) => drop(log.settle()),
+                Ok(_) => drop(log.clear()),
                 Err(problem) => {
-                    if log.is_changed(&problem.to_string()) {
+                    if log.should_log(&problem.to_string()) {
                         tracing::warn!("{problem}; the last valid settings stay in use");
                     }
                 }

@@ -1,18 +1,35 @@
 //! A tracker with the cameras that it follows: one camera, or all cameras of a site.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
+use lookdown_common::text::one_line;
+use lookdown_tracking::{
+    Observation, RefusedReport, SiteError, Track, Tracker, TrackerSettings,
+    heat_map::HeatMap,
+    lines::{Direction, LineCounter, LineState},
+    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Observation,
-    definition::{CameraDefinition, DefinitionKey},
-    heat_map::HeatMap,
-    lines::{Direction, LineCounter, LineState},
+    definition::CameraDefinition,
+    definition_key::DefinitionKey,
+    now::{LogPause, Now},
+    presence::Presence,
+    report::ReportKey,
     sums::{DAY_MS, LineDirection, MINUTE_MS, Owner, Sums, ZoneOf, minutes},
-    tracking::{RefusedReport, SiteError, Track, Tracker, TrackerSettings},
-    zones::{DEFAULT_HOLD_S, ZoneCounter, ZoneEvent, ZoneState},
 };
+
+/// Reports of a camera that are late for this long mean that a clock was set back: tracks begin again
+/// at its time.
+pub(crate) const LATE_LIMIT: Duration = Duration::from_secs(10);
+
+/// Pause between two log lines about the clock of a camera.
+const LOG_PAUSE: Duration = Duration::from_hours(1);
 
 /// A tracker, the counters of its cameras, and the state of their sums.
 pub(crate) struct Scene {
@@ -21,6 +38,9 @@ pub(crate) struct Scene {
     heat_map: HeatMap,
     presence: Presence,
     pub(crate) cameras: Vec<SceneCamera>,
+    /// True from a reset of the position until the next report: the server's clock may have been set
+    /// back.
+    pub(crate) may_begin_again: bool,
 }
 
 /// A camera of a scene.
@@ -32,13 +52,11 @@ pub(crate) struct SceneCamera {
     presence: Presence,
     /// Persons in each zone at the last report of this camera.
     zone_persons: Vec<u64>,
-}
-
-/// The last report and its number of persons.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Presence {
-    pub(crate) last_ms: Option<i64>,
-    pub(crate) persons: u64,
+    /// The last report of this camera, counted or not.
+    pub(crate) last_report: Option<ReportKey>,
+    /// Arrival of the first of the late reports since the last one in order.
+    late_since: Option<Instant>,
+    clock_log: LogPause,
 }
 
 /// The state of a scene as it is stored.
@@ -59,6 +77,7 @@ struct CameraState {
     zones: ZoneState,
     presence: Presence,
     zone_persons: Vec<u64>,
+    last_report: Option<ReportKey>,
 }
 
 /// A crossing with its names.
@@ -66,42 +85,6 @@ struct CameraState {
 pub(crate) struct NamedCrossing {
     pub(crate) of: LineDirection,
     pub(crate) at_ms: i64,
-}
-
-impl Presence {
-    /// Returns the time since the last report if it is known: positive, and no longer than the
-    /// longest gap.
-    fn known_since(&self, at_ms: i64, longest_gap_ms: i64) -> Option<i64> {
-        let last = self.last_ms?;
-        (last < at_ms && at_ms - last <= longest_gap_ms).then_some(last)
-    }
-
-    /// Adds the time since the last report to the sums, and sets the number of persons.
-    fn advance(
-        &mut self,
-        owner: &Owner,
-        (at_ms, longest_gap_ms): (i64, i64),
-        persons: u64,
-        sums: &mut Sums,
-    ) {
-        if let Some(last) = self.known_since(at_ms, longest_gap_ms) {
-            for (minute, length_ms) in minutes(last, at_ms) {
-                let sum = sums.presence.entry((owner.clone(), minute)).or_default();
-                sum.known_ms += length_ms;
-                sum.person_ms += length_ms * self.persons;
-                sum.most = sum.most.max(self.persons);
-            }
-        }
-        if self.last_ms.is_none_or(|last| last < at_ms) {
-            let minute = at_ms.div_euclid(MINUTE_MS);
-            let sum = sums.presence.entry((owner.clone(), minute)).or_default();
-            sum.most = sum.most.max(persons);
-            *self = Self {
-                last_ms: Some(at_ms),
-                persons,
-            };
-        }
-    }
 }
 
 impl SceneCamera {
@@ -112,15 +95,42 @@ impl SceneCamera {
             zones: zone_counter(&definition, ZoneState::default()),
             presence: Presence::default(),
             zone_persons: vec![0; definition.zones.len()],
+            last_report: None,
+            late_since: None,
+            clock_log: LogPause::default(),
             definition,
         }
     }
 
     /// Changes what is counted. Visits and approaches begin again.
     pub(crate) fn redefine(&mut self, definition: Arc<CameraDefinition>) {
-        let presence = self.presence;
-        *self = Self::new(&self.name, definition);
-        self.presence = presence;
+        *self = Self {
+            presence: self.presence,
+            last_report: self.last_report,
+            late_since: self.late_since,
+            clock_log: self.clock_log,
+            ..Self::new(&self.name, definition)
+        };
+    }
+
+    /// Returns true if a refused report shows that a clock was set back: no report of this camera was
+    /// in order for [`LATE_LIMIT`].
+    pub(crate) fn is_set_back(&mut self, now: Instant) -> bool {
+        let since = *self.late_since.get_or_insert(now);
+        now.saturating_duration_since(since) >= LATE_LIMIT
+    }
+
+    /// Logs that the capture times of the camera are not used.
+    pub(crate) fn warn_of_clock(&mut self, ahead_ms: i64, now: Now) {
+        if self.clock_log.is_over(LOG_PAUSE, now) {
+            let camera = one_line(&self.name);
+            let seconds = Duration::from_millis(ahead_ms.unsigned_abs()).as_secs_f64();
+            let side = if ahead_ms > 0 { "ahead" } else { "behind" };
+            tracing::warn!(
+                "captured_at of {camera} is {seconds} s {side}, so the arrival is its time: set the \
+                 clock of the camera's client"
+            );
+        }
     }
 
     pub(crate) fn presence(&self) -> &Presence {
@@ -215,6 +225,7 @@ impl Scene {
             cameras: cameras
                 .map(|(name, definition)| SceneCamera::new(&name, definition))
                 .collect(),
+            may_begin_again: false,
         })
     }
 
@@ -233,6 +244,9 @@ impl Scene {
                 zones: zone_counter(&definition, camera.zones),
                 presence: camera.presence,
                 zone_persons,
+                last_report: camera.last_report,
+                late_since: None,
+                clock_log: LogPause::default(),
                 definition,
             }
         });
@@ -242,6 +256,7 @@ impl Scene {
             tracker: state.tracker,
             heat_map: state.heat_map,
             presence: state.presence,
+            may_begin_again: false,
         }
     }
 
@@ -254,6 +269,7 @@ impl Scene {
             zones: camera.zones.state().clone(),
             presence: camera.presence,
             zone_persons: camera.zone_persons.clone(),
+            last_report: camera.last_report,
         });
         SceneState {
             owner: self.owner.clone(),
@@ -288,6 +304,7 @@ impl Scene {
         let time = (at_ms, longest_gap_ms);
         let is_site = matches!(self.owner, Owner::Site(_));
         let reporting = &mut self.cameras[camera];
+        reporting.late_since = None;
         reporting.advance_zones(at_ms, longest_gap_ms, sums);
         let own = if is_site {
             let own = tracks

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_tracking::heat_map::Cell;
 use serde::{Deserialize, Serialize};
-
-use crate::heat_map::Cell;
 
 /// Milliseconds of a minute and of a day.
 pub(crate) const MINUTE_MS: i64 = 60_000;
@@ -74,6 +73,61 @@ pub(crate) struct ZoneSum {
     pub(crate) person_ms: u64,
     /// Most persons at once.
     pub(crate) most: u64,
+}
+
+/// Counts since the store was created.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Totals {
+    pub(crate) crossings: BTreeMap<LineDirection, u64>,
+    pub(crate) zones: BTreeMap<ZoneOf, ZoneTotal>,
+}
+
+/// The counts of a zone since the store was created.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct ZoneTotal {
+    pub(crate) entries: u64,
+    /// Time that persons spent in the zone, milliseconds.
+    pub(crate) person_ms: u64,
+}
+
+impl Totals {
+    /// Adds sums.
+    pub(crate) fn add(&mut self, sums: &Sums) {
+        for ((of, _), crossings) in &sums.crossings {
+            *self.crossings.entry(of.clone()).or_default() += crossings;
+        }
+        for ((of, _), sum) in &sums.zones {
+            let total = self.zones.entry(of.clone()).or_default();
+            total.entries += sum.entries;
+            total.person_ms += sum.person_ms;
+        }
+    }
+}
+
+impl Sums {
+    /// Adds other sums.
+    pub(crate) fn add(&mut self, other: Self) {
+        for (key, sum) in other.presence {
+            let own = self.presence.entry(key).or_default();
+            own.known_ms += sum.known_ms;
+            own.person_ms += sum.person_ms;
+            own.most = own.most.max(sum.most);
+        }
+        for (key, crossings) in other.crossings {
+            *self.crossings.entry(key).or_default() += crossings;
+        }
+        for (key, sum) in other.zones {
+            let own = self.zones.entry(key).or_default();
+            own.entries += sum.entries;
+            own.visits += sum.visits;
+            own.visit_ms += sum.visit_ms;
+            own.person_ms += sum.person_ms;
+            own.most = own.most.max(sum.most);
+        }
+        for (key, milliseconds) in other.cells {
+            *self.cells.entry(key).or_default() += milliseconds;
+        }
+    }
 }
 
 /// Splits a time into its parts per minute: the minute and the milliseconds in it.

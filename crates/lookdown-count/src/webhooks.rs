@@ -7,7 +7,7 @@ mod signature;
 use std::{path::PathBuf, time::Duration};
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
-use lookdown_client::{ConfigError, read_secret};
+use lookdown_common::{ConfigError, optional_duration, read_secret};
 use reqwest::Url;
 use secrecy::ExposeSecret;
 use serde::{Deserialize, Serialize};
@@ -17,8 +17,6 @@ use sha2::{Digest, Sha256};
 pub(crate) use conditions::{Conditions, HeldCondition};
 pub(crate) use delivery::Deliveries;
 use signature::SigningKey;
-
-use crate::options::duration;
 
 /// Time without a report after which a camera is silent.
 const SILENT_AFTER: Duration = Duration::from_mins(1);
@@ -136,8 +134,8 @@ impl WebhookEntry {
                 }
             }
             Occasion::Silent => {
-                let limits = (Duration::from_secs(5), Duration::from_hours(24));
-                let after = duration(&field("after"), self.after, limits)?;
+                let limits = Duration::from_secs(5)..=Duration::from_hours(24);
+                let after = optional_duration(&field("after"), self.after.as_deref(), limits)?;
                 Condition::Silent {
                     after: after.unwrap_or(SILENT_AFTER),
                 }

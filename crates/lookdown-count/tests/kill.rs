@@ -12,7 +12,7 @@ use std::{
 };
 
 use events::{CALIBRATION, Server, walks};
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 use lookdown_count::{CountEntry, HttpEntry, Origin, Snapshot, StoreEntry, count};
 use rusqlite::Connection;
 use tokio::{sync::watch, time::sleep};

@@ -95,7 +95,7 @@ async fn with_companion<T>(
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
     let companion = Companion {
         url: format!("http://{address}"),
-        client: lookdown_client::client_builder().build().unwrap(),
+        client: lookdown_common::client_builder().build().unwrap(),
     };
     let mut outcome = None;
     let stop = async {

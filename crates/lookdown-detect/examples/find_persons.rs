@@ -5,10 +5,10 @@ use std::{env, error::Error, fs, path::Path, sync::Arc};
 
 use lookdown_detect::{
     Detector, DetectorOptions,
-    calibration::Calibration,
     imaging::decode::{DecodeLimits, decode},
     parameters::DetectParameters,
 };
+use lookdown_lens::calibration::Calibration;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = env::args().skip(1);

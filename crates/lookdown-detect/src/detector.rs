@@ -2,10 +2,10 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, thread::available_parallelism};
 
+use lookdown_lens::{calibration::Calibration, warning::Warning};
 use parking_lot::Mutex;
 
 use crate::{
-    calibration::Calibration,
     imaging::Frame,
     inference::{
         CandidateOptions, Device, ModelFolder, ModelRepository, OnnxOptions, RepositoryError,
@@ -17,7 +17,6 @@ use crate::{
         DefaultModels, DetectJob, Engine, EngineOptions, JobImage, Person, PipelineError,
         StageTimings, ViewCounts, ZoneCount,
     },
-    warning::Warning,
 };
 
 /// The library of ONNX Runtime that `make setup` fetches.

@@ -16,4 +16,3 @@ pub mod pipeline;
 pub use detector::{
     DEFAULT_MODELS, DEFAULT_ONNX_RUNTIME, Detections, Detector, DetectorError, DetectorOptions,
 };
-pub use lookdown_lens::{calibration, geometry, plain_name, quoted, revision, warning};

@@ -42,9 +42,3 @@ pub use report::{
 pub use ticket::Ticket;
 pub use timeline::{Stage, StageSpan, Timeline};
 pub use worker_pool::WorkerPool;
-
-pub use crate::parameters::{
-    DefaultSource, DefaultUsed, DetectDefaults, DetectParameters, GivenParameters, Interface,
-    JsonType, ParameterDefault, ParameterError, ParameterFault, ParameterKind, ParameterSpec,
-    Priority, Profile, parse_profile, whole_number,
-};

@@ -23,8 +23,8 @@ use self::pictures::{Files, PictureIndex};
 impl DataSet {
     /// Opens the data set at `path`, which is one of:
     ///
-    /// * a folder with `annotations.json` (COCO, each image with a `calibration`), `images/` and
-    ///   `calibrations/<id>.json`;
+    /// * a folder with `annotations.json` (COCO, each image with a `calibration`),
+    ///   `calibrations/<id>.json`, and the images in `images/` or beside the annotations;
     /// * a COCO file, or a folder with `annotations.json`, `annotations/*.json` or `*.json` and
     ///   the images anywhere below it; boxes of five numbers are rotated (CEPDOF, RAPiD);
     /// * a folder with Pascal VOC XML files and the images of the same names anywhere below it

@@ -19,9 +19,6 @@ mod strata;
 mod summary;
 pub mod sweep;
 
-use lookdown_detect::{detection, imaging, pipeline};
-use lookdown_lens::{calibration, geometry};
-
 pub use average_precision::AveragePrecision;
 pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch};
 pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};

@@ -1,10 +1,9 @@
 //! The outline of a person, annotated or detected, in the shape that is compared.
 
+use lookdown_detect::detection::{BBox, FramePixels};
+use lookdown_lens::geometry::OrientedBox;
+
 use super::{Region, RotatedBox};
-use crate::{
-    detection::{BBox, FramePixels},
-    geometry::OrientedBox,
-};
 
 /// The shape of the ground truth, which determines the compared shape of a detection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,14 +4,13 @@ mod draw;
 mod line_plot;
 mod precision_recall;
 
+use lookdown_detect::imaging::{
+    Frame,
+    annotate::{EncodeError, encode_png},
+};
 use plotters::{
     backend::{BitMapBackend, SVGBackend},
     drawing::{DrawingAreaErrorKind, IntoDrawingArea},
-};
-
-use crate::imaging::{
-    Frame,
-    annotate::{EncodeError, encode_png},
 };
 
 pub use line_plot::{Line, LinePlot};

@@ -1,6 +1,6 @@
 //! The interface between the matching and outlines of any shape.
 
-use crate::detection::BBox;
+use lookdown_detect::detection::BBox;
 
 /// A part of the plane that can be compared with another.
 pub trait Region {

@@ -5,11 +5,10 @@
 //! part outside the frame does not count. Masks are not stored: the box is convex, so its pixels in
 //! one row are one span, which is calculated on demand.
 
+use lookdown_detect::detection::{BBox, BBoxError, FramePixels};
+use lookdown_lens::geometry::OrientedBox;
+
 use super::{Region, region::share};
-use crate::{
-    detection::{BBox, BBoxError, FramePixels},
-    geometry::OrientedBox,
-};
 
 /// A rectangle rotated about its centre, represented by the pixels that it covers in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

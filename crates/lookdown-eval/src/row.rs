@@ -2,14 +2,16 @@
 
 use std::{fmt, time::Duration};
 
+use lookdown_detect::{
+    detection::{BBox, FramePixels, Refinement, RefinementParameters},
+    parameters::Profile,
+    pipeline::Person,
+};
+use lookdown_lens::geometry::OrientedBox;
+
 use super::{
     DataSet, EvaluatedImage, MatchingRule, NoPersons, NoStrata, Outline, PrecisionRecallCurve,
     ScoredBox, Stratification, Stratum, Summary,
-};
-use crate::{
-    detection::{BBox, FramePixels, Refinement, RefinementParameters},
-    geometry::OrientedBox,
-    pipeline::{Person, Profile},
 };
 
 /// The rule that matches detections with the ground truth.

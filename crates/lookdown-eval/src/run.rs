@@ -6,10 +6,14 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_detect::{
+    parameters::DetectParameters,
+    pipeline::{DetectJob, Engine, JobImage, PipelineError},
+};
+
 use super::{
     DataSet, DataSetImage, DetectedRow, FoundPerson, RowCost, RowName, in_order::in_order,
 };
-use crate::pipeline::{DetectJob, DetectParameters, Engine, JobImage, PipelineError};
 
 /// The reason why an image has no detections.
 #[derive(Debug, thiserror::Error)]

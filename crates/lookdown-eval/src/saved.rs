@@ -9,13 +9,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use lookdown_detect::detection::BBox;
+use lookdown_lens::geometry::{OrientedBox, Pixel};
 use serde::{Deserialize, Serialize};
 
 use super::{DataSet, DetectedRow, FoundPerson, ImageId, RowName};
-use crate::{
-    detection::BBox,
-    geometry::{OrientedBox, Pixel},
-};
 
 /// The category ID of `person` in COCO. Detections of other categories are skipped.
 const PERSON: u64 = 1;

@@ -6,11 +6,11 @@ mod matrix;
 use std::fmt::Write;
 
 use super::{DetectedRow, EvaluatedRow, Line, LinePlot};
-use crate::{
-    detection::{Refinement, RefinementParameters},
-    pipeline::DetectParameters,
-};
 
+use lookdown_detect::{
+    detection::{Refinement, RefinementParameters},
+    parameters::DetectParameters,
+};
 pub use matrix::matrix;
 
 /// `N_t` from 0 to 1.

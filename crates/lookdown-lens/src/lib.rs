@@ -5,8 +5,6 @@
 
 pub mod calibration;
 pub mod geometry;
-pub mod plain_name;
-pub mod quoted;
 pub mod revision;
 pub mod self_calibration;
 pub mod warning;

@@ -2,14 +2,13 @@
 
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
-use lookdown::{
-    api::Report,
-    app::engine_for,
-    calibration::Calibration,
+use lookdown::{api::Report, app::engine_for, settings};
+use lookdown_detect::{
     imaging::Frame,
-    pipeline::{DetectJob, DetectParameters, Engine, JobImage},
-    settings,
+    parameters::DetectParameters,
+    pipeline::{DetectJob, Engine, JobImage},
 };
+use lookdown_lens::calibration::Calibration;
 use numpy::PyReadonlyArray3;
 use pyo3::prelude::*;
 

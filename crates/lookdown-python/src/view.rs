@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use lookdown::{
+use lookdown_detect::pipeline::PlannedView;
+use lookdown_lens::{
     calibration::Calibration,
     geometry::{
         Pixel,
         pixels::{PixelConvention, cross_half_pixel},
     },
-    pipeline::PlannedView,
 };
 use numpy::ndarray::{Array2, arr1, arr2};
 use numpy::{IntoPyArray, PyArray1, PyArray2};

@@ -3,10 +3,10 @@
 mod entry;
 mod file;
 
-pub use entry::{CameraEntry, parse_duration};
+pub use entry::CameraEntry;
 pub use file::load;
 
-use lookdown_client::{ConfigError, ServerOptions};
+use lookdown_common::{ConfigError, ServerOptions};
 
 use crate::Camera;
 

@@ -17,9 +17,9 @@ use tokio::{
 };
 
 use crate::{
-    MAX_FRAME_BYTES, SourceError, VideoOptions, source::JpegSplitter, stderr_line::LastLine,
+    MAX_FRAME_BYTES, SourceError, VideoOptions, jpeg_splitter::JpegSplitter, stderr_line::LastLine,
 };
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
 
 /// Most pixels of a frame that `ffmpeg` decodes.
 const MAX_PIXELS: &str = "134217728";

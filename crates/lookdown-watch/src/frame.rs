@@ -4,12 +4,11 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_common::JPEG_START;
 
 /// Largest frame in bytes: an uncompressed-looking JPEG of 50 megapixels fits.
 pub const MAX_FRAME_BYTES: usize = 32 << 20;
 
-/// First bytes of a JPEG.
-const JPEG_START: &[u8] = &[0xff, 0xd8, 0xff];
 /// Last bytes of a JPEG.
 const JPEG_END: &[u8] = &[0xff, 0xd9];
 /// First bytes of a PNG.

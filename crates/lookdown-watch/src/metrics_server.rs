@@ -10,7 +10,7 @@ use hyper::{
     header::{ALLOW, CONTENT_TYPE},
     service::service_fn,
 };
-use lookdown_client::http_server;
+use lookdown_common::http_server;
 use tokio::net::TcpListener;
 
 use crate::Metrics;

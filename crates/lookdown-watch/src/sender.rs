@@ -11,7 +11,7 @@ use crate::{
     server::{Answer, Server},
     slot::Slot,
 };
-use lookdown_client::{Backoff, LogOnce};
+use lookdown_common::{Backoff, LogOnce};
 
 /// First and longest pause after a failure of the server.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(15));
@@ -39,7 +39,7 @@ pub(crate) async fn run(
             Answer::Report => {
                 metrics.sent();
                 backoff.reset();
-                if log.settle() {
+                if log.clear() {
                     tracing::info!("the server accepts frames again");
                 }
                 continue;
@@ -52,7 +52,7 @@ pub(crate) async fn run(
             Answer::Failed(message) => (Failure::Unreachable, message, backoff.next_pause()),
         };
         metrics.failed(failure);
-        if log.is_changed(&message) {
+        if log.should_log(&message) {
             tracing::warn!("{message}");
         }
         sleep(pause).await;

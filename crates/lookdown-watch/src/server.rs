@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lookdown_client::{
+use lookdown_common::{
     ClientError, ServerClient, ServerOptions, client_builder, read_body, retry_after,
 };
 use reqwest::{Client, Response, StatusCode, Url, header::CONTENT_TYPE};

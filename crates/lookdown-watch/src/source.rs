@@ -2,12 +2,10 @@
 
 mod folder;
 mod http;
-mod jpeg_splitter;
 mod multipart;
 mod standard_input;
 mod video;
 
-pub(crate) use jpeg_splitter::JpegSplitter;
 pub use standard_input::ImageReader;
 
 use std::{
@@ -22,11 +20,11 @@ use reqwest::Client;
 use tokio::time::sleep;
 
 use crate::{
-    Camera, Frame, FrameError, Location,
+    Camera, Frame, FrameError, Location, SourceError,
     metrics::{CameraMetrics, Failure},
     slot::Slot,
 };
-use lookdown_client::{Backoff, LogOnce};
+use lookdown_common::{Backoff, LogOnce};
 
 /// First and longest pause before a source is started again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));
@@ -36,88 +34,6 @@ const LOGIN_PAUSES: (Duration, Duration) = (Duration::from_secs(10), Duration::f
 const STALL_CHECKS: u32 = 4;
 /// Shortest time for the first frame: streams begin with a key frame.
 const FIRST_FRAME: Duration = Duration::from_secs(10);
-
-/// The reason why a source ended. Its text holds no credentials.
-#[derive(Debug, thiserror::Error)]
-pub enum SourceError {
-    /// Wrong credentials.
-    #[error(
-        "the camera refuses the user name {user:?} or its password: correct user and password_file, or the URL"
-    )]
-    CredentialsRefused {
-        /// The user name.
-        user: String,
-    },
-    /// Credentials are missing.
-    #[error(
-        "the camera requires a user name and a password: give user and password_file, or add them to the URL"
-    )]
-    CredentialsMissing,
-    /// The camera requires an unknown authentication scheme.
-    #[error(
-        "the camera requires an authentication other than Basic and Digest: select one of them in the camera"
-    )]
-    UnknownAuthentication,
-    /// Another status than 200.
-    #[error(
-        "the camera answered with the status {0}: check the path of the URL in the camera's manual"
-    )]
-    Status(u16),
-    /// A redirection.
-    #[error("the camera redirects to another URL: give that URL, which `curl -i` shows")]
-    Redirect,
-    /// Neither an image nor a stream of images.
-    #[error(
-        "the camera sends {0:?} instead of an image: give the URL of a JPEG snapshot, an MJPEG stream or RTSP"
-    )]
-    ContentType(String),
-    /// A frame that cannot be used.
-    #[error(transparent)]
-    Frame(#[from] FrameError),
-    /// A damaged stream.
-    #[error("{0}")]
-    Stream(String),
-    /// A frame beyond the limit.
-    #[error("the camera's image has more than 32 MiB: reduce its resolution or quality")]
-    TooLarge,
-    /// No frame within the limit.
-    #[error("no whole frame arrived within {0:?}: check the camera, or raise stall_after")]
-    Stalled(Duration),
-    /// The stream ended.
-    #[error("the camera ended the stream")]
-    Closed,
-    /// The camera cannot be reached.
-    #[error("the camera cannot be reached: {0}")]
-    Unreachable(String),
-    /// `ffmpeg` cannot be started.
-    #[error(
-        "{program} cannot be started: {problem}: install ffmpeg 5.1 or newer, or set its path with the key ffmpeg"
-    )]
-    NoFfmpeg {
-        /// The program.
-        program: String,
-        /// The cause.
-        problem: String,
-    },
-    /// `ffmpeg` failed, with its last line.
-    #[error("ffmpeg ended: {0}")]
-    Ffmpeg(String),
-    /// A file or a folder cannot be read.
-    #[error("{0} cannot be read: {1}")]
-    Unreadable(String, String),
-}
-
-impl SourceError {
-    /// Returns true if the camera refuses the credentials.
-    fn is_refused_login(&self) -> bool {
-        matches!(
-            self,
-            Self::CredentialsRefused { .. }
-                | Self::CredentialsMissing
-                | Self::UnknownAuthentication
-        )
-    }
-}
 
 /// The receiver of a camera's frames.
 pub(crate) struct Sink<'a> {
@@ -145,7 +61,7 @@ impl Sink<'_> {
         if self.slot.put(frame).is_some() {
             self.metrics.skipped();
         }
-        if self.is_failing.lock().settle() {
+        if self.is_failing.lock().clear() {
             tracing::info!("the camera sends frames again");
         }
         Ok(())
@@ -205,7 +121,7 @@ pub(crate) async fn supervise(
         let pause = match outcome {
             Ok(()) => return,
             Err(error) => {
-                if log.lock().is_changed(&error.to_string()) {
+                if log.lock().should_log(&error.to_string()) {
                     tracing::warn!("{error}");
                 }
                 if error.is_refused_login() {

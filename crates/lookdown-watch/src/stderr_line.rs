@@ -6,7 +6,7 @@ use tokio::{
     time::{Duration, timeout},
 };
 
-use lookdown_client::text::one_line;
+use lookdown_common::text::one_line;
 
 /// Most bytes of a line that are kept.
 const MAX_BYTES: usize = 1000;

@@ -19,7 +19,7 @@ use crate::{
     slot::{Slot, Writer},
     source,
 };
-use lookdown_client::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry, http_server};
 
 /// Interval of the checks for a changed file.
 const FILE_CHECK: Duration = Duration::from_secs(2);
@@ -185,8 +185,8 @@ impl Watcher {
                 Err(error) => Err(error.to_string()),
             };
             match outcome {
-                Ok(()) => drop(log.settle()),
-                Err(problem) if log.is_changed(&problem) => {
+                Ok(()) => drop(log.clear()),
+                Err(problem) if log.should_log(&problem) => {
                     tracing::warn!("{problem}; the last valid settings stay in use");
                 }
                 Err(_) => {}

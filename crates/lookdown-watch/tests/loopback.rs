@@ -9,7 +9,7 @@ use std::{
 };
 
 use exchange::{Exchange, Reply, serve};
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 use lookdown_watch::{
     CameraEntry, Origin, VideoFrames, VideoOptions, WatchError, WatchOptions, watch,
 };

@@ -1,4 +1,4 @@
-"""A darknet detector as a model folder for Lookdown; the outputs are the raw maps, not boxes."""
+"""A darknet detector as a model folder for Lookdown: YOLOv2 as its raw map, YOLOv3 with decoded boxes."""
 
 from pathlib import Path
 
@@ -7,6 +7,7 @@ from ..onnx_builder import OnnxBuilder
 from .heads import Region
 from .network import Network, read_network
 from .weights import read_weights
+from .yolo_boxes import decoded
 
 
 def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_names: Path | None) -> str:
@@ -17,16 +18,15 @@ def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_na
     builder = OnnxBuilder()
     maps = network.add_to(builder, "images", read_weights(weights, network.parameters))
 
+    outputs = _outputs(builder, network, maps, person)
+
     def save(file: Path) -> None:
         builder.save(
             file,
-            outputs={
-                f"raw_{index}": (tensor, [head.shape.channels, head.shape.height, head.shape.width])
-                for index, (tensor, head) in enumerate(zip(maps, network.heads, strict=True))
-            },
+            outputs=outputs,
             height=picture.height,
             width=picture.width,
-            description=f"{name}. images: RGB 0..1. raw_0 and on: what the heads of {cfg.name} get, not decoded.",
+            description=f"{name}, from {cfg.name}. images: RGB 0..1. Outputs: {', '.join(outputs)}.",
         )
 
     source = f"darknet {cfg.name} and {weights.name}"
@@ -37,17 +37,19 @@ def convert_detector(cfg: Path, weights: Path, folder: Path, name: str, class_na
     )
 
 
+def _outputs(builder: OnnxBuilder, network: Network, maps: list[str], person: int) -> dict:
+    """The outputs of the graph and their shapes: the raw map of YOLOv2, or the boxes and scores of YOLOv3."""
+    head = network.heads[0]
+    if isinstance(head, Region):
+        return {"raw": (maps[0], [head.shape.channels, head.shape.height, head.shape.width])}
+    boxes, scores, candidates = decoded(builder, network, maps, person)
+    return {"boxes": (boxes, [candidates, 4]), "scores": (scores, [candidates])}
+
+
 def _tables(network: Network, person: int) -> list[str]:
     """The manifest lines of input and output."""
+    lines = ["", "[input]", f"scale = {[1 / 255] * 3}"]
+    if not isinstance(network.heads[0], Region):
+        return lines
     anchors = network.heads[0].anchors
-    lines = ["", "[input]", f"scale = {[1 / 255] * 3}", "", "[output]"]
-    if isinstance(network.heads[0], Region):
-        return [*lines, 'head = "yolo_v2"', f"person_class = {person}", f"anchors = {anchors}  # in cells"]
-    return [
-        *lines,
-        'head = "yolo_v3"',
-        f"person_class = {person}",
-        f"anchors = {anchors}  # in pixels of the input",
-        "# The anchors of raw_0, raw_1 and on. The published yolov3-tiny.cfg is wrong in its 0, 1, 2: make it 1, 2, 3.",
-        f"masks = {[head.mask for head in network.heads]}",
-    ]
+    return [*lines, "", "[output]", 'head = "yolo_v2"', f"person_class = {person}", f"anchors = {anchors}  # in cells"]

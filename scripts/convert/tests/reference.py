@@ -47,6 +47,32 @@ def run(cfg: str, numbers: numpy.ndarray, picture: numpy.ndarray) -> list[numpy.
     return heads
 
 
+def yolov3_boxes(cfg: str, maps: list[numpy.ndarray], person: int = 0) -> tuple[numpy.ndarray, numpy.ndarray]:
+    """Corners `[A, 4]` in pixels and scores `[A]` of the raw maps, box by box."""
+    _, net = parse(cfg)[0]
+    heads = [options for kind, options in parse(cfg) if kind == "yolo"]
+    boxes, scores = [], []
+    for values, options in zip(maps, heads, strict=True):
+        classes, numbers = int(options["classes"]), [float(part) for part in options["anchors"].split(",")]
+        _, rows, columns = values.shape
+        stride = int(net["width"]) / columns
+        for place, anchor in enumerate(int(part) for part in options["mask"].split(",")):
+            for row in range(rows):
+                for column in range(columns):
+                    first = place * (5 + classes)
+                    t_x, t_y, t_w, t_h, t_o, *logits = values[first : first + 5 + classes, row, column]
+                    x, y = (column + logistic(t_x)) * stride, (row + logistic(t_y)) * stride
+                    w, h = numbers[2 * anchor] * numpy.exp(t_w), numbers[2 * anchor + 1] * numpy.exp(t_h)
+                    boxes.append([x - w / 2, y - h / 2, x + w / 2, y + h / 2])
+                    scores.append(logistic(t_o) * logistic(logits[person]))
+    return numpy.array(boxes), numpy.array(scores)
+
+
+def logistic(value: float) -> float:
+    """1 / (1 + e^-value)."""
+    return 1 / (1 + numpy.exp(-value))
+
+
 def convolved(image, options, whole, numbers):
     """A convolution, and the remaining weights."""
     filters, size, stride = whole["filters"], whole["size"], whole["stride"]

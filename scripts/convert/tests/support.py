@@ -45,8 +45,11 @@ class WithDarknetFiles(unittest.TestCase):
         """Converts the written network."""
         return convert_detector(self.cfg, self.weights, self.model, "made_up", class_names)
 
-    def require_same_answers(self, cfg: str, class_names: Path | None = None) -> None:
-        """Writes and converts the network, and compares its outputs for two images with the reference."""
+    def require_same_answers(self, cfg: str, class_names: Path | None = None, decode=lambda cfg, maps: maps) -> None:
+        """Writes and converts the network, and compares its outputs for two images with the reference.
+
+        `decode` turns the raw maps of the reference into the outputs of the graph.
+        """
         self.model = Path(tempfile.mkdtemp(dir=self.folder))
         self.write(cfg)
         self.convert(class_names)
@@ -55,7 +58,7 @@ class WithDarknetFiles(unittest.TestCase):
         pictures = numpy.random.default_rng(PICTURE_SEED).uniform(0, 1, shape).astype(numpy.float32)
         numbers = numpy.fromfile(self.weights, "<f4", offset=20)
         found = ReferenceEvaluator(str(self.model / "model.onnx"), new_ops=[MaxPool]).run(None, {"images": pictures})
-        expected = zip(*(reference.run(cfg, numbers, picture) for picture in pictures), strict=True)
+        expected = zip(*(decode(cfg, reference.run(cfg, numbers, picture)) for picture in pictures), strict=True)
         for answer, answers in zip(found, expected, strict=True):
             self.assertGreater(answer.std(), 0)
             numpy.testing.assert_allclose(answer, numpy.stack(answers), rtol=1e-3, atol=1e-4)

@@ -1,9 +1,11 @@
 """Whole networks of the published architectures: outputs, manifests, refusals."""
 
+import functools
 import tomllib
 
 from ..darknet.network import read_network
 from ..errors import ConversionError
+from . import reference
 from .made_up_darknet import COCO_ANCHORS, VOC_ANCHORS, yolov2_cfg, yolov2_tiny_cfg, yolov3_tiny_cfg
 from .support import WithDarknetFiles
 
@@ -18,7 +20,13 @@ class Answers(WithDarknetFiles):
         self.require_same_answers(yolov2_tiny_cfg(96, COCO_ANCHORS, 80, thinner=THINNER))
 
     def test_yolov3_tiny_equals_the_reference_in_both_scales(self):
-        self.require_same_answers(yolov3_tiny_cfg(64, 80, THINNER))
+        self.require_same_answers(yolov3_tiny_cfg(64, 80, THINNER), decode=reference.yolov3_boxes)
+
+    def test_yolov3_with_another_person_class_reads_that_class(self):
+        names = self.folder / "names.txt"
+        names.write_text("cat\nperson\ndog\n", encoding="utf-8")
+        decode = functools.partial(reference.yolov3_boxes, person=1)
+        self.require_same_answers(yolov3_tiny_cfg(64, 3, THINNER), names, decode)
 
 
 class Sizes(WithDarknetFiles):
@@ -47,11 +55,10 @@ class Manifests(WithDarknetFiles):
         self.assertEqual(manifest["input"], {"scale": [1 / 255] * 3})
         self.assertEqual((manifest["name"], manifest["onnx"]), ("made_up", "model.onnx"))
 
-    def test_yolov3_manifest_assigns_anchors_to_maps(self):
-        output = self.manifest(yolov3_tiny_cfg(32, 80, THINNER))["output"]
-        self.assertEqual((output["head"], output["person_class"]), ("yolo_v3", 0))
-        self.assertEqual(output["masks"], [[3, 4, 5], [1, 2, 3]])
-        self.assertEqual(output["anchors"][5], [344, 319])
+    def test_the_manifest_of_yolov3_needs_no_head(self):
+        manifest = self.manifest(yolov3_tiny_cfg(32, 80, THINNER))
+        self.assertNotIn("output", manifest)
+        self.assertEqual(manifest["input"], {"scale": [1 / 255] * 3})
 
     def test_a_list_of_names_says_which_class_the_person_is(self):
         cfg = yolov2_tiny_cfg(32, VOC_ANCHORS, 3, thinner=THINNER)

@@ -1,7 +1,12 @@
 //! The format of a response: the parameter `format`, or content negotiation.
 
 use axum::http::HeaderMap;
-use lookdown_detect::parameter_table;
+use lookdown_detect::{
+    parameter_table,
+    parameters::{
+        GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
+    },
+};
 use strum::VariantNames;
 
 use crate::{
@@ -10,9 +15,6 @@ use crate::{
     api::http::{
         accept::Accepted,
         problem::{Problem, ProblemKind},
-    },
-    pipeline::{
-        GivenParameters, Interface, ParameterDefault, ParameterError, ParameterKind, ParameterSpec,
     },
 };
 

@@ -5,15 +5,20 @@
 //! server.
 //!
 //! So a request that may make changes is refused unless its `Origin` is the server itself or one of
-//! `access.cors_origins`. A server that only its own machine reaches also refuses requests for a
-//! public host name, and requests that a proxy forwarded: the clients of a proxy are on other
+//! `access.cors_origins`. Requests for a public host name are refused unless `access.hosts` lists it,
+//! and images for pages of other sites unless their origin is allowed. A server that only its own
+//! machine reaches also refuses requests that a proxy forwarded: the clients of a proxy are on other
 //! machines. API keys make these checks unnecessary: browsers do not add them on their own.
 
 use std::{net::IpAddr, sync::Arc};
 
 use axum::{
     extract::{Request, State},
-    http::{HeaderMap, HeaderName, Uri, header::ORIGIN, uri::Authority},
+    http::{
+        HeaderMap, HeaderName, Uri,
+        header::{ORIGIN, REFERER},
+        uri::Authority,
+    },
     middleware::Next,
     response::{IntoResponse, Response},
 };
@@ -24,38 +29,78 @@ use super::{
     problem::{Problem, ProblemKind},
 };
 
-/// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` and
-/// `X-Forwarded-…` by convention; RFC 8586; the names of some content networks and load balancers).
-const FORWARDING_HEADERS: [&str; 9] = [
+/// The headers that forwarding proxies add (RFC 7239; RFC 9110, section 7.6.3; `X-Real-IP` by
+/// convention; RFC 8586; the names of content networks, load balancers and tunnels).
+const FORWARDING_HEADERS: [&str; 16] = [
+    "ali-cdn-real-ip",
     "cdn-loop",
-    "cf-connecting-ip",
+    "fastly-client-ip",
+    "fly-client-ip",
+    "fly-forwarded-port",
     "forwarded",
+    "proxy-client-ip",
     "true-client-ip",
     "via",
+    "wl-proxy-client-ip",
     "x-client-ip",
     "x-cluster-client-ip",
     "x-forwarded",
+    "x-original-host",
+    "x-proxyuser-ip",
     "x-real-ip",
 ];
-const FORWARDING_PREFIX: &str = "x-forwarded-";
+/// The beginnings of the names of such headers: by convention, and of Cloudflare, Envoy, Azure,
+/// AWS, Google Cloud, Akamai, ngrok and Tailscale.
+const FORWARDING_PREFIXES: [&str; 14] = [
+    "akamai-",
+    "cf-",
+    "cloudfront-",
+    "ngrok-",
+    "tailscale-",
+    "x-akamai-",
+    "x-amzn-",
+    "x-appengine-",
+    "x-arr-",
+    "x-azure-",
+    "x-cloud-trace-",
+    "x-envoy-",
+    "x-forwarded-",
+    "x-original-forwarded-",
+];
+/// The relation of the page that caused a request to the server, which browsers add (Fetch
+/// Metadata).
+const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
+/// The use of the response in the browser, such as `image`. A `document` is a link that was
+/// followed.
+const SEC_FETCH_DEST: HeaderName = HeaderName::from_static("sec-fetch-dest");
+/// The names that the public DNS delegates to nobody (RFC 6761, 6762, 8375; the private-use name of
+/// ICANN).
+const LOCAL_SUFFIXES: [&str; 4] = [".localhost", ".local", ".internal", ".home.arpa"];
 /// Largest number of characters of a header that an error message repeats.
 const MAX_SHOWN_CHARS: usize = 128;
 
-/// The origins that may make changes.
+/// The origins that may make changes, and the names of the server.
 #[derive(Clone)]
 pub(in crate::api) struct AllowedOrigins {
     own_machine_only: bool,
     /// The origins in `access.cors_origins`.
     allowed: Arc<[String]>,
+    /// The names in `access.hosts`.
+    hosts: Arc<[String]>,
 }
 
 impl AllowedOrigins {
     /// Returns `None` if there are API keys.
-    pub(in crate::api) fn of(access: &Access, cors_origins: &[String]) -> Option<Self> {
+    pub(in crate::api) fn of(
+        access: &Access,
+        cors_origins: &[String],
+        hosts: &[String],
+    ) -> Option<Self> {
         match access {
             Access::Open { own_machine_only } => Some(Self {
                 own_machine_only: *own_machine_only,
                 allowed: cors_origins.into(),
+                hosts: hosts.into(),
             }),
             Access::Keys(_) => None,
         }
@@ -75,54 +120,87 @@ pub(in crate::api) async fn refuse(
 }
 
 fn check(request: &Request, own_pages: &AllowedOrigins) -> Result<(), Problem> {
+    let forbidden = |detail| Err(Problem::new(ProblemKind::Forbidden, detail));
     let AllowedOrigins {
         own_machine_only,
         allowed,
+        hosts,
     } = own_pages;
-    if *own_machine_only && let Some(header) = forwarding_header(request.headers()) {
-        let detail = format!(
+    let headers = request.headers();
+    if *own_machine_only && let Some(header) = forwarding_header(headers) {
+        return forbidden(format!(
             "without keys (access.keys_file), this server answers clients on its own machine only, \
              and {header} shows that a proxy passed this request on: set access.keys_file"
-        );
-        return Err(Problem::new(ProblemKind::Forbidden, detail));
+        ));
     }
     // Every browser sends a host, so a client without one is not a browser.
-    let host = host_of(request.uri(), request.headers());
+    let host = host_of(request.uri(), headers);
     if let Some(host) = &host
-        && *own_machine_only
         && !is_private(host.host())
+        && !hosts.iter().any(|pattern| matches(pattern, host.host()))
         && !allowed.iter().any(|origin| names(origin, host))
     {
         let host = shown(host.as_str());
-        let detail = format!(
-            "without keys (access.keys_file), this server answers on its own machine only, and \
-             {host} may be another machine: use localhost, or add the origin to \
-             access.cors_origins"
-        );
-        return Err(Problem::new(ProblemKind::Forbidden, detail));
+        return forbidden(format!(
+            "without keys (access.keys_file), this server answers to names that no stranger can own, \
+             and the owner of {host} can make it resolve to any machine: use an address, or add the \
+             name to access.hosts"
+        ));
     }
-    let Some(origin) = request.headers().get(ORIGIN) else {
-        return Ok(());
+    let is_allowed = |origin: &str| {
+        let is_own = host.as_ref().is_some_and(|host| names(origin, host));
+        is_own || allowed.iter().any(|allowed| allowed == origin)
     };
-    let origin = origin.to_str().unwrap_or("null");
-    let is_own = host.is_some_and(|host| names(origin, &host));
-    if request.method().is_safe() || is_own || allowed.iter().any(|allowed| allowed == origin) {
-        return Ok(());
+    if let Some(origin) = headers.get(ORIGIN) {
+        let origin = origin.to_str().unwrap_or("null");
+        if request.method().is_safe() || is_allowed(origin) {
+            return Ok(());
+        }
+        let origin = shown(origin);
+        return forbidden(format!(
+            "without keys (access.keys_file), web pages of other origins may only read, and this \
+             request is from a page of {origin}: add a trusted origin to access.cors_origins"
+        ));
     }
-    let origin = shown(origin);
-    let detail = format!(
-        "without keys (access.keys_file), web pages of other origins may only read, and this \
-         request is from a page of {origin}: add a trusted origin to access.cors_origins"
-    );
-    Err(Problem::new(ProblemKind::Forbidden, detail))
+    // Browsers send no origin with the request of an image or a script.
+    let is = |name, value: &str| headers.get(name).is_some_and(|given| given == value);
+    let referrer = headers.get(REFERER).and_then(|value| value.to_str().ok());
+    if is(SEC_FETCH_SITE, "cross-site")
+        && !is(SEC_FETCH_DEST, "document")
+        && !referrer
+            .and_then(origin_of)
+            .is_some_and(|origin| is_allowed(&origin))
+    {
+        return forbidden(
+            "without keys (access.keys_file), this server sends nothing to pages of other sites: open \
+             its address directly, or add the origin of the page to access.cors_origins"
+                .to_owned(),
+        );
+    }
+    Ok(())
+}
+
+/// Returns the origin of an address.
+fn origin_of(url: &str) -> Option<String> {
+    let url: Uri = url.parse().ok()?;
+    Some(format!("{}://{}", url.scheme_str()?, url.authority()?))
+}
+
+/// Returns `true` if a host name is that of a pattern in `access.hosts`.
+fn matches(pattern: &str, host: &str) -> bool {
+    let name = host.trim_end_matches('.').to_ascii_lowercase();
+    match pattern.strip_prefix('*') {
+        Some(suffix) => name.ends_with(suffix),
+        None => name == pattern,
+    }
 }
 
 /// Returns the first header that a forwarding proxy adds.
 fn forwarding_header(headers: &HeaderMap) -> Option<&str> {
-    headers
-        .keys()
-        .map(HeaderName::as_str)
-        .find(|name| name.starts_with(FORWARDING_PREFIX) || FORWARDING_HEADERS.contains(name))
+    headers.keys().map(HeaderName::as_str).find(|name| {
+        let begins = |prefix: &&str| name.starts_with(prefix);
+        FORWARDING_HEADERS.contains(name) || FORWARDING_PREFIXES.iter().any(begins)
+    })
 }
 
 /// Returns `true` if an origin has this host.
@@ -142,11 +220,12 @@ fn names(origin: &str, host: &Authority) -> bool {
 }
 
 /// Returns `true` if an attacker cannot own the name: it is an address, has no dot, or has a suffix
-/// that RFC 6761 (section 6.3) reserves for the local machine.
+/// that is reserved for local networks.
 fn is_private(host: &str) -> bool {
     let name = host.trim_end_matches('.').to_ascii_lowercase();
     let address = name.trim_start_matches('[').trim_end_matches(']');
-    address.parse::<IpAddr>().is_ok() || !name.contains('.') || name.ends_with(".localhost")
+    let is_local = |suffix: &&str| name.ends_with(suffix);
+    address.parse::<IpAddr>().is_ok() || !name.contains('.') || LOCAL_SUFFIXES.iter().any(is_local)
 }
 
 fn shown(text: &str) -> String {
@@ -166,6 +245,8 @@ mod tests {
             "127.0.0.1",
             "[::1]",
             "camera-pc",
+            "homeassistant.local",
+            "lookdown.internal",
         ] {
             assert!(is_private(host), "{host}");
         }
@@ -176,6 +257,20 @@ mod tests {
             "a.b.",
         ] {
             assert!(!is_private(host), "{host}");
+        }
+    }
+
+    #[test]
+    fn patterns_match_names_and_those_below_them() {
+        assert!(matches("lookdown.example", "Lookdown.Example."));
+        assert!(matches("*.example", "a.b.example"));
+        assert!(matches("*", "evil.example"));
+        for (pattern, host) in [
+            ("lookdown.example", "a.lookdown.example"),
+            ("*.example", "example"),
+            ("*.example", "badexample"),
+        ] {
+            assert!(!matches(pattern, host), "{pattern} {host}");
         }
     }
 

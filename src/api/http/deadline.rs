@@ -6,13 +6,13 @@ use axum::{
     extract::{FromRef, FromRequestParts},
     http::request::Parts,
 };
+use lookdown_detect::pipeline::PipelineError;
 use tokio::{
     task::spawn_blocking,
     time::{Instant, timeout_at},
 };
 
 use super::problem::{Problem, ProblemKind};
-use crate::pipeline::PipelineError;
 
 /// The longest duration of a request, from its first byte to its response.
 #[derive(Debug, Clone, Copy)]

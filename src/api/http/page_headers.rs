@@ -24,12 +24,17 @@ const API_PAGE_POLICY: HeaderValue = HeaderValue::from_static(
      blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
 
+/// Determines the pages that may show a response as an image or run it as a script (Fetch, section
+/// 3.7).
+const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
+
 /// The headers of every response. A response that is not a page loads nothing.
-const ALWAYS: [(HeaderName, HeaderValue); 4] = [
+const ALWAYS: [(HeaderName, HeaderValue); 5] = [
     (
         CONTENT_SECURITY_POLICY,
         HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'"),
     ),
+    (RESOURCE_POLICY, HeaderValue::from_static("same-origin")),
     (REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
     (X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
     (X_FRAME_OPTIONS, HeaderValue::from_static("DENY")),
@@ -43,6 +48,14 @@ pub(in crate::api) async fn of_web_page(response: Response) -> Response {
 /// Adds the policy of the API page.
 pub(in crate::api) async fn of_api_page(response: Response) -> Response {
     with_policy(response, API_PAGE_POLICY)
+}
+
+/// Permits pages of other origins to show a response. A server with `access.cors_origins` refuses the
+/// requests of other pages itself.
+pub(in crate::api) async fn for_other_origins(mut response: Response) -> Response {
+    let policy = HeaderValue::from_static("cross-origin");
+    response.headers_mut().insert(RESOURCE_POLICY, policy);
+    response
 }
 
 fn with_policy(mut response: Response, policy: HeaderValue) -> Response {

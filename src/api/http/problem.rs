@@ -108,7 +108,10 @@ impl Problem {
             )),
             StatusCode::METHOD_NOT_ALLOWED => Some(Self::new(
                 ProblemKind::MethodNotAllowed,
-                format!("{path} does not support {method}: use a method of the header Allow"),
+                format!(
+                    "{path} does not support {method}: use {}",
+                    remedy_for_method(method, path)
+                ),
             )),
             status if status.is_client_error() => Some(Self::new(
                 ProblemKind::MalformedRequest,
@@ -240,4 +243,12 @@ pub(in crate::api) struct ProblemBody {
     #[serde(flatten)]
     #[schema(ignore)]
     members: BTreeMap<&'static str, Value>,
+}
+/// Names the resource that a client probably means, or the header with the methods.
+fn remedy_for_method(method: &str, path: &str) -> String {
+    let camera = path.strip_prefix("/results/");
+    match camera.filter(|camera| method == "GET" && !camera.contains('/')) {
+        Some(camera) => format!("/results/{camera}/latest"),
+        None => "a method of the header Allow".to_owned(),
+    }
 }

@@ -1,9 +1,9 @@
 //! The parameters of a request as names and values.
 
 use axum::{extract::Query, http::Uri};
+use lookdown_detect::parameters::{ParameterError, ParameterSpec};
 
 use super::problem::{Problem, ProblemKind};
-use crate::pipeline::{ParameterError, ParameterSpec};
 
 /// Returns the names and values of the query parameters.
 pub(in crate::api) fn query_parameters(uri: &Uri) -> Result<Vec<(String, String)>, Problem> {

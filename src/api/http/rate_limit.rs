@@ -18,6 +18,7 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use lookdown_detect::fairness::Client;
 use parking_lot::Mutex;
 
 use self::buckets::{Buckets, Standing};
@@ -25,7 +26,6 @@ use super::{
     access::Access,
     problem::{Problem, ProblemKind},
 };
-use crate::fairness::Client;
 
 pub(in crate::api) const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 pub(in crate::api) const RATE_LIMIT_POLICY: HeaderName =

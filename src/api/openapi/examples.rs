@@ -48,6 +48,13 @@ fn requests() -> Vec<Row> {
             FORM,
             deepstack(frame),
         ),
+        ("post", "/v2/models/{name}/infer", JSON, infer_request()),
+        (
+            "post",
+            "/v2/models/{name}/versions/{version}/infer",
+            JSON,
+            infer_request(),
+        ),
         ("post", "/v2/repository/index", JSON, json!({"ready": true})),
         ("post", "/v2/repository/models/{name}/load", JSON, json!({})),
         (
@@ -57,6 +64,15 @@ fn requests() -> Vec<Row> {
             json!({}),
         ),
     ]
+}
+
+/// The request of a frame, whose bytes JSON carries in Base64.
+fn infer_request() -> Value {
+    json!({
+        "id": "17",
+        "parameters": {"calibration": "lobby", "profile": "fast"},
+        "inputs": [{"name": "image", "datatype": "BYTES", "shape": [1], "data": ["/9j/4AAQSkZJRg…"]}]
+    })
 }
 
 fn responses() -> Vec<Row> {
@@ -119,8 +135,9 @@ fn model_ready() -> Value {
 
 #[cfg(test)]
 mod tests {
+    use lookdown_lens::calibration::CalibrationFile;
+
     use super::*;
-    use crate::calibration::CalibrationFile;
 
     #[test]
     fn the_example_calibration_is_accepted() {

@@ -2,23 +2,20 @@
 //! Defaults are in the descriptions alone: generated clients would send a `default`, in the query
 //! and in the form, and a repeated parameter is refused.
 
+use lookdown_detect::parameters::{
+    DetectParameters, Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec,
+};
 use serde_json::Value;
 use utoipa::{
     IntoParams, PartialSchema, ToSchema,
     openapi::{
-        KnownFormat, Object, ObjectBuilder, RefOr, Required, Schema, SchemaFormat,
+        Components, KnownFormat, ObjectBuilder, Ref, RefOr, Required, Schema, SchemaFormat,
         path::{Parameter, ParameterBuilder, ParameterIn},
         schema::{AdditionalProperties, Type},
     },
 };
 
-use crate::{
-    annotated_image::AnnotationOptions,
-    api::parameters,
-    pipeline::{
-        DetectParameters, Interface, JsonType, ParameterDefault, ParameterKind, ParameterSpec,
-    },
-};
+use crate::{annotated_image::AnnotationOptions, api::parameters};
 
 /// The parameters of `POST /detect` in the query.
 pub(in crate::api) struct DetectQuery;
@@ -83,13 +80,35 @@ impl PartialSchema for DetectForm {
     }
 }
 
+/// The names of schemas for parameters with a fixed choice of values. Generated clients have one
+/// type for each.
+const CHOICE_SCHEMAS: [(&str, &str); 3] = [
+    ("profile", "Profile"),
+    ("refine", "Refinement"),
+    ("format", "AnswerFormat"),
+];
+
+/// Adds the schemas of parameters with a fixed choice of values.
+pub(super) fn add_choices(components: &mut Components) {
+    let names = CHOICE_SCHEMAS.iter();
+    for (spec, (_, schema)) in names.filter_map(|row| Some((named(row.0)?, row))) {
+        let values = value_schema(spec.kind).description(Some(spec.help));
+        components
+            .schemas
+            .insert((*schema).to_owned(), values.into());
+    }
+}
+
+fn named(name: &str) -> Option<&'static ParameterSpec> {
+    parameters::all().find(|spec| spec.name == name)
+}
+
 /// Returns the parameters of an interface as fields of an object.
-pub(in crate::api) fn fields(interface: Interface) -> impl Iterator<Item = (&'static str, Object)> {
+pub(in crate::api) fn fields(
+    interface: Interface,
+) -> impl Iterator<Item = (&'static str, RefOr<Schema>)> {
     let offered = parameters::all().filter(move |spec| spec.is_offered_by(interface));
-    offered.map(|spec| {
-        let field = schema(spec.kind).description(Some(description(spec)));
-        (spec.name, field.build())
-    })
+    offered.map(|spec| (spec.name, schema(spec, Some(description(spec)))))
 }
 
 fn in_query(spec: &ParameterSpec) -> Parameter {
@@ -98,7 +117,7 @@ fn in_query(spec: &ParameterSpec) -> Parameter {
         .parameter_in(ParameterIn::Query)
         .required(Required::False)
         .description(Some(description(spec)))
-        .schema(Some(schema(spec.kind)))
+        .schema(Some(schema(spec, None)))
         .example(spec.example.map(|example| json(spec.kind, example)))
         .build()
 }
@@ -121,7 +140,20 @@ fn json(kind: ParameterKind, value: &str) -> Value {
     }
 }
 
-fn schema(kind: ParameterKind) -> ObjectBuilder {
+/// Returns a reference to the named schema of the values, or the schema itself.
+fn schema(spec: &ParameterSpec, description: Option<String>) -> RefOr<Schema> {
+    let choice = CHOICE_SCHEMAS.iter().find(|(name, _)| *name == spec.name);
+    match choice {
+        Some((_, schema)) => {
+            let mut reference = Ref::from_schema_name(*schema);
+            reference.description = description.unwrap_or_default();
+            reference.into()
+        }
+        None => value_schema(spec.kind).description(description).into(),
+    }
+}
+
+fn value_schema(kind: ParameterKind) -> ObjectBuilder {
     let of_type = |schema_type| ObjectBuilder::new().schema_type(schema_type);
     let format = |format| Some(SchemaFormat::KnownFormat(format));
     let number = || of_type(Type::Number).format(format(KnownFormat::Double));
@@ -188,6 +220,14 @@ mod tests {
         distinct.sort_unstable();
         distinct.dedup();
         assert_eq!(distinct.len(), expected.len());
+    }
+
+    #[test]
+    fn every_choice_of_values_has_a_named_schema() {
+        let choices = parameters::all()
+            .filter(|spec| matches!(spec.kind, ParameterKind::Choice(_)))
+            .map(|spec| spec.name);
+        assert!(choices.eq(CHOICE_SCHEMAS.iter().map(|(name, _)| *name)));
     }
 
     #[test]

@@ -11,6 +11,7 @@ use axum::{
     Extension, Json,
     extract::{Path, State},
 };
+use lookdown_lens::calibration::CalibrationId;
 
 use self::{
     answer::{DeepStackAnswer, DeepStackModels},
@@ -24,7 +25,6 @@ use crate::{
         require_scope::RequireRead,
         run_detection::run_detection,
     },
-    calibration::CalibrationId,
     telemetry::RequestTrace,
 };
 

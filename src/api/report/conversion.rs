@@ -1,16 +1,18 @@
 //! Converts the report of the pipeline to the units and decimals of the API.
 
+use lookdown_detect::{
+    imaging::lens_circle::LensCircle,
+    parameters::DefaultUsed,
+    pipeline::{self, DetectionReport, ModelUsed},
+};
+use lookdown_lens::warning::Warning;
+
 use super::{
     Report, ReportBearing, ReportBox, ReportCalibration, ReportCircle, ReportDefault, ReportFloor,
     ReportImage, ReportModel, ReportOrientedBox, ReportPerson, ReportRefinement, ReportTimings,
     ReportViews, ReportWarning, ReportZone,
 };
-use crate::{
-    imaging::lens_circle::LensCircle,
-    pipeline::{self, DefaultUsed, DetectionReport, ModelUsed},
-    rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share},
-    warning::Warning,
-};
+use crate::rounding::{azimuth_degrees, degrees, metres, milliseconds, pixels, share};
 
 impl From<&DetectionReport> for Report {
     fn from(report: &DetectionReport) -> Self {

@@ -6,6 +6,7 @@ use axum::{
     http::{HeaderValue, header::CONTENT_TYPE},
     response::{AppendHeaders, IntoResponse},
 };
+use lookdown_detect::pipeline::DetectJob;
 
 use crate::{
     api::{
@@ -19,7 +20,6 @@ use crate::{
         run_detection::{DetectionOutcome, run_detection},
         upload::Upload,
     },
-    pipeline::DetectJob,
     telemetry::RequestTrace,
 };
 
@@ -47,7 +47,7 @@ use crate::{
         (status = OK, description = "The persons found, possibly none.",
          content(
             (Report = "application/json"),
-            ("image/jpeg"), ("image/png"),
+            (inline(RawBytes) = "image/jpeg"), (inline(RawBytes) = "image/png"),
             (Object = "application/geo+json"), (Object = "application/x.coco+json"),
             (Object = "application/x.cepdof+json"), (Object = "application/x.label-studio+json"),
             (String = "application/xml"), (String = "text/plain"),

@@ -8,12 +8,12 @@ use axum::{
     http::{HeaderMap, header::CONTENT_TYPE},
     response::IntoResponse,
 };
+use lookdown_detect::metrics::gauge_value;
 use utoipa::ToSchema;
 
 use crate::{
     api::{ApiState, http::problem::Problem, require_scope::RequireRead},
     calibration_store::CalibrationsHealth,
-    metrics::gauge_value,
 };
 
 /// Largest number of invalid files in a response.

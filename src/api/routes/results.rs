@@ -17,6 +17,7 @@ use axum::{
     response::IntoResponse,
 };
 use jiff::Timestamp;
+use lookdown_common::text::Quoted;
 
 use self::row::CameraRow;
 use crate::{
@@ -25,7 +26,6 @@ use crate::{
         http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
     },
-    quoted::Quoted,
     results::{ListenError, Unreachable},
 };
 

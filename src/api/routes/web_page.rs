@@ -14,19 +14,17 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
 
-use crate::{
-    api::{
-        ApiState,
-        http::{
-            entity_tags::{entity_tag, is_unmodified},
-            page_headers,
-            problem::{Problem, ProblemKind},
-        },
+use crate::api::{
+    ApiState,
+    http::{
+        entity_tags::{entity_tag, is_unmodified},
+        page_headers,
+        problem::{Problem, ProblemKind},
     },
-    revision::revision_of,
 };
 
 /// A file of the page.

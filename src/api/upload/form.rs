@@ -67,6 +67,9 @@ pub(super) async fn parse(
             FieldUse::Frame => {
                 file_name = field.file_name().and_then(name_of_file);
                 let bytes = field.bytes().await.map_err(broken)?;
+                if file_name.is_none() && is_file_name(&bytes) {
+                    return Err(name_instead_of_file(&name));
+                }
                 if image.replace(bytes).is_some() {
                     return Err(second_image(&name));
                 }
@@ -103,6 +106,19 @@ fn missing_image() -> Problem {
     let fault = "the form has no frame: send one in the field `img` or `image`, as in curl -F \
                  img=@frame.jpg";
     Problem::of_parameter(ProblemKind::MissingImage, "img", fault)
+}
+
+/// Returns true for the name of an image file, which curl sends for `-F img=frame.jpg`.
+fn is_file_name(content: &[u8]) -> bool {
+    let endings = [".jpg", ".jpeg", ".png", ".webp"];
+    let text = str::from_utf8(content).unwrap_or_default().to_lowercase();
+    text.len() <= MAX_VALUE_BYTES && endings.iter().any(|ending| text.ends_with(ending))
+}
+
+fn name_instead_of_file(name: &str) -> Problem {
+    let fault = "the value is the name of a file, not its content: put @ before the name, as in \
+                 curl -F img=@frame.jpg";
+    Problem::of_parameter(ProblemKind::MissingImage, name, fault)
 }
 
 fn second_image(name: &str) -> Problem {

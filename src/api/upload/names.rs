@@ -1,10 +1,9 @@
 //! The parameters that may accompany a frame.
 
+use lookdown_detect::parameters::ParameterError;
+
 use super::form::FieldUse;
-use crate::{
-    api::{http::problem::Problem, parameters},
-    pipeline::ParameterError,
-};
+use crate::api::{http::problem::Problem, parameters};
 
 /// The names of the frame's field.
 const FRAME_NAMES: [&str; 2] = ["img", "image"];

@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
+use lookdown_lens::calibration::CalibrationId;
+
 use super::{
     CalibrationEntry, Calibrations, ChangeError, Reading, content::import, load::LoadedFile,
     named_file::written_name,
 };
-use crate::{
-    calibration::CalibrationId,
-    calibration_store::{Replaces, StoredFile},
-};
+use crate::calibration_store::{Replaces, StoredFile};
 
 /// The precondition of a change to a calibration.
 #[derive(Debug, Clone, PartialEq, Eq)]

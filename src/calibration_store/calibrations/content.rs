@@ -2,17 +2,18 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::ChangeError;
-use crate::{
+use lookdown_detect::parameters::DetectDefaults;
+use lookdown_lens::{
     calibration::{
         Calibration, CalibrationFile, CalibrationId, FormatError,
         export::Target,
         formats::FileCamera,
         native::{NativeCalibration, NativeImage, NativeValue},
     },
-    parameters::DetectDefaults,
     warning::Warning,
 };
+
+use super::ChangeError;
 
 /// Most characters of a camera's name that are repeated to its sender.
 const MAX_NAME_CHARS: usize = 64;

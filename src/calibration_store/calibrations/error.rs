@@ -1,9 +1,8 @@
 //! Reasons for which a calibration cannot be used or was not changed, or for which the outcome is unknown.
 
-use crate::{
-    calibration::{CalibrationId, FormatError},
-    calibration_store::StoreError,
-};
+use lookdown_lens::calibration::{CalibrationId, FormatError};
+
+use crate::calibration_store::StoreError;
 
 /// A calibration that was not changed, or that could not be read back afterwards. Every message is
 /// one sentence with the remedy.

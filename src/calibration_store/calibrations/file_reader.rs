@@ -12,8 +12,9 @@ use std::{
     time::Duration,
 };
 
+use lookdown_lens::calibration::{CalibrationId, FormatError};
+
 use super::content::{Cameras, cameras};
-use crate::calibration::{CalibrationId, FormatError};
 
 /// Longest time for a file.
 const TIME_LIMIT: Duration = Duration::from_secs(5);

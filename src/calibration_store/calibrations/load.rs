@@ -2,12 +2,14 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use lookdown_lens::calibration::CalibrationId;
+
 use super::{
     content::CalibrationEntry,
     file_reader::{FileReader, Unread},
     named_file::NamedFile,
 };
-use crate::{calibration::CalibrationId, calibration_store::StoreError};
+use crate::calibration_store::StoreError;
 
 /// A file of the store.
 #[derive(Debug)]

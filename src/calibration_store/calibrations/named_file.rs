@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::{calibration::CalibrationId, calibration_store::StoredFile};
+use lookdown_lens::calibration::CalibrationId;
+
+use crate::calibration_store::StoredFile;
 
 /// File endings that are read; of several files of one ID the first in this order counts.
 const ENDINGS: [&str; 6] = ["json", "yaml", "yml", "toml", "xml", "txt"];

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
+use lookdown_lens::calibration::{CalibrationFile, CalibrationId};
 use parking_lot::MutexGuard;
 
 use super::{
@@ -10,10 +11,7 @@ use super::{
     named_file::{NamedFile, by_id},
     snapshot::Snapshot,
 };
-use crate::{
-    calibration::{CalibrationFile, CalibrationId},
-    calibration_store::{READ_AT_ONCE, StoreError},
-};
+use crate::calibration_store::{READ_AT_ONCE, StoreError};
 
 /// The files of a store by the ID in their names.
 type Files = BTreeMap<CalibrationId, Arc<LoadedFile>>;

@@ -5,12 +5,11 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_detect::metrics::{gauge_value, replace_info};
+use lookdown_lens::{calibration::CalibrationId, revision::revision_of};
+
 use super::{CalibrationEntry, load::LoadedFile};
-use crate::{
-    calibration::CalibrationId,
-    metrics::{Metrics, gauge_value, replace_info},
-    revision::revision_of,
-};
+use crate::metrics::Metrics;
 
 /// All calibrations at one moment; never changed, only replaced.
 #[derive(Debug, Default)]

@@ -9,20 +9,20 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
+use lookdown_detect::imaging::{
+    MaskedPixels,
+    annotate::{encode_jpeg, sketch_areas, sketch_lens, sketch_lines},
+};
+use lookdown_lens::{
+    calibration::{Areas, Calibration, CameraGeometry},
+    geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
+};
 
 use super::{
     read_frame,
     source::{NamedCamera, Source},
 };
 use crate::cli::output::UNWRITABLE;
-use crate::{
-    calibration::{Areas, Calibration, CameraGeometry},
-    geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
-    imaging::{
-        MaskedPixels,
-        annotate::{encode_jpeg, sketch_areas, sketch_lens, sketch_lines},
-    },
-};
 
 /// The resolution of the plan's views: the input side of the default network, pixels.
 const VIEW_SIDE: u32 = 416;

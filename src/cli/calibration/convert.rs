@@ -9,16 +9,14 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
+use lookdown_lens::calibration::{
+    export::Target,
+    native::{NativeCalibration, NativeImage},
+};
 
 use super::source::Source;
 use crate::cli::output::UNWRITABLE;
-use crate::{
-    calibration::{
-        export::Target,
-        native::{NativeCalibration, NativeImage},
-    },
-    cli::parameters::one_of,
-};
+use crate::cli::parameters::one_of;
 
 /// Arguments of `lookdown calibration convert`.
 #[derive(Debug, Args)]
@@ -46,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let (width, height) = calibration.image_size();
     let id = match &arguments.id {
         Some(id) => id
-            .parse::<crate::calibration::CalibrationId>()
+            .parse::<lookdown_lens::calibration::CalibrationId>()
             .context("--id")?,
         None => calibration.id().clone(),
     };

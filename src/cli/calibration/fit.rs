@@ -10,10 +10,8 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-
-use super::read_frame;
-use crate::cli::output::UNWRITABLE;
-use crate::{
+use lookdown_detect::imaging::lens_circle::{AgreedCircle, agreed_circle, find_lens_circle};
+use lookdown_lens::{
     calibration::{
         CalibrationId,
         export::Target,
@@ -23,8 +21,10 @@ use crate::{
         Lens, Ray,
         lens::{Equidistant, Equisolid, LensModel, Orthographic, Stereographic},
     },
-    imaging::lens_circle::{AgreedCircle, agreed_circle, find_lens_circle},
 };
+
+use super::read_frame;
+use crate::cli::output::UNWRITABLE;
 
 /// Arguments of `lookdown calibration fit`.
 #[derive(Debug, Args)]

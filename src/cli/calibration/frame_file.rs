@@ -3,8 +3,7 @@
 use std::{fs, path::Path};
 
 use anyhow::Context;
-
-use crate::imaging::{
+use lookdown_detect::imaging::{
     Frame,
     decode::{DecodeLimits, decode},
 };

@@ -4,16 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-
-use crate::{
-    calibration::{
-        Calibration, CalibrationFile, FormatError,
-        formats::{FileCamera, Format},
-        native::NativeImage,
-        read_content,
-    },
-    calibration_store::defaults,
+use lookdown_lens::calibration::{
+    Calibration, CalibrationFile, FormatError,
+    formats::{FileCamera, Format},
+    native::NativeImage,
+    read_content,
 };
+
+use crate::calibration_store::defaults;
 
 /// The arguments that select a file, and a camera of it.
 #[derive(Debug, Args)]

@@ -7,12 +7,10 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use lookdown_detect::pipeline::DetectionReport;
 
 use super::pictures::Picture;
-use crate::{
-    annotation_formats::{AnnotatedImage, AnnotationFormat, BoxKind},
-    pipeline::DetectionReport,
-};
+use crate::annotation_formats::{AnnotatedImage, AnnotationFormat, BoxKind};
 
 /// The annotations of one run.
 pub(super) struct Labels {

@@ -8,9 +8,8 @@ use std::{
 
 use anyhow::{Context, bail};
 use bytes::Bytes;
-use lookdown_watch::{
-    ImageReader, VideoFrames, VideoOptions, VideoWriter, parse_duration, video_duration,
-};
+use lookdown_common::parse_duration;
+use lookdown_watch::{ImageReader, VideoFrames, VideoOptions, VideoWriter, video_duration};
 use tokio::runtime::{self, Runtime};
 
 use crate::cli::progress::Progress;

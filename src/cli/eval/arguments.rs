@@ -6,14 +6,11 @@ use clap::{
     Args,
     builder::{PossibleValuesParser, TypedValueParser},
 };
+use lookdown_detect::{detection::Refinement, parameters::Profile};
+use lookdown_lens::geometry::FieldOfViewReading;
 
 use super::{plot_file::PlotFile, truth::TruthFlags};
-use crate::{
-    cli::{parameters::one_of, settings_file::SettingsFile},
-    detection::Refinement,
-    geometry::FieldOfViewReading,
-    pipeline::Profile,
-};
+use crate::cli::{parameters::one_of, settings_file::SettingsFile};
 
 /// C_t without `--score-threshold`: low, as average precision considers all scores.
 const DEFAULT_SCORE_THRESHOLD: &str = "0.001";

@@ -1,11 +1,9 @@
 //! One pass over a data set for several rows.
 
-use crate::{
-    cli::progress::Progress,
-    evaluation::{DataSet, DetectedRow, EvaluationError, detect},
-    pipeline::{DetectParameters, Engine},
-    settings::Settings,
-};
+use lookdown_detect::{parameters::DetectParameters, pipeline::Engine};
+use lookdown_eval::{DataSet, DetectedRow, EvaluationError, detect};
+
+use crate::{cli::progress::Progress, settings::Settings};
 
 /// Detects the persons of a data set once for all rows of a group.
 pub(super) fn detect_group(

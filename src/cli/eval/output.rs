@@ -3,13 +3,13 @@
 use std::io::{self, Write};
 
 use anyhow::Context;
+use lookdown_eval::{DataSet, DetectedRow, EvaluatedRow, precision_recall_plot};
 
 use super::{
     Arguments,
     table::{self, Row},
 };
 use crate::cli::output::UNWRITABLE;
-use crate::evaluation::{DataSet, DetectedRow, EvaluatedRow, precision_recall_plot};
 
 /// The rows of one run.
 pub(super) struct Output<'a> {

@@ -3,8 +3,7 @@
 use std::{ffi::OsStr, fs, path::Path, str::FromStr};
 
 use anyhow::Context;
-
-use crate::evaluation::LinePlot;
+use lookdown_eval::LinePlot;
 
 /// The output file of a plot: SVG or PNG, by its extension.
 #[derive(Debug, Clone)]

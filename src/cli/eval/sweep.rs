@@ -7,6 +7,8 @@ use std::{
 };
 
 use anyhow::Context;
+use lookdown_detect::imaging::{Frame, annotate::encode_jpeg, decode::decode};
+use lookdown_eval::{DataSet, DetectedRow, EvaluatedRow, sweep};
 
 use super::{
     Arguments, detect_group,
@@ -16,8 +18,6 @@ use super::{
 use crate::cli::output::UNWRITABLE;
 use crate::{
     app::{decode_limits, evaluation_engine},
-    evaluation::{DataSet, DetectedRow, EvaluatedRow, sweep},
-    imaging::{Frame, annotate::encode_jpeg, decode::decode},
     settings::LimitSettings,
 };
 

@@ -2,13 +2,9 @@
 
 use std::fmt;
 
+use lookdown_detect::{detection::Refinement, parameters::Profile};
+use lookdown_eval::{DetectedRow, EvaluatedRow, Stratification, Stratum};
 use serde::Serialize;
-
-use crate::{
-    detection::Refinement,
-    evaluation::{DetectedRow, EvaluatedRow, Stratification, Stratum},
-    pipeline::Profile,
-};
 
 /// One row: a JSON object, or a line of the table by its `Display`. Unknown values of detections
 /// from a file are null, or a dash.

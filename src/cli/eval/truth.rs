@@ -7,13 +7,13 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
+use lookdown_detect::pipeline::CalibrationLookup;
+use lookdown_eval::{DataSet, Scoring, Stratification};
+use lookdown_lens::calibration::{Calibration, CalibrationId};
 
 use crate::{
     app::open_calibrations,
-    calibration::{Calibration, CalibrationId},
     cli::{SettingsFile, parameters::one_of},
-    evaluation::{DataSet, Scoring, Stratification},
-    pipeline::CalibrationLookup,
 };
 
 /// The flags that select a data set.

@@ -1,13 +1,13 @@
 //! The variants to evaluate: groups of parameters that share an inference per image.
 
 use anyhow::{Context, bail};
+use lookdown_detect::{
+    detection::Refinement,
+    parameters::{DetectParameters, ParameterError, Profile},
+};
 use strum::VariantArray;
 
 use super::Arguments;
-use crate::{
-    detection::Refinement,
-    pipeline::{DetectParameters, ParameterError, Profile},
-};
 
 /// The rows of the paper's table: its method with its three refinements, and the detector on the
 /// fisheye frame itself (`Omni`).

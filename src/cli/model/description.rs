@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::{
+use lookdown_detect::{
     imaging::ChannelOrder,
     inference::{ModelDescription, OnnxTensor},
 };

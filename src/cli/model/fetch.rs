@@ -8,10 +8,10 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::Args;
+use lookdown_detect::inference::{ModelManifest, ModelSource, fetch_weights, model_names};
 
 use crate::{
     cli::{complete, output::UNWRITABLE, settings_file::SettingsFile},
-    inference::{ModelManifest, ModelSource, fetch_weights, model_names},
     settings::Settings,
 };
 

@@ -6,11 +6,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{
-    app::{Assembly, assemble},
+use lookdown_detect::{
     imaging::ViewBatch,
     inference::{InferenceError, Model},
-    pipeline::Profile,
+    parameters::Profile,
+};
+
+use crate::{
+    app::{Assembly, assemble},
     settings::Settings,
 };
 

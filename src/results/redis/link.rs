@@ -1,9 +1,10 @@
 //! The state of the link to Redis: one shared connection, or the reason why there is none.
 
+use lookdown_common::text::one_line;
 use redis::{RedisError, RetryMethod, aio::MultiplexedConnection};
 use tokio::sync::watch;
 
-use crate::{metrics::IntGauge, quoted::one_line, results::Unreachable};
+use crate::{metrics::IntGauge, results::Unreachable};
 
 /// The shared connection to Redis, if there is one now.
 #[derive(Debug)]

@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
+use lookdown_common::text::one_line;
 use redis::{RedisResult, Script, aio::MultiplexedConnection};
 use uuid::Uuid;
 
 use super::{Shared, link::is_refusal, outbox::PendingReport};
-use crate::{quoted::one_line, results::Cameras};
+use crate::results::Cameras;
 
 /// The script that stores a report in Redis.
 const RECORD: &str = concat!(include_str!("forget.lua"), include_str!("record.lua"));

@@ -2,6 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
+use lookdown_common::text::one_line;
 use redis::{RedisResult, aio::MultiplexedConnection};
 use tokio::time::{Instant, sleep};
 
@@ -10,7 +11,7 @@ use super::{
     news::{self, Positions},
     pushes::Pushes,
 };
-use crate::{quoted::one_line, results::ReportId};
+use crate::results::ReportId;
 
 /// Pause before the second attempt to connect. Each pause is twice as long as the one before.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);

@@ -83,7 +83,11 @@ pub(in crate::settings) fn address() -> Form<SocketAddr> {
     parsed(
         "IP address and port",
         |text| {
-            text.parse().map_err(|_| {
+            // A name is not looked up, because it may stand for several addresses.
+            let ip = text
+                .strip_prefix("localhost:")
+                .map(|port| format!("127.0.0.1:{port}"));
+            ip.as_deref().unwrap_or(text).parse().map_err(|_| {
                 let remedy = "give an IP address and a port, such as 127.0.0.1:8080 or [::]:8080";
                 Refusal::Shown(remedy.to_owned())
             })

@@ -1,6 +1,6 @@
 //! Custom models: effects of a manifest and an ONNX file on the network input and the detections.
 
-use lookdown::{
+use lookdown_detect::{
     imaging::{Frame, Letterbox, NetworkInput, ViewBatch},
     inference::{Detector, HeadOutput, Layout, OnnxDetector},
 };

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, process::Command};
 
-use lookdown::{
+use lookdown_detect::{
     imaging::{Frame, Letterbox, ViewBatch},
     inference::{CandidateOptions, Detector, OnnxDetector, OnnxOptions},
 };

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use lookdown::inference::{
+use lookdown_detect::inference::{
     CandidateOptions, Device, InferenceError, Model, OnnxDetector, OnnxOptions, onnx_loader,
 };
 use tempfile::TempDir;

@@ -10,14 +10,14 @@ use std::{
     thread,
 };
 
-use lookdown::{
+use lookdown_detect::{
     inference::{
         InferenceError, ModelFolder, ModelRepository, RepositoryError, RepositoryOptions,
         RepositoryRow,
     },
     metrics::DetectMetrics,
-    revision::sha256_of,
 };
+use lookdown_lens::revision::sha256_of;
 use tempfile::TempDir;
 
 use crate::models::folder::{fixture, model_of_two_sessions, write};

@@ -2,7 +2,7 @@
 
 use std::{fs, os::unix::fs::symlink};
 
-use lookdown::inference::{Device, InferenceError, OnnxDetector, OnnxOptions};
+use lookdown_detect::inference::{Device, InferenceError, OnnxDetector, OnnxOptions};
 use tempfile::TempDir;
 
 use crate::models::folder::{fixture, library, load, options, refusal, write};

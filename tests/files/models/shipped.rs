@@ -5,12 +5,15 @@ use std::{fs, sync::Arc};
 use lookdown::{
     annotated_image::{AnnotationOptions, ImageFormat, annotated_image},
     app::engine_for,
-    calibration::Calibration,
-    detection::{BBox, FramePixels},
-    inference::is_fetched,
-    pipeline::{DetectJob, DetectParameters, DetectionReport, JobImage},
     settings,
 };
+use lookdown_detect::{
+    detection::{BBox, FramePixels},
+    inference::is_fetched,
+    parameters::DetectParameters,
+    pipeline::{DetectJob, DetectionReport, JobImage},
+};
+use lookdown_lens::calibration::Calibration;
 use serde_json::Value;
 
 use crate::models::folder::of_repository;

@@ -21,10 +21,12 @@ use http_body_util::BodyExt;
 use lookdown::{
     api::{self, ApiOptions, ApiState, Readiness},
     calibration_store::{Calibrations, FolderStore},
-    inference::{ModelFolder, ModelRepository, RepositoryOptions},
     metrics::Metrics,
-    pipeline::{Engine, EngineOptions, WorkerPool},
     results::{MemoryResults, ResultLimits},
+};
+use lookdown_detect::{
+    inference::{ModelFolder, ModelRepository, RepositoryOptions},
+    pipeline::{Engine, EngineOptions, WorkerPool},
 };
 use serde_json::Value;
 use tempfile::TempDir;

@@ -160,3 +160,9 @@ fn credentials_in_a_collector_s_address_are_not_repeated() {
     assert_eq!(told.as_str(), "https://collector.example/otlp");
     assert_eq!(defaults().traces.otlp_endpoint, None);
 }
+
+#[test]
+fn localhost_is_an_address_to_listen_on() {
+    let settings = from_environment("LOOKDOWN__SERVER__LISTEN", "localhost:8081").unwrap();
+    assert_eq!(settings.server.listen.to_string(), "127.0.0.1:8081");
+}

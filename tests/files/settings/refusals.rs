@@ -4,7 +4,7 @@ use std::{collections::HashMap, path::Path};
 
 use lookdown::settings::load;
 
-use crate::settings::{from_environment, from_file, refusal};
+use crate::settings::{environment, from_environment, from_file, refusal};
 
 #[test]
 fn an_unknown_key_is_refused_by_name() {
@@ -363,6 +363,25 @@ fn the_password_of_a_broker_is_neither_shown_nor_repeated() {
     let refused = refusal(from_environment("LOOKDOWN__MQTT__URL", &format!("{url}/x")));
     assert!(refused.contains("mqtt.url"), "{refused}");
     assert!(!refused.contains("s3cret"), "{refused}");
+}
+
+#[test]
+fn the_password_of_a_broker_has_a_variable_of_its_own() {
+    let url = ("LOOKDOWN__MQTT__URL", "mqtt://home@broker");
+    let password = ("LOOKDOWN__MQTT__PASSWORD", "s3cret");
+    let settings = load(None, environment(&[url, password])).unwrap();
+    assert!(settings.mqtt.is_some());
+    assert!(!format!("{settings:?}").contains("s3cret"));
+    for (url, remedy) in [
+        ("mqtt://broker", "mqtt://user@host"),
+        ("mqtt://home:other@broker", "remove one"),
+    ] {
+        let variables = [("LOOKDOWN__MQTT__URL", url), password];
+        let refused = refusal(load(None, environment(&variables)));
+        let names_key = refused.contains("mqtt.password");
+        assert!(names_key && refused.contains(remedy), "{refused}");
+        assert!(!refused.contains("s3cret"), "{refused}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Files with the parameters of a camera in `fixtures/vectors` project to its known answers.
 
-use lookdown::{calibration::CalibrationFile, geometry::Pixel};
+use lookdown_lens::{calibration::CalibrationFile, geometry::Pixel};
 use serde_json::Value;
 
 use crate::calibration_formats::{camera, fixture, json, lens, ray};

@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use lookdown::{
-    calibration::CalibrationFile,
-    calibration_store::{Calibrations, FolderStore, Reading, WriteCondition},
-};
+use lookdown::calibration_store::{Calibrations, FolderStore, Reading, WriteCondition};
+use lookdown_lens::calibration::CalibrationFile;
 use proptest::prelude::*;
 
 use crate::calibration_formats::refusal;

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use lookdown::{
+use lookdown_lens::{
     calibration::{CalibrationFile, export::Target, native::NativeCalibration},
     geometry::{Lens, Ray},
 };

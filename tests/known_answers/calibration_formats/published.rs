@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use lookdown::geometry::{
+use lookdown_lens::geometry::{
     Pixel,
     pixels::{PixelConvention, cross_half_pixel},
 };
@@ -223,7 +223,7 @@ fn moil_radii() {
     let lens = lens(&camera(&content, 0));
     for (degrees, radius) in set["alpha_deg_to_r_px"].as_object().unwrap() {
         let theta = degrees.parse::<f64>().unwrap().to_radians();
-        let ray = lookdown::geometry::Ray::new(theta.sin(), 0.0, theta.cos());
+        let ray = lookdown_lens::geometry::Ray::new(theta.sin(), 0.0, theta.cos());
         let pixel = lens.project(&ray).unwrap();
         assert!((pixel.x - 1439.0 - radius.as_f64().unwrap()).abs() < 1e-9);
     }

@@ -1,6 +1,6 @@
 //! Details of calibration formats that are easily misread.
 
-use lookdown::{calibration::CalibrationFile, geometry::lens::LensModel};
+use lookdown_lens::{calibration::CalibrationFile, geometry::lens::LensModel};
 
 use crate::calibration_formats::{camera, fixture, refusal};
 

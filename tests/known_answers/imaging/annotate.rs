@@ -1,11 +1,13 @@
 //! Annotated frames: painted pixels and encoding.
 
-use lookdown::imaging::Frame;
-use lookdown::imaging::annotate::{
-    Cancelled, Drawing, Head, Mark, OrientedMark, annotate, annotate_unless, encode_jpeg,
-    encode_png,
+use lookdown_detect::imaging::{
+    Frame,
+    annotate::{
+        Cancelled, Drawing, Head, Mark, OrientedMark, annotate, annotate_unless, encode_jpeg,
+        encode_png,
+    },
+    decode::{DecodeLimits, decode},
 };
-use lookdown::imaging::decode::{DecodeLimits, decode};
 use proptest::prelude::*;
 
 const GREY: [u8; 3] = [90, 90, 90];

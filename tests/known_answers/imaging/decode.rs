@@ -1,6 +1,8 @@
 //! Decoding of every accepted format, upright and in RGB, and refusal of everything else.
 
-use lookdown::imaging::decode::{DecodeError, DecodeLimits, DecodedFrame, ExceededLimit, decode};
+use lookdown_detect::imaging::decode::{
+    DecodeError, DecodeLimits, DecodedFrame, ExceededLimit, decode,
+};
 use proptest::prelude::*;
 
 fn fixture(name: &str) -> Vec<u8> {
@@ -216,7 +218,7 @@ fn the_format_is_detected_from_content_and_others_are_named() {
         other => panic!("{other}"),
     };
     assert_eq!(found(&fixture("picture.gif")), "in the format Gif");
-    assert_eq!(found(&fixture("picture.bmp")), "in the format Bmp");
+    assert_eq!(found(&fixture("picture.bmp")), "in the format BMP");
     assert_eq!(
         found(b"\0\0\0\x18ftypheic\0\0\0\0mif1"),
         "in the format HEIF"

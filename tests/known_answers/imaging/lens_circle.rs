@@ -1,7 +1,9 @@
 //! The lens circle of synthetic rooms with a known circle is found within half a percent.
 
-use lookdown::imaging::Frame;
-use lookdown::imaging::lens_circle::{LensCircle, assumed_circle, find_lens_circle};
+use lookdown_detect::imaging::{
+    Frame,
+    lens_circle::{LensCircle, assumed_circle, find_lens_circle},
+};
 use proptest::prelude::*;
 
 /// A room seen through a fisheye lens, rendered from formulas.

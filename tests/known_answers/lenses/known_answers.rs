@@ -1,6 +1,6 @@
 //! Common structure of all sets of known answers.
 
-use lookdown::geometry::{Lens, Pixel, Ray, lens::LensModel};
+use lookdown_lens::geometry::{Lens, Pixel, Ray, lens::LensModel};
 use serde_json::Value;
 
 /// Projections and unprojections of one camera. `None` where the lens must refuse.

@@ -62,10 +62,11 @@ pub fn absolute(module: &str, code: &str) -> String {
     code
 }
 
-/// The paths after `crate::`, also in lists of imports.
+/// The paths after `crate::` and after the names of the libraries, also in lists of imports.
 pub fn used_paths(code: &str) -> BTreeSet<String> {
     let mut used = BTreeSet::new();
-    for (start, name) in code.match_indices("crate::") {
+    let starts = ["crate::", "lookdown_lens::", "lookdown_detect::"];
+    for (start, name) in starts.iter().flat_map(|name| code.match_indices(name)) {
         let before = &code[..start];
         let ends_name = |c: char| c.is_alphanumeric() || c == '_' || c == '$';
         // A visibility is not a use.

@@ -7,9 +7,10 @@ use axum::{
     http::header::CONTENT_TYPE,
     response::{IntoResponse, Response},
 };
+use lookdown_tracking::Plane;
 
 use super::{Problem, Shared, check_known, now_ms};
-use crate::{scene::Scene, sums::Owner, tracking::Plane};
+use crate::{scene::Scene, sums::Owner};
 
 /// Least extent around a camera, metres.
 const AROUND_CAMERA_M: f64 = 4.0;

@@ -6,13 +6,14 @@ use axum::{
     extract::{Path, State},
     response::Response,
 };
+use lookdown_tracking::heat_map::Cell;
 use tokio::task::spawn_blocking;
 
 use super::{
     Problem, Shared,
     heat_map::{Parameters, colour, image, stored},
 };
-use crate::{definition::CameraDefinition, heat_map::Cell, sums::Owner};
+use crate::{definition::CameraDefinition, sums::Owner};
 
 /// Width of the image, pixels. Its height follows from the frame.
 const WIDTH: u32 = 480;

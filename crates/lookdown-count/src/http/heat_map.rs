@@ -9,13 +9,11 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
+use lookdown_tracking::heat_map::{CELL_M, Cell};
 use serde::Serialize;
 
 use super::{Problem, Shared, check_known, counts::unknown_parameter, query, time::TimeParameters};
-use crate::{
-    heat_map::{CELL_M, Cell},
-    sums::{DAY_MS, MINUTE_MS, Owner},
-};
+use crate::sums::{DAY_MS, MINUTE_MS, Owner};
 
 /// Most cells along a side of an answer: those with the most time decide.
 const MAX_SIDE: i64 = 400;

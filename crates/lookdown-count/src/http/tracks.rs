@@ -7,6 +7,7 @@ use axum::{
     extract::{Path, State},
 };
 use jiff::Timestamp;
+use lookdown_tracking::{Plane, TailPoint, Track};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -16,7 +17,6 @@ use crate::{
     scene::{Scene, SceneCamera},
     snapshot::{LineSnapshot, ZoneSnapshot},
     sums::Owner,
-    tracking::{Plane, TailPoint, Track},
 };
 
 /// Longest tail of an answer, seconds.

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use lookdown_tracking::heat_map::Cell;
 use rusqlite::{Connection, OptionalExtension, params};
 
-use super::{Store, StoreError};
+use super::{STATE_VERSION, Store, StoreError};
 use crate::{
-    engine::{Totals, ZoneTotal},
-    heat_map::Cell,
     scene::SceneState,
-    sums::{DAY_MS, LineDirection, Owner, PresenceSum, ZoneOf, ZoneSum},
+    sums::{DAY_MS, LineDirection, Owner, PresenceSum, Totals, ZoneOf, ZoneSum, ZoneTotal},
     webhooks::{HeldCondition, Message},
 };
 
@@ -195,12 +194,15 @@ fn scenes(connection: &Connection) -> rusqlite::Result<Vec<SceneState>> {
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
         let state: Vec<u8> = row.get(1)?;
-        match postcard::from_bytes(&state) {
-            Ok(state) => scenes.push(state),
-            Err(problem) => {
-                let owner: String = row.get(0)?;
-                tracing::warn!("the tracks of {owner} begin again: {problem}");
-            }
+        let state = match state.split_first() {
+            Some((&STATE_VERSION, state)) => postcard::from_bytes(state).ok(),
+            _ => None,
+        };
+        if let Some(state) = state {
+            scenes.push(state);
+        } else {
+            let owner: String = row.get(0)?;
+            tracing::warn!("the tracks of {owner} begin again: another version stored them");
         }
     }
     Ok(scenes)

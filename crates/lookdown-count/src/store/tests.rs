@@ -1,7 +1,8 @@
+use lookdown_tracking::heat_map::Cell;
+
 use super::*;
 use crate::{
     engine::Batch,
-    heat_map::Cell,
     sums::{LineDirection, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
     webhooks::Message,
 };

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use rusqlite::{Transaction, params};
 
-use super::{Store, StoreError};
+use super::{STATE_VERSION, Store, StoreError};
 use crate::{
     engine::Batch,
     sums::{DAY_MS, MINUTE_MS, Owner, Sums},
@@ -37,7 +37,7 @@ impl Store {
         for (owner, state) in &batch.scenes {
             match state {
                 Some(state) => {
-                    let state = postcard::to_stdvec(state)?;
+                    let state = postcard::to_extend(state, vec![STATE_VERSION])?;
                     transaction
                         .prepare_cached("INSERT OR REPLACE INTO scenes VALUES (?, ?)")?
                         .execute(params![owner.key(), state])?;

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use lookdown_client::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
+use lookdown_common::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
 use reqwest::{Client, StatusCode, header::CONTENT_TYPE};
 use tokio::{
     sync::mpsc::{self, error::TrySendError},
@@ -134,11 +134,11 @@ impl Receiver {
         loop {
             let problem = match self.attempt(message).await {
                 Attempt::Delivered => {
-                    self.log.settle();
+                    self.log.clear();
                     return true;
                 }
                 Attempt::Refused(problem) => {
-                    if self.log.is_changed(&problem) {
+                    if self.log.should_log(&problem) {
                         tracing::warn!("{problem}; the message is dropped");
                     }
                     return false;
@@ -146,7 +146,7 @@ impl Receiver {
                 Attempt::Failed(problem) => problem,
             };
             let pause = pauses.next();
-            if self.log.is_changed(&problem) {
+            if self.log.should_log(&problem) {
                 tracing::warn!("{problem}");
             }
             match pause {

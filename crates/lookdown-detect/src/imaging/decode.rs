@@ -69,7 +69,13 @@ pub fn decode(bytes: &[u8], limits: &DecodeLimits) -> Result<DecodedFrame, Decod
         Ok(ImageFormat::Jpeg) => decode_jpeg(bytes, limits),
         Ok(ImageFormat::Png) => decode_png(bytes, limits),
         Ok(ImageFormat::WebP) => decode_webp(bytes, limits),
-        Ok(other) => Err(unsupported(format!("in the format {other:?}"))),
+        Ok(other) => {
+            let name = other.extensions_str().first().copied().unwrap_or("unknown");
+            Err(unsupported(format!(
+                "in the format {}",
+                name.to_uppercase()
+            )))
+        }
         Err(_) if container::is_heif(bytes) => Err(unsupported("in the format HEIF")),
         Err(_) => Err(unsupported("not in a known image format")),
     }

@@ -3,12 +3,13 @@
 
 use std::ops::Range;
 
-use super::Frame;
-use crate::geometry::{
+use lookdown_lens::geometry::{
     Pixel, Polygon,
     pixels::{PixelConvention, cross_half_pixel},
     polygon::{Edge, crossing},
 };
+
+use super::Frame;
 
 /// The pixels that masks cover, wholly or in part.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

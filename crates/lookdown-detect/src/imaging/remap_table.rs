@@ -25,6 +25,8 @@ use rayon::prelude::*;
 use self::avx2 as vector;
 #[cfg(target_arch = "aarch64")]
 use self::neon as vector;
+use lookdown_lens::geometry::{FrameCrop, Lens, Pixel, VirtualView};
+
 use self::{
     band::Band,
     block_size::LANES,
@@ -35,7 +37,6 @@ use self::{
     whole_patches::WholePatches,
 };
 use super::{Frame, MaskedPixels, NetworkInput};
-use crate::geometry::{FrameCrop, Lens, Pixel, VirtualView};
 
 /// One view's sampling positions.
 ///

@@ -6,7 +6,6 @@
 
 mod boxes_scores;
 mod candidate_collector;
-mod centernet;
 mod decoder;
 mod detr;
 mod end_to_end;
@@ -15,10 +14,8 @@ mod nanodet;
 mod outputs;
 mod score;
 mod shape;
-mod ssd;
 mod tensor;
 mod yolo_v2;
-mod yolo_v3;
 mod yolo_v8;
 mod yolox;
 
@@ -31,15 +28,12 @@ use crate::imaging::NetworkInput;
 
 pub use self::{
     boxes_scores::BoxesScoresHead,
-    centernet::{CenternetHead, CenternetUnit},
     detr::DetrHead,
     end_to_end::{Column, EndToEndHead, EndToEndUnit},
     nanodet::{NanodetHead, PriorPosition},
     score::{Activation, ClassActivation},
-    ssd::{AnchorGenerator, SsdHead},
     tensor::{OutputShape, TensorView},
     yolo_v2::YoloV2Head,
-    yolo_v3::YoloV3Head,
     yolo_v8::{YoloV8Head, YoloV8Layout},
     yolox::YoloxHead,
 };
@@ -77,12 +71,8 @@ macro_rules! heads {
 heads! {
     /// Boxes and person scores decoded by the graph.
     BoxesScores(BoxesScoresHead),
-    /// SSD: offsets to anchors, class scores.
-    Ssd(SsdHead),
     /// YOLOv2: one grid of anchors, softmax over classes.
     YoloV2(YoloV2Head),
-    /// YOLOv3: a grid of anchors per scale, a sigmoid per class.
-    YoloV3(YoloV3Head),
     /// YOLOX: a grid per scale without anchors, with objectness.
     Yolox(YoloxHead),
     /// Distances to the sides as distributions.
@@ -91,8 +81,6 @@ heads! {
     YoloV8(YoloV8Head),
     /// The DETR family: a set of queries.
     Detr(DetrHead),
-    /// Peaks of a heat map.
-    Centernet(CenternetHead),
     /// Final detections with overlaps suppressed by the graph.
     EndToEnd(EndToEndHead),
 }

@@ -9,6 +9,7 @@ mod provider;
 
 use std::{num::NonZeroUsize, path::Path};
 
+use lookdown_lens::revision::{revision_of, sha256_of};
 use ort::{session::Session, value::TensorRef};
 
 use super::{
@@ -18,10 +19,7 @@ use super::{
     signature::Signature,
     staging::{Staged, Staging},
 };
-use crate::{
-    imaging::{NetworkInput, ViewBatch},
-    revision::{revision_of, sha256_of},
-};
+use crate::imaging::{NetworkInput, ViewBatch};
 
 pub(super) use description::{FLOAT, Metadata, float_shapes};
 pub use description::{ModelDescription, OnnxTensor};

@@ -5,6 +5,7 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
+use lookdown_lens::calibration::CalibrationId;
 use strum::VariantNames;
 
 use super::{
@@ -12,7 +13,6 @@ use super::{
     ParameterError, ParameterKind, ParameterSpec, Priority, Profile,
 };
 use crate::{
-    calibration::CalibrationId,
     detection::{Refinement, RefinementParameters},
     fairness::PriorityLevel,
 };

@@ -1,11 +1,9 @@
 //! Profiles: named trade-offs between cost and accuracy.
 
+use lookdown_lens::geometry::{BackProjection, FieldOfViewReading, ViewPlan};
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
-use crate::{
-    detection::Refinement,
-    geometry::{BackProjection, FieldOfViewReading, ViewPlan},
-};
+use crate::detection::Refinement;
 
 /// A profile: the views, models and refinement used for a frame.
 #[derive(

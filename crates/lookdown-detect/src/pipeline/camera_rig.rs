@@ -4,11 +4,14 @@
 
 use std::sync::Arc;
 
+use lookdown_lens::{
+    calibration::CameraGeometry,
+    geometry::{BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView},
+};
+
 use super::outline::{crop_outline, view_outline};
 use crate::{
-    calibration::CameraGeometry,
     detection::{BBox, FramePixels, ViewPixels},
-    geometry::{BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView},
     imaging::{Frame, Letterbox, MaskedPixels, NetworkInput, RemapTable},
 };
 

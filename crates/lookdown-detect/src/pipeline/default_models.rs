@@ -4,8 +4,10 @@ use std::iter;
 
 use strum::VariantArray;
 
-use super::{DetectParameters, Profile};
-use crate::inference::Device;
+use crate::{
+    inference::Device,
+    parameters::{DetectParameters, Profile},
+};
 
 /// Returns the models of a profile, in order of preference. This is the only table of them. Models
 /// that were not fetched are skipped; [`FALLBACK`] is the last choice.

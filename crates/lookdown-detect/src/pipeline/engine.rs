@@ -12,12 +12,16 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_lens::{
+    geometry::FieldOfViewReading,
+    warning::{Warning, WarningCode},
+};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use self::observation::Observation;
 use super::{
-    BatchOptions, CalibrationLookup, DefaultModels, DetectJob, DetectParameters, Detected,
-    DetectionReport, JobImage, Person, PipelineError, Profile, Stage, StageTimings,
+    BatchOptions, CalibrationLookup, DefaultModels, DetectJob, Detected, DetectionReport, JobImage,
+    Person, PipelineError, Stage, StageTimings,
     inference_cache::{FrameKey, InferenceCache},
     merge,
     motion_cache::{CameraViews, MotionCache},
@@ -27,14 +31,13 @@ use super::{
 };
 use crate::{
     detection::RefinementParameters,
-    geometry::FieldOfViewReading,
     imaging::{
         Frame,
         decode::{DecodeLimits, decode},
     },
     inference::{Model, ModelRegistry},
     metrics::DetectMetrics,
-    warning::{Warning, WarningCode},
+    parameters::{DetectParameters, Profile},
 };
 
 /// The smallest frame side that can hold a lens image, pixels.

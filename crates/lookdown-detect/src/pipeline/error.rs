@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
-use super::ParameterError;
-use crate::{fairness::Client, imaging::decode::DecodeError, inference::InferenceError};
+use crate::{
+    fairness::Client, imaging::decode::DecodeError, inference::InferenceError,
+    parameters::ParameterError,
+};
 
 /// The reason why a frame has no report.
 #[derive(Debug, thiserror::Error)]

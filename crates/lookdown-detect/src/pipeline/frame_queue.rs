@@ -74,7 +74,7 @@ impl<T> FrameQueue<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{fairness::Client, pipeline::Priority};
+    use crate::{fairness::Client, parameters::Priority};
 
     fn ticket(level: u32, name: &str) -> Ticket {
         Ticket {

@@ -4,15 +4,14 @@ use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_lens::{calibration::Calibration, geometry::Pixel, revision::sha256_of};
 use tokio_util::sync::CancellationToken;
 
-use super::{DetectParameters, DetectionReport, Ticket, camera_rig::CameraRig};
+use super::{DetectionReport, Ticket, camera_rig::CameraRig};
 use crate::{
-    calibration::Calibration,
-    geometry::Pixel,
     imaging::{Frame, annotate::ZoneOutline, decode::declared_size},
     inference::Model,
-    revision::sha256_of,
+    parameters::DetectParameters,
 };
 
 /// The frame of a job.

@@ -1,7 +1,14 @@
 //! Merges boxes of views into persons of the frame.
 
+use lookdown_lens::geometry::{
+    BackProjection, Footprint, OrientedBox, Ray,
+    crop_placement::CropTarget,
+    floor::{bearing, floor_position},
+    oriented_box::vertical_in_frame,
+};
+
 use super::{
-    Person, Profile,
+    Person,
     camera_rig::CameraRig,
     pass::{Pass, PassDetection, detections, views_holding},
     plausibility::score_weight,
@@ -12,13 +19,8 @@ use crate::{
         BBox, Candidate, FramePixels, MergedDetection, Refinement, RefinementParameters,
         ViewPixels, refine,
     },
-    geometry::{
-        BackProjection, Footprint, OrientedBox, Ray,
-        crop_placement::CropTarget,
-        floor::{bearing, floor_position},
-        oriented_box::vertical_in_frame,
-    },
     imaging::NetworkInput,
+    parameters::Profile,
 };
 
 /// Distance to the view's border, as a share of the view's width, below which a box is considered

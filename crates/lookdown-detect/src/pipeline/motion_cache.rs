@@ -8,12 +8,12 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_lens::geometry::FrameCrop;
 use moka::{policy::EvictionPolicy, sync::Cache};
 use parking_lot::{Mutex, MutexGuard};
 
 use super::camera_rig::CameraRig;
 use crate::{
-    geometry::FrameCrop,
     imaging::ViewSignature,
     inference::{Model, ViewDetection},
 };

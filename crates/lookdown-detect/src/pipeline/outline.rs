@@ -1,6 +1,6 @@
 //! The outlines of views and crops in the frame.
 
-use crate::geometry::{
+use lookdown_lens::geometry::{
     FrameCrop, Lens, Pixel, VirtualView,
     pixels::{PixelConvention, cross_half_pixel},
 };

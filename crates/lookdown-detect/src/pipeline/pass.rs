@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
+use lookdown_lens::geometry::Footprint;
+
 use super::camera_rig::CameraRig;
-use crate::{
-    geometry::Footprint,
-    inference::{Model, ViewDetection},
-};
+use crate::inference::{Model, ViewDetection};
 
 /// One pass over a frame. All passes over a frame share its camera.
 pub(super) struct Pass {

@@ -1,15 +1,16 @@
 //! The view plan of a camera, without a frame of it.
 
-use super::{Engine, PipelineError, Profile, outline::view_outline};
-use crate::{
+use lookdown_lens::{
     calibration::Calibration,
     geometry::{
         Lens, Pixel, Polygon, VirtualView,
         pixels::{PixelConvention, cross_half_pixel},
         view_plan::Coverage,
     },
-    imaging::MaskedPixels,
 };
+
+use super::{Engine, PipelineError, outline::view_outline};
+use crate::{imaging::MaskedPixels, parameters::Profile};
 
 /// Steps along each side of a view between the rays that test whether it covers the lens image.
 const SIGHT_STEPS: u32 = 64;

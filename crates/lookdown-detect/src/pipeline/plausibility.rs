@@ -1,7 +1,7 @@
 //! The score weight of a box: a factor from its position in its view and from the implied size of
 //! the person.
 
-use crate::geometry::{Mount, height_ratio::HeightRatio};
+use lookdown_lens::geometry::{Mount, height_ratio::HeightRatio};
 
 /// The factor for a box cut off by the border of its view. Other views show the person whole.
 const CUT_OFF_WEIGHT: f64 = 0.7;

@@ -3,17 +3,19 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
-
-use super::{DefaultUsed, Profile};
-use crate::{
-    detection::{BBox, FramePixels, RefinementParameters},
+use lookdown_lens::{
     geometry::{
         OrientedBox, Pixel, Zone,
         floor::{Bearing, FloorPosition},
     },
+    warning::Warning,
+};
+
+use crate::{
+    detection::{BBox, FramePixels, RefinementParameters},
     imaging::lens_circle::LensCircle,
     inference::Model,
-    warning::Warning,
+    parameters::{DefaultUsed, Profile},
 };
 
 /// The persons in one frame.

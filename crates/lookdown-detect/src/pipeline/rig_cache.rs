@@ -4,8 +4,11 @@ use std::sync::Arc;
 
 use moka::{notification::RemovalCause, policy::EvictionPolicy, sync::Cache};
 
-use super::{Profile, camera_rig::CameraRig};
-use crate::metrics::{DetectMetrics, gauge_value};
+use super::camera_rig::CameraRig;
+use crate::{
+    metrics::{DetectMetrics, gauge_value},
+    parameters::Profile,
+};
 
 /// The cache key of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

@@ -5,8 +5,7 @@
 //! power of the odds of the merged score (Platt scaling on the logit of the score). `docs/results.md`
 //! has the reliability of the results. The order of persons does not change.
 
-use super::Profile;
-use crate::detection::Refinement;
+use crate::{detection::Refinement, parameters::Profile};
 
 /// The power of the odds. It holds for all profiles, on photographs and on rendered frames.
 const SLOPE: f64 = 2.5;

@@ -9,16 +9,17 @@ use std::{
 
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_lens::calibration::{Calibration, CalibrationFile, CalibrationId};
 
 use super::{
-    BatchOptions, CalibrationLookup, DetectJob, DetectParameters, Engine, EngineOptions, JobImage,
-    Ticket, UnusableCalibration,
+    BatchOptions, CalibrationLookup, DetectJob, Engine, EngineOptions, JobImage, Ticket,
+    UnusableCalibration,
 };
 use crate::{
-    calibration::{Calibration, CalibrationFile, CalibrationId},
     detection::{BBox, ViewPixels},
     imaging::{Frame, NetworkInput, ViewBatch, annotate::encode_png},
     inference::{Detector, HeadOutput, InferenceError, Model, ModelRegistry, ViewDetection},
+    parameters::DetectParameters,
 };
 
 /// Returns the bounding box of all pixels in a view that are brighter than this.

@@ -3,8 +3,8 @@
 
 use tokio_util::sync::CancellationToken;
 
-use super::{Priority, Timeline};
-use crate::fairness::Client;
+use super::Timeline;
+use crate::{fairness::Client, parameters::Priority};
 
 /// Travels with a frame through every queue.
 #[derive(Debug, Clone, Default)]

@@ -9,8 +9,7 @@
 
 use std::collections::HashMap;
 
-use super::Priority;
-use crate::fairness::Client;
+use crate::{fairness::Client, parameters::Priority};
 
 /// Virtual time of a cost of 1. Shares of it are rounded down.
 const UNIT: u64 = 1 << 20;

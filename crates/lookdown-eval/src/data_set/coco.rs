@@ -11,14 +11,12 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_detect::detection::BBox;
+use lookdown_lens::calibration::{Calibration, CalibrationError, CalibrationId};
 use serde::Deserialize;
 
 use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
-use crate::{
-    AnnotatedPerson, Outline, RotatedBox, Scoring,
-    calibration::{Calibration, CalibrationError, CalibrationId},
-    detection::BBox,
-};
+use crate::{AnnotatedPerson, Outline, RotatedBox, Scoring};
 
 /// The largest common file, that of COCO's training set, has 450 MB.
 const MAX_BYTES: u64 = 1024 * 1024 * 1024;
@@ -56,16 +54,18 @@ struct CocoCategory {
     name: String,
 }
 
-/// Reads the annotations of a folder with `images/` and `calibrations/`.
+/// Reads the annotations of a folder with `calibrations/`, whose images are in `images/` or beside
+/// the annotations.
 pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, DataSetError> {
     let mut calibrations = Calibrations::new(folder.join("calibrations"));
-    let pictures = folder.join("images");
+    let images = folder.join("images");
+    let images = if images.is_dir() {
+        images
+    } else {
+        folder.to_owned()
+    };
     let mut reader = Reader::default();
-    reader.read(
-        file,
-        Some(&mut calibrations),
-        |name| Ok(pictures.join(name)),
-    )?;
+    reader.read(file, Some(&mut calibrations), |name| Ok(images.join(name)))?;
     Ok(reader.data_set())
 }
 

@@ -2,16 +2,17 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{ImageId, ScoringMismatch};
-use crate::{
-    AnnotatedPerson, GroundTruth, Outline, Scoring,
+use lookdown_detect::detection::{BBox, FramePixels};
+use lookdown_lens::{
     calibration::Calibration,
-    detection::{BBox, FramePixels},
     geometry::{
         Lens, OrientedBox, Pixel,
         pixels::{PixelConvention, cross_half_pixel},
     },
 };
+
+use super::{ImageId, ScoringMismatch};
+use crate::{AnnotatedPerson, GroundTruth, Outline, Scoring};
 
 /// Images with annotated persons.
 #[derive(Debug)]

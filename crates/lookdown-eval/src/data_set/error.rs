@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::{Scoring, calibration::CalibrationError};
+use lookdown_lens::calibration::CalibrationError;
+
+use crate::Scoring;
 
 /// The path holds no usable data set.
 #[derive(Debug, thiserror::Error)]

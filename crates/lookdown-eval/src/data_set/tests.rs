@@ -5,11 +5,14 @@ use std::{
     sync::Arc,
 };
 
+use lookdown_detect::detection::BBox;
+use lookdown_lens::calibration::Calibration;
+
 use super::{
     test_support::{boxes, folder, open, refusal},
     *,
 };
-use crate::{Outline, Scoring, calibration::Calibration, detection::BBox};
+use crate::{Outline, Scoring};
 
 const CALIBRATION: &str = r#"{"id":"lobby","image":{"width":600,"height":600},
     "lens":{"model":"equidistant","focal":190,"cx":299.5,"cy":299.5}}"#;

@@ -7,11 +7,12 @@
 
 use std::path::{Path, PathBuf};
 
+use lookdown_detect::detection::BBox;
 use quick_xml::{Reader, events::Event};
 use serde::Deserialize;
 
 use super::{DataSet, DataSetError, DataSetImage, ImageId, PictureIndex, text::read_text};
-use crate::{AnnotatedPerson, Outline, Scoring, detection::BBox};
+use crate::{AnnotatedPerson, Outline, Scoring};
 
 /// The file of a crowded image has some 100 kB.
 const MAX_BYTES: u64 = 16 * 1024 * 1024;

@@ -1,14 +1,13 @@
 //! Tests of several detections for one person.
 
+use lookdown_detect::detection::{BBox, FramePixels};
+
 use super::{
     GroundTruth, MatchingRule,
     Outcome::{self, FalsePositive, Ignored, TruePositive},
     ScoredBox,
 };
-use crate::{
-    AnnotatedPerson,
-    detection::{BBox, FramePixels},
-};
+use crate::AnnotatedPerson;
 
 type FrameBox = BBox<FramePixels>;
 

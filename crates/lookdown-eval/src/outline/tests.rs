@@ -1,5 +1,6 @@
 //! Tests of the comparison of shapes.
 
+use lookdown_lens::geometry::Pixel;
 use nalgebra::Vector2;
 
 use super::*;
@@ -7,7 +8,6 @@ use crate::{
     GroundTruth, MatchingRule,
     Outcome::{FalsePositive, TruePositive},
     ScoredBox,
-    geometry::Pixel,
 };
 
 fn boxed(corners: [f64; 4]) -> Outline {

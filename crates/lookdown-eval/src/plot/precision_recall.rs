@@ -49,11 +49,10 @@ fn steps(curve: &PrecisionRecallCurve) -> Vec<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
+    use lookdown_detect::detection::{BBox, FramePixels};
+
     use super::*;
-    use crate::{
-        EvaluatedImage, GroundTruth, MatchingRule, ScoredBox,
-        detection::{BBox, FramePixels},
-    };
+    use crate::{EvaluatedImage, GroundTruth, MatchingRule, ScoredBox};
 
     #[test]
     fn the_area_under_a_line_is_the_average_precision() {

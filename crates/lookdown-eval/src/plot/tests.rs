@@ -1,5 +1,6 @@
+use lookdown_detect::imaging::decode::{DecodeLimits, decode};
+
 use super::*;
-use crate::imaging::decode::{DecodeLimits, decode};
 
 fn plot(names: &[&str]) -> LinePlot {
     LinePlot {

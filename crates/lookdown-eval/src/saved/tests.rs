@@ -1,7 +1,7 @@
+use lookdown_detect::{detection::Refinement, parameters::Profile};
 use serde_json::json;
 
 use super::*;
-use crate::{detection::Refinement, pipeline::Profile};
 
 /// Two images, 7 and 8.
 fn data_set() -> (tempfile::TempDir, DataSet) {

@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use lookdown_detect::detection::BBox;
+
 use super::*;
-use crate::{ImageId, detection::BBox};
+use crate::ImageId;
 
 const SIDE: f64 = 600.0;
 

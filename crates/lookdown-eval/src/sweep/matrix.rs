@@ -2,9 +2,7 @@
 
 use std::ops::Range;
 
-use super::{SCORE_THRESHOLDS, SIGMAS};
-use crate::{
-    DetectedRow, EvaluatedRow, FoundPerson,
+use lookdown_detect::{
     detection::Refinement,
     imaging::{
         Frame, FrameError,
@@ -13,6 +11,9 @@ use crate::{
         thumbnail,
     },
 };
+
+use super::{SCORE_THRESHOLDS, SIGMAS};
+use crate::{DetectedRow, EvaluatedRow, FoundPerson};
 
 /// Margin around the boxes, as a fraction of the side of the square that contains them.
 const ROOM_SHARE: f64 = 0.06;

@@ -1,7 +1,9 @@
+use lookdown_detect::{detection::BBox, imaging::Frame};
+
 use super::*;
 use crate::{
     EvaluatedImage, FoundPerson, GroundTruth, MatchingRule, PrecisionRecallCurve, RowName,
-    ScoredBox, Summary, detection::BBox, imaging::Frame,
+    ScoredBox, Summary,
 };
 
 fn cells_of_paper() -> Vec<DetectParameters> {

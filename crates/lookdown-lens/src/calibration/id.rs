@@ -2,9 +2,9 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::{
+use lookdown_common::{
     plain_name::{MAX_CHARS, is_plain},
-    quoted::{Quoted, shortened},
+    text::{Quoted, shortened},
 };
 
 /// The ID of a calibration: `[a-z0-9][a-z0-9_-]{0,63}`. Safe in file names and URLs.

@@ -1,10 +1,9 @@
 //! The place of a camera on a site, checked.
 
+use lookdown_common::plain_name::{MAX_CHARS, is_plain};
+
 use super::{FormatError, native::NativeMount};
-use crate::{
-    geometry::SitePlacement,
-    plain_name::{MAX_CHARS, is_plain},
-};
+use crate::geometry::SitePlacement;
 
 /// Farthest coordinate of a site, metres.
 const MAX_POSITION_M: f64 = 10_000.0;

@@ -1,13 +1,12 @@
 //! One camera as it is written, and its checks.
 
-use std::{collections::BTreeMap, ops::RangeInclusive, path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
-use jiff::SignedDuration;
 use secrecy::SecretString;
 use serde::Deserialize;
 
 use crate::{Camera, Credentials, Location, Transport, VideoOptions};
-use lookdown_client::{ConfigError, read_secret};
+use lookdown_common::{ConfigError, optional_duration, read_secret};
 
 /// Shortest interval between two frames.
 const MIN_EVERY: Duration = Duration::from_millis(40);
@@ -131,12 +130,16 @@ impl CameraEntry {
         let (location, in_url) =
             Location::parse(url).map_err(|error| ConfigError::problem(&field("url"), &error))?;
         let name = self.checked_name(&field("name"))?;
-        let every = duration(&field("every"), self.every.as_deref(), MIN_EVERY)?;
+        let every = optional_duration(
+            &field("every"),
+            self.every.as_deref(),
+            MIN_EVERY..=MAX_EVERY,
+        )?;
         let every = every.unwrap_or(DEFAULT_EVERY);
-        let stall_after = duration(
+        let stall_after = optional_duration(
             &field("stall_after"),
             self.stall_after.as_deref(),
-            MIN_STALL,
+            MIN_STALL..=MAX_EVERY,
         )?;
         let (least, intervals) = DEFAULT_STALL;
         let stall_after = stall_after.unwrap_or(least.max(every * intervals));
@@ -217,28 +220,6 @@ impl CameraEntry {
             keyframes_only: self.keyframes_only.unwrap_or_default(),
         })
     }
-}
-
-/// Parses a duration with limits.
-fn duration(
-    field: &str,
-    text: Option<&str>,
-    least: Duration,
-) -> Result<Option<Duration>, ConfigError> {
-    let Some(text) = text else { return Ok(None) };
-    let parsed = parse_duration(text, least..=MAX_EVERY);
-    parsed.map(Some).ok_or_else(|| {
-        let least = least.as_secs_f64();
-        let remedy = format!("is no duration from {least} s to 1 h: write it like 1s, 500ms or 2m");
-        ConfigError::value(field, &text, &remedy)
-    })
-}
-
-/// Parses a duration with its unit, such as `500ms`. `None` if it is none or outside of the limits.
-#[must_use]
-pub fn parse_duration(text: &str, limits: RangeInclusive<Duration>) -> Option<Duration> {
-    let parsed = Duration::try_from(text.parse::<SignedDuration>().ok()?).ok()?;
-    limits.contains(&parsed).then_some(parsed)
 }
 
 fn credentials(

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lookdown_client::{ConfigError, ServerEntry, parse_toml, read_file};
+use lookdown_common::{ConfigError, ServerEntry, parse_toml, read_file};
 use serde::Deserialize;
 
 use super::{CameraEntry, WatchOptions};

@@ -10,8 +10,8 @@ use std::{
 use jiff::Timestamp;
 use tokio::{task::spawn_blocking, time::sleep};
 
-use super::{Sink, SourceError};
-use crate::{Camera, MAX_FRAME_BYTES};
+use super::Sink;
+use crate::{Camera, MAX_FRAME_BYTES, SourceError};
 
 /// Shortest and longest interval of the checks for new files.
 const CHECKS: (Duration, Duration) = (Duration::from_millis(100), Duration::from_millis(500));

@@ -3,7 +3,7 @@
 
 use std::convert::Infallible;
 
-use lookdown_client::text::with_causes;
+use lookdown_common::text::with_causes;
 
 use bytes::{Bytes, BytesMut};
 use reqwest::{
@@ -12,8 +12,8 @@ use reqwest::{
 };
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::{Sink, SourceError, multipart::PartReader};
-use crate::{Camera, MAX_FRAME_BYTES, credentials::Login};
+use super::{Sink, multipart::PartReader};
+use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login};
 
 /// Requests for one answer: the second one answers the challenge of the first.
 const ATTEMPTS: usize = 2;

@@ -1,13 +1,11 @@
 //! Images on standard input: one image, or JPEG files one after another.
 
 use bytes::Bytes;
+use lookdown_common::JPEG_START;
 use tokio::io::{AsyncRead, AsyncReadExt};
 
-use super::{Sink, SourceError, jpeg_splitter::JpegSplitter};
-use crate::MAX_FRAME_BYTES;
-
-/// First bytes of a JPEG.
-const JPEG_START: &[u8] = &[0xff, 0xd8];
+use super::Sink;
+use crate::{MAX_FRAME_BYTES, SourceError, jpeg_splitter::JpegSplitter};
 
 /// Reads images from a stream.
 pub struct ImageReader<R> {

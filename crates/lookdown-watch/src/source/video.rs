@@ -8,9 +8,9 @@ use std::{convert::Infallible, ffi::OsString, fmt::Write as _, path::Path, time:
 use reqwest::Url;
 use secrecy::ExposeSecret;
 
-use super::{Sink, SourceError};
+use super::Sink;
 use crate::{
-    Camera, Credentials,
+    Camera, Credentials, SourceError,
     ffmpeg::{Ffmpeg, decoding, file_input},
 };
 

@@ -1,10 +1,12 @@
 //! Converts errors of the pipeline to problems. No other place decides their kind.
 
-use super::{Problem, ProblemKind};
-use crate::{
+use lookdown_detect::{
     imaging::decode::DecodeError,
-    pipeline::{ParameterError, ParameterFault, PipelineError},
+    parameters::{ParameterError, ParameterFault},
+    pipeline::PipelineError,
 };
+
+use super::{Problem, ProblemKind};
 
 impl From<PipelineError> for Problem {
     fn from(error: PipelineError) -> Self {

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::fairness::Client;
+use lookdown_detect::fairness::Client;
 
 /// Largest number of buckets. Further addresses share one bucket.
 const MAX_BUCKETS: usize = 10_000;

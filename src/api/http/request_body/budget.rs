@@ -3,11 +3,9 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
+use lookdown_detect::fairness::{BudgetError, BudgetShare, Client, SharedBudget};
 
-use crate::{
-    api::http::problem::{Problem, ProblemKind},
-    fairness::{BudgetError, BudgetShare, Client, SharedBudget},
-};
+use crate::api::http::problem::{Problem, ProblemKind};
 
 /// The memory of all bodies and of the tensors unpacked from them, in bytes. Clones share it.
 #[derive(Clone)]

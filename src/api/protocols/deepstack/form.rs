@@ -2,6 +2,10 @@
 //! query may have the parameters of `POST /detect`.
 
 use axum::extract::{FromRequest, Request};
+use lookdown_detect::{
+    parameters::{DetectParameters, ParameterError},
+    pipeline::DetectJob,
+};
 use utoipa::ToSchema;
 
 use crate::{
@@ -16,7 +20,6 @@ use crate::{
         },
         upload::{FieldUse, Upload, is_multipart},
     },
-    pipeline::{DetectJob, DetectParameters, ParameterError},
 };
 
 const MIN_CONFIDENCE: &str = "min_confidence";

@@ -5,16 +5,14 @@ use axum::{
     response::{AppendHeaders, IntoResponse, Response},
 };
 use bytes::Bytes;
+use lookdown_detect::open_inference::{
+    HEAD_LENGTH, TensorValues,
+    bounded_json::Entries,
+    message::{InferResponse, Message, OutputParameters, OutputTensor},
+};
 
 use super::wanted::Wanted;
-use crate::{
-    api::http::problem::Problem,
-    open_inference::{
-        HEAD_LENGTH, TensorValues,
-        bounded_json::Entries,
-        message::{InferResponse, Message, OutputParameters, OutputTensor},
-    },
-};
+use crate::api::http::problem::Problem;
 
 /// An inference response.
 pub(super) struct InferAnswer {

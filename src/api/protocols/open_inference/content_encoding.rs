@@ -6,14 +6,12 @@ use std::io::{ErrorKind, Read};
 use axum::http::{HeaderMap, header::CONTENT_ENCODING};
 use bytes::Bytes;
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
+use lookdown_common::text::Quoted;
 
 use super::request::malformed;
-use crate::{
-    api::http::{
-        problem::{Problem, ProblemKind},
-        request_body::{Held, UploadBudget},
-    },
-    quoted::Quoted,
+use crate::api::http::{
+    problem::{Problem, ProblemKind},
+    request_body::{Held, UploadBudget},
 };
 
 /// The number of bytes that are decompressed at a time.

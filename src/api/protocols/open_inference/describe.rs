@@ -1,17 +1,15 @@
 //! Metadata and health checks of the server and its models.
 
 use axum::{Json, extract::State};
+use lookdown_detect::open_inference::metadata::{
+    ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady,
+};
 
 use super::{
     own_metadata::{EXTENSIONS, NAME},
     requested_model::{ModelAddress, RequestedModel},
 };
-use crate::{
-    api::{ApiState, http::problem::Problem, require_scope::RequireDetect},
-    open_inference::metadata::{
-        ModelMetadata, ModelReady, ServerLive, ServerMetadata, ServerReady,
-    },
-};
+use crate::api::{ApiState, http::problem::Problem, require_scope::RequireDetect};
 
 /// Get server metadata
 #[utoipa::path(

@@ -3,6 +3,12 @@
 use std::{sync::Arc, time::Instant};
 
 use jiff::Timestamp;
+use lookdown_detect::{
+    inference::{HeadOutput, Model},
+    open_inference::{Datatype, metadata::ModelMetadata},
+    parameters::{DetectParameters, Interface, ParameterError},
+    pipeline::ViewsJob,
+};
 
 use super::{
     answer::{Answerer, InferAnswer, Output, OutputValues},
@@ -18,9 +24,6 @@ use crate::{
         http::{deadline::Deadline, problem::Problem, query::pairs, request_body::Held},
         limit::Limit,
     },
-    inference::{HeadOutput, Model},
-    open_inference::{Datatype, metadata::ModelMetadata},
-    pipeline::{DetectParameters, Interface, ParameterError, ViewsJob},
     telemetry::RequestTrace,
 };
 

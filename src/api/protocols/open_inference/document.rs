@@ -1,6 +1,7 @@
 //! Inference requests and responses in the OpenAPI document. `request` reads the requests,
 //! `answer` writes the responses.
 
+use lookdown_detect::parameters::Interface;
 use utoipa::{
     PartialSchema, ToSchema,
     openapi::{
@@ -9,7 +10,7 @@ use utoipa::{
     },
 };
 
-use crate::{api::openapi::fields, pipeline::Interface};
+use crate::api::openapi::fields;
 
 /// An inference request with its tensors. A tensor whose bytes follow the JSON has the parameter
 /// `binary_data_size` instead of `data`.

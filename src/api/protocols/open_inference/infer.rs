@@ -45,7 +45,7 @@ use crate::{
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "The outputs.",
-         content((InferResponseBody = "application/json"), ("application/octet-stream"))),
+         content((InferResponseBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))),
     )
 )]
 pub(in crate::api) async fn infer(
@@ -100,7 +100,7 @@ pub(in crate::api) async fn infer(
     security((), ("bearer" = ["detect"]), ("api_key" = ["detect"])),
     responses(
         (status = OK, description = "The outputs.",
-         content((InferResponseBody = "application/json"), ("application/octet-stream"))),
+         content((InferResponseBody = "application/json"), (inline(RawBytes) = "application/octet-stream"))),
     )
 )]
 pub(in crate::api) async fn infer_version(

@@ -1,8 +1,8 @@
 //! The parameters of an inference request: those of `/detect`, and the protocol's `timeout`.
 
-use crate::{
+use lookdown_detect::{
     open_inference::parameters::Parameter,
-    pipeline::{DetectParameters, JsonType, ParameterError},
+    parameters::{DetectParameters, JsonType, ParameterError},
 };
 
 /// The name of [`TIMEOUT_MILLIS`] in the protocol; its unit is microseconds.

@@ -1,6 +1,6 @@
 //! The parts of metadata that all models have in common.
 
-use crate::open_inference::{BINARY_EXTENSION, Datatype, metadata::TensorMetadata};
+use lookdown_detect::open_inference::{BINARY_EXTENSION, Datatype, metadata::TensorMetadata};
 
 /// The name of the server, and the platform of its models.
 pub(super) const NAME: &str = "lookdown";

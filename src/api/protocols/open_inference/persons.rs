@@ -5,6 +5,10 @@ use std::time::Instant;
 use axum::http::HeaderValue;
 use bytes::Bytes;
 use jiff::Timestamp;
+use lookdown_detect::{
+    open_inference::{Datatype, metadata::ModelMetadata},
+    pipeline::{DetectJob, DetectionReport},
+};
 
 use super::{
     answer::{Answerer, InferAnswer, Output, OutputValues},
@@ -23,8 +27,6 @@ use crate::{
         report_headers::{PERSON_COUNT, report_headers},
         run_detection::{DetectionOutcome, run_detection},
     },
-    open_inference::{Datatype, metadata::ModelMetadata},
-    pipeline::{DetectJob, DetectionReport},
     telemetry::RequestTrace,
 };
 

@@ -7,19 +7,17 @@ use axum::{
     Json,
     extract::{Path, State},
 };
+use lookdown_detect::inference::{InferenceError, Model, RepositoryError, RepositoryRow};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::{
-    api::{
-        ApiState,
-        http::{
-            deadline::Deadline,
-            problem::{Problem, ProblemKind},
-        },
-        require_scope::{RequireAdmin, RequireModelRead},
+use crate::api::{
+    ApiState,
+    http::{
+        deadline::Deadline,
+        problem::{Problem, ProblemKind},
     },
-    inference::{InferenceError, Model, RepositoryError, RepositoryRow},
+    require_scope::{RequireAdmin, RequireModelRead},
 };
 use body::{IndexRequest, LoadRequest, SmallBody, UnloadRequest};
 

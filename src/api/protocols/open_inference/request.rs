@@ -2,24 +2,22 @@
 
 use axum::http::HeaderMap;
 use bytes::Bytes;
+use lookdown_common::text::{Quoted, shortened};
+use lookdown_detect::open_inference::{
+    BINARY_SIZE, HEAD_LENGTH, TensorData,
+    bounded_json::Table,
+    message::{InputTensor, Message, read_request},
+    parameters::{Parameter, Parameters},
+};
 use serde_json::value::RawValue;
 
 use super::{
     tensor::{Tensor, misfit, refuse_others},
     wanted::Wanted,
 };
-use crate::{
-    api::http::{
-        problem::{Problem, ProblemKind},
-        request_body::UploadBudget,
-    },
-    open_inference::{
-        BINARY_SIZE, HEAD_LENGTH, TensorData,
-        bounded_json::Table,
-        message::{InputTensor, Message, read_request},
-        parameters::{Parameter, Parameters},
-    },
-    quoted::{Quoted, shortened},
+use crate::api::http::{
+    problem::{Problem, ProblemKind},
+    request_body::UploadBudget,
 };
 
 /// Longest ID of a request, characters.

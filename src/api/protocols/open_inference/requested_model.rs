@@ -6,20 +6,17 @@ use axum::{
     extract::{FromRequestParts, Path, rejection::PathRejection},
     http::request::Parts,
 };
+use lookdown_common::text::Quoted;
+use lookdown_detect::{inference::Model, open_inference::metadata::ModelMetadata};
 use serde::Deserialize;
 
 use super::{
     detector,
     persons::{self, FRAME_MODEL, FRAME_MODEL_VERSION},
 };
-use crate::{
-    api::{
-        ApiState,
-        http::problem::{Problem, ProblemKind},
-    },
-    inference::Model,
-    open_inference::metadata::ModelMetadata,
-    quoted::Quoted,
+use crate::api::{
+    ApiState,
+    http::problem::{Problem, ProblemKind},
 };
 
 /// The address of a model: `/v2/models/{name}` or `/v2/models/{name}/versions/{version}`.

@@ -1,15 +1,15 @@
 //! Input tensors: a name, a shape, and frames or numbers.
 
 use bytes::Bytes;
-
-use crate::{
-    api::http::{
-        problem::{Problem, ProblemKind},
-        request_body::{Held, UploadBudget},
-    },
+use lookdown_common::text::{Quoted, shortened};
+use lookdown_detect::{
     fairness::BudgetShare,
     open_inference::{Datatype, TensorData, element_count, parameters::Parameters},
-    quoted::{Quoted, shortened},
+};
+
+use crate::api::http::{
+    problem::{Problem, ProblemKind},
+    request_body::{Held, UploadBudget},
 };
 
 /// An input tensor.

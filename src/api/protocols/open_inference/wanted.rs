@@ -1,15 +1,14 @@
 //! The requested outputs of an inference request and their encoding.
 
-use super::tensor::{misfit, refuse_others};
-use crate::{
-    api::http::problem::{Problem, ProblemKind},
-    open_inference::{
-        BINARY_OUTPUT,
-        message::RequestedOutput,
-        parameters::{Parameter, Parameters},
-    },
-    quoted::Quoted,
+use lookdown_common::text::Quoted;
+use lookdown_detect::open_inference::{
+    BINARY_OUTPUT,
+    message::RequestedOutput,
+    parameters::{Parameter, Parameters},
 };
+
+use super::tensor::{misfit, refuse_others};
+use crate::api::http::problem::{Problem, ProblemKind};
 
 /// The request parameter that selects bytes for all outputs.
 const ALL_BINARY: &str = "binary_data_output";

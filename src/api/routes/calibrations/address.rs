@@ -4,13 +4,11 @@ use axum::{
     extract::{FromRequestParts, Path},
     http::request::Parts,
 };
+use lookdown_lens::calibration::CalibrationId;
 
-use crate::{
-    api::{
-        ApiState,
-        http::problem::{Problem, ProblemKind},
-    },
-    calibration::CalibrationId,
+use crate::api::{
+    ApiState,
+    http::problem::{Problem, ProblemKind},
 };
 
 /// The ID of an existing calibration; it need not exist.

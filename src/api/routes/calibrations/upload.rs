@@ -5,6 +5,7 @@ use axum::{
     http::Uri,
 };
 use bytes::Bytes;
+use lookdown_lens::calibration::{CalibrationFile, native::NotAFrameSize};
 
 use crate::{
     api::{
@@ -16,7 +17,6 @@ use crate::{
             query::parameters_named,
         },
     },
-    calibration::{CalibrationFile, native::NotAFrameSize},
     calibration_store::Reading,
 };
 

@@ -7,6 +7,11 @@ use axum::{
     http::{Uri, header::CONTENT_TYPE},
     response::{IntoResponse, Response},
 };
+use lookdown_detect::{
+    parameters::{Profile, parse_profile, whole_number},
+    pipeline::{Engine, PlannedView, PlannedViews},
+};
+use lookdown_lens::calibration::Calibration;
 use serde::Serialize;
 use utoipa::{IntoParams, ToSchema};
 
@@ -23,9 +28,7 @@ use crate::{
         openapi::RawBytes,
         require_scope::RequireRead,
     },
-    calibration::Calibration,
     calibration_store::Calibrations,
-    pipeline::{Engine, PlannedView, PlannedViews, Profile, parse_profile, whole_number},
     rounding::pixels,
 };
 

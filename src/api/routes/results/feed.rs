@@ -3,11 +3,11 @@
 use std::{collections::VecDeque, num::NonZeroUsize, sync::Arc, time::Duration};
 
 use axum::response::sse::Event;
+use lookdown_detect::fairness::Client;
 use tokio::time::sleep;
 
 use crate::{
     api::http::problem::Problem,
-    fairness::Client,
     results::{Cameras, Listening, ReportId, ResultStore, StoredReport},
 };
 

@@ -12,6 +12,7 @@ use axum::{
 };
 use bytes::{BufMut, Bytes, BytesMut};
 use jiff::Timestamp;
+use lookdown_detect::parameters::{ParameterError, whole_number};
 use utoipa::ToSchema;
 
 use super::{NO_CACHE, address::CameraAddress, unknown};
@@ -22,7 +23,6 @@ use crate::{
         report::Report,
         require_scope::RequireRead,
     },
-    pipeline::{ParameterError, whole_number},
     results::{Cameras, ReportId, StoredReport},
 };
 

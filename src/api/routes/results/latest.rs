@@ -10,6 +10,7 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use lookdown_detect::parameters::whole_number;
 use tokio::time::timeout_at;
 
 use super::{NO_CACHE, address::CameraAddress, unknown};
@@ -26,7 +27,6 @@ use crate::{
         report::Report,
         require_scope::RequireRead,
     },
-    pipeline::whole_number,
     results::{Cameras, StoredReport},
 };
 

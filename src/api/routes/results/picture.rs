@@ -9,6 +9,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use bytes::Bytes;
+use lookdown_common::text::{Quoted, one_line};
 
 use super::{address::CameraAddress, unknown};
 use crate::{
@@ -25,7 +26,6 @@ use crate::{
         openapi::{AnnotationQuery, RawBytes},
         require_scope::RequireRead,
     },
-    quoted::{Quoted, one_line},
 };
 
 /// Only the client may cache the image, and must revalidate it before use.

@@ -1,8 +1,7 @@
 //! Meanings of a provider's failures, in words that hold no secrets and stay the same while the
 //! cause does: addresses with signatures, times and numbers of requests are left out.
 
-use std::error::Error as _;
-
+use lookdown_common::text::causes;
 use object_store::{
     Error,
     client::{HttpError, HttpErrorKind},
@@ -35,20 +34,9 @@ pub(super) fn of(place: &str, error: &Error) -> StoreError {
     }
 }
 
-/// Every cause of an error, the innermost last.
-fn causes(error: &Error) -> Vec<&(dyn std::error::Error + 'static)> {
-    let mut causes = Vec::new();
-    let mut next = error.source();
-    while let Some(cause) = next {
-        causes.push(cause);
-        next = cause.source();
-    }
-    causes
-}
-
 /// Returns the reason why the bucket did not answer, if it did not.
 fn transport(error: &Error) -> Option<String> {
-    let causes = causes(error);
+    let causes: Vec<_> = causes(error).skip(1).collect();
     let failed = causes
         .iter()
         .find_map(|cause| cause.downcast_ref::<HttpError>())?;
@@ -61,7 +49,7 @@ fn transport(error: &Error) -> Option<String> {
 /// The status and the provider's code for the failure, as in
 /// ` (403 Forbidden, SignatureDoesNotMatch)`.
 fn answer(error: &Error) -> String {
-    let text = causes(error).last().map(ToString::to_string);
+    let text = causes(error).skip(1).last().map(ToString::to_string);
     let text = text.unwrap_or_default();
     let status = text.split_once(STATUS).map(|(_, rest)| rest);
     let status = status.and_then(|rest| rest.split(':').next());

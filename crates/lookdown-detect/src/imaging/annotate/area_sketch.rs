@@ -1,5 +1,6 @@
 //! Zones and masks drawn into a frame of their camera.
 
+use lookdown_lens::geometry::{CountingLine, Lens, Mount, Pixel, Polygon, Zone};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -10,10 +11,7 @@ use super::{
     label::Labels,
     line_width,
 };
-use crate::{
-    geometry::{CountingLine, Lens, Mount, Pixel, Polygon, Zone},
-    imaging::{Frame, MaskedPixels},
-};
+use crate::imaging::{Frame, MaskedPixels};
 
 pub(super) const ZONE: Rgb = [126, 240, 110];
 const MASK: Rgb = [255, 128, 210];
@@ -128,8 +126,9 @@ fn sketch_outlines(frame: &mut Frame, outlines: &[ZoneOutline], colour: Rgb) {
 
 #[cfg(test)]
 mod tests {
+    use lookdown_lens::geometry::{LineEnds, ZoneArea};
+
     use super::*;
-    use crate::geometry::{LineEnds, ZoneArea};
 
     #[test]
     fn masks_are_black_and_zones_are_outlined_with_their_names() {

@@ -3,17 +3,16 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
+use lookdown_lens::geometry::{
+    Lens, Pixel, Ray, VirtualView,
+    pixels::{PixelConvention, cross_half_pixel},
+};
+
 use super::{
     canvas::{Rgb, Stroke},
     line_width,
 };
-use crate::{
-    geometry::{
-        Lens, Pixel, Ray, VirtualView,
-        pixels::{PixelConvention, cross_half_pixel},
-    },
-    imaging::Frame,
-};
+use crate::imaging::Frame;
 
 const RIM: Rgb = [255, 90, 80];
 const RING: Rgb = [255, 220, 60];

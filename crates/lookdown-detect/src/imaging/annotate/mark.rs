@@ -1,9 +1,9 @@
 //! Marks to draw into a frame.
 
+use lookdown_lens::geometry::{OrientedBox, Pixel};
 use serde::{Deserialize, Serialize};
 
 use super::is_drawable;
-use crate::geometry::{OrientedBox, Pixel};
 
 /// One mark. All coordinates are corner-origin frame pixels: pixel i covers [i, i + 1).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use std::array;
 
-use crate::geometry::lens::ImagePlane;
+use lookdown_lens::geometry::lens::ImagePlane;
 
 /// An affine map in the precision in which nodes are kept.
 #[derive(Debug, Clone, Copy)]

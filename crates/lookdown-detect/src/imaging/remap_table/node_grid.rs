@@ -1,11 +1,12 @@
 //! Node grids: where a view samples, at every eighth pixel: in the lens's normalised plane, or, of a
 //! frame crop, in the frame.
 
-use super::{block_size::NODE_STEP, visibility::Visibility};
-use crate::geometry::{
+use lookdown_lens::geometry::{
     FrameCrop, Lens, Pixel, VirtualView,
     pixels::{PixelConvention, cross_half_pixel},
 };
+
+use super::{block_size::NODE_STEP, visibility::Visibility};
 
 /// One view's nodes. Patches of 8×8 pixels lie between them, the last ones beyond the view's right
 /// and lower border where its sides are no multiples of 8.

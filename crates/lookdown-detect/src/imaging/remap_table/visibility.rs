@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use lookdown_lens::geometry::{Lens, Pixel, VirtualView};
+
 use super::block_size::LANES;
-use crate::geometry::{Lens, Pixel, VirtualView};
 
 /// In each row of a view one span of pixels, which meets a cone about the optical axis: what the
 /// lens sees, or, where that is more than a half space, what it does not.
@@ -122,10 +123,10 @@ fn first(start: u32, end: u32, holds: impl Fn(u32) -> bool) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use lookdown_lens::geometry::{Mount, Ray};
     use proptest::prelude::*;
 
     use super::*;
-    use crate::geometry::{Mount, Ray};
 
     proptest! {
         #[test]

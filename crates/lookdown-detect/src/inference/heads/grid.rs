@@ -33,22 +33,15 @@ impl Grid {
             cells.map_or(0, |&cells| u32::try_from(cells).unwrap_or(0))
         };
         let (columns, rows) = (side(1), side(2));
-        let cell = [0.0; 2];
-        let grid = Self {
+        let cell = [
+            f64::from(batch.width) / f64::from(columns),
+            f64::from(batch.height) / f64::from(rows),
+        ];
+        Self {
             columns,
             rows,
             cell,
-        };
-        grid.stretched_over(batch)
-    }
-
-    /// The same number of cells with a size that covers the input exactly.
-    pub(super) fn stretched_over(self, batch: &Batch) -> Self {
-        let cell = [
-            f64::from(batch.width) / f64::from(self.columns),
-            f64::from(batch.height) / f64::from(self.rows),
-        ];
-        Self { cell, ..self }
+        }
     }
 
     /// Square cells of `stride` pixels. The last ones may reach beyond the input.
@@ -71,14 +64,6 @@ impl Grid {
         let columns = self.columns;
         (0..self.rows)
             .flat_map(move |row| (0..columns).map(move |column| [column, row].map(f64::from)))
-    }
-
-    /// Column and row of the cell with the number `index`, row by row.
-    pub(super) fn cell_at(self, index: usize) -> [f64; 2] {
-        let columns = self.columns.max(1) as usize;
-        // Both fit in a u32: there are at most u32::MAX columns and rows.
-        [index % columns, index / columns]
-            .map(|cell| u32::try_from(cell).map_or(f64::NAN, f64::from))
     }
 
     /// The pixel position of a point given in cells.

@@ -1,7 +1,8 @@
 //! Selection of a head's outputs among all outputs of a model.
 
+use lookdown_common::text::Quoted;
+
 use super::tensor::Output;
-use crate::quoted::Quoted;
 
 /// Most names of outputs in a message.
 const MAX_NAMES: usize = 16;

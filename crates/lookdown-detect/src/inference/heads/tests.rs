@@ -108,32 +108,6 @@ fn a_table_without_rows_is_an_empty_view() {
     assert_eq!(found.per_view, [vec![]]);
 }
 
-/// A heat map of 5×10 equal cells, each of 10×10 pixels, without offsets.
-fn plateau(max_peaks: usize) -> Vec<[f64; 2]> {
-    let peaks = head(&format!(
-        "head = 'centernet'\nperson_class = 0\nheat_map = 'hm'\nsize = 'wh'\n\
-         max_peaks = {max_peaks}"
-    ));
-    let outputs: [(&str, &[usize], &[f32]); 2] = [
-        ("hm", &[1, 1, 5, 10], &[0.8; 50]),
-        ("wh", &[1, 2, 5, 10], &[1.0; 100]),
-    ];
-    let found = decode(&peaks, &outputs, 0.5).unwrap();
-    let persons = found.per_view[0].iter();
-    persons.map(|person| person.bbox.center()).collect()
-}
-
-#[test]
-fn every_cell_of_a_plateau_is_a_peak() {
-    assert_eq!(plateau(50).len(), 50);
-}
-
-#[test]
-fn the_first_of_too_many_equal_peaks_are_kept() {
-    assert_eq!(plateau(3), [[5.0, 5.0], [15.0, 5.0], [25.0, 5.0]]);
-    assert!(plateau(0).is_empty());
-}
-
 #[test]
 fn the_best_boxes_of_a_view_are_kept() {
     let found = (0..50).map(|index| ViewDetection {

@@ -1,8 +1,9 @@
 //! HTTP connection to the server: keep-alive, and limits on the time and size of every response.
 
-use std::{error::Error, io::Read, time::Duration};
+use std::{io::Read, time::Duration};
 
 use bytes::Bytes;
+use lookdown_common::text::{one_line, with_causes};
 use reqwest::{
     blocking::{Client, RequestBuilder, Response},
     header::{AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER},
@@ -11,10 +12,7 @@ use reqwest::{
 use url::Url;
 
 use super::RemoteOptions;
-use crate::{
-    open_inference::{HEAD_LENGTH, message::Message},
-    quoted::one_line,
-};
+use crate::open_inference::{HEAD_LENGTH, message::Message};
 
 /// Connect timeout.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -131,7 +129,7 @@ fn reply(request: impl Fn() -> RequestBuilder, max_bytes: u64) -> Result<Reply, 
         }
         sent => sent,
     };
-    sent.map_err(with_causes)
+    sent.map_err(|error| with_causes(&error.without_url()))
         .and_then(|response| read(response, max_bytes))
 }
 
@@ -158,16 +156,4 @@ fn read(response: Response, max_bytes: u64) -> Result<Reply, String> {
         head_length,
         body,
     })
-}
-
-/// Formats the error with its causes in one line.
-fn with_causes(error: reqwest::Error) -> String {
-    let error = error.without_url();
-    let mut message = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        message = format!("{message}: {error}");
-        cause = error.source();
-    }
-    one_line(&message)
 }

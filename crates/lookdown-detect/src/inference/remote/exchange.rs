@@ -1,17 +1,15 @@
 //! Inference requests with views, and their responses.
 
+use lookdown_common::text::{Quoted, one_line};
 use serde::ser::Error;
 use serde_json::value::RawValue;
 
-use crate::{
-    open_inference::{
-        BINARY_OUTPUT, BINARY_SIZE, Datatype, TensorData, TensorValues,
-        bounded_json::{Entries, Table},
-        element_count,
-        message::{InferRequest, InferResponse, InputTensor, Message, RequestedOutput},
-        parameters::{Parameter, Parameters},
-    },
-    quoted::{Quoted, one_line},
+use crate::open_inference::{
+    BINARY_OUTPUT, BINARY_SIZE, Datatype, TensorData, TensorValues,
+    bounded_json::{Entries, Table},
+    element_count,
+    message::{InferRequest, InferResponse, InputTensor, Message, RequestedOutput},
+    parameters::{Parameter, Parameters},
 };
 
 /// An inference request with views for a model.

@@ -1,5 +1,7 @@
 //! Metadata of a model on a server.
 
+use lookdown_common::text::{Quoted, one_line};
+use lookdown_lens::revision::revision_of;
 use serde::Deserialize;
 
 use super::server::{RemoteServer, refusal};
@@ -15,8 +17,6 @@ use crate::{
         bounded_json::MAX_ENTRIES,
         metadata::{ModelMetadata, ServerMetadata, TensorMetadata},
     },
-    quoted::{Quoted, one_line},
-    revision::revision_of,
 };
 
 /// Longest name of a tensor or a datatype.

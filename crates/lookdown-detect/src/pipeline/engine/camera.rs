@@ -2,23 +2,27 @@
 
 use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
-use super::Engine;
-use crate::{
+use lookdown_lens::{
     calibration::{Areas, Calibration, CalibrationId, CameraGeometry},
     geometry::{Lens, Mount},
+    warning::{Warning, WarningCode},
+};
+
+use super::Engine;
+use crate::{
     imaging::{
         Frame, NetworkInput,
         lens_circle::{LensCircle, assumed_circle, find_lens_circle},
     },
     inference::Model,
+    parameters::Profile,
     pipeline::{
-        DetectJob, PipelineError, Profile,
+        DetectJob, PipelineError,
         camera_rig::CameraRig,
         error::internal,
         report::CalibrationUsed,
         rig_cache::{RigCamera, RigKey},
     },
-    warning::{Warning, WarningCode},
 };
 
 /// The rounding step of lens circles, as a share of the radius. Rounding maps the jittering circles

@@ -2,16 +2,18 @@
 
 use std::sync::Arc;
 
+use lookdown_lens::warning::Warning;
+
 use super::camera::FrameCamera;
 use crate::{
     imaging::Frame,
     inference::Model,
+    parameters::Profile,
     pipeline::{
-        PipelineError, Profile, Stage, StageTimings, Timeline, ViewCounts,
+        PipelineError, Stage, StageTimings, Timeline, ViewCounts,
         network::{PassTask, Work},
         pass::Pass,
     },
-    warning::Warning,
 };
 
 /// A frame with its detections: the complete input of refinement, so that other refinements of the

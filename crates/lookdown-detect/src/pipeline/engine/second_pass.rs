@@ -2,13 +2,14 @@
 
 use std::{sync::Arc, time::Instant};
 
+use lookdown_lens::geometry::{
+    Ray,
+    crop_placement::{CropTarget, place_crops},
+    zoom::zoomed_views,
+};
+
 use super::{Engine, Observation};
 use crate::{
-    geometry::{
-        Ray,
-        crop_placement::{CropTarget, place_crops},
-        zoom::zoomed_views,
-    },
     inference::Model,
     pipeline::{
         DetectJob, Stage, camera_rig::CameraRig, merge, motion_cache::CameraViews,

@@ -2,15 +2,18 @@
 
 use std::sync::{Arc, LazyLock};
 
+use lookdown_lens::{
+    calibration::{Areas, CameraGeometry},
+    geometry::{FieldOfViewReading, Lens, Mount},
+};
 use proptest::prelude::*;
 use strum::VariantArray;
 
 use super::*;
 use crate::{
-    calibration::{Areas, CameraGeometry},
-    geometry::{FieldOfViewReading, Lens, Mount},
     inference::{Model, ViewDetection},
-    pipeline::{Profile, test_support::BlobDetector},
+    parameters::Profile,
+    pipeline::test_support::BlobDetector,
 };
 
 const WIDTH: u32 = 320;

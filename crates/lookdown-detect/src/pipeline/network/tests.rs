@@ -3,13 +3,16 @@ use std::{
     time::Duration,
 };
 
-use super::*;
-use crate::{
+use lookdown_lens::{
     calibration::{Areas, CameraGeometry},
     geometry::{Lens, Mount, ViewPlan, view_plan::Ring},
+};
+
+use super::*;
+use crate::{
     imaging::NetworkInput,
     inference::{Detector, HeadOutput, InferenceError},
-    pipeline::Priority,
+    parameters::Priority,
 };
 
 /// Reports the view count of each run and the brightness of its first view, then waits for release.

@@ -1,12 +1,11 @@
+use lookdown_lens::{
+    calibration::{Areas, CameraGeometry},
+    geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
+};
 use strum::VariantArray;
 
 use super::*;
-use crate::{
-    calibration::{Areas, CameraGeometry},
-    geometry::{FieldOfViewReading, Lens, Mount, ViewPlan},
-    imaging::NetworkInput,
-    metrics::IntGauge,
-};
+use crate::{imaging::NetworkInput, metrics::IntGauge};
 
 fn key(radius: i64) -> RigKey {
     RigKey {

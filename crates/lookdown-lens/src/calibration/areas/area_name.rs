@@ -1,9 +1,8 @@
 //! The names of zones and lines.
 
-use crate::{
-    calibration::FormatError,
-    plain_name::{MAX_CHARS, is_plain},
-};
+use lookdown_common::plain_name::{MAX_CHARS, is_plain};
+
+use crate::calibration::FormatError;
 
 /// Checks the name in a field of a calibration file.
 pub(super) fn check_name(field: &str, name: &str) -> Result<(), FormatError> {

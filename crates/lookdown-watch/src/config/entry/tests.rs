@@ -1,6 +1,6 @@
 use std::{fs, path::Path};
 
-use lookdown_client::ServerEntry;
+use lookdown_common::ServerEntry;
 
 use crate::{Location, load};
 

@@ -1,10 +1,11 @@
 //! Errors of interpolated positions against the exact lens model.
 
+use lookdown_lens::geometry::{FieldOfViewReading, Mount, ViewPlan};
+
 use super::{
     super::*,
     lenses::{FRAME_SIDE, every_lens},
 };
-use crate::geometry::{FieldOfViewReading, Mount, ViewPlan};
 
 /// Distances between two places, in pixels of the frame and in pixels of the view.
 #[derive(Debug, Default)]

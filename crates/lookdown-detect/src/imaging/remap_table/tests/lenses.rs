@@ -1,6 +1,6 @@
 //! A lens of each model, as one may hang over a frame of 1680 × 1680 pixels.
 
-use crate::geometry::{
+use lookdown_lens::geometry::{
     Lens,
     lens::{
         DoubleSphere, Equidistant, Equisolid, Eucm, FTheta, Fov, ImagePlane, KannalaBrandt,

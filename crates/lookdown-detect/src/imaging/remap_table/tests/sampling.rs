@@ -1,9 +1,9 @@
 //! Single bands, pixel by pixel.
 
+use lookdown_lens::geometry::lens::ImagePlane;
 use proptest::prelude::*;
 
 use super::super::{node_grid::Nodes, visibility::Visibility, *};
-use crate::geometry::lens::ImagePlane;
 
 pub(super) fn noise(width: u32, height: u32) -> Frame {
     let pixels = (0..width * height * 3).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8);

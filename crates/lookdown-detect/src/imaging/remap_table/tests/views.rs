@@ -1,5 +1,6 @@
 //! Whole views.
 
+use lookdown_lens::geometry::{Mount, QuarterTurn, Ray, ViewPlan};
 use nalgebra::Unit;
 
 use super::{
@@ -7,10 +8,7 @@ use super::{
     lenses::{FRAME_SIDE, every_lens},
     sampling::{noise, reference},
 };
-use crate::{
-    geometry::{Mount, QuarterTurn, Ray, ViewPlan},
-    imaging::ChannelOrder,
-};
+use crate::imaging::ChannelOrder;
 
 fn tilted() -> Mount {
     Mount::new(Unit::new_normalize(Ray::new(0.1, 0.05, -1.0)), None)

@@ -7,31 +7,16 @@ pub(super) type Case = (&'static str, &'static [usize], &'static [usize]);
 pub(super) const N: usize = usize::MAX;
 
 /// One case for every code path of every head.
-pub(super) const CASES: [Case; 15] = [
+pub(super) const CASES: [Case; 10] = [
     (
         "head = 'boxes_scores'\nboxes = 'a'\nscores = 'b'",
         &[N, 5, 4],
         &[N, 5],
     ),
     (
-        "head = 'ssd'\nperson_class = 1\nboxes = 'a'\nscores = 'b'\nanchor_generator = { strides = [4] }",
-        &[N, 6, 4],
-        &[N, 6, 2],
-    ),
-    (
-        "head = 'ssd'\nperson_class = 0\nanchors = [[0.5, 0.5, 1, 1]]\nscore_activation = 'softmax'",
-        &[N, 1, 4],
-        &[N, 1, 2],
-    ),
-    (
         "head = 'yolo_v2'\nperson_class = 1\nanchors = [[1, 2]]\nname = 'a'",
         &[N, 7, 2, 4],
         &[N],
-    ),
-    (
-        "head = 'yolo_v3'\nperson_class = 0\nanchors = [[1, 2]]\nmasks = [[0], [0]]",
-        &[N, 6, 1, 2],
-        &[N, 6, 2, 4],
     ),
     (
         "head = 'yolox'\nperson_class = 0\nstrides = [4, 8]\nname = 'a'",
@@ -63,16 +48,6 @@ pub(super) const CASES: [Case; 15] = [
         "head = 'detr'\nperson_class = 1\nscore_activation = 'none'",
         &[N, 3, 2],
         &[N, 3, 4],
-    ),
-    (
-        "head = 'centernet'\nperson_class = 1\nheat_map = 'b'\nsize = 'a'\noffset = 'a'\nmax_peaks = 1",
-        &[N, 2, 4, 4],
-        &[N, 2, 4, 4],
-    ),
-    (
-        "head = 'centernet'\nperson_class = 0\nheat_map = 'b'\nsides = 'a'\nscore_activation = 'sigmoid'",
-        &[N, 4, 2, 8],
-        &[N, 1, 2, 8],
     ),
     (
         "head = 'end_to_end'\nperson_class = 1\nname = 'a'\ncolumns = ['view', 'x_min', 'y_min', 'x_max', 'y_max', 'class', 'score']",

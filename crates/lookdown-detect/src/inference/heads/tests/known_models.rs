@@ -21,14 +21,6 @@ fn the_paper_s_yolo_v2_fits() {
 }
 
 #[test]
-fn yolo_v3_tiny_fits() {
-    let manifest = "head = 'yolo_v3'\nperson_class = 0\nanchors = [[10, 14], [23, 27], [37, 58], \
-                    [81, 82], [135, 169], [344, 319]]\nmasks = [[3, 4, 5], [1, 2, 3]]";
-    let maps: [(&str, &[i64]); 2] = [("016", &[1, 255, 13, 13]), ("023", &[1, 255, 26, 26])];
-    fits(manifest, 416, &maps);
-}
-
-#[test]
 fn yolox_s_fits() {
     fits(
         "head = 'yolox'\nperson_class = 0",
@@ -69,24 +61,6 @@ fn detr_descendants_fit() {
     let detr: [(&str, &[i64]); 2] = [("logits", &[-1, 100, 92]), ("pred_boxes", &[-1, 100, 4])];
     let softmax = "head = 'detr'\nperson_class = 1\nscore_activation = 'softmax'";
     fits(softmax, 800, &detr);
-}
-
-#[test]
-fn ssd_mobilenet_fits_with_the_default_anchors() {
-    let outputs: [(&str, &[i64]); 2] = [("concat", &[-1, 1917, 4]), ("concat_1", &[-1, 1917, 91])];
-    fits("head = 'ssd'\nperson_class = 1", 300, &outputs);
-}
-
-#[test]
-fn centernets_fit() {
-    let manifest = "head = 'centernet'\nperson_class = 0\nheat_map = 'hm'\nsize = 'wh'\noffset = \
-                    'reg'";
-    let outputs: [(&str, &[i64]); 3] = [
-        ("hm", &[1, 80, 128, 128]),
-        ("wh", &[1, 2, 128, 128]),
-        ("reg", &[1, 2, 128, 128]),
-    ];
-    fits(manifest, 512, &outputs);
 }
 
 #[test]

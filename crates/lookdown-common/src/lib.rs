@@ -1,0 +1,37 @@
+//! The parts that the crates of Lookdown share: texts of clients, names, problems that are logged once.
+//!
+//! With the feature `companion` also those of a client of the server: settings files, the server and
+//! its key, HTTP requests with limits, an HTTP server with limits, durations and backoff.
+
+#[cfg(feature = "companion")]
+mod abort_on_drop;
+#[cfg(feature = "companion")]
+mod backoff;
+#[cfg(feature = "companion")]
+mod config;
+#[cfg(feature = "companion")]
+mod duration;
+#[cfg(feature = "companion")]
+mod http_client;
+#[cfg(feature = "companion")]
+pub mod http_server;
+mod log_once;
+pub mod plain_name;
+#[cfg(feature = "companion")]
+mod server_entry;
+pub mod text;
+
+pub use log_once::LogOnce;
+
+#[cfg(feature = "companion")]
+pub use {
+    abort_on_drop::AbortOnDrop,
+    backoff::Backoff,
+    config::{ConfigError, parse_toml, read_file, read_secret},
+    duration::{optional_duration, parse_duration},
+    http_client::{ClientError, ServerClient, client_builder, read_body, retry_after},
+    server_entry::{ServerEntry, ServerOptions},
+};
+
+/// The first bytes of a JPEG file.
+pub const JPEG_START: &[u8] = &[0xff, 0xd8, 0xff];

@@ -1,0 +1,81 @@
+//! Text of clients and other programs, as problems and log lines repeat it.
+
+use std::{error::Error, fmt};
+
+/// Largest number of characters of a client's text that are repeated.
+const MAX_CHARS: usize = 64;
+/// Largest number of characters of a line.
+const MAX_LINE_CHARS: usize = 300;
+
+/// Displays a text in quotation marks with its control characters escaped, cut after 64 characters:
+/// enough to recognise it, too short to fill a log.
+#[derive(Debug, Clone, Copy)]
+pub struct Quoted<'a>(pub &'a str);
+
+impl fmt::Display for Quoted<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kept = shortened(self.0);
+        let ellipsis = if kept.len() < self.0.len() { "…" } else { "" };
+        write!(formatter, "{kept:?}{ellipsis}")
+    }
+}
+
+/// Formats a text as one line of at most 300 characters, so that it can neither forge nor fill log
+/// lines.
+#[must_use]
+pub fn one_line(text: &(impl fmt::Display + ?Sized)) -> String {
+    let text = text.to_string();
+    let text = text.trim().chars().take(MAX_LINE_CHARS);
+    text.map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// Formats an error with its causes in one line.
+#[must_use]
+pub fn with_causes(error: &(dyn Error + 'static)) -> String {
+    one_line(
+        &causes(error)
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join(": "),
+    )
+}
+
+/// Returns an error and its causes, the innermost last.
+pub fn causes<'a>(
+    error: &'a (dyn Error + 'static),
+) -> impl Iterator<Item = &'a (dyn Error + 'static)> {
+    std::iter::successors(Some(error), |&error| error.source())
+}
+
+/// Returns the first 64 characters of a text.
+#[must_use]
+pub fn shortened(text: &str) -> &str {
+    let end = text.char_indices().nth(MAX_CHARS);
+    end.map_or(text, |(end, _)| &text[..end])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_text_is_quoted_whole() {
+        assert_eq!(Quoted("1.5").to_string(), "\"1.5\"");
+        assert_eq!(Quoted("").to_string(), "\"\"");
+        assert_eq!(Quoted("a\n\"b").to_string(), r#""a\n\"b""#);
+    }
+
+    #[test]
+    fn an_error_is_one_line_of_limited_length() {
+        let error = "refused\r\n2026-11-22 WARN\tforged\u{1b}[31m";
+        assert_eq!(one_line(&error), "refused  2026-11-22 WARN forged [31m");
+        assert_eq!(one_line(&"ä".repeat(1000)).chars().count(), 300);
+    }
+
+    #[test]
+    fn long_text_is_cut_between_characters() {
+        let quoted = Quoted(&"ä".repeat(65)).to_string();
+        assert_eq!(quoted, format!("\"{}\"…", "ä".repeat(64)));
+        assert!(!Quoted(&"ä".repeat(64)).to_string().contains('…'));
+    }
+}

@@ -1,0 +1,40 @@
+//! The own clocks at one moment.
+
+use std::time::{Duration, Instant};
+
+use jiff::Timestamp;
+
+/// The clock of the machine, and one that never jumps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Now {
+    /// Milliseconds since the Unix epoch. It may jump.
+    pub(crate) unix_ms: i64,
+    /// It measures durations.
+    pub(crate) instant: Instant,
+}
+
+impl Now {
+    /// Reads both clocks.
+    pub(crate) fn read() -> Self {
+        Self {
+            unix_ms: Timestamp::now().as_millisecond(),
+            instant: Instant::now(),
+        }
+    }
+}
+
+/// Keeps equal log lines apart.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct LogPause(Option<Instant>);
+
+impl LogPause {
+    /// Returns true if there was no line for `pause`: then there is one now.
+    pub(crate) fn is_over(&mut self, pause: Duration, now: Now) -> bool {
+        let elapsed = self.0.map(|last| now.instant.duration_since(last));
+        let is_over = elapsed.is_none_or(|elapsed| elapsed >= pause);
+        if is_over {
+            self.0 = Some(now.instant);
+        }
+        is_over
+    }
+}

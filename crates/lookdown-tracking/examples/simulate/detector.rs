@@ -1,0 +1,289 @@
+//! A ceiling camera whose detector misses, invents and misplaces persons as the measured one does.
+//!
+//! The figures of the detector are in `figures`; docs/count-accuracy.md has the assumptions.
+
+use lookdown_lens::geometry::{
+    Lens, Mount, OrientedBox, Pixel, Ray,
+    floor::{FloorPosition, bearing, floor_position, pixel_of},
+    oriented_box::vertical_in_frame,
+};
+use lookdown_tracking::{CameraPose, Observation};
+use nalgebra::{Point2, Unit, Vector2, Vector3};
+use std::collections::HashMap;
+
+use crate::{
+    chance::{Chance, Slow},
+    figures::{Figures, SCORE_FLOOR},
+};
+
+/// Side of the frame, pixels.
+pub const FRAME_PX: f64 = 1280.0;
+/// Radius of a person, metres.
+const BODY_RADIUS_M: f64 = 0.25;
+/// Time over which scores and places stay wrong, seconds, and the share of the variance that does.
+const CORRELATION_S: f64 = 1.0;
+const SLOW_SHARE: f64 = 0.5;
+/// Share of the background's false alarms that come from fixed places (posters, coat stands).
+const FIXED_SHARE: f64 = 0.85;
+/// Share of the variance of their scores between such places; the rest changes over time.
+const FIXED_BETWEEN: f64 = 0.75;
+/// Time over which the score of such a place stays the same, seconds.
+const FIXED_CORRELATION_S: f64 = 3.0;
+/// Loss of the logit of a person who is half hidden behind another one.
+const HIDDEN_LOGIT: f64 = 2.0;
+
+/// A camera with its detector.
+pub struct Camera {
+    pub pose: CameraPose,
+    lens: Lens,
+    mount: Mount,
+    figures: Figures,
+    chance: Chance,
+    errors: HashMap<u64, Errors>,
+    fixed: Vec<FixedPlace>,
+}
+
+/// A thing that is taken for a person.
+struct FixedPlace {
+    place: Vector2<f64>,
+    /// Standard normal numbers: the part of the score that stays, and the part that changes.
+    lasting: f64,
+    changing: Slow,
+}
+
+/// The slow errors of one person.
+#[derive(Clone, Copy, Default)]
+struct Errors {
+    score: Slow,
+    edges: [Slow; 4],
+}
+
+/// A box that the lens shows.
+#[derive(Clone, Copy)]
+pub struct Shown {
+    pub id: u64,
+    pub oriented: OrientedBox,
+}
+
+impl Camera {
+    pub fn new(
+        pose: CameraPose,
+        figures: &Figures,
+        mut chance: Chance,
+        reach_m: Vector2<f64>,
+    ) -> Self {
+        let centre = (FRAME_PX - 1.0) / 2.0;
+        let lens = Lens::equidistant_circle(centre, centre, FRAME_PX / 2.0, 90_f64.to_radians());
+        let places = chance.count(figures.background.count * FIXED_SHARE);
+        let fixed = (0..places).map(|_| FixedPlace {
+            place: Vector2::new(
+                chance.uniform(-reach_m.x, reach_m.x),
+                chance.uniform(-reach_m.y, reach_m.y),
+            ),
+            lasting: chance.normal(),
+            changing: Slow::default(),
+        });
+        let fixed = fixed.collect();
+        Self {
+            pose,
+            lens: lens.expect("a valid lens"),
+            mount: Mount::new(Unit::new_normalize(-Vector3::z()), pose.height_m),
+            figures: *figures,
+            fixed,
+            errors: HashMap::new(),
+            chance,
+        }
+    }
+
+    /// The camera's floor coordinates of a place of the site.
+    pub fn floor_of_site(&self, place: Vector2<f64>) -> Vector2<f64> {
+        let away = place - Vector2::from(self.pose.position_m);
+        let (sin, cos) = self.pose.yaw_deg.to_radians().sin_cos();
+        Vector2::new(cos * away.x + sin * away.y, cos * away.y - sin * away.x)
+    }
+
+    /// The oriented box around a standing person.
+    pub fn show(&self, id: u64, place: Vector2<f64>, height_m: f64) -> Option<Shown> {
+        let camera_m = self.pose.height_m?;
+        let pixel = |x: f64, y: f64, z: f64| {
+            let shown = self.lens.project(&Ray::new(x, y, camera_m - z))?;
+            Some(Pixel::new(shown.x + 0.5, shown.y + 0.5))
+        };
+        let middle = pixel(place.x, place.y, height_m / 2.0)?;
+        let up = vertical_in_frame(middle, &self.lens, &self.mount);
+        let across = Vector2::new(-up.y, up.x);
+        // A round body with narrower feet and head.
+        let rings = [(0.0, 0.5), (0.4, 0.8), (0.8, 1.0), (0.95, 0.6), (1.0, 0.3)];
+        let (mut low, mut high) = (Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN));
+        for (share, radius) in rings {
+            for step in 0..12 {
+                let (sin, cos) = (f64::from(step) * std::f64::consts::TAU / 12.0).sin_cos();
+                let radius = radius * BODY_RADIUS_M;
+                let point = pixel(
+                    place.x + radius * cos,
+                    place.y + radius * sin,
+                    share * height_m,
+                )?;
+                let along = Vector2::new((point - middle).dot(&across), (point - middle).dot(&up));
+                low = low.inf(&along);
+                high = high.sup(&along);
+            }
+        }
+        let oriented = with_edges(middle, up, low, high);
+        Some(Shown { id, oriented })
+    }
+
+    /// The persons that the detector reports at `at_s`.
+    pub fn detect(&mut self, at_s: f64, shown: &[Shown]) -> Vec<(Observation, OrientedBox)> {
+        let mut found = Vec::new();
+        for person in shown {
+            let hidden = self.is_hidden(person, shown);
+            let mut errors = self.errors.get(&person.id).copied().unwrap_or_default();
+            let slow = self.mixed(&mut errors.score, at_s);
+            let lost = if hidden { HIDDEN_LOGIT } else { 0.0 };
+            let logit = self.logit_of(&person.oriented, slow) - lost;
+            let mut edges = [0.0; 4];
+            for (edge, slow) in edges.iter_mut().zip(&mut errors.edges) {
+                *edge = self.figures.edge * self.mixed(slow, at_s);
+            }
+            self.errors.insert(person.id, errors);
+            found.extend(self.observe(moved(&person.oriented, edges), logit));
+            let Figures { parts, .. } = self.figures;
+            for _ in 0..self.chance.count(parts.count) {
+                let shift = self.chance.uniform(-0.4, 0.4);
+                let part = moved(&person.oriented, [shift, shift, shift * 0.3, shift * 0.3]);
+                let logit = parts.logit_of(self.chance.normal());
+                found.extend(self.observe(part, logit));
+            }
+        }
+        self.invent(at_s, &mut found);
+        found
+    }
+
+    fn invent(&mut self, at_s: f64, found: &mut Vec<(Observation, OrientedBox)>) {
+        let Figures { background, .. } = self.figures;
+        for index in 0..self.fixed.len() {
+            let fixed = &mut self.fixed[index];
+            let changing = fixed
+                .changing
+                .at(at_s, FIXED_CORRELATION_S, &mut self.chance);
+            let value =
+                FIXED_BETWEEN.sqrt() * fixed.lasting + (1.0 - FIXED_BETWEEN).sqrt() * changing;
+            let place = fixed.place;
+            if let Some(shown) = self.show(0, place, 1.7) {
+                found.extend(self.observe(shown.oriented, background.logit_of(value)));
+            }
+        }
+        for _ in 0..self.chance.count(background.count * (1.0 - FIXED_SHARE)) {
+            let reach = 6.0;
+            let place = Vector2::new(
+                self.chance.uniform(-reach, reach),
+                self.chance.uniform(-reach, reach),
+            );
+            if let Some(shown) = self.show(0, place, 1.7) {
+                let logit = background.logit_of(self.chance.normal());
+                found.extend(self.observe(shown.oriented, logit));
+            }
+        }
+    }
+
+    fn mixed(&mut self, slow: &mut Slow, at_s: f64) -> f64 {
+        let slow = slow.at(at_s, CORRELATION_S, &mut self.chance);
+        SLOW_SHARE.sqrt() * slow + (1.0 - SLOW_SHARE).sqrt() * self.chance.normal()
+    }
+
+    /// The logit of the score of a person, for a standard normal number.
+    fn logit_of(&self, oriented: &OrientedBox, normal: f64) -> f64 {
+        let angle = bearing(oriented.center, &self.lens).map_or(90.0, |b| b.off_axis.to_degrees());
+        self.figures.logit_of_person(angle, normal)
+    }
+
+    fn is_hidden(&self, person: &Shown, shown: &[Shown]) -> bool {
+        let centre = self.lens.principal_point();
+        let polar = |shown: &Shown| {
+            let away = shown.oriented.center - centre;
+            (away.norm(), away.y.atan2(away.x))
+        };
+        let (radius, azimuth) = polar(person);
+        shown.iter().any(|other| {
+            let (other_radius, other_azimuth) = polar(other);
+            let turn = (azimuth - other_azimuth + std::f64::consts::PI)
+                .rem_euclid(std::f64::consts::TAU)
+                - std::f64::consts::PI;
+            let gap = turn.abs() * radius;
+            other.id != person.id
+                && other_radius < radius
+                && radius - other_radius < 0.7 * person.oriented.height
+                && gap < 0.5 * person.oriented.width
+        })
+    }
+
+    fn observe(&self, oriented: OrientedBox, logit: f64) -> Option<(Observation, OrientedBox)> {
+        let score = 1.0 / (1.0 + (-logit).exp());
+        let seen = bearing(oriented.center, &self.lens)?;
+        let foot = oriented.foot();
+        let floor = floor_position(foot, &self.lens, &self.mount);
+        (score >= SCORE_FLOOR).then(|| {
+            let observation = Observation {
+                floor_m: floor.map(|place| [place.x_m, place.y_m]),
+                azimuth_deg: (seen.azimuth.to_degrees() + 90.0).rem_euclid(360.0),
+                off_axis_deg: seen.off_axis.to_degrees(),
+                centre_px: [oriented.center.x, oriented.center.y],
+                foot_px: [foot.x, foot.y],
+                score,
+            };
+            (observation, oriented)
+        })
+    }
+
+    /// The pixel of a floor place of this camera.
+    pub fn pixel_of_floor(&self, place: Vector2<f64>) -> Option<Pixel> {
+        let place = FloorPosition {
+            x_m: place.x,
+            y_m: place.y,
+        };
+        pixel_of(place, &self.lens, &self.mount)
+    }
+}
+
+/// The box with edges moved by shares of its extents: lower, upper, left, right.
+fn moved(oriented: &OrientedBox, [lower, upper, left, right]: [f64; 4]) -> OrientedBox {
+    let half = Vector2::new(oriented.width, oriented.height) / 2.0;
+    let low = Vector2::new(
+        -half.x + left * oriented.width,
+        -half.y + lower * oriented.height,
+    );
+    let high = Vector2::new(
+        half.x + right * oriented.width,
+        half.y + upper * oriented.height,
+    );
+    with_edges(oriented.center, oriented.up, low, high)
+}
+
+fn with_edges(
+    centre: Pixel,
+    up: Vector2<f64>,
+    low: Vector2<f64>,
+    high: Vector2<f64>,
+) -> OrientedBox {
+    let across = Vector2::new(-up.y, up.x);
+    let middle = (low + high) / 2.0;
+    let place: Point2<f64> = centre + across * middle.x + up * middle.y;
+    let mut oriented = OrientedBox::turned(place, high.x - low.x, high.y - low.y, 0.0);
+    oriented.up = up;
+    oriented
+}
+
+/// Bounds of the ellipse in an oriented box: x and y of the least corner, x and y of the greatest.
+pub fn bounds(oriented: &OrientedBox) -> [f64; 4] {
+    let up = oriented.up * (oriented.height / 2.0);
+    let across = Vector2::new(-oriented.up.y, oriented.up.x) * (oriented.width / 2.0);
+    let half = Vector2::new(up.x.hypot(across.x), up.y.hypot(across.y));
+    let centre = oriented.center;
+    [
+        centre.x - half.x,
+        centre.y - half.y,
+        centre.x + half.x,
+        centre.y + half.y,
+    ]
+}

@@ -1,0 +1,39 @@
+use super::*;
+use crate::{CameraPose, Observation, Tracker, TrackerSettings};
+
+fn person(x: f64, y: f64) -> Observation {
+    Observation {
+        floor_m: Some([x, y]),
+        azimuth_deg: y.atan2(x).to_degrees().rem_euclid(360.0),
+        off_axis_deg: (x.hypot(y) / 2.8).atan().to_degrees(),
+        centre_px: [0.0, 0.0],
+        foot_px: [0.0, 0.0],
+        score: 0.9,
+    }
+}
+
+#[test]
+fn a_standing_person_heats_one_cell() {
+    let poses = [CameraPose::alone(Some(2.8))];
+    let mut tracker = Tracker::new(&poses, TrackerSettings::default()).unwrap();
+    let mut heat_map = HeatMap::default();
+    for frame in 0..50 {
+        let at_s = 1000.0 + f64::from(frame) * 0.2;
+        tracker.update(0, at_s, &[person(1.1, -0.9)]).unwrap();
+        heat_map.update(tracker.tracks());
+    }
+    let cells = heat_map.take();
+    let of_person = cells[&Cell { column: 4, row: -4 }];
+    assert!((9_000..=10_000).contains(&of_person), "{cells:?}");
+    assert_eq!(cells.values().sum::<u64>(), of_person);
+    assert!(heat_map.take().is_empty());
+}
+
+#[test]
+fn far_and_invalid_places_have_no_cell() {
+    assert_eq!(Cell::of([-0.1, 0.3]), Some(Cell { column: -1, row: 1 }));
+    assert_eq!(Cell { column: -1, row: 1 }.corner_m(), [-0.25, 0.25]);
+    for x in [f64::NAN, f64::INFINITY, 1e9] {
+        assert_eq!(Cell::of([x, 0.0]), None);
+    }
+}

@@ -1,0 +1,36 @@
+#![doc = include_str!("../README.md")]
+//!
+//! [`Tracker`] turns [`Observation`]s into tracks, [`lines`] counts crossings, [`zones`] occupancy and
+//! dwell times, [`heat_map`] seconds of presence.
+
+mod assignment;
+mod camera;
+mod duplicates;
+mod evidence;
+pub mod heat_map;
+mod kalman;
+pub mod lines;
+mod measurement;
+mod motion;
+mod observation;
+mod plane;
+mod settings;
+mod site;
+#[cfg(test)]
+mod test_walks;
+mod track;
+mod track_id;
+mod tracker;
+pub mod zones;
+
+pub use evidence::EvidenceSettings;
+pub use observation::Observation;
+pub use plane::Plane;
+pub use settings::{MeasurementNoise, PlaneSettings, TrackerSettings};
+pub use site::CameraPose;
+pub use track::{MAX_TAIL_POINTS, PersonOfReport, TailPoint, Track};
+pub use track_id::TrackId;
+pub use tracker::{MAX_CAMERAS, MAX_PERSONS, RefusedReport, SiteError, Tracker};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,239 @@
+//! Lines that count crossings in two directions.
+//!
+//! A crossing is pending while its track is within the hysteresis band around the line, and counts
+//! once the track is beyond the band. A track that returns within the band cancels it, so that a
+//! person who hesitates on the line is never counted twice.
+
+mod crossings;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Plane, TailPoint, Track, TrackId};
+use crossings::{distance, signed_crossings};
+
+/// Most points of a line.
+pub const MAX_LINE_POINTS: usize = 64;
+/// Most lines of a counter.
+pub const MAX_LINES: usize = 64;
+
+/// The direction of a crossing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Direction {
+    /// To the right-hand side of a walk from the line's first point to its last, seen as on the
+    /// screen (x right, y down).
+    In,
+    /// To the left-hand side.
+    Out,
+}
+
+/// A line of one or more segments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// The name, unique within its counter.
+    pub name: String,
+    /// The plane of the points.
+    pub plane: Plane,
+    /// The points in order, 2 to [`MAX_LINE_POINTS`].
+    pub points: Vec<[f64; 2]>,
+    /// Half the width of the hysteresis band, in the unit of the plane: metres or pixels.
+    pub band: f64,
+}
+
+/// Half the width of the hysteresis band for lines on the floor, metres, where none is set.
+pub const DEFAULT_BAND_M: f64 = 0.3;
+
+/// A counted crossing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Crossing {
+    /// Index of the line.
+    pub line: usize,
+    /// Direction of the crossing.
+    pub direction: Direction,
+    /// Track of the person.
+    pub track: TrackId,
+    /// Time at which the person was beyond the band, seconds since the Unix epoch.
+    pub at_s: f64,
+}
+
+/// Lines that cannot be counted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LineError {
+    /// Too many lines.
+    #[error("there are {0} lines: give at most {MAX_LINES}")]
+    Count(usize),
+    /// A line with too few or too many points.
+    #[error("line `{name}` has {count} points: give 2 to {MAX_LINE_POINTS}")]
+    Points {
+        /// Name of the line.
+        name: String,
+        /// Number of its points.
+        count: usize,
+    },
+    /// A coordinate that is not finite.
+    #[error("line `{0}` has a coordinate that is not finite: give numbers")]
+    Coordinate(String),
+    /// Two neighbouring points in one place.
+    #[error("line `{0}` has the same point twice in a row: leave one out")]
+    Repeated(String),
+    /// A band without a width.
+    #[error("line `{name}` has the band {band}: give a number above 0")]
+    Band {
+        /// Name of the line.
+        name: String,
+        /// Its band.
+        band: f64,
+    },
+}
+
+/// The lines over the tracks of one tracker.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LineCounter {
+    lines: Vec<Line>,
+    state: LineState,
+}
+
+/// The part of a counter that must survive a restart together with the tracker.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LineState {
+    /// The state of each track at each line.
+    tracks: BTreeMap<TrackId, Vec<Approach>>,
+}
+
+/// A track and a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Approach {
+    /// Last place and its time.
+    last: Option<([f64; 2], f64)>,
+    /// True once the track was beyond the band.
+    is_settled: bool,
+    /// Crossings since then: those to the right minus those to the left.
+    pending: i32,
+}
+
+impl LineCounter {
+    /// Returns a counter of these lines.
+    ///
+    /// # Errors
+    /// [`LineError`] for a line that cannot be counted.
+    pub fn new(lines: Vec<Line>) -> Result<Self, LineError> {
+        Self::resumed(lines, LineState::default())
+    }
+
+    /// Returns a counter of the lines that `state` was kept for.
+    ///
+    /// # Errors
+    /// [`LineError`] for a line that cannot be counted.
+    pub fn resumed(lines: Vec<Line>, mut state: LineState) -> Result<Self, LineError> {
+        if lines.len() > MAX_LINES {
+            return Err(LineError::Count(lines.len()));
+        }
+        lines.iter().try_for_each(Line::check)?;
+        state
+            .tracks
+            .retain(|_, approaches| approaches.len() == lines.len());
+        Ok(Self { lines, state })
+    }
+
+    /// Returns the lines.
+    #[must_use]
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// Returns the state to be stored with that of the tracker.
+    #[must_use]
+    pub fn state(&self) -> &LineState {
+        &self.state
+    }
+
+    /// Returns the crossings since the last call. `tracks` are all confirmed tracks of the tracker,
+    /// after each of its updates.
+    pub fn update<'a>(&mut self, tracks: impl IntoIterator<Item = &'a Track>) -> Vec<Crossing> {
+        let mut crossings = Vec::new();
+        let mut states = BTreeMap::new();
+        for track in tracks {
+            let known = self.state.tracks.remove(&track.id());
+            let mut approaches =
+                known.unwrap_or_else(|| vec![Approach::default(); self.lines.len()]);
+            for (index, (line, approach)) in self.lines.iter().zip(&mut approaches).enumerate() {
+                for (direction, at_s) in approach.advance(line, track.tail()) {
+                    crossings.push(Crossing {
+                        line: index,
+                        direction,
+                        track: track.id(),
+                        at_s,
+                    });
+                }
+            }
+            states.insert(track.id(), approaches);
+        }
+        self.state.tracks = states;
+        crossings
+    }
+}
+
+impl Approach {
+    /// Follows the new points of a track and returns the crossings that now count.
+    fn advance<'a>(
+        &mut self,
+        line: &Line,
+        tail: impl Iterator<Item = &'a TailPoint>,
+    ) -> Vec<(Direction, f64)> {
+        let mut counted = Vec::new();
+        for point in tail {
+            let is_known = self.last.is_some_and(|(_, at_s)| point.at_s <= at_s);
+            let Some(place) = point.place(line.plane).filter(|_| !is_known) else {
+                continue;
+            };
+            if let Some((last, _)) = self.last {
+                self.pending += signed_crossings(&line.points, last, place);
+            }
+            self.last = Some((place, point.at_s));
+            if distance(&line.points, place) < line.band {
+                continue;
+            }
+            if self.is_settled {
+                let direction = if self.pending > 0 {
+                    Direction::In
+                } else {
+                    Direction::Out
+                };
+                let count = self.pending.unsigned_abs() as usize;
+                counted.extend(std::iter::repeat_n((direction, point.at_s), count));
+            }
+            self.is_settled = true;
+            self.pending = 0;
+        }
+        counted
+    }
+}
+
+impl Line {
+    fn check(&self) -> Result<(), LineError> {
+        let name = || self.name.clone();
+        let count = self.points.len();
+        if !(2..=MAX_LINE_POINTS).contains(&count) {
+            return Err(LineError::Points {
+                name: name(),
+                count,
+            });
+        }
+        if !self.points.iter().flatten().all(|part| part.is_finite()) {
+            return Err(LineError::Coordinate(name()));
+        }
+        if self.points.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err(LineError::Repeated(name()));
+        }
+        if !(self.band > 0.0 && self.band.is_finite()) {
+            let band = self.band;
+            return Err(LineError::Band { name: name(), band });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

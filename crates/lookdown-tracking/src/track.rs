@@ -1,0 +1,196 @@
+//! One track: its motion, its evidence and its recent places.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::Observation;
+use crate::{
+    Plane, TrackId, TrackerSettings, evidence::Evidence, measurement::Measurement, motion::Motion,
+};
+
+/// Most places that a track keeps.
+pub const MAX_TAIL_POINTS: usize = 64;
+
+/// A confirmed or possible person over time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Track {
+    id: TrackId,
+    pub(super) motion: Motion,
+    first_seen_s: f64,
+    seen_s: f64,
+    pub(super) evidence: Evidence,
+    /// The place at which the present evidence began.
+    evidence_place: [f64; 3],
+    pub(super) missed: u32,
+    confirmed: bool,
+    last_person: PersonOfReport,
+    foot_px: [f64; 2],
+    /// The time of the last person of each camera that saw the track.
+    pub(super) seen_by: BTreeMap<usize, f64>,
+    tail: VecDeque<TailPoint>,
+}
+
+/// A person's place in a report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PersonOfReport {
+    /// Number of the camera in its tracker.
+    pub camera: usize,
+    /// Index of the person in the report.
+    pub person: usize,
+}
+
+/// A past place of a track.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TailPoint {
+    /// Time of the frame, seconds since the Unix epoch.
+    pub at_s: f64,
+    /// Filtered place on the floor, metres; absent in bearing space.
+    pub floor_m: Option<[f64; 2]>,
+    /// Foot point in the frame of the camera that saw the person, pixels.
+    pub foot_px: [f64; 2],
+}
+
+impl TailPoint {
+    /// Returns the place in a plane; `None` for the floor in bearing space.
+    #[must_use]
+    pub fn place(&self, plane: Plane) -> Option<[f64; 2]> {
+        match plane {
+            Plane::FloorM => self.floor_m,
+            Plane::FramePx => Some(self.foot_px),
+        }
+    }
+}
+
+/// A measured person of the current report.
+pub(super) struct Sighting<'a> {
+    pub at_s: f64,
+    /// Time since the camera's last report, seconds.
+    pub interval_s: f64,
+    pub source: PersonOfReport,
+    pub person: &'a Observation,
+    pub measured: &'a Measurement,
+}
+
+impl Track {
+    /// Returns a new track, not confirmed yet.
+    pub(super) fn new(id: TrackId, seen: &Sighting, settings: &TrackerSettings) -> Self {
+        let plane = settings.plane_of(&seen.measured.place);
+        let motion = Motion::new(seen.measured, seen.at_s, plane);
+        let mut track = Self {
+            id,
+            evidence_place: motion.place().into(),
+            motion,
+            first_seen_s: seen.at_s,
+            seen_s: seen.at_s,
+            evidence: Evidence::first(seen.measured.score, &settings.evidence),
+            missed: 0,
+            confirmed: false,
+            last_person: seen.source,
+            foot_px: seen.person.foot_px,
+            seen_by: BTreeMap::new(),
+            tail: VecDeque::new(),
+        };
+        track.record(seen);
+        track
+    }
+
+    /// Updates the track with a person.
+    pub(super) fn update(&mut self, seen: &Sighting, settings: &TrackerSettings) {
+        let plane = settings.plane_of(&seen.measured.place);
+        self.motion.update(seen.measured, seen.at_s, plane);
+        let settings = &settings.evidence;
+        let here = self.motion.place();
+        if (here - Vector3::from(self.evidence_place)).norm() >= plane.independent_distance {
+            self.evidence_place = here.into();
+            self.evidence.move_on(settings);
+        }
+        self.evidence
+            .add_hit(seen.measured.score, seen.interval_s, settings);
+        self.confirmed |= self.evidence.confirms(settings);
+        self.record(seen);
+    }
+
+    fn record(&mut self, seen: &Sighting) {
+        self.missed = 0;
+        self.seen_s = self.seen_s.max(seen.at_s);
+        self.last_person = seen.source;
+        self.foot_px = seen.person.foot_px;
+        self.seen_by.insert(seen.source.camera, seen.at_s);
+        if self.tail.len() == MAX_TAIL_POINTS {
+            self.tail.pop_front();
+        }
+        self.tail.push_back(TailPoint {
+            at_s: self.seen_s,
+            floor_m: self.place(Plane::FloorM),
+            foot_px: self.foot_px,
+        });
+    }
+
+    /// Returns the track's identifier.
+    #[must_use]
+    pub fn id(&self) -> TrackId {
+        self.id
+    }
+
+    /// Returns true once the track has enough evidence of a person.
+    #[must_use]
+    pub fn is_confirmed(&self) -> bool {
+        self.confirmed
+    }
+
+    /// Returns the time of the first observation, seconds since the Unix epoch.
+    #[must_use]
+    pub fn first_seen_s(&self) -> f64 {
+        self.first_seen_s
+    }
+
+    /// Returns the time of the last observation, seconds since the Unix epoch.
+    #[must_use]
+    pub fn seen_s(&self) -> f64 {
+        self.seen_s
+    }
+
+    /// Returns the person of the report that updated the track last.
+    #[must_use]
+    pub fn last_person(&self) -> PersonOfReport {
+        self.last_person
+    }
+
+    /// Returns the place at the last observation: filtered on the floor, as observed in the frame.
+    /// `None` for the floor without the camera's height.
+    #[must_use]
+    pub fn place(&self, plane: Plane) -> Option<[f64; 2]> {
+        match plane {
+            Plane::FloorM => self.motion.on_floor().map(|state| state.place().into()),
+            Plane::FramePx => Some(self.foot_px),
+        }
+    }
+
+    /// Returns the velocity on the floor, metres per second; `None` without the camera's height.
+    #[must_use]
+    pub fn velocity_m_s(&self) -> Option<[f64; 2]> {
+        self.motion.on_floor().map(|state| state.velocity().into())
+    }
+
+    /// Returns the filtered direction in the camera's frame: azimuth (as in the observations) and
+    /// angle off the axis, degrees; `None` on the floor.
+    #[must_use]
+    pub fn bearing_deg(&self) -> Option<[f64; 2]> {
+        let direction = self.motion.direction()?;
+        let azimuth = direction
+            .y
+            .atan2(direction.x)
+            .to_degrees()
+            .rem_euclid(360.0);
+        let off_axis = direction.xy().norm().atan2(direction.z).to_degrees();
+        Some([azimuth, off_axis])
+    }
+
+    /// Returns the last places, oldest first, at most [`MAX_TAIL_POINTS`].
+    #[must_use]
+    pub fn tail(&self) -> impl ExactSizeIterator<Item = &TailPoint> {
+        self.tail.iter()
+    }
+}

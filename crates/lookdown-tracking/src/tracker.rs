@@ -1,0 +1,343 @@
+//! The tracker: association of each report's persons with the tracks.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{CameraPose, Observation};
+use crate::{
+    Track, TrackId, TrackerSettings,
+    assignment::best_pairs,
+    camera::Camera,
+    duplicates::end_duplicates,
+    evidence::log_odds,
+    measurement::Measurement,
+    track::{PersonOfReport, Sighting},
+};
+
+/// Most cameras of a tracker.
+pub const MAX_CAMERAS: usize = 64;
+/// Most persons of a report that are considered: those with the highest scores.
+pub const MAX_PERSONS: usize = 300;
+/// Squared Mahalanobis distance beyond which a person never continues a track: the 99.9 % quantile
+/// of the chi-squared distribution with two degrees of freedom.
+const GATE: f64 = 13.8;
+
+/// A tracker of one camera or one site. Serializable: stored with the counts, it survives a restart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tracker {
+    settings: TrackerSettings,
+    cameras: Vec<Camera>,
+    on_floor: bool,
+    tracks: Vec<Track>,
+    next_id: u64,
+    newest_report_s: Option<f64>,
+}
+
+/// Cameras that make no tracker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SiteError {
+    /// Too few or too many cameras.
+    #[error("a site has {0} cameras: give 1 to {MAX_CAMERAS}")]
+    Count(usize),
+    /// A camera of several without its height.
+    #[error(
+        "camera number {0} of the site has no height: set mount.height_m, which places persons on the common floor"
+    )]
+    NoHeight(usize),
+}
+
+/// A report that cannot update the tracks.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum RefusedReport {
+    /// A camera that is not in the tracker.
+    #[error("camera number {0} is not part of the tracker")]
+    UnknownCamera(usize),
+    /// A time that is not finite.
+    #[error("the time of the report is not finite")]
+    Time,
+    /// A report that is not newer than the camera's last one.
+    #[error("the report is not newer than the last one of its camera")]
+    OutOfOrder,
+    /// A report that came too long after those of other cameras.
+    #[error("the report is {0:.1} s older than the newest one of the site")]
+    Late(f64),
+}
+
+/// A person of the current report with its measurement.
+struct Candidate<'a> {
+    index: usize,
+    person: &'a Observation,
+    measured: Measurement,
+}
+
+impl Tracker {
+    /// Returns a tracker for `cameras`: on the floor where every camera has its height, else in
+    /// bearing space.
+    ///
+    /// # Errors
+    /// [`SiteError`] without cameras, with more than [`MAX_CAMERAS`], or with several of which one
+    /// lacks its height.
+    pub fn new(poses: &[CameraPose], settings: TrackerSettings) -> Result<Self, SiteError> {
+        if !(1..=MAX_CAMERAS).contains(&poses.len()) {
+            return Err(SiteError::Count(poses.len()));
+        }
+        let without_height = poses.iter().position(|pose| pose.height_m.is_none());
+        if let (Some(number), true) = (without_height, poses.len() > 1) {
+            return Err(SiteError::NoHeight(number));
+        }
+        let camera = |&pose| Camera {
+            pose,
+            last_report_s: None,
+        };
+        Ok(Self {
+            settings,
+            cameras: poses.iter().map(camera).collect(),
+            on_floor: without_height.is_none(),
+            tracks: Vec::new(),
+            next_id: 1,
+            newest_report_s: None,
+        })
+    }
+
+    /// Updates the tracks with the persons of one frame of the camera number `camera`, captured at
+    /// `at_s` (seconds since the Unix epoch). Returns the confirmed tracks that ended.
+    ///
+    /// Reports of several cameras may arrive in any order within
+    /// [`TrackerSettings::max_lateness_s`]; those of one camera are in order of time.
+    ///
+    /// # Errors
+    /// [`RefusedReport`] for an unknown camera, a time that is not finite, or a report that is too
+    /// old. Nothing changes then.
+    pub fn update(
+        &mut self,
+        camera: usize,
+        at_s: f64,
+        persons: &[Observation],
+    ) -> Result<Vec<Track>, RefusedReport> {
+        self.check(camera, at_s)?;
+        let candidates = self.candidates(camera, persons);
+        let report = Report {
+            camera,
+            at_s,
+            interval_s: self.interval_s(camera, at_s),
+        };
+        let used = self.associate(&report, &candidates);
+        self.start_tracks(&report, &candidates, &used);
+        self.count_misses(&report);
+        self.cameras[camera].last_report_s = Some(at_s);
+        let now_s = self.newest_report_s.map_or(at_s, |newest| newest.max(at_s));
+        self.newest_report_s = Some(now_s);
+        let mut ended = self.end_unseen(now_s);
+        if self.cameras.len() > 1 {
+            ended.extend(end_duplicates(&mut self.tracks, now_s));
+        }
+        ended.retain(Track::is_confirmed);
+        Ok(ended)
+    }
+
+    /// Returns the confirmed tracks in order of their identifiers; those without a person in the
+    /// last report are among them until they end.
+    pub fn tracks(&self) -> impl Iterator<Item = &Track> {
+        self.tracks.iter().filter(|track| track.is_confirmed())
+    }
+
+    fn check(&self, camera: usize, at_s: f64) -> Result<(), RefusedReport> {
+        let known = self.cameras.get(camera);
+        let known = known.ok_or(RefusedReport::UnknownCamera(camera))?;
+        if !at_s.is_finite() {
+            return Err(RefusedReport::Time);
+        }
+        if known.last_report_s.is_some_and(|last| at_s <= last) {
+            return Err(RefusedReport::OutOfOrder);
+        }
+        let lateness = self.newest_report_s.map_or(0.0, |newest| newest - at_s);
+        if lateness > self.settings.max_lateness_s {
+            return Err(RefusedReport::Late(lateness));
+        }
+        Ok(())
+    }
+
+    /// The time since the camera's last report; long where there was none.
+    fn interval_s(&self, camera: usize, at_s: f64) -> f64 {
+        let last = self.cameras[camera].last_report_s;
+        last.map_or(f64::INFINITY, |last| at_s - last)
+    }
+
+    /// The persons that count, in an order that does not depend on the report's.
+    fn candidates<'a>(&self, camera: usize, persons: &'a [Observation]) -> Vec<Candidate<'a>> {
+        let pose = &self.cameras[camera].pose;
+        let noise = &self.settings.noise;
+        let measure = |person| match pose.height_m {
+            Some(height_m) if self.on_floor => Measurement::on_floor(person, pose, height_m, noise),
+            _ => Measurement::of_bearing(person, noise),
+        };
+        let mut candidates: Vec<_> = persons
+            .iter()
+            .enumerate()
+            .filter(|(_, person)| person.score >= self.settings.low_score)
+            .filter_map(|(index, person)| {
+                let measured = measure(person)?;
+                Some(Candidate {
+                    index,
+                    person,
+                    measured,
+                })
+            })
+            .collect();
+        let key = |candidate: &Candidate| {
+            let person = candidate.person;
+            let [foot_x, foot_y] = person.foot_px;
+            [
+                -person.score,
+                foot_x,
+                foot_y,
+                person.off_axis_deg,
+                person.azimuth_deg,
+            ]
+        };
+        candidates.sort_by(|a, b| {
+            let pairs = key(a).into_iter().zip(key(b));
+            pairs.fold(std::cmp::Ordering::Equal, |order, (a, b)| {
+                order.then(a.total_cmp(&b))
+            })
+        });
+        candidates.truncate(MAX_PERSONS);
+        self.drop_parts(candidates)
+    }
+
+    /// Drops weak persons that may be a part of a stronger one, or the same one again. They come in
+    /// order of falling scores.
+    fn drop_parts<'a>(&self, candidates: Vec<Candidate<'a>>) -> Vec<Candidate<'a>> {
+        let mut kept: Vec<Candidate> = Vec::new();
+        for candidate in candidates {
+            let one = &candidate.measured;
+            let is_weak = one.score < self.settings.least_score_in_line;
+            if !is_weak || !kept.iter().any(|other| one.is_part_of(&other.measured)) {
+                kept.push(candidate);
+            }
+        }
+        kept
+    }
+
+    /// Continues tracks with persons in the three steps of `ByteTrack`: high scores, low scores, then
+    /// tracks without confirmation. Returns true for each candidate that continued a track.
+    fn associate(&mut self, report: &Report, candidates: &[Candidate]) -> Vec<bool> {
+        let high = self.settings.high_score;
+        let mut used = vec![false; candidates.len()];
+        for (confirmed, scores) in [
+            (true, high..=f64::INFINITY),
+            (true, f64::NEG_INFINITY..=high),
+            (false, f64::NEG_INFINITY..=f64::INFINITY),
+        ] {
+            let rows: Vec<usize> = (0..self.tracks.len())
+                .filter(|&row| {
+                    let track = &self.tracks[row];
+                    track.is_confirmed() == confirmed && !report.shows(track)
+                })
+                .collect();
+            let columns: Vec<usize> = (0..candidates.len())
+                .filter(|&column| {
+                    !used[column] && scores.contains(&candidates[column].measured.score)
+                })
+                .collect();
+            let pairs = best_pairs(rows.len(), columns.len(), |row, column| {
+                let track = &self.tracks[rows[row]];
+                self.gain(track, &candidates[columns[column]].measured, report.at_s)
+            });
+            for (row, column) in pairs {
+                let seen = report.sighting(&candidates[columns[column]]);
+                self.tracks[rows[row]].update(&seen, &self.settings);
+                used[columns[column]] = true;
+            }
+        }
+        used
+    }
+
+    /// The logarithm of the likelihood ratio of "this person continues this track" to "this person
+    /// is new or false" (Blackman and Popoli, "Design and Analysis of Modern Tracking Systems"
+    /// (1999), section 6.2); negative beyond the gate.
+    fn gain(&self, track: &Track, measured: &Measurement, at_s: f64) -> f64 {
+        let plane = self.settings.plane_of(&measured.place);
+        let innovation = track.motion.innovation(measured, at_s, plane);
+        if innovation.squared_distance() > GATE {
+            return -1.0;
+        }
+        let is_person = self.settings.score_share * log_odds(measured.score);
+        let is_there = track.evidence.log_probability(&self.settings.evidence);
+        innovation.log_density() - plane.clutter_density.ln() + is_person + is_there
+    }
+
+    fn start_tracks(&mut self, report: &Report, candidates: &[Candidate], used: &[bool]) {
+        for (candidate, _) in candidates.iter().zip(used).filter(|(_, used)| !**used) {
+            let least = if self.is_taken(report, &candidate.measured) {
+                self.settings.new_track_score_in_line
+            } else {
+                self.settings.new_track_score
+            };
+            if candidate.measured.score >= least && self.tracks.len() < self.settings.max_tracks {
+                let id = TrackId(self.next_id);
+                self.next_id += 1;
+                let seen = report.sighting(candidate);
+                self.tracks.push(Track::new(id, &seen, &self.settings));
+            }
+        }
+    }
+
+    /// Returns true when this may be a further box of a person that the report holds already.
+    fn is_taken(&self, report: &Report, measured: &Measurement) -> bool {
+        let current = self.tracks.iter().filter(|track| report.shows(track));
+        let mut motions = current.map(|track| &track.motion);
+        motions.any(|motion| motion.is_same_person(measured, report.at_s))
+    }
+
+    fn count_misses(&mut self, report: &Report) {
+        let is_alone = self.cameras.len() == 1;
+        let camera = &self.cameras[report.camera];
+        for track in self.tracks.iter_mut().filter(|track| !report.shows(track)) {
+            let expected = track.motion.floor_at(report.at_s);
+            if is_alone || expected.is_some_and(|place| camera.sees(place)) {
+                track.missed = track.missed.saturating_add(1);
+                let evidence = &self.settings.evidence;
+                track.evidence.add_miss(report.interval_s, evidence);
+            }
+        }
+    }
+
+    fn end_unseen(&mut self, now_s: f64) -> Vec<Track> {
+        let settings = &self.settings;
+        let is_over = |track: &mut Track| {
+            let unseen_s = now_s - track.seen_s();
+            let is_missed = track.missed >= settings.max_missed && unseen_s > settings.max_unseen_s;
+            let is_refuted = track.evidence.refutes(&settings.evidence) && track.missed > 0;
+            let is_revoked = track.is_confirmed() && track.evidence.revokes(&settings.evidence);
+            is_missed || is_refuted || is_revoked || unseen_s > settings.max_silent_s
+        };
+        self.tracks.extract_if(.., is_over).collect()
+    }
+}
+
+/// The camera and the time of the current report.
+struct Report {
+    camera: usize,
+    at_s: f64,
+    interval_s: f64,
+}
+
+impl Report {
+    /// Returns true when a person of this report continued or started the track.
+    fn shows(&self, track: &Track) -> bool {
+        track.seen_by.get(&self.camera) == Some(&self.at_s)
+    }
+
+    fn sighting<'a>(&self, candidate: &'a Candidate) -> Sighting<'a> {
+        Sighting {
+            at_s: self.at_s,
+            interval_s: self.interval_s,
+            source: PersonOfReport {
+                camera: self.camera,
+                person: candidate.index,
+            },
+            person: candidate.person,
+            measured: &candidate.measured,
+        }
+    }
+}

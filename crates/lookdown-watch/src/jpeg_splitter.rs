@@ -1,0 +1,234 @@
+//! Splits a stream of concatenated JPEG files into files.
+//!
+//! The segments of a file are followed, so a thumbnail within a file does not end it. Damaged bytes
+//! are skipped up to the start of the next file.
+
+use bytes::{Bytes, BytesMut};
+use lookdown_common::JPEG_START;
+
+/// Bytes that are read at once.
+const CHUNK_BYTES: usize = 64 << 10;
+
+/// A parser that takes bytes as they arrive, and returns whole files.
+#[derive(Debug)]
+pub(crate) struct JpegSplitter {
+    buffer: BytesMut,
+    max_bytes: usize,
+    state: State,
+    /// Number of bytes of the buffer that were parsed.
+    parsed: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum State {
+    /// Before the start of a file.
+    Start,
+    /// At a marker.
+    Marker,
+    /// In the compressed data of a scan.
+    Scan,
+}
+
+/// The result of one step.
+enum Step {
+    Continue,
+    NeedsMore,
+    Whole,
+}
+
+impl JpegSplitter {
+    /// Creates a splitter of files with at most this many bytes.
+    pub(crate) fn new(max_bytes: usize) -> Self {
+        Self {
+            buffer: BytesMut::new(),
+            max_bytes,
+            state: State::Start,
+            parsed: 0,
+        }
+    }
+
+    /// The buffer that received bytes are appended to, with room for a chunk.
+    pub(crate) fn buffer(&mut self) -> &mut BytesMut {
+        self.buffer.reserve(CHUNK_BYTES);
+        &mut self.buffer
+    }
+
+    /// Returns the next whole file, or `None` if more bytes are needed.
+    pub(crate) fn next_file(&mut self) -> Option<Bytes> {
+        loop {
+            match self.step() {
+                Step::Whole => {
+                    let file = self.buffer.split_to(self.parsed).freeze();
+                    self.restart();
+                    return Some(file);
+                }
+                Step::Continue => {}
+                Step::NeedsMore => {
+                    if self.buffer.len() > self.max_bytes {
+                        self.skip(self.buffer.len());
+                    }
+                    return None;
+                }
+            }
+        }
+    }
+
+    fn restart(&mut self) {
+        self.state = State::Start;
+        self.parsed = 0;
+    }
+
+    /// Drops the first bytes, and searches for the next file after them.
+    fn skip(&mut self, count: usize) {
+        let _ = self.buffer.split_to(count.min(self.buffer.len()));
+        self.restart();
+    }
+
+    fn step(&mut self) -> Step {
+        match self.state {
+            State::Start => self.find_start(),
+            State::Marker => self.read_marker(),
+            State::Scan => self.read_scan(),
+        }
+    }
+
+    fn find_start(&mut self) -> Step {
+        match memchr::memmem::find(&self.buffer, JPEG_START) {
+            Some(0) => {
+                self.parsed = 2;
+                self.state = State::Marker;
+                Step::Continue
+            }
+            Some(before) => {
+                self.skip(before);
+                Step::Continue
+            }
+            None => {
+                let certain = self.buffer.len().saturating_sub(JPEG_START.len() - 1);
+                self.skip(certain);
+                Step::NeedsMore
+            }
+        }
+    }
+
+    fn read_marker(&mut self) -> Step {
+        let Some([first, second]) = self.bytes_at(self.parsed) else {
+            return Step::NeedsMore;
+        };
+        if first != 0xff {
+            self.skip(self.parsed);
+            return Step::Continue;
+        }
+        match second {
+            // A fill byte.
+            0xff => self.parsed += 1,
+            0xd9 => {
+                self.parsed += 2;
+                return Step::Whole;
+            }
+            // The start of another file, or a byte that is no marker.
+            0xd8 | 0x00 => self.skip(self.parsed),
+            // Markers without a segment.
+            0x01 | 0xd0..=0xd7 => self.parsed += 2,
+            marker => {
+                let Some(length) = self.bytes_at(self.parsed + 2) else {
+                    return Step::NeedsMore;
+                };
+                let length = usize::from(u16::from_be_bytes(length));
+                if length < 2 {
+                    self.skip(self.parsed);
+                    return Step::Continue;
+                }
+                self.parsed += 2 + length;
+                if marker == 0xda {
+                    self.state = State::Scan;
+                }
+            }
+        }
+        Step::Continue
+    }
+
+    fn read_scan(&mut self) -> Step {
+        let rest = self.buffer.get(self.parsed..).unwrap_or_default();
+        let Some(found) = memchr::memchr(0xff, rest) else {
+            self.parsed = self.parsed.max(self.buffer.len());
+            return Step::NeedsMore;
+        };
+        self.parsed += found;
+        match self.bytes_at(self.parsed) {
+            None => return Step::NeedsMore,
+            // A byte of the data, or a restart marker.
+            Some([_, 0x00 | 0xd0..=0xd7]) => self.parsed += 2,
+            Some([_, 0xff]) => self.parsed += 1,
+            Some(_) => self.state = State::Marker,
+        }
+        Step::Continue
+    }
+
+    fn bytes_at(&self, position: usize) -> Option<[u8; 2]> {
+        let bytes = self.buffer.get(position..position + 2)?;
+        bytes.try_into().ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A JPEG with a thumbnail in a segment, and a scan with a stuffed byte and a restart marker.
+    const WHOLE: &[u8] =
+        b"\xff\xd8\xff\xe1\x00\x08\xff\xd8\xff\xd9..\xff\xda\x00\x02ab\xff\x00c\xff\xd0d\xff\xd9";
+    const SMALL: &[u8] = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9";
+
+    fn files(stream: &[u8], chunk: usize) -> Vec<Bytes> {
+        let mut splitter = JpegSplitter::new(1000);
+        let mut files = Vec::new();
+        for bytes in stream.chunks(chunk) {
+            splitter.buffer().extend_from_slice(bytes);
+            while let Some(file) = splitter.next_file() {
+                files.push(file);
+            }
+        }
+        files
+    }
+
+    #[test]
+    fn concatenated_files_are_split_at_any_chunk_size() {
+        let stream = [WHOLE, SMALL, WHOLE].concat();
+        for chunk in [1, 2, 3, 7, 1000] {
+            assert_eq!(files(&stream, chunk), [WHOLE, SMALL, WHOLE], "{chunk}");
+        }
+    }
+
+    #[test]
+    fn damaged_bytes_are_skipped_up_to_the_next_file() {
+        let cut = &WHOLE[..WHOLE.len() - 2];
+        for damaged in [
+            b"noise\xff".as_slice(),
+            cut,
+            b"\xff\xd8\xff\x00",
+            b"\xff\xd8\xff\xe0\x00\x01",
+        ] {
+            let stream = [SMALL, damaged, SMALL].concat();
+            for chunk in [1, 5, 1000] {
+                let found = files(&stream, chunk);
+                assert_eq!(found, [SMALL, SMALL], "{damaged:x?} in chunks of {chunk}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_without_an_end_is_bounded() {
+        let mut splitter = JpegSplitter::new(1000);
+        splitter
+            .buffer()
+            .extend_from_slice(b"\xff\xd8\xff\xda\x00\x02");
+        for _ in 0..100 {
+            splitter.buffer().extend_from_slice(&[b'x'; 100]);
+            assert_eq!(splitter.next_file(), None);
+            assert!(splitter.buffer().len() <= 1000);
+        }
+        splitter.buffer().extend_from_slice(SMALL);
+        assert_eq!(splitter.next_file().as_deref(), Some(SMALL));
+    }
+}

@@ -1,0 +1,87 @@
+//! The reasons why a source of frames ends.
+
+use std::time::Duration;
+
+use crate::FrameError;
+
+/// The reason why a source ended. Its text holds no credentials.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// Wrong credentials.
+    #[error(
+        "the camera refuses the user name {user:?} or its password: correct user and password_file, or the URL"
+    )]
+    CredentialsRefused {
+        /// The user name.
+        user: String,
+    },
+    /// Credentials are missing.
+    #[error(
+        "the camera requires a user name and a password: give user and password_file, or add them to the URL"
+    )]
+    CredentialsMissing,
+    /// The camera requires an unknown authentication scheme.
+    #[error(
+        "the camera requires an authentication other than Basic and Digest: select one of them in the camera"
+    )]
+    UnknownAuthentication,
+    /// Another status than 200.
+    #[error(
+        "the camera answered with the status {0}: check the path of the URL in the camera's manual"
+    )]
+    Status(u16),
+    /// A redirection.
+    #[error("the camera redirects to another URL: give that URL, which `curl -i` shows")]
+    Redirect,
+    /// Neither an image nor a stream of images.
+    #[error(
+        "the camera sends {0:?} instead of an image: give the URL of a JPEG snapshot, an MJPEG stream or RTSP"
+    )]
+    ContentType(String),
+    /// A frame that cannot be used.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A damaged stream.
+    #[error("{0}")]
+    Stream(String),
+    /// A frame beyond the limit.
+    #[error("the camera's image has more than 32 MiB: reduce its resolution or quality")]
+    TooLarge,
+    /// No frame within the limit.
+    #[error("no whole frame arrived within {0:?}: check the camera, or raise stall_after")]
+    Stalled(Duration),
+    /// The stream ended.
+    #[error("the camera ended the stream")]
+    Closed,
+    /// The camera cannot be reached.
+    #[error("the camera cannot be reached: {0}")]
+    Unreachable(String),
+    /// `ffmpeg` cannot be started.
+    #[error(
+        "{program} cannot be started: {problem}: install ffmpeg 5.1 or newer, or set its path with the key ffmpeg"
+    )]
+    NoFfmpeg {
+        /// The program.
+        program: String,
+        /// The cause.
+        problem: String,
+    },
+    /// `ffmpeg` failed, with its last line.
+    #[error("ffmpeg ended: {0}")]
+    Ffmpeg(String),
+    /// A file or a folder cannot be read.
+    #[error("{0} cannot be read: {1}")]
+    Unreadable(String, String),
+}
+
+impl SourceError {
+    /// Returns true if the camera refuses the credentials.
+    pub(crate) fn is_refused_login(&self) -> bool {
+        matches!(
+            self,
+            Self::CredentialsRefused { .. }
+                | Self::CredentialsMissing
+                | Self::UnknownAuthentication
+        )
+    }
+}
