@@ -78,6 +78,7 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
         lines: camera.lines.clone(),
         masks: camera.masks.clone(),
         detect: camera.detect.clone(),
+        sources: camera.sources.clone(),
     });
     let Ok(Exported { content, .. }) = written else {
         return;

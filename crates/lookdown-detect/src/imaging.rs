@@ -12,6 +12,7 @@ mod letterbox;
 mod masked_pixels;
 mod network_input;
 mod remap_table;
+pub mod room_fit;
 mod thumbnail;
 mod view_signature;
 

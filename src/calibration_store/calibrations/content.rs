@@ -77,6 +77,7 @@ fn entry(
             lines: described.lines,
             masks: described.masks,
             detect: described.detect,
+            sources: described.sources,
         },
         defaults,
         notes: described.notes,

@@ -57,6 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         lines: stated.lines,
         masks: stated.masks,
         detect: stated.detect,
+        sources: stated.sources,
     })?;
     let notes = stated.notes.iter().map(ToString::to_string);
     for note in notes.chain(exported.lost) {

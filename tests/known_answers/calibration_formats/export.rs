@@ -154,6 +154,7 @@ fn a_native_file_keeps_everything() {
         lines: Vec::new(),
         masks: read_back.masks,
         detect: read_back.detect,
+        sources: read_back.sources,
     };
     let written = Target::Native.write(&native).unwrap().content;
     let file = CalibrationFile::parse(written.as_bytes()).unwrap();

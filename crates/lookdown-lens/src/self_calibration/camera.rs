@@ -91,7 +91,11 @@ impl RoomCamera {
 
     /// The directions of edges: the vertical, then pairs of horizontal ones.
     pub(super) fn directions(&self) -> Vec<Ray> {
-        let mut directions = vec![self.room * Ray::z(), self.room * Ray::x(), self.room * Ray::y()];
+        let mut directions = vec![
+            self.room * Ray::z(),
+            self.room * Ray::x(),
+            self.room * Ray::y(),
+        ];
         for heading in &self.headings {
             let (sin, cos) = heading.sin_cos();
             directions.push(self.room * Vector3::new(cos, sin, 0.0));
@@ -140,13 +144,21 @@ impl Angles {
         }
         #[expect(clippy::cast_precision_loss, reason = "a small constant")]
         let entries_per_focal = ENTRIES as f64 / end;
-        Some(Self { shape, thetas, entries_per_focal })
+        Some(Self {
+            shape,
+            thetas,
+            entries_per_focal,
+        })
     }
 
     /// The angle at a radius in focal lengths: linear between the entries, then one step of Newton.
     pub(super) fn theta(&self, radius: f64) -> f64 {
         let at = radius * self.entries_per_focal;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative"
+        )]
         let entry = (at as usize).min(self.thetas.len() - 2);
         #[expect(clippy::cast_precision_loss, reason = "a small index")]
         let share = (at - entry as f64).min(1.0);

@@ -7,16 +7,16 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 use super::{
     camera::{Angles, RoomCamera, SeenRay, ideal_shape_slope},
     edge_curve::EdgeCurve,
+    prior::Prior,
 };
 use crate::geometry::Ray;
 
 /// Standard deviation of a point across its edge, in pixels.
-pub(super) fn ev(n:&str,d:f64)->f64{ use std::sync::OnceLock; use std::collections::HashMap; use std::sync::Mutex; static M:OnceLock<Mutex<HashMap<String,f64>>>=OnceLock::new(); *M.get_or_init(Default::default).lock().unwrap().entry(n.to_string()).or_insert_with(||std::env::var(n).ok().and_then(|v|v.parse().ok()).unwrap_or(d)) }
 const SIGMA_PIXELS: f64 = 0.2;
 /// Standard deviation of the direction of an edge from that of the room, radians.
 const SIGMA_DIRECTION: f64 = 0.004;
@@ -24,21 +24,6 @@ const SIGMA_DIRECTION: f64 = 0.004;
 const OUTLIER_SHARE: f64 = 0.4;
 /// Parameters without further headings: focal length, two of the shape, center, rotation.
 pub(super) const PARAMETERS: usize = 8;
-
-/// What is assumed before any curve is seen.
-#[derive(Debug, Clone)]
-pub(super) struct Prior {
-    /// Center of the lens circle in pixels.
-    pub center: [f64; 2],
-    /// Standard deviation of the optical center from it, pixels.
-    pub center_sigma: f64,
-    /// Radius up to which the curve must rise, pixels.
-    pub radius: f64,
-    /// Standard deviation of the second coefficient from that of an ideal lens.
-    pub k2_sigma: f64,
-    /// Angle at the radius and its standard deviation, radians.
-    pub rim: (f64, f64),
-}
 
 /// Evidence, and the normal equations of the parameters.
 pub(super) struct Evaluation {
@@ -81,7 +66,6 @@ pub(super) fn evaluate(
         shares: vec![0.0; directions.len()],
         explained: Vec::with_capacity(curves.len()),
     };
-    let (sp,sd)=(ev("SP",SIGMA_PIXELS),ev("SD",SIGMA_DIRECTION));
     let mut rays: Vec<SeenRay> = Vec::new();
     let mut total = 0.0;
     #[expect(clippy::cast_precision_loss, reason = "a few directions")]
@@ -94,7 +78,7 @@ pub(super) fn evaluate(
         #[expect(clippy::cast_precision_loss, reason = "a few points")]
         let count = rays.len() as f64;
         let lever = length / 12.0_f64.sqrt();
-        let sigma = blur * sp.hypot(sd * lever);
+        let sigma = blur * SIGMA_PIXELS.hypot(SIGMA_DIRECTION * lever);
         // The prior density of an edge's angle is uniform over half a turn.
         let sigma_angle = sigma / (lever * count.sqrt());
         let gain = (PI / (TAU.sqrt() * sigma_angle)).max(1.0);
@@ -102,7 +86,11 @@ pub(super) fn evaluate(
         for (index, direction) in directions.iter().enumerate() {
             let (normal, squares) = best_plane(&rays, direction);
             let likelihood = share * gain * (-0.5 * squares / (sigma * sigma)).exp();
-            fits.push(Fitted { normal, likelihood, direction: index });
+            fits.push(Fitted {
+                normal,
+                likelihood,
+                direction: index,
+            });
         }
         let inlier: f64 = fits.iter().map(|fit| fit.likelihood).sum();
         let sum = OUTLIER_SHARE + inlier;
@@ -121,7 +109,7 @@ pub(super) fn evaluate(
     for share in &mut result.shares {
         *share /= total.max(1e-9);
     }
-    add_prior(&mut result, camera, prior, &angles);
+    prior.add_to(&mut result, camera, &angles);
     Some(result)
 }
 
@@ -150,15 +138,19 @@ fn best_plane(rays: &[SeenRay], direction: &Ray) -> (Ray, f64) {
         normal = Some(first * angle.cos() + second * angle.sin());
     }
     let normal = normal.unwrap_or(first);
-    let squares = rays.iter().map(|seen| {
-        (normal.dot(&seen.ray) * pixels_per_unit(seen, &normal)).powi(2)
-    });
+    let squares = rays
+        .iter()
+        .map(|seen| (normal.dot(&seen.ray) * pixels_per_unit(seen, &normal)).powi(2));
     (normal, squares.sum())
 }
 
 /// Two unit vectors across a direction and each other.
 fn across(direction: &Ray) -> (Ray, Ray) {
-    let helper = if direction.x.abs() < 0.6 { Ray::x() } else { Ray::y() };
+    let helper = if direction.x.abs() < 0.6 {
+        Ray::x()
+    } else {
+        Ray::y()
+    };
     let first = direction.cross(&helper).normalize();
     (first, direction.cross(&first))
 }
@@ -196,7 +188,10 @@ fn add_curve(
         let along = ideal[0] + theta * theta * (ideal[1] + theta * theta * ideal[2]);
         row[1] = -outward * per_focal * cube * along;
         row[2] = -outward * per_focal * cube * theta * theta;
-        let (out, round) = (outward * seen.theta_per_pixel, around * seen.around_per_pixel);
+        let (out, round) = (
+            outward * seen.theta_per_pixel,
+            around * seen.around_per_pixel,
+        );
         row[3] = -(out * seen.side[0] - round * seen.side[1]);
         row[4] = -(out * seen.side[1] + round * seen.side[0]);
         // The normal turns with the room.
@@ -224,97 +219,4 @@ fn add_curve(
             result.normal[(index, other)] -= scale * own_rows[index] * own_rows[other] / own;
         }
     }
-}
-
-fn add_prior(result: &mut Evaluation, camera: &RoomCamera, prior: &Prior, angles: &Angles) {
-    let mut add = |rows: &[(usize, f64)], residual: f64, sigma: f64| {
-        let weight = 1.0 / (sigma * sigma);
-        result.evidence -= 0.5 * weight * residual * residual;
-        for (index, slope) in rows {
-            result.right[*index] -= weight * slope * residual;
-            for (other, other_slope) in rows {
-                if other <= index {
-                    result.normal[(*index, *other)] += weight * slope * other_slope;
-                }
-            }
-        }
-    };
-    for axis in 0..2 {
-        let off = camera.center[axis] - prior.center[axis];
-        add(&[(3 + axis, 1.0)], off, prior.center_sigma);
-    }
-    add(&[(2, 1.0)], camera.k2_offset, prior.k2_sigma);
-    // Between orthographic and stereographic.
-    add(&[(1, 1.0)], camera.k1 + 0.03, ev("K1S",0.15));
-    let theta = angles.theta(prior.radius / camera.focal);
-    let (radius, slope) = camera.curve(theta);
-    let ideal = ideal_shape_slope(camera.k1);
-    let cube = theta.powi(3);
-    let rows = [
-        (0, -radius / slope),
-        (1, -cube * (ideal[0] + theta * theta * (ideal[1] + theta * theta * ideal[2])) / slope),
-        (2, -cube * theta * theta / slope),
-    ];
-    add(&rows, theta - prior.rim.0, prior.rim.1);
-    for index in 0..result.right.len() {
-        for other in 0..index {
-            result.normal[(other, index)] = result.normal[(index, other)];
-        }
-    }
-}
-
-/// The camera after a step of its parameters.
-pub(super) fn stepped(camera: &RoomCamera, step: &DVector<f64>) -> RoomCamera {
-    RoomCamera {
-        focal: camera.focal * step[0].exp(),
-        k1: camera.k1 + step[1],
-        k2_offset: camera.k2_offset + step[2],
-        center: [camera.center[0] + step[3], camera.center[1] + step[4]],
-        room: Rotation3::new(Vector3::new(step[5], step[6], step[7])) * camera.room,
-        headings: camera
-            .headings
-            .iter()
-            .enumerate()
-            .map(|(index, heading)| heading + step[PARAMETERS + index])
-            .collect(),
-    }
-}
-
-/// Climbs to the nearest maximum of the evidence (Levenberg-Marquardt).
-pub(super) fn climb(
-    mut camera: RoomCamera,
-    curves: &[EdgeCurve],
-    weights: &[f64],
-    prior: &Prior,
-    blur: f64,
-    steps: usize,
-) -> Option<(RoomCamera, Evaluation)> {
-    let mut current = evaluate(&camera, curves, weights, prior, blur, true)?;
-    let mut damping = 1e-3;
-    for _ in 0..steps {
-        let mut damped = current.normal.clone();
-        for index in 0..damped.nrows() {
-            damped[(index, index)] *= 1.0 + damping;
-        }
-        let Some(cholesky) = damped.cholesky() else { break };
-        let step = cholesky.solve(&current.right);
-        let next = stepped(&camera, &step);
-        match evaluate(&next, curves, weights, prior, blur, true) {
-            Some(evaluation) if evaluation.evidence > current.evidence => {
-                let gain = evaluation.evidence - current.evidence;
-                (camera, current) = (next, evaluation);
-                damping = (damping * 0.2).max(1e-6);
-                if gain < 1e-3 {
-                    break;
-                }
-            }
-            _ => {
-                damping *= 10.0;
-                if damping > 1e4 {
-                    break;
-                }
-            }
-        }
-    }
-    Some((camera, current))
 }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3};
 use super::{
     camera::{Angles, RoomCamera, ideal_shape},
     edge_curve::EdgeCurve,
-    evidence::Prior,
+    prior::Prior,
 };
 use crate::geometry::Ray;
 
@@ -16,8 +16,6 @@ use crate::geometry::Ray;
 const SHAPES: [f64; 5] = [-1.0 / 6.0, -0.094, -1.0 / 24.0, 0.0, 1.0 / 12.0];
 /// Angles at the circle of the tried lenses, degrees.
 const RIMS: [f64; 7] = [72.0, 78.0, 84.0, 90.0, 96.0, 102.0, 108.0];
-/// The longest curves that take part.
-const MAX_CURVES: usize = 400;
 /// Largest tilt, degrees.
 const MAX_TILT: f64 = 36.0;
 /// Distance between tried verticals, degrees.
@@ -29,12 +27,6 @@ const VERTICALS: usize = 4;
 /// Headings over a quarter turn.
 const HEADINGS: usize = 45;
 
-/// A start and its score.
-pub(super) struct Start {
-    pub camera: RoomCamera,
-    pub score: f64,
-}
-
 struct Plane {
     normal: Ray,
     middle: Ray,
@@ -42,18 +34,22 @@ struct Plane {
 }
 
 /// Returns starts in the order of their scores, best first, one or two per lens.
-pub(super) fn starts(curves: &[EdgeCurve], prior: &Prior, known: Option<f64>) -> Vec<Start> {
-    let mut longest: Vec<&EdgeCurve> = curves.iter().collect();
-    longest.sort_by(|a, b| b.length().total_cmp(&a.length()));
-    longest.truncate(MAX_CURVES);
+pub(super) fn starts(
+    curves: &[EdgeCurve],
+    prior: &Prior,
+    known_rim: Option<f64>,
+    known_k1: Option<f64>,
+) -> Vec<RoomCamera> {
     let verticals = cone();
-    let mut starts = Vec::new();
-    for k1 in SHAPES {
-        for rim in RIMS {
-            let rim = known.unwrap_or(rim.to_radians());
+    let mut starts: Vec<(RoomCamera, f64)> = Vec::new();
+    let shapes = known_k1.map_or(SHAPES.to_vec(), |k1| vec![k1]);
+    let rims = known_rim.map_or(RIMS.map(f64::to_radians).to_vec(), |rim| vec![rim]);
+    for k1 in shapes {
+        for &rim in &rims {
             let shape = ideal_shape(k1);
             let square = rim * rim;
-            let radius = rim * (1.0 + square * (shape[0] + square * (shape[1] + square * shape[2])));
+            let radius =
+                rim * (1.0 + square * (shape[0] + square * (shape[1] + square * shape[2])));
             let camera = RoomCamera {
                 focal: prior.radius / radius,
                 k1,
@@ -62,19 +58,27 @@ pub(super) fn starts(curves: &[EdgeCurve], prior: &Prior, known: Option<f64>) ->
                 room: Rotation3::identity(),
                 headings: Vec::new(),
             };
-            let Some(angles) = Angles::of(&camera, prior.radius) else { continue };
-            let planes = planes(&longest, &camera, &angles);
-            starts.extend(directions(&planes, &verticals).into_iter().map(|(room, score)| Start {
-                camera: RoomCamera { room, ..camera.clone() },
-                score,
-            }));
-            if known.is_some() {
-                break;
-            }
+            let Some(angles) = Angles::of(&camera, prior.radius) else {
+                continue;
+            };
+            let planes = planes(curves, &camera, &angles);
+            starts.extend(
+                directions(&planes, &verticals)
+                    .into_iter()
+                    .map(|(room, score)| {
+                        (
+                            RoomCamera {
+                                room,
+                                ..camera.clone()
+                            },
+                            score,
+                        )
+                    }),
+            );
         }
     }
-    starts.sort_by(|a, b| b.score.total_cmp(&a.score));
-    starts
+    starts.sort_by(|a, b| b.1.total_cmp(&a.1));
+    starts.into_iter().map(|(camera, _)| camera).collect()
 }
 
 /// Directions around the axis, evenly.
@@ -96,15 +100,19 @@ fn cone() -> Vec<Ray> {
 }
 
 /// The planes of the curves, weighted by length; a curve that is no straight line has no weight.
-fn planes(curves: &[&EdgeCurve], camera: &RoomCamera, angles: &Angles) -> Vec<Plane> {
-    let plane = |curve: &&EdgeCurve| {
+fn planes(curves: &[EdgeCurve], camera: &RoomCamera, angles: &Angles) -> Vec<Plane> {
+    let plane = |curve: &EdgeCurve| {
         let first = angles.ray(camera, *curve.points.first()?).ray;
         let last = angles.ray(camera, *curve.points.last()?).ray;
         let middle = angles.ray(camera, curve.points[curve.points.len() / 2]).ray;
         let normal = first.cross(&last).try_normalize(1e-6)?;
         let bend = normal.dot(&middle) * camera.focal / 2.0;
         let weight = curve.length().min(120.0) / (1.0 + bend * bend);
-        Some(Plane { normal, middle, weight })
+        Some(Plane {
+            normal,
+            middle,
+            weight,
+        })
     };
     curves.iter().filter_map(plane).collect()
 }
@@ -118,8 +126,11 @@ fn kernel(sine: f64) -> f64 {
 fn directions(planes: &[Plane], verticals: &[Ray]) -> Vec<(Rotation3<f64>, f64)> {
     let total: f64 = planes.iter().map(|plane| plane.weight).sum();
     let along = |direction: &Ray| -> f64 {
-        let hits = planes.iter().filter(|plane| plane.middle.dot(direction).abs() < 0.97);
-        hits.map(|plane| plane.weight * kernel(plane.normal.dot(direction))).sum()
+        let hits = planes
+            .iter()
+            .filter(|plane| plane.middle.dot(direction).abs() < 0.97);
+        hits.map(|plane| plane.weight * kernel(plane.normal.dot(direction)))
+            .sum()
     };
     let mut scored: Vec<(Ray, f64)> = verticals.iter().map(|ray| (*ray, along(ray))).collect();
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -132,8 +143,10 @@ fn directions(planes: &[Plane], verticals: &[Ray]) -> Vec<(Rotation3<f64>, f64)>
             break;
         }
     }
-    let mut found: Vec<(Rotation3<f64>, f64)> =
-        peaks.iter().map(|down| heading(planes, *down, total)).collect();
+    let mut found: Vec<(Rotation3<f64>, f64)> = peaks
+        .iter()
+        .map(|down| heading(planes, *down, total))
+        .collect();
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     found.truncate(2);
     found

@@ -7,8 +7,16 @@ const MIN_PIXELS: usize = 14;
 /// Least cosine between the gradients of neighbors.
 const MIN_COSINE: f32 = 0.88;
 /// The eight neighbors, clockwise from the right.
-const NEIGHBORS: [[i32; 2]; 8] =
-    [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
+const NEIGHBORS: [[i32; 2]; 8] = [
+    [1, 0],
+    [1, 1],
+    [0, 1],
+    [-1, 1],
+    [-1, 0],
+    [-1, -1],
+    [0, -1],
+    [1, -1],
+];
 
 /// Returns chains of points in pixel centers of the gradient.
 pub(super) fn linked(
@@ -29,7 +37,12 @@ pub(super) fn linked(
         pixels.push(seed);
         pixels.extend(walk(gradient, &mut free, seed, -1.0));
         if pixels.len() >= MIN_PIXELS {
-            chains.push(pixels.into_iter().map(|at| position(gradient, at, width)).collect());
+            chains.push(
+                pixels
+                    .into_iter()
+                    .map(|at| position(gradient, at, width))
+                    .collect(),
+            );
         }
     }
     chains
@@ -59,7 +72,11 @@ fn maxima(gradient: &Gradient, is_used: &dyn Fn([f64; 2]) -> bool) -> Vec<bool> 
 
 /// Distance between the neighbors along the axis in which the gradient is larger.
 fn dominant_step(gradient: &Gradient, at: usize) -> usize {
-    if gradient.along_x[at].abs() >= gradient.along_y[at].abs() { 1 } else { gradient.width }
+    if gradient.along_x[at].abs() >= gradient.along_y[at].abs() {
+        1
+    } else {
+        gradient.width
+    }
 }
 
 /// Follows an edge from a pixel in one of its two senses.
@@ -90,7 +107,9 @@ fn next_pixel(gradient: &Gradient, free: &[bool], at: usize, sense: f32) -> Opti
         (*free.get(next)? && cosine > MIN_COSINE).then_some(next)
     };
     for far in [1, 2] {
-        let found = [0, -1, 1].into_iter().filter_map(|side| candidate(far, side));
+        let found = [0, -1, 1]
+            .into_iter()
+            .filter_map(|side| candidate(far, side));
         let strongest = found.max_by(|a, b| gradient.size[*a].total_cmp(&gradient.size[*b]));
         if strongest.is_some() {
             return strongest;
@@ -102,11 +121,18 @@ fn next_pixel(gradient: &Gradient, free: &[bool], at: usize, sense: f32) -> Opti
 /// The position of the maximum across the edge: the vertex of a parabola through three pixels.
 fn position(gradient: &Gradient, at: usize, width: usize) -> [f64; 2] {
     let step = dominant_step(gradient, at);
-    let [before, here, after] =
-        [at - step, at, at + step].map(|at| f64::from(gradient.size[at]));
+    let [before, here, after] = [at - step, at, at + step].map(|at| f64::from(gradient.size[at]));
     let bend = before - 2.0 * here + after;
-    let shift = if bend < -1e-6 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    let shift = if bend < -1e-6 {
+        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    };
     #[expect(clippy::cast_precision_loss, reason = "a position in a frame")]
     let (x, y) = ((at % width) as f64, (at / width) as f64);
-    if step == 1 { [x + shift, y] } else { [x, y + shift] }
+    if step == 1 {
+        [x + shift, y]
+    } else {
+        [x, y + shift]
+    }
 }

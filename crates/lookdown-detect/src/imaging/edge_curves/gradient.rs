@@ -3,7 +3,9 @@
 use super::plane::Plane;
 
 /// Gaussian of 1.1 pixels.
-const KERNEL: [f32; 7] = [0.008_831, 0.069_737, 0.241_062, 0.360_740, 0.241_062, 0.069_737, 0.008_831];
+const KERNEL: [f32; 7] = [
+    0.008_831, 0.069_737, 0.241_062, 0.360_740, 0.241_062, 0.069_737, 0.008_831,
+];
 /// Least gradient of an edge, luminance per pixel, whatever the noise.
 const MIN_EDGE: f32 = 0.7;
 /// Largest threshold, luminance per pixel: a textured room has its edges nevertheless.
@@ -45,8 +47,13 @@ impl Gradient {
                 gradient.size[at] = (across * across + down * down).sqrt();
             }
         }
-        let mut sample: Vec<f32> =
-            gradient.size.iter().step_by(7).copied().filter(|size| *size > 0.05).collect();
+        let mut sample: Vec<f32> = gradient
+            .size
+            .iter()
+            .step_by(7)
+            .copied()
+            .filter(|size| *size > 0.05)
+            .collect();
         if !sample.is_empty() {
             let middle = sample.len() / 2;
             let (_, median, _) = sample.select_nth_unstable_by(middle, f32::total_cmp);

@@ -16,7 +16,9 @@ pub(super) fn smooth(chain: &[[f64; 2]]) -> Vec<&[[f64; 2]]> {
     let mut open = vec![chain];
     let mut pieces = Vec::new();
     while let Some(piece) = open.pop() {
-        let (Some(first), Some(last)) = (piece.first(), piece.last()) else { continue };
+        let (Some(first), Some(last)) = (piece.first(), piece.last()) else {
+            continue;
+        };
         let length = (last[0] - first[0]).hypot(last[1] - first[1]);
         if piece.len() < 2 * ENDS + 6 {
             continue;
@@ -44,10 +46,16 @@ fn farthest(piece: &[[f64; 2]], first: [f64; 2], last: [f64; 2]) -> usize {
     let [x, y] = [last[0] - first[0], last[1] - first[1]];
     let far = |point: &[f64; 2]| {
         let [px, py] = [point[0] - first[0], point[1] - first[1]];
-        if x.hypot(y) < 3.0 { px.hypot(py) } else { (px * y - py * x).abs() }
+        if x.hypot(y) < 3.0 {
+            px.hypot(py)
+        } else {
+            (px * y - py * x).abs()
+        }
     };
     let indexed = piece.iter().enumerate();
-    indexed.max_by(|a, b| far(a.1).total_cmp(&far(b.1))).map_or(0, |(index, _)| index)
+    indexed
+        .max_by(|a, b| far(a.1).total_cmp(&far(b.1)))
+        .map_or(0, |(index, _)| index)
 }
 
 /// Returns true if a parabola over the chord describes the piece.
@@ -66,7 +74,9 @@ fn is_parabola(piece: &[[f64; 2]], first: [f64; 2], last: [f64; 2], length: f64)
         normal += row * row.transpose();
         right += row * across;
     }
-    let Some(cholesky) = normal.cholesky() else { return false };
+    let Some(cholesky) = normal.cholesky() else {
+        return false;
+    };
     let coefficients = cholesky.solve(&right);
     let inner = &piece[ENDS..piece.len() - ENDS];
     inner.iter().all(|point| {
@@ -79,12 +89,18 @@ fn is_parabola(piece: &[[f64; 2]], first: [f64; 2], last: [f64; 2], length: f64)
 /// Averages groups of points to supports, whose noise is smaller.
 pub(super) fn supports(piece: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let wanted = (count(piece.len()) / SUPPORT_DISTANCE).clamp(3.0, MAX_SUPPORTS);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "3 to 24")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "3 to 24"
+    )]
     let wanted = wanted.round() as usize;
     let mean = |index: usize| {
         let group = &piece[index * piece.len() / wanted..(index + 1) * piece.len() / wanted];
         let share = 1.0 / count(group.len()).max(1.0);
-        group.iter().fold([0.0, 0.0], |sum, point| [sum[0] + share * point[0], sum[1] + share * point[1]])
+        group.iter().fold([0.0, 0.0], |sum, point| {
+            [sum[0] + share * point[0], sum[1] + share * point[1]]
+        })
     };
     (0..wanted).map(mean).collect()
 }

@@ -13,7 +13,10 @@ impl Plane {
     /// The luminance of a frame (ITU-R BT.601), each side divided.
     pub(super) fn luminance(frame: &Frame, divisor: u32) -> Self {
         let step = divisor as usize;
-        let (width, height) = (frame.width() as usize / step, frame.height() as usize / step);
+        let (width, height) = (
+            frame.width() as usize / step,
+            frame.height() as usize / step,
+        );
         let line = 3 * frame.width() as usize;
         let pixels = frame.pixels();
         let mut values = vec![0.0; width * height];
@@ -32,16 +35,27 @@ impl Plane {
                 }
             }
         }
-        Self { width, height, values }
+        Self {
+            width,
+            height,
+            values,
+        }
     }
 
     /// The plane after a Gaussian blur. The border of the width of the kernel stays as it was.
     pub(super) fn blurred(&self, kernel: &[f32]) -> Self {
         let reach = kernel.len() / 2;
         let mut across = self.values.clone();
-        for (target, source) in across.chunks_exact_mut(self.width).zip(self.values.chunks_exact(self.width)) {
+        for (target, source) in across
+            .chunks_exact_mut(self.width)
+            .zip(self.values.chunks_exact(self.width))
+        {
             for (value, window) in target[reach..].iter_mut().zip(source.windows(kernel.len())) {
-                *value = window.iter().zip(kernel).map(|(value, weight)| value * weight).sum();
+                *value = window
+                    .iter()
+                    .zip(kernel)
+                    .map(|(value, weight)| value * weight)
+                    .sum();
             }
         }
         let mut values = across.clone();
@@ -56,6 +70,10 @@ impl Plane {
                 }
             }
         }
-        Self { width: self.width, height: self.height, values }
+        Self {
+            width: self.width,
+            height: self.height,
+            values,
+        }
     }
 }

@@ -8,24 +8,38 @@ const CELL: usize = 4;
 /// Cells that are dark and connected with the border of the frame, and their neighbors.
 pub(super) struct SurroundMask {
     columns: usize,
-    rows: usize,
     dark: Vec<bool>,
 }
 
 impl SurroundMask {
     pub(super) fn contains(&self, [x, y]: [f64; 2]) -> bool {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in the frame")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "in the frame"
+        )]
         let (column, row) = (x as usize / CELL, y as usize / CELL);
-        self.dark.get(row * self.columns + column).copied().unwrap_or(true)
+        self.dark
+            .get(row * self.columns + column)
+            .copied()
+            .unwrap_or(true)
     }
 }
 
 /// Returns the surround of a frame, each side divided.
 pub(super) fn mask(frame: &Frame, divisor: u32) -> SurroundMask {
     let side = CELL * divisor as usize;
-    let (columns, rows) = ((frame.width() as usize).div_ceil(side), (frame.height() as usize).div_ceil(side));
-    let mut mask = SurroundMask { columns, rows, dark: vec![false; columns * rows] };
-    let Some(threshold) = surround_threshold(frame) else { return mask };
+    let (columns, rows) = (
+        (frame.width() as usize).div_ceil(side),
+        (frame.height() as usize).div_ceil(side),
+    );
+    let mut mask = SurroundMask {
+        columns,
+        dark: vec![false; columns * rows],
+    };
+    let Some(threshold) = surround_threshold(frame) else {
+        return mask;
+    };
     let is_dark = |cell: usize| {
         let (left, top) = ((cell % columns) * side, (cell / columns) * side);
         let mut lit = 0;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Format, FormatError};
 use crate::{
     calibration::native::{
-        NativeImage, NativeLine, NativeMask, NativeMount, NativeValue, NativeZone,
+        NativeImage, NativeLine, NativeMask, NativeMount, NativeSource, NativeValue, NativeZone,
     },
     geometry::lens::LensModel,
     warning::Warning,
@@ -46,6 +46,8 @@ pub struct Camera {
     pub masks: Vec<NativeMask>,
     /// Its defaults of detection parameters; only native files have some.
     pub detect: BTreeMap<String, NativeValue>,
+    /// The sources of its values; only native files have some.
+    pub sources: BTreeMap<String, NativeSource>,
     /// The assumptions of the reader.
     pub notes: Vec<Warning>,
 }
@@ -60,6 +62,7 @@ impl Camera {
             lines: Vec::new(),
             masks: Vec::new(),
             detect: BTreeMap::new(),
+            sources: BTreeMap::new(),
             notes: Vec::new(),
         }
     }

@@ -29,6 +29,7 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
                 lines: file.lines,
                 masks: file.masks,
                 detect: file.detect,
+                sources: file.sources,
                 notes: Vec::new(),
             }),
         }],
