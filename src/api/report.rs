@@ -23,7 +23,7 @@ use utoipa::ToSchema;
         "max_detections": 1000
     },
     "defaults": [{"name": "profile", "value": "quality", "source": "calibration"}],
-    "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0},
+    "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0, "outside_areas": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},
         "score": 0.8731,
@@ -32,6 +32,7 @@ use utoipa::ToSchema;
         },
         "bearing": {"azimuth_deg": 349.87, "off_axis_deg": 41.71},
         "floor": {"x_m": 1.873, "y_m": -0.334},
+        "height_m": 1.74, "height_sd_m": 0.21,
         "views": 3,
         "zones": ["entrance"]
     }],
@@ -80,6 +81,11 @@ pub struct Report {
     pub views: ReportViews,
     /// Persons, highest score first.
     pub persons: Vec<ReportPerson>,
+    /// People in the margin around the areas of the calibration, for tracking across their edges.
+    /// They are in no number; absent without areas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub margin: Option<Vec<ReportPerson>>,
     /// Number of persons in each zone of the calibration, in its order; absent without zones.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -187,6 +193,8 @@ pub struct ReportViews {
     pub outside: usize,
     /// Views that the masks of the calibration hide completely.
     pub masked: usize,
+    /// Views that cannot show a person in an area of the calibration.
+    pub outside_areas: usize,
 }
 
 /// A zone of the calibration.
@@ -212,6 +220,15 @@ pub struct ReportPerson {
     pub bearing: Option<ReportBearing>,
     /// Position of the person on the floor; null when the height of the camera is unknown.
     pub floor: Option<ReportFloor>,
+    /// Height of the person above the floor in meters; absent when the height of the camera is
+    /// unknown, below the camera, and far away.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub height_m: Option<f64>,
+    /// Standard deviation of `height_m` in meters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub height_sd_m: Option<f64>,
     /// Number of views that detected the person.
     pub views: usize,
     /// Names of the zones that contain the person's foot point; absent without zones.

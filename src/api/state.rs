@@ -15,13 +15,14 @@ use lookdown_detect::{
     parameters::DetectDefaults,
     pipeline::{PipelineError, WorkerPool},
 };
+use lookdown_http::header_limits::HeaderLimits;
 
 use super::{
+    companions::Companions,
     http::{
         access::Access,
         deadline::{Deadline, RequestTimeout},
         drain_body::BodyLimits,
-        header_limits::HeaderLimits,
         problem::{Problem, ProblemKind},
         rate_limit::RequestRate,
         request_body::{BodyReader, UploadBudget},
@@ -73,8 +74,8 @@ pub struct ApiOptions {
     pub cors_origins: Vec<String>,
     /// Further names of a server without keys.
     pub hosts: Vec<String>,
-    /// The path of `lookdown count` on the origin of the web page; `None` for none.
-    pub page_counts_path: Option<String>,
+    /// The cameras and counts of this process, and the counts of another host.
+    pub companions: Companions,
     /// Creates the spans of requests.
     pub tracer: Tracer,
 }
@@ -126,7 +127,7 @@ impl ApiOptions {
             },
             cors_origins: Vec::new(),
             hosts: Vec::new(),
-            page_counts_path: None,
+            companions: Companions::default(),
             tracer: Tracer::default(),
         }
     }

@@ -13,7 +13,7 @@ use lookdown_detect::{
 };
 use lookdown_lens::{
     geometry::{
-        OrientedBox, Pixel,
+        OrientedBox, PersonHeight, Pixel,
         floor::{Bearing, FloorPosition},
     },
     warning::{Warning, WarningCode},
@@ -38,6 +38,10 @@ fn person() -> Person {
             x_m: 1.873_49,
             y_m: -0.000_1,
         }),
+        height: Some(PersonHeight {
+            height_m: 1.740_9,
+            sd_m: 0.21,
+        }),
         views: 3,
         zones: Some(vec!["entrance".to_owned()]),
     }
@@ -47,6 +51,7 @@ fn report() -> DetectionReport {
     let unknown_place = Person {
         bearing: None,
         floor: None,
+        height: None,
         zones: Some(Vec::new()),
         ..person()
     };
@@ -85,6 +90,7 @@ fn report() -> DetectionReport {
         },
         defaults: Vec::new(),
         persons: vec![person(), unknown_place],
+        margin: None,
         zones: vec![ZoneCount {
             name: "entrance".to_owned(),
             persons: 1,
@@ -94,6 +100,7 @@ fn report() -> DetectionReport {
             unchanged: 4,
             outside: 1,
             masked: 2,
+            outside_areas: 3,
         },
         batch_count: 3,
         non_finite: 0,

@@ -21,6 +21,8 @@ from mosquitto import PASSWORD, USER, broker
 from support.lookdown import lookdown
 from waiting import wait_until
 
+from metrics import metric
+
 HERE = Path(__file__).resolve().parent
 VERIFIER = ROOT / ".setup" / "real" / "webhooks" / "bin" / "python"
 SECRET = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"
@@ -100,16 +102,16 @@ class CountedCamera(unittest.TestCase):
         calibration |= {"zones": ZONES, "lines": LINES}
         (calibrations / "office.json").write_text(json.dumps(calibration), encoding="utf-8")
         self.broker = self.enterContext(broker(self.folder))
-        self.server = self.enterContext(lookdown({"MODEL__PATH": ""}, calibrations=calibrations))
+        server = {"MODEL__PATH": "", "MQTT__URL": self.broker.url, "RESULTS__CAMERA_METRICS": "true"}
+        self.server = self.enterContext(lookdown(server, calibrations=calibrations))
         (self.port,) = free_ports(1)
         password = self.folder / "password"
         password.write_text(PASSWORD + "\n", encoding="utf-8")
         self.settings, self.store = self.folder / "count.toml", self.folder / "counts.sqlite"
         self.settings.write_text(
-            f'[server]\nurl = "http://{self.server.address}"\n'
-            f'[http]\nlisten = "127.0.0.1:{self.port}"\n'
-            f'[store]\npath = "{self.store}"\ncommit_every = "200ms"\n'
-            f'[counting]\nlongest_gap = "{LONGEST_GAP}"\n'
+            f'[upstream]\nurl = "http://{self.server.address}"\n'
+            f'[counts]\nlisten = "127.0.0.1:{self.port}"\n'
+            f'path = "{self.store}"\ncommit_every = "200ms"\nlongest_gap = "{LONGEST_GAP}"\n'
             f'[mqtt]\nurl = "mqtt://{USER}@localhost:{self.broker.port}"\npassword_file = "{password}"\n',
             encoding="utf-8",
         )
@@ -174,6 +176,45 @@ class Counts(CountedCamera):
             self.assertEqual(0, count.stop())
         self.assertIn("continuing after the report of", (self.folder / "count.log").read_text(encoding="utf-8"))
 
+    def shown_numbers(self, count: Count) -> dict[str, float]:
+        """The number of persons of the camera in every place."""
+        row = next(row for row in json.loads(self.server.get("/results")) if row["camera"] == "office")
+        retained = self.broker.retained()
+        return {
+            "results": row["persons"],
+            "source": row["persons_source"],
+            "tracks": len((count.get("/counts/office/tracks") or {"tracks": []})["tracks"]),
+            "metrics": metric(self.server, 'camera_persons{camera="office"}'),
+            "mqtt": float(retained.get("lookdown/cameras/office/persons", "nan")),
+            "counts over mqtt": float(retained.get(f"{TOPICS}/persons", "nan")),
+            "frame": row["frame_persons"],
+            "frame over mqtt": float(retained.get("lookdown/cameras/office/frame_persons", "nan")),
+        }
+
+    def test_every_place_shows_one_number(self):
+        def is_one(numbers: dict[str, float]) -> bool:
+            places = [numbers[place] for place in ("results", "tracks", "metrics", "mqtt", "counts over mqtt")]
+            return len(set(places)) == 1 and places[0] > 0 and numbers["source"] == "tracks"
+
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.server.post(DETECT, OFFICE)
+            deadline = time.monotonic() + 60
+            while not is_one(numbers := self.shown_numbers(count)):
+                self.assertLess(time.monotonic(), deadline, numbers)
+                # Weak persons are in the frame only.
+                self.server.post(f"{DETECT}&score_threshold=0.06", OFFICE)
+            self.assertGreater(numbers["frame"], numbers["results"])
+            self.assertEqual(numbers["frame"], numbers["frame over mqtt"])
+            name = "homeassistant/sensor/lookdown_office_frame_persons/config"
+            config = json.loads(self.broker.retained()[name])
+            self.assertIs(False, config["enabled_by_default"])
+            count.stop(signal.SIGKILL)
+        self.server.delete("/results/office")
+        last = [len(json.loads(self.server.post(DETECT, OFFICE))["persons"]) for _ in range(3)]
+        rows = json.loads(self.server.get("/results"))
+        self.assertEqual([(last[-1], "median")], [(row["persons"], row["persons_source"]) for row in rows])
+
     def test_topics_of_cameras_removed_while_down_are_withdrawn(self):
         def topics_of(camera: str) -> list[str]:
             names = (f"/counts/cameras/{camera}/", f"_{camera}_count_")
@@ -230,9 +271,9 @@ class Counts(CountedCamera):
 
     def test_problems_are_one_clear_sentence(self):
         for text, problem in [
-            ("[server]\nurl = 5\n", "server.url"),
+            ("[upstream]\nurl = 5\n", "upstream.url"),
             ('[mqtt]\nurl = "http://localhost"\n', "mqtt.url"),
-            ('[store]\npath = "/nowhere/counts.sqlite"\n', "store.path: /nowhere/counts.sqlite cannot be used"),
+            ('[counts]\npath = "/nowhere/counts.sqlite"\n', "counts.path: /nowhere/counts.sqlite cannot be used"),
         ]:
             with self.subTest(problem):
                 self.settings.write_text(text, encoding="utf-8")

@@ -1,7 +1,7 @@
 """Rendered walks through an RTSP server, `lookdown watch`, the server and `lookdown count`: counted and true crossings,
 and the CPU time of each process.
 
-The clip is made of our own renders: `training/make.py walks`. `WALKS_ROUNDS` repeats it, `WALKS_RATES="1 2 5 10"` are
+The clip is made of our own renders: `lab/training/make.py walks`. `WALKS_ROUNDS` repeats it, `WALKS_RATES="1 2 5 10"` are
 the frames per second of the CPU times, and `WALKS_TRACKS` names a file that gets the tracks.
 """
 
@@ -37,7 +37,7 @@ STREAM_RATE = 10
 QUIET_SECONDS = 1.5
 """The clip begins and ends with 2 s without a crossing."""
 ERROR_SHARE = 0.05
-"""Missed and invented crossings that the test permits. docs/count-accuracy.md has the measured ones."""
+"""Missed and invented crossings that the test permits. docs/lab/count-accuracy.md has the measured ones."""
 
 
 @dataclass
@@ -81,8 +81,8 @@ class Walks(unittest.TestCase):
             server = stack.enter_context(lookdown({"MODEL__PATH": ""}, calibrations=self.calibrations))
             settings = folder / "count.toml"
             settings.write_text(
-                f'[server]\nurl = "http://{server.address}"\n[http]\nlisten = "127.0.0.1:{port}"\n'
-                f'[store]\npath = "{folder / "counts.sqlite"}"\n',
+                f'[upstream]\nurl = "http://{server.address}"\n[counts]\nlisten = "127.0.0.1:{port}"\n'
+                f'path = "{folder / "counts.sqlite"}"\n',
                 encoding="utf-8",
             )
             count = Count(settings, folder / "count.log", port)
@@ -90,7 +90,7 @@ class Walks(unittest.TestCase):
             rtsp = stack.enter_context(rtsp_camera(self.frames, stream_rate))
             cameras = folder / "cameras.toml"
             cameras.write_text(
-                f'[server]\nurl = "http://{server.address}"\n[[cameras]]\nname = "{CAMERA}"\ncalibration = "{CAMERA}"\n'
+                f'[upstream]\nurl = "http://{server.address}"\n[[cameras]]\nname = "{CAMERA}"\ncalibration = "{CAMERA}"\n'
                 f'url = "rtsp://127.0.0.1:{rtsp}/stream"\nprofile = "fast"\nevery = "{1000 // rate}ms"\n'
                 "parameters = { score_threshold = 0.06 }\n",
                 encoding="utf-8",

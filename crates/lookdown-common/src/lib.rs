@@ -1,7 +1,8 @@
-//! The parts that the crates of Lookdown share: texts of clients, names, problems that are logged once.
+//! The parts that the crates of Lookdown share: texts of clients, names, files, problems
+//! that are logged once.
 //!
 //! With the feature `companion` also those of a client of the server: settings files, the server and
-//! its key, HTTP requests with limits, an HTTP server with limits, durations and backoff.
+//! its key, HTTP requests with limits, durations and backoff.
 
 #[cfg(feature = "companion")]
 mod abort_on_drop;
@@ -11,12 +12,15 @@ mod backoff;
 mod config;
 #[cfg(feature = "companion")]
 mod duration;
+pub mod files;
 #[cfg(feature = "companion")]
 mod http_client;
 #[cfg(feature = "companion")]
-pub mod http_server;
+mod in_process;
 mod log_once;
 pub mod plain_name;
+#[cfg(feature = "companion")]
+mod reload;
 #[cfg(feature = "companion")]
 mod server_entry;
 pub mod text;
@@ -30,6 +34,8 @@ pub use {
     config::{ConfigError, parse_toml, read_file, read_secret},
     duration::{optional_duration, parse_duration},
     http_client::{ClientError, ServerClient, client_builder, read_body, retry_after},
+    in_process::InProcess,
+    reload::Reload,
     server_entry::{ServerEntry, ServerOptions},
 };
 

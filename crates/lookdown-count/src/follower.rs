@@ -113,7 +113,8 @@ impl Follower {
                     }
                 }
             }
-            if Instant::now() >= self.next_commit || !self.messages.is_empty() {
+            let is_urgent = self.engine.lock().is_urgent() || !self.messages.is_empty();
+            if is_urgent || Instant::now() >= self.next_commit {
                 self.commit().await;
             }
         }
@@ -131,7 +132,8 @@ impl Follower {
             skipped("malformed");
             return Ok(());
         };
-        let Ok(report) = serde_json::from_slice::<Report>(&event.data) else {
+        let report = serde_json::from_slice::<Report>(&event.data).ok();
+        let Some(report) = report.filter(Report::has_valid_names) else {
             skipped("malformed");
             return Ok(());
         };
@@ -156,14 +158,16 @@ impl Follower {
             self.calibrations.definition(key)
         };
         let mut engine = self.engine.lock();
-        match engine.accept(id, &report, &definition, Now::read()) {
+        let now = Now::read();
+        match engine.accept(id, &report, &definition, now) {
             Accepted::Counted(crossings) => {
                 self.metrics.reports.inc();
                 if let Some(scene) = engine.scene_of(&report.camera) {
                     let at_ms = report.at_ms(definition.site.is_some());
+                    let times = (at_ms, now.unix_ms);
                     let messages =
                         self.conditions
-                            .of_report(id, &report.camera, at_ms, &crossings, scene);
+                            .of_report(id, &report.camera, times, &crossings, scene);
                     self.messages.extend(messages);
                 }
             }
@@ -187,7 +191,7 @@ impl Follower {
         }
         if Instant::now() >= self.next_expiry {
             self.next_expiry = Instant::now() + EXPIRY;
-            self.engine.lock().forget_silent();
+            self.engine.lock().forget_silent(now_ms);
             let age_ms = i64::try_from(self.retention.as_millis()).unwrap_or(i64::MAX);
             let store = self.store.clone();
             let expired = spawn_blocking(move || store.expire(now_ms.saturating_sub(age_ms))).await;
@@ -207,8 +211,10 @@ impl Follower {
         if batch.is_none() && messages.is_empty() && held.is_none() {
             return;
         }
-        let last_event = self.engine.lock().last_event();
-        let batch = batch.unwrap_or_else(|| Batch::empty(last_event));
+        let batch = batch.unwrap_or_else(|| {
+            let engine = self.engine.lock();
+            Batch::empty(engine.last_event(), engine.totals().clone())
+        });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
         let mut log = LogOnce::default();
@@ -226,7 +232,7 @@ impl Follower {
                     self.metrics.commits_failed.inc();
                     let problem = problem.to_string();
                     if log.should_log(&problem) {
-                        tracing::error!("{problem}: free space, or correct store.path");
+                        tracing::error!("{problem}: free space, or correct counts.path");
                     }
                 }
                 // A task that panicked is logged by the panic hook.
@@ -240,6 +246,7 @@ impl Follower {
             }
             sleep(backoff.next_pause()).await;
         }
+        self.engine.lock().stored(&batch.0);
         if log.clear() {
             tracing::info!("the store is written again");
         }

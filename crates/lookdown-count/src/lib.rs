@@ -18,11 +18,13 @@ mod engine;
 mod event_parser;
 mod event_stream;
 mod follower;
+mod hand_back;
 mod http;
 mod metrics;
 mod now;
 mod options;
 mod presence;
+mod recording;
 mod report;
 mod run;
 mod scene;
@@ -31,10 +33,9 @@ mod store;
 mod sums;
 mod webhooks;
 
-pub use options::{
-    CountEntry, CountOptions, CountingEntry, HttpEntry, MqttEntry, StoreEntry, load,
-};
-pub use run::{CountError, Origin, count};
+pub use options::{CountEntry, CountOptions, read_key};
+pub use recording::{Recording, RecordingError};
+pub use run::{CountError, Started, count};
 pub use snapshot::{CameraSnapshot, LineSnapshot, SiteSnapshot, Snapshot, ZoneSnapshot};
 pub use store::StoreError;
 pub use webhooks::WebhookEntry;

@@ -9,6 +9,7 @@ mod write;
 
 use std::{
     fs::{File, OpenOptions, TryLockError},
+    os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
     sync::Arc,
     thread::sleep,
@@ -33,7 +34,7 @@ const LOCK_PAUSE: Duration = Duration::from_millis(50);
 pub enum StoreError {
     /// The file cannot be opened, or is no store.
     #[error(
-        "store.path: {path} cannot be used: {problem}: give a writable path of a store of lookdown count"
+        "counts.path: {path} cannot be used: {problem}: give a writable path of a store of lookdown count"
     )]
     Unusable {
         /// The file.
@@ -42,11 +43,11 @@ pub enum StoreError {
         problem: String,
     },
     /// Another process has the store open.
-    #[error("store.path: {0} is in use by another process: stop it, or give another path")]
+    #[error("counts.path: {0} is in use by another process: stop it, or give another path")]
     InUse(PathBuf),
     /// The store is of a later version.
     #[error(
-        "store.path: {path} has the version {version}: use the program that wrote it, or give another path"
+        "counts.path: {path} has the version {version}: use the program that wrote it, or give another path"
     )]
     Version {
         /// The file.
@@ -79,6 +80,12 @@ impl Store {
             path: path.to_owned(),
             problem: problem.to_string(),
         };
+        // The files of SQLite beside it get its mode.
+        let created = open_private(path);
+        created.map_err(|problem| StoreError::Unusable {
+            path: path.to_owned(),
+            problem: problem.to_string(),
+        })?;
         let writer = connect(path).map_err(unusable)?;
         let version = schema::version(&writer).map_err(unusable)?;
         if version > schema::VERSION {
@@ -110,16 +117,22 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
     Ok(connection)
 }
 
+/// Opens or creates a file that only its owner may read.
+fn open_private(path: &Path) -> std::io::Result<File> {
+    OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .mode(0o600)
+        .open(path)
+}
+
 /// Locks the file beside the store. Waits for a process that ends, and for requests that end with
 /// earlier settings.
 fn lock(path: &Path) -> Result<File, StoreError> {
     let mut name = path.as_os_str().to_owned();
     name.push(".lock");
-    let opened = OpenOptions::new()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(&name);
+    let opened = open_private(Path::new(&name));
     let unusable = |problem: std::io::Error| StoreError::Unusable {
         path: path.to_owned(),
         problem: problem.to_string(),

@@ -9,12 +9,14 @@
 pub mod counting_line;
 pub mod crop_placement;
 pub mod floor;
+pub mod foot_filter;
 pub mod footprint;
 pub mod frame_crop;
 pub mod height_ratio;
 pub mod lens;
 pub mod mount;
 pub mod oriented_box;
+pub mod person_height;
 pub mod pixels;
 pub mod polygon;
 pub mod site_placement;
@@ -24,11 +26,13 @@ pub mod zone;
 pub mod zoom;
 
 pub use counting_line::{CountingLine, LineEnds};
+pub use foot_filter::{FootFilter, FootPlace};
 pub use footprint::{BackProjection, Footprint};
 pub use frame_crop::{FrameCrop, QuarterTurn};
 pub use lens::{Lens, LensError};
 pub use mount::Mount;
 pub use oriented_box::OrientedBox;
+pub use person_height::PersonHeight;
 pub use polygon::{Polygon, PolygonError};
 pub use site_placement::SitePlacement;
 pub use view_plan::{FieldOfViewReading, ViewPlan};

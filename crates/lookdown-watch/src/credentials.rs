@@ -7,6 +7,8 @@ use reqwest::{
 };
 use secrecy::{ExposeSecret, SecretString};
 
+use crate::SourceError;
+
 /// The user name and the password of a camera.
 #[derive(Debug, Clone)]
 pub struct Credentials {
@@ -23,10 +25,12 @@ impl PartialEq for Credentials {
 }
 
 /// Authentication of requests to a camera, as the camera asks for it: Digest is preferred to Basic
-/// (RFC 7616, RFC 7617).
+/// (RFC 7616, RFC 7617). A camera that asked for Digest once gets no Basic later, which is the
+/// password in plain text.
 pub(crate) struct Login {
     credentials: Option<Credentials>,
     challenge: Option<PasswordClient>,
+    has_digest: bool,
 }
 
 impl Login {
@@ -35,38 +39,75 @@ impl Login {
         Self {
             credentials,
             challenge: None,
+            has_digest: false,
         }
     }
 
-    /// Takes the challenge of a response with the status 401. Returns false if no request can
-    /// answer it: there are no credentials, or the scheme is unknown.
-    pub(crate) fn accept_challenge(&mut self, headers: &HeaderMap) -> bool {
+    /// Forgets the challenge of the last connection.
+    pub(crate) fn restart(&mut self) {
+        self.challenge = None;
+    }
+
+    /// Takes the challenge of an HTTP response with the status 401.
+    ///
+    /// # Errors
+    /// Those of [`Self::accept_challenges`].
+    pub(crate) fn accept_challenge(&mut self, headers: &HeaderMap) -> Result<(), SourceError> {
         let challenges = headers.get_all(WWW_AUTHENTICATE).iter();
+        self.accept_challenges(challenges.filter_map(|header| header.to_str().ok()))
+    }
+
+    /// Takes the challenges of a response with the status 401.
+    ///
+    /// # Errors
+    /// [`SourceError`] if no request can answer them: there are no credentials, the scheme is
+    /// unknown, or it is Basic after Digest.
+    pub(crate) fn accept_challenges<'a>(
+        &mut self,
+        challenges: impl Iterator<Item = &'a str>,
+    ) -> Result<(), SourceError> {
+        self.challenge = None;
+        if self.credentials.is_none() {
+            return Err(SourceError::CredentialsMissing);
+        }
         let mut builder = PasswordClient::builder();
-        for challenge in challenges.filter_map(|header| header.to_str().ok()) {
+        for challenge in challenges {
             builder = builder.challenges(challenge);
         }
-        self.challenge = builder.build().ok();
-        self.credentials.is_some() && self.challenge.is_some()
+        let challenge = builder
+            .build()
+            .map_err(|_| SourceError::UnknownAuthentication)?;
+        match challenge {
+            PasswordClient::Digest(_) => self.has_digest = true,
+            _ if self.has_digest => return Err(SourceError::BasicAfterDigest),
+            _ => {}
+        }
+        self.challenge = Some(challenge);
+        Ok(())
     }
 
     /// The header `Authorization` of a GET request.
     pub(crate) fn authorization(&mut self, url: &Url) -> Option<HeaderValue> {
-        let (credentials, challenge) = (self.credentials.as_ref()?, self.challenge.as_mut()?);
         let uri = match url.query() {
             Some(query) => format!("{}?{query}", url.path()),
             None => url.path().to_owned(),
         };
+        let mut header = HeaderValue::try_from(self.respond("GET", &uri)?).ok()?;
+        header.set_sensitive(true);
+        Some(header)
+    }
+
+    /// The value of `Authorization` for a request.
+    pub(crate) fn respond(&mut self, method: &str, uri: &str) -> Option<String> {
+        let (credentials, challenge) = (self.credentials.as_ref()?, self.challenge.as_mut()?);
         let value = challenge.respond(&PasswordParams {
             username: &credentials.user,
             password: credentials.password.expose_secret(),
-            uri: &uri,
-            method: "GET",
+            uri,
+            method,
             body: Some(&[]),
         });
-        let mut header = HeaderValue::try_from(value.ok()?).ok()?;
-        header.set_sensitive(true);
-        Some(header)
+        value.ok()
     }
 
     /// The user name.
@@ -103,7 +144,8 @@ mod tests {
     fn digest_is_preferred_to_basic() {
         let mut login = login();
         let digest = "Digest realm=\"cam\", qop=\"auth\", nonce=\"abc\", algorithm=MD5";
-        assert!(login.accept_challenge(&challenges(&["Basic realm=\"cam\"", digest])));
+        let offered = challenges(&["Basic realm=\"cam\"", digest]);
+        login.accept_challenge(&offered).unwrap();
         let url = "http://camera/snap.jpg?size=1".parse().unwrap();
         let header = login.authorization(&url).unwrap();
         assert!(header.is_sensitive());
@@ -115,10 +157,22 @@ mod tests {
 
     #[test]
     fn an_unknown_scheme_or_no_password_is_reported() {
-        let unknown = challenges(&["Negotiate"]);
-        assert!(!login().accept_challenge(&unknown));
+        let unknown = login().accept_challenge(&challenges(&["Negotiate"]));
+        assert!(matches!(unknown, Err(SourceError::UnknownAuthentication)));
         let basic = challenges(&["Basic realm=\"cam\""]);
-        assert!(!Login::new(None).accept_challenge(&basic));
-        assert!(login().accept_challenge(&basic));
+        let missing = Login::new(None).accept_challenge(&basic);
+        assert!(matches!(missing, Err(SourceError::CredentialsMissing)));
+        login().accept_challenge(&basic).unwrap();
+    }
+
+    #[test]
+    fn no_password_is_sent_in_plain_text_after_digest() {
+        let mut login = login();
+        let digest = challenges(&["Digest realm=\"cam\", nonce=\"abc\", qop=\"auth\""]);
+        login.accept_challenge(&digest).unwrap();
+        login.restart();
+        let basic = login.accept_challenge(&challenges(&["Basic realm=\"cam\""]));
+        assert!(matches!(basic, Err(SourceError::BasicAfterDigest)));
+        assert_eq!(login.respond("GET", "/"), None);
     }
 }

@@ -10,19 +10,35 @@ use std::{
 };
 
 use bytes::Bytes;
-use secrecy::{ExposeSecret, SecretString};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     process::{Child, ChildStdout, Command},
+    time::{Interval, interval},
 };
 
 use crate::{
-    MAX_FRAME_BYTES, SourceError, VideoOptions, jpeg_splitter::JpegSplitter, stderr_line::LastLine,
+    MAX_FRAME_BYTES, SourceError, VideoOptions,
+    child::{
+        self, Task,
+        usage::{self, Usage},
+    },
+    jpeg_splitter::JpegSplitter,
+    memory_budget::Reservation,
+    stderr_line::LastLine,
 };
 use lookdown_common::text::one_line;
 
-/// Most pixels of a frame that `ffmpeg` decodes.
-const MAX_PIXELS: &str = "134217728";
+/// Most pixels of a frame that `ffmpeg` decodes: those that the server accepts.
+const MAX_PIXELS: &str = "50000000";
+/// Protocols of video files.
+const FILE_PROTOCOLS: &str = "file";
+/// Formats of video files. Playlists are not among them: they name other files.
+const FILE_FORMATS: &str = "mov,matroska,avi,mpegts,mpeg,mpegvideo,flv,asf,ogg,ivf,obu,h264,hevc,\
+                            m4v,mjpeg,mxf,nut,dhav,gif";
+/// Threads of the decoder of a file. Each holds frames in memory.
+const FILE_THREADS: usize = 8;
+/// The last words of `ffmpeg` about a file whose format is not in the list.
+const REFUSED_FORMAT: &str = "Invalid argument";
 
 /// A running `ffmpeg`.
 pub(crate) struct Ffmpeg {
@@ -30,16 +46,36 @@ pub(crate) struct Ffmpeg {
     output: ChildStdout,
     errors: LastLine,
     splitter: JpegSplitter,
-    secret: Option<SecretString>,
+    /// The memory of the splitter.
+    memory: Reservation,
+    /// The memory and the CPU time of the process.
+    usage: Usage,
+    checks: Interval,
+    /// The URL of the relay, and the camera that errors show instead.
+    shown: Option<(String, String)>,
+}
+
+/// The input of `ffmpeg`.
+pub(crate) enum Input<'a> {
+    /// A file, which the arguments name.
+    File,
+    /// A stream, which a script names.
+    Stream {
+        /// The script for standard input.
+        script: &'a str,
+        /// The URL of the relay.
+        relay: String,
+        /// The camera, for messages.
+        camera: String,
+    },
 }
 
 impl Ffmpeg {
-    /// Starts the process, and writes `script` to its standard input.
+    /// Starts the process.
     pub(crate) async fn start(
         options: &VideoOptions,
         arguments: &[OsString],
-        script: &str,
-        secret: Option<SecretString>,
+        input: Input<'_>,
     ) -> Result<Self, SourceError> {
         let no_ffmpeg = |problem: String| SourceError::NoFfmpeg {
             program: options.ffmpeg.display().to_string(),
@@ -56,21 +92,34 @@ impl Ffmpeg {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
-        let mut child = command
-            .spawn()
+        let mut child = child::spawn(&mut command, Task::Decode)
             .map_err(|error| no_ffmpeg(error.to_string()))?;
+        let usage = Usage::of(child.id().unwrap_or_default());
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let (Some(mut input), Some(output), Some(errors)) = pipes else {
+        let (Some(mut pipe), Some(output), Some(errors)) = pipes else {
             return Err(no_ffmpeg("it has no pipes".to_owned()));
         };
-        // A process that ends at once reports its problem on standard error.
-        let _ = input.write_all(script.as_bytes()).await;
+        let shown = match input {
+            Input::File => None,
+            Input::Stream {
+                script,
+                relay,
+                camera,
+            } => {
+                // A process that ends at once reports its problem on standard error.
+                let _ = pipe.write_all(script.as_bytes()).await;
+                Some((relay, camera))
+            }
+        };
         Ok(Self {
             child,
             output,
             errors: LastLine::new(errors),
             splitter: JpegSplitter::new(MAX_FRAME_BYTES),
-            secret,
+            memory: Reservation::default(),
+            usage,
+            checks: interval(usage::INTERVAL),
+            shown,
         })
     }
 
@@ -80,9 +129,19 @@ impl Ffmpeg {
             if let Some(frame) = self.splitter.next_file() {
                 return Ok(Some(frame));
             }
+            self.memory
+                .resize(self.splitter.buffered())
+                .map_err(|_| SourceError::Memory)?;
             let read = tokio::select! {
                 read = self.output.read_buf(self.splitter.buffer()) => read.unwrap_or(0),
                 () = self.errors.read() => continue,
+                _ = self.checks.tick() => {
+                    // The decoder of a file works as fast as it can.
+                    if self.shown.is_some() {
+                        self.usage.check()?;
+                    }
+                    continue;
+                }
             };
             if read == 0 {
                 let line = self.errors.last().await;
@@ -96,10 +155,14 @@ impl Ffmpeg {
         if status.is_some_and(|status| status.success()) {
             return Ok(None);
         }
-        let line = without_credentials(line, self.secret.as_ref());
+        let line = match &self.shown {
+            Some((relay, camera)) => line.replace(relay, camera),
+            None => line.to_owned(),
+        };
+        let line = one_line(&line);
         let line = line.trim_start_matches("pipe:0: ");
-        if line.contains("401 Unauthorized") {
-            return Err(SourceError::CredentialsMissing);
+        if line.contains(REFUSED_FORMAT) && self.shown.is_none() {
+            return Err(SourceError::NotAVideo);
         }
         Err(SourceError::Ffmpeg(match (line, status) {
             ("", Some(status)) => status.to_string(),
@@ -108,18 +171,10 @@ impl Ffmpeg {
     }
 }
 
-/// Returns a command that ends with its handle and has no settings of the server, which may be
-/// secret.
+/// Returns a command that starts `ffmpeg` without questions.
 pub(crate) fn command(ffmpeg: &Path) -> Command {
-    let mut command = Command::new(ffmpeg);
-    command
-        .args(["-nostdin", "-hide_banner", "-loglevel", "error"])
-        .kill_on_drop(true);
-    for (name, _) in std::env::vars_os() {
-        if name.to_string_lossy().starts_with("LOOKDOWN__") {
-            command.env_remove(name);
-        }
-    }
+    let mut command = child::command(ffmpeg);
+    command.args(["-nostdin", "-hide_banner", "-loglevel", "error"]);
     command
 }
 
@@ -137,13 +192,23 @@ pub(crate) fn decoding(options: &VideoOptions) -> Vec<OsString> {
 
 /// The arguments that read the video of a file.
 pub(crate) fn file_input(path: &Path) -> Vec<OsString> {
-    // Other files that a playlist names are not read.
-    let mut arguments: Vec<OsString> = ["-protocol_whitelist", "file", "-i"]
-        .map(Into::into)
-        .to_vec();
-    arguments.push(file_url(path));
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut arguments: Vec<OsString> = file_restrictions().map(Into::into).to_vec();
+    arguments.push("-threads".into());
+    arguments.push(threads.min(FILE_THREADS).to_string().into());
+    arguments.extend(["-i".into(), file_url(path)]);
     arguments.extend(["-an", "-sn", "-dn"].map(Into::into));
     arguments
+}
+
+/// The arguments that make `ffmpeg` and `ffprobe` read no other file than the given one.
+pub(crate) fn file_restrictions() -> [&'static str; 4] {
+    [
+        "-protocol_whitelist",
+        FILE_PROTOCOLS,
+        "-format_whitelist",
+        FILE_FORMATS,
+    ]
 }
 
 /// Returns a path as a URL, so that it is not taken for an option or another protocol.
@@ -151,49 +216,4 @@ pub(crate) fn file_url(path: &Path) -> OsString {
     let mut url = OsString::from("file:");
     url.push(path);
     url
-}
-
-/// Returns a line without the credentials that `ffmpeg` repeats.
-fn without_credentials(line: &str, secret: Option<&SecretString>) -> String {
-    let mut shown = String::new();
-    let mut rest = line;
-    while let Some((before, after)) = rest.split_once("://") {
-        let end = after.find(['\'', '"', ' ']).unwrap_or(after.len());
-        let authority = after[..end].rfind('@').map_or(0, |at| at + 1);
-        shown.push_str(before);
-        shown.push_str("://");
-        rest = &after[authority..];
-    }
-    shown.push_str(rest);
-    if let Some(secret) = secret.filter(|secret| !secret.expose_secret().is_empty()) {
-        shown = shown.replace(secret.expose_secret(), "…");
-    }
-    one_line(&shown)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_of_ffmpeg_lose_their_credentials() {
-        let secret = Some("geheim".into());
-        for (line, expected) in [
-            (
-                "Impossible to open 'rtsp://cam:ge%40heim@10.0.0.8/s1'",
-                "Impossible to open 'rtsp://10.0.0.8/s1'",
-            ),
-            (
-                "rtsp://u:p@q@host/a and rtsp://v:w@host",
-                "rtsp://host/a and rtsp://host",
-            ),
-            ("password geheim is wrong", "password … is wrong"),
-            (
-                "Connection to tcp://127.0.0.1:8555 failed",
-                "Connection to tcp://127.0.0.1:8555 failed",
-            ),
-        ] {
-            assert_eq!(without_credentials(line, secret.as_ref()), expected);
-        }
-    }
 }

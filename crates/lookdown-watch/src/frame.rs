@@ -1,10 +1,12 @@
 //! One encoded frame of a camera.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use jiff::Timestamp;
 use lookdown_common::JPEG_START;
+
+use crate::memory_budget::Reservation;
 
 /// Largest frame in bytes: an uncompressed-looking JPEG of 50 megapixels fits.
 pub const MAX_FRAME_BYTES: usize = 32 << 20;
@@ -50,6 +52,8 @@ pub struct Frame {
     pub captured_at: Timestamp,
     /// The time at which the frame was received.
     pub received: Instant,
+    /// The memory of the image.
+    _memory: Arc<Reservation>,
 }
 
 /// The reason why bytes are not a frame.
@@ -61,6 +65,9 @@ pub enum FrameError {
     /// The end is missing.
     #[error("the image ends early")]
     Incomplete,
+    /// The frames of all cameras exceed their budget.
+    #[error("the frames of all cameras together take more than 512 MiB")]
+    Memory,
 }
 
 impl Frame {
@@ -70,11 +77,13 @@ impl Frame {
     /// [`FrameError`] if they are another file, or the end is missing.
     pub fn new(image: Bytes, captured_at: Timestamp) -> Result<Self, FrameError> {
         let format = format_of(&image)?;
+        let memory = Reservation::of(image.len()).map_err(|_| FrameError::Memory)?;
         Ok(Self {
             image,
             format,
             captured_at,
             received: Instant::now(),
+            _memory: memory,
         })
     }
 }

@@ -53,6 +53,11 @@ impl JpegSplitter {
         &mut self.buffer
     }
 
+    /// The number of bytes in the buffer.
+    pub(crate) fn buffered(&self) -> usize {
+        self.buffer.len()
+    }
+
     /// Returns the next whole file, or `None` if more bytes are needed.
     pub(crate) fn next_file(&mut self) -> Option<Bytes> {
         loop {

@@ -5,15 +5,19 @@
 //! This crate is a client of the public HTTP API. It does not depend on the server.
 
 mod camera;
+mod child;
 mod config;
 mod credentials;
 mod ffmpeg;
 mod frame;
 mod jpeg_splitter;
 mod location;
+mod memory_budget;
 mod metrics;
 mod metrics_server;
 mod pace;
+mod rate;
+mod rtsp_relay;
 mod sender;
 mod server;
 mod slot;
@@ -24,12 +28,14 @@ mod video;
 mod watcher;
 
 pub use camera::{Camera, Transport, VideoOptions};
-pub use config::{CameraEntry, WatchOptions, load};
+pub use config::{CameraEntry, WatchEntry, WatchOptions};
 pub use credentials::Credentials;
 pub use frame::{Frame, FrameError, ImageFormat, MAX_FRAME_BYTES};
 pub use location::{InvalidLocation, Location};
-pub use metrics::Metrics;
-pub use source::ImageReader;
+pub use metrics::{CameraState, Metrics};
+pub use metrics_server::serve_metrics;
+pub use rate::Rate;
+pub use source::{ImageReader, first_frame};
 pub use source_error::SourceError;
-pub use video::{VideoFrames, VideoWriter, video_duration};
+pub use video::{VideoFrames, VideoWriter, video_created_at, video_duration};
 pub use watcher::{Origin, WatchError, watch};

@@ -20,8 +20,10 @@ use reqwest::Client;
 use tokio::time::sleep;
 
 use crate::{
-    Camera, Frame, FrameError, Location, SourceError,
+    Camera, Frame, FrameError, Location, Metrics, SourceError,
+    credentials::Login,
     metrics::{CameraMetrics, Failure},
+    server::camera_client,
     slot::Slot,
 };
 use lookdown_common::{Backoff, LogOnce};
@@ -106,7 +108,9 @@ pub(crate) async fn supervise(
     let (first, longest) = LOGIN_PAUSES;
     let mut login_backoff = Backoff::new(first, longest);
     let log = Mutex::new(LogOnce::default());
+    let mut login = Login::new(camera.credentials.clone());
     loop {
+        login.restart();
         let sink = Sink {
             slot,
             metrics,
@@ -115,12 +119,13 @@ pub(crate) async fn supervise(
             is_failing: &log,
         };
         let outcome = tokio::select! {
-            outcome = run(camera, client, &sink) => outcome,
+            outcome = run(camera, client, &mut login, &sink) => outcome,
             error = stalled(camera, &sink) => Err(error),
         };
         let pause = match outcome {
             Ok(()) => return,
             Err(error) => {
+                metrics.ended(&error.to_string());
                 if log.lock().should_log(&error.to_string()) {
                     tracing::warn!("{error}");
                 }
@@ -141,11 +146,45 @@ pub(crate) async fn supervise(
     }
 }
 
+/// Returns the first frame of a camera, within this time.
+///
+/// # Errors
+/// [`SourceError`].
+pub async fn first_frame(camera: &Camera, limit: Duration) -> Result<Frame, SourceError> {
+    let client = camera_client().map_err(|error| SourceError::Unreachable(error.to_string()))?;
+    let all = Metrics::new().map_err(|error| SourceError::Stream(error.to_string()))?;
+    let metrics = all.add(&camera.name, camera.location.to_string());
+    let (slot, log) = (Slot::default(), Mutex::new(LogOnce::default()));
+    let mut login = Login::new(camera.credentials.clone());
+    let sink = Sink {
+        slot: &slot,
+        metrics: &metrics,
+        started: Instant::now(),
+        alive: Mutex::default(),
+        is_failing: &log,
+    };
+    tokio::select! {
+        biased;
+        frame = slot.take() => frame.ok_or(SourceError::Closed),
+        ended = run(camera, &client, &mut login, &sink) => {
+            slot.close();
+            let last = slot.take().await;
+            last.ok_or_else(|| ended.err().unwrap_or(SourceError::Closed))
+        }
+        () = sleep(limit) => Err(SourceError::Stalled(limit)),
+    }
+}
+
 /// Reads frames until the source ends.
-async fn run(camera: &Camera, client: &Client, sink: &Sink<'_>) -> Result<(), SourceError> {
+async fn run(
+    camera: &Camera,
+    client: &Client,
+    login: &mut Login,
+    sink: &Sink<'_>,
+) -> Result<(), SourceError> {
     let ended: Infallible = match &camera.location {
-        Location::Http(url) => http::run(camera, url, client, sink).await?,
-        Location::Rtsp(url) => video::run_stream(camera, url, sink).await?,
+        Location::Http(url) => http::run(camera, url, client, login, sink).await?,
+        Location::Rtsp(url) => video::run_stream(camera, url, login, sink).await?,
         Location::Folder(path) => folder::run(camera, path, sink).await?,
         Location::Video(path) => return video::run_file(camera, path, sink).await,
         Location::StandardInput => return standard_input::run(sink).await,

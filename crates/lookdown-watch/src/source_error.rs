@@ -25,6 +25,11 @@ pub enum SourceError {
         "the camera requires an authentication other than Basic and Digest: select one of them in the camera"
     )]
     UnknownAuthentication,
+    /// A challenge for the password in plain text, after one for its digest.
+    #[error(
+        "the camera asks for the password in plain text (Basic), although it asked for its digest before: check that it is the camera, and restart this program"
+    )]
+    BasicAfterDigest,
     /// Another status than 200.
     #[error(
         "the camera answered with the status {0}: check the path of the URL in the camera's manual"
@@ -47,6 +52,24 @@ pub enum SourceError {
     /// A frame beyond the limit.
     #[error("the camera's image has more than 32 MiB: reduce its resolution or quality")]
     TooLarge,
+    /// The frames of all cameras exceed their budget.
+    #[error(
+        "the frames of all cameras together take more than 512 MiB: reduce their resolution or quality"
+    )]
+    Memory,
+    /// The decoders of all cameras exceed their budget.
+    #[error(
+        "the decoders of all cameras take more than half of the memory, and that of this camera the most: reduce its resolution"
+    )]
+    DecoderMemory,
+    /// A decoder exceeds its share of CPU time.
+    #[error("the decoder of the camera uses {0:.1} cores: reduce its resolution or frame rate")]
+    DecoderTime(f64),
+    /// A file that names other files, or of an unknown format.
+    #[error(
+        "the file is not a video: playlists and unknown formats are not read: give an MP4, MKV, AVI or TS file"
+    )]
+    NotAVideo,
     /// No frame within the limit.
     #[error("no whole frame arrived within {0:?}: check the camera, or raise stall_after")]
     Stalled(Duration),
@@ -82,6 +105,7 @@ impl SourceError {
             Self::CredentialsRefused { .. }
                 | Self::CredentialsMissing
                 | Self::UnknownAuthentication
+                | Self::BasicAfterDigest
         )
     }
 }

@@ -3,6 +3,7 @@
 use std::{ffi::OsString, path::Path, process::Stdio, time::Duration};
 
 use bytes::Bytes;
+use jiff::Timestamp;
 use tokio::{
     io::AsyncWriteExt,
     process::{Child, ChildStdin},
@@ -11,7 +12,8 @@ use tokio::{
 
 use crate::{
     SourceError, VideoOptions,
-    ffmpeg::{Ffmpeg, command, decoding, file_input, file_url},
+    child::{self, Task},
+    ffmpeg::{Ffmpeg, Input, command, decoding, file_input, file_restrictions, file_url},
     stderr_line::LastLine,
 };
 
@@ -40,7 +42,7 @@ impl VideoFrames {
         let filter = format!("fps=fps=1000/{}", every.as_millis().max(1));
         arguments.extend(["-vf", &filter].map(OsString::from));
         Ok(Self {
-            ffmpeg: Ffmpeg::start(options, &arguments, "", None).await?,
+            ffmpeg: Ffmpeg::start(options, &arguments, Input::File).await?,
             every,
             count: 0,
         })
@@ -62,19 +64,34 @@ impl VideoFrames {
 
 /// Returns the duration of a video file, if `ffprobe` can read it.
 pub async fn video_duration(path: &Path, options: &VideoOptions) -> Option<Duration> {
-    let mut command = tokio::process::Command::new(options.ffmpeg.with_file_name("ffprobe"));
+    let seconds = probed(path, "format=duration", options).await?;
+    Duration::try_from_secs_f64(seconds.parse().ok()?).ok()
+}
+
+/// Returns the time at which a video file says that it was created.
+pub async fn video_created_at(path: &Path, options: &VideoOptions) -> Option<Timestamp> {
+    let created_at = probed(path, "format_tags=creation_time", options).await?;
+    created_at.parse().ok()
+}
+
+/// Returns a value that `ffprobe` reads from a file.
+async fn probed(path: &Path, entry: &str, options: &VideoOptions) -> Option<String> {
+    let mut command = child::command(options.ffmpeg.with_file_name("ffprobe"));
     command
-        .args(["-v", "error", "-protocol_whitelist", "file"])
-        .args(["-show_entries", "format=duration", "-of", "csv=p=0"])
+        .args(["-v", "error"])
+        .args(file_restrictions())
+        .args(["-show_entries", entry, "-of", "csv=p=0"])
         .arg(file_url(path))
         .stdin(Stdio::null())
-        .kill_on_drop(true);
-    let output = timeout(DURATION_TIMEOUT, command.output())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let child = child::spawn(&mut command, Task::Decode).ok()?;
+    let output = timeout(DURATION_TIMEOUT, child.wait_with_output())
         .await
         .ok()?
         .ok()?;
-    let seconds: f64 = String::from_utf8(output.stdout).ok()?.trim().parse().ok()?;
-    Duration::try_from_secs_f64(seconds).ok()
+    let value = String::from_utf8(output.stdout).ok()?.trim().to_owned();
+    (!value.is_empty()).then_some(value)
 }
 
 /// A video file that is written frame by frame.
@@ -118,8 +135,7 @@ impl VideoWriter {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
-        let mut child = command
-            .spawn()
+        let mut child = child::spawn(&mut command, Task::Encode)
             .map_err(|error| no_ffmpeg(error.to_string()))?;
         let (Some(input), Some(errors)) = (child.stdin.take(), child.stderr.take()) else {
             return Err(no_ffmpeg("it has no pipes".to_owned()));

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use lookdown_lens::{
     geometry::{
-        OrientedBox, Pixel, Zone,
+        OrientedBox, PersonHeight, Pixel, Zone,
         floor::{Bearing, FloorPosition},
     },
     warning::Warning,
@@ -49,6 +49,8 @@ pub struct DetectionReport {
     pub defaults: Vec<DefaultUsed>,
     /// Persons, highest score first.
     pub persons: Vec<Person>,
+    /// Persons in the margin of the areas, who do not count; `None` without areas.
+    pub margin: Option<Vec<Person>>,
     /// The number of persons in each zone, in the order of the calibration.
     pub zones: Vec<ZoneCount>,
     /// The numbers of views by outcome.
@@ -74,6 +76,8 @@ pub struct ViewCounts {
     pub outside: usize,
     /// Views wholly hidden by the masks of the camera.
     pub masked: usize,
+    /// Views that cannot show a person in an area of the camera.
+    pub outside_areas: usize,
 }
 
 /// The calibration on which a report is based.
@@ -141,6 +145,8 @@ pub struct Person {
     pub bearing: Option<Bearing>,
     /// The floor position of the person, when the height of the camera is known.
     pub floor: Option<FloorPosition>,
+    /// The height of the person, where the boxes and the height of the camera give it.
+    pub height: Option<PersonHeight>,
     /// The number of supporting views.
     pub views: usize,
     /// The names of the zones that the person's foot is in; `None` when the calibration has none.

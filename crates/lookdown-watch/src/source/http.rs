@@ -13,7 +13,7 @@ use reqwest::{
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::{Sink, multipart::PartReader};
-use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login};
+use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login, memory_budget::Reservation};
 
 /// Requests for one answer: the second one answers the challenge of the first.
 const ATTEMPTS: usize = 2;
@@ -23,15 +23,15 @@ pub(super) async fn run(
     camera: &Camera,
     url: &Url,
     client: &Client,
+    login: &mut Login,
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
-    let mut login = Login::new(camera.credentials.clone());
     let mut entity_tag = None;
     let mut ticks = interval(camera.every);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;
-        let response = get(client, url, &mut login, entity_tag.as_ref()).await?;
+        let response = get(client, url, login, entity_tag.as_ref()).await?;
         if response.status() == StatusCode::NOT_MODIFIED {
             sink.alive();
             continue;
@@ -68,12 +68,7 @@ async fn get(
         let response = request.send().await.map_err(unreachable)?;
         match response.status() {
             StatusCode::UNAUTHORIZED => {
-                if login.user().is_none() {
-                    return Err(SourceError::CredentialsMissing);
-                }
-                if !login.accept_challenge(response.headers()) {
-                    return Err(SourceError::UnknownAuthentication);
-                }
+                login.accept_challenge(response.headers())?;
             }
             StatusCode::NOT_MODIFIED => return Ok(response),
             status if status.is_success() => return Ok(response),
@@ -88,10 +83,13 @@ async fn get(
 /// Reads the whole image of a snapshot.
 async fn read_image(mut response: Response) -> Result<Bytes, SourceError> {
     let mut image = BytesMut::new();
+    let mut memory = Reservation::default();
     while let Some(chunk) = response.chunk().await.map_err(unreachable)? {
         if image.len() + chunk.len() > MAX_FRAME_BYTES {
             return Err(SourceError::TooLarge);
         }
+        let bytes = image.len() + chunk.len();
+        memory.resize(bytes).map_err(|_| SourceError::Memory)?;
         image.extend_from_slice(&chunk);
     }
     Ok(image.freeze())
@@ -105,7 +103,10 @@ async fn read_stream(
 ) -> Result<Infallible, SourceError> {
     let stream = |error: super::multipart::PartError| SourceError::Stream(error.to_string());
     let mut parts = PartReader::new(content_type, MAX_FRAME_BYTES).map_err(stream)?;
+    let mut memory = Reservation::default();
     while let Some(chunk) = response.chunk().await.map_err(unreachable)? {
+        let bytes = parts.buffered() + chunk.len();
+        memory.resize(bytes).map_err(|_| SourceError::Memory)?;
         parts.push(&chunk);
         while let Some(image) = parts.next_part().map_err(stream)? {
             // The sink counts damaged frames.

@@ -69,6 +69,11 @@ impl PartReader {
         self.buffer.extend_from_slice(bytes);
     }
 
+    /// The number of bytes in the buffer.
+    pub(crate) fn buffered(&self) -> usize {
+        self.buffer.len()
+    }
+
     /// Returns the body of the next part, or `None` if more bytes are needed.
     ///
     /// # Errors

@@ -1,24 +1,27 @@
 //! RTSP streams and video files in real time, through `ffmpeg`.
 //!
-//! The URL of a stream with its credentials is written to the standard input of `ffmpeg`, so it is
-//! not in the list of processes.
+//! `ffmpeg` reads a stream through a relay, whose URL is written to its standard input, so it is not in
+//! the list of processes.
 
 use std::{convert::Infallible, ffi::OsString, fmt::Write as _, path::Path, time::Duration};
 
 use reqwest::Url;
-use secrecy::ExposeSecret;
 
 use super::Sink;
 use crate::{
-    Camera, Credentials, SourceError,
-    ffmpeg::{Ffmpeg, decoding, file_input},
+    Camera, SourceError,
+    credentials::Login,
+    ffmpeg::{Ffmpeg, Input, decoding, file_input},
+    rtsp_relay::Relay,
 };
 
 /// Part of the interval between two frames after which the next frame is taken, so that the frames
 /// of a camera are not missed by a rounding of their times.
 const EARLY: f64 = 0.98;
-/// Protocols of RTSP streams.
-const STREAM_PROTOCOLS: &str = "pipe,rtsp,rtsps,rtp,srtp,tcp,udp,tls,crypto";
+/// Protocols of RTSP streams through the relay.
+const STREAM_PROTOCOLS: &str = "pipe,rtsp,rtp,tcp,udp";
+/// Formats of the playlist and of the streams in it.
+const STREAM_FORMATS: &str = "concat,rtsp";
 /// The bytes and the time that `ffmpeg` reads of a stream before its first frame.
 const PROBE: [(&str, &str); 2] = [("probesize", "1000000"), ("analyzeduration", "1000000")];
 
@@ -26,8 +29,10 @@ const PROBE: [(&str, &str); 2] = [("probesize", "1000000"), ("analyzeduration", 
 pub(super) async fn run_stream(
     camera: &Camera,
     url: &Url,
+    login: &mut Login,
     sink: &Sink<'_>,
 ) -> Result<Infallible, SourceError> {
+    let relay = Relay::connect(url, camera.stall_after).await?;
     let video = &camera.video;
     let mut arguments = decoding(video);
     let mut add = |words: &[&str]| arguments.extend(words.iter().map(OsString::from));
@@ -49,6 +54,8 @@ pub(super) async fn run_stream(
         "0",
         "-protocol_whitelist",
         STREAM_PROTOCOLS,
+        "-format_whitelist",
+        STREAM_FORMATS,
     ]);
     add(&["-i", "pipe:0", "-an", "-sn", "-dn"]);
     add(&[
@@ -57,18 +64,28 @@ pub(super) async fn run_stream(
         "-fps_mode",
         "passthrough",
     ]);
-    let script = script(camera, url);
-    let secret = camera.credentials.as_ref();
-    let secret = secret.map(|credentials| credentials.password.clone());
-    let mut ffmpeg = Ffmpeg::start(video, &arguments, &script, secret).await?;
-    loop {
-        match ffmpeg.next_frame().await {
-            // The sink counts damaged frames.
-            Ok(Some(frame)) => drop(sink.accept(frame)),
-            Ok(None) => return Err(SourceError::Closed),
-            Err(error) => return Err(with_user(error, camera.credentials.as_ref())),
+    let script = script(camera, relay.url());
+    let input = Input::Stream {
+        script: &script,
+        relay: relay.url().to_owned(),
+        camera: camera.location.to_string(),
+    };
+    let mut ffmpeg = Ffmpeg::start(video, &arguments, input).await?;
+    let frames = async {
+        loop {
+            match ffmpeg.next_frame().await {
+                // The sink counts damaged frames.
+                Ok(Some(frame)) => drop(sink.accept(frame)),
+                Ok(None) => return SourceError::Closed,
+                Err(error) => return error,
+            }
         }
-    }
+    };
+    Err(tokio::select! {
+        biased;
+        error = relay.run(login) => error,
+        error = frames => error,
+    })
 }
 
 /// Reads frames of a video file in real time until it ends.
@@ -82,7 +99,7 @@ pub(super) async fn run_file(
     arguments.extend(file_input(path));
     let filter = first_of_each(camera.every);
     arguments.extend(["-vf", &filter, "-fps_mode", "passthrough"].map(OsString::from));
-    let mut ffmpeg = Ffmpeg::start(&camera.video, &arguments, "", None).await?;
+    let mut ffmpeg = Ffmpeg::start(&camera.video, &arguments, Input::File).await?;
     while let Some(frame) = ffmpeg.next_frame().await? {
         sink.accept(frame)?;
     }
@@ -96,15 +113,8 @@ fn first_of_each(every: Duration) -> String {
     format!("select='isnan(prev_selected_t)+gte(abs(t-prev_selected_t)\\,{seconds:.4})'")
 }
 
-/// The playlist with the URL and its options (`ffmpeg-formats`, concat).
-fn script(camera: &Camera, url: &Url) -> String {
-    let mut url = url.clone();
-    if let Some(Credentials { user, password }) = &camera.credentials {
-        // A URL with a host can have both.
-        let _ = url.set_username(user);
-        let _ = url.set_password(Some(password.expose_secret()));
-    }
-    let url = url.as_str().replace('\'', r"'\''");
+/// The playlist with the URL of the relay and its options (`ffmpeg-formats`, concat).
+fn script(camera: &Camera, url: &str) -> String {
     let transport = camera.video.transport.name();
     let mut script =
         format!("ffconcat version 1.0\nfile '{url}'\noption rtsp_transport {transport}\n");
@@ -117,39 +127,30 @@ fn script(camera: &Camera, url: &Url) -> String {
     script
 }
 
-/// Names the user if the camera refuses the credentials.
-fn with_user(error: SourceError, credentials: Option<&Credentials>) -> SourceError {
-    match (error, credentials) {
-        (SourceError::CredentialsMissing, Some(credentials)) => SourceError::CredentialsRefused {
-            user: credentials.user.clone(),
-        },
-        (error, _) => error,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::CameraEntry;
 
     #[test]
-    fn the_password_is_in_the_script_and_quoted() {
+    fn the_script_has_the_relay_and_no_password() {
         let entry = CameraEntry {
             name: Some("gate".to_owned()),
-            url: Some("rtsp://cam:it's%40p@10.0.0.8/s'1".to_owned()),
+            url: Some("rtsp://cam:secret@10.0.0.8/s1".to_owned()),
             stall_after: Some("4s".to_owned()),
             ..CameraEntry::default()
         };
         let camera = entry.check("").unwrap();
-        let crate::Location::Rtsp(url) = &camera.location else {
-            panic!("it is RTSP")
-        };
-        let script = script(&camera, url);
+        let script = script(&camera, "rtsp://127.0.0.1:5/token");
         assert!(
-            script.contains("it'\\''s%40p@10.0.0.8/s'\\''1'\n"),
+            script.contains("file 'rtsp://127.0.0.1:5/token'\n"),
             "{script}"
         );
         assert!(script.contains("option timeout 4000000\n"), "{script}");
         assert!(script.contains("option rtsp_transport tcp\n"), "{script}");
+        assert!(
+            !script.contains("secret") && !script.contains("10.0.0.8"),
+            "{script}"
+        );
     }
 }

@@ -45,6 +45,8 @@ pub(super) fn fit(
         zones: Vec::new(),
         lines: Vec::new(),
         masks: Vec::new(),
+        areas: Vec::new(),
+        ignore: Vec::new(),
         detect: BTreeMap::new(),
         sources,
     };

@@ -1,0 +1,198 @@
+//! A relay between `ffmpeg` and an RTSP camera.
+//!
+//! `ffmpeg` follows redirections to any host, takes the password along, and sends it in plain text
+//! to any host that asks. So it gets a URL on the loopback interface without credentials. The relay
+//! alone connects to the camera, answers its challenges, and ends at a redirection.
+
+mod exchange;
+mod message;
+mod tls;
+
+use std::{net::IpAddr, time::Duration};
+
+use bytes::BytesMut;
+use reqwest::Url;
+use tokio::{
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
+    net::{TcpListener, TcpStream},
+    time::timeout,
+};
+
+use self::{
+    exchange::Exchange,
+    message::{Unit, next_unit},
+};
+use crate::{SourceError, credentials::Login};
+
+/// The ports of `rtsp` and `rtsps`.
+const PORTS: (u16, u16) = (554, 322);
+/// Bytes that are read at once.
+const CHUNK_BYTES: usize = 64 << 10;
+/// Longest time for the first request of a connection to the relay.
+const FIRST_REQUEST: Duration = Duration::from_secs(5);
+/// Random bytes of the token in the URL of the relay.
+const TOKEN_BYTES: usize = 16;
+
+/// A connection to a camera, in plain text or with TLS.
+trait Connection: AsyncRead + AsyncWrite + Send + Unpin {}
+impl<T: AsyncRead + AsyncWrite + Send + Unpin> Connection for T {}
+
+/// A relay that is connected to a camera, and waits for `ffmpeg`.
+pub(crate) struct Relay {
+    camera: Box<dyn Connection>,
+    peer: IpAddr,
+    listener: TcpListener,
+    inner: String,
+    outer: String,
+}
+
+impl Relay {
+    /// Connects to a camera within a time limit.
+    ///
+    /// # Errors
+    /// [`SourceError::Unreachable`].
+    pub(crate) async fn connect(url: &Url, limit: Duration) -> Result<Self, SourceError> {
+        let unreachable = |problem: String| SourceError::Unreachable(problem);
+        let connected = timeout(limit, connect(url)).await;
+        let connected =
+            connected.map_err(|_| unreachable(format!("no answer within {limit:?}")))?;
+        let (camera, peer) = connected.map_err(|error| unreachable(error.to_string()))?;
+        let local = async {
+            let listener = TcpListener::bind(("127.0.0.1", 0)).await?;
+            let port = listener.local_addr()?.port();
+            let mut token = [0; TOKEN_BYTES];
+            getrandom::fill(&mut token).map_err(std::io::Error::other)?;
+            let token: String = token.iter().map(|byte| format!("{byte:02x}")).collect();
+            // Only `ffmpeg` has the token, so no other local process gets the stream.
+            std::io::Result::Ok((listener, format!("rtsp://127.0.0.1:{port}/{token}")))
+        };
+        let (listener, inner) = local
+            .await
+            .map_err(|error| unreachable(error.to_string()))?;
+        Ok(Self {
+            camera,
+            peer,
+            listener,
+            inner,
+            outer: url.as_str().to_owned(),
+        })
+    }
+
+    /// The URL for `ffmpeg`.
+    pub(crate) fn url(&self) -> &str {
+        &self.inner
+    }
+
+    /// Relays one connection. Ends with an error that concerns the camera, otherwise never: the end
+    /// of a connection ends `ffmpeg`, which reports it.
+    pub(crate) async fn run(self, login: &mut Login) -> SourceError {
+        let Self {
+            mut camera,
+            peer,
+            listener,
+            inner,
+            outer,
+        } = self;
+        let (mut ffmpeg, mut from_ffmpeg) = accept(&listener, &inner).await;
+        drop(listener);
+        let mut exchange = Exchange::new(inner, outer, peer, login);
+        let mut from_camera = BytesMut::new();
+        let relay = async {
+            loop {
+                let (mut to_camera, mut to_ffmpeg) = (BytesMut::new(), BytesMut::new());
+                while let Some(unit) = next_unit(&mut from_ffmpeg).map_err(too_long)? {
+                    match unit {
+                        Unit::Packet(packet) => to_camera.extend_from_slice(&packet),
+                        Unit::Message(message) => {
+                            exchange.accept_request(message, &mut to_camera)?
+                        }
+                    }
+                }
+                while let Some(unit) = next_unit(&mut from_camera).map_err(too_long)? {
+                    match unit {
+                        Unit::Packet(packet) => to_ffmpeg.extend_from_slice(&packet),
+                        Unit::Message(message) => {
+                            exchange.accept_answer(message, &mut to_ffmpeg, &mut to_camera)?;
+                        }
+                    }
+                }
+                let written = async {
+                    camera.write_all(&to_camera).await?;
+                    camera.flush().await?;
+                    ffmpeg.write_all(&to_ffmpeg).await
+                };
+                if written.await.is_err() {
+                    return Ok(());
+                }
+                from_camera.reserve(CHUNK_BYTES);
+                from_ffmpeg.reserve(CHUNK_BYTES);
+                let read = tokio::select! {
+                    read = camera.read_buf(&mut from_camera) => read,
+                    read = ffmpeg.read_buf(&mut from_ffmpeg) => read,
+                };
+                if read.unwrap_or(0) == 0 {
+                    return Ok(());
+                }
+            }
+        };
+        let ended: Result<(), SourceError> = relay.await;
+        drop(ffmpeg);
+        match ended {
+            Err(error) => error,
+            Ok(()) => std::future::pending().await,
+        }
+    }
+}
+
+fn too_long(error: message::TooLong) -> SourceError {
+    SourceError::Stream(error.to_string())
+}
+
+async fn connect(url: &Url) -> std::io::Result<(Box<dyn Connection>, IpAddr)> {
+    let host = url.host_str().unwrap_or_default();
+    let host = host.trim_matches(['[', ']']);
+    let has_tls = url.scheme() == "rtsps";
+    let port = url
+        .port()
+        .unwrap_or(if has_tls { PORTS.1 } else { PORTS.0 });
+    let connection = TcpStream::connect((host, port)).await?;
+    connection.set_nodelay(true)?;
+    let peer = connection.peer_addr()?.ip();
+    Ok(if has_tls {
+        (Box::new(tls::connect(host, connection).await?), peer)
+    } else {
+        (Box::new(connection), peer)
+    })
+}
+
+/// Waits for the connection whose first request has the URL of the relay. Returns it with the bytes
+/// that were read.
+async fn accept(listener: &TcpListener, inner: &str) -> (TcpStream, BytesMut) {
+    loop {
+        let Ok((mut connection, _)) = listener.accept().await else {
+            continue;
+        };
+        let first = timeout(FIRST_REQUEST, first_line(&mut connection));
+        if let Ok(Some(read)) = first.await {
+            let line = String::from_utf8_lossy(&read);
+            let address = line.split(' ').nth(1);
+            if address.is_some_and(|address| address.starts_with(inner)) {
+                return (connection, read);
+            }
+        }
+    }
+}
+
+/// Reads until the end of the first line.
+async fn first_line(connection: &mut TcpStream) -> Option<BytesMut> {
+    let mut read = BytesMut::with_capacity(CHUNK_BYTES);
+    while !read.contains(&b'\n') {
+        if read.len() >= CHUNK_BYTES || connection.read_buf(&mut read).await.ok()? == 0 {
+            return None;
+        }
+    }
+    Some(read)
+}
+
+#[cfg(test)]
+mod tests;
