@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let heat_map = runtime.block_on(heat_map(arguments))?;
     let Some(corners) = walked_area(&heat_map) else {
         bail!(
-            "{}: nobody has walked through at least 2 m² of floor: wait until people have walked \
+            "{}: no one has walked through at least 2 m² of floor: wait until people have walked \
              where they can be, or give an earlier time with --from",
             arguments.camera
         );

@@ -1,11 +1,11 @@
-//! What is assumed before any edge is seen.
+//! The assumptions before any edge is seen.
 
 use super::{
     camera::{Angles, RoomCamera, ideal_shape_slope},
     evidence::Evaluation,
 };
 
-/// What is assumed before any curve is seen.
+/// The assumptions before any curve is seen.
 #[derive(Debug, Clone)]
 pub(super) struct Prior {
     /// Center of the lens circle in pixels.
