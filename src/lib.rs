@@ -23,4 +23,3 @@ pub mod settings;
 pub mod shutdown;
 pub mod telemetry;
 pub mod tls;
-pub mod watched_file;

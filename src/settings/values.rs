@@ -3,6 +3,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use lookdown_common::files::{self, MAX_SETTINGS_BYTES};
 use toml::{Table, Value};
 
 use super::{
@@ -102,10 +103,11 @@ impl Values {
 }
 
 fn read(path: &Path) -> Result<Table, SettingsError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SettingsError::Unreadable {
-        path: path.to_owned(),
-        source,
-    })?;
+    let text =
+        files::read_text(path, MAX_SETTINGS_BYTES).map_err(|source| SettingsError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
     text.parse()
         .map_err(|error: toml::de::Error| SettingsError::NotToml {
             path: path.to_owned(),

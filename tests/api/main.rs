@@ -19,6 +19,7 @@ mod fairness;
 mod kept_pictures;
 mod load;
 mod log;
+mod matrix;
 mod metrics_table;
 mod operation;
 mod peers;

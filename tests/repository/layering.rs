@@ -1,7 +1,7 @@
 //! Dependencies between modules are acyclic, and only few modules use external systems.
 
 mod file_circles;
-mod source_scan;
+pub mod source_scan;
 
 use std::fs;
 
@@ -79,8 +79,7 @@ const DETECT: Table = &[
 
 const SERVER: Table = &[
     ("metrics", &[]),
-    ("watched_file", &[]),
-    ("access", &["fairness", "plain_name", "watched_file"]),
+    ("access", &["fairness", "plain_name"]),
     ("rounding", &[]),
     ("shutdown", &[]),
     ("poller", &[]),
@@ -98,7 +97,7 @@ const SERVER: Table = &[
             "pipeline",
         ],
     ),
-    ("tls", &["metrics", "watched_file"]),
+    ("tls", &["metrics"]),
     ("server", &["metrics", "shutdown", "tls"]),
     ("mqtt", &["fairness", "metrics", "results", "tls"]),
     (

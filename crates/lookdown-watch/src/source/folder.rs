@@ -8,6 +8,7 @@ use std::{
 };
 
 use jiff::Timestamp;
+use lookdown_common::files::{self, Links};
 use tokio::{task::spawn_blocking, time::sleep};
 
 use super::Sink;
@@ -64,8 +65,8 @@ fn read_newest(folder: &Path, after: Option<&Stamp>) -> io::Result<Option<(Stamp
         if !is_image(&path) {
             continue;
         }
-        // A file may have been removed since.
-        let Ok(about) = fs::metadata(&path) else {
+        // A file may have been removed since. Cameras that upload files must not name others by links.
+        let Ok(about) = fs::symlink_metadata(&path) else {
             continue;
         };
         if !about.is_file() || about.len() == 0 || about.len() > MAX_FRAME_BYTES as u64 {
@@ -77,7 +78,7 @@ fn read_newest(folder: &Path, after: Option<&Stamp>) -> io::Result<Option<(Stamp
         }
     }
     let Some(stamp) = newest else { return Ok(None) };
-    match fs::read(&stamp.1) {
+    match files::read_with(&stamp.1, MAX_FRAME_BYTES as u64, Links::Refuse) {
         Ok(image) => Ok(Some((stamp, image))),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),
