@@ -9,7 +9,6 @@ import tempfile
 import time
 from pathlib import Path
 
-from harness.lookdown import MODEL
 from harness.places import LOOKDOWN, ROOT, SAMPLES
 from harness.processes import Server
 from support.effort import Effort
@@ -17,6 +16,8 @@ from support.exchange import ask
 from support.lookdown import lookdown
 from support.row import Row
 
+MODEL = "nanodet_g_416"
+"""The model whose folder is copied."""
 LONGEST_SECONDS = 10.0
 """Longest time of a refusal."""
 
