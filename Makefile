@@ -15,7 +15,7 @@ VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml)
 FORM ?= long
 
 .NOTPARALLEL:
-.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist deb image wheel arm64 bench bench-full bench-remap ci fuzz bless
+.PHONY: help setup models serve test test-real reliability real audit advisories sbom dist deb image wheel arm64 bench bench-full bench-remap check release ci fuzz bless
 
 help: ## list the targets
 	@echo "make TARGET, where TARGET is:"
@@ -39,6 +39,11 @@ serve: ## download ONNX Runtime and the default models, build what a first look 
 	@# Makes glibc return the memory of replaced models: docs/models.md.
 	@MALLOC_MMAP_THRESHOLD_=131072 exec target/quick/lookdown serve
 
+check: ## check formatting and lints and run the unit tests; without network once the crates are there
+	cargo fmt --all --check
+	cargo clippy --workspace --lib --bins --locked -- -D warnings
+	cargo test --workspace --lib --locked
+
 test: ## set up, then check formatting, lints, tests and documentation; needs only this repository
 	@$(PYTHON) scripts/setup.py toolchain runtime model converters s3-server checkers
 	cargo fmt --all --check
@@ -46,7 +51,7 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	rustfmt --check --edition 2024 crates/lookdown-lens/src/geometry/lens/models/*.rs
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	@# Checks that the lock file of the fuzzers is current.
-	cargo tree --quiet --locked --manifest-path fuzz/Cargo.toml > /dev/null
+	cargo tree --quiet --locked --manifest-path lab/fuzz/Cargo.toml > /dev/null
 	$(CARGO_DENY) bans licenses sources
 	PATH="$(CURDIR)/$(CHECKERS):$$PATH" cargo shear --deny-warnings
 	$(CHECKERS)/ruff check
@@ -54,7 +59,7 @@ test: ## set up, then check formatting, lints, tests and documentation; needs on
 	$(CHECKERS)/typos
 	$(PYTHON) -m unittest discover -s scripts/tests -t scripts
 	.setup/venv/bin/python -m unittest discover -s scripts/convert/tests -t scripts
-	$(PYTHON) -m unittest discover -s benches/tests -t benches
+	$(PYTHON) -m unittest discover -s lab/benches/tests -t lab/benches
 	$(PYTHON) -m unittest discover -s tests/reliability/tests -t tests/reliability
 	cargo test --workspace --locked
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items --locked
@@ -78,6 +83,11 @@ dist: ## pack everything that Lookdown needs to run: target/dist
 deb: dist ## build the Debian package: target/deb
 	@scripts/packages.sh debhelper
 	SOURCE_DATE_EPOCH=$(SOURCE_DATE_EPOCH) $(PYTHON) scripts/deb.py
+
+release: deb wheel sbom ## build every artifact of a release with its sums: target/release-files
+	rm -rf target/release-files && mkdir -p target/release-files
+	cp target/dist/*.tar.* target/deb/*.deb target/wheels/*.whl target/lookdown.cdx.json target/release-files
+	cd target/release-files && sha256sum -- * > SHA256SUMS
 
 image: ## build the container image from source with docker, or with ENGINE=podman or buildah
 	$(ENGINE) build $(if $(filter-out docker,$(ENGINE)),--format docker) --file docker/Dockerfile \
@@ -108,13 +118,13 @@ real: ## test with a browser, Redis, brokers, clients ..., or only PARTS: tests/
 	LOOKDOWN_COMMIT=$(LOOKDOWN_COMMIT) $(PYTHON) scripts/wheel.py
 	$(PYTHON) tests/real/run.py $(PARTS)
 
-reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/reliability.md
+reliability: ## kill, flood, starve and soak the server (an hour), or only PARTS: docs/lab/reliability.md
 	@$(PYTHON) scripts/setup.py toolchain runtime model reliability
 	cargo build --release --locked --target-dir target
 	cargo build --release --locked --example load --target-dir target
 	$(PYTHON) tests/reliability/run.py $(FORM) $(PARTS)
 
-bench: ## run short benchmarks against other servers (a few minutes): benches/RESULTS.md
+bench: ## run short benchmarks against other servers (a few minutes): lab/benches/RESULTS.md
 bench-full: ## run the benchmarks for reliable figures: two hours on an idle machine
 bench: BENCH = short
 bench-full: BENCH = full
@@ -123,12 +133,12 @@ bench bench-full:
 	@$(PYTHON) scripts/setup.py toolchain runtime model benches
 	cargo build --release --locked --target-dir target
 	cargo build --release --locked --example load --target-dir target
-	.setup/benches/benches/bin/python benches/run.py $(BENCH) $(PARTS)
+	.setup/benches/benches/bin/python lab/benches/run.py $(BENCH) $(PARTS)
 
 ci: ## run the continuous integration
 	.ci/run
 
-fuzz: ## run every fuzzer RUNS times (an hour or more); needs cargo-fuzz and C++: docs/reliability.md
+fuzz: ## run every fuzzer RUNS times (an hour or more); needs cargo-fuzz and C++: docs/lab/reliability.md
 	$(PYTHON) scripts/fuzz.py --runs $(RUNS)
 
 bless: ## regenerate openapi/openapi.json, settings, tables of docs/ and snapshots
@@ -141,4 +151,4 @@ bless: ## regenerate openapi/openapi.json, settings, tables of docs/ and snapsho
 bench-remap: ## time remap tables and rendering, and the same with OpenCV
 	@$(PYTHON) scripts/setup.py benches
 	cargo bench --locked --bench remap
-	.setup/benches/benches/bin/python benches/against_opencv.py
+	.setup/benches/benches/bin/python lab/benches/against_opencv.py

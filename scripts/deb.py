@@ -1,6 +1,6 @@
 """Packs target/dist/lookdown into a Debian package in target/deb: `deb.py`, after `dist.py`.
 
-The folder `debian` describes the package; debhelper builds it. The changelog and the copyright file of the package are
+The folder `packaging/debian` describes the package; debhelper builds it. The changelog and the copyright file of the package are
 written here, from the version of the crate, NOTICE and the licences of the packed files.
 """
 
@@ -43,7 +43,7 @@ def main() -> int:
     shutil.rmtree(PLACE, ignore_errors=True)
     source = PLACE / "source"
     shutil.copytree(DIST, source)
-    shutil.copytree(ROOT / "debian", source / "debian")
+    shutil.copytree(ROOT / "packaging/debian", source / "debian")
     modified = int(os.environ.get("SOURCE_DATE_EPOCH", (DIST / "lookdown").stat().st_mtime))
     (source / "debian" / "changelog").write_text(changelog(ROOT, modified), encoding="utf-8")
     (source / "debian" / "copyright").write_text(copyright_of(DIST), encoding="utf-8")
@@ -59,7 +59,7 @@ def main() -> int:
 def changelog(root: Path, modified: int) -> str:
     """The changelog of the package; the changes of Lookdown are in CHANGELOG.md."""
     manifest = tomllib.loads((root / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
-    control = (root / "debian" / "control").read_text(encoding="utf-8").splitlines()
+    control = (root / "packaging/debian/control").read_text(encoding="utf-8").splitlines()
     (maintainer,) = (line.removeprefix("Maintainer: ") for line in control if line.startswith("Maintainer: "))
     upstream = manifest["version"]
     version = f"{upstream}-{REVISION}"

@@ -12,9 +12,9 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FUZZ = ROOT / "fuzz"
+FUZZ = ROOT / "lab/fuzz"
 IMPORTERS = re.findall(r'^    \("(\w+)", Format::', (FUZZ / "src/importer.rs").read_text(), re.MULTILINE)
-# Seeds in addition to fuzz/seeds/TARGET.
+# Seeds in addition to lab/fuzz/seeds/TARGET.
 SEEDS = {"picture": ["tests/fixtures/images"]} | {
     name: ["tests/fixtures/calibrations", "samples/calibrations"] for name in IMPORTERS
 }
@@ -32,7 +32,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"among {', '.join(TARGETS)}")
     parser.add_argument("--runs", type=int, default=1_000_000, help="how often each is run")
-    parser.add_argument("--minimise", action="store_true", help="keep the best finds in fuzz/corpus")
+    parser.add_argument("--minimise", action="store_true", help="keep the best finds in lab/fuzz/corpus")
     arguments = parser.parse_args()
     for target in arguments.targets:
         if target not in TARGETS:

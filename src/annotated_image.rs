@@ -77,7 +77,8 @@ fn drawn(
         (Layer::Silhouette, Concealment::Silhouette),
     ] {
         if options.layers.contains(&layer) {
-            conceal(&mut picture, &drawing.marks, concealment, is_cancelled)?;
+            let marks = sketch.concealed(picture.width());
+            conceal(&mut picture, &marks, concealment, is_cancelled)?;
         }
     }
     annotate_unless(&mut picture, &drawing, is_cancelled)?;

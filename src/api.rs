@@ -26,6 +26,7 @@ use axum::{
     routing::get,
 };
 use lookdown_detect::open_inference::HEAD_LENGTH;
+use lookdown_http::{csrf, header_limits, host, page_headers};
 use tower::{ServiceBuilder, util::option_layer};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -33,11 +34,8 @@ use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use self::{
     http::{
-        connection_limit, cors,
-        csrf::{self, AllowedOrigins},
-        drain_body,
+        connection_limit, cors, drain_body,
         envelope::{self, Surroundings},
-        header_limits, host, page_headers,
         rate_limit::{self, RateLimiter},
     },
     protocols::{
@@ -130,7 +128,7 @@ fn metrics() -> OpenApiRouter<ApiState> {
 pub fn router(state: ApiState) -> Router {
     let options = &state.options;
     let access = &options.access;
-    let own_pages = AllowedOrigins::of(access, &options.cors_origins, &options.hosts);
+    let own_pages = access.allowed_origins(&options.cors_origins, &options.hosts);
     let own_pages = own_pages.map(|own| from_fn_with_state(own, csrf::refuse));
     let limiter = options
         .request_rate

@@ -18,8 +18,6 @@ pub mod poller;
 pub mod probe;
 pub mod results;
 mod rounding;
-pub mod server;
 pub mod settings;
-pub mod shutdown;
 pub mod telemetry;
 pub mod tls;

@@ -52,7 +52,7 @@ metric_set! {
     non_finite: IntCounter = "non_finite_candidates_total" [];
     /// Persons reported.
     persons: IntCounter = "persons_total" [];
-    /// Persons in the latest frame of a camera; only with `results.camera_metrics`.
+    /// Persons that a camera sees now, as in `GET /results`; only with `results.camera_metrics`.
     camera_persons: CameraGauges = "camera_persons" ["camera"];
     /// Time of a camera's latest report, seconds since 1970; only with `results.camera_metrics`.
     camera_last_report: CameraGauges = "camera_last_report_timestamp_seconds" ["camera"];
@@ -149,7 +149,7 @@ impl Metrics {
         self.zone_persons.replace(camera, rows);
     }
 
-    /// Sets the number of persons of a camera's latest frame and the time of its report, seconds
+    /// Sets the number of persons of a camera and the time of its latest report, seconds
     /// since 1970. At most a thousand cameras are published.
     pub fn set_camera(&self, camera: &str, persons: usize, reported_at: f64) {
         self.camera_persons

@@ -54,7 +54,9 @@ use self::{
     declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
     threads::ThreadKeys, tls::TlsKeys, values::Values,
 };
-use crate::{mqtt::MqttOptions, results::ResultLimits, server::ConnectionLimits, tls::TlsOptions};
+use lookdown_http::server::ConnectionLimits;
+
+use crate::{mqtt::MqttOptions, results::ResultLimits, tls::TlsOptions};
 
 /// All settings, checked.
 #[derive(Debug, Clone, PartialEq)]

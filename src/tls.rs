@@ -12,6 +12,7 @@ mod validity;
 use std::{num::NonZeroU64, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use lookdown_http::server::Handshake;
 use parking_lot::{Mutex, RwLock};
 use tokio::{net::TcpStream, time::timeout};
 use tokio_rustls::server::TlsStream;
@@ -81,32 +82,6 @@ impl Tls {
         }
     }
 
-    /// Performs the TLS handshake of a connection. Returns `None` if it fails, is refused, or takes
-    /// longer than the handshake timeout or `max_duration`.
-    pub async fn accept(
-        &self,
-        connection: TcpStream,
-        max_duration: Duration,
-    ) -> Option<TlsStream<TcpStream>> {
-        let max_duration = max_duration.min(self.options.handshake_timeout);
-        let config = Arc::clone(&self.serving().config);
-        let handshake = shake_hands(connection, config);
-        let (result, encrypted) = match timeout(max_duration, handshake).await {
-            Ok(Ok(encrypted)) => ("success", Some(encrypted)),
-            Ok(Err(error)) => {
-                tracing::debug!("a TLS handshake failed: {error}");
-                ("failure", None)
-            }
-            Err(_) => {
-                tracing::debug!("a TLS handshake took too long");
-                ("timeout", None)
-            }
-        };
-        let handshakes = &self.metrics.tls_handshakes;
-        handshakes.with_label_values(&[result]).inc();
-        encrypted
-    }
-
     /// The identity in the files, if it differs from the current one.
     fn newer(&self) -> Result<Option<Identity>, TlsError> {
         let files = TlsFiles::read(&self.options)?;
@@ -141,3 +116,33 @@ fn show(identity: &Identity, options: &TlsOptions, metrics: &Metrics) {
 
 #[cfg(test)]
 mod tests;
+
+impl Handshake for Tls {
+    type Stream = TlsStream<TcpStream>;
+
+    /// Performs the TLS handshake of a connection. Returns `None` if it fails, is refused, or takes
+    /// longer than the handshake timeout or `max_duration`.
+    async fn accept(
+        &self,
+        connection: TcpStream,
+        max_duration: Duration,
+    ) -> Option<TlsStream<TcpStream>> {
+        let max_duration = max_duration.min(self.options.handshake_timeout);
+        let config = Arc::clone(&self.serving().config);
+        let handshake = shake_hands(connection, config);
+        let (result, encrypted) = match timeout(max_duration, handshake).await {
+            Ok(Ok(encrypted)) => ("success", Some(encrypted)),
+            Ok(Err(error)) => {
+                tracing::debug!("a TLS handshake failed: {error}");
+                ("failure", None)
+            }
+            Err(_) => {
+                tracing::debug!("a TLS handshake took too long");
+                ("timeout", None)
+            }
+        };
+        let handshakes = &self.metrics.tls_handshakes;
+        handshakes.with_label_values(&[result]).inc();
+        encrypted
+    }
+}

@@ -171,7 +171,7 @@ export class AreaEditor {
   /** Makes the outline an area, and selects it. */
   finish() {
     const { kind, space, corners } = this.draft;
-    const name = kind === "mask" ? "" : freeName(kind, this.areas);
+    const name = ["mask", "area"].includes(kind) ? "" : freeName(kind, this.areas);
     const area = areaOf(kind, space, name, corners);
     this.draft = null;
     this.selected = { key: area.key, corner: null };

@@ -29,7 +29,7 @@ export function showList(list, { editor, countOf, invalid }) {
 export const scrollToRow = (key) => rows.get(key)?.node.scrollIntoView({ block: "nearest" });
 
 function rowOf({ key, kind }) {
-  const row = { node: element("li", { class: `area-row ${kind}`, "data-key": key }) };
+  const row = { node: element("li", { class: `area-row ${kind}`, "data-key": key, "data-kind": kind }) };
   const area = () => row.editor.area(key);
   const change = (changes, mark = null) => row.editor.change({ ...area(), ...changes }, mark && `${mark}-${key}`);
   const field = (label, name, act) => {

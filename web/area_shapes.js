@@ -40,7 +40,7 @@ function areaShape(area, { editor, surface, unit, countOf, invalid }) {
     "g",
     {
       class: `area ${area.kind}${isSelected ? " selected" : ""}${invalid === area.key ? " invalid" : ""}`,
-      "data-node": `area-${area.key}`, "data-key": area.key,
+      "data-node": `area-${area.key}`, "data-key": area.key, "data-kind": area.kind,
       tabindex: 0, role: "button", "aria-pressed": String(isSelected), "aria-label": facts,
     },
     part("hit", 22),
@@ -60,7 +60,7 @@ function text(words, [x, y], unit, kind) {
 function captions(area, { editor, surface, unit, countOf }) {
   const places = area.corners.map(surface.toDrawing);
   if (area.kind === "line") return lineCaptions(area, places, unit);
-  const words = [area.kind === "mask" ? capital(titleOf(area, editor.areas)) : area.name, countOf(area)?.split(" ")[0]];
+  const words = [area.name || capital(titleOf(area, editor.areas)), countOf(area)?.split(" ")[0]];
   return [text(words.filter(Boolean).join(" · "), middleOf(places), unit, area.kind)];
 }
 
@@ -120,7 +120,7 @@ function draftShapes({ kind, corners, cursor }, { editor, surface, unit }) {
   return [
     shape(
       "g",
-      { class: `area draft ${kind}` },
+      { class: `area draft ${kind}`, "data-kind": kind },
       shape(name, { points: outline, class: "casing", "stroke-width": 4.5 * unit }),
       shape(name, { points: outline, class: "outline", "stroke-width": 2 * unit }),
     ),

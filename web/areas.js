@@ -1,16 +1,20 @@
-/** The zones, lines and masks of a calibration: reading, writing, and edits of their corners. */
+/** The zones, lines, masks, areas and ignored places of a calibration: reading, writing, and edits of their corners. */
 
 /** The kinds of areas: their field in a calibration and their numbers of corners. */
 export const KINDS = {
   zone: { field: "zones", least: 3, most: 64 },
   line: { field: "lines", least: 2, most: 2 },
   mask: { field: "masks", least: 3, most: 64 },
+  area: { field: "areas", least: 3, most: 64 },
+  ignore: { field: "ignore", least: 3, most: 64 },
 };
 /** The maximum number of areas of a kind in a calibration. */
 export const MOST_OF_A_KIND = 32;
 /** The decimals of coordinates: pixels of the frame, metres on the floor. */
 const DECIMALS = { frame_px: 1, floor_m: 2 };
 const DIRECTIONS = ["in", "out"];
+/** The words for kinds that are not their own word. */
+const TITLES = { ignore: "ignored place" };
 
 let lastKey = 0;
 
@@ -43,10 +47,13 @@ export function withAreas(file, areas) {
 
 function entryOf({ kind, space, name, corners, directions }) {
   const entry = { [space]: corners };
-  if (kind !== "mask") entry.name = name;
+  if (kind !== "mask" && (name || !isNameless(kind))) entry.name = name;
   if (kind === "line") entry.directions = directions;
   return entry;
 }
+
+/** True for kinds whose areas need no name. */
+const isNameless = (kind) => ["mask", "area", "ignore"].includes(kind);
 
 /** The calibration file with its areas scaled to frames of the size `image`. */
 export function scaledTo(file, image) {
@@ -58,15 +65,15 @@ export function scaledTo(file, image) {
 
 /** Returns the area that a message of the server names, and the message without the field; null if it names none. */
 export function problemOf(detail, areas) {
-  const [, field, index, text] = /\b(zones|lines|masks)\[(\d+)\][\w.[\]]*: (.*)/.exec(detail) ?? [];
+  const [, field, index, text] = /\b(zones|lines|masks|areas|ignore)\[(\d+)\][\w.[\]]*: (.*)/.exec(detail) ?? [];
   const area = areas.filter(({ kind }) => KINDS[kind].field === field)[Number(index)];
   return area ? { key: area.key, text: `${text[0].toUpperCase()}${text.slice(1)}.` } : null;
 }
 
-/** The title of an area: its kind and name. Masks have numbers. */
+/** The title of an area: its kind and name. Areas without a name have numbers. */
 export function titleOf(area, areas) {
-  if (area.kind !== "mask") return `${area.kind} ${area.name}`;
-  return `mask ${areas.filter(({ kind }) => kind === "mask").indexOf(area) + 1}`;
+  if (area.name) return `${TITLES[area.kind] ?? area.kind} ${area.name}`;
+  return `${TITLES[area.kind] ?? area.kind} ${areas.filter(({ kind }) => kind === area.kind).indexOf(area) + 1}`;
 }
 
 /** The first free name of a kind, such as `zone-2`. */

@@ -45,15 +45,14 @@ function drawnTrack({ id, frame_px: [x, y], tail_px: tail }, unit) {
   );
 }
 
-/** The rows of the persons, of lines with their crossings, and of zones with their persons. */
-export function countRows({ is_current: isCurrent, tracks, lines = [], zones = [] }) {
+/** The rows of lines with their crossings, and of zones with their persons. */
+export function countRows({ lines = [], zones = [] }) {
   const ofLine = ({ line, directions, crossings }) => {
     const [first, second] = directions;
     return row("line", line, number(crossings[first]), ` → ${first}, `, number(crossings[second]), ` ← ${second}`);
   };
   const ofZone = ({ zone, persons, entries }) => row("zone", zone, number(persons ?? "?"), " now, ", number(entries), " entered");
-  const persons = element("li", { class: "of-persons" }, number(isCurrent ? tracks.length : "?"), tracks.length === 1 ? " person followed" : " persons followed");
-  return [persons, ...lines.map(ofLine), ...zones.map(ofZone)];
+  return [...lines.map(ofLine), ...zones.map(ofZone)];
 }
 
 const row = (kind, name, ...counts) => element("li", { class: `of-${kind}` }, element("span", { class: "count-of" }, name), element("span", {}, ...counts));

@@ -2,6 +2,7 @@
 
 import { addCounts, followCounts, layersBelow } from "./counts.js";
 import { element, find } from "./dom.js";
+import { addBoxes, forgetKey } from "./ignore_place.js";
 import { sketch } from "./marks.js";
 import { stepPlot } from "./plot.js";
 import { shown, showFailure, withProgress } from "./progress.js";
@@ -9,10 +10,12 @@ import { ask, askJson, events } from "./server.js";
 
 /** The maximum number of cards; cameras with the latest reports come first. */
 const MAX_CARDS = 60;
-/** The number of reports in a plot. */
+/** The number of steps in a plot. */
 const MAX_HISTORY = 100;
 /** The pause between the end of a stream and the next attempt. */
 const PAUSE_MILLIS = 2000;
+/** The interval between two updates of the numbers of persons. */
+const NUMBERS_MILLIS = 1000;
 
 const cards = new Map();
 let listening = null;
@@ -43,26 +46,54 @@ async function listen(signal) {
 
 async function loadHistory({ camera }, signal) {
   const rows = await askJson(`results/${encodeURIComponent(camera)}/history?limit=${MAX_HISTORY}`, { signal });
-  for (const { id, report } of rows) addReport(id, report);
+  for (const { id, persons, report } of rows) addReport(id, report, persons);
 }
 
-/** Adds a report to its card; ignores known reports. */
-function addReport(id, report) {
+/** Updates the numbers of all cards until `signal` aborts: the server has one number of each camera. */
+async function followNumbers(signal) {
+  while (!signal.aborted) {
+    await new Promise((resolve) => setTimeout(resolve, NUMBERS_MILLIS));
+    // While the server does not respond, the events report it.
+    const rows = await askJson("results", { signal }).catch(() => []);
+    for (const { camera, persons, received_at: receivedAt } of rows) {
+      const card = cards.get(camera);
+      if (card) addNumber(card, Date.parse(receivedAt), persons);
+    }
+  }
+}
+
+/** Adds a number of persons to a card. Numbers that did not change are one step of its plot. */
+function addNumber(card, time, persons) {
+  const last = card.history.at(-1);
+  card.reportedAt = Math.max(time, card.reportedAt);
+  if (last?.persons === persons) return;
+  card.history.push({ time: Math.max(time, last?.time ?? 0), persons });
+  card.history.splice(0, card.history.length - MAX_HISTORY);
+  redraw(card);
+}
+
+/** Draws a card once for many simultaneous changes. */
+function redraw(card) {
+  card.drawn ||= requestAnimationFrame(() => draw(card));
+}
+
+/** Adds a report to its card; ignores known reports. The number of an event follows from the next update. */
+function addReport(id, report, persons) {
   const card = cards.get(report.camera) ?? added(report.camera);
   if (Number(id) <= Number(card.id)) return;
   if (Number(id) > Number(lastId)) lastId = id;
   card.id = id;
-  card.history.push({ time: Date.parse(report.received_at), persons: report.persons.length });
-  card.history.splice(0, card.history.length - MAX_HISTORY);
   card.report = report;
-  if (card.drawn) return;
-  // Draws once for many simultaneous reports.
-  card.drawn = requestAnimationFrame(() => draw(card));
+  const time = Date.parse(report.received_at);
+  card.reportedAt = Math.max(time, card.reportedAt);
+  // The number after the first report of a camera is that of the report.
+  if (persons !== undefined || card.history.length === 0) addNumber(card, time, persons ?? report.persons.length);
+  redraw(card);
 }
 
 function added(camera) {
   const node = element("article", { class: "card", "aria-label": `Camera ${camera}`, "data-camera": camera });
-  const card = { camera, node, id: "0", history: [], report: null, drawn: 0, picture: null, hasPicture: true, isAsking: false };
+  const card = { camera, node, id: "0", history: [], reportedAt: 0, report: null, drawn: 0, picture: null, hasPicture: true, isAsking: false, message: null };
   if (cards.size >= MAX_CARDS) {
     const [oldest] = [...cards.values()].sort((one, other) => Number(one.id) - Number(other.id));
     oldest.node.remove();
@@ -80,8 +111,9 @@ function added(camera) {
 function draw(card) {
   card.drawn = 0;
   const { report, history } = card;
-  const count = report.persons.length;
+  const count = history.at(-1).persons;
   const zones = report.zones?.map(({ name, persons }) => element("li", {}, `${name} `, element("b", {}, String(persons))));
+  const focused = card.node.contains(document.activeElement) ? document.activeElement.dataset.box : undefined;
   card.age = element("span", { class: "age" });
   card.node.replaceChildren(
     element("header", {}, element("h2", {}, card.camera), card.age),
@@ -92,6 +124,8 @@ function draw(card) {
   tellAge(card);
   showPicture(card);
   addCounts(card);
+  if (card.message) find(".sight", card.node).after(card.message);
+  addBoxes(card, [...cards.values()], focused);
 }
 
 /** Replaces the sketch by the image of the latest report, if the server stores images of this camera. */
@@ -112,9 +146,9 @@ async function showPicture(card) {
   }
 }
 
-function tellAge({ age, history }) {
+function tellAge({ age, reportedAt }) {
   if (!age) return;
-  const seconds = Math.max(0, Math.round((Date.now() - history.at(-1).time) / 1000));
+  const seconds = Math.max(0, Math.round((Date.now() - reportedAt) / 1000));
   const [value, unit] = seconds < 60 ? [seconds, "s"] : seconds < 3600 ? [Math.floor(seconds / 60), "min"] : [Math.floor(seconds / 3600), "h"];
   age.textContent = seconds < 2 ? "now" : `${value} ${unit} ago`;
 }
@@ -129,11 +163,13 @@ export function visible(is) {
   } else if (!listening) {
     listening = new AbortController();
     listenShown(listening.signal);
+    followNumbers(listening.signal);
   }
 }
 
 export function restart() {
   if (!listening) return;
+  forgetKey();
   visible(false);
   visible(true);
 }

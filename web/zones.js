@@ -1,4 +1,4 @@
-/** The section Zones: draws the zones, lines and masks of a calibration, and saves them. */
+/** The section Zones: draws the zones, lines, masks, areas and ignored places of a calibration, and saves them. */
 
 import { personsIn } from "./area_counts.js";
 import { AreaEditor } from "./area_editor.js";
@@ -73,7 +73,7 @@ async function show() {
 function reason() {
   if (!shared.frame) return "Pick a frame in Detect first: zones are drawn on it.";
   if (!shared.calibrations.length) return "Zones are stored in the calibration of the camera. Save one in Calibrate first.";
-  return "Choose the calibration of this camera: its zones, lines and masks are drawn here.";
+  return "Choose the calibration of this camera: its zones, lines, masks and areas are drawn here.";
 }
 
 const hasFloor = () => Boolean(shownDocument.file.mount?.height_m);

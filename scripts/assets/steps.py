@@ -78,7 +78,7 @@ def install_derived(places: Places, model: Derived, pins: Pins) -> None:
 def install_benches(places: Places) -> None:
     """Creates a Python environment for the benchmarks and one for each peer server."""
     step = "benches"
-    benches = places.root / "benches"
+    benches = places.root / "lab/benches"
     for file in sorted([benches / "requirements.txt", *benches.glob("peers/*/requirements.txt")]):
         PrivatePython(places, step, places.bench_pythons / file.parent.name).install_file(file)
     say(step, "the Python environments of the benchmarks are in place")

@@ -11,7 +11,7 @@ class Fuzz(unittest.TestCase):
         source = (ROOT / "crates/lookdown-lens/src/calibration/formats/format.rs").read_text()
         variants = re.search(r"pub enum Format \{(.*?)\n\}", source, re.DOTALL)[1]
         formats = re.findall(r"^ +(\w+),$", variants, re.MULTILINE)
-        fuzzed = re.findall(r"Format::(\w+)\),$", (ROOT / "fuzz/src/importer.rs").read_text(), re.MULTILINE)
+        fuzzed = re.findall(r"Format::(\w+)\),$", (ROOT / "lab/fuzz/src/importer.rs").read_text(), re.MULTILINE)
         self.assertEqual(sorted(formats), sorted(fuzzed))
         self.assertEqual(len(IMPORTERS), len(fuzzed))
 

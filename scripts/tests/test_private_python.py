@@ -60,7 +60,7 @@ class Making(InEmptyRepository):
 
     def test_requirements_file_is_installed_once_in_its_folder(self):
         commands = self.with_modules("venv", "ensurepip")
-        file = self.write("benches/peers/other/requirements.txt", b"a==1\n")
+        file = self.write("lab/benches/peers/other/requirements.txt", b"a==1\n")
         python = PrivatePython(self.places, "benches", self.places.python)
         python.install_file(file)
         python.install_file(file)

@@ -68,7 +68,7 @@ impl StoredFrame {
         let sketch = Sketch::of(detected, Layer::VARIANTS).rounded();
         if let Some(concealment) = concealment {
             let mut frame = Frame::clone(&detected.frame);
-            let marks = sketch.drawing(frame.width(), &[]).marks;
+            let marks = sketch.concealed(frame.width());
             let is_cancelled = || detected.withdrawn.is_cancelled();
             conceal(&mut frame, &marks, concealment, &is_cancelled)
                 .map_err(AnnotationError::from)?;

@@ -14,6 +14,9 @@ pub(super) struct Sketch {
     frame_width: u32,
     /// The persons, with their scores.
     marks: Vec<Mark>,
+    /// Boxes that hide people who are in no result; frames of earlier versions have none.
+    #[serde(default)]
+    others: Vec<[f64; 4]>,
     views: Vec<Vec<[f64; 2]>>,
     zones: Vec<ZoneOutline>,
     timestamp: String,
@@ -31,6 +34,7 @@ impl Sketch {
         Self {
             frame_width: detected.frame.width(),
             marks: report.persons.iter().map(marks::mark).collect(),
+            others: detected.boxes_of_others(),
             views: views
                 .map(|outline| outline.iter().map(|at| [at.x, at.y]).collect())
                 .collect(),
@@ -46,6 +50,20 @@ impl Sketch {
             *coordinate = (*coordinate * 10.0).round() / 10.0;
         }
         self
+    }
+
+    /// The marks of all people to be concealed, in pixels of an image of this width: also of those
+    /// who are in no result.
+    pub(super) fn concealed(&self, picture_width: u32) -> Vec<Mark> {
+        let factor = f64::from(picture_width) / f64::from(self.frame_width.max(1));
+        let others = self.others.iter().map(|&bbox| Mark {
+            bbox,
+            oriented: None,
+            head: None,
+            label: String::new(),
+        });
+        let marks = self.marks.iter().cloned().chain(others);
+        marks.map(|mark| mark.scaled(factor)).collect()
     }
 
     /// The drawing of these layers, in pixels of an image of this width.

@@ -13,12 +13,13 @@ use lookdown_detect::{
     pipeline::Ticket,
 };
 
+use lookdown_http::request_id::RequestId;
+
 use super::{
     ApiState,
     http::{
         access::Access,
         problem::{Problem, ProblemKind},
-        request_id::RequestId,
     },
 };
 use crate::access::Holder;

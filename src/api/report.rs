@@ -23,7 +23,7 @@ use utoipa::ToSchema;
         "max_detections": 1000
     },
     "defaults": [{"name": "profile", "value": "quality", "source": "calibration"}],
-    "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0},
+    "views": {"inferred": 24, "unchanged": 0, "outside": 0, "masked": 0, "outside_areas": 0},
     "persons": [{
         "box": {"x_min": 1102.41, "y_min": 700.08, "x_max": 1341.77, "y_max": 842.6},
         "score": 0.8731,
@@ -80,6 +80,11 @@ pub struct Report {
     pub views: ReportViews,
     /// Persons, highest score first.
     pub persons: Vec<ReportPerson>,
+    /// People in the margin around the areas of the calibration, for tracking across their edges.
+    /// They are in no number; absent without areas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub margin: Option<Vec<ReportPerson>>,
     /// Number of persons in each zone of the calibration, in its order; absent without zones.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -187,6 +192,8 @@ pub struct ReportViews {
     pub outside: usize,
     /// Views that the masks of the calibration hide completely.
     pub masked: usize,
+    /// Views that can show nobody who stands in an area of the calibration.
+    pub outside_areas: usize,
 }
 
 /// A zone of the calibration.

@@ -29,6 +29,7 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
         ))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
+        .routes(routes!(results::followed::put))
         .routes(routes!(results::latest::get_latest))
         .routes(routes!(results::picture::get_picture))
         .routes(routes!(results::history::get_history))

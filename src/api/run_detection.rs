@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use jiff::Timestamp;
 use lookdown_detect::{
     imaging::annotate::Concealment,
     pipeline::{DetectJob, Detected, DetectionReport},
@@ -66,7 +65,7 @@ pub(super) async fn run_detection<T: Send + 'static>(
             json,
         };
         state.results.publish(kept, picture);
-        record_camera(state, &report);
+        record_zones(state, &report);
     }
     Ok((report, answer))
 }
@@ -116,17 +115,12 @@ fn describe(trace: &RequestTrace, report: &DetectionReport) {
     }
 }
 
-/// Sets the metrics of the camera.
-fn record_camera(state: &ApiState, report: &DetectionReport) {
+/// Sets the metrics of the camera's zones.
+fn record_zones(state: &ApiState, report: &DetectionReport) {
     if state.options.zone_metrics {
         let zones = report.zones.iter();
         let zones = zones.map(|zone| (zone.name.as_str(), zone.persons));
         state.metrics.set_zones(&report.camera, zones);
-    }
-    if state.options.camera_metrics {
-        let now = Timestamp::now().as_duration().as_secs_f64();
-        let persons = report.persons.len();
-        state.metrics.set_camera(&report.camera, persons, now);
     }
 }
 

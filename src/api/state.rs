@@ -15,13 +15,13 @@ use lookdown_detect::{
     parameters::DetectDefaults,
     pipeline::{PipelineError, WorkerPool},
 };
+use lookdown_http::header_limits::HeaderLimits;
 
 use super::{
     http::{
         access::Access,
         deadline::{Deadline, RequestTimeout},
         drain_body::BodyLimits,
-        header_limits::HeaderLimits,
         problem::{Problem, ProblemKind},
         rate_limit::RequestRate,
         request_body::{BodyReader, UploadBudget},

@@ -7,6 +7,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_http::{
+    Shutdown,
+    server::{self, Plain, Services},
+};
 use tokio::{
     join,
     net::TcpListener,
@@ -18,9 +22,7 @@ use tokio::{
 use super::{App, CALIBRATIONS_CHECK, Sockets, systemd};
 use crate::{
     api::{self, Phase},
-    server::{self, Services},
     settings::Settings,
-    shutdown::Shutdown,
 };
 
 /// Longest time that the shutdown waits for the MQTT broker.
@@ -66,7 +68,7 @@ impl App {
             tls,
             services,
             limits,
-            &self.metrics,
+            &self.metrics.connections,
             &shutdown,
         );
         // Waits for both: the process must not exit while a model is being loaded.
@@ -135,12 +137,12 @@ impl App {
             beyond_limit: router,
         };
         let limits = &self.settings.connections;
-        server::serve(
+        server::serve::<Plain, _, _>(
             listener,
             None,
             services,
             limits,
-            &self.metrics,
+            &self.metrics.connections,
             &Shutdown::default(),
         )
         .await;

@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use lookdown_http::Shutdown;
 use sd_notify::NotifyState;
 use tokio::{
     join,
@@ -12,10 +13,7 @@ use tokio::{
     time::{MissedTickBehavior, interval},
 };
 
-use crate::{
-    api::{Phase, Readiness},
-    shutdown::Shutdown,
-};
+use crate::api::{Phase, Readiness};
 
 /// Notifies systemd when the server is ready and when a stop is requested. Confirms the watchdog at
 /// half of its interval while `is_stuck` returns false. A blocked runtime confirms nothing. In both

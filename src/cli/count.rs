@@ -7,13 +7,11 @@ use clap::Args;
 use lookdown_count::{
     CountEntry, CountOptions, HttpEntry, MqttEntry, Origin, Snapshot, StoreEntry, count,
 };
+use lookdown_http::Shutdown;
 use tokio::{runtime, sync::watch};
 
 use super::{SettingsFile, serve, server_flags::ServerFlags};
-use crate::{
-    mqtt::{Broker, CountsOptions, CountsPublisher},
-    shutdown::Shutdown,
-};
+use crate::mqtt::{Broker, CountsOptions, CountsPublisher};
 
 /// Threads for all cameras.
 const RUNTIME_THREADS: usize = 2;

@@ -10,6 +10,7 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
+use lookdown_http::Shutdown;
 use tokio::{
     runtime::{self, Runtime},
     signal::unix::{Signal, SignalKind, signal},
@@ -22,7 +23,6 @@ use crate::cli::output::UNWRITABLE;
 use crate::{
     app::{App, Reloader, Sockets, assemble},
     settings::Settings,
-    shutdown::Shutdown,
 };
 
 /// Most threads for sockets and JSON. Frames have separate threads.

@@ -10,6 +10,7 @@ use std::{
 use anyhow::{Context, bail};
 use clap::{Args, builder::PossibleValuesParser};
 use lookdown_detect::parameters::Profile;
+use lookdown_http::Shutdown;
 use lookdown_watch::{CameraEntry, Origin, Transport, WatchOptions, watch};
 use strum::VariantNames;
 use tokio::{runtime, time::sleep};
@@ -18,7 +19,6 @@ use super::{SettingsFile, serve, server_flags::ServerFlags};
 use crate::{
     probe::{self, Probe},
     settings::Settings,
-    shutdown::Shutdown,
 };
 
 /// Threads for all cameras. Frames are not decoded here.

@@ -28,7 +28,10 @@ pub(super) struct Delays {
 #[derive(Debug)]
 pub(super) struct Camera {
     name: String,
+    /// The headline number.
     persons: usize,
+    /// The number of its latest frame.
+    frame_persons: usize,
     occupancy: Occupancy,
     zones: Vec<Zone>,
     attributes: Attributes,
@@ -95,6 +98,7 @@ impl Camera {
         Self {
             name: name.to_owned(),
             persons: 0,
+            frame_persons: 0,
             occupancy: Occupancy::default(),
             zones: Vec::new(),
             attributes: Attributes::default(),
@@ -103,10 +107,11 @@ impl Camera {
         }
     }
 
-    /// Updates the state with a report of age `age`.
+    /// Updates the state with a report of age `age` and the headline number after it.
     pub(super) fn update(
         &mut self,
         report: &NewReport,
+        persons: usize,
         age: Duration,
         now: Instant,
         delays: &Delays,
@@ -136,8 +141,8 @@ impl Camera {
             zone.occupancy.update(persons, now, delays.hold);
             self.zones.push(zone);
         }
-        self.persons = report.persons;
-        self.occupancy.update(report.persons, now, delays.hold);
+        self.frame_persons = report.persons;
+        self.set_persons(persons, now, delays);
         let rest = delays.expire.map(|expire| expire.saturating_sub(age));
         self.expires_at = rest.map(|rest| now + rest);
         self.is_available = rest != Some(Duration::ZERO);
@@ -146,6 +151,14 @@ impl Camera {
             entities: has_other_zones,
             attributes: has_other_attributes,
         }
+    }
+
+    /// Sets the headline number. Returns false if it is the same as before.
+    pub(super) fn set_persons(&mut self, persons: usize, now: Instant, delays: &Delays) -> bool {
+        let is_changed = self.persons != persons;
+        self.persons = persons;
+        self.occupancy.update(persons, now, delays.hold);
+        is_changed
     }
 
     /// Changes what has changed by now without a report. Returns the messages.
@@ -175,6 +188,10 @@ impl Camera {
         zones.chain(others).min()
     }
 
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
     pub(super) fn is_available(&self) -> bool {
         self.is_available
     }
@@ -197,6 +214,7 @@ impl Camera {
         let count = |topic, persons: usize| Message::retained(topic, persons.to_string());
         let mut messages = vec![
             count(topics.persons(camera), self.persons),
+            count(topics.frame_persons(camera), self.frame_persons),
             self.occupancy_message(topics),
         ];
         for zone in &self.zones {

@@ -57,11 +57,13 @@ impl Cameras {
         }
     }
 
-    /// Updates the camera of a report whose frame arrived `age` ago. Returns the messages to
+    /// Updates the camera of a report whose frame arrived `age` ago, and whose headline number is
+    /// `persons`. Returns the messages to
     /// publish: none for a camera beyond the limit.
     pub(super) fn update(
         &mut self,
         report: &StoredReport,
+        persons: usize,
         age: Duration,
         now: Instant,
     ) -> Vec<Message> {
@@ -80,7 +82,7 @@ impl Cameras {
             return Vec::new();
         }
         let camera = self.known.entry(key).or_insert_with(|| Camera::new(name));
-        let changes = camera.update(report, age, now, &self.delays);
+        let changes = camera.update(report, persons, age, now, &self.delays);
         let topics = &self.topics;
         let mut messages = Vec::new();
         for zone in changes.removed_zones {
@@ -96,6 +98,30 @@ impl Cameras {
         let json = report.json.clone();
         messages.push(Message::passing(topics.report(name), json));
         messages
+    }
+
+    /// The names of the cameras that send frames.
+    pub(super) fn available(&self) -> Vec<String> {
+        let known = self.known.values().filter(|camera| camera.is_available());
+        known.map(|camera| camera.name().to_owned()).collect()
+    }
+
+    /// Sets the headline number of a camera. Returns the messages: none without a change.
+    pub(super) fn set_persons(
+        &mut self,
+        camera: &str,
+        persons: usize,
+        now: Instant,
+    ) -> Vec<Message> {
+        let (topics, delays) = (&self.topics, &self.delays);
+        let camera = self.known.get_mut(&level(camera));
+        camera
+            .filter(|camera| camera.is_available())
+            .and_then(|camera| {
+                let is_changed = camera.set_persons(persons, now, delays);
+                is_changed.then(|| camera.state(topics))
+            })
+            .unwrap_or_default()
     }
 
     /// All messages that the broker is to retain.

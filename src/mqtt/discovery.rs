@@ -18,6 +18,8 @@ pub(super) const OFFLINE: &str = "offline";
 /// The component of numbers.
 pub(super) const SENSOR: &str = "sensor";
 const BINARY_SENSOR: &str = "binary_sensor";
+/// The ID of the number of the latest frame.
+const FRAME_PERSONS: &str = "frame_persons";
 
 /// The parts of the announcements that the settings give.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -44,6 +46,7 @@ impl Discovery {
         let of_camera = [
             occupancy("Occupancy", None, &topics.occupancy(camera)),
             persons("Persons", None, &topics.persons(camera)),
+            frame_persons(&topics.frame_persons(camera)),
         ];
         let zones = zones.into_iter().flat_map(|zone| {
             let name = |what: &str| format!("{what} in {zone}");
@@ -101,11 +104,15 @@ pub(super) fn config_withdrawals(
     camera: &str,
     zone: Option<&str>,
 ) -> Vec<Message> {
+    let of_frame = zone.is_none().then(|| (SENSOR, FRAME_PERSONS.to_owned()));
     let entities = [occupancy_id(zone), persons_id(zone)];
-    let topics = entities.into_iter().filter_map(|(component, entity)| {
-        let id = format!("{}_{entity}", topics.device_id(camera));
-        topics.config(component, &id)
-    });
+    let topics = entities
+        .into_iter()
+        .chain(of_frame)
+        .filter_map(|(component, entity)| {
+            let id = format!("{}_{entity}", topics.device_id(camera));
+            topics.config(component, &id)
+        });
     topics.map(Message::forget).collect()
 }
 
@@ -130,6 +137,19 @@ fn persons(name: &str, zone: Option<&str>, state_topic: &str) -> Entity {
     });
     let (component, id) = persons_id(zone);
     (component, id, config)
+}
+
+/// The number of the latest frame, for diagnosis: Home Assistant shows it once a user enables it.
+fn frame_persons(state_topic: &str) -> Entity {
+    let config = json!({
+        "name": "Persons in the latest frame",
+        "state_topic": state_topic,
+        "state_class": "measurement",
+        "icon": "mdi:account-multiple-outline",
+        "entity_category": "diagnostic",
+        "enabled_by_default": false,
+    });
+    (SENSOR, FRAME_PERSONS.to_owned(), config)
 }
 
 fn occupancy_id(zone: Option<&str>) -> (&'static str, String) {
@@ -160,7 +180,7 @@ mod tests {
     fn camera_and_zones_announce_occupancy_and_persons() {
         let discovery = Discovery::default();
         let messages = discovery.announcements(&topics(), "north gate", ["till"]);
-        let [occupancy, persons, till, till_occupancy] = messages.as_slice() else {
+        let [occupancy, persons, frame, till, till_occupancy] = messages.as_slice() else {
             panic!("{messages:?}")
         };
         assert!(messages.iter().all(|message| message.retained));
@@ -169,6 +189,7 @@ mod tests {
         for (message, entity, state_topic) in [
             (occupancy, "binary_sensor/DEVICE_occupancy", "occupancy"),
             (persons, "sensor/DEVICE_persons", "persons"),
+            (frame, "sensor/DEVICE_frame_persons", "frame_persons"),
             (till, "sensor/DEVICE_zone_till", "zones/till"),
             (
                 till_occupancy,
@@ -198,6 +219,9 @@ mod tests {
             assert!(config["origin"].get("support_url").is_none());
         }
         assert_eq!(config(occupancy)["device_class"], "occupancy");
+        assert_eq!(config(frame)["enabled_by_default"], false);
+        assert_eq!(config(frame)["entity_category"], "diagnostic");
+        assert!(config(persons).get("entity_category").is_none());
     }
 
     #[test]

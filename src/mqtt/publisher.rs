@@ -8,7 +8,7 @@ use lookdown_detect::fairness::Client;
 use rumqttc::Publish;
 use tokio::{
     sync::broadcast::{self, error::RecvError},
-    time::{Instant, interval, sleep, sleep_until},
+    time::{Instant, MissedTickBehavior, interval, sleep, sleep_until},
 };
 use uuid::Uuid;
 
@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     metrics::Metrics,
-    results::{self, ListenError, ResultStore, StoredReport},
+    results::{self, Headline, ListenError, ResultStore, StoredReport},
     tls::{ClientTls, TlsError},
 };
 
@@ -33,6 +33,9 @@ const LISTEN_PAUSE: Duration = Duration::from_secs(1);
 
 /// Shortest time between two messages of the whole state. Any client of the broker can ask for it.
 const BIRTH_PAUSE: Duration = Duration::from_secs(10);
+
+/// Interval of the checks for followed numbers.
+const NUMBER_CHECK: Duration = Duration::from_secs(1);
 
 /// Interval of the checks for cameras that another server with the same result store has removed.
 const REMOVAL_CHECK: Duration = Duration::from_mins(1);
@@ -108,7 +111,8 @@ impl Publisher {
         for report in self.results.latest_of_all().await.unwrap_or_default() {
             let age = Timestamp::now().duration_since(report.report.received_at);
             let age = Duration::try_from(age).unwrap_or_default();
-            cameras.update(&report, age, Instant::now());
+            let persons = self.headline(&report).await;
+            cameras.update(&report, persons, age, Instant::now());
         }
         let mut backoff = reconnect_backoff();
         let mut is_told = false;
@@ -166,7 +170,8 @@ impl Publisher {
         loop {
             match queue.recv().await {
                 Ok(report) => {
-                    cameras.update(&report, Duration::ZERO, Instant::now());
+                    let persons = self.headline(&report).await;
+                    cameras.update(&report, persons, Duration::ZERO, Instant::now());
                     self.metrics.mqtt_reports_dropped.inc();
                 }
                 Err(RecvError::Lagged(count)) => self.metrics.mqtt_reports_dropped.inc_by(count),
@@ -187,6 +192,8 @@ impl Publisher {
         let topics = [self.topics.status()].into_iter().chain(birth);
         let mut removals = self.results.listeners().removals();
         let mut checks = interval(REMOVAL_CHECK);
+        let mut numbers = interval(NUMBER_CHECK);
+        numbers.set_missed_tick_behavior(MissedTickBehavior::Delay);
         cameras.begin_connection(Instant::now());
         session
             .subscribe(topics.chain(self.topics.camera_filters()))
@@ -220,12 +227,16 @@ impl Publisher {
                 Ok(()) = removals.changed() => {
                     session.publish(self.without_removed(cameras).await).await?;
                 }
+                _ = numbers.tick() => {
+                    session.publish(self.followed(cameras).await).await?;
+                }
                 _ = checks.tick() => {
                     session.publish(self.without_removed(cameras).await).await?;
                 }
                 report = queue.recv() => match report {
                     Ok(report) => {
-                        let messages = cameras.update(&report, Duration::ZERO, Instant::now());
+                        let persons = self.headline(&report).await;
+                        let messages = cameras.update(&report, persons, Duration::ZERO, Instant::now());
                         let is_one_too_many = messages.is_empty();
                         let published = session.publish(messages).await;
                         let counter = if is_one_too_many || published.is_err() {
@@ -241,6 +252,24 @@ impl Publisher {
                 },
             }
         }
+    }
+
+    /// Returns the headline number after a report: that of the frame if the store does not answer.
+    async fn headline(&self, report: &StoredReport) -> usize {
+        let headline = Headline::of(&*self.results, report).await;
+        headline.map_or(report.report.persons, |headline| headline.persons)
+    }
+
+    /// Updates the followed numbers, which change without a report. Returns the messages.
+    async fn followed(&self, cameras: &mut Cameras) -> Vec<Message> {
+        let mut messages = Vec::new();
+        for camera in cameras.available() {
+            // Without an answer or a number, the next report decides.
+            if let Ok(Some(number)) = self.results.followed(&camera).await {
+                messages.extend(cameras.set_persons(&camera, number.persons, Instant::now()));
+            }
+        }
+        messages
     }
 
     /// Removes the cameras that the result store has no longer. Returns the messages.

@@ -51,6 +51,7 @@ pub(super) fn withdrawal(
 ) -> Vec<Message> {
     let of_camera = [
         topics.persons(camera),
+        topics.frame_persons(camera),
         topics.occupancy(camera),
         topics.attributes(camera),
         topics.availability(camera),

@@ -39,7 +39,12 @@ impl Topics {
         rest.strip_prefix("/counts/")
     }
 
-    /// The topic of the number of persons in a camera's frame.
+    /// The topic of the number of persons in the latest frame of a camera.
+    pub(super) fn frame_persons(&self, camera: &str) -> String {
+        format!("{}/frame_persons", self.of_camera(camera))
+    }
+
+    /// The topic of the number of persons that a camera sees now.
     pub(super) fn persons(&self, camera: &str) -> String {
         format!("{}/persons", self.of_camera(camera))
     }

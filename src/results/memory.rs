@@ -3,7 +3,7 @@
 mod kept;
 mod pictures;
 
-use std::{num::NonZeroUsize, sync::Arc};
+use std::{collections::BTreeMap, num::NonZeroUsize, sync::Arc};
 
 use async_trait::async_trait;
 use jiff::Timestamp;
@@ -12,8 +12,8 @@ use parking_lot::{Mutex, MutexGuard};
 
 use self::kept::Kept;
 use super::{
-    Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, ResultLimits,
-    ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId,
+    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
 use crate::metrics::Metrics;
 
@@ -21,6 +21,8 @@ use crate::metrics::Metrics;
 #[derive(Debug)]
 pub struct MemoryResults {
     kept: Mutex<Kept>,
+    /// The followed numbers of the cameras.
+    followed: Mutex<BTreeMap<String, FollowedNumber>>,
     listeners: Arc<Listeners>,
     metrics: Arc<Metrics>,
 }
@@ -33,6 +35,7 @@ impl MemoryResults {
         Self {
             listeners: Arc::new(Listeners::new(limits.max_listeners, Arc::clone(&metrics))),
             kept: Mutex::new(Kept::new(limits)),
+            followed: Mutex::default(),
             metrics,
         }
     }
@@ -61,6 +64,10 @@ impl MemoryResults {
 
     fn note_removals(&self, kept: &Kept, before: u64) {
         if kept.removed_cameras() > before {
+            let cameras = kept.cameras();
+            self.followed
+                .lock()
+                .retain(|camera, _| cameras.contains(camera));
             self.listeners.note_removal();
         }
     }
@@ -87,6 +94,7 @@ impl ResultStore for MemoryResults {
     async fn delete(&self, camera: &str) -> Result<bool, Unreachable> {
         let is_deleted = self.kept().delete(camera);
         if is_deleted {
+            self.followed.lock().remove(camera);
             self.listeners.note_removal();
         }
         Ok(is_deleted)
@@ -107,6 +115,19 @@ impl ResultStore for MemoryResults {
 
     async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
         Ok(self.kept().picture(camera))
+    }
+
+    async fn follow(&self, camera: &str, number: FollowedNumber) -> Result<bool, Unreachable> {
+        let is_known = self.kept().latest(camera).is_some();
+        if is_known {
+            self.followed.lock().insert(camera.to_owned(), number);
+        }
+        Ok(is_known)
+    }
+
+    async fn followed(&self, camera: &str) -> Result<Option<FollowedNumber>, Unreachable> {
+        let number = self.followed.lock().get(camera).copied();
+        Ok(number.filter(|number| number.is_valid(Timestamp::now())))
     }
 
     async fn listen(&self, client: &Client, to: Cameras) -> Result<Listening, ListenError> {

@@ -44,8 +44,8 @@ use self::{
     shared::Shared,
 };
 use super::{
-    Cameras, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId, ResultLimits,
-    ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
+    Cameras, FollowedNumber, ListenError, Listeners, Listening, NewPicture, NewReport, ReportId,
+    ResultLimits, ResultStore, ResultUse, StoreHealth, StoredPicture, StoredReport, Unreachable,
 };
 use crate::{metrics::Metrics, tls::TlsError};
 
@@ -158,6 +158,16 @@ impl ResultStore for RedisResults {
 
     async fn picture(&self, camera: &str) -> Result<Option<Arc<StoredPicture>>, Unreachable> {
         self.ask(async |mut reader| reader.picture(camera).await)
+            .await
+    }
+
+    async fn follow(&self, camera: &str, number: FollowedNumber) -> Result<bool, Unreachable> {
+        self.ask(async |mut reader| reader.follow(camera, number).await)
+            .await
+    }
+
+    async fn followed(&self, camera: &str) -> Result<Option<FollowedNumber>, Unreachable> {
+        self.ask(async |mut reader| reader.followed(camera).await)
             .await
     }
 

@@ -37,7 +37,7 @@ const SYSTEM_FOLDER: &str = "/usr/lib/lookdown";
 
 /// Returns the folders that may contain the files of this installation, best first: that of the
 /// executable, the repository that it was built in, and the folder of the Debian package. The current
-/// folder is not one of them: whoever can write there would choose the code that this program runs.
+/// folder is not one of them: its owner would choose the code that this program runs.
 fn installation_folders() -> Vec<PathBuf> {
     let executable = std::env::current_exe().unwrap_or_default();
     let mut folders: Vec<_> = executable

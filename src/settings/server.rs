@@ -2,11 +2,12 @@
 
 use std::{net::SocketAddr, time::Duration};
 
+use lookdown_http::server::ConnectionLimits;
+
 use super::{
     declare::settings,
     form::{MAX_TIMEOUT_MILLIS, address, count, millis, optional, whole, zero_is_none},
 };
-use crate::server::ConnectionLimits;
 
 settings! {
     /// The HTTP server.

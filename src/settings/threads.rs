@@ -3,7 +3,7 @@
 //!
 //! On a CPU there are as many sessions as cores, each with one thread and one view at a time.
 //! Sessions do not wait for each other, while the threads of one session synchronise at every
-//! layer. A batch of views takes as long as its views one by one. Measured in benches/NOTES.md;
+//! layer. A batch of views takes as long as its views one by one. Measured in lab/benches/NOTES.md;
 //! `lookdown tune` measures it on the current machine.
 //!
 //! The counts follow from the cores that this process may use:

@@ -169,3 +169,47 @@ async fn a_plan_for_huge_frames_with_many_masks_is_fast() {
     // Without optimisation; in all rows of the frame it takes a hundred times as long.
     assert!(began.elapsed() < Duration::from_secs(12));
 }
+
+/// The calibration `lobby` with these areas and ignored places.
+fn lobby_with(areas: &Value, ignore: &Value) -> Value {
+    let mut lobby = lobby(&zones(), &json!([]));
+    lobby["areas"] = areas.clone();
+    lobby["ignore"] = ignore.clone();
+    lobby
+}
+
+#[tokio::test]
+async fn people_outside_areas_are_in_no_result() {
+    let service = Service::start();
+    let report = async |query: &str| {
+        let query = format!("calibration=lobby&{query}");
+        service.post_raw(&query, frame()).await
+    };
+    let whole = json!([{ "frame_px": [[0.0, 0.0], [200.0, 0.0], [200.0, 200.0], [0.0, 200.0]] }]);
+    let far = json!([{ "floor_m": [[80.0, 80.0], [90.0, 80.0], [90.0, 90.0]] }]);
+    for (areas, ignore, is_left_out) in [
+        (json!([]), json!([]), false),
+        (whole.clone(), json!([]), false),
+        (far, json!([]), true),
+        (json!([]), whole, true),
+    ] {
+        let sent = lobby_with(&areas, &ignore);
+        let answer = service.put("/calibrations/lobby", &sent.to_string()).await;
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        let got = service.get("/calibrations/lobby").await.json();
+        assert_eq!(got.get("areas").unwrap_or(&json!([])), &areas);
+        assert_eq!(got.get("ignore").unwrap_or(&json!([])), &ignore);
+        let answer = report("profile=fast").await.json();
+        let persons = answer["persons"].as_array().unwrap().len();
+        assert_eq!(persons == 0, is_left_out, "{answer}");
+        assert_eq!(answer.get("margin").is_some(), areas != json!([]));
+        let zones = answer["zones"].as_array().unwrap().iter();
+        let in_zones: u64 = zones.map(|zone| zone["persons"].as_u64().unwrap()).sum();
+        assert_eq!(in_zones == 0, is_left_out);
+        let coco = report("profile=fast&format=coco").await.json();
+        let exported = coco["annotations"].as_array().unwrap().len();
+        assert_eq!(exported, persons);
+        let rows = service.get("/results").await.json();
+        assert_eq!(rows[0]["frame_persons"], json!(persons));
+    }
+}

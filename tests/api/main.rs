@@ -17,6 +17,7 @@ mod ending;
 mod extremes;
 mod fairness;
 mod kept_pictures;
+mod listeners;
 mod load;
 mod log;
 mod matrix;

@@ -85,6 +85,7 @@ fn report() -> DetectionReport {
         },
         defaults: Vec::new(),
         persons: vec![person(), unknown_place],
+        margin: None,
         zones: vec![ZoneCount {
             name: "entrance".to_owned(),
             persons: 1,
@@ -94,6 +95,7 @@ fn report() -> DetectionReport {
             unchanged: 4,
             outside: 1,
             masked: 2,
+            outside_areas: 3,
         },
         batch_count: 3,
         non_finite: 0,

@@ -231,7 +231,7 @@ async fn the_limits_bound_the_stored_reports() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|row| &row["persons"])
+        .map(|row| &row["frame_persons"])
         .collect();
     assert_eq!(persons, [&Value::from(5), &Value::from(6)]);
     let metrics = service.get("/metrics").await.text();

@@ -11,8 +11,8 @@ use lookdown::{
     api::Readiness,
     app::{App, Sockets},
     settings,
-    shutdown::Shutdown,
 };
+use lookdown_http::Shutdown;
 use tempfile::TempDir;
 use tokio::task::{JoinHandle, spawn_blocking};
 

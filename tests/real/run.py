@@ -10,7 +10,7 @@ import unittest
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-for folder in (HERE, HERE.parent / "reliability", HERE.parents[1] / "benches"):
+for folder in (HERE, HERE.parent / "reliability", HERE.parents[1] / "lab/benches"):
     sys.path.insert(0, str(folder))
 
 

@@ -21,6 +21,8 @@ from mosquitto import PASSWORD, USER, broker
 from support.lookdown import lookdown
 from waiting import wait_until
 
+from metrics import metric
+
 HERE = Path(__file__).resolve().parent
 VERIFIER = ROOT / ".setup" / "real" / "webhooks" / "bin" / "python"
 SECRET = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"
@@ -100,7 +102,8 @@ class CountedCamera(unittest.TestCase):
         calibration |= {"zones": ZONES, "lines": LINES}
         (calibrations / "office.json").write_text(json.dumps(calibration), encoding="utf-8")
         self.broker = self.enterContext(broker(self.folder))
-        self.server = self.enterContext(lookdown({"MODEL__PATH": ""}, calibrations=calibrations))
+        server = {"MODEL__PATH": "", "MQTT__URL": self.broker.url, "RESULTS__CAMERA_METRICS": "true"}
+        self.server = self.enterContext(lookdown(server, calibrations=calibrations))
         (self.port,) = free_ports(1)
         password = self.folder / "password"
         password.write_text(PASSWORD + "\n", encoding="utf-8")
@@ -173,6 +176,45 @@ class Counts(CountedCamera):
             self.assertGreater(more, before)
             self.assertEqual(0, count.stop())
         self.assertIn("continuing after the report of", (self.folder / "count.log").read_text(encoding="utf-8"))
+
+    def shown_numbers(self, count: Count) -> dict[str, float]:
+        """The number of persons of the camera in every place."""
+        row = next(row for row in json.loads(self.server.get("/results")) if row["camera"] == "office")
+        retained = self.broker.retained()
+        return {
+            "results": row["persons"],
+            "source": row["persons_source"],
+            "tracks": len((count.get("/counts/office/tracks") or {"tracks": []})["tracks"]),
+            "metrics": metric(self.server, 'camera_persons{camera="office"}'),
+            "mqtt": float(retained.get("lookdown/cameras/office/persons", "nan")),
+            "counts over mqtt": float(retained.get(f"{TOPICS}/persons", "nan")),
+            "frame": row["frame_persons"],
+            "frame over mqtt": float(retained.get("lookdown/cameras/office/frame_persons", "nan")),
+        }
+
+    def test_every_place_shows_one_number(self):
+        def is_one(numbers: dict[str, float]) -> bool:
+            places = [numbers[place] for place in ("results", "tracks", "metrics", "mqtt", "counts over mqtt")]
+            return len(set(places)) == 1 and places[0] > 0 and numbers["source"] == "tracks"
+
+        with self.counting() as count:
+            wait_until(lambda: count.get("/counts") is not None, "lookdown count answers")
+            self.server.post(DETECT, OFFICE)
+            deadline = time.monotonic() + 60
+            while not is_one(numbers := self.shown_numbers(count)):
+                self.assertLess(time.monotonic(), deadline, numbers)
+                # Weak persons are in the frame only.
+                self.server.post(f"{DETECT}&score_threshold=0.06", OFFICE)
+            self.assertGreater(numbers["frame"], numbers["results"])
+            self.assertEqual(numbers["frame"], numbers["frame over mqtt"])
+            name = "homeassistant/sensor/lookdown_office_frame_persons/config"
+            config = json.loads(self.broker.retained()[name])
+            self.assertIs(False, config["enabled_by_default"])
+            count.stop(signal.SIGKILL)
+        self.server.delete("/results/office")
+        last = [len(json.loads(self.server.post(DETECT, OFFICE))["persons"]) for _ in range(3)]
+        rows = json.loads(self.server.get("/results"))
+        self.assertEqual([(last[-1], "median")], [(row["persons"], row["persons_source"]) for row in rows])
 
     def test_topics_of_cameras_removed_while_down_are_withdrawn(self):
         def topics_of(camera: str) -> list[str]:

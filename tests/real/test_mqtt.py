@@ -27,6 +27,7 @@ REPORT = "lookdown/cameras/office/report"
 CONFIGS = {
     "homeassistant/binary_sensor/lookdown_office_occupancy/config",
     "homeassistant/sensor/lookdown_office_persons/config",
+    "homeassistant/sensor/lookdown_office_frame_persons/config",
     "homeassistant/binary_sensor/lookdown_office_zone_left_occupancy/config",
     "homeassistant/sensor/lookdown_office_zone_left/config",
     "homeassistant/binary_sensor/lookdown_office_zone_empty_occupancy/config",

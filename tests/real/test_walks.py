@@ -1,7 +1,7 @@
 """Rendered walks through an RTSP server, `lookdown watch`, the server and `lookdown count`: counted and true crossings,
 and the CPU time of each process.
 
-The clip is made of our own renders: `training/make.py walks`. `WALKS_ROUNDS` repeats it, `WALKS_RATES="1 2 5 10"` are
+The clip is made of our own renders: `lab/training/make.py walks`. `WALKS_ROUNDS` repeats it, `WALKS_RATES="1 2 5 10"` are
 the frames per second of the CPU times, and `WALKS_TRACKS` names a file that gets the tracks.
 """
 
@@ -37,7 +37,7 @@ STREAM_RATE = 10
 QUIET_SECONDS = 1.5
 """The clip begins and ends with 2 s without a crossing."""
 ERROR_SHARE = 0.05
-"""Missed and invented crossings that the test permits. docs/count-accuracy.md has the measured ones."""
+"""Missed and invented crossings that the test permits. docs/lab/count-accuracy.md has the measured ones."""
 
 
 @dataclass

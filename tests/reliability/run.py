@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
+sys.path.append(str(Path(__file__).resolve().parents[2] / "lab/benches"))
 
 from harness.machine import made  # noqa: E402
 from harness.processes import BenchError  # noqa: E402

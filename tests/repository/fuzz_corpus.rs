@@ -1,7 +1,7 @@
-//! Replays the seeds of the fuzzers and the inputs that they kept. `docs/reliability.md` describes
+//! Replays the seeds of the fuzzers and the inputs that they kept. `docs/lab/reliability.md` describes
 //! how the fuzzers are run.
 
-#[path = "../../fuzz/src/lib.rs"]
+#[path = "../../lab/fuzz/src/lib.rs"]
 mod targets;
 
 use std::{fs, path::Path};
@@ -21,7 +21,10 @@ fn replay(folder: &str, read: impl Fn(&[u8]) -> bool) -> usize {
 
 /// Replays the seeds and the corpus of one target, and the files of `folders`.
 fn replay_all(name: &str, folders: &[&str], read: impl Fn(&[u8]) -> bool) {
-    let own = [format!("fuzz/seeds/{name}"), format!("fuzz/corpus/{name}")];
+    let own = [
+        format!("lab/fuzz/seeds/{name}"),
+        format!("lab/fuzz/corpus/{name}"),
+    ];
     let folders = own
         .iter()
         .map(String::as_str)

@@ -5,5 +5,6 @@
 mod documentation;
 mod fuzz_corpus;
 mod layering;
+mod links;
 mod openapi;
 mod variables;

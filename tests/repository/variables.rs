@@ -5,17 +5,18 @@ use std::{collections::BTreeSet, fs, path::Path};
 use lookdown::settings::load;
 
 /// The folders and files that tell users how to set variables.
-const PLACES: [&str; 12] = [
+const PLACES: [&str; 13] = [
     "CONTRIBUTING.md",
     "Makefile",
     "README.md",
     "SECURITY.md",
     "config",
-    "debian",
     "docker",
     "docs",
     "examples",
     "k8s",
+    "lab",
+    "packaging",
     "scripts",
     "web",
 ];

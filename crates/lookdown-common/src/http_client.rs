@@ -103,6 +103,11 @@ impl ServerClient {
         self.client.get(url)
     }
 
+    /// Starts a PUT request.
+    pub fn put(&self, url: Url) -> RequestBuilder {
+        self.client.put(url)
+    }
+
     /// Starts a POST request.
     pub fn post(&self, url: Url) -> RequestBuilder {
         self.client.post(url)

@@ -2,7 +2,7 @@
 //! that are logged once.
 //!
 //! With the feature `companion` also those of a client of the server: settings files, the server and
-//! its key, HTTP requests with limits, an HTTP server with limits, durations and backoff.
+//! its key, HTTP requests with limits, durations and backoff.
 
 #[cfg(feature = "companion")]
 mod abort_on_drop;
@@ -15,8 +15,6 @@ mod duration;
 pub mod files;
 #[cfg(feature = "companion")]
 mod http_client;
-#[cfg(feature = "companion")]
-pub mod http_server;
 mod log_once;
 pub mod plain_name;
 #[cfg(feature = "companion")]

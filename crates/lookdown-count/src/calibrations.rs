@@ -14,12 +14,15 @@ use crate::{
 
 /// Longest time for a calibration.
 const TIMEOUT: Duration = Duration::from_secs(20);
-/// Most calibrations in memory.
+/// Most calibrations that are kept, and most bytes of their files.
 const MAX_CALIBRATIONS: usize = 1024;
+const MAX_TOTAL_BYTES: usize = 16 << 20;
 
 /// The calibrations by ID.
 pub(crate) struct Calibrations {
     known: BTreeMap<String, Known>,
+    /// Number of the last request.
+    requests: u64,
 }
 
 /// A calibration, and the revision for which it was requested.
@@ -27,6 +30,10 @@ struct Known {
     /// The revision of the report that caused the request: the server may have a later one.
     requested: String,
     calibration: Option<Arc<Calibration>>,
+    /// Bytes of its file.
+    bytes: usize,
+    /// Number of its request: the oldest is forgotten first.
+    request: u64,
 }
 
 /// The reason why a calibration is not known.
@@ -42,15 +49,19 @@ impl Calibrations {
     /// Continues with the calibrations of the store.
     pub(crate) fn resumed(stored: StoredCalibrations) -> Self {
         let known = stored.into_iter().map(|(id, (requested, content))| {
+            let bytes = content.as_ref().map_or(0, Vec::len);
             let calibration = content.and_then(|content| parse(&id, &content).ok());
             let known = Known {
                 requested,
                 calibration: calibration.map(Arc::new),
+                bytes,
+                request: 0,
             };
             (id, known)
         });
         Self {
             known: known.collect(),
+            requests: 0,
         }
     }
 
@@ -91,22 +102,39 @@ impl Calibrations {
             },
             None => None,
         };
-        let (store, id, revision) = (store.clone(), id.clone(), key.revision.clone());
-        let stored_id = id.clone();
-        let stored = tokio::task::spawn_blocking(move || {
-            store.put_calibration(&stored_id, &revision, content.as_deref())
-        });
-        // A task that panicked is logged by the panic hook.
-        stored.await.unwrap_or(Ok(()))?;
-        if self.known.len() >= MAX_CALIBRATIONS && !self.known.contains_key(&id) {
-            self.known.pop_first();
-        }
+        self.requests += 1;
         let known = Known {
             requested: key.revision.clone(),
             calibration,
+            bytes: content.as_ref().map_or(0, Vec::len),
+            request: self.requests,
         };
-        self.known.insert(id, known);
+        self.known.insert(id.clone(), known);
+        let forgotten = self.forget_oldest(id);
+        let (store, id, revision) = (store.clone(), id.clone(), key.revision.clone());
+        let stored = tokio::task::spawn_blocking(move || {
+            store.put_calibration(&id, &revision, content.as_deref(), &forgotten)
+        });
+        // A task that panicked is logged by the panic hook.
+        stored.await.unwrap_or(Ok(()))?;
         Ok(())
+    }
+
+    /// Forgets the calibrations beyond the limits except one, and returns their IDs. Cameras that use
+    /// them keep their definitions until the next start, which requests them again.
+    fn forget_oldest(&mut self, except: &str) -> Vec<String> {
+        let mut forgotten = Vec::new();
+        let mut total: usize = self.known.values().map(|known| known.bytes).sum();
+        while self.known.len() > MAX_CALIBRATIONS || total > MAX_TOTAL_BYTES {
+            let others = self.known.iter().filter(|(id, _)| *id != except);
+            let oldest = others.min_by_key(|(_, known)| known.request);
+            let Some(id) = oldest.map(|(id, _)| id.clone()) else {
+                break;
+            };
+            total -= self.known.remove(&id).map_or(0, |known| known.bytes);
+            forgotten.push(id);
+        }
+        forgotten
     }
 }
 
@@ -137,4 +165,22 @@ fn parse(id: &str, content: &[u8]) -> Result<Calibration, String> {
     let first = file.calibrations(id, content).into_iter().next();
     let (_, calibration) = first.ok_or_else(|| "it has no camera".to_owned())?;
     calibration.map_err(|problem| one_line(&problem.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calibrations_beyond_the_limits_are_forgotten() {
+        let content = vec![b' '; CalibrationFile::MAX_BYTES];
+        let stored =
+            (0..400).map(|number| (number.to_string(), ("1".to_owned(), Some(content.clone()))));
+        let mut calibrations = Calibrations::resumed(stored.collect());
+        let forgotten = calibrations.forget_oldest("7");
+        let kept = MAX_TOTAL_BYTES / CalibrationFile::MAX_BYTES;
+        assert_eq!(calibrations.known.len(), kept);
+        assert_eq!(forgotten.len(), 400 - kept);
+        assert!(calibrations.known.contains_key("7"));
+    }
 }

@@ -391,3 +391,24 @@ fn repeated_and_late_reports_are_shown_as_dropped() {
     let drops = world.engine.drops().of("hall").unwrap();
     assert_eq!(drops.since_ms, None);
 }
+
+/// A camera of the year 2036 neither counts as current nor ends the others.
+#[test]
+fn a_report_of_the_future_changes_no_other_camera() {
+    let mut world = World::new(None);
+    world.run(4);
+    let present_ms = world.true_ms;
+    world.step(&Step::ServerClock {
+        ahead_ms: 315_360_000_000,
+    });
+    let number = world.capture(0, &[]);
+    world.deliver(u64::MAX / 2, number);
+    let snapshot = world.engine.snapshot(present_ms);
+    let [gate, hall] = snapshot.cameras.as_slice() else {
+        panic!("{snapshot:?}");
+    };
+    assert!(gate.last_report_ms > present_ms && gate.persons.is_none());
+    assert_eq!(hall.persons, Some(1));
+    world.engine.forget_silent(present_ms);
+    assert!(world.engine.scene_of("hall").is_some());
+}

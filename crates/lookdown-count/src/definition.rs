@@ -35,6 +35,8 @@ pub(crate) struct CameraDefinition {
     pub(crate) directions: Vec<[String; 2]>,
     /// The zones in the plane of the tracker.
     pub(crate) zones: Vec<Zone>,
+    /// The areas of the calibration on the floor of the site; none for a camera alone.
+    pub(crate) areas: Vec<Polygon>,
 }
 
 impl CameraDefinition {
@@ -48,6 +50,7 @@ impl CameraDefinition {
             lines: Vec::new(),
             directions: Vec::new(),
             zones: Vec::new(),
+            areas: Vec::new(),
         }
     }
 
@@ -108,7 +111,11 @@ impl CameraDefinition {
             let name = zone.name.clone();
             Some(Zone { name, plane, area })
         });
+        let areas = geometry.areas.foot_filter.areas.iter();
+        let areas = areas.filter_map(|area| Some(planes.zone(area)?.1));
+        let areas = placement.map_or_else(Vec::new, |_| areas.collect());
         Self {
+            areas,
             site: placement.map(|placement| placement.site.clone()),
             pose,
             lines,

@@ -1,4 +1,4 @@
-//! What identifies a definition: the calibration and the frame size of a report.
+//! The key of a definition: the calibration and the frame size of a report.
 
 use serde::{Deserialize, Serialize};
 

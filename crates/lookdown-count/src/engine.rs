@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Times that are this much after the own clock are logged, milliseconds.
-const MAX_AHEAD_MS: i64 = 300_000;
+pub(crate) const MAX_AHEAD_MS: i64 = 300_000;
 /// Pause between two equal log lines.
 const LOG_PAUSE: Duration = Duration::from_mins(10);
 
@@ -282,7 +282,7 @@ impl Engine {
                 return Some(owner);
             }
             if known.definition.pose == definition.pose {
-                scene.cameras[index].redefine(Arc::clone(definition));
+                scene.redefine(index, Arc::clone(definition));
                 return Some(owner);
             }
         }
@@ -302,8 +302,8 @@ impl Engine {
     }
 
     /// Removes cameras without a report in the day before the newest report, so that others have
-    /// their place. Their counts stay in the store.
-    pub(crate) fn forget_silent(&mut self) {
+    /// their place. A report of the future does not count. Their counts stay in the store.
+    pub(crate) fn forget_silent(&mut self, now_ms: i64) {
         let cameras = self.scenes.values().flat_map(|scene| {
             let cameras = scene.cameras.iter();
             cameras.map(|camera| {
@@ -315,7 +315,8 @@ impl Engine {
             })
         });
         let cameras: Vec<_> = cameras.collect();
-        let newest = cameras.iter().filter_map(|(.., last_ms)| *last_ms).max();
+        let times = cameras.iter().filter_map(|(.., last_ms)| *last_ms);
+        let newest = times.filter(|last| *last <= now_ms + MAX_AHEAD_MS).max();
         for (owner, camera, last_ms) in cameras {
             if newest.is_none_or(|newest| last_ms.is_some_and(|last| newest - last <= DAY_MS)) {
                 continue;

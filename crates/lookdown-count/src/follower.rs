@@ -131,7 +131,8 @@ impl Follower {
             skipped("malformed");
             return Ok(());
         };
-        let Ok(report) = serde_json::from_slice::<Report>(&event.data) else {
+        let report = serde_json::from_slice::<Report>(&event.data).ok();
+        let Some(report) = report.filter(Report::has_valid_names) else {
             skipped("malformed");
             return Ok(());
         };
@@ -156,14 +157,16 @@ impl Follower {
             self.calibrations.definition(key)
         };
         let mut engine = self.engine.lock();
-        match engine.accept(id, &report, &definition, Now::read()) {
+        let now = Now::read();
+        match engine.accept(id, &report, &definition, now) {
             Accepted::Counted(crossings) => {
                 self.metrics.reports.inc();
                 if let Some(scene) = engine.scene_of(&report.camera) {
                     let at_ms = report.at_ms(definition.site.is_some());
+                    let times = (at_ms, now.unix_ms);
                     let messages =
                         self.conditions
-                            .of_report(id, &report.camera, at_ms, &crossings, scene);
+                            .of_report(id, &report.camera, times, &crossings, scene);
                     self.messages.extend(messages);
                 }
             }
@@ -187,7 +190,7 @@ impl Follower {
         }
         if Instant::now() >= self.next_expiry {
             self.next_expiry = Instant::now() + EXPIRY;
-            self.engine.lock().forget_silent();
+            self.engine.lock().forget_silent(now_ms);
             let age_ms = i64::try_from(self.retention.as_millis()).unwrap_or(i64::MAX);
             let store = self.store.clone();
             let expired = spawn_blocking(move || store.expire(now_ms.saturating_sub(age_ms))).await;

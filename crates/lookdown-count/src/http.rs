@@ -4,7 +4,6 @@ mod counts;
 mod floor;
 mod frame_heat_map;
 mod heat_map;
-mod problem;
 mod time;
 mod tracks;
 
@@ -12,39 +11,34 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use axum::{
     Json, Router,
-    extract::{Request, State},
+    extract::State,
     http::{
-        HeaderMap, HeaderValue, Method,
-        header::{AUTHORIZATION, CACHE_CONTROL, CONTENT_TYPE},
+        HeaderValue,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
     },
-    middleware::{self, Next},
-    response::{IntoResponse, Response},
+    middleware,
+    response::Response,
     routing::get,
 };
 use jiff::Timestamp;
+use lookdown_common::text::one_line;
+use lookdown_http::problem::{Kind, Problem};
 use parking_lot::Mutex;
-use secrecy::{ExposeSecret, SecretString};
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use crate::{engine::Engine, metrics::Metrics, store::Store, sums::Owner};
-use problem::Problem;
 
 /// Everything that requests read.
-#[expect(clippy::struct_field_names, reason = "a key of the API")]
 pub(crate) struct Api {
     pub(crate) engine: Arc<Mutex<Engine>>,
     pub(crate) store: Store,
-    pub(crate) metrics: Arc<Metrics>,
-    pub(crate) api_key: Option<SecretString>,
 }
 
 type Shared = Arc<Api>;
 
-/// Returns the routes.
+/// Returns the routes, without protection: a listener adds it.
 pub(crate) fn router(api: Api) -> Router {
-    let api = Arc::new(api);
-    let with_key = Router::new()
+    Router::new()
         .route("/counts", get(cameras))
         .route("/counts/{camera}", get(counts::of_camera))
         .route("/counts/{camera}/tracks", get(tracks::of_camera))
@@ -62,44 +56,29 @@ pub(crate) fn router(api: Api) -> Router {
         .route("/sites/{site}/heatmap.json", get(heat_map::json_of_site))
         .route("/sites/{site}/heatmap.png", get(heat_map::png_of_site))
         .route("/sites/{site}/floor.svg", get(floor::svg))
-        .route("/metrics", get(metrics))
-        .layer(middleware::from_fn_with_state(Arc::clone(&api), check_key));
-    Router::new()
-        .route("/livez", get(async || "ok\n"))
-        .merge(with_key)
-        .fallback(async |request: Request| {
-            Problem::not_found(format!(
-                "there is no resource at {}: docs/count.md lists all paths",
-                request.uri().path()
-            ))
-        })
-        .method_not_allowed_fallback(async |method: Method| Problem::method(&method))
         .layer(middleware::map_response(without_cache))
-        .with_state(api)
+        .with_state(Arc::new(api))
+}
+
+/// Returns the route of the metrics.
+pub(crate) fn metrics_router(engine: &Arc<Mutex<Engine>>, metrics: &Arc<Metrics>) -> Router {
+    let (engine, metrics) = (Arc::clone(engine), Arc::clone(metrics));
+    let text = async move || {
+        let text = metrics.text(&engine.lock(), now_ms());
+        ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text)
+    };
+    Router::new().route("/metrics", get(text))
+}
+
+/// Returns the route of the health check.
+pub(crate) fn probes() -> Router {
+    Router::new().route("/livez", get(async || "ok\n"))
 }
 
 async fn without_cache(mut response: Response) -> Response {
-    let value = axum::http::HeaderValue::from_static("no-store");
+    let value = HeaderValue::from_static("no-store");
     response.headers_mut().insert(CACHE_CONTROL, value);
     response
-}
-
-/// Requires the key of the settings.
-async fn check_key(State(api): State<Shared>, request: Request, next: Next) -> Response {
-    match &api.api_key {
-        Some(key) if !has_key(request.headers(), key) => Problem::unauthorized().into_response(),
-        _ => next.run(request).await,
-    }
-}
-
-fn has_key(headers: &HeaderMap, key: &SecretString) -> bool {
-    let bearer = headers.get(AUTHORIZATION);
-    let bearer = bearer.and_then(|value| value.as_bytes().strip_prefix(b"Bearer "));
-    let plain = headers.get("x-api-key").map(HeaderValue::as_bytes);
-    // Digests of equal length make the time of the comparison independent of the key.
-    let wanted = Sha256::digest(key.expose_secret());
-    let given = bearer.or(plain);
-    given.is_some_and(|given| Sha256::digest(given) == wanted)
 }
 
 /// A camera of the list.
@@ -165,11 +144,6 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
     Json(rows.into_values().collect())
 }
 
-async fn metrics(State(api): State<Shared>) -> Response {
-    let text = api.metrics.text(&api.engine.lock(), now_ms());
-    ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response()
-}
-
 fn now_ms() -> i64 {
     Timestamp::now().as_millisecond()
 }
@@ -180,16 +154,26 @@ async fn query<T: Send + 'static>(
     query: impl FnOnce(&Store) -> Result<T, crate::store::StoreError> + Send + 'static,
 ) -> Result<T, Problem> {
     let store = api.store.clone();
-    let answer = tokio::task::spawn_blocking(move || query(&store)).await;
-    match answer {
-        Ok(Ok(answer)) => Ok(answer),
-        Ok(Err(problem)) => {
+    blocking(move || {
+        query(&store).map_err(|problem| {
             tracing::error!("{problem}");
-            Err(Problem::internal())
-        }
-        // A task that panicked is logged by the panic hook.
-        Err(_) => Err(Problem::internal()),
-    }
+            Problem::internal()
+        })
+    })
+    .await
+}
+
+/// Runs work that takes time without blocking the runtime.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
+    let done = tokio::task::spawn_blocking(work).await;
+    // A task that panicked is logged by the panic hook.
+    done.unwrap_or_else(|_| Err(Problem::internal()))
+}
+
+fn not_found(detail: impl Into<String>) -> Problem {
+    Problem::new(Kind::NotFound, detail)
 }
 
 /// Refuses an owner that has neither a scene nor sums.
@@ -206,13 +190,13 @@ async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Problem> {
         return Ok(());
     }
     Err(match owner {
-        Owner::Camera(camera) => Problem::not_found(format!(
+        Owner::Camera(camera) => not_found(format!(
             "there is no camera {}: GET /counts lists them",
-            lookdown_common::text::one_line(camera)
+            one_line(camera)
         )),
-        Owner::Site(site) => Problem::not_found(format!(
+        Owner::Site(site) => not_found(format!(
             "there is no site {}: give a mount.site of a calibration in use",
-            lookdown_common::text::one_line(site)
+            one_line(site)
         )),
     })
 }

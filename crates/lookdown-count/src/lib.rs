@@ -18,6 +18,7 @@ mod engine;
 mod event_parser;
 mod event_stream;
 mod follower;
+mod hand_back;
 mod http;
 mod metrics;
 mod now;

@@ -10,6 +10,8 @@ use crate::engine::Engine;
 pub(crate) struct Metrics {
     registry: Registry,
     pub(crate) connected: IntGauge,
+    /// Open connections of clients.
+    pub(crate) connections: IntGauge,
     pub(crate) reports: IntCounter,
     pub(crate) reports_skipped: IntCounterVec,
     position_resets: IntCounter,
@@ -44,6 +46,8 @@ impl Metrics {
             "1 while the stream of reports is open, else 0.",
         )?;
         registry.register(Box::new(connected.clone()))?;
+        let connections = IntGauge::new(name("connections"), "Open connections of clients.")?;
+        registry.register(Box::new(connections.clone()))?;
         let reports_skipped = IntCounterVec::new(
             Opts::new(
                 name("reports_skipped_total"),
@@ -59,6 +63,7 @@ impl Metrics {
         };
         Ok(Self {
             connected,
+            connections,
             reports: counter("reports_total", "Counted reports.")?,
             reports_skipped,
             position_resets: counter(

@@ -58,6 +58,8 @@ pub struct HttpEntry {
     pub listen: Option<SocketAddr>,
     /// A file with the key that requests must have.
     pub api_key_file: Option<PathBuf>,
+    /// True to answer every client of an address that other machines reach, without a key.
+    pub open: Option<bool>,
 }
 
 /// The store as it is written.
@@ -203,6 +205,7 @@ impl CountEntry {
             http: HttpEntry {
                 listen: self.http.listen.or(other.http.listen),
                 api_key_file: self.http.api_key_file.or(other.http.api_key_file),
+                open: self.http.open.or(other.http.open),
             },
             store: StoreEntry {
                 path: self.store.path.or(other.store.path),
@@ -260,16 +263,23 @@ impl CountEntry {
             let problem = "the key is too short: write at least 16 characters into the file";
             return Err(ConfigError::problem("http.api_key_file", &problem));
         }
+        let listen = match self.http.listen {
+            Some(listen) => listen,
+            None => LISTEN
+                .parse()
+                .map_err(|error| ConfigError::problem("http.listen", &error))?,
+        };
+        let is_open = self.http.open.unwrap_or_default();
+        if !listen.ip().is_loopback() && api_key.is_none() && !is_open {
+            let remedy = "is reached by other machines: set http.api_key_file, or set http.open to \
+                          true to let every client read the counts";
+            return Err(ConfigError::value("http.listen", &listen, remedy));
+        }
         let webhooks = self.webhooks.into_iter().enumerate();
         let webhooks = webhooks.map(|(index, entry)| entry.check(&format!("webhooks[{index}].")));
         Ok(CountOptions {
             server: self.server.check()?,
-            listen: match self.http.listen {
-                Some(listen) => listen,
-                None => LISTEN
-                    .parse()
-                    .map_err(|error| ConfigError::problem("http.listen", &error))?,
-            },
+            listen,
             api_key,
             store: self.store.path.unwrap_or_else(|| STORE.into()),
             retention: seconds(u64::from(retention_days) * 86_400),

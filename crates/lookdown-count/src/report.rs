@@ -1,7 +1,10 @@
 //! The parts of a report of the server that are used.
 
 use jiff::Timestamp;
-use lookdown_lens::geometry::{Pixel, oriented_box::vertical_in_frame};
+use lookdown_lens::{
+    calibration::CalibrationId,
+    geometry::{Pixel, oriented_box::vertical_in_frame},
+};
 use lookdown_tracking::Observation;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -16,6 +19,10 @@ const MAX_BEHIND_MS: i64 = 3_600_000;
 const MAX_AHEAD_ON_SITE_MS: i64 = 500;
 const MAX_BEHIND_ON_SITE_MS: i64 = 1_000;
 
+/// The server's limits of names.
+const MAX_CAMERA_CHARS: usize = 128;
+const MAX_REVISION_BYTES: usize = 128;
+
 /// A report of the server.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct Report {
@@ -27,6 +34,9 @@ pub(crate) struct Report {
     pub(crate) calibration: UsedCalibration,
     pub(crate) image: Image,
     pub(crate) persons: Vec<Person>,
+    /// Persons in the margin around the areas of the calibration.
+    #[serde(default)]
+    margin: Vec<Person>,
 }
 
 /// The ID and the arrival of a report: the same for each time that the server sends it.
@@ -81,6 +91,14 @@ struct Floor {
 }
 
 impl Report {
+    /// Returns true if the names are as long as the server permits at most.
+    pub(crate) fn has_valid_names(&self) -> bool {
+        let used = &self.calibration;
+        self.camera.chars().count() <= MAX_CAMERA_CHARS
+            && (used.assumed || used.id.parse::<CalibrationId>().is_ok())
+            && used.revision.len() <= MAX_REVISION_BYTES
+    }
+
     /// Returns the time of the frame in milliseconds since the Unix epoch: the capture time if it
     /// is plausible, else the arrival.
     pub(crate) fn at_ms(&self, is_on_site: bool) -> i64 {
@@ -123,15 +141,23 @@ impl Report {
         }
     }
 
-    /// Returns the persons as the tracker needs them. A person without a direction is left out.
+    /// Returns the persons as the tracker needs them, then those in the margin. A person without a
+    /// direction is left out.
     pub(crate) fn observations(&self, definition: &CameraDefinition) -> Vec<Observation> {
-        let persons = self.persons.iter();
+        let persons = self.persons.iter().map(|person| (person, false));
+        let margin = self.margin.iter().map(|person| (person, true));
         persons
-            .filter_map(|person| self.observation(person, definition))
+            .chain(margin)
+            .filter_map(|(person, is_in_margin)| self.observation(person, is_in_margin, definition))
             .collect()
     }
 
-    fn observation(&self, person: &Person, definition: &CameraDefinition) -> Option<Observation> {
+    fn observation(
+        &self,
+        person: &Person,
+        is_in_margin: bool,
+        definition: &CameraDefinition,
+    ) -> Option<Observation> {
         let bearing = person.bearing?;
         let OrientedBox {
             cx,
@@ -162,6 +188,7 @@ impl Report {
             centre_px: [cx, cy],
             foot_px: [foot.x, foot.y],
             score: person.score,
+            is_in_margin,
         })
     }
 }
@@ -206,6 +233,26 @@ mod tests {
                 assert_eq!(is_used, offset != 0, "{captured}");
             }
         }
+    }
+
+    #[test]
+    fn names_are_limited_as_those_of_the_server() {
+        let report = report("null", "");
+        assert!(report.has_valid_names());
+        let change = |change: fn(&mut Report)| {
+            let mut changed = report.clone();
+            changed.calibration.assumed = false;
+            change(&mut changed);
+            changed.has_valid_names()
+        };
+        assert!(change(|_| ()));
+        assert!(!change(|report| report.camera = "n".repeat(129)));
+        assert!(!change(
+            |report| report.calibration.id = "../results".to_owned()
+        ));
+        assert!(!change(
+            |report| report.calibration.revision = "1".repeat(129)
+        ));
     }
 
     #[test]

@@ -2,9 +2,12 @@
 
 use std::{future::Future, path::PathBuf, sync::Arc, time::Duration};
 
-use hyper_util::service::TowerToHyperService;
 use jiff::Timestamp;
-use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient};
+use lookdown_http::{
+    protect::{self, Access, Routes},
+    server::bind,
+};
 use parking_lot::Mutex;
 use tokio::{
     sync::watch,
@@ -16,7 +19,8 @@ use crate::{
     calibrations::Calibrations,
     engine::{CountingOptions, Engine},
     follower::Follower,
-    http::{Api, router},
+    hand_back::hand_back,
+    http::{Api, metrics_router, probes, router},
     metrics::Metrics,
     options::{CountEntry, CountOptions, load},
     snapshot::Snapshot,
@@ -100,7 +104,7 @@ pub async fn count(
 ) -> Result<(), CountError> {
     let metrics = Arc::new(Metrics::new()?);
     let client = ServerClient::new(&options.server)?;
-    let listener = http_server::bind("http.listen", options.listen).await;
+    let listener = bind("http.listen", options.listen).await;
     let listener = listener.map_err(CountError::Address)?;
     let path = options.store.clone();
     let opened = spawn_blocking(move || {
@@ -130,15 +134,25 @@ pub async fn count(
     let api = Api {
         engine: Arc::clone(&engine),
         store: store.clone(),
-        metrics: Arc::clone(&metrics),
-        api_key: options.api_key.clone(),
     };
     if let Ok(address) = listener.local_addr() {
         tracing::info!("counts at http://{address}/counts");
     }
-    let service = TowerToHyperService::new(router(api));
-    let serving = tokio::spawn(http_server::serve(listener, service));
+    let access = match &options.api_key {
+        Some(key) => Access::Key(key.clone()),
+        None => Access::without_key(options.listen),
+    };
+    let routes = Routes {
+        protected: router(api).merge(metrics_router(&engine, &metrics)),
+        probes: probes(),
+    };
+    let open = metrics.connections.clone();
+    let serving = tokio::spawn(async move {
+        protect::serve(listener, routes, access, "http.api_key_file", &open).await;
+    });
     let _serving = AbortOnDrop(serving.abort_handle());
+    let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
+    let _handing_back = AbortOnDrop(handing_back.abort_handle());
     let (stop_sender, stop_receiver) = watch::channel(false);
     let mut follower = Follower {
         deliveries: Deliveries::start(&options.webhooks, resumed.messages, &store, &metrics)?,

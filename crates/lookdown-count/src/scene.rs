@@ -103,7 +103,7 @@ impl SceneCamera {
     }
 
     /// Changes what is counted. Visits and approaches begin again.
-    pub(crate) fn redefine(&mut self, definition: Arc<CameraDefinition>) {
+    fn redefine(&mut self, definition: Arc<CameraDefinition>) {
         *self = Self {
             presence: self.presence,
             last_report: self.last_report,
@@ -152,7 +152,8 @@ impl SceneCamera {
     }
 
     /// Adds the crossings, entries and visits of the tracks to the sums.
-    fn count(&mut self, tracks: &[&Track], sums: &mut Sums) -> Vec<NamedCrossing> {
+    /// Lines have all tracks, zones those that count.
+    fn count(&mut self, [tracks, counted]: [&[&Track]; 2], sums: &mut Sums) -> Vec<NamedCrossing> {
         let mut named = Vec::new();
         for crossing in self.lines.update(tracks.iter().copied()) {
             let line = &self.lines.lines()[crossing.line];
@@ -170,7 +171,7 @@ impl SceneCamera {
             *sums.crossings.entry(key).or_default() += 1;
             named.push(NamedCrossing { of, at_ms });
         }
-        for event in self.zones.update(tracks.iter().copied()) {
+        for event in self.zones.update(counted.iter().copied()) {
             let (ZoneEvent::Entered { zone, at_s, .. } | ZoneEvent::Left { zone, at_s, .. }) =
                 event;
             let minute = milliseconds(at_s).div_euclid(MINUTE_MS);
@@ -216,9 +217,13 @@ impl Scene {
         cameras: Vec<(String, Arc<CameraDefinition>)>,
     ) -> Result<Self, SiteError> {
         let poses: Vec<_> = cameras.iter().map(|(_, camera)| camera.pose).collect();
+        let mut tracker = Tracker::new(&poses, TrackerSettings::default())?;
+        for (index, (_, camera)) in cameras.iter().enumerate() {
+            tracker.limit(index, camera.areas.clone());
+        }
         let cameras = cameras.into_iter();
         Ok(Self {
-            tracker: Tracker::new(&poses, TrackerSettings::default())?,
+            tracker,
             owner,
             heat_map: HeatMap::default(),
             presence: Presence::default(),
@@ -250,14 +255,25 @@ impl Scene {
                 definition,
             }
         });
+        let cameras: Vec<_> = cameras.collect();
+        let mut tracker = state.tracker;
+        for (index, camera) in cameras.iter().enumerate() {
+            tracker.limit(index, camera.definition.areas.clone());
+        }
         Self {
-            cameras: cameras.collect(),
+            cameras,
             owner: state.owner,
-            tracker: state.tracker,
+            tracker,
             heat_map: state.heat_map,
             presence: state.presence,
             may_begin_again: false,
         }
+    }
+
+    /// Changes what is counted of a camera. Visits and approaches begin again.
+    pub(crate) fn redefine(&mut self, camera: usize, definition: Arc<CameraDefinition>) {
+        self.tracker.limit(camera, definition.areas.clone());
+        self.cameras[camera].redefine(definition);
     }
 
     /// Returns the state to be stored.
@@ -291,9 +307,13 @@ impl Scene {
         self.tracker.update(camera, seconds(at_ms), persons)?;
         let tracks: Vec<&Track> = self.tracker.tracks().collect();
         let mut crossings = Vec::new();
+        // A line at the edge of an area counts those who cross it from the margin.
+        let counted = tracks.iter().copied().filter(|track| track.counts());
+        let counted: Vec<&Track> = counted.collect();
         for camera in &mut self.cameras {
-            crossings.extend(camera.count(&tracks, sums));
+            crossings.extend(camera.count([&tracks, &counted], sums));
         }
+        let tracks = counted;
         self.heat_map.update(tracks.iter().copied());
         let day = at_ms.div_euclid(DAY_MS);
         for (cell, milliseconds) in self.heat_map.take() {
@@ -322,9 +342,9 @@ impl Scene {
         Ok(crossings)
     }
 
-    /// Returns the confirmed tracks.
+    /// Returns the tracks that count.
     pub(crate) fn tracks(&self) -> impl Iterator<Item = &Track> {
-        self.tracker.tracks()
+        self.tracker.tracks().filter(|track| track.counts())
     }
 
     /// Returns the persons of the site at its last report.
@@ -375,3 +395,6 @@ fn milliseconds(seconds: f64) -> i64 {
     let milliseconds = (seconds * 1000.0).round() as i64;
     milliseconds
 }
+
+#[cfg(test)]
+mod tests;

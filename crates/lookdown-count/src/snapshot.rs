@@ -1,7 +1,7 @@
 //! The current counts of all cameras and sites, for metrics and MQTT.
 
 use crate::{
-    engine::Engine,
+    engine::{Engine, MAX_AHEAD_MS},
     sums::{LineDirection, Owner, ZoneOf},
 };
 
@@ -66,7 +66,9 @@ impl Engine {
     /// Returns the current counts.
     pub(crate) fn snapshot(&self, now_ms: i64) -> Snapshot {
         let is_known = |last_ms: Option<i64>| {
-            last_ms.is_some_and(|last_ms| now_ms - last_ms <= self.longest_gap_ms())
+            // A report of the future says nothing about the present.
+            let ages = -MAX_AHEAD_MS..=self.longest_gap_ms();
+            last_ms.is_some_and(|last_ms| ages.contains(&(now_ms - last_ms)))
         };
         let mut snapshot = Snapshot::default();
         for scene in self.scenes() {

@@ -9,6 +9,7 @@ mod write;
 
 use std::{
     fs::{File, OpenOptions, TryLockError},
+    os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
     sync::Arc,
     thread::sleep,
@@ -79,6 +80,12 @@ impl Store {
             path: path.to_owned(),
             problem: problem.to_string(),
         };
+        // The files of SQLite beside it get its mode.
+        let created = open_private(path);
+        created.map_err(|problem| StoreError::Unusable {
+            path: path.to_owned(),
+            problem: problem.to_string(),
+        })?;
         let writer = connect(path).map_err(unusable)?;
         let version = schema::version(&writer).map_err(unusable)?;
         if version > schema::VERSION {
@@ -110,16 +117,22 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
     Ok(connection)
 }
 
+/// Opens or creates a file that only its owner may read.
+fn open_private(path: &Path) -> std::io::Result<File> {
+    OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .mode(0o600)
+        .open(path)
+}
+
 /// Locks the file beside the store. Waits for a process that ends, and for requests that end with
 /// earlier settings.
 fn lock(path: &Path) -> Result<File, StoreError> {
     let mut name = path.as_os_str().to_owned();
     name.push(".lock");
-    let opened = OpenOptions::new()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(&name);
+    let opened = open_private(Path::new(&name));
     let unusable = |problem: std::io::Error| StoreError::Unusable {
         path: path.to_owned(),
         problem: problem.to_string(),

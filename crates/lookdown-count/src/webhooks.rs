@@ -26,8 +26,8 @@ const SILENT_AFTER: Duration = Duration::from_mins(1);
 pub(crate) struct Message {
     /// The same for every attempt.
     pub(crate) id: String,
-    /// The receiver.
-    pub(crate) url: String,
+    /// The digest of its webhook. The URL of the receiver may hold a password or a token.
+    pub(crate) webhook: String,
     /// JSON.
     pub(crate) body: String,
     /// Time of the message, seconds since the Unix epoch.

@@ -9,6 +9,7 @@
 pub mod counting_line;
 pub mod crop_placement;
 pub mod floor;
+pub mod foot_filter;
 pub mod footprint;
 pub mod frame_crop;
 pub mod height_ratio;
@@ -24,6 +25,7 @@ pub mod zone;
 pub mod zoom;
 
 pub use counting_line::{CountingLine, LineEnds};
+pub use foot_filter::{FootFilter, FootPlace};
 pub use footprint::{BackProjection, Footprint};
 pub use frame_crop::{FrameCrop, QuarterTurn};
 pub use lens::{Lens, LensError};

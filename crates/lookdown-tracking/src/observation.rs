@@ -16,4 +16,7 @@ pub struct Observation {
     pub foot_px: [f64; 2],
     /// Probability that this is a person (0 to 1).
     pub score: f64,
+    /// True for a person in the margin around the camera's areas, who continues tracks but does not
+    /// count.
+    pub is_in_margin: bool,
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{evidence::EvidenceSettings, measurement::Place};
 
-/// Settings of a tracker. The defaults are tuned on simulated walks (`docs/count-accuracy.md`).
+/// Settings of a tracker. The defaults are tuned on simulated walks (`docs/lab/count-accuracy.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TrackerSettings {

@@ -20,6 +20,7 @@ pub(crate) fn with_score(x: f64, y: f64, score: f64) -> Observation {
         centre_px: px,
         foot_px: px,
         score,
+        is_in_margin: false,
     }
 }
 

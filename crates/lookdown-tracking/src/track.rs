@@ -27,6 +27,9 @@ pub struct Track {
     confirmed: bool,
     last_person: PersonOfReport,
     foot_px: [f64; 2],
+    /// True while the last person was in the margin of an area.
+    #[serde(default)]
+    in_margin: bool,
     /// The time of the last person of each camera that saw the track.
     pub(super) seen_by: BTreeMap<usize, f64>,
     tail: VecDeque<TailPoint>,
@@ -89,6 +92,7 @@ impl Track {
             confirmed: false,
             last_person: seen.source,
             foot_px: seen.person.foot_px,
+            in_margin: seen.person.is_in_margin,
             seen_by: BTreeMap::new(),
             tail: VecDeque::new(),
         };
@@ -117,6 +121,7 @@ impl Track {
         self.seen_s = self.seen_s.max(seen.at_s);
         self.last_person = seen.source;
         self.foot_px = seen.person.foot_px;
+        self.in_margin = seen.person.is_in_margin;
         self.seen_by.insert(seen.source.camera, seen.at_s);
         if self.tail.len() == MAX_TAIL_POINTS {
             self.tail.pop_front();
@@ -138,6 +143,13 @@ impl Track {
     #[must_use]
     pub fn is_confirmed(&self) -> bool {
         self.confirmed
+    }
+
+    /// Returns true if the track counts: it is confirmed, and its last person was not in the margin
+    /// of an area.
+    #[must_use]
+    pub fn counts(&self) -> bool {
+        self.confirmed && !self.in_margin
     }
 
     /// Returns the time of the first observation, seconds since the Unix epoch.

@@ -1,5 +1,6 @@
 //! The tracker: association of each report's persons with the tracks.
 
+use lookdown_lens::geometry::Polygon;
 use serde::{Deserialize, Serialize};
 
 use crate::{CameraPose, Observation};
@@ -87,6 +88,7 @@ impl Tracker {
         let camera = |&pose| Camera {
             pose,
             last_report_s: None,
+            areas: Vec::new(),
         };
         Ok(Self {
             settings,
@@ -96,6 +98,14 @@ impl Tracker {
             next_id: 1,
             newest_report_s: None,
         })
+    }
+
+    /// Limits the reports of a camera to areas on the floor of the site: it misses no person elsewhere.
+    /// Not stored.
+    pub fn limit(&mut self, camera: usize, areas: Vec<Polygon>) {
+        if let Some(camera) = self.cameras.get_mut(camera) {
+            camera.areas = areas;
+        }
     }
 
     /// Updates the tracks with the persons of one frame of the camera number `camera`, captured at

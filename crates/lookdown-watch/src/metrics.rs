@@ -3,7 +3,9 @@
 use std::{sync::Arc, time::Instant};
 
 use parking_lot::Mutex;
-use prometheus::{Encoder, GaugeVec, IntCounter, IntCounterVec, Opts, Registry, TextEncoder};
+use prometheus::{
+    Encoder, GaugeVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry, TextEncoder,
+};
 
 /// The reason why a frame did not become a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,6 +47,8 @@ pub struct Metrics {
     skipped: IntCounterVec,
     failed: IntCounterVec,
     reconnects: IntCounterVec,
+    /// Open connections of clients.
+    pub(crate) connections: IntGauge,
     cameras: Mutex<Vec<Arc<CameraMetrics>>>,
 }
 
@@ -80,8 +84,11 @@ impl Metrics {
             of_camera,
         )?;
         registry.register(Box::new(age.clone()))?;
+        let connections = IntGauge::new("connections", "Open connections of clients.")?;
+        registry.register(Box::new(connections.clone()))?;
         Ok(Self {
             age,
+            connections,
             received: counter(
                 "frames_received_total",
                 "Whole frames of the camera.",

@@ -19,7 +19,8 @@ use crate::{
     slot::{Slot, Writer},
     source,
 };
-use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry, http_server};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry};
+use lookdown_http::server::bind;
 
 /// Interval of the checks for a changed file.
 const FILE_CHECK: Duration = Duration::from_secs(2);
@@ -67,7 +68,7 @@ pub async fn watch(
     let metrics = Arc::new(Metrics::new()?);
     let listener = match metrics_listen {
         Some(address) => Some(
-            http_server::bind("--metrics-listen", address)
+            bind("--metrics-listen", address)
                 .await
                 .map_err(WatchError::Address)?,
         ),

@@ -4,14 +4,14 @@
 
 use std::sync::Arc;
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header::AUTHORIZATION};
+use axum::http::HeaderMap;
+use lookdown_http::{
+    csrf::{AllowedOrigins, Remedies},
+    keys::{only_key, presented},
+};
 
 use super::problem::{Problem, ProblemKind};
 use crate::access::{AccessKeys, Holder, Scope};
-
-/// The header that holds a key alone.
-pub(in crate::api) const API_KEY: HeaderName = HeaderName::from_static("x-api-key");
-const BEARER: &[u8] = b"bearer ";
 
 /// The access rules of the server.
 #[derive(Debug, Clone)]
@@ -47,7 +47,7 @@ impl Access {
         let Self::Keys(keys) = self else {
             return Ok(None);
         };
-        let key = only_key(shown_keys(headers).chain(in_form.map(str::as_bytes)))?;
+        let key = only_key(presented(headers).chain(in_form.map(str::as_bytes)))?;
         let holder = keys.holder_of(key).ok_or_else(|| {
             let detail = "the key is not valid: it was mistyped, or the server's operator \
                           has removed it";
@@ -64,6 +64,27 @@ impl Access {
         Err(Problem::new(ProblemKind::Forbidden, detail))
     }
 
+    /// Returns the origins that may make changes; `None` if there are keys.
+    pub(in crate::api) fn allowed_origins(
+        &self,
+        cors_origins: &[String],
+        hosts: &[String],
+    ) -> Option<AllowedOrigins> {
+        match self {
+            Self::Open { own_machine_only } => Some(AllowedOrigins {
+                own_machine_only: *own_machine_only,
+                allowed: cors_origins.into(),
+                hosts: hosts.into(),
+                remedies: Remedies {
+                    keys: "access.keys_file",
+                    hosts: "add the name to access.hosts",
+                    origins: "add a trusted origin to access.cors_origins",
+                },
+            }),
+            Self::Keys(_) => None,
+        }
+    }
+
     /// Returns `true` if every request needs a key.
     pub(in crate::api) fn needs_keys(&self) -> bool {
         matches!(self, Self::Keys(_))
@@ -73,7 +94,7 @@ impl Access {
     pub(in crate::api) fn holder(&self, headers: &HeaderMap) -> Option<Holder> {
         match self {
             Self::Open { .. } => None,
-            Self::Keys(keys) => keys.holder_of(only_key(shown_keys(headers)).ok()?),
+            Self::Keys(keys) => keys.holder_of(only_key(presented(headers)).ok()?),
         }
     }
 
@@ -99,34 +120,5 @@ impl Access {
 
 /// Returns `true` if these headers hold any key, valid or not.
 pub(in crate::api) fn shows_key(headers: &HeaderMap) -> bool {
-    shown_keys(headers).next().is_some()
-}
-
-/// Returns the keys in the headers. Other schemes of `Authorization` are ignored: they may be meant
-/// for a proxy.
-fn shown_keys(headers: &HeaderMap) -> impl Iterator<Item = &[u8]> {
-    let bearers = headers.get_all(AUTHORIZATION).iter().filter_map(|value| {
-        let (scheme, key) = value.as_bytes().split_at_checked(BEARER.len())?;
-        scheme
-            .eq_ignore_ascii_case(BEARER)
-            .then(|| key.trim_ascii())
-    });
-    let plain = headers.get_all(API_KEY).iter();
-    bearers.chain(plain.map(HeaderValue::as_bytes))
-}
-
-/// Returns the single key of a request.
-fn only_key<'a>(mut keys: impl Iterator<Item = &'a [u8]>) -> Result<&'a [u8], Problem> {
-    match (keys.next(), keys.next()) {
-        (Some(key), None) => Ok(key),
-        (None, _) => Err(Problem::new(
-            ProblemKind::KeyRequired,
-            "the request needs a key: send it as Authorization: Bearer KEY or as X-API-Key: KEY",
-        )),
-        (Some(_), Some(_)) => Err(Problem::new(
-            ProblemKind::KeyRequired,
-            "more than one key was sent: send one, as Authorization: Bearer KEY or as X-API-Key: \
-             KEY",
-        )),
-    }
+    presented(headers).next().is_some()
 }

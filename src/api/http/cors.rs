@@ -7,13 +7,10 @@ use axum::http::{
         WWW_AUTHENTICATE,
     },
 };
+use lookdown_http::{keys::API_KEY, request_id};
 use tower_http::cors::CorsLayer;
 
-use super::{
-    access::API_KEY,
-    rate_limit::{RATE_LIMIT, RATE_LIMIT_POLICY},
-    request_id,
-};
+use super::rate_limit::{RATE_LIMIT, RATE_LIMIT_POLICY};
 
 /// Returns the CORS layer for these origins; `None` if there are none. `sent` and `read` are the
 /// headers of the routes that a page may send and read, besides the common ones.

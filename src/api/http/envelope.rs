@@ -9,14 +9,14 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use lookdown_http::{
+    page_headers,
+    request_id::{self, RequestId},
+};
 use tracing::Instrument;
 use uuid::Uuid;
 
-use super::{
-    incoming_trace, page_headers,
-    problem::Problem,
-    request_id::{self, RequestId},
-};
+use super::{incoming_trace, problem::Problem};
 use crate::{
     metrics::Metrics,
     telemetry::{RequestTrace, Tracer},

@@ -16,12 +16,11 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use serde::Serialize;
 use serde_json::Value;
-use utoipa::ToSchema;
 use uuid::Uuid;
 
 pub(in crate::api) use kind::ProblemKind;
+pub(in crate::api) use lookdown_http::problem::ProblemBody;
 
 /// The longest `Retry-After`.
 const MAX_RETRY_AFTER_SECONDS: u64 = 60;
@@ -100,6 +99,12 @@ impl Problem {
     ) -> Option<Self> {
         if let Some(problem) = response.extensions_mut().remove::<Self>() {
             return Some(problem);
+        }
+        if let Some(problem) = response
+            .extensions_mut()
+            .remove::<lookdown_http::problem::Problem>()
+        {
+            return Some(problem.into());
         }
         match response.status() {
             StatusCode::NOT_FOUND => Some(Self::new(
@@ -189,6 +194,17 @@ impl Problem {
     }
 }
 
+/// The problems of the layers that all listeners share have the kinds of the table.
+impl From<lookdown_http::problem::Problem> for Problem {
+    fn from(problem: lookdown_http::problem::Problem) -> Self {
+        let kind = ProblemKind::from_name(problem.kind.name()).unwrap_or(ProblemKind::Internal);
+        Self {
+            parameter: problem.parameter,
+            ..Self::new(kind, problem.detail)
+        }
+    }
+}
+
 /// Status and headers; the envelope writes the body.
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
@@ -205,44 +221,6 @@ impl IntoResponse for Problem {
         response.extensions_mut().insert(self);
         response
     }
-}
-
-/// The reason why a request failed (RFC 9457).
-#[derive(Debug, Serialize, ToSchema)]
-#[schema(as = Problem, example = json!({
-    "type": "/problems/invalid-parameter",
-    "title": "Invalid parameter",
-    "status": 422,
-    "detail": "score_threshold: 1.5 is outside 0 to 1",
-    "instance": "urn:uuid:0197a3c5-8f0e-7c3e-9a55-2f8e4b1d6c71",
-    "error": "score_threshold: 1.5 is outside 0 to 1",
-    "parameter": "score_threshold",
-    "request_id": "0197a3c5-8f0e-7c3e-9a55-2f8e4b1d6c70"
-}))]
-pub(in crate::api) struct ProblemBody {
-    /// Identifies the kind of problem: the path of its documentation on this server. Stable.
-    #[schema(format = "uri-reference")]
-    r#type: String,
-    /// The kind of problem in words.
-    title: &'static str,
-    /// The HTTP status.
-    status: u16,
-    /// The fault of this request and its remedy, as one sentence.
-    detail: String,
-    /// Identifies this occurrence, also in the server's log.
-    #[schema(format = "uri")]
-    instance: String,
-    /// The same as `detail`, for clients that expect it here.
-    error: String,
-    /// Identifies the request: the client's own `X-Request-Id`, or a generated one.
-    request_id: String,
-    /// The parameter, form field or field of the calibration at fault; absent where none is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    parameter: Option<String>,
-    #[serde(flatten)]
-    #[schema(ignore)]
-    members: BTreeMap<&'static str, Value>,
 }
 /// Names the resource that a client probably means, or the header with the methods.
 fn remedy_for_method(method: &str, path: &str) -> String {

@@ -49,8 +49,13 @@ impl From<&DetectionReport> for Report {
                 unchanged: report.views.unchanged,
                 outside: report.views.outside,
                 masked: report.views.masked,
+                outside_areas: report.views.outside_areas,
             },
             persons: report.persons.iter().map(ReportPerson::from).collect(),
+            margin: report.margin.as_ref().map(|margin| {
+                let margin = margin.iter();
+                margin.map(ReportPerson::from).collect()
+            }),
             zones: (!report.zones.is_empty()).then(|| {
                 let zones = report.zones.iter();
                 zones.map(ReportZone::from).collect()

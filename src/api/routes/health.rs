@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 use crate::{
     api::{ApiState, http::problem::Problem, require_scope::RequireRead},
     calibration_store::CalibrationsHealth,
+    results::Headline,
 };
 
 /// Largest number of invalid files in a response.
@@ -149,7 +150,7 @@ pub(in crate::api) async fn metrics(
     State(state): State<ApiState>,
 ) -> Result<impl IntoResponse, Problem> {
     read_gauges(&state).await;
-    forget_cameras(&state).await;
+    read_cameras(&state).await;
     let text = state.metrics.render().map_err(Problem::internal)?;
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
@@ -175,10 +176,22 @@ async fn read_gauges(state: &ApiState) {
     }
 }
 
-/// Removes the metrics of cameras without a stored report.
-async fn forget_cameras(state: &ApiState) {
-    let has_cameras = state.options.zone_metrics || state.options.camera_metrics;
-    if has_cameras && let Ok(cameras) = state.results.cameras().await {
-        state.metrics.retain_cameras(&cameras);
+/// Sets the metrics of the cameras in the result store, and removes those of others.
+async fn read_cameras(state: &ApiState) {
+    if !(state.options.zone_metrics || state.options.camera_metrics) {
+        return;
+    }
+    let Ok(latest) = state.results.latest_of_all().await else {
+        return;
+    };
+    let cameras = latest.iter().map(|report| report.report.camera.clone());
+    state.metrics.retain_cameras(&cameras.collect::<Vec<_>>());
+    for report in latest.iter().filter(|_| state.options.camera_metrics) {
+        let Ok(headline) = Headline::of(&*state.results, report).await else {
+            return;
+        };
+        let at = report.id.time().as_duration().as_secs_f64();
+        let camera = &report.report.camera;
+        state.metrics.set_camera(camera, headline.persons, at);
     }
 }

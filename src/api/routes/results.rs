@@ -5,6 +5,7 @@ mod address;
 pub(in crate::api) mod delete;
 pub(in crate::api) mod events;
 mod feed;
+pub(in crate::api) mod followed;
 pub(in crate::api) mod history;
 pub(in crate::api) mod latest;
 pub(in crate::api) mod picture;
@@ -26,7 +27,7 @@ use crate::{
         http::problem::{Problem, ProblemKind},
         require_scope::RequireRead,
     },
-    results::{ListenError, Unreachable},
+    results::{Headline, ListenError, Unreachable},
 };
 
 /// Clients may cache the response, but must revalidate it before use.
@@ -34,7 +35,7 @@ const NO_CACHE: HeaderValue = HeaderValue::from_static("no-cache");
 
 /// List cameras with reports
 ///
-/// Each entry has the age of the latest report and its number of persons.
+/// Each entry has the age of the latest report and the number of persons there now.
 #[utoipa::path(
     get, path = "/results", tag = "results", operation_id = "list_results",
     security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
@@ -46,10 +47,11 @@ pub(in crate::api) async fn list(
 ) -> Result<impl IntoResponse, Problem> {
     let now = Timestamp::now();
     let latest = state.results.latest_of_all().await?;
-    let mut rows: Vec<_> = latest
-        .iter()
-        .map(|report| CameraRow::at(report, now))
-        .collect();
+    let mut rows = Vec::with_capacity(latest.len());
+    for report in &latest {
+        let headline = Headline::of(&*state.results, report).await?;
+        rows.push(CameraRow::at(report, headline, now));
+    }
     rows.sort_unstable_by(|one, other| one.camera.cmp(&other.camera));
     Ok(([(CACHE_CONTROL, NO_CACHE)], Json(rows)))
 }

@@ -14,6 +14,7 @@ use axum::{
     response::{IntoResponse, Response},
     routing::get,
 };
+use lookdown_http::page_headers;
 use lookdown_lens::revision::revision_of;
 
 use serde::Serialize;
@@ -22,9 +23,9 @@ use crate::api::{
     ApiState,
     http::{
         entity_tags::{entity_tag, is_unmodified},
-        page_headers,
         problem::{Problem, ProblemKind},
     },
+    require_scope::RequireAdmin,
 };
 
 /// A file of the page.
@@ -55,6 +56,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "panels.css" from "web",
         "zones.css" from "web",
         "icon.svg" from "web",
+        "ignore_place.js" from "web",
         "main.js" from "web",
         "dom.js" from "web",
         "server.js" from "web",
@@ -116,6 +118,8 @@ impl Asset {
 struct PageOptions<'a> {
     /// The path of `lookdown count` on this origin.
     counts_path: Option<&'a str>,
+    /// True if the request may change calibrations.
+    can_change: bool,
 }
 
 /// Returns the routes of the page and its files.
@@ -124,10 +128,13 @@ pub(in crate::api) fn router() -> Router<ApiState> {
     let asset = async |Path(name): Path<String>, uri: Uri, headers: HeaderMap| {
         answer(&name, &headers, uri.path())
     };
-    let options = async |State(state): State<ApiState>| {
-        let counts_path = state.options.page_counts_path.as_deref();
+    let options = async |State(state): State<ApiState>, headers: HeaderMap| {
+        let options = PageOptions {
+            counts_path: state.options.page_counts_path.as_deref(),
+            can_change: RequireAdmin::check(&state, &headers).is_ok(),
+        };
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];
-        (no_store, Json(PageOptions { counts_path })).into_response()
+        (no_store, Json(options)).into_response()
     };
     Router::new()
         .route("/", get(page))

@@ -76,6 +76,8 @@ fn entry(
             zones: described.zones,
             lines: described.lines,
             masks: described.masks,
+            areas: described.areas,
+            ignore: described.ignore,
             detect: described.detect,
         },
         defaults,

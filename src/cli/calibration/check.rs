@@ -11,7 +11,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use lookdown_detect::imaging::{
     MaskedPixels,
-    annotate::{encode_jpeg, sketch_areas, sketch_lens, sketch_lines},
+    annotate::{encode_jpeg, sketch_areas, sketch_foot_filter, sketch_lens, sketch_lines},
 };
 use lookdown_lens::{
     calibration::{Areas, Calibration, CameraGeometry},
@@ -182,6 +182,7 @@ fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, Strin
         zones,
         lines,
         masks,
+        foot_filter,
     } = calibration.areas();
     let names = zones.iter().map(|zone| match zone.area {
         ZoneArea::Frame(_) => format!("{} (in the frame)", zone.name),
@@ -203,7 +204,21 @@ fn areas(calibration: &Calibration) -> impl Iterator<Item = (&'static str, Strin
         let text = format!("{}, which hide {percent:.1} % of the frame", masks.len());
         ("  masks", text)
     });
-    zones.into_iter().chain(lines).chain(masks)
+    let counted = |title, areas: &[ZoneArea]| {
+        let on_floor = areas
+            .iter()
+            .filter(|area| matches!(area, ZoneArea::Floor(_)));
+        let on_floor = on_floor.count();
+        let text = format!(
+            "{on_floor} on the floor, {} in the frame",
+            areas.len() - on_floor
+        );
+        (!areas.is_empty()).then_some((title, text))
+    };
+    let areas = counted("  areas", &foot_filter.areas);
+    let ignore = counted("  ignore", &foot_filter.ignore);
+    let places = areas.into_iter().chain(ignore);
+    zones.into_iter().chain(lines).chain(masks).chain(places)
 }
 
 fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<()> {
@@ -219,6 +234,7 @@ fn draw(calibration: &Calibration, frame: &Path, out: &Path) -> anyhow::Result<(
     };
     let CameraGeometry { lens, mount, areas } = &geometry;
     sketch_areas(&mut picture, &areas.zones, &areas.masks, lens, mount);
+    sketch_foot_filter(&mut picture, &areas.foot_filter, lens, mount);
     sketch_lines(&mut picture, &areas.lines, lens, mount);
     sketch_lens(&mut picture, lens, &views(calibration));
     fs::write(out, encode_jpeg(&picture, JPEG_QUALITY)?)

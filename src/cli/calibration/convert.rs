@@ -56,6 +56,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         zones: stated.zones,
         lines: stated.lines,
         masks: stated.masks,
+        areas: stated.areas,
+        ignore: stated.ignore,
         detect: stated.detect,
     })?;
     let notes = stated.notes.iter().map(ToString::to_string);

@@ -144,6 +144,8 @@ fn calibration(
         zones: Vec::new(),
         lines: Vec::new(),
         masks: Vec::new(),
+        areas: Vec::new(),
+        ignore: Vec::new(),
         detect: BTreeMap::new(),
     })
 }

@@ -35,7 +35,12 @@ fn report(camera: &str, persons: usize, zones: &str) -> StoredReport {
 }
 
 fn update(cameras: &mut Cameras, report: &StoredReport) -> Vec<Message> {
-    cameras.update(report, Duration::ZERO, Instant::now())
+    cameras.update(
+        report,
+        report.report.persons,
+        Duration::ZERO,
+        Instant::now(),
+    )
 }
 
 /// Topic and payload of all messages that are no announcements, and the number of announcements.
@@ -65,13 +70,17 @@ fn the_first_report_announces_a_camera_and_each_updates_it() {
     let wanted = expected(&[
         ("lobby/attributes", NO_ATTRIBUTES),
         ("lobby/persons", "2"),
+        ("lobby/frame_persons", "2"),
         ("lobby/occupancy", "ON"),
         ("lobby/availability", "online"),
         ("lobby/report", "{\"camera\":\"lobby\"}"),
     ]);
-    assert_eq!(published(&messages), (wanted, 2));
+    assert_eq!(published(&messages), (wanted, 3));
     let kept: Vec<_> = messages.iter().map(|message| message.retained).collect();
-    assert_eq!(kept, [true, true, true, true, true, true, false]);
+    assert_eq!(
+        kept,
+        [true, true, true, true, true, true, true, true, false]
+    );
 
     let (published, announcements) = published(&update(&mut cameras, &report("lobby", 0, "")));
     assert_eq!((published[0].1.as_str(), announcements), ("0", 0));
@@ -82,14 +91,14 @@ fn zones_come_and_go_with_the_calibration() {
     let mut cameras = cameras(10);
     let zones = ",\"zones\":[{\"name\":\"door\",\"persons\":1},{\"name\":\"till\",\"persons\":0}]";
     let (first, announcements) = published(&update(&mut cameras, &report("lobby", 1, zones)));
-    assert_eq!(announcements, 6);
+    assert_eq!(announcements, 7);
     let wanted = expected(&[
         ("lobby/zones/door", "1"),
         ("lobby/zones/door/occupancy", "ON"),
         ("lobby/zones/till", "0"),
         ("lobby/zones/till/occupancy", "OFF"),
     ]);
-    assert_eq!(first[3..7], wanted);
+    assert_eq!(first[4..8], wanted);
 
     let zones = ",\"zones\":[{\"name\":\"till\",\"persons\":1}]";
     let messages = update(&mut cameras, &report("lobby", 1, zones));
@@ -102,7 +111,7 @@ fn zones_come_and_go_with_the_calibration() {
         "lookdown/cameras/lobby/zones/door/occupancy",
     ];
     assert_eq!(removed, BTreeSet::from(wanted));
-    assert_eq!(published(&messages).1, 2 + 4);
+    assert_eq!(published(&messages).1, 2 + 5);
 }
 
 #[test]
@@ -114,9 +123,9 @@ fn retained_messages_are_repeated_without_reports() {
     let messages = cameras.all(Instant::now());
     assert!(messages.iter().all(|message| message.retained));
     let (published, announcements) = published(&messages);
-    assert_eq!((published.len(), announcements), (8, 4));
+    assert_eq!((published.len(), announcements), (10, 6));
     assert_eq!(published[1], expected(&[("gate/persons", "3")])[0]);
-    assert_eq!(published[5], expected(&[("lobby/persons", "2")])[0]);
+    assert_eq!(published[6], expected(&[("lobby/persons", "2")])[0]);
 }
 
 #[test]
@@ -134,7 +143,7 @@ fn attributes_are_published_when_they_change() {
         (found.map(|(_, payload)| payload), announcements)
     };
     let fast = r#"{"calibration":"hall","model":"yolox","profile":"fast"}"#;
-    assert_eq!(attributes("fast"), (Some(fast.to_owned()), 2));
+    assert_eq!(attributes("fast"), (Some(fast.to_owned()), 3));
     assert_eq!(attributes("fast"), (None, 0));
     let careful = fast.replace("fast", "careful");
     assert_eq!(attributes("careful"), (Some(careful), 0));
@@ -148,16 +157,16 @@ fn only_the_first_cameras_up_to_the_limit_are_published() {
         assert_eq!(published, camera != "c", "{camera}");
     }
     assert!(!update(&mut cameras, &report("a", 2, "")).is_empty());
-    assert_eq!(published(&cameras.all(Instant::now())).0.len(), 8);
+    assert_eq!(published(&cameras.all(Instant::now())).0.len(), 10);
 }
 
 #[test]
 fn occupancy_ends_after_the_hold_availability_at_expiry() {
     let (mut cameras, begin) = (cameras(10), Instant::now());
-    cameras.update(&report("lobby", 1, ""), Duration::ZERO, begin);
+    cameras.update(&report("lobby", 1, ""), 1, Duration::ZERO, begin);
     assert_eq!(cameras.next_change(), Some(begin + EXPIRY));
-    let messages = cameras.update(&report("lobby", 0, ""), Duration::ZERO, begin);
-    assert_eq!(published(&messages).0[1].1, "ON");
+    let messages = cameras.update(&report("lobby", 0, ""), 0, Duration::ZERO, begin);
+    assert_eq!(published(&messages).0[2].1, "ON");
     assert_eq!(cameras.next_change(), Some(begin + HOLD));
     assert!(cameras.expire(begin).is_empty());
     let messages = published(&cameras.expire(begin + HOLD)).0;
@@ -166,9 +175,9 @@ fn occupancy_ends_after_the_hold_availability_at_expiry() {
     assert_eq!(messages, expected(&[("lobby/availability", "offline")]));
     assert_eq!(cameras.next_change(), None);
     let messages = update(&mut cameras, &report("lobby", 0, ""));
-    assert_eq!(published(&messages).0[2].1, "online");
-    let messages = cameras.update(&report("gate", 0, ""), EXPIRY, begin);
-    assert_eq!(published(&messages).0[3].1, "offline");
+    assert_eq!(published(&messages).0[3].1, "online");
+    let messages = cameras.update(&report("gate", 0, ""), 0, EXPIRY, begin);
+    assert_eq!(published(&messages).0[4].1, "offline");
 }
 
 #[test]
@@ -222,12 +231,14 @@ fn unknown_retained_cameras_are_withdrawn_after_a_time() {
         "homeassistant/binary_sensor/lookdown_old_occupancy/config",
         "homeassistant/binary_sensor/lookdown_old_zone_door_occupancy/config",
         "homeassistant/sensor/lookdown_lobby_zone_gone/config",
+        "homeassistant/sensor/lookdown_old_frame_persons/config",
         "homeassistant/sensor/lookdown_old_persons/config",
         "homeassistant/sensor/lookdown_old_zone_door/config",
         "lookdown/cameras/lobby/zones/gone",
         "lookdown/cameras/lobby/zones/gone/occupancy",
         "lookdown/cameras/old/attributes",
         "lookdown/cameras/old/availability",
+        "lookdown/cameras/old/frame_persons",
         "lookdown/cameras/old/occupancy",
         "lookdown/cameras/old/persons",
         "lookdown/cameras/old/zones/door",
@@ -236,4 +247,19 @@ fn unknown_retained_cameras_are_withdrawn_after_a_time() {
     assert_eq!(removed, BTreeSet::from(wanted));
     // Later, retained messages are ignored.
     assert_eq!(cameras.compare(&topics.persons("late"), b"1", true), None);
+}
+
+#[test]
+fn headline_number_is_published_beside_that_of_the_frame() {
+    let (mut cameras, now) = (cameras(10), Instant::now());
+    let messages = cameras.update(&report("lobby", 9, ""), 5, Duration::ZERO, now);
+    let published_now = published(&messages).0;
+    for expected in expected(&[("lobby/persons", "5"), ("lobby/frame_persons", "9")]) {
+        assert!(published_now.contains(&expected), "{published_now:?}");
+    }
+    assert_eq!(cameras.available(), ["lobby"]);
+    assert!(cameras.set_persons("lobby", 5, now).is_empty());
+    let followed = published(&cameras.set_persons("lobby", 6, now)).0;
+    assert_eq!(followed[0], expected(&[("lobby/persons", "6")])[0]);
+    assert!(cameras.set_persons("unknown", 6, now).is_empty());
 }

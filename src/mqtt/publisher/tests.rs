@@ -110,7 +110,11 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     assert_eq!(heard(&mut client).await, said(status, "online", true));
 
     setup.results.publish(report(2), None);
-    let configs = [heard(&mut client).await, heard(&mut client).await];
+    let configs = [
+        heard(&mut client).await,
+        heard(&mut client).await,
+        heard(&mut client).await,
+    ];
     assert!(
         configs
             .iter()
@@ -120,9 +124,10 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     let none = r#"{"calibration":null,"model":null,"profile":null}"#;
     let attributes = said(&format!("{camera}/attributes"), none, true);
     let count = said(&format!("{camera}/persons"), "2", true);
+    let frame = said(&format!("{camera}/frame_persons"), "2", true);
     let occupancy = said(&format!("{camera}/occupancy"), "ON", true);
     let availability = said(&format!("{camera}/availability"), "online", true);
-    for expected in [&attributes, &count, &occupancy, &availability] {
+    for expected in [&attributes, &count, &frame, &occupancy, &availability] {
         assert_eq!(heard(&mut client).await, *expected);
     }
     assert_eq!(
@@ -138,12 +143,12 @@ async fn a_connection_begins_with_a_will_and_ends_with_a_farewell() {
     for config in configs {
         assert_eq!(heard(&mut client).await, config);
     }
-    for expected in [&attributes, &count, &occupancy, &availability] {
+    for expected in [&attributes, &count, &frame, &occupancy, &availability] {
         assert_eq!(heard(&mut client).await, *expected);
     }
     // Home Assistant withdraws a camera whose reports are deleted.
     assert!(setup.results.delete("lobby").await.unwrap());
-    for _ in 0..6 {
+    for _ in 0..8 {
         let (_, payload, is_retained) = heard(&mut client).await;
         assert!(payload.is_empty() && is_retained);
     }
@@ -201,12 +206,12 @@ async fn a_new_connection_publishes_the_current_state() {
     let (mut client, _) = accept(&setup.listener).await;
     welcome(&mut client).await;
     let mut said = Vec::new();
-    while said.len() < 5 {
+    while said.len() < 6 {
         said.push(heard(&mut client).await);
     }
     assert_eq!(said[0].1, "online");
     assert_eq!(
-        said[4],
+        said[5],
         (
             "lookdown/cameras/lobby/persons".to_owned(),
             "7".to_owned(),

@@ -56,6 +56,11 @@ impl Keys {
         self.prefix_of_pictures() + camera
     }
 
+    /// The followed number of a camera: the number, a space, and its time in microseconds.
+    pub(super) fn followed(&self, camera: &str) -> String {
+        self.key("followed:") + camera
+    }
+
     /// The prefix of the keys of all images.
     pub(super) fn prefix_of_pictures(&self) -> String {
         self.key("picture:")

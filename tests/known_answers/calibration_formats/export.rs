@@ -153,6 +153,8 @@ fn a_native_file_keeps_everything() {
         zones: read_back.zones,
         lines: Vec::new(),
         masks: read_back.masks,
+        areas: read_back.areas,
+        ignore: read_back.ignore,
         detect: read_back.detect,
     };
     let written = Target::Native.write(&native).unwrap().content;

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 REAL = Path(__file__).resolve().parents[1]
-for folder in (REAL, REAL.parent / "reliability", REAL.parents[1] / "benches"):
+for folder in (REAL, REAL.parent / "reliability", REAL.parents[1] / "lab/benches"):
     sys.path.insert(0, str(folder))
 
 from harness.places import LOOKDOWN, ROOT, SAMPLES  # noqa: E402

@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { personsIn } from "../../../web/area_counts.js";
 import { AreaEditor } from "../../../web/area_editor.js";
+import { assumedFile, withIgnored } from "../../../web/ignore_place.js";
 import { areaOf, areasOf, freeName, movedBy, placed, problemOf, titleOf, withAreas } from "../../../web/areas.js";
 
 const FRAME = [0, 0, 100, 100];
@@ -14,12 +15,14 @@ const FILE = {
   zones: [{ name: "till", frame_px: SQUARE }, { name: "door", floor_m: [[1, 1], [2, 1], [2, 2]] }],
   lines: [{ name: "gate", frame_px: [[0, 50], [100, 50]], directions: ["enter", "leave"] }],
   masks: [{ frame_px: SQUARE }],
+  areas: [{ floor_m: [[-3, -3], [3, -3], [3, 3]] }],
+  ignore: [{ name: "chair", frame_px: SQUARE }],
   detect: { profile: "fast" },
 };
 
 test("areas survive reading and writing, with the rest of the file", () => {
   assert.deepEqual(withAreas(FILE, areasOf(FILE)), FILE);
-  const { zones: _, lines: __, masks: ___, ...rest } = FILE;
+  const { zones: _, lines: __, masks: ___, areas: ____, ignore: _____, ...rest } = FILE;
   assert.deepEqual(withAreas(FILE, []), rest);
 });
 
@@ -30,6 +33,9 @@ test("a problem of the server names its area", () => {
   assert.equal(problem.text, 'Another zone is called "a", too: rename one.');
   assert.equal(problemOf("lines[0].directions: both are \"in\": rename one", areas).key, areas[2].key);
   assert.equal(problemOf("masks[0].frame_px: it has 2 corners: give 3 to 64", areas).key, areas[3].key);
+  assert.equal(problemOf("areas[0].floor_m: it has 2 corners: give 3 to 64", areas).key, areas[4].key);
+  assert.equal(problemOf("ignore[0].name: it is \"A\"", areas).key, areas[5].key);
+  assert.deepEqual(areas.slice(3).map((area) => titleOf(area, areas)), ["mask 1", "area 1", "ignored place chair"]);
   assert.equal(problemOf("lens.focal: it is 0", areas), null);
 });
 
@@ -106,4 +112,26 @@ test("a zone counts feet in the frame, and places on the floor", () => {
   assert.equal(personsIn(zone("frame_px", [[35, 15], [45, 15], [45, 25], [35, 25]]), report, FILE.image), 0);
   assert.equal(personsIn(zone("floor_m", FILE.zones[1].floor_m), report, FILE.image), 1);
   assert.equal(personsIn(zone("floor_m", FILE.zones[1].floor_m), null, FILE.image), null);
+});
+
+test("the place of a person is ignored on the floor, or around the foot in the frame", () => {
+  const report = { image: { width: 200, height: 200 } };
+  const box = { cx: 150, cy: 100, width: 20, height: 60, angle_deg: 90 };
+  const person = { oriented_box: box, floor: { x_m: 1, y_m: 2 } };
+  const file = { id: "hall", image: { width: 100, height: 100 }, lens: { cx: 49.5, cy: 49.5 }, mount: { height_m: 3 } };
+  const [onFloor] = withIgnored(file, person, report).ignore;
+  assert.equal(onFloor.name, "ignore-1");
+  assert.ok(onFloor.floor_m.every(([x, y]) => Math.abs(Math.hypot(x - 1, y - 2) - 0.5) < 0.02));
+  const known = { ...file, mount: {}, ignore: [{ name: "ignore-1", frame_px: SQUARE }] };
+  const [first, second] = withIgnored(known, { ...person, floor: null }, report).ignore;
+  assert.deepEqual([first.name, second.name], ["ignore-1", "ignore-2"]);
+  // The foot is toward the middle: at 120, 100 of 200 pixels, thus at 60, 50 of 100.
+  assert.ok(second.frame_px.every(([x, y]) => Math.abs(Math.hypot(x - 60, y - 50) - 5) < 0.2), JSON.stringify(second));
+});
+
+test("an assumed lens becomes a calibration", () => {
+  const report = { image: { width: 200, height: 200 }, calibration: { assumed_circle: { cx: 100, cy: 100, radius: 90 } } };
+  const file = assumedFile("hall", report);
+  assert.deepEqual([file.id, file.lens.model, file.lens.cx, file.image], ["hall", "equidistant", 99.5, report.image]);
+  assert.ok(Math.abs(file.lens.focal * file.lens.max_theta - 90) < 1e-9);
 });

@@ -1,7 +1,8 @@
 /** The sections Views, Floor and Live, and the key. */
 
 import assert from "node:assert/strict";
-import { assertAccessible, detectSample, pageTest, post, reportAfter } from "./browser.js";
+import { readFile } from "node:fs/promises";
+import { SAMPLES, SERVER, assertAccessible, detectSample, pageTest, post, reportAfter } from "./browser.js";
 
 const go = (page, name) => page.getByRole("navigation").getByRole("link", { name }).click();
 
@@ -100,11 +101,40 @@ pageTest("a camera with kept images is shown with them", "#live", async (page) =
 
 pageTest("a later visitor sees earlier results", "", async (page) => {
   await post("yard", "office");
-  await post("yard", "lounge");
+  await post("yard", "lounge", "profile=fast&max_detections=1");
   await go(page, "Live");
   const card = page.getByRole("article", { name: "Camera yard" });
   await card.waitFor();
   assert.match(await card.locator(".plot .steps").getAttribute("d"), /V/);
+});
+
+pageTest("a click on a false box ignores its place, and Undo takes it back", "#live", async (page) => {
+  const address = (id) => `${SERVER}/calibrations/${id}`;
+  const stored = async (id) => (await fetch(address(id))).json();
+  const copy = JSON.stringify({ ...(await stored("office")), id: "stall" });
+  assert.ok((await fetch(address("stall"), { method: "PUT", body: copy })).ok);
+  const body = await readFile(`${SAMPLES}/office.jpg`);
+  const send = async (camera) => {
+    const answer = await fetch(`${SERVER}/detect?profile=fast&calibration=stall&camera=${camera}`, { method: "POST", body });
+    return answer.json();
+  };
+  const before = await send("stall");
+  const card = page.getByRole("article", { name: "Camera stall", exact: true });
+  await card.getByRole("button", { name: /^Ignore the place of person 1,/ }).dispatchEvent("pointerdown");
+  await card.getByText("The place is ignored from the next frame on.").waitFor();
+  assert.equal((await stored("stall")).ignore.length, 1);
+  assert.ok((await send("stall")).persons.length < before.persons.length);
+  await assertAccessible(page);
+  await card.getByRole("button", { name: "Undo" }).click();
+  await card.getByText("The place counts again.").waitFor();
+  assert.equal((await stored("stall")).ignore, undefined);
+  assert.equal((await send("stall")).persons.length, before.persons.length);
+  // A calibration that two cameras use becomes one of the camera's own.
+  await send("stall-2");
+  const second = page.getByRole("article", { name: "Camera stall-2" });
+  await second.getByRole("button", { name: /^Ignore the place of person 1,/ }).dispatchEvent("pointerdown");
+  await second.getByText("stall also use stall: stall-2 now has the calibration stall-2.").waitFor();
+  assert.deepEqual([(await stored("stall")).ignore, (await stored("stall-2")).ignore.length], [undefined, 1]);
 });
 
 /** Sends a frame of a named camera. Runs in the page. */

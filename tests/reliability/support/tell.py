@@ -1,4 +1,4 @@
-"""The stored rows as Markdown for docs/reliability.md."""
+"""The stored rows as Markdown for docs/lab/reliability.md."""
 
 import json
 from collections.abc import Iterable

@@ -6,12 +6,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The folders with the sources of the crates whose files are checked.
-pub const CRATES: [&str; 4] = [
-    "src",
-    "crates/lookdown-lens/src",
-    "crates/lookdown-detect/src",
-    "crates/lookdown-eval/src",
+/// The crates of the workspace with the folders of their sources.
+pub const CRATES: [(&str, &str); 11] = [
+    ("lookdown-common", "crates/lookdown-common/src"),
+    ("lookdown-lens", "crates/lookdown-lens/src"),
+    ("lookdown-tracking", "crates/lookdown-tracking/src"),
+    ("lookdown-detect", "crates/lookdown-detect/src"),
+    ("lookdown-eval", "crates/lookdown-eval/src"),
+    ("lookdown-watch", "crates/lookdown-watch/src"),
+    ("lookdown-count", "crates/lookdown-count/src"),
+    ("lookdown", "src"),
+    ("lookdown-python", "crates/lookdown-python/src"),
+    ("load", "lab/benches/load"),
+    ("simulate", "crates/lookdown-tracking/examples/simulate"),
 ];
 
 /// Every source file of a crate with its module path, such as `api::http::csrf`.
@@ -37,7 +44,17 @@ pub fn sources(root: &str) -> Vec<(String, PathBuf)> {
 
 /// The files of all crates.
 pub fn all_sources() -> Vec<(String, PathBuf)> {
-    CRATES.into_iter().flat_map(sources).collect()
+    CRATES
+        .into_iter()
+        .flat_map(|(_, root)| sources(root))
+        .collect()
+}
+
+/// Returns a file without its module of tests.
+pub fn without_tests(text: &str) -> &str {
+    text.split("#[cfg(test)]\nmod tests {")
+        .next()
+        .unwrap_or(text)
 }
 
 /// Returns the code of a file without comments.
@@ -62,11 +79,10 @@ pub fn absolute(module: &str, code: &str) -> String {
     code
 }
 
-/// The paths after `crate::` and after the names of the libraries, also in lists of imports.
+/// The paths after `crate::`, also in lists of imports.
 pub fn used_paths(code: &str) -> BTreeSet<String> {
     let mut used = BTreeSet::new();
-    let starts = ["crate::", "lookdown_lens::", "lookdown_detect::"];
-    for (start, name) in starts.iter().flat_map(|name| code.match_indices(name)) {
+    for (start, name) in code.match_indices("crate::") {
         let before = &code[..start];
         let ends_name = |c: char| c.is_alphanumeric() || c == '_' || c == '$';
         // A visibility is not a use.

@@ -17,11 +17,14 @@ use axum::{
 use jiff::Timestamp;
 use serde::Serialize;
 
-use super::{Problem, Shared, check_known, query, time::TimeParameters};
+use super::{Problem, Shared, blocking, check_known, query, time::TimeParameters};
 use crate::{
     store::{Span, Step},
     sums::{MINUTE_MS, Owner},
 };
+
+/// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at most.
+const MAX_VALUES: usize = 100_000;
 
 /// The counts of a camera or a site.
 #[derive(Debug, Serialize)]
@@ -111,13 +114,24 @@ async fn answer(
     check_known(api, &owner).await?;
     let names = current_names(api, &owner);
     let asked = owner.clone();
-    let sums = query(api, move |store| store.steps(&asked, span)).await?;
-    let counts = counts(owner, span, &sums, names);
-    if !is_csv {
-        return Ok(Json(counts).into_response());
-    }
-    let content_type = [(CONTENT_TYPE, "text/csv; charset=utf-8; header=present")];
-    Ok((content_type, csv(&counts)).into_response())
+    let sums = query(api, move |store| store.steps(&asked, span, MAX_VALUES)).await?;
+    let sums = sums.ok_or_else(too_large)?;
+    blocking(move || {
+        let counts = counts(owner, span, &sums, names).ok_or_else(too_large)?;
+        if !is_csv {
+            return Ok(Json(counts).into_response());
+        }
+        let content_type = [(CONTENT_TYPE, "text/csv; charset=utf-8; header=present")];
+        Ok((content_type, csv(&counts)).into_response())
+    })
+    .await
+}
+
+fn too_large() -> Problem {
+    Problem::of_parameter(
+        "step",
+        "the steps of this time have too many values: give a longer step, or a shorter time",
+    )
 }
 
 pub(super) fn unknown_parameter() -> Problem {
@@ -144,13 +158,19 @@ fn current_names(api: &Shared, owner: &Owner) -> Names {
     (lines.collect(), zones.collect())
 }
 
-fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) -> Counts {
+/// Returns the counts, or `None` if there are too many.
+fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) -> Option<Counts> {
     let (mut lines, mut zones) = names;
     for step in sums.values() {
         lines.extend(step.crossings.keys().cloned());
         zones.extend(step.zones.keys().cloned());
     }
     let count = (span.to - span.from + span.step - 1) / span.step;
+    let columns = 1 + lines.len() + zones.len();
+    let values = usize::try_from(count).ok()?.saturating_mul(columns);
+    if values > MAX_VALUES {
+        return None;
+    }
     let nothing = Step::default();
     let steps = (0..count).map(|number| {
         let from = span.from + number * span.step;
@@ -158,7 +178,7 @@ fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) ->
         let step = sums.get(&number).unwrap_or(&nothing);
         step_counts(step, (from, to), (&lines, &zones), &owner)
     });
-    Counts {
+    Some(Counts {
         from: time(span.from),
         to: time(span.to),
         step_seconds: span.step * 60,
@@ -171,7 +191,7 @@ fn counts(owner: Owner, span: Span, sums: &BTreeMap<i64, Step>, names: Names) ->
             Owner::Site(name) => Some(name),
             Owner::Camera(_) => None,
         },
-    }
+    })
 }
 
 fn step_counts(

@@ -9,7 +9,7 @@ use axum::{
 };
 use lookdown_tracking::Plane;
 
-use super::{Problem, Shared, check_known, now_ms};
+use super::{Problem, Shared, check_known, not_found, now_ms};
 use crate::{scene::Scene, sums::Owner};
 
 /// Least extent around a camera, metres.
@@ -25,8 +25,8 @@ pub(super) async fn svg(
     check_known(&api, &owner).await?;
     let engine = api.engine.lock();
     let Some(scene) = engine.site(&site) else {
-        let detail = "the site has no camera now: send frames of its cameras".to_owned();
-        return Err(Problem::not_found(detail));
+        let detail = "the site has no camera now: send frames of its cameras";
+        return Err(not_found(detail));
     };
     let last = scene.presence().last_ms;
     let is_current = last.is_some_and(|last| now_ms() - last <= engine.longest_gap_ms());

@@ -7,11 +7,11 @@ use axum::{
     response::Response,
 };
 use lookdown_tracking::heat_map::Cell;
-use tokio::task::spawn_blocking;
 
 use super::{
-    Problem, Shared,
+    Problem, Shared, blocking,
     heat_map::{Parameters, colour, image, stored},
+    not_found,
 };
 use crate::{definition::CameraDefinition, sums::Owner};
 
@@ -26,13 +26,14 @@ pub(super) async fn png(
     let (_, cells) = stored(&api, Owner::Camera(camera.clone()), parameters).await?;
     let definition = api.engine.lock().definition(&camera);
     let Some(definition) = definition.filter(|definition| definition.geometry.is_some()) else {
-        let detail = "the camera has no calibration now: send frames with one".to_owned();
-        return Err(Problem::not_found(detail));
+        let detail = "the camera has no calibration now: send frames with one";
+        return Err(not_found(detail));
     };
-    let drawn = spawn_blocking(move || drawn(&cells, &definition)).await;
-    // A task that panicked is logged by the panic hook.
-    let (pixels, height) = drawn.map_err(|_| Problem::internal())?;
-    image(&pixels, WIDTH as usize, height as usize)
+    blocking(move || {
+        let (pixels, height) = drawn(&cells, &definition);
+        image(&pixels, WIDTH as usize, height as usize)
+    })
+    .await
 }
 
 /// Draws the map, transparent without presence. Returns the pixels and the height.

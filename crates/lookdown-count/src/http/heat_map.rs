@@ -12,7 +12,9 @@ use jiff::Timestamp;
 use lookdown_tracking::heat_map::{CELL_M, Cell};
 use serde::Serialize;
 
-use super::{Problem, Shared, check_known, counts::unknown_parameter, query, time::TimeParameters};
+use super::{
+    Problem, Shared, blocking, check_known, counts::unknown_parameter, query, time::TimeParameters,
+};
 use crate::sums::{DAY_MS, MINUTE_MS, Owner};
 
 /// Most cells along a side of an answer: those with the most time decide.
@@ -60,7 +62,7 @@ pub(super) async fn png_of_camera(
     Path(camera): Path<String>,
     parameters: Parameters,
 ) -> Result<Response, Problem> {
-    png(&heat_map(&api, Owner::Camera(camera), parameters).await?)
+    png(heat_map(&api, Owner::Camera(camera), parameters).await?).await
 }
 
 pub(super) async fn png_of_site(
@@ -68,7 +70,7 @@ pub(super) async fn png_of_site(
     Path(site): Path<String>,
     parameters: Parameters,
 ) -> Result<Response, Problem> {
-    png(&heat_map(&api, Owner::Site(site), parameters).await?)
+    png(heat_map(&api, Owner::Site(site), parameters).await?).await
 }
 
 async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<HeatMap, Problem> {
@@ -77,7 +79,7 @@ async fn heat_map(api: &Shared, owner: Owner, parameters: Parameters) -> Result<
         let time = Timestamp::from_millisecond(milliseconds.div_euclid(DAY_MS) * DAY_MS);
         time.unwrap_or(Timestamp::UNIX_EPOCH)
     };
-    let (origin, seconds) = grid(&cells);
+    let (origin, seconds) = blocking(move || Ok(grid(&cells))).await?;
     Ok(HeatMap {
         from: day(time.0),
         to: day(time.1 + DAY_MS - 1),
@@ -151,8 +153,12 @@ fn grid(cells: &BTreeMap<Cell, u64>) -> (Cell, Vec<Vec<f64>>) {
     )
 }
 
+async fn png(map: HeatMap) -> Result<Response, Problem> {
+    blocking(move || drawn(&map)).await
+}
+
 /// Draws the map: transparent without presence, from blue to red with the logarithm of the time.
-fn png(map: &HeatMap) -> Result<Response, Problem> {
+fn drawn(map: &HeatMap) -> Result<Response, Problem> {
     let columns = map.seconds.first().map_or(1, Vec::len);
     let rows = map.seconds.len().max(1);
     let most = map.seconds.iter().flatten().copied().fold(0.0, f64::max);

@@ -65,12 +65,15 @@ impl Store {
         })
     }
 
-    /// Returns the sums of the steps of a time that have any, by the number of the step. Blocks.
+    /// Returns the sums of the steps of a time that have any, by the number of the step. `None` if
+    /// they have more values than `most`. Blocks.
     pub(crate) fn steps(
         &self,
         owner: &Owner,
         span: Span,
-    ) -> Result<BTreeMap<i64, Step>, StoreError> {
+        most: usize,
+    ) -> Result<Option<BTreeMap<i64, Step>>, StoreError> {
+        let mut values = 0;
         let connection = self.reader.lock();
         let Span { from, to, step } = span;
         let mut steps = BTreeMap::<i64, Step>::new();
@@ -87,7 +90,7 @@ impl Store {
             };
         }
         let Owner::Camera(camera) = owner else {
-            return Ok(steps);
+            return Ok(Some(steps));
         };
         let mut statement = connection.prepare_cached(
             "SELECT (minute - ?2) / ?4, line, direction, sum(crossings) FROM crossings
@@ -95,6 +98,10 @@ impl Store {
         )?;
         let mut rows = statement.query(params![camera, from, to, step])?;
         while let Some(row) = rows.next()? {
+            values += 1;
+            if values > most {
+                return Ok(None);
+            }
             let crossings = &mut steps.entry(row.get(0)?).or_default().crossings;
             crossings.insert(
                 (row.get(1)?, row.get(2)?),
@@ -107,6 +114,10 @@ impl Store {
         )?;
         let mut rows = statement.query(params![camera, from, to, step])?;
         while let Some(row) = rows.next()? {
+            values += 1;
+            if values > most {
+                return Ok(None);
+            }
             let zones = &mut steps.entry(row.get(0)?).or_default().zones;
             let sum = ZoneSum {
                 entries: row.get::<_, i64>(2)?.cast_unsigned(),
@@ -117,7 +128,7 @@ impl Store {
             };
             zones.insert(row.get(1)?, sum);
         }
-        Ok(steps)
+        Ok(Some(steps))
     }
 
     /// Returns the milliseconds of presence per cell in whole days. Blocks.
@@ -215,12 +226,12 @@ fn calibrations(connection: &Connection) -> rusqlite::Result<StoredCalibrations>
 }
 
 fn messages(connection: &Connection) -> rusqlite::Result<Vec<Message>> {
-    let mut statement =
-        connection.prepare("SELECT id, url, body, created_s FROM outbox ORDER BY created_s, id")?;
+    let mut statement = connection
+        .prepare("SELECT id, webhook, body, created_s FROM deliveries ORDER BY created_s, id")?;
     let rows = statement.query_map([], |row| {
         Ok(Message {
             id: row.get(0)?,
-            url: row.get(1)?,
+            webhook: row.get(1)?,
             body: row.get(2)?,
             created_s: row.get(3)?,
         })

@@ -31,8 +31,8 @@ CREATE TABLE IF NOT EXISTS line_totals (
 CREATE TABLE IF NOT EXISTS zone_totals (
   camera TEXT, zone TEXT, entries INTEGER NOT NULL, person_ms INTEGER NOT NULL,
   PRIMARY KEY (camera, zone)) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS outbox (
-  id TEXT PRIMARY KEY, url TEXT NOT NULL, body TEXT NOT NULL, created_s INTEGER NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS deliveries (
+  id TEXT PRIMARY KEY, webhook TEXT NOT NULL, body TEXT NOT NULL, created_s INTEGER NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS conditions (
   webhook TEXT, camera TEXT, PRIMARY KEY (webhook, camera)) WITHOUT ROWID;
 PRAGMA user_version = 1;
@@ -46,5 +46,7 @@ pub(super) fn version(connection: &Connection) -> rusqlite::Result<i64> {
 
 /// Creates the tables that are missing.
 pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
+    // An earlier table held the URLs of webhooks with their secrets.
+    connection.execute_batch("PRAGMA secure_delete = ON; DROP TABLE IF EXISTS outbox;")?;
     connection.execute_batch(TABLES)
 }

@@ -54,10 +54,11 @@ fn sums_of_batches_add_up_over_steps() {
         to: 30,
         step,
     };
-    let steps = store.steps(&hall, span(15)).unwrap();
+    let steps = store.steps(&hall, span(15), 100).unwrap().unwrap();
     assert_eq!(steps.keys().copied().collect::<Vec<_>>(), [0, 1]);
     assert_eq!(steps[&0].presence.known_ms, 90_000);
-    let whole = &store.steps(&hall, span(30)).unwrap()[&0];
+    assert!(store.steps(&hall, span(15), 3).unwrap().is_none());
+    let whole = &store.steps(&hall, span(30), 100).unwrap().unwrap()[&0];
     assert_eq!(
         (whole.presence.person_ms, whole.presence.most),
         (240_000, 3)
@@ -97,7 +98,9 @@ fn old_sums_expire_and_totals_stay() {
         step: 200,
     };
     assert_eq!(
-        store.steps(&hall, span).unwrap()[&0].presence.known_ms,
+        store.steps(&hall, span, 100).unwrap().unwrap()[&0]
+            .presence
+            .known_ms,
         30_000
     );
     assert_eq!(
@@ -118,7 +121,7 @@ fn messages_stay_until_they_are_removed() {
     let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
     let message = Message {
         id: "msg_1".to_owned(),
-        url: "http://127.0.0.1/".to_owned(),
+        webhook: "digest".to_owned(),
         body: "{}".to_owned(),
         created_s: 5,
     };
@@ -155,4 +158,21 @@ fn a_store_has_one_user_and_a_known_version() {
     .unwrap();
     let refused = Store::open(&other).err().unwrap().to_string();
     assert!(refused.contains("cannot be used"), "{refused}");
+}
+
+#[test]
+fn files_of_the_store_are_readable_by_the_owner_alone() {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("counts.sqlite")).unwrap();
+    store.commit(&batch(1, 7), &[], None).unwrap();
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder.path()).unwrap() {
+        let entry = entry.unwrap();
+        let mode = entry.metadata().unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600, "{:?}", entry.file_name());
+        files += 1;
+    }
+    assert!(files >= 3, "{files}");
 }

@@ -49,10 +49,10 @@ impl Store {
         }
         for message in messages {
             transaction
-                .prepare_cached("INSERT OR IGNORE INTO outbox VALUES (?, ?, ?, ?)")?
+                .prepare_cached("INSERT OR IGNORE INTO deliveries VALUES (?, ?, ?, ?)")?
                 .execute(params![
                     message.id,
-                    message.url,
+                    message.webhook,
                     message.body,
                     message.created_s
                 ])?;
@@ -72,25 +72,32 @@ impl Store {
         Ok(transaction.commit()?)
     }
 
-    /// Stores a calibration; `None` if the server has none with this ID. Blocks.
+    /// Stores a calibration, and removes those that are forgotten. `content` is `None` if the server
+    /// has none with this ID. Blocks.
     pub(crate) fn put_calibration(
         &self,
         id: &str,
         revision: &str,
         content: Option<&[u8]>,
+        forgotten: &[String],
     ) -> Result<(), StoreError> {
-        self.writer.lock().execute(
+        let mut connection = self.writer.lock();
+        let transaction = connection.transaction()?;
+        for id in forgotten {
+            transaction.execute("DELETE FROM calibrations WHERE id = ?", [id])?;
+        }
+        transaction.execute(
             "INSERT OR REPLACE INTO calibrations VALUES (?, ?, ?)",
             params![id, revision, content],
         )?;
-        Ok(())
+        Ok(transaction.commit()?)
     }
 
     /// Removes a message that was delivered or given up. Blocks.
     pub(crate) fn remove_message(&self, id: &str) -> Result<(), StoreError> {
         self.writer
             .lock()
-            .execute("DELETE FROM outbox WHERE id = ?", [id])?;
+            .execute("DELETE FROM deliveries WHERE id = ?", [id])?;
         Ok(())
     }
 

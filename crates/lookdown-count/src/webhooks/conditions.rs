@@ -15,7 +15,8 @@ pub(crate) struct Conditions {
     holding: BTreeSet<(usize, String)>,
     /// True if the stored state is another one.
     is_changed: bool,
-    /// Last report of each camera, milliseconds since the Unix epoch.
+    /// Last report of each camera, milliseconds since the Unix epoch, but no later than its arrival:
+    /// a camera whose report is of the future may be silent all the same.
     reports: BTreeMap<String, i64>,
     /// Time of the start, milliseconds since the Unix epoch. No camera is silent for longer: reports
     /// of the time before may still arrive.
@@ -49,7 +50,10 @@ impl Conditions {
             is_changed: holding.len() != held.len(),
             webhooks,
             holding,
-            reports,
+            reports: reports
+                .into_iter()
+                .map(|(camera, at_ms)| (camera, at_ms.min(started_ms)))
+                .collect(),
             started_ms,
         }
     }
@@ -68,12 +72,12 @@ impl Conditions {
         Some(held.collect())
     }
 
-    /// Returns the messages of a counted report.
+    /// Returns the messages of a counted report of the time `at_ms`, which arrived at `now_ms`.
     pub(crate) fn of_report(
         &mut self,
         event: u64,
         camera: &str,
-        at_ms: i64,
+        (at_ms, now_ms): (i64, i64),
         crossings: &[NamedCrossing],
         scene: &Scene,
     ) -> Vec<Message> {
@@ -136,7 +140,7 @@ impl Conditions {
                 Condition::Occupancy { .. } | Condition::Silent { .. } => {}
             }
         }
-        self.reports.insert(camera.to_owned(), at_ms);
+        self.reports.insert(camera.to_owned(), at_ms.min(now_ms));
         messages
     }
 
@@ -186,7 +190,7 @@ fn message(id: String, webhook: &Webhook, kind: &str, at_ms: i64, data: &Value) 
     let body = json!({ "type": kind, "timestamp": time(at_ms), "data": data });
     Message {
         id,
-        url: webhook.url.to_string(),
+        webhook: webhook.digest(),
         body: body.to_string(),
         created_s: at_ms.div_euclid(1000),
     }

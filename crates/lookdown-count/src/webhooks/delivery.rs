@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use lookdown_common::{AbortOnDrop, ClientError, LogOnce, client_builder, text::with_causes};
-use reqwest::{Client, StatusCode, header::CONTENT_TYPE};
+use reqwest::{Client, StatusCode, Url, header::CONTENT_TYPE};
 use tokio::{
     sync::mpsc::{self, error::TrySendError},
     task::spawn_blocking,
@@ -28,6 +28,7 @@ const PAUSES: [Duration; 4] = [
 
 /// The receivers.
 pub(crate) struct Deliveries {
+    /// By the digest of the webhook. Webhooks with one URL share a receiver.
     receivers: BTreeMap<String, mpsc::Sender<Message>>,
     store: Store,
     metrics: Arc<Metrics>,
@@ -38,6 +39,7 @@ pub(crate) struct Deliveries {
 struct Receiver {
     client: Client,
     key: SigningKey,
+    url: Url,
     /// The scheme, the host and the port: the path may be a secret.
     address: String,
     log: LogOnce,
@@ -61,23 +63,26 @@ impl Deliveries {
     ) -> Result<Self, ClientError> {
         let client = client_builder().timeout(TIMEOUT).build()?;
         let mut receivers = BTreeMap::new();
+        let mut of_urls = BTreeMap::<&Url, mpsc::Sender<Message>>::new();
         let mut tasks = Vec::new();
         for webhook in webhooks {
-            let url = webhook.url.to_string();
-            if receivers.contains_key(&url) {
+            if let Some(sender) = of_urls.get(&webhook.url) {
+                receivers.insert(webhook.digest(), sender.clone());
                 continue;
             }
             let (sender, queue) = mpsc::channel(QUEUE);
             let receiver = Receiver {
                 client: client.clone(),
                 key: webhook.key.clone(),
+                url: webhook.url.clone(),
                 address: webhook.url.origin().ascii_serialization(),
                 log: LogOnce::default(),
             };
             let (store, metrics) = (store.clone(), Arc::clone(metrics));
             let task = tokio::spawn(receiver.run(queue, store, metrics));
             tasks.push(AbortOnDrop(task.abort_handle()));
-            receivers.insert(url, sender);
+            of_urls.insert(&webhook.url, sender.clone());
+            receivers.insert(webhook.digest(), sender);
         }
         let deliveries = Self {
             receivers,
@@ -93,7 +98,7 @@ impl Deliveries {
     pub(crate) fn send(&self, messages: Vec<Message>) {
         for message in messages {
             let id = message.id.clone();
-            let sent = match self.receivers.get(&message.url) {
+            let sent = match self.receivers.get(&message.webhook) {
                 Some(receiver) => receiver.try_send(message),
                 // The webhook was removed from the settings.
                 None => Err(TrySendError::Closed(message)),
@@ -161,7 +166,7 @@ impl Receiver {
         let signature = self.key.sign(&message.id, timestamp_s, &message.body);
         let request = self
             .client
-            .post(&message.url)
+            .post(self.url.clone())
             .header(CONTENT_TYPE, "application/json")
             .header("webhook-id", &message.id)
             .header("webhook-timestamp", timestamp_s)

@@ -15,7 +15,7 @@ mod style;
 pub(super) mod text;
 
 use super::frame::Frame;
-pub use area_sketch::{ZoneOutline, sketch_areas, sketch_lines};
+pub use area_sketch::{ZoneOutline, sketch_areas, sketch_foot_filter, sketch_lines};
 use canvas::{Outline, Rgb, Stroke};
 pub use conceal::{Concealment, conceal};
 pub use effort::Cancelled;

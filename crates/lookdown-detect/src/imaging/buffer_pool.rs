@@ -2,7 +2,7 @@
 //!
 //! An allocator that returns freed memory to the kernel, as configured by `make serve` and in the
 //! container image, gets zeroed pages for each new frame. That took 1 to 3 % of all processor time
-//! (benches/NOTES.md).
+//! (lab/benches/NOTES.md).
 
 use std::{
     mem,

@@ -145,10 +145,16 @@ impl RemapTable {
     /// Returns true if a pixel of the view shows an unmasked part of the lens image.
     #[must_use]
     pub fn sees_beside(&self, masked: &MaskedPixels) -> bool {
+        self.sees_pixel(|x, y| !masked.hides(x, y))
+    }
+
+    /// Returns true if a pixel of the view depends on a pixel of the frame for which `counts` holds.
+    #[must_use]
+    pub fn sees_pixel(&self, counts: impl Fn(u32, u32) -> bool) -> bool {
         let width = self.frame_width as usize;
         self.has_sample(|sample| {
             let mut neighbours = sample.neighbours(width);
-            neighbours.any(|[x, y]| !masked.hides(x, y))
+            neighbours.any(|[x, y]| counts(x, y))
         })
     }
 

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use lookdown_lens::{
     calibration::CameraGeometry,
-    geometry::{BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView},
+    geometry::{
+        BackProjection, Footprint, FrameCrop, Pixel, ViewPlan, VirtualView, foot_filter::AreaReach,
+    },
 };
 
 use super::outline::{crop_outline, view_outline};
@@ -20,10 +22,50 @@ use crate::{
 pub(super) struct CameraRig {
     geometry: CameraGeometry,
     frame: BBox<FramePixels>,
-    masked: Arc<MaskedPixels>,
+    hidden: Hidden,
     views: Views,
-    views_outside: usize,
-    views_masked: usize,
+    left_out: LeftOut,
+}
+
+/// The pixels of a frame that show no person who counts.
+#[derive(Debug, Clone)]
+struct Hidden {
+    masked: Arc<MaskedPixels>,
+    /// The pixels that can show a person of the areas; `None` without areas.
+    reach: Option<Arc<AreaReach>>,
+}
+
+impl Hidden {
+    fn of(geometry: &CameraGeometry, width: u32, height: u32) -> Self {
+        let CameraGeometry { lens, mount, areas } = geometry;
+        let reach = AreaReach::new(&areas.foot_filter, lens, mount, width, height);
+        Self {
+            masked: Arc::new(MaskedPixels::new(&areas.masks, width, height)),
+            reach: reach.map(Arc::new),
+        }
+    }
+
+    /// Returns true if a view shows an unmasked pixel that can show a person of the areas.
+    fn leaves_something(&self, table: &RemapTable) -> bool {
+        let Some(reach) = &self.reach else {
+            return true;
+        };
+        table.sees_pixel(|x, y| {
+            reach.holds(Pixel::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
+                && !self.masked.hides(x, y)
+        })
+    }
+}
+
+/// The numbers of planned views that the network does not process.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct LeftOut {
+    /// Views outside the lens image.
+    pub(super) outside: usize,
+    /// Views whose part of the lens image is wholly masked.
+    pub(super) masked: usize,
+    /// Views that can show nobody who stands in an area.
+    pub(super) outside_areas: usize,
 }
 
 /// The network's views of a frame.
@@ -37,38 +79,36 @@ enum Views {
     Direct(Letterbox),
 }
 
-/// The views that show an unmasked part of the lens image, and the number of the others.
+/// The views that can show a person, and the numbers of the others.
 struct Visible<V> {
     views: Vec<(V, RemapTable)>,
-    /// Views outside the lens image.
-    outside: usize,
-    /// Views whose part of the lens image is wholly masked.
-    masked: usize,
+    left_out: LeftOut,
 }
 
 impl<V> Visible<V> {
-    fn of(planned: impl Iterator<Item = (V, RemapTable)>, masked: &MaskedPixels) -> Self {
-        let mut visible = Self {
-            views: Vec::new(),
-            outside: 0,
-            masked: 0,
-        };
+    fn of(planned: impl Iterator<Item = (V, RemapTable)>, hidden: &Hidden) -> Self {
+        let mut views = Vec::new();
+        let mut left_out = LeftOut::default();
+        let masked = &hidden.masked;
         for (view, table) in planned {
             if !table.sees_anything() {
-                visible.outside += 1;
+                left_out.outside += 1;
             } else if !masked.is_empty() && !table.sees_beside(masked) {
-                visible.masked += 1;
+                left_out.masked += 1;
+            } else if !hidden.leaves_something(&table) {
+                left_out.outside_areas += 1;
             } else {
-                visible.views.push((view, table));
+                views.push((view, table));
             }
         }
-        visible
+        Self { views, left_out }
     }
 }
 
 impl CameraRig {
     /// Builds the remap tables of the views of `plan`. Without a plan, the only view is the whole
-    /// frame. Views that show no unmasked part of the lens image are left out.
+    /// frame. Views that can show no person are left out: those outside the lens image, those that
+    /// are wholly masked, and those far from all areas.
     pub(super) fn new(
         geometry: CameraGeometry,
         frame_width: u32,
@@ -76,20 +116,18 @@ impl CameraRig {
         plan: Option<&ViewPlan>,
         input: &NetworkInput,
     ) -> Self {
-        let masks = &geometry.areas.masks;
-        let masked = Arc::new(MaskedPixels::new(masks, frame_width, frame_height));
+        let hidden = Hidden::of(&geometry, frame_width, frame_height);
         let Some(plan) = plan else {
             return Self {
                 geometry,
                 frame: BBox::of_frame(frame_width, frame_height),
-                masked,
+                hidden,
                 views: Views::Direct(Letterbox::new(frame_width, frame_height, input)),
-                views_outside: 0,
-                views_masked: 0,
+                left_out: LeftOut::default(),
             };
         };
         let views = plan.views(&geometry.mount, input.width, input.height);
-        Self::of_views(geometry, masked, views, frame_width, frame_height)
+        Self::of_views(geometry, hidden, views, frame_width, frame_height)
     }
 
     /// Returns a rig of the same camera with other views.
@@ -99,8 +137,8 @@ impl CameraRig {
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
-        let (geometry, masked) = (self.geometry.clone(), Arc::clone(&self.masked));
-        Self::of_views(geometry, masked, views, frame_width, frame_height)
+        let (geometry, hidden) = (self.geometry.clone(), self.hidden.clone());
+        Self::of_views(geometry, hidden, views, frame_width, frame_height)
     }
 
     /// Returns a rig of the same camera with crops of the frame instead of views.
@@ -113,45 +151,43 @@ impl CameraRig {
         let tables = crops
             .iter()
             .map(|crop| RemapTable::of_crop(crop, frame_width, frame_height));
-        let visible = Visible::of(crops.iter().copied().zip(tables), &self.masked);
+        let visible = Visible::of(crops.iter().copied().zip(tables), &self.hidden);
         Self {
             geometry: self.geometry.clone(),
             frame: BBox::of_frame(frame_width, frame_height),
-            masked: Arc::clone(&self.masked),
-            views_outside: visible.outside,
-            views_masked: visible.masked,
+            hidden: self.hidden.clone(),
+            left_out: visible.left_out,
             views: Views::Crops(visible.views),
         }
     }
 
-    /// Builds a rig from `views`, without those that show no unmasked part of the lens image.
+    /// Builds a rig from `views`, without those that can show no person.
     fn of_views(
         geometry: CameraGeometry,
-        masked: Arc<MaskedPixels>,
+        hidden: Hidden,
         views: Vec<VirtualView>,
         frame_width: u32,
         frame_height: u32,
     ) -> Self {
         let tables = RemapTable::of_views(&views, &geometry.lens, frame_width, frame_height);
-        let visible = Visible::of(views.into_iter().zip(tables), &masked);
+        let visible = Visible::of(views.into_iter().zip(tables), &hidden);
         Self {
             geometry,
             frame: BBox::of_frame(frame_width, frame_height),
-            masked,
-            views_outside: visible.outside,
-            views_masked: visible.masked,
+            hidden,
+            left_out: visible.left_out,
             views: Views::Virtual(visible.views),
         }
     }
 
     /// Blanks the masked areas of the frame. Must run before any other use of the frame.
     pub(super) fn blank(&self, frame: &mut Frame) {
-        self.masked.blank(frame);
+        self.hidden.masked.blank(frame);
     }
 
     /// Returns true if no pixel of the frame is masked.
     pub(super) fn has_no_masks(&self) -> bool {
-        self.masked.is_empty()
+        self.hidden.masked.is_empty()
     }
 
     /// Returns the lens, the mount and the areas of the camera.
@@ -173,14 +209,15 @@ impl CameraRig {
         }
     }
 
-    /// Returns the number of planned views that lie outside the lens image.
-    pub(super) fn views_outside(&self) -> usize {
-        self.views_outside
+    /// Returns the boxes of the pixels that can show nobody who stands in an area.
+    pub(super) fn unsearched(&self) -> Vec<[f64; 4]> {
+        let reach = self.hidden.reach.as_ref();
+        reach.map_or_else(Vec::new, |reach| reach.boxes_outside())
     }
 
-    /// Returns the number of planned views whose part of the lens image is wholly masked.
-    pub(super) fn views_masked(&self) -> usize {
-        self.views_masked
+    /// Returns the numbers of planned views that the network does not process.
+    pub(super) fn left_out(&self) -> LeftOut {
+        self.left_out
     }
 
     /// Returns the outlines of the views in corner-origin frame pixels.
@@ -203,7 +240,8 @@ impl CameraRig {
             Views::Crops(crops) => RemapTable::bytes(crops.iter().map(|(_, table)| table)),
             Views::Direct(_) => 0,
         };
-        tables + self.masked.bytes()
+        let reach = self.hidden.reach.as_ref().map_or(0, |reach| reach.bytes());
+        tables + self.hidden.masked.bytes() + reach
     }
 
     /// Renders one view into its slot `[3, height, width]` of the network's input, on the calling

@@ -4,6 +4,7 @@
 mod camera;
 mod given_views;
 mod observation;
+mod placed;
 mod second_pass;
 
 use std::{
@@ -19,6 +20,7 @@ use lookdown_lens::{
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use self::observation::Observation;
+use self::placed::Placed;
 use super::{
     BatchOptions, CalibrationLookup, DefaultModels, DetectJob, Detected, DetectionReport, JobImage,
     Person, PipelineError, Stage, StageTimings,
@@ -163,6 +165,12 @@ impl Engine {
         timeline.enter(Stage::Refine, Instant::now());
         let persons = self.persons(&observation, &parameters.refinement);
         timeline.leave(Instant::now());
+        let foot_filter = &observation.camera.rig.geometry().areas.foot_filter;
+        let Placed {
+            persons,
+            margin,
+            outside,
+        } = Placed::of(persons, foot_filter);
         let views = observation.view_counts();
         let zones = ZoneCount::of(&observation.camera.rig.geometry().areas.zones, &persons);
         let calibration = observation.camera.used.clone();
@@ -184,6 +192,7 @@ impl Engine {
             refinement: parameters.refinement,
             defaults: parameters.defaults.clone(),
             persons,
+            margin,
             zones,
             views,
             batch_count: observation.batch_count,
@@ -206,6 +215,7 @@ impl Engine {
             withdrawn: job.ticket.withdrawn.clone(),
             report,
             frame: observation.frame,
+            outside,
             encoded: match &job.image {
                 JobImage::Encoded(file) if has_no_masks => Some(file.clone()),
                 _ => None,

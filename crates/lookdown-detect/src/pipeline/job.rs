@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use lookdown_lens::{calibration::Calibration, geometry::Pixel, revision::sha256_of};
 use tokio_util::sync::CancellationToken;
 
-use super::{DetectionReport, Ticket, camera_rig::CameraRig};
+use super::{DetectionReport, Person, Ticket, camera_rig::CameraRig};
 use crate::{
     imaging::{Frame, annotate::ZoneOutline, decode::declared_size},
     inference::Model,
@@ -127,6 +127,8 @@ pub struct Detected {
     pub encoded: Option<Bytes>,
     /// Cancelled when the client is gone. Drawing then stops.
     pub withdrawn: CancellationToken,
+    /// Persons outside of all areas and their margins, or in an ignored place.
+    pub(super) outside: Vec<Person>,
     pub(super) rigs: Vec<Arc<CameraRig>>,
 }
 
@@ -137,6 +139,19 @@ impl Detected {
     pub fn view_outlines(&self) -> Vec<Vec<Pixel>> {
         let rigs = self.rigs.iter();
         rigs.flat_map(|rig| rig.view_outlines()).collect()
+    }
+
+    /// Returns the boxes (corner-origin frame pixels) that hide people who are in no result: those
+    /// that were found, and all pixels in which none are looked for.
+    #[must_use]
+    pub fn boxes_of_others(&self) -> Vec<[f64; 4]> {
+        let margin = self.report.margin.iter().flatten();
+        let found = margin.chain(&self.outside);
+        let found = found.map(|person| person.bbox.corners());
+        // All rigs belong to one camera.
+        let camera = self.rigs.first();
+        let unsearched = camera.into_iter().flat_map(|rig| rig.unsearched());
+        found.chain(unsearched).collect()
     }
 
     /// Returns the outlines of the calibration's zones in the frame.

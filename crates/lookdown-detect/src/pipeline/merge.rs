@@ -100,6 +100,10 @@ pub(super) fn persons(
         .collect()
 }
 
+/// Targets of the second pass may be this many margins away from an area: their feet are less exact
+/// than those of persons.
+const TARGET_MARGINS: f64 = 2.0;
+
 /// The refinement that turns boxes of the first pass into targets of the second.
 const TARGET_REFINEMENT: RefinementParameters = RefinementParameters {
     refinement: Refinement::Fusion,
@@ -123,7 +127,10 @@ pub(super) fn second_pass_targets(
     rig: &CameraRig,
     profile: Profile,
 ) -> SecondPassTargets {
-    let (mapped, merged) = merged(passes, rig, profile, &TARGET_REFINEMENT);
+    let (mapped, mut merged) = merged(passes, rig, profile, &TARGET_REFINEMENT);
+    if !rig.geometry().areas.foot_filter.areas.is_empty() {
+        merged.retain(|merged| may_count(merged, &mapped, rig));
+    }
     let best = merged.iter().filter_map(|merged| merged.members.first());
     let unit = |rays: &[Ray]| rays.iter().map(Ray::normalize).collect();
     let outlines = best.map(|&member| unit(mapped[member].footprint.rays()));
@@ -141,6 +148,20 @@ pub(super) fn second_pass_targets(
         outlines: outlines.collect(),
         crop_targets: crop_targets.collect(),
     }
+}
+
+/// Returns true if a merged box of the first pass may become a person in the margin of an area.
+fn may_count(merged: &MergedDetection, mapped: &[Mapped], rig: &CameraRig) -> bool {
+    let members: Vec<&Mapped> = merged
+        .members
+        .iter()
+        .map(|&member| &mapped[member])
+        .collect();
+    let filter = &rig.geometry().areas.foot_filter;
+    let person = person(merged.bbox, merged.score, &members, rig);
+    person.is_none_or(|person| {
+        filter.is_near(person.oriented_box.foot(), person.floor, TARGET_MARGINS)
+    })
 }
 
 fn merged(

@@ -4,6 +4,7 @@ use lookdown_lens::{
     calibration::Calibration,
     geometry::{
         Lens, Pixel, Polygon, VirtualView,
+        foot_filter::AreaReach,
         pixels::{PixelConvention, cross_half_pixel},
         view_plan::Coverage,
     },
@@ -30,7 +31,7 @@ pub struct PlannedViews {
     pub image_width: u32,
     /// Frame height that the outlines refer to, pixels.
     pub image_height: u32,
-    /// The views that cover some unmasked part of the lens image, in plan order. Empty for
+    /// The views that can show a person, in plan order. Empty for
     /// [`Profile::Direct`].
     pub views: Vec<PlannedView>,
     /// Share of the lens image that lies in at least one view, 0 to 1.
@@ -91,10 +92,16 @@ impl Engine {
         let input = model.input();
         let (lens, (image_width, image_height)) = (calibration.lens(), calibration.image_size());
         let masked = CoarseMasks::new(&calibration.areas().masks, image_width, image_height);
+        let areas = &calibration.areas().foot_filter;
+        let reach = AreaReach::new(areas, lens, calibration.mount(), image_width, image_height);
+        let counts = |pixel: Pixel| {
+            let at = cross_half_pixel(pixel, PixelConvention::CornerOrigin);
+            !masked.hides_position(pixel) && reach.as_ref().is_none_or(|reach| reach.holds(at))
+        };
         let plan = profile.view_plan(options.paper_field_of_view);
         let views = plan.as_ref().map(|plan| {
             let mut views = plan.views(calibration.mount(), input.width, input.height);
-            views.retain(|view| sees(view, lens, &masked));
+            views.retain(|view| sees(view, lens, counts));
             views
         });
         let coverage = views
@@ -154,15 +161,15 @@ impl CoarseMasks {
     }
 }
 
-/// Returns true when the view covers some unmasked part of the lens image.
-fn sees(view: &VirtualView, lens: &Lens, masked: &CoarseMasks) -> bool {
+/// Returns true when the view covers some part of the lens image for which `counts` holds.
+fn sees(view: &VirtualView, lens: &Lens, counts: impl Fn(Pixel) -> bool) -> bool {
     let place =
         |index: u32, side: u32| f64::from(index) / f64::from(SIGHT_STEPS) * f64::from(side) - 0.5;
     (0..=SIGHT_STEPS).any(|row| {
         (0..=SIGHT_STEPS).any(|column| {
             let pixel = Pixel::new(place(column, view.width()), place(row, view.height()));
             let seen = lens.project(&view.ray_in_camera(&pixel));
-            seen.is_some_and(|pixel| !masked.hides_position(pixel))
+            seen.is_some_and(&counts)
         })
     })
 }

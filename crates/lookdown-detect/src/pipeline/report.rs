@@ -49,6 +49,8 @@ pub struct DetectionReport {
     pub defaults: Vec<DefaultUsed>,
     /// Persons, highest score first.
     pub persons: Vec<Person>,
+    /// Persons in the margin of the areas, who do not count; `None` without areas.
+    pub margin: Option<Vec<Person>>,
     /// The number of persons in each zone, in the order of the calibration.
     pub zones: Vec<ZoneCount>,
     /// The numbers of views by outcome.
@@ -74,6 +76,8 @@ pub struct ViewCounts {
     pub outside: usize,
     /// Views wholly hidden by the masks of the camera.
     pub masked: usize,
+    /// Views that can show nobody who stands in an area of the camera.
+    pub outside_areas: usize,
 }
 
 /// The calibration on which a report is based.

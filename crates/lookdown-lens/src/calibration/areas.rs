@@ -1,4 +1,4 @@
-//! The zones, lines and masks of a calibration, checked.
+//! The zones, lines, masks, areas and ignored places of a calibration, checked.
 
 mod area_name;
 mod line;
@@ -8,12 +8,14 @@ use std::collections::BTreeSet;
 use super::{
     FormatError,
     formats::Camera,
-    native::{NativeImage, NativeZone},
+    native::{NativeImage, NativePlace},
 };
-use crate::geometry::{CountingLine, Mount, Polygon, Zone, ZoneArea};
+use crate::geometry::{
+    CountingLine, FootFilter, Mount, Polygon, Zone, ZoneArea, foot_filter::MARGIN_OF_FRAME,
+};
 use area_name::check_name;
 
-/// Most zones of a calibration, most lines and most masks.
+/// Most zones of a calibration, most lines, most masks, most areas and most ignored places.
 const MAX_AREAS: usize = 32;
 
 /// Areas that are drawn into the frames or onto the floor of a camera.
@@ -25,6 +27,8 @@ pub struct Areas {
     pub lines: Vec<CountingLine>,
     /// Areas that are blanked before detection, corner-origin frame pixels.
     pub masks: Vec<Polygon>,
+    /// Where people count.
+    pub foot_filter: FootFilter,
 }
 
 impl Areas {
@@ -38,11 +42,15 @@ impl Areas {
             zones,
             lines,
             masks,
+            areas,
+            ignore,
             ..
         } = camera;
         at_most("zones", zones.len())?;
         at_most("lines", lines.len())?;
         at_most("masks", masks.len())?;
+        at_most("areas", areas.len())?;
+        at_most("ignore", ignore.len())?;
         let mut names = BTreeSet::new();
         let zones = zones.iter().enumerate().map(|(index, zone)| {
             let field = format!("zones[{index}]");
@@ -53,7 +61,7 @@ impl Areas {
             }
             Ok(Zone {
                 name: zone.name.clone(),
-                area: area(&field, zone, image, mount)?,
+                area: area(&field, (&zone.frame_px, &zone.floor_m), image, mount)?,
             })
         });
         let zones = zones.collect::<Result<_, _>>()?;
@@ -66,6 +74,11 @@ impl Areas {
             zones,
             lines,
             masks: masks.collect::<Result<_, _>>()?,
+            foot_filter: FootFilter {
+                areas: places("areas", areas, image, mount)?,
+                ignore: places("ignore", ignore, image, mount)?,
+                margin_px: MARGIN_OF_FRAME * f64::from(image.width),
+            },
         })
     }
 
@@ -77,6 +90,7 @@ impl Areas {
             lines: lines.map(|line| line.scaled(scale_x, scale_y)).collect(),
             zones: zones.map(|zone| zone.scaled(scale_x, scale_y)).collect(),
             masks: masks.map(|mask| mask.scaled(scale_x, scale_y)).collect(),
+            foot_filter: self.foot_filter.scaled(scale_x, scale_y),
         }
     }
 }
@@ -89,13 +103,33 @@ fn at_most(field: &str, count: usize) -> Result<(), FormatError> {
     Err(FormatError::invalid(field, problem))
 }
 
+/// Checks areas or ignored places of the field `of`.
+fn places(
+    of: &str,
+    places: &[NativePlace],
+    image: NativeImage,
+    mount: &Mount,
+) -> Result<Vec<ZoneArea>, FormatError> {
+    let checked = places.iter().enumerate().map(|(index, place)| {
+        let field = format!("{of}[{index}]");
+        if let Some(name) = &place.name {
+            check_name(&format!("{field}.name"), name)?;
+        }
+        area(&field, (&place.frame_px, &place.floor_m), image, mount)
+    });
+    checked.collect()
+}
+
+/// Corners in the frame, and corners on the floor.
+type Corners<'a> = (&'a Option<Vec<[f64; 2]>>, &'a Option<Vec<[f64; 2]>>);
+
 fn area(
     field: &str,
-    zone: &NativeZone,
+    corners: Corners<'_>,
     image: NativeImage,
     mount: &Mount,
 ) -> Result<ZoneArea, FormatError> {
-    match (&zone.frame_px, &zone.floor_m) {
+    match corners {
         (Some(corners), None) => {
             let field = format!("{field}.frame_px");
             Ok(ZoneArea::Frame(frame_polygon(&field, corners, image)?))
@@ -104,14 +138,14 @@ fn area(
             let field = format!("{field}.floor_m");
             if mount.height_m().is_none() {
                 let problem = "where the floor is follows from the camera's height: give \
-                               mount.height_m, or draw the zone in the frame with frame_px";
+                               mount.height_m, or draw the area in the frame with frame_px";
                 return Err(FormatError::invalid(field, problem));
             }
             Ok(ZoneArea::Floor(polygon(&field, corners)?))
         }
         (Some(_), Some(_)) => Err(FormatError::invalid(
             field,
-            "it has both frame_px and floor_m: leave one out, or make two zones",
+            "it has both frame_px and floor_m: leave one out, or make two areas",
         )),
         (None, None) => Err(FormatError::invalid(
             field,

@@ -111,6 +111,8 @@ impl Target {
             ("zones", calibration.zones.len()),
             ("lines", calibration.lines.len()),
             ("masks", calibration.masks.len()),
+            ("areas", calibration.areas.len()),
+            ("ignored places (ignore)", calibration.ignore.len()),
             ("defaults (detect)", calibration.detect.len()),
         ] {
             if count > 0 {

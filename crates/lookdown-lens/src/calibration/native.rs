@@ -9,7 +9,7 @@ use std::{collections::BTreeMap, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-pub use areas::{NativeLine, NativeMask, NativeZone};
+pub use areas::{NativeLine, NativeMask, NativePlace, NativeZone};
 pub use detect::NativeValue;
 
 use crate::geometry::lens::LensModel;
@@ -36,6 +36,12 @@ pub struct NativeCalibration {
     /// Areas that are blanked before detection.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masks: Vec<NativeMask>,
+    /// The places where people can be; those outside of all are in no result.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub areas: Vec<NativePlace>,
+    /// Places whose detections are in no result.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ignore: Vec<NativePlace>,
     /// Defaults of detection parameters for the frames of this camera, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub detect: BTreeMap<String, NativeValue>,

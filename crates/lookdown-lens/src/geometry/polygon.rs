@@ -108,6 +108,12 @@ impl Polygon {
         crossed.count() % 2 == 1
     }
 
+    /// Returns true for a point inside, or at most `margin` away from the outline.
+    #[must_use]
+    pub fn holds_within(&self, point: Point2<f64>, margin: f64) -> bool {
+        self.holds(point) || self.edges().any(|edge| distance(edge, point) <= margin)
+    }
+
     /// Returns true when two areas have a point in common, be it one of their outlines.
     #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
@@ -166,6 +172,13 @@ pub fn crossing([a, b]: Edge, y: f64) -> Option<f64> {
     let [upper, lower] = if a.y <= b.y { [a, b] } else { [b, a] };
     let passes = upper.y <= y && y < lower.y;
     passes.then(|| upper.x + (lower.x - upper.x) * ((y - upper.y) / (lower.y - upper.y)))
+}
+
+/// The distance of a point from an edge.
+fn distance([a, b]: Edge, point: Point2<f64>) -> f64 {
+    let along = b - a;
+    let share = (point - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
+    (a + along * share.clamp(0.0, 1.0) - point).norm()
 }
 
 /// On which side of the line through an edge a point lies: 1, −1, or 0 on it.

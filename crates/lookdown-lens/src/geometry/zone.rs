@@ -1,5 +1,7 @@
 //! Zones: named areas of the frame or of the floor, and who stands in them.
 
+use nalgebra::Point2;
+
 use super::{
     Lens, Mount, Pixel,
     floor::{FloorPosition, pixel_of},
@@ -29,24 +31,15 @@ impl Zone {
     /// pixels), which is `floor`. What meets no floor is in no zone of it.
     #[must_use]
     pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
-        match &self.area {
-            ZoneArea::Frame(area) => area.holds(foot),
-            ZoneArea::Floor(area) => {
-                floor.is_some_and(|floor| area.holds(nalgebra::Point2::new(floor.x_m, floor.y_m)))
-            }
-        }
+        self.area.holds(foot, floor)
     }
 
     /// The same zone in frames `scale_x`, `scale_y` times as large; the floor stays as it is.
     #[must_use]
     pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
-        let area = match &self.area {
-            ZoneArea::Frame(area) => ZoneArea::Frame(area.scaled(scale_x, scale_y)),
-            ZoneArea::Floor(area) => ZoneArea::Floor(area.clone()),
-        };
         Self {
             name: self.name.clone(),
-            area,
+            area: self.area.scaled(scale_x, scale_y),
         }
     }
 
@@ -55,16 +48,44 @@ impl Zone {
     /// edges on the floor are curves in the frame.
     #[must_use]
     pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
-        let (ZoneArea::Frame(area) | ZoneArea::Floor(area)) = &self.area;
+        self.area.outline(lens, mount, points_per_edge)
+    }
+}
+
+impl ZoneArea {
+    /// Returns true when it contains a foot at `foot` (corner-origin frame pixels), which is `floor`.
+    #[must_use]
+    pub fn holds(&self, foot: Pixel, floor: Option<FloorPosition>) -> bool {
+        match self {
+            Self::Frame(area) => area.holds(foot),
+            Self::Floor(area) => {
+                floor.is_some_and(|floor| area.holds(Point2::new(floor.x_m, floor.y_m)))
+            }
+        }
+    }
+
+    /// The same area in frames `scale_x`, `scale_y` times as large; the floor stays as it is.
+    #[must_use]
+    pub fn scaled(&self, scale_x: f64, scale_y: f64) -> Self {
+        match self {
+            Self::Frame(area) => Self::Frame(area.scaled(scale_x, scale_y)),
+            Self::Floor(area) => Self::Floor(area.clone()),
+        }
+    }
+
+    /// Points along its outline, as of [`Zone::outline`].
+    #[must_use]
+    pub fn outline(&self, lens: &Lens, mount: &Mount, points_per_edge: u32) -> Vec<Option<Pixel>> {
+        let (Self::Frame(area) | Self::Floor(area)) = self;
         let along = area.edges().flat_map(|[a, b]| {
             let shares = (0..points_per_edge)
                 .map(move |point| f64::from(point) / f64::from(points_per_edge));
             shares.map(move |share| a + (b - a) * share)
         });
         let closed = along.chain(area.corners().first().copied());
-        let in_frame = closed.map(|point| match &self.area {
-            ZoneArea::Frame(_) => Some(point),
-            ZoneArea::Floor(_) => {
+        let in_frame = closed.map(|point| match self {
+            Self::Frame(_) => Some(point),
+            Self::Floor(_) => {
                 let (x_m, y_m) = (point.x, point.y);
                 pixel_of(FloorPosition { x_m, y_m }, lens, mount)
             }

@@ -1,6 +1,6 @@
 //! A ceiling camera whose detector misses, invents and misplaces persons as the measured one does.
 //!
-//! The figures of the detector are in `figures`; docs/count-accuracy.md has the assumptions.
+//! The figures of the detector are in `figures`; docs/lab/count-accuracy.md has the assumptions.
 
 use lookdown_lens::geometry::{
     Lens, Mount, OrientedBox, Pixel, Ray,
@@ -231,6 +231,7 @@ impl Camera {
                 centre_px: [oriented.center.x, oriented.center.y],
                 foot_px: [foot.x, foot.y],
                 score,
+                is_in_margin: false,
             };
             (observation, oriented)
         })

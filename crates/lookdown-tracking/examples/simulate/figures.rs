@@ -1,6 +1,6 @@
 //! Measured figures of the detector: its misses, false alarms and errors of boxes.
 //!
-//! `benches/count/measure_detector.py` derives them from detections of `lookdown eval`, with `fusion`.
+//! `lab/benches/count/measure_detector.py` derives them from detections of `lookdown eval`, with `fusion`.
 
 /// Scores at which the recall is measured.
 const SCORES: [f64; 10] = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];

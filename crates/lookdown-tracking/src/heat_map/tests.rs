@@ -9,6 +9,7 @@ fn person(x: f64, y: f64) -> Observation {
         centre_px: [0.0, 0.0],
         foot_px: [0.0, 0.0],
         score: 0.9,
+        is_in_margin: false,
     }
 }
 

@@ -240,6 +240,17 @@ mod tests {
     }
 
     #[test]
+    fn shared_kinds_are_those_of_the_table() {
+        for shared in lookdown_http::problem::Kind::ALL {
+            let kind = ProblemKind::from_name(shared.name()).unwrap();
+            assert_eq!(
+                (kind.status(), kind.title()),
+                (shared.status(), shared.title())
+            );
+        }
+    }
+
+    #[test]
     fn every_kind_has_an_error_status_and_full_sentences() {
         for kind in ProblemKind::ALL {
             let status = kind.status();

@@ -23,7 +23,7 @@ use crate::{
         report::Report,
         require_scope::RequireRead,
     },
-    results::{Cameras, ReportId, StoredReport},
+    results::{Cameras, ReportId, StoredReport, medians},
 };
 
 const DEFAULT_LIMIT: usize = 100;
@@ -38,6 +38,9 @@ pub(in crate::api) struct PastReport {
     /// The ID: the value for `since`, and the `ETag` of the latest report.
     #[schema(example = "1763717400412345")]
     id: String,
+    /// Median of the persons in the reports of the 5 s up to this one, as far as this page has them.
+    #[schema(example = 3)]
+    persons: usize,
     /// The report.
     report: Report,
 }
@@ -78,20 +81,25 @@ pub(in crate::api) async fn get_history(
     let page = state.results.since(&camera, since, limit).await?;
     let content_type = [(CONTENT_TYPE, "application/json")];
     let cache = [(CACHE_CONTROL, NO_CACHE)];
-    let body = write(page.iter().map(AsRef::as_ref));
+    let persons = medians(&page);
+    let body = write(page.iter().map(AsRef::as_ref).zip(persons));
     Ok((content_type, cache, body))
 }
 
-/// Writes a JSON array of the reports with their IDs. The stored JSON of each report is copied
+/// Writes a JSON array of the reports with their IDs and medians. The stored JSON of each report is copied
 /// unchanged.
-fn write<'a>(page: impl Iterator<Item = &'a StoredReport>) -> Bytes {
+fn write<'a>(page: impl Iterator<Item = (&'a StoredReport, usize)>) -> Bytes {
     let mut text = BytesMut::new();
-    for stored in page {
+    for (stored, persons) in page {
         if text.len() > PAGE_BYTES {
             break;
         }
         text.put_u8(if text.is_empty() { b'[' } else { b',' });
-        text.put_slice(format!("{{\"id\":\"{}\",\"report\":", stored.id).as_bytes());
+        let start = format!(
+            "{{\"id\":\"{}\",\"persons\":{persons},\"report\":",
+            stored.id
+        );
+        text.put_slice(start.as_bytes());
         text.put_slice(&stored.report.json);
         text.put_u8(b'}');
     }

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::results::StoredReport;
+use crate::results::{Headline, StoredReport};
 
 /// A camera and its latest report.
 #[derive(Debug, Serialize, ToSchema)]
@@ -21,13 +21,20 @@ pub(in crate::api) struct CameraRow {
     /// Age of the report in seconds.
     #[schema(minimum = 0, example = 0.731)]
     age_seconds: f64,
-    /// Number of persons in the report.
+    /// Number of persons there now: the followed persons while `lookdown count` hands their number
+    /// back, else the median of the reports of the last 5 s.
     #[schema(example = 3)]
     persons: usize,
+    /// The origin of `persons`: `tracks` or `median`.
+    #[schema(example = "median")]
+    persons_source: &'static str,
+    /// Number of persons in the latest report.
+    #[schema(example = 4)]
+    frame_persons: usize,
 }
 
 impl CameraRow {
-    pub(super) fn at(latest: &StoredReport, now: Timestamp) -> Self {
+    pub(super) fn at(latest: &StoredReport, headline: Headline, now: Timestamp) -> Self {
         let age = now.duration_since(latest.id.time()).as_secs_f64();
         Self {
             camera: latest.report.camera.clone(),
@@ -35,7 +42,9 @@ impl CameraRow {
             received_at: format!("{:.3}", latest.report.received_at),
             // The clock may have been set back since.
             age_seconds: (age.max(0.0) * 1000.0).round() / 1000.0,
-            persons: latest.report.persons,
+            persons: headline.persons,
+            persons_source: headline.source.name(),
+            frame_persons: latest.report.persons,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Zones and masks drawn into a frame of their camera.
 
-use lookdown_lens::geometry::{CountingLine, Lens, Mount, Pixel, Polygon, Zone};
+use lookdown_lens::geometry::{CountingLine, FootFilter, Lens, Mount, Pixel, Polygon, Zone};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -16,6 +16,8 @@ use crate::imaging::{Frame, MaskedPixels};
 pub(super) const ZONE: Rgb = [126, 240, 110];
 const MASK: Rgb = [255, 128, 210];
 const LINE: Rgb = [255, 214, 60];
+const AREA: Rgb = [90, 200, 255];
+const IGNORE: Rgb = [255, 90, 70];
 /// Straight edges on the floor are curves in the frame.
 const POINTS_PER_EDGE: u32 = 32;
 
@@ -98,6 +100,20 @@ pub fn sketch_areas(
     let zones = zones.iter().map(|zone| ZoneOutline::of(zone, lens, mount));
     let zones: Vec<_> = zones.collect();
     sketch_outlines(frame, &zones, ZONE);
+}
+
+/// Draws the outlines of areas and of ignored places.
+pub fn sketch_foot_filter(frame: &mut Frame, filter: &FootFilter, lens: &Lens, mount: &Mount) {
+    for (places, name, color) in [
+        (&filter.areas, "area", AREA),
+        (&filter.ignore, "ignore", IGNORE),
+    ] {
+        let outlines = places.iter().map(|place| {
+            ZoneOutline::in_pieces(name, &place.outline(lens, mount, POINTS_PER_EDGE))
+        });
+        let outlines: Vec<_> = outlines.collect();
+        sketch_outlines(frame, &outlines, color);
+    }
 }
 
 /// Draws counting lines with their names. They are in frame pixels or on the floor and projected

@@ -107,3 +107,83 @@ fn wholly_masked_views_skip_inference_and_are_counted() {
     let planned = engine.planned_views(&calibration(RIGHT_HALF), Profile::Balanced);
     assert_eq!(planned.unwrap().pictures, half.inferred - 1);
 }
+
+/// An area on the floor around the disc at 420, 300, whose foot is at about 1.7 m, 0 m.
+const AROUND_FOOT: &str =
+    r#", "areas": [{"floor_m": [[1, -0.6], [2.4, -0.6], [2.4, 0.6], [1, 0.6]]}]"#;
+/// The same place as an area that ends 0.5 m before the foot, and as an ignored place.
+const BEFORE_FOOT: &str =
+    r#", "areas": [{"floor_m": [[0, -0.6], [1.2, -0.6], [1.2, 0.6], [0, 0.6]]}]"#;
+const IGNORED_FOOT: &str = r#", "ignore": [{"name": "chair", "frame_px": [[380, 280], [410, 280], [410, 320], [380, 320]]}]"#;
+/// An area on the other side of the camera.
+const OTHER_SIDE: &str = r#", "areas": [{"floor_m": [[-4, -1], [-2.5, -1], [-2.5, 1], [-4, 1]]}]"#;
+
+#[test]
+fn persons_outside_areas_and_in_ignored_places_do_not_count() {
+    let engine = engine(BlobDetector::default(), None);
+    for profile in ["paper", "fast", "balanced", "quality", "direct"] {
+        let found = |areas: &str| {
+            let detected = detected(&engine, areas, profile, 1, [420.0, 300.0]);
+            let report = detected.report;
+            let zones: usize = report.zones.iter().map(|zone| zone.persons).sum();
+            let margin = report.margin.map(|margin| !margin.is_empty());
+            (!report.persons.is_empty(), margin, zones > 0)
+        };
+        for (areas, expected) in [
+            ("", (true, None, true)),
+            (AROUND_FOOT, (true, Some(false), true)),
+            (BEFORE_FOOT, (false, Some(true), false)),
+            (IGNORED_FOOT, (false, None, false)),
+            (OTHER_SIDE, (false, Some(false), false)),
+        ] {
+            let areas = format!("{areas}{ZONES}");
+            assert_eq!(found(&areas), expected, "{profile}: {areas}");
+        }
+    }
+}
+
+#[test]
+fn views_far_from_all_areas_skip_inference() {
+    let engine = engine(BlobDetector::default(), None);
+    for (profile, least) in [("fast", 1), ("balanced", 6), ("paper", 30)] {
+        let views = |areas| {
+            detected(&engine, areas, profile, 1, [420.0, 300.0])
+                .report
+                .views
+        };
+        let open = views("");
+        assert_eq!(open.outside_areas, 0);
+        let limited = views(OTHER_SIDE);
+        assert!(
+            limited.outside_areas >= least && limited.inferred + least <= open.inferred,
+            "{profile}: {limited:?}, {open:?}"
+        );
+        // The disc is far from the area: no crop shows it.
+        let first_pass = open.inferred + open.outside - usize::from(profile == "balanced");
+        assert_eq!(
+            limited.inferred + limited.outside + limited.outside_areas,
+            first_pass,
+            "{profile}"
+        );
+    }
+    let planned = engine.planned_views(&calibration(OTHER_SIDE), Profile::Balanced);
+    let run = detected(&engine, OTHER_SIDE, "balanced", 1, [420.0, 300.0]);
+    assert_eq!(planned.unwrap().pictures, run.report.views.inferred);
+}
+
+#[test]
+fn people_who_do_not_count_are_concealed() {
+    let engine = engine(BlobDetector::default(), None);
+    let hidden = |areas, at: [f64; 2]| {
+        let detected = detected(&engine, areas, "fast", 1, at);
+        let boxes = detected.boxes_of_others();
+        boxes.iter().any(|&[left, top, right, bottom]| {
+            left <= at[0] && at[0] < right && top <= at[1] && at[1] < bottom
+        })
+    };
+    assert!(!hidden("", [420.0, 300.0]));
+    assert!(!hidden(AROUND_FOOT, [420.0, 300.0]));
+    for areas in [BEFORE_FOOT, IGNORED_FOOT, OTHER_SIDE] {
+        assert!(hidden(areas, [420.0, 300.0]), "{areas}");
+    }
+}

@@ -39,13 +39,15 @@ impl Observation {
         self.passes.iter().map(|pass| pass.rig.view_count()).sum()
     }
 
-    /// Returns the counts of inferred, unchanged, outside and masked views.
+    /// Returns the counts of views by outcome.
     pub(super) fn view_counts(&self) -> ViewCounts {
+        let left_out = self.camera.rig.left_out();
         ViewCounts {
             inferred: self.view_count() - self.unchanged_views,
             unchanged: self.unchanged_views,
-            outside: self.camera.rig.views_outside(),
-            masked: self.camera.rig.views_masked(),
+            outside: left_out.outside,
+            masked: left_out.masked,
+            outside_areas: left_out.outside_areas,
         }
     }
 

@@ -152,3 +152,59 @@ fn the_floor_is_known_only_with_the_height() {
         "{refusal}"
     );
 }
+
+#[test]
+fn areas_and_ignored_places_are_read_scaled_and_written() {
+    let places = r#""areas": [{"floor_m": [[-3, -3], [3, -3], [3, 3], [-3, 3]]}],
+        "ignore": [{"name": "chair", "frame_px": [[100, 100], [200, 100], [200, 200]]}]"#;
+    let content = file(r#", "height_m": 3"#, places);
+    let calibration = read(&content).unwrap();
+    let filter = calibration.for_frame(1600, 1200).unwrap().areas.foot_filter;
+    assert!(matches!(&filter.areas[..], [ZoneArea::Floor(_)]));
+    assert!(filter.ignore[0].holds(Pixel::new(350.0, 250.0), None));
+    assert!((filter.margin_px - 80.0).abs() < 1e-9);
+    let native: NativeCalibration = serde_json::from_str(&content).unwrap();
+    let written = Target::Native.write(&native).unwrap().content;
+    assert_eq!(
+        serde_json::from_str::<NativeCalibration>(&written).unwrap(),
+        native
+    );
+    let lost = Target::Kalibr.write(&native).map(|exported| exported.lost);
+    let lost = lost.map_or_else(|error| vec![error.to_string()], |lost| lost);
+    assert!(!lost.is_empty());
+}
+
+#[test]
+fn invalid_areas_and_ignored_places_are_refused() {
+    let triangle = "[[1, 1], [9, 1], [9, 9]]";
+    for (refusal, expected) in [
+        (refusal(r#""areas": [{}]"#), "areas[0]: it has no corners"),
+        (
+            refusal(r#""ignore": [{"floor_m": [[1, 1], [2, 1]]}]"#),
+            "ignore[0].floor_m: it has 2 corners",
+        ),
+        (
+            refusal(&format!(
+                r#""ignore": [{{"name": "A b", "frame_px": {triangle}}}]"#
+            )),
+            "ignore[0].name: it is \"A b\"",
+        ),
+        (
+            refusal(&format!(
+                r#""areas": [{}]"#,
+                vec![format!(r#"{{"frame_px": {triangle}}}"#); 33].join(",")
+            )),
+            "areas: there are 33",
+        ),
+        (
+            read(&file(
+                "",
+                &format!(r#""areas": [{{"floor_m": {triangle}}}]"#),
+            ))
+            .unwrap_err(),
+            "areas[0].floor_m: where the floor is follows from the camera's height",
+        ),
+    ] {
+        assert!(refusal.starts_with(expected), "{refusal}");
+    }
+}

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Format, FormatError};
 use crate::{
     calibration::native::{
-        NativeImage, NativeLine, NativeMask, NativeMount, NativeValue, NativeZone,
+        NativeImage, NativeLine, NativeMask, NativeMount, NativePlace, NativeValue, NativeZone,
     },
     geometry::lens::LensModel,
     warning::Warning,
@@ -44,6 +44,10 @@ pub struct Camera {
     pub lines: Vec<NativeLine>,
     /// Its masks; only native files have some.
     pub masks: Vec<NativeMask>,
+    /// The places where people can be; only native files have some.
+    pub areas: Vec<NativePlace>,
+    /// The places whose detections are left out; only native files have some.
+    pub ignore: Vec<NativePlace>,
     /// Its defaults of detection parameters; only native files have some.
     pub detect: BTreeMap<String, NativeValue>,
     /// The assumptions of the reader.
@@ -59,6 +63,8 @@ impl Camera {
             zones: Vec::new(),
             lines: Vec::new(),
             masks: Vec::new(),
+            areas: Vec::new(),
+            ignore: Vec::new(),
             detect: BTreeMap::new(),
             notes: Vec::new(),
         }

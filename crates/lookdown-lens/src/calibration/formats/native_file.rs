@@ -1,5 +1,5 @@
 //! The native format, in JSON, YAML or TOML: the only one with an ID, a mount,
-//! zones, lines and masks.
+//! zones, lines, masks, areas and ignored places.
 
 use super::{
     CalibrationFile, Camera, FileCamera, Format, FormatError,
@@ -28,6 +28,8 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
                 zones: file.zones,
                 lines: file.lines,
                 masks: file.masks,
+                areas: file.areas,
+                ignore: file.ignore,
                 detect: file.detect,
                 notes: Vec::new(),
             }),

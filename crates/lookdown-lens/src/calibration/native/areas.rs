@@ -1,5 +1,5 @@
-//! Zones, lines and masks as they are written. Corners follow each other along the outline; pixels are
-//! corner-origin, of frames of the calibration's own size.
+//! Zones, lines, masks and places as they are written. Corners follow each other along the outline;
+//! pixels are corner-origin, of frames of the calibration's own size.
 
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +41,21 @@ fn in_and_out() -> [String; 2] {
 
 fn is_in_and_out(directions: &[String; 2]) -> bool {
     directions == &["in", "out"]
+}
+
+/// A place where people count or do not count, in pixels of the frame or in metres on the floor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NativePlace {
+    /// Its name, `[a-z0-9][a-z0-9_-]{0,63}`; only people read it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Corners `[x, y]`, frame pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_px: Option<Vec<[f64; 2]>>,
+    /// Corners `[x, y]`, metres on the floor from the place below the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor_m: Option<Vec<[f64; 2]>>,
 }
 
 /// An area that is blanked before anything looks at a frame.

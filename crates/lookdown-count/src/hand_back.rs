@@ -1,0 +1,78 @@
+//! Hands the followed numbers back to the server, whose number of a camera they become.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use lookdown_common::{LogOnce, ServerClient};
+use reqwest::{StatusCode, header::CONTENT_TYPE};
+use tokio::{
+    sync::watch,
+    time::{Instant, sleep},
+};
+
+use crate::snapshot::Snapshot;
+
+/// Longest time for a request.
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// An unchanged number is sent again after this time: the server forgets it after 15 s.
+const REPEAT: Duration = Duration::from_secs(5);
+/// The pause after a failure.
+const PAUSE: Duration = Duration::from_secs(10);
+
+/// The last number that was sent for each camera, and the time.
+type Sent = BTreeMap<String, (u64, Instant)>;
+
+/// Sends each changed number until the snapshots end.
+pub(crate) async fn hand_back(client: ServerClient, mut snapshots: watch::Receiver<Snapshot>) {
+    let (mut sent, mut log) = (Sent::new(), LogOnce::default());
+    loop {
+        let snapshot = snapshots.borrow_and_update().clone();
+        let pause = match send(&client, &snapshot, &mut sent).await {
+            Ok(()) => {
+                log.clear();
+                REPEAT
+            }
+            Err(problem) => {
+                if log.should_log(&problem) {
+                    tracing::warn!("the server has its own numbers of persons only: {problem}");
+                }
+                sleep(PAUSE).await;
+                Duration::ZERO
+            }
+        };
+        tokio::select! {
+            changed = snapshots.changed() => if changed.is_err() { return },
+            () = sleep(pause) => {}
+        }
+    }
+}
+
+/// Sends the known numbers that are new or old.
+async fn send(client: &ServerClient, snapshot: &Snapshot, sent: &mut Sent) -> Result<(), String> {
+    let known = snapshot.cameras.iter();
+    let known = known.filter_map(|camera| Some((camera.name.as_str(), camera.persons?)));
+    for (camera, persons) in known {
+        let is_sent = |&(last, at): &(u64, Instant)| last == persons && at.elapsed() < REPEAT;
+        if sent.get(camera).is_some_and(is_sent) {
+            continue;
+        }
+        let url = client.route(["results", camera, "followed"]);
+        let request = client.put(url).timeout(TIMEOUT);
+        let request = request.header(CONTENT_TYPE, "application/json");
+        let body = format!("{{\"persons\":{persons}}}");
+        let response = request.body(body).send().await;
+        let response = response.map_err(|error| client.failure(error))?;
+        match response.status() {
+            StatusCode::NO_CONTENT => {}
+            // The reports of the camera were deleted.
+            StatusCode::NOT_FOUND => continue,
+            StatusCode::FORBIDDEN => {
+                let refusal = client.refusal(response).await;
+                return Err(format!("{refusal}; give the key the scope detect, too"));
+            }
+            _ => return Err(client.refusal(response).await),
+        }
+        sent.insert(camera.to_owned(), (persons, Instant::now()));
+    }
+    sent.retain(|camera, _| snapshot.cameras.iter().any(|known| known.name == *camera));
+    Ok(())
+}

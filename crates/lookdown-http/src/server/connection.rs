@@ -1,0 +1,124 @@
+//! One connection, from the first byte to the last.
+
+use std::{convert::Infallible, io, net::SocketAddr, pin::pin, sync::Arc, time::Duration};
+
+use hyper::{
+    Request, Response,
+    body::{Body, Incoming},
+    header::{CONNECTION, HeaderValue},
+    server::conn::http1,
+    service::service_fn,
+};
+use hyper_util::rt::TokioIo;
+use tokio::{
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
+    time::timeout,
+};
+use tower::{BoxError, Service, ServiceExt};
+
+use super::{
+    ConnectionLimits,
+    connection_timeouts::ConnectionTimeouts,
+    instrumented_io::{InstrumentedBody, InstrumentedStream},
+};
+use crate::Shutdown;
+
+/// The connection passes heads of up to this multiple of the limit to the service, which refuses
+/// them with a description.
+const HEAD_LIMIT_FACTOR: usize = 2;
+/// Longest wait for the first request on a connection that was accepted just before draining.
+const LAST_CALL: Duration = Duration::from_millis(500);
+/// Longest time, and most bytes, for which input is discarded after a request that could not be
+/// parsed.
+const LINGER: Duration = Duration::from_secs(1);
+const LINGER_BYTES: u64 = 4 << 20;
+
+/// The rules of a connection.
+pub(super) struct Rules {
+    pub(super) limits: ConnectionLimits,
+    pub(super) one_request_only: bool,
+    /// The address of the client, unless it has already disconnected.
+    pub(super) client: Option<SocketAddr>,
+    pub(super) shutdown: Shutdown,
+}
+
+/// Serves the requests of a client one after the other, until it disconnects, exceeds a timeout, or
+/// the server shuts down.
+pub(super) async fn serve<T, S, B>(stream: T, service: S, rules: Rules)
+where
+    T: AsyncRead + AsyncWrite + Unpin + Send,
+    S: Service<Request<Incoming>, Response = Response<B>, Error = Infallible> + Clone,
+    B: Body<Data: Send, Error: Into<BoxError>> + Unpin + 'static,
+{
+    let Rules {
+        limits,
+        one_request_only,
+        client,
+        shutdown,
+    } = rules;
+    let timeouts = Arc::new(ConnectionTimeouts::new(&limits));
+    let service = service_fn(|mut request: Request<Incoming>| {
+        if let Some(client) = client {
+            request.extensions_mut().insert(client);
+        }
+        timeouts.request_begins(request.body().size_hint().exact());
+        let answer = service.clone().oneshot(request);
+        let (timeouts, shutdown) = (Arc::clone(&timeouts), &shutdown);
+        async move {
+            let mut response = answer.await?;
+            if one_request_only || shutdown.is_requested() {
+                let close = HeaderValue::from_static("close");
+                response.headers_mut().insert(CONNECTION, close);
+            }
+            Ok::<_, Infallible>(response.map(|body| InstrumentedBody { body, timeouts }))
+        }
+    });
+    let mut stream = InstrumentedStream {
+        stream,
+        timeouts: Arc::clone(&timeouts),
+    };
+    let connection = http1::Builder::new()
+        .max_headers(limits.max_headers * HEAD_LIMIT_FACTOR)
+        .max_header_size(limits.max_header_bytes * HEAD_LIMIT_FACTOR)
+        .serve_connection(TokioIo::new(&mut stream), service);
+    let was_refused = {
+        let mut connection = pin!(connection);
+        let to_its_end = async {
+            tokio::select! {
+                // Checked first: requests that arrived before the shutdown are served.
+                biased;
+                ended = connection.as_mut() => return ended,
+                () = shutdown.draining() => {}
+            }
+            if timeouts.awaits_first_request()
+                && let Ok(ended) = timeout(LAST_CALL, connection.as_mut()).await
+            {
+                return ended;
+            }
+            connection.as_mut().graceful_shutdown();
+            connection.await
+        };
+        tokio::select! {
+            ended = to_its_end => ended.is_err_and(|error| {
+                tracing::debug!("a connection failed: {error}");
+                error.is_parse()
+            }),
+            () = timeouts.overdue() => {
+                tracing::debug!("a connection exceeded a timeout and was closed");
+                false
+            }
+        }
+    };
+    if was_refused {
+        let _ = timeout(LINGER, discard_rest(stream)).await;
+    }
+}
+
+/// Ends a connection whose client may still be sending. An immediate close would reset the
+/// connection and lose the response.
+async fn discard_rest(mut stream: impl AsyncRead + AsyncWrite + Unpin) -> io::Result<()> {
+    stream.shutdown().await?;
+    let mut rest = stream.take(LINGER_BYTES);
+    tokio::io::copy(&mut rest, &mut tokio::io::sink()).await?;
+    Ok(())
+}

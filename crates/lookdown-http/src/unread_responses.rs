@@ -1,0 +1,81 @@
+//! The memory of large responses that clients have not read yet.
+
+use std::sync::Arc;
+
+use axum::{
+    body::{Body, HttpBody, to_bytes},
+    extract::{Request, State},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+use bytes::Bytes;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use crate::problem::{Kind, Problem};
+
+/// Responses of at most this size take no share.
+const SMALL_BYTES: u64 = 64 << 10;
+/// Bytes per permit.
+const UNIT_BYTES: u64 = 1 << 10;
+
+/// A budget in bytes. Clones share it.
+#[derive(Debug, Clone)]
+pub(crate) struct UnreadResponses {
+    free: Arc<Semaphore>,
+    units: u32,
+}
+
+impl UnreadResponses {
+    pub(crate) fn new(units: u32) -> Self {
+        Self {
+            free: Arc::new(Semaphore::new(units as usize)),
+            units,
+        }
+    }
+}
+
+/// Makes a large response take a share of the budget until it is read, or refuses it with 429.
+pub(crate) async fn bound(
+    State(budget): State<UnreadResponses>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let response = next.run(request).await;
+    let size = response.body().size_hint().exact();
+    let Some(size) = size.filter(|size| *size > SMALL_BYTES) else {
+        return response;
+    };
+    let units = u32::try_from(size.div_ceil(UNIT_BYTES)).unwrap_or(u32::MAX);
+    let units = units.min(budget.units);
+    let Ok(permit) = Arc::clone(&budget.free).try_acquire_many_owned(units) else {
+        let detail = "too many responses that clients have not read are in memory: read responses \
+                      faster, or ask for less";
+        return Problem::new(Kind::Overloaded, detail).into_response();
+    };
+    let (parts, body) = response.into_parts();
+    match to_bytes(body, usize::MAX).await {
+        Ok(content) => {
+            let held = Held {
+                content,
+                _permit: permit,
+            };
+            Response::from_parts(parts, Body::from(Bytes::from_owner(held)))
+        }
+        Err(error) => {
+            tracing::error!("a response cannot be written: {error}");
+            Problem::internal().into_response()
+        }
+    }
+}
+
+/// Bytes with their share of the budget.
+struct Held {
+    content: Bytes,
+    _permit: OwnedSemaphorePermit,
+}
+
+impl AsRef<[u8]> for Held {
+    fn as_ref(&self) -> &[u8] {
+        &self.content
+    }
+}

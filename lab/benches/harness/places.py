@@ -1,0 +1,30 @@
+"""The folders of the benchmarks."""
+
+import os
+from pathlib import Path
+
+BENCHES = Path(__file__).resolve().parents[1]
+ROOT = BENCHES.parents[1]
+RAW = BENCHES / "raw"
+CHARTS = BENCHES / "charts"
+RESULTS = BENCHES / "RESULTS.md"
+PEERS = BENCHES / "peers"
+SAMPLES = ROOT / "samples"
+PYTHONS = ROOT / ".setup" / "benches"
+"""The Python environments that `scripts/setup.py benches` makes."""
+WORK = PYTHONS / "work"
+"""Generated files: frames, plans, logs."""
+
+LOOKDOWN = Path(os.environ.get("LOOKDOWN_BINARY") or ROOT / "target" / "release" / "lookdown")
+"""The release binary, or the one that the environment names."""
+LOAD = ROOT / "target" / "release" / "examples" / "load"
+
+
+def model(name: str) -> Path:
+    """A model's ONNX file."""
+    return ROOT / "models" / name / "model.onnx"
+
+
+def python_of(peer: str) -> Path:
+    """The interpreter of a peer's own environment."""
+    return PYTHONS / peer / "bin" / "python"

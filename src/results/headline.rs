@@ -1,0 +1,186 @@
+//! The headline number of a camera: how many people are there now.
+//!
+//! It is the number of followed persons while `lookdown count` hands it back, else the median of the
+//! camera's last reports. All servers with one result store have the same number.
+
+use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{Cameras, ReportId, ResultStore, StoredReport, Unreachable};
+
+/// The reports of this time before the latest one, inclusively, have a part in the median.
+pub const MEDIAN_WINDOW: Duration = Duration::from_secs(5);
+/// Most reports of the median.
+const MOST_REPORTS: usize = 500;
+/// A followed number is valid for this time.
+pub const FOLLOWED_FOR: Duration = Duration::from_secs(15);
+
+/// The number of followed persons, as it was handed back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FollowedNumber {
+    /// The number of persons.
+    pub persons: usize,
+    /// The time at which it was handed back.
+    pub at: Timestamp,
+}
+
+impl FollowedNumber {
+    /// Returns true while it is valid.
+    #[must_use]
+    pub fn is_valid(&self, now: Timestamp) -> bool {
+        let age = now.duration_since(self.at);
+        Duration::try_from(age).map_or(true, |age| age <= FOLLOWED_FOR)
+    }
+}
+
+/// The origin of a headline number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeadlineSource {
+    /// The persons that `lookdown count` follows.
+    Tracks,
+    /// The median of the last reports.
+    Median,
+}
+
+/// The headline number of a camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Headline {
+    /// The number of persons.
+    pub persons: usize,
+    /// Its origin.
+    pub source: HeadlineSource,
+}
+
+impl Headline {
+    /// Returns the headline number of the camera with this latest report.
+    ///
+    /// # Errors
+    /// [`Unreachable`].
+    pub async fn of(store: &dyn ResultStore, latest: &StoredReport) -> Result<Self, Unreachable> {
+        if let Some(followed) = store.followed(&latest.report.camera).await? {
+            return Ok(followed.into());
+        }
+        let camera = Cameras::One(latest.report.camera.clone());
+        let most = NonZeroUsize::new(MOST_REPORTS).unwrap_or(NonZeroUsize::MIN);
+        let after = ReportId::at(latest.id.time() - MEDIAN_WINDOW);
+        let reports = store.since(&camera, after, most).await?;
+        let is_counted = |report: &&Arc<StoredReport>| report.id <= latest.id;
+        let counted = reports.iter().filter(is_counted);
+        let persons = median(counted.map(|report| report.report.persons));
+        Ok(Self {
+            persons: persons.unwrap_or(latest.report.persons),
+            source: HeadlineSource::Median,
+        })
+    }
+}
+
+impl From<FollowedNumber> for Headline {
+    fn from(followed: FollowedNumber) -> Self {
+        Self {
+            persons: followed.persons,
+            source: HeadlineSource::Tracks,
+        }
+    }
+}
+
+impl HeadlineSource {
+    /// The name in the API.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracks => "tracks",
+            Self::Median => "median",
+        }
+    }
+}
+
+/// Returns the median of each report and those before it in the window, in the order of the reports.
+#[must_use]
+pub fn medians(reports: &[Arc<StoredReport>]) -> Vec<usize> {
+    let mut first = 0;
+    let medians = reports.iter().enumerate().map(|(index, report)| {
+        let from = ReportId::at(report.id.time() - MEDIAN_WINDOW);
+        while reports[first].id <= from {
+            first += 1;
+        }
+        let counted = reports[first..=index].iter();
+        median(counted.map(|report| report.report.persons)).unwrap_or_default()
+    });
+    medians.collect()
+}
+
+/// Returns the median; the lower one of two in the middle.
+fn median(numbers: impl Iterator<Item = usize>) -> Option<usize> {
+    let mut numbers: Vec<usize> = numbers.collect();
+    numbers.sort_unstable();
+    let middle = numbers.len().checked_sub(1)? / 2;
+    numbers.get(middle).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+    use crate::{
+        metrics::Metrics,
+        results::{MemoryResults, NewReport, ResultLimits},
+    };
+
+    fn store_of(numbers: &[usize]) -> (MemoryResults, Arc<StoredReport>) {
+        let store = MemoryResults::new(ResultLimits::default(), Arc::new(Metrics::default()));
+        let reports = numbers.iter().map(|&persons| {
+            let report = NewReport {
+                camera: "hall".to_owned(),
+                received_at: Timestamp::now(),
+                persons,
+                json: Bytes::from_static(b"{}"),
+            };
+            store.store(report, None)
+        });
+        let latest = reports.last().unwrap();
+        (store, latest)
+    }
+
+    #[tokio::test]
+    async fn headline_is_the_median_of_the_last_reports() {
+        for (numbers, expected) in [
+            (&[3][..], 3),
+            (&[3, 9], 3),
+            (&[3, 9, 4], 4),
+            (&[0, 0, 7, 0, 8], 0),
+            (&[5, 5, 8, 5, 14, 5, 3], 5),
+        ] {
+            let (store, latest) = store_of(numbers);
+            let headline = Headline::of(&store, &latest).await.unwrap();
+            assert_eq!(headline.persons, expected, "{numbers:?}");
+            assert_eq!(headline.source, HeadlineSource::Median);
+            let reports = store.since(&Cameras::All, ReportId::default(), NonZeroUsize::MAX);
+            assert_eq!(medians(&reports.await.unwrap()).last(), Some(&expected));
+        }
+    }
+
+    #[tokio::test]
+    async fn followed_number_replaces_the_median_while_it_is_valid() {
+        let (store, latest) = store_of(&[9, 9, 9]);
+        let follow = async |persons, age: i64| {
+            let at = Timestamp::now() - jiff::SignedDuration::from_secs(age);
+            let number = FollowedNumber { persons, at };
+            assert!(store.follow("hall", number).await.unwrap());
+            Headline::of(&store, &latest).await.unwrap()
+        };
+        let headline = follow(5, 0).await;
+        assert_eq!((headline.persons, headline.source.name()), (5, "tracks"));
+        assert_eq!(follow(6, 10).await.persons, 6);
+        assert_eq!(follow(6, 20).await.persons, 9);
+        let number = FollowedNumber {
+            persons: 1,
+            at: Timestamp::now(),
+        };
+        assert!(!store.follow("other", number).await.unwrap());
+        follow(5, 0).await;
+        assert!(store.delete("hall").await.unwrap());
+        assert_eq!(store.followed("hall").await.unwrap(), None);
+    }
+}
