@@ -3,8 +3,10 @@
 
 mod answer;
 mod caller;
+mod companions;
 mod detect_parameters;
 mod http;
+mod in_process;
 mod limit;
 mod openapi;
 mod parameters;
@@ -44,7 +46,7 @@ use self::{
     },
     report_headers::{PERSON_COUNT, SERVER_TIMING},
     routes::{
-        health,
+        counts, health,
         openapi::{self as document, DocumentSource},
         problems,
         results::events::LAST_EVENT_ID,
@@ -53,7 +55,9 @@ use self::{
 };
 
 pub use self::{
+    companions::Companions,
     http::{access::Access, rate_limit::RequestRate},
+    in_process::in_process,
     readiness::{Phase, Readiness},
     report::Report,
     routes::problems::problem_table,
@@ -126,13 +130,23 @@ fn metrics() -> OpenApiRouter<ApiState> {
 
 /// The router of the whole service.
 pub fn router(state: ApiState) -> Router {
+    let limiter = state
+        .options
+        .request_rate
+        .map(|rate| RateLimiter::new(rate, &state.options.access));
+    limited_router(state, limiter)
+}
+
+/// The router for requests of this process: without a rate limit.
+fn in_process_router(state: ApiState) -> Router {
+    limited_router(state, None)
+}
+
+fn limited_router(state: ApiState, limiter: Option<RateLimiter>) -> Router {
     let options = &state.options;
     let access = &options.access;
     let own_pages = access.allowed_origins(&options.cors_origins, &options.hosts);
     let own_pages = own_pages.map(|own| from_fn_with_state(own, csrf::refuse));
-    let limiter = options
-        .request_rate
-        .map(|rate| RateLimiter::new(rate, access));
     let limiter = limiter.map(|all| from_fn_with_state(all, rate_limit::apply));
     let responses = from_fn_with_state(state.clone(), response_memory::bound);
     let guards = ServiceBuilder::new()
@@ -143,7 +157,8 @@ pub fn router(state: ApiState) -> Router {
     let description = Router::from(description())
         .route("/v2/", get(open_inference::describe::server))
         .layer(Extension(DocumentSource(openapi_document)));
-    let clients = Router::from(client_routes()).route_layer(guards.clone());
+    let clients = Router::from(client_routes()).merge(counts::router());
+    let clients = clients.route_layer(guards.clone());
     let deepstack = Router::from(deepstack_routes()).route_layer(guards);
     let router = clients
         .merge(deepstack::with_failures(deepstack))

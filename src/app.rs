@@ -19,15 +19,17 @@ use lookdown_detect::{
 };
 use lookdown_lens::geometry::FieldOfViewReading;
 
+use lookdown_common::{InProcess, ServerClient, ServerOptions};
+
 use crate::{
     access::AccessKeys,
-    api::{Access, ApiOptions, ApiState, Readiness, RequestRate},
+    api::{self, Access, ApiOptions, ApiState, Companions, Readiness, RequestRate},
     calibration_store::{BucketStore, CalibrationStore, Calibrations, FolderStore},
     metrics::Metrics,
     mqtt::Publisher,
     results::{MemoryResults, RedisResults, ResultStore},
     settings::{
-        AccessSettings, CalibrationPlace, LimitSettings, ResultSettings, Settings,
+        AccessSettings, CalibrationPlace, CountSettings, LimitSettings, ResultSettings, Settings,
         find_calibrations,
     },
     telemetry::Tracer,
@@ -166,6 +168,7 @@ pub struct App {
     /// The MQTT publisher, if a broker is configured.
     publisher: Option<Publisher>,
     tracer: Tracer,
+    companions: Companions,
     state: ApiState,
     settings: Box<Settings>,
 }
@@ -217,6 +220,7 @@ impl App {
             },
         };
         let tracer = Tracer::start(&settings.traces)?;
+        let companions = companions(&settings.counts)?;
         let options = ApiOptions {
             max_body_bytes: settings.server.max_body_bytes,
             max_upload_bytes: settings.limits.max_upload_bytes,
@@ -240,7 +244,7 @@ impl App {
             access,
             cors_origins: settings.access.cors_origins.clone(),
             hosts: settings.access.hosts.clone(),
-            page_counts_path: settings.page.counts_path.clone(),
+            companions: companions.clone(),
             tracer: tracer.clone(),
         };
         let state = ApiState::new(
@@ -264,9 +268,22 @@ impl App {
             tls,
             publisher: publisher.transpose()?,
             tracer,
+            companions,
             state,
             settings: Box::new(settings),
         })
+    }
+
+    /// The cameras and counts of this process.
+    #[must_use]
+    pub fn companions(&self) -> Companions {
+        self.companions.clone()
+    }
+
+    /// Returns the connection of parts of this process to the server.
+    #[must_use]
+    pub fn in_process(&self) -> InProcess {
+        api::in_process(self.state.clone())
     }
 
     /// The readiness of the app. Clones share its state.
@@ -340,4 +357,21 @@ fn open_keys(settings: &AccessSettings) -> anyhow::Result<Option<Arc<AccessKeys>
     }
     let keys = AccessKeys::open(settings.keys.clone(), settings.keys_file.as_deref())?;
     Ok(Some(Arc::new(keys)))
+}
+
+/// The counts of another host, if the settings name one.
+fn companions(settings: &CountSettings) -> anyhow::Result<Companions> {
+    let companions = Companions::default();
+    if let Some(url) = &settings.url {
+        let key = settings.api_key_file.as_deref();
+        let key = key.map(lookdown_count::read_key).transpose()?;
+        let options = ServerOptions {
+            url: url.clone(),
+            api_key: key,
+            authorities: None,
+            in_process: None,
+        };
+        companions.forward_counts(ServerClient::new(&options)?);
+    }
+    Ok(companions)
 }

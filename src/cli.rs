@@ -2,6 +2,7 @@
 
 mod annotate;
 mod calibration;
+mod camera_flags;
 mod complete;
 mod count;
 mod detect;
@@ -12,6 +13,7 @@ mod model;
 mod output;
 mod parameters;
 mod progress;
+mod run;
 mod serve;
 mod server_flags;
 mod settings_file;
@@ -44,7 +46,9 @@ struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Start the HTTP server
+    /// Watch cameras, count people and serve all of it, in one process
+    Run(Box<run::Arguments>),
+    /// Start the HTTP server alone
     Serve(serve::Arguments),
     /// Send frames of cameras to a server: snapshots, MJPEG, RTSP, folders, video files
     Watch(Box<watch::Arguments>),
@@ -89,8 +93,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, commit: Option<&str>) 
         Err(error) => error.exit(),
     }
     let outcome = match parse(arguments, commit).command {
+        Command::Run(arguments) => run::run(&arguments, commit),
         Command::Serve(arguments) => serve::run(&arguments, commit),
-        Command::Watch(arguments) => watch::run(&arguments, commit),
+        Command::Watch(arguments) => watch::run(&arguments),
         Command::Count(arguments) => count::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Detect(arguments) => detect::run(&arguments),

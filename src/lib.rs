@@ -11,6 +11,7 @@ pub mod annotation_formats;
 pub mod api;
 pub mod app;
 pub mod calibration_store;
+pub mod cameras;
 pub mod cli;
 pub mod metrics;
 pub mod mqtt;

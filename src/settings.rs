@@ -6,6 +6,7 @@
 
 mod access;
 mod calibrations;
+mod counts;
 mod declare;
 mod detect;
 mod entry;
@@ -13,38 +14,44 @@ mod error;
 mod form;
 mod inference;
 mod limits;
+mod lists;
 mod locate;
 mod model;
 mod mqtt;
 mod observability;
-mod page;
 #[cfg(test)]
 mod reference;
 mod remote;
 mod results;
 mod server;
+mod state;
 mod threads;
 mod tls;
+mod upstream;
 mod values;
 mod variables;
 
 use std::{path::Path, time::Duration};
 
+use lookdown_common::ServerEntry;
+
 pub use access::AccessSettings;
 pub use calibrations::{CalibrationPlace, CalibrationSettings};
+pub use counts::CountSettings;
 pub use error::SettingsError;
 pub use inference::InferenceSettings;
 pub use limits::LimitSettings;
+pub use lists::ListSettings;
 pub use locate::{
     PackagedFiles, find_calibrations, find_installed, is_installed, use_packaged_files,
 };
 use lookdown_detect::parameters::DetectDefaults;
 pub use model::ModelSettings;
 pub use observability::{LogFormat, LogSettings, TraceSettings};
-pub use page::PageSettings;
 pub use remote::RemoteSettings;
 pub use results::ResultSettings;
 pub use server::{ServerSettings, ShutdownSettings};
+pub use state::StateSettings;
 pub use threads::ThreadPlan;
 pub use variables::environment;
 
@@ -52,7 +59,7 @@ pub(crate) use variables::variable_of;
 
 use self::{
     declare::Table, entry::Entry, mqtt::MqttKeys, remote::RemoteKeys, results::ResultKeys,
-    threads::ThreadKeys, tls::TlsKeys, values::Values,
+    threads::ThreadKeys, tls::TlsKeys, upstream::UpstreamKeys, values::Values,
 };
 use lookdown_http::server::ConnectionLimits;
 
@@ -71,8 +78,6 @@ pub struct Settings {
     pub shutdown: ShutdownSettings,
     /// API keys, and the web pages that may call the server.
     pub access: AccessSettings,
-    /// The web page.
-    pub page: PageSettings,
     /// The calibration store.
     pub calibrations: CalibrationSettings,
     /// The defaults of detection parameters.
@@ -91,6 +96,14 @@ pub struct Settings {
     pub results: ResultSettings,
     /// The MQTT broker; `None` for none.
     pub mqtt: Option<MqttOptions>,
+    /// The server of `watch` and `count`.
+    pub upstream: ServerEntry,
+    /// The counts.
+    pub counts: CountSettings,
+    /// The state of `lookdown run`.
+    pub state: StateSettings,
+    /// Cameras and webhooks.
+    pub lists: ListSettings,
     /// The log.
     pub log: LogSettings,
     /// Traces.
@@ -118,7 +131,6 @@ impl Settings {
             tls: TlsKeys::read(values)?.checked()?,
             shutdown: ShutdownSettings::read(values)?,
             access: AccessSettings::read(values)?,
-            page: PageSettings::read(values)?,
             calibrations: CalibrationSettings::read(values)?,
             detect: DetectDefaults::read(values)?,
             threads: ThreadKeys::read(values)?.plan(inference.device, is_remote),
@@ -127,6 +139,10 @@ impl Settings {
             remote,
             results: ResultKeys::read(values)?.checked(ResultLimits::read(values)?)?,
             mqtt: MqttKeys::read(values)?.checked()?,
+            upstream: UpstreamKeys::read(values)?.entry(),
+            counts: CountSettings::read(values)?,
+            state: StateSettings::read(values)?,
+            lists: values.lists.clone(),
             log: LogSettings::read(values)?,
             traces: TraceSettings::read(values)?,
         })
@@ -141,7 +157,6 @@ fn entries() -> Vec<Entry> {
         TlsKeys::entries(),
         ShutdownSettings::entries(),
         AccessSettings::entries(),
-        PageSettings::entries(),
         CalibrationSettings::entries(),
         DetectDefaults::entries(),
         ModelSettings::entries(),
@@ -152,6 +167,9 @@ fn entries() -> Vec<Entry> {
         ResultKeys::entries(),
         ResultLimits::entries(),
         MqttKeys::entries(),
+        CountSettings::entries(),
+        StateSettings::entries(),
+        UpstreamKeys::entries(),
         LogSettings::entries(),
         TraceSettings::entries(),
     ]

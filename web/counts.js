@@ -1,4 +1,4 @@
-/** Counts of `lookdown count` in the section Live, where the server names its path: tracks, lines, zones, heat maps. */
+/** Counts in the section Live, if the server has them: tracks, lines, zones, heat maps. */
 
 import { countRows, drawCounts } from "./counts_drawing.js";
 import { element, find, shape } from "./dom.js";
@@ -44,7 +44,7 @@ export const layersBelow = ({ camera }) => (counted.has(camera) ? "none" : "orie
 
 async function poll(signal) {
   try {
-    path ??= (await askJson("assets/options.json", { signal })).counts_path ?? "";
+    path ??= (await askJson("assets/options.json", { signal })).has_counts ? "/counts" : "";
   } catch {
     // The section reports that the server does not respond.
     return;
@@ -63,8 +63,7 @@ async function poll(signal) {
       }
     } catch (error) {
       if (signal.aborted) return;
-      const remedy = error.status === 401 ? "requires another API key: let the proxy send it" : "cannot be reached: start it, and forward this path to it";
-      report(`lookdown count at ${path} ${remedy}.`);
+      report("The counts cannot be read: the log of the server has the reason.");
       for (const camera of [...counted.keys()]) remove(camera);
       await pause(PAUSE_MILLIS, signal);
     }

@@ -100,10 +100,10 @@ async function ownCalibration({ camera, report }, others) {
   if (!PLAIN_NAME.test(camera)) {
     return { problem: `Not saved: ${camera} cannot be the name of a calibration. Save one in Calibrate, and name it in the frames.` };
   }
-  const why = assumed ? "Its lens was assumed" : `${sharing.map((other) => other.camera).join(", ")} also use ${id}`;
+  const why = assumed ? "Its lens was assumed" : `${id} is also used by ${sharing.map((other) => other.camera).join(", ")}`;
   const note = `${why}: ${camera} now has the calibration ${camera}. Its frames must name it: calibration=${camera}.`;
-  const existing = await read(camera).catch(() => null);
-  if (existing) return { ...existing, note };
+  const stored = await askJson("calibrations");
+  if (stored.some((calibration) => calibration.id === camera)) return { ...(await read(camera)), note };
   const file = assumed ? assumedFile(camera, report) : { ...(await read(id)).file, id: camera };
   return { id: camera, file, tag: null, note };
 }

@@ -13,11 +13,23 @@ pub(super) fn detect_parameters<'a>(
     mut given: Vec<(&'a str, &'a str)>,
     protocol: &[(&'a str, &'a str)],
 ) -> Result<DetectParameters, ParameterError> {
-    let mut named = given.iter();
-    let id = named.find(|(name, _)| *name == DetectParameters::CALIBRATION);
+    let value = |wanted: &str| {
+        let mut named = given.iter();
+        named.find_map(|(name, value)| (*name == wanted).then_some(*value))
+    };
+    let entry = |id: &str| state.calibrations.entry(&id.parse::<CalibrationId>().ok()?);
     // An invalid ID is refused below, an unknown one by the engine.
-    let id = id.and_then(|(_, id)| id.parse::<CalibrationId>().ok());
-    let camera = id.and_then(|id| state.calibrations.entry(&id));
+    let calibration = value(DetectParameters::CALIBRATION);
+    let mut camera = calibration.and_then(entry);
+    if calibration.is_none()
+        && let Some(name) = value(DetectParameters::CAMERA)
+    {
+        // A camera without a calibration uses the calibration of the same name.
+        camera = entry(name);
+        if camera.is_some() {
+            given.push((DetectParameters::CALIBRATION, name));
+        }
+    }
     let server = &state.options.detect_defaults;
     let mut layers = Vec::with_capacity(2);
     if let Some(camera) = &camera {

@@ -15,7 +15,6 @@ use utoipa::ToSchema;
     "calibration": {"id": "lobby", "revision": "9f86d081884c", "assumed": false},
     "image": {"width": 1680, "height": 1680},
     "model": {"name": "nanodet_g_416", "revision": "a3c2e9b54d10"},
-    "second_opinion": {"name": "ssdlite_mobilenet_v2_int8", "revision": "60303ae22b99"},
     "crop_model": {"name": "nanodet_g_fisheye_416_int8", "revision": "99cfa8ef2934"},
     "profile": "quality",
     "refinement": {
@@ -32,6 +31,7 @@ use utoipa::ToSchema;
         },
         "bearing": {"azimuth_deg": 349.87, "off_axis_deg": 41.71},
         "floor": {"x_m": 1.873, "y_m": -0.334},
+        "height_m": 1.74, "height_sd_m": 0.21,
         "views": 3,
         "zones": ["entrance"]
     }],
@@ -59,10 +59,6 @@ pub struct Report {
     pub image: ReportImage,
     /// The model.
     pub model: ReportModel,
-    /// The second model of the zoom views; absent when they used no other model than `model`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    pub second_opinion: Option<ReportModel>,
     /// The model of the upright crops; absent when they used no other model than `model`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -192,7 +188,7 @@ pub struct ReportViews {
     pub outside: usize,
     /// Views that the masks of the calibration hide completely.
     pub masked: usize,
-    /// Views that can show nobody who stands in an area of the calibration.
+    /// Views that cannot show a person in an area of the calibration.
     pub outside_areas: usize,
 }
 
@@ -219,6 +215,15 @@ pub struct ReportPerson {
     pub bearing: Option<ReportBearing>,
     /// Position of the person on the floor; null when the height of the camera is unknown.
     pub floor: Option<ReportFloor>,
+    /// Height of the person above the floor in meters; absent when the height of the camera is
+    /// unknown, below the camera, and far away.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub height_m: Option<f64>,
+    /// Standard deviation of `height_m` in meters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub height_sd_m: Option<f64>,
     /// Number of views that detected the person.
     pub views: usize,
     /// Names of the zones that contain the person's foot point; absent without zones.

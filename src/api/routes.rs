@@ -2,6 +2,8 @@
 //! endpoint needs its handler and a row of the table here.
 
 pub(super) mod calibrations;
+pub(super) mod cameras;
+pub(super) mod counts;
 pub(super) mod detect;
 pub(super) mod health;
 pub(super) mod openapi;
@@ -27,6 +29,9 @@ pub(super) fn of_clients() -> OpenApiRouter<ApiState> {
             calibrations::views::get_views,
             calibrations::views::try_views
         ))
+        .routes(routes!(cameras::list))
+        .routes(routes!(cameras::get, cameras::put, cameras::delete))
+        .routes(routes!(cameras::test))
         .routes(routes!(results::list))
         .routes(routes!(results::delete::delete))
         .routes(routes!(results::followed::put))

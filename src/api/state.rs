@@ -18,6 +18,7 @@ use lookdown_detect::{
 use lookdown_http::header_limits::HeaderLimits;
 
 use super::{
+    companions::Companions,
     http::{
         access::Access,
         deadline::{Deadline, RequestTimeout},
@@ -73,8 +74,8 @@ pub struct ApiOptions {
     pub cors_origins: Vec<String>,
     /// Further names of a server without keys.
     pub hosts: Vec<String>,
-    /// The path of `lookdown count` on the origin of the web page; `None` for none.
-    pub page_counts_path: Option<String>,
+    /// The cameras and counts of this process, and the counts of another host.
+    pub companions: Companions,
     /// Creates the spans of requests.
     pub tracer: Tracer,
 }
@@ -126,7 +127,7 @@ impl ApiOptions {
             },
             cors_origins: Vec::new(),
             hosts: Vec::new(),
-            page_counts_path: None,
+            companions: Companions::default(),
             tracer: Tracer::default(),
         }
     }

@@ -5,6 +5,8 @@ mod convert;
 mod fit;
 mod frame_file;
 mod source;
+mod suggest_area;
+mod walked_area;
 
 use std::process::ExitCode;
 
@@ -21,6 +23,8 @@ pub(super) enum Command {
     Convert(convert::Arguments),
     /// Fit a calibration to frames: the lens circle is detected, an ideal lens assumed
     Fit(fit::Arguments),
+    /// Suggest an area from the places where people walked
+    SuggestArea(suggest_area::Arguments),
 }
 
 /// Runs the subcommand.
@@ -29,5 +33,6 @@ pub(super) fn run(command: &Command) -> anyhow::Result<ExitCode> {
         Command::Check(arguments) => check::run(arguments),
         Command::Convert(arguments) => convert::run(arguments),
         Command::Fit(arguments) => fit::run(arguments),
+        Command::SuggestArea(arguments) => suggest_area::run(arguments),
     }
 }

@@ -1,17 +1,27 @@
 //! `lookdown count`
 
-use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
+mod recording;
 
-use anyhow::Context;
+use std::{path::PathBuf, process::ExitCode};
+
+use anyhow::{Context, bail};
 use clap::Args;
-use lookdown_count::{
-    CountEntry, CountOptions, HttpEntry, MqttEntry, Origin, Snapshot, StoreEntry, count,
-};
+use lookdown_common::{ConfigError, Reload, ServerEntry, ServerOptions};
+use lookdown_count::{CountEntry, CountOptions, Snapshot, Started, count};
 use lookdown_http::Shutdown;
 use tokio::{runtime, sync::watch};
 
-use super::{SettingsFile, serve, server_flags::ServerFlags};
-use crate::mqtt::{Broker, CountsOptions, CountsPublisher};
+use super::{
+    SettingsFile,
+    detect::stream::is_video,
+    serve,
+    server_flags::{ServerFlags, given},
+    settings_file::SettingsSource,
+};
+use crate::{
+    mqtt::{CountsOptions, CountsPublisher},
+    settings::Settings,
+};
 
 /// Threads for all cameras.
 const RUNTIME_THREADS: usize = 2;
@@ -19,107 +29,153 @@ const RUNTIME_THREADS: usize = 2;
 /// Arguments of `lookdown count`.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A file of settings (docs/count.md) [default: none]
-    #[arg(value_name = "COUNT.toml")]
-    file: Option<PathBuf>,
+    /// A settings file (docs/count.md); or recordings of one camera in their order, such as
+    /// clip.mp4, which are counted without a server [default: none]
+    #[arg(value_name = "SETTINGS.toml|CLIP")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    recording: recording::RecordingFlags,
     #[command(flatten)]
     server: ServerFlags,
-    /// The address of the counts [default: 127.0.0.1:8090]
+    /// The address of the counts (`counts.listen`) [default: 127.0.0.1:8090]
     #[arg(long, value_name = "ADDRESS")]
-    listen: Option<SocketAddr>,
-    /// The file of the counts [default: counts.sqlite]
+    listen: Option<String>,
+    /// The file of the counts (`counts.path`) [default: counts.sqlite]
     #[arg(long, value_name = "FILE")]
-    store: Option<PathBuf>,
+    store: Option<String>,
     #[command(flatten)]
     settings_file: SettingsFile,
 }
 
-impl Arguments {
-    fn origin(&self) -> Origin {
-        let flags = CountEntry {
-            server: self.server.entry(),
-            http: HttpEntry {
-                listen: self.listen,
-                ..HttpEntry::default()
-            },
-            store: StoreEntry {
-                path: self.store.clone(),
-                ..StoreEntry::default()
-            },
-            ..CountEntry::default()
-        };
-        Origin {
-            file: self.file.clone(),
-            flags,
-        }
-    }
+/// The settings of the counts.
+#[derive(Clone, PartialEq)]
+pub(super) struct Counting {
+    options: CountOptions,
+    /// The broker.
+    mqtt: Option<CountsOptions>,
 }
 
 /// Counts until a stop is requested. Changed settings apply at once.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    arguments.settings_file.load()?;
+    if arguments.files.iter().any(|file| is_video(file)) {
+        return recording::run(arguments);
+    }
+    if arguments.recording.is_given() {
+        bail!("flags of a recording need one: give a video such as clip.mp4");
+    }
+    let file = match arguments.files.as_slice() {
+        [] => None,
+        [file] => Some(file.to_string_lossy()),
+        [_, other, ..] => bail!(
+            "{}: it is no recording: give one settings file, or recordings such as clip.mp4",
+            other.display()
+        ),
+    };
+    let own = given(&[
+        ("counts.listen", arguments.listen.as_deref()),
+        ("counts.path", arguments.store.as_deref()),
+    ]);
+    let flags = [arguments.server.settings(), own].concat();
+    let settings = arguments.settings_file.source(file.as_deref(), &flags)?;
+    settings.load()?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(RUNTIME_THREADS)
         .enable_all()
         .build()
         .context("the operating system creates no thread")?;
-    let origin = arguments.origin();
     let outcome = runtime.block_on(async {
         let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
-        let mut options = origin.load().await?;
-        loop {
-            match count_until_changed(&origin, &options, &shutdown).await? {
-                Some(changed) => options = changed,
-                None => return anyhow::Ok(()),
-            }
-        }
+        let counting = counting(&settings, None);
+        run_counts(&counting, |_| {}, async || shutdown.requested().await).await
     });
     serve::end(runtime);
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
-/// Counts with these settings. Returns the changed settings, or `None` when a stop is requested.
-async fn count_until_changed(
-    origin: &Origin,
-    options: &CountOptions,
-    shutdown: &Shutdown,
-) -> anyhow::Result<Option<CountOptions>> {
-    let (snapshots, latest_snapshot) = watch::channel(Snapshot::default());
-    let publisher = match &options.mqtt {
-        Some(entry) => {
-            let publishing = publishing_options(entry, options.longest_gap)?;
-            Some(CountsPublisher::new(publishing, latest_snapshot)?)
+/// Returns the settings of the counts. Counts of `server`, which is in this process, have no address
+/// of their own.
+pub(super) fn counting(
+    settings: &SettingsSource,
+    server: Option<ServerOptions>,
+) -> Reload<Counting> {
+    let settings = settings.clone();
+    Reload::new(move || {
+        let settings = settings.again()?;
+        let mqtt = publishing(&settings);
+        let mut options = CountEntry {
+            server: match &server {
+                Some(_) => ServerEntry::default(),
+                None => settings.upstream,
+            },
+            webhooks: settings.lists.webhooks,
+            hosts: settings.access.hosts.clone(),
+            ..settings.counts.entry()
         }
-        None => None,
-    };
-    let mut changed = None;
-    let stop = async {
-        changed = tokio::select! {
-            options = origin.changed(options) => Some(options),
-            () = shutdown.requested() => None,
+        .check()?;
+        if let Some(server) = &server {
+            options.server = server.clone();
+            options.listen = None;
+        }
+        Ok::<_, ConfigError>(Counting { options, mqtt })
+    })
+}
+
+/// The broker of the settings. Topics of unknown cameras are withdrawn after the time for which the
+/// counts of a silent camera are known.
+fn publishing(settings: &Settings) -> Option<CountsOptions> {
+    let mqtt = settings.mqtt.clone()?;
+    Some(CountsOptions {
+        broker: mqtt.broker,
+        authorities: mqtt.authorities,
+        topic_prefix: mqtt.topic_prefix,
+        discovery_prefix: mqtt.discovery_prefix,
+        unknown_for: settings.counts.longest_gap,
+    })
+}
+
+/// Counts until `stopped` ends, and again after each change of the settings. `started` receives the
+/// routes each time.
+pub(super) async fn run_counts(
+    settings: &Reload<Counting>,
+    started: impl Fn(Started),
+    stopped: impl AsyncFn(),
+) -> anyhow::Result<()> {
+    let mut current = settings.load().await?;
+    loop {
+        let mut changed = None;
+        let stop = async {
+            changed = tokio::select! {
+                counting = settings.changed(&current) => Some(counting),
+                () = stopped() => None,
+            };
         };
-    };
+        count_with(&current, &started, stop).await?;
+        match changed {
+            Some(counting) => current = counting,
+            None => return Ok(()),
+        }
+    }
+}
+
+/// Counts with these settings until `stop` ends.
+async fn count_with(
+    counting: &Counting,
+    started: impl Fn(Started),
+    stop: impl Future<Output = ()>,
+) -> anyhow::Result<()> {
+    let (snapshots, latest_snapshot) = watch::channel(Snapshot::default());
+    let publisher = counting.mqtt.clone();
+    let publisher = publisher.map(|options| CountsPublisher::new(options, latest_snapshot));
+    let publisher = publisher.transpose()?;
     let publishing = async {
         if let Some(publisher) = publisher {
             publisher.run().await;
         }
     };
     // The end of the counts ends the publisher.
-    let (counted, ()) = tokio::join!(count(options, snapshots, stop), publishing);
-    counted?;
-    Ok(changed)
-}
-
-/// The broker of the settings, with its password. Topics of unknown cameras are withdrawn after the
-/// time for which the counts of a silent camera are known.
-fn publishing_options(entry: &MqttEntry, unknown_for: Duration) -> anyhow::Result<CountsOptions> {
-    let broker: Broker = entry.url_with_password()?.parse().context("mqtt.url")?;
-    let discovery = &entry.discovery_prefix;
-    Ok(CountsOptions {
-        broker,
-        authorities: entry.authorities.clone(),
-        topic_prefix: entry.topic_prefix.clone(),
-        discovery_prefix: (!discovery.is_empty()).then(|| discovery.clone()),
-        unknown_for,
-    })
+    let (counted, ()) = tokio::join!(
+        count(&counting.options, snapshots, started, stop),
+        publishing
+    );
+    Ok(counted?)
 }

@@ -2,7 +2,7 @@
 
 mod labels;
 mod pictures;
-mod stream;
+pub(super) mod stream;
 
 use std::{
     fs,

@@ -40,6 +40,27 @@ impl ParameterFlags {
         let calibration = calibration.map(|id| ("calibration", id));
         DetectParameters::parse(pairs(&self.0).chain(calibration))
     }
+
+    /// Returns true if no parameter is given.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Like [`Self::check`], with another default of a parameter.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when a value cannot be used.
+    pub(super) fn check_or(
+        &self,
+        calibration: Option<&str>,
+        (name, value): (&'static str, &str),
+    ) -> Result<DetectParameters, ParameterError> {
+        let mut given = self.0.clone();
+        if given.iter().all(|(other, _)| *other != name) {
+            given.push((name, value.to_owned()));
+        }
+        Self(given).check(calibration)
+    }
 }
 
 impl PictureFlags {

@@ -81,17 +81,31 @@ fn runtime_threads() -> usize {
 }
 
 /// Runs the server with these settings until a stop is requested.
-pub(super) async fn serve(
+async fn serve(settings: Settings, commit: Option<&str>, shutdown: Shutdown) -> anyhow::Result<()> {
+    let (app, sockets) = open(settings, commit).await?;
+    serve_app(app, sockets, shutdown).await
+}
+
+/// Binds the addresses and starts the workers. No model is loaded yet.
+pub(super) async fn open(
     settings: Settings,
     commit: Option<&str>,
-    shutdown: Shutdown,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<(App, Sockets)> {
     // From now on SIGHUP does not end the process.
     let hangups = signal(SignalKind::hangup()).context("signals cannot be handled")?;
     let sockets = Sockets::bind(&settings.server).await?;
     let app = start(settings).await?;
     app.metrics().set_build(commit);
     spawn(reload_on(hangups, app.reloader()));
+    Ok((app, sockets))
+}
+
+/// Serves until a stop is requested.
+pub(super) async fn serve_app(
+    app: App,
+    sockets: Sockets,
+    shutdown: Shutdown,
+) -> anyhow::Result<()> {
     let (tracer, at_once) = (app.tracer(), shutdown.clone());
     let outcome = app.serve(sockets, shutdown).await;
     let last_spans = spawn_blocking(move || tracer.shut_down());

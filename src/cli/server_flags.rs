@@ -1,31 +1,49 @@
 //! The flags of the companions for the server that they are clients of.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use lookdown_common::ServerEntry;
 
 /// The server of a companion.
 #[derive(Debug, Args)]
 pub(super) struct ServerFlags {
-    /// The URL of the server [default: port 8080 on this machine]
+    /// The URL of the server (`upstream.url`) [default: port 8080 on this machine]
     #[arg(long, value_name = "URL")]
     server: Option<String>,
-    /// A file with the API key for the server
+    /// A file with the API key for the server (`upstream.api_key_file`)
     #[arg(long, value_name = "FILE")]
-    api_key_file: Option<PathBuf>,
-    /// A PEM file with the authorities of the server's certificate [default: those of the system]
+    api_key_file: Option<String>,
+    /// A PEM file with the authorities of the server's certificate (`upstream.authorities`)
+    /// [default: those of the system]
     #[arg(long, value_name = "FILE")]
-    authorities: Option<PathBuf>,
+    authorities: Option<String>,
 }
 
 impl ServerFlags {
-    /// Returns the flags as an entry of a settings file.
+    /// Returns the server of the flags alone.
     pub(super) fn entry(&self) -> ServerEntry {
         ServerEntry {
             url: self.server.clone(),
-            api_key_file: self.api_key_file.clone(),
-            authorities: self.authorities.clone(),
+            api_key_file: self.api_key_file.as_ref().map(Into::into),
+            authorities: self.authorities.as_ref().map(Into::into),
         }
     }
+
+    /// Returns the settings that the flags give.
+    pub(super) fn settings(&self) -> Vec<(String, String)> {
+        given(&[
+            ("upstream.url", self.server.as_deref()),
+            ("upstream.api_key_file", self.api_key_file.as_deref()),
+            ("upstream.authorities", self.authorities.as_deref()),
+        ])
+    }
+}
+
+/// Returns the keys and values of flags that are given.
+pub(super) fn given(flags: &[(&str, Option<&str>)]) -> Vec<(String, String)> {
+    let given = flags
+        .iter()
+        .filter_map(|(key, value)| Some((*key, (*value)?)));
+    given
+        .map(|(key, value)| (key.to_owned(), value.to_owned()))
+        .collect()
 }

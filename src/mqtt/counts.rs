@@ -31,6 +31,7 @@ use crate::tls::{ClientTls, TlsError};
 use number::{AVAILABILITY, Number, Owner};
 
 /// The broker of the counts, and the settings of the messages.
+#[derive(Debug, Clone, PartialEq)]
 pub struct CountsOptions {
     /// The broker.
     pub broker: Broker,

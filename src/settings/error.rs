@@ -61,6 +61,9 @@ pub enum SettingsError {
         /// The remedy.
         remedy: String,
     },
+    /// A camera, a webhook or a secret that cannot be used.
+    #[error(transparent)]
+    Part(#[from] lookdown_common::ConfigError),
     /// A file or folder that is not there.
     #[error("{key}: there is no {what} at {}: {remedy}", path.display())]
     Missing {

@@ -6,11 +6,12 @@ mod texts;
 mod written;
 
 pub(super) use numbers::{
-    MAX_BYTES, MAX_TIMEOUT_MILLIS, count, flag, millis, poll_seconds, rate, seconds, share, whole,
-    zero_is_none,
+    MAX_BYTES, MAX_TIMEOUT_MILLIS, count, duration, flag, millis, poll_seconds, rate, seconds,
+    share, whole, zero_is_none,
 };
 pub(super) use texts::{
     address, choice, given_path, list, names, optional, optional_text, parsed, path, secret, text,
+    web_address,
 };
 pub(super) use written::{Refusal, Written};
 

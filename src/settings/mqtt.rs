@@ -2,13 +2,14 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
+use lookdown_common::read_secret;
 use secrecy::{ExposeSecret, SecretString};
 use url::Url;
 
 use super::{
     SettingsError,
     declare::settings,
-    form::{Form, Refusal, count, optional, parsed, path, seconds, secret, text, zero_is_none},
+    form::{Form, count, optional, path, seconds, secret, text, web_address, zero_is_none},
 };
 use crate::mqtt::{Broker, BrokerError, Discovery, MqttOptions};
 
@@ -28,6 +29,8 @@ settings! {
         /// The password of the user in that URL, as it is. Empty: the password of the URL. It is
         /// better kept in the variable than in a file that others can read.
         password: Option<SecretString> = None => secret("password");
+        /// The file with that password on its first line, instead of `mqtt.password`. Empty: none.
+        password_file: Option<PathBuf> = None => optional(path());
         /// The PEM file of the certificate authorities of a broker with TLS. Empty: those that the
         /// system trusts.
         authorities: Option<PathBuf> = None => optional(path());
@@ -64,7 +67,9 @@ impl MqttKeys {
         let mut broker = broker
             .transpose()
             .map_err(|error: BrokerError| refusal("mqtt.url", error.to_string()))?;
-        if let Some(password) = self.password {
+        let in_file = self.password_file.as_deref();
+        let in_file = in_file.map(|path| read_secret("mqtt.password_file", path));
+        if let Some(password) = self.password.or(in_file.transpose()?) {
             let with_password = |broker: Broker| broker.with_password(password.expose_secret());
             broker = broker
                 .map(with_password)
@@ -85,20 +90,6 @@ impl MqttKeys {
             },
         }))
     }
-}
-
-fn web_address() -> Form<Url> {
-    parsed(
-        "URL",
-        |text| {
-            let url = text.parse::<Url>().ok();
-            let url = url.filter(|url| matches!(url.scheme(), "http" | "https"));
-            url.ok_or_else(|| {
-                Refusal::Shown("give an address such as http://lookdown.local:8080".to_owned())
-            })
-        },
-        Url::to_string,
-    )
 }
 
 /// The beginning of topics (MQTT 3.1.1, section 4.7): no wildcard, no empty level, and none of the

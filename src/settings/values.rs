@@ -10,6 +10,7 @@ use super::{
     SettingsError,
     entry::{Entry, unknown},
     form::{Form, Written},
+    lists::{self, ListSettings},
     variables,
 };
 
@@ -18,6 +19,8 @@ use super::{
 pub(super) struct Values {
     /// Those of the settings file, by their keys.
     file: BTreeMap<String, Value>,
+    /// Cameras and webhooks of the settings file.
+    pub(super) lists: ListSettings,
     /// Those of the environment and the command line, by their keys.
     variables: BTreeMap<String, String>,
 }
@@ -31,7 +34,15 @@ impl Values {
     ) -> Result<Self, SettingsError> {
         let mut values = Self::default();
         if let Some(path) = file {
-            values.add_table("", read(path)?, entries)?;
+            let text = read(path)?;
+            let mut table = parse(path, &text)?;
+            let lists = lists::NAMES
+                .iter()
+                .filter(|name| table.remove(**name).is_some());
+            if lists.count() > 0 {
+                values.lists = ListSettings::read(&text)?;
+            }
+            values.add_table("", table, entries)?;
         }
         for (name, value) in environment {
             if let Some(key) = variables::key_of(&name, entries)? {
@@ -102,12 +113,14 @@ impl Values {
     }
 }
 
-fn read(path: &Path) -> Result<Table, SettingsError> {
-    let text =
-        files::read_text(path, MAX_SETTINGS_BYTES).map_err(|source| SettingsError::Unreadable {
-            path: path.to_owned(),
-            source,
-        })?;
+fn read(path: &Path) -> Result<String, SettingsError> {
+    files::read_text(path, MAX_SETTINGS_BYTES).map_err(|source| SettingsError::Unreadable {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn parse(path: &Path, text: &str) -> Result<Table, SettingsError> {
     text.parse()
         .map_err(|error: toml::de::Error| SettingsError::NotToml {
             path: path.to_owned(),

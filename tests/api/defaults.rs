@@ -57,6 +57,20 @@ async fn request_precedes_calibration_and_calibration_the_server() {
 }
 
 #[tokio::test]
+async fn a_camera_uses_the_calibration_of_the_same_name() {
+    let service = service();
+    let before = service.post_raw("camera=hall", frame()).await.json();
+    assert_eq!(before["calibration"]["assumed"], true, "{before}");
+    let detect = json!({"score_threshold": 0.5});
+    let put = service.put("/calibrations/hall", &hall(&detect)).await;
+    assert_eq!(put.status, 201, "{}", put.text());
+    let after = service.post_raw("camera=hall", frame()).await.json();
+    assert_eq!(after["calibration"]["id"], "hall", "{after}");
+    assert_eq!(after["calibration"]["assumed"], false);
+    assert_eq!(after["refinement"]["score_threshold"], 0.5);
+}
+
+#[tokio::test]
 async fn invalid_defaults_of_a_calibration_are_refused() {
     let service = Service::start();
     for (detect, field) in [

@@ -6,12 +6,13 @@ use std::{
     io::{Read, Write},
     net::{SocketAddr, TcpListener, TcpStream},
     path::{Path, PathBuf},
+    sync::Arc,
     time::Duration,
 };
 
 use lookdown_common::ServerEntry;
-use lookdown_count::{CountEntry, HttpEntry, Snapshot, StoreEntry};
-use lookdown_watch::{CameraEntry, WatchOptions};
+use lookdown_count::{CountEntry, Snapshot};
+use lookdown_watch::{CameraEntry, Metrics, WatchOptions, serve_metrics};
 use tempfile::TempDir;
 use tokio::{
     sync::watch,
@@ -163,24 +164,18 @@ fn free_address() -> SocketAddr {
 /// Starts `lookdown count` for a server that does not run.
 async fn start_count(folder: &Path, key_file: Option<PathBuf>) -> (SocketAddr, JoinHandle<()>) {
     let address = free_address();
-    let flags = CountEntry {
+    let entry = CountEntry {
         server: nowhere(),
-        http: HttpEntry {
-            listen: Some(address),
-            api_key_file: key_file,
-            ..HttpEntry::default()
-        },
-        store: StoreEntry {
-            path: Some(folder.join("counts.sqlite")),
-            ..StoreEntry::default()
-        },
+        listen: Some(address),
+        api_key_file: key_file,
+        store: folder.join("counts.sqlite"),
         ..CountEntry::default()
     };
-    let origin = lookdown_count::Origin { file: None, flags };
-    let options = origin.load().await.unwrap();
+    let options = entry.check().unwrap();
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
     let task = tokio::spawn(async move {
-        let counting = lookdown_count::count(&options, snapshots, std::future::pending());
+        let never = std::future::pending();
+        let counting = lookdown_count::count(&options, snapshots, |_| {}, never);
         counting.await.unwrap();
     });
     (address, task)
@@ -198,8 +193,11 @@ fn start_watch(folder: &Path) -> (SocketAddr, JoinHandle<()>) {
     let options = WatchOptions::new(nowhere().check().unwrap(), vec![camera]).unwrap();
     let origin = lookdown_watch::Origin::Fixed(options);
     let task = tokio::spawn(async move {
-        let watching = lookdown_watch::watch(origin, Some(address), std::future::pending());
-        watching.await.unwrap();
+        let metrics = Arc::new(Metrics::new().unwrap());
+        let listener = tokio::net::TcpListener::bind(address).await.unwrap();
+        let watching = lookdown_watch::watch(origin, Arc::clone(&metrics), std::future::pending());
+        let (watched, ()) = tokio::join!(watching, serve_metrics(listener, metrics));
+        watched.unwrap();
     });
     (address, task)
 }

@@ -13,7 +13,7 @@ use lookdown_detect::{
 };
 use lookdown_lens::{
     geometry::{
-        OrientedBox, Pixel,
+        OrientedBox, PersonHeight, Pixel,
         floor::{Bearing, FloorPosition},
     },
     warning::{Warning, WarningCode},
@@ -38,6 +38,10 @@ fn person() -> Person {
             x_m: 1.873_49,
             y_m: -0.000_1,
         }),
+        height: Some(PersonHeight {
+            height_m: 1.740_9,
+            sd_m: 0.21,
+        }),
         views: 3,
         zones: Some(vec!["entrance".to_owned()]),
     }
@@ -47,6 +51,7 @@ fn report() -> DetectionReport {
     let unknown_place = Person {
         bearing: None,
         floor: None,
+        height: None,
         zones: Some(Vec::new()),
         ..person()
     };
@@ -67,10 +72,6 @@ fn report() -> DetectionReport {
             name: "ssdlite_mobilenet_v2".to_owned(),
             revision: "60303ae22b99".to_owned(),
         },
-        second_opinion: Some(ModelUsed {
-            name: "nanodet_g_416".to_owned(),
-            revision: "a3c2e9b54d10".to_owned(),
-        }),
         crop_model: Some(ModelUsed {
             name: "nanodet_g_fisheye_416".to_owned(),
             revision: "5b1f0c77e2aa".to_owned(),

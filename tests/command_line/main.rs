@@ -8,6 +8,7 @@ mod health;
 mod keys;
 mod models;
 mod planted;
+mod run;
 mod samples;
 mod serve;
 mod shell;

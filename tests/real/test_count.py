@@ -109,10 +109,9 @@ class CountedCamera(unittest.TestCase):
         password.write_text(PASSWORD + "\n", encoding="utf-8")
         self.settings, self.store = self.folder / "count.toml", self.folder / "counts.sqlite"
         self.settings.write_text(
-            f'[server]\nurl = "http://{self.server.address}"\n'
-            f'[http]\nlisten = "127.0.0.1:{self.port}"\n'
-            f'[store]\npath = "{self.store}"\ncommit_every = "200ms"\n'
-            f'[counting]\nlongest_gap = "{LONGEST_GAP}"\n'
+            f'[upstream]\nurl = "http://{self.server.address}"\n'
+            f'[counts]\nlisten = "127.0.0.1:{self.port}"\n'
+            f'path = "{self.store}"\ncommit_every = "200ms"\nlongest_gap = "{LONGEST_GAP}"\n'
             f'[mqtt]\nurl = "mqtt://{USER}@localhost:{self.broker.port}"\npassword_file = "{password}"\n',
             encoding="utf-8",
         )
@@ -272,9 +271,9 @@ class Counts(CountedCamera):
 
     def test_problems_are_one_clear_sentence(self):
         for text, problem in [
-            ("[server]\nurl = 5\n", "server.url"),
+            ("[upstream]\nurl = 5\n", "upstream.url"),
             ('[mqtt]\nurl = "http://localhost"\n', "mqtt.url"),
-            ('[store]\npath = "/nowhere/counts.sqlite"\n', "store.path: /nowhere/counts.sqlite cannot be used"),
+            ('[counts]\npath = "/nowhere/counts.sqlite"\n', "counts.path: /nowhere/counts.sqlite cannot be used"),
         ]:
             with self.subTest(problem):
                 self.settings.write_text(text, encoding="utf-8")

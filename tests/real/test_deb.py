@@ -43,8 +43,9 @@ class DebianPackage(unittest.TestCase):
     def test_systemd_accepts_the_unit(self):
         chroot = Chroot.create(self.place / "verified")
         chroot.install(self.package)
-        command = ["systemd-analyze", "verify", "--man=no", f"--root={chroot.root}", "lookdown.service"]
-        self.assertEqual(run(command), "")
+        for unit in ("lookdown.service", "lookdown-watch.service", "lookdown-count.service"):
+            command = ["systemd-analyze", "verify", "--man=no", f"--root={chroot.root}", unit]
+            self.assertEqual(run(command), "")
 
     def test_the_service_is_confined(self):
         root = f"--root={self.chroot.root}"

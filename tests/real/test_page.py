@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from harness.processes import free_ports
-from reverse_proxy import reverse_proxy
 from support.lookdown import lookdown
 from support.places import FIXTURES, ROOT, SAMPLES
 from test_count import Count
@@ -75,7 +74,10 @@ class Page(unittest.TestCase):
 
     @contextlib.contextmanager
     def counted(self, folder: Path) -> Iterator[dict[str, str]]:
-        """A server with `lookdown count` behind a proxy, and frames of a walk. Yields variables of the tests."""
+        """A server that forwards to `lookdown count`, one whose counts are gone, and frames of a walk.
+
+        Yields variables of the tests.
+        """
         calibrations, frames = folder / "counted", folder / "walk"
         calibrations.mkdir()
         frames.mkdir()
@@ -83,24 +85,24 @@ class Page(unittest.TestCase):
         (calibrations / "walks.json").write_text(json.dumps(calibration | {"zones": [ZONE]}), encoding="utf-8")
         clip = ["-i", WALKS / "walks.mp4", "-q:v", "2", frames / "%d.jpg"]
         subprocess.run(["ffmpeg", "-v", "error", *clip], check=True)
-        (port,) = free_ports(1)
+        port, closed_port = free_ports(2)
         settings = folder / "count.toml"
-        server_settings = {"PAGE__COUNTS_PATH": "/counts", "RESULTS__PICTURES": "hall"}
-        with lookdown(server_settings, calibrations=calibrations) as server:
+        uncounted_settings = {"COUNTS__URL": f"http://127.0.0.1:{closed_port}"}
+        server_settings = {"COUNTS__URL": f"http://127.0.0.1:{port}", "RESULTS__PICTURES": "hall"}
+        with lookdown(server_settings, calibrations=calibrations) as server, lookdown(uncounted_settings) as uncounted:
             settings.write_text(
-                f'[server]\nurl = "http://{server.address}"\n[http]\nlisten = "127.0.0.1:{port}"\n'
-                f'[store]\npath = "{folder / "counts.sqlite"}"\n[counting]\nlongest_gap = "10m"\n',
+                f'[upstream]\nurl = "http://{server.address}"\n[counts]\nlisten = "127.0.0.1:{port}"\n'
+                f'path = "{folder / "counts.sqlite"}"\nlongest_gap = "10m"\n',
                 encoding="utf-8",
             )
             count = Count(settings, folder / "count.log", port)
             try:
-                with reverse_proxy("/counts", f"127.0.0.1:{port}", server.address) as proxy:
-                    yield {
-                        "LOOKDOWN_COUNTED_URL": f"http://{proxy}",
-                        "LOOKDOWN_UNCOUNTED_URL": f"http://{server.address}",
-                        "LOOKDOWN_WALK": str(frames),
-                        "LOOKDOWN_WALK_TRUTH": str(WALKS / "truth.json"),
-                    }
+                yield {
+                    "LOOKDOWN_COUNTED_URL": f"http://{server.address}",
+                    "LOOKDOWN_UNCOUNTED_URL": f"http://{uncounted.address}",
+                    "LOOKDOWN_WALK": str(frames),
+                    "LOOKDOWN_WALK_TRUTH": str(WALKS / "truth.json"),
+                }
             finally:
                 count.stop(signal.SIGKILL)
 

@@ -81,8 +81,8 @@ class Walks(unittest.TestCase):
             server = stack.enter_context(lookdown({"MODEL__PATH": ""}, calibrations=self.calibrations))
             settings = folder / "count.toml"
             settings.write_text(
-                f'[server]\nurl = "http://{server.address}"\n[http]\nlisten = "127.0.0.1:{port}"\n'
-                f'[store]\npath = "{folder / "counts.sqlite"}"\n',
+                f'[upstream]\nurl = "http://{server.address}"\n[counts]\nlisten = "127.0.0.1:{port}"\n'
+                f'path = "{folder / "counts.sqlite"}"\n',
                 encoding="utf-8",
             )
             count = Count(settings, folder / "count.log", port)
@@ -90,7 +90,7 @@ class Walks(unittest.TestCase):
             rtsp = stack.enter_context(rtsp_camera(self.frames, stream_rate))
             cameras = folder / "cameras.toml"
             cameras.write_text(
-                f'[server]\nurl = "http://{server.address}"\n[[cameras]]\nname = "{CAMERA}"\ncalibration = "{CAMERA}"\n'
+                f'[upstream]\nurl = "http://{server.address}"\n[[cameras]]\nname = "{CAMERA}"\ncalibration = "{CAMERA}"\n'
                 f'url = "rtsp://127.0.0.1:{rtsp}/stream"\nprofile = "fast"\nevery = "{1000 // rate}ms"\n'
                 "parameters = { score_threshold = 0.06 }\n",
                 encoding="utf-8",

@@ -119,7 +119,7 @@ class Cameras(unittest.TestCase):
     def configured(self, cameras: dict[str, str], extra: str = "") -> Path:
         """A file of cameras with these URLs."""
         path = self.folder / "cameras.toml"
-        text = f'[defaults]\nevery = "{1000 // RATE}ms"\nstall_after = "2s"\nprofile = "fast"\n{extra}\n'
+        text = f'[camera_defaults]\nevery = "{1000 // RATE}ms"\nstall_after = "2s"\nprofile = "fast"\n{extra}\n'
         for name, url in cameras.items():
             text += f'[[cameras]]\nname = "{name}"\nurl = "{url}"\n'
             if name == "digest":
@@ -257,12 +257,13 @@ class Cameras(unittest.TestCase):
         subprocess.run(command, input=self.frames[0], check=True, capture_output=True, timeout=20)
         self.assertEqual(self.latest("pipe")["image"]["width"], SIDE)
 
-    def test_one_command_serves_and_watches(self):
+    def test_one_command_serves_watches_and_counts(self):
         http = self.enterContext(http_camera(self.frames, RATE))
         (port,) = free_ports(1)
         settings = {f"LOOKDOWN__{name}": value for name, value in TINY.items()}
         settings["LOOKDOWN__SERVER__LISTEN"] = f"127.0.0.1:{port}"
-        command = [LOOKDOWN, "watch", f"http://127.0.0.1:{http}/stream", "--name", "hall", "--serve"]
+        settings["LOOKDOWN__COUNTS__PATH"] = str(self.folder / "counts.sqlite")
+        command = [LOOKDOWN, "run", f"http://127.0.0.1:{http}/stream", "--name", "hall"]
         with open(self.folder / "serve.log", "wb") as log:
             process = subprocess.Popen(command, env=os.environ | settings, stderr=log)
         try:

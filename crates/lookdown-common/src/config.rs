@@ -38,6 +38,9 @@ pub enum ConfigError {
         /// The remedy, as the end of the sentence.
         remedy: String,
     },
+    /// A whole file of settings that cannot be used.
+    #[error("{0}")]
+    File(String),
     /// A missing or secret value.
     #[error("{field}: {problem}")]
     Problem {

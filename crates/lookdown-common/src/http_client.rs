@@ -2,16 +2,17 @@
 
 use std::time::Duration;
 
+use http_body::Body as _;
 use reqwest::{
-    Certificate, Client, RequestBuilder, Response, Url,
-    header::{AUTHORIZATION, HeaderMap, HeaderValue, RETRY_AFTER},
+    Body, Certificate, Client, RequestBuilder, Response, Url,
+    header::{AUTHORIZATION, CONTENT_LENGTH, HOST, HeaderMap, HeaderValue, RETRY_AFTER},
     redirect,
 };
 use secrecy::ExposeSecret;
 use serde::Deserialize;
 
 use crate::{
-    ServerOptions,
+    InProcess, ServerOptions,
     text::{one_line, with_causes},
 };
 
@@ -27,7 +28,7 @@ const MAX_PROBLEM_BYTES: usize = 64 << 10;
 /// A reason why there is no HTTP client.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "server.authorities: {0}: give a PEM file with the authorities of the server's certificate"
+    "upstream.authorities: {0}: give a PEM file with the authorities of the server's certificate"
 )]
 pub struct ClientError(String);
 
@@ -36,6 +37,8 @@ pub struct ClientError(String);
 pub struct ServerClient {
     client: Client,
     url: Url,
+    /// The server in this process, with the header of its key.
+    in_process: Option<(InProcess, HeaderMap)>,
 }
 
 /// The parts of a problem document that are used.
@@ -77,13 +80,14 @@ impl ServerClient {
             key.set_sensitive(true);
             headers.insert(AUTHORIZATION, key);
         }
-        let mut builder = client_builder().default_headers(headers);
+        let mut builder = client_builder().default_headers(headers.clone());
         if let Some(pem) = &options.authorities {
             builder = builder.tls_certs_only(Certificate::from_pem_bundle(pem)?);
         }
         Ok(Self {
             client: builder.build()?,
             url: options.url.clone(),
+            in_process: options.in_process.clone().map(|server| (server, headers)),
         })
     }
 
@@ -113,6 +117,23 @@ impl ServerClient {
         self.client.post(url)
     }
 
+    /// Sends a request of this client.
+    ///
+    /// # Errors
+    /// If the connection fails. A server in this process always answers.
+    pub async fn send(&self, request: RequestBuilder) -> reqwest::Result<Response> {
+        let Some((server, own_headers)) = &self.in_process else {
+            return request.send().await;
+        };
+        let mut request: http::Request<Body> = request.build()?.try_into()?;
+        let length = request.body().size_hint().exact();
+        let headers = request.headers_mut();
+        headers.extend(own_headers.clone());
+        headers.insert(HOST, HeaderValue::from_static("localhost"));
+        headers.extend(length.map(|length| (CONTENT_LENGTH, HeaderValue::from(length))));
+        Ok(Response::from(server.answer(request).await))
+    }
+
     /// Returns the scheme, the host and the port of the server.
     #[must_use]
     pub fn address(&self) -> String {
@@ -127,7 +148,7 @@ impl ServerClient {
             serde_json::from_slice(&body.unwrap_or_default()).unwrap_or_default();
         let address = self.address();
         match problem.detail.as_str() {
-            "" => format!("{address} answered {status}: check server.url"),
+            "" => format!("{address} answered {status}: check upstream.url"),
             detail => one_line(&format!("{address} answered {status}: {detail}")),
         }
     }
@@ -136,7 +157,7 @@ impl ServerClient {
     #[must_use]
     pub fn failure(&self, error: reqwest::Error) -> String {
         format!(
-            "the server {} cannot be reached: {}: start it, or correct server.url",
+            "the server {} cannot be reached: {}: start it, or correct upstream.url",
             self.address(),
             with_causes(&error.without_url())
         )

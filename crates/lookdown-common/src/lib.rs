@@ -15,8 +15,12 @@ mod duration;
 pub mod files;
 #[cfg(feature = "companion")]
 mod http_client;
+#[cfg(feature = "companion")]
+mod in_process;
 mod log_once;
 pub mod plain_name;
+#[cfg(feature = "companion")]
+mod reload;
 #[cfg(feature = "companion")]
 mod server_entry;
 pub mod text;
@@ -30,6 +34,8 @@ pub use {
     config::{ConfigError, parse_toml, read_file, read_secret},
     duration::{optional_duration, parse_duration},
     http_client::{ClientError, ServerClient, client_builder, read_body, retry_after},
+    in_process::InProcess,
+    reload::Reload,
     server_entry::{ServerEntry, ServerOptions},
 };
 

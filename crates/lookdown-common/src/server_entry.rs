@@ -7,7 +7,7 @@ use secrecy::{ExposeSecret, SecretString};
 use serde::Deserialize;
 
 use crate::{
-    ConfigError,
+    ConfigError, InProcess,
     config::{read_file, read_secret},
 };
 
@@ -23,6 +23,8 @@ pub struct ServerOptions {
     pub api_key: Option<SecretString>,
     /// The authorities to trust instead of those of the system, as PEM.
     pub authorities: Option<Vec<u8>>,
+    /// The server if it is in this process. The URL then only names it.
+    pub in_process: Option<InProcess>,
 }
 
 impl PartialEq for ServerOptions {
@@ -31,12 +33,15 @@ impl PartialEq for ServerOptions {
             let key = options.api_key.as_ref();
             key.map(|key| key.expose_secret().to_owned())
         };
-        self.url == other.url && key(self) == key(other) && self.authorities == other.authorities
+        self.url == other.url
+            && key(self) == key(other)
+            && self.authorities == other.authorities
+            && self.in_process == other.in_process
     }
 }
 
 /// The server as it is written in the file or on the command line.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ServerEntry {
     /// The base URL of the server.
@@ -72,16 +77,17 @@ impl ServerEntry {
             let remedy = "is no URL of a server: write it like http://127.0.0.1:8080";
             // It may hold a password.
             let shown = text.rsplit('@').next().unwrap_or_default();
-            return Err(ConfigError::value("server.url", &shown, remedy));
+            return Err(ConfigError::value("upstream.url", &shown, remedy));
         };
         let key = self.api_key_file.as_deref();
-        let key = key.map(|path| read_secret("server.api_key_file", path));
+        let key = key.map(|path| read_secret("upstream.api_key_file", path));
         let authorities = self.authorities.as_deref();
-        let authorities = authorities.map(|path| read_file("server.authorities", path));
+        let authorities = authorities.map(|path| read_file("upstream.authorities", path));
         Ok(ServerOptions {
             url,
             api_key: key.transpose()?,
             authorities: authorities.transpose()?,
+            in_process: None,
         })
     }
 }

@@ -141,7 +141,7 @@ impl Calibrations {
 /// Requests a calibration in the native format; `None` if the server has none with this ID.
 async fn request(client: &ServerClient, id: &str) -> Result<Option<Vec<u8>>, String> {
     let url = client.route(["calibrations", id]);
-    let sent = client.get(url).timeout(TIMEOUT).send().await;
+    let sent = client.send(client.get(url).timeout(TIMEOUT)).await;
     let response = sent.map_err(|error| client.failure(error))?;
     match response.status() {
         StatusCode::OK => {
@@ -152,7 +152,9 @@ async fn request(client: &ServerClient, id: &str) -> Result<Option<Vec<u8>>, Str
                 Ok(Some(body))
             } else {
                 let address = client.address();
-                Err(format!("{address} is no Lookdown server: check server.url"))
+                Err(format!(
+                    "{address} is no Lookdown server: check upstream.url"
+                ))
             }
         }
         StatusCode::NOT_FOUND => Ok(None),

@@ -41,6 +41,11 @@ pub(crate) struct Engine {
     owners: BTreeMap<String, Owner>,
     sums: Sums,
     totals: Totals,
+    /// The totals of the last transaction. Only these are shown, so that no count that was shown is
+    /// lost with the process.
+    stored_totals: Totals,
+    /// True if a crossing or an entry is not stored yet.
+    is_urgent: bool,
     /// ID of the last report that was accepted or refused.
     last_event: u64,
     /// Number of times that the IDs of the server went back.
@@ -58,6 +63,8 @@ pub(crate) struct Engine {
 /// The content of the next transaction of the store.
 pub(crate) struct Batch {
     pub(crate) last_event: u64,
+    /// The totals with these sums.
+    pub(crate) totals: Totals,
     pub(crate) sums: Sums,
     /// Changed scenes; `None` for those that are gone.
     pub(crate) scenes: Vec<(Owner, Option<SceneState>)>,
@@ -79,7 +86,9 @@ impl Engine {
             scenes: BTreeMap::new(),
             owners: BTreeMap::new(),
             sums: Sums::default(),
+            stored_totals: totals.clone(),
             totals,
+            is_urgent: false,
             last_event,
             position_resets: 0,
             drops: Drops::default(),
@@ -109,8 +118,19 @@ impl Engine {
         self.last_event
     }
 
+    /// Returns the totals that are stored.
     pub(crate) fn totals(&self) -> &Totals {
-        &self.totals
+        &self.stored_totals
+    }
+
+    /// Returns true if a crossing or an entry waits for a transaction.
+    pub(crate) fn is_urgent(&self) -> bool {
+        self.is_urgent
+    }
+
+    /// Shows the totals of a batch that is stored.
+    pub(crate) fn stored(&mut self, batch: &Batch) {
+        self.stored_totals.clone_from(&batch.totals);
     }
 
     pub(crate) fn scenes(&self) -> impl Iterator<Item = &Scene> {
@@ -219,6 +239,8 @@ impl Engine {
             accepted = scene.accept(index, time, &persons, &mut sums);
         }
         let crossings = accepted.map_err(|_| DropReason::OutOfOrder)?;
+        let has_entries = sums.zones.values().any(|sum| sum.entries > 0);
+        self.is_urgent |= has_entries || !sums.crossings.is_empty();
         self.totals.add(&sums);
         self.sums.add(sums);
         Ok(crossings)
@@ -362,6 +384,7 @@ impl Engine {
         if !std::mem::take(&mut self.has_news) {
             return None;
         }
+        self.is_urgent = false;
         let changed = std::mem::take(&mut self.changed).into_iter();
         let scenes = changed.map(|owner| {
             let state = self.scenes.get(&owner).map(Scene::state);
@@ -369,6 +392,7 @@ impl Engine {
         });
         Some(Batch {
             last_event: self.last_event,
+            totals: self.totals.clone(),
             scenes: scenes.collect(),
             sums: std::mem::take(&mut self.sums),
         })
@@ -377,9 +401,10 @@ impl Engine {
 
 impl Batch {
     /// Returns a batch without news.
-    pub(crate) fn empty(last_event: u64) -> Self {
+    pub(crate) fn empty(last_event: u64, totals: Totals) -> Self {
         Self {
             last_event,
+            totals,
             sums: Sums::default(),
             scenes: Vec::new(),
         }

@@ -38,13 +38,13 @@ impl<'a> EventStream<'a> {
         if after > 0 {
             request = request.header("last-event-id", after);
         }
-        let response = match timeout(CONNECT_TIMEOUT, request.send()).await {
+        let response = match timeout(CONNECT_TIMEOUT, client.send(request)).await {
             Ok(Ok(response)) => response,
             Ok(Err(error)) => return Err(StreamError::new(client.failure(error))),
             Err(_) => {
                 let address = client.address();
                 return Err(StreamError::new(format!(
-                    "the server {address} does not answer in 20 s: check server.url"
+                    "the server {address} does not answer in 20 s: check upstream.url"
                 )));
             }
         };
@@ -70,7 +70,7 @@ impl<'a> EventStream<'a> {
                 Ok(None) => {}
                 Err(TooLarge) => {
                     let address = self.client.address();
-                    let message = format!("{address}: {TooLarge}: check server.url");
+                    let message = format!("{address}: {TooLarge}: check upstream.url");
                     return Err(StreamError::new(message));
                 }
             }

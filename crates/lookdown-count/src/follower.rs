@@ -113,7 +113,8 @@ impl Follower {
                     }
                 }
             }
-            if Instant::now() >= self.next_commit || !self.messages.is_empty() {
+            let is_urgent = self.engine.lock().is_urgent() || !self.messages.is_empty();
+            if is_urgent || Instant::now() >= self.next_commit {
                 self.commit().await;
             }
         }
@@ -210,8 +211,10 @@ impl Follower {
         if batch.is_none() && messages.is_empty() && held.is_none() {
             return;
         }
-        let last_event = self.engine.lock().last_event();
-        let batch = batch.unwrap_or_else(|| Batch::empty(last_event));
+        let batch = batch.unwrap_or_else(|| {
+            let engine = self.engine.lock();
+            Batch::empty(engine.last_event(), engine.totals().clone())
+        });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);
         let mut log = LogOnce::default();
@@ -229,7 +232,7 @@ impl Follower {
                     self.metrics.commits_failed.inc();
                     let problem = problem.to_string();
                     if log.should_log(&problem) {
-                        tracing::error!("{problem}: free space, or correct store.path");
+                        tracing::error!("{problem}: free space, or correct counts.path");
                     }
                 }
                 // A task that panicked is logged by the panic hook.
@@ -243,6 +246,7 @@ impl Follower {
             }
             sleep(backoff.next_pause()).await;
         }
+        self.engine.lock().stored(&batch.0);
         if log.clear() {
             tracing::info!("the store is written again");
         }

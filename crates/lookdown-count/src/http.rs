@@ -27,6 +27,7 @@ use parking_lot::Mutex;
 use serde::Serialize;
 
 use crate::{engine::Engine, metrics::Metrics, store::Store, sums::Owner};
+pub(crate) use counts::{MAX_VALUES, table};
 
 /// Everything that requests read.
 pub(crate) struct Api {

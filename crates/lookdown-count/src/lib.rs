@@ -24,6 +24,7 @@ mod metrics;
 mod now;
 mod options;
 mod presence;
+mod recording;
 mod report;
 mod run;
 mod scene;
@@ -32,10 +33,9 @@ mod store;
 mod sums;
 mod webhooks;
 
-pub use options::{
-    CountEntry, CountOptions, CountingEntry, HttpEntry, MqttEntry, StoreEntry, load,
-};
-pub use run::{CountError, Origin, count};
+pub use options::{CountEntry, CountOptions, read_key};
+pub use recording::{Recording, RecordingError};
+pub use run::{CountError, Started, count};
 pub use snapshot::{CameraSnapshot, LineSnapshot, SiteSnapshot, Snapshot, ZoneSnapshot};
 pub use store::StoreError;
 pub use webhooks::WebhookEntry;

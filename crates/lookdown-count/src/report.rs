@@ -91,6 +91,15 @@ struct Floor {
 }
 
 impl Report {
+    /// Returns the report of a frame that was captured at this time, whenever it arrived.
+    pub(crate) fn captured(self, at: Timestamp) -> Self {
+        Self {
+            received_at: at,
+            captured_at: None,
+            ..self
+        }
+    }
+
     /// Returns true if the names are as long as the server permits at most.
     pub(crate) fn has_valid_names(&self) -> bool {
         let used = &self.calibration;

@@ -1,9 +1,10 @@
 //! The companion: follows the server, stores the sums, answers requests.
 
-use std::{future::Future, path::PathBuf, sync::Arc, time::Duration};
+use std::{future::Future, sync::Arc, time::Duration};
 
+use axum::Router;
 use jiff::Timestamp;
-use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerClient};
+use lookdown_common::{AbortOnDrop, ClientError, ConfigError, ServerClient};
 use lookdown_http::{
     protect::{self, Access, Routes},
     server::bind,
@@ -12,7 +13,7 @@ use parking_lot::Mutex;
 use tokio::{
     sync::watch,
     task::spawn_blocking,
-    time::{Instant, sleep, timeout},
+    time::{Instant, timeout},
 };
 
 use crate::{
@@ -22,24 +23,21 @@ use crate::{
     hand_back::hand_back,
     http::{Api, metrics_router, probes, router},
     metrics::Metrics,
-    options::{CountEntry, CountOptions, load},
+    options::CountOptions,
     snapshot::Snapshot,
     store::{Store, StoreError},
     webhooks::{Conditions, Deliveries},
 };
 
-/// Interval of the checks for changed settings.
-const FILE_CHECK: Duration = Duration::from_secs(2);
 /// Longest time for the last transaction.
 const LAST_COMMIT: Duration = Duration::from_secs(10);
 
-/// The origin of the settings.
-#[derive(Debug, Clone)]
-pub struct Origin {
-    /// A file that is read again when it changes.
-    pub file: Option<PathBuf>,
-    /// Flags, which have precedence.
-    pub flags: CountEntry,
+/// The running counts, for a server that answers with them.
+pub struct Started {
+    /// The routes below `/counts` and `/sites`, without access control.
+    pub routes: Router,
+    /// Returns all metrics in the text format of Prometheus.
+    pub metrics: Box<dyn Fn() -> Vec<u8> + Send + Sync>,
 }
 
 /// The reason why nothing is counted.
@@ -62,50 +60,26 @@ pub enum CountError {
     Address(String),
 }
 
-impl Origin {
-    /// Reads and checks the settings without blocking the runtime.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
-    pub async fn load(&self) -> Result<CountOptions, ConfigError> {
-        let Self { file, flags } = self.clone();
-        let loaded = spawn_blocking(move || load(file.as_deref(), &flags)).await;
-        loaded.unwrap_or_else(|error| Err(ConfigError::problem("settings", &error)))
-    }
-
-    /// Waits until the settings differ, and returns them. Invalid settings are logged once.
-    ///
-    /// The store and the address stay in use while settings are invalid.
-    pub async fn changed(&self, current: &CountOptions) -> CountOptions {
-        let mut log = LogOnce::default();
-        loop {
-            sleep(FILE_CHECK).await;
-            match self.load().await {
-                Ok(options) if options != *current => return options,
-                Ok(_) => drop(log.clear()),
-                Err(problem) => {
-                    if log.should_log(&problem.to_string()) {
-                        tracing::warn!("{problem}; the last valid settings stay in use");
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Counts with these settings until `stop` ends. `snapshots` receives the current counts.
+/// Counts with these settings until `stop` ends. `snapshots` receives the current counts, and
+/// `started` the routes.
 ///
 /// # Errors
 /// [`CountError`].
 pub async fn count(
     options: &CountOptions,
     snapshots: watch::Sender<Snapshot>,
+    started: impl FnOnce(Started),
     stop: impl Future<Output = ()>,
 ) -> Result<(), CountError> {
     let metrics = Arc::new(Metrics::new()?);
     let client = ServerClient::new(&options.server)?;
-    let listener = bind("http.listen", options.listen).await;
-    let listener = listener.map_err(CountError::Address)?;
+    let listener = match options.listen {
+        Some(address) => {
+            let listener = bind("counts.listen", address).await;
+            Some(listener.map_err(CountError::Address)?)
+        }
+        None => None,
+    };
     let path = options.store.clone();
     let opened = spawn_blocking(move || {
         let store = Store::open(&path)?;
@@ -135,22 +109,35 @@ pub async fn count(
         engine: Arc::clone(&engine),
         store: store.clone(),
     };
-    if let Ok(address) = listener.local_addr() {
-        tracing::info!("counts at http://{address}/counts");
-    }
-    let access = match &options.api_key {
-        Some(key) => Access::Key(key.clone()),
-        None => Access::without_key(options.listen),
-    };
-    let routes = Routes {
-        protected: router(api).merge(metrics_router(&engine, &metrics)),
-        probes: probes(),
-    };
-    let open = metrics.connections.clone();
-    let serving = tokio::spawn(async move {
-        protect::serve(listener, routes, access, "http.api_key_file", &open).await;
+    let counts = router(api);
+    let _serving = listener.map(|listener| {
+        let address = listener.local_addr().ok();
+        if let Some(address) = address {
+            tracing::info!("counts at http://{address}/counts");
+        }
+        let access = match (&options.api_key, address) {
+            (Some(key), _) => Access::Key(key.clone()),
+            (None, _) if options.open => Access::Everyone(options.hosts.clone().into()),
+            (None, Some(address)) => Access::without_key(address),
+            (None, None) => Access::OwnMachine,
+        };
+        let routes = Routes {
+            protected: counts.clone().merge(metrics_router(&engine, &metrics)),
+            probes: probes(),
+        };
+        let open = metrics.connections.clone();
+        let serving = tokio::spawn(async move {
+            protect::serve(listener, routes, access, "counts.api_key_file", &open).await;
+        });
+        AbortOnDrop(serving.abort_handle())
     });
-    let _serving = AbortOnDrop(serving.abort_handle());
+    let (shown, shown_engine) = (Arc::clone(&metrics), Arc::clone(&engine));
+    started(Started {
+        routes: counts,
+        metrics: Box::new(move || {
+            shown.text(&shown_engine.lock(), Timestamp::now().as_millisecond())
+        }),
+    });
     let handing_back = tokio::spawn(hand_back(client.clone(), snapshots.subscribe()));
     let _handing_back = AbortOnDrop(handing_back.abort_handle());
     let (stop_sender, stop_receiver) = watch::channel(false);

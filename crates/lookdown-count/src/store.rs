@@ -34,7 +34,7 @@ const LOCK_PAUSE: Duration = Duration::from_millis(50);
 pub enum StoreError {
     /// The file cannot be opened, or is no store.
     #[error(
-        "store.path: {path} cannot be used: {problem}: give a writable path of a store of lookdown count"
+        "counts.path: {path} cannot be used: {problem}: give a writable path of a store of lookdown count"
     )]
     Unusable {
         /// The file.
@@ -43,11 +43,11 @@ pub enum StoreError {
         problem: String,
     },
     /// Another process has the store open.
-    #[error("store.path: {0} is in use by another process: stop it, or give another path")]
+    #[error("counts.path: {0} is in use by another process: stop it, or give another path")]
     InUse(PathBuf),
     /// The store is of a later version.
     #[error(
-        "store.path: {path} has the version {version}: use the program that wrote it, or give another path"
+        "counts.path: {path} has the version {version}: use the program that wrote it, or give another path"
     )]
     Version {
         /// The file.

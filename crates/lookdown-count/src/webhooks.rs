@@ -35,7 +35,7 @@ pub(crate) struct Message {
 }
 
 /// A webhook as it is written.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WebhookEntry {
     url: String,

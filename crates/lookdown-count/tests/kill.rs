@@ -13,31 +13,26 @@ use std::{
 
 use events::{CALIBRATION, Server, walks};
 use lookdown_common::ServerEntry;
-use lookdown_count::{CountEntry, HttpEntry, Origin, Snapshot, StoreEntry, count};
+use lookdown_count::{CountEntry, CountOptions, Snapshot, count};
 use rusqlite::Connection;
 use tokio::{sync::watch, time::sleep};
 
 /// Kills of the test.
 const KILLS: u64 = 25;
 
-fn settings(server: &str, store: &Path) -> Origin {
-    let flags = CountEntry {
+fn settings(server: &str, store: &Path) -> CountOptions {
+    let entry = CountEntry {
         server: ServerEntry {
             url: Some(server.to_owned()),
             ..ServerEntry::default()
         },
-        http: HttpEntry {
-            listen: Some(([127, 0, 0, 1], 0).into()),
-            ..HttpEntry::default()
-        },
-        store: StoreEntry {
-            path: Some(store.to_owned()),
-            retention_days: Some(3660),
-            commit_every: Some("100ms".to_owned()),
-        },
+        listen: Some(([127, 0, 0, 1], 0).into()),
+        store: store.to_owned(),
+        retention: Duration::from_hours(24 * 3660),
+        commit_every: Duration::from_millis(100),
         ..CountEntry::default()
     };
-    Origin { file: None, flags }
+    entry.check().unwrap()
 }
 
 /// The process that is killed: this test again, with the server and the store in its environment.
@@ -45,28 +40,26 @@ fn settings(server: &str, store: &Path) -> Origin {
 #[ignore = "started by the test"]
 async fn companion() {
     let variable = |name: &str| std::env::var(name).unwrap();
-    let origin = settings(
+    let options = settings(
         &variable("COUNT_SERVER"),
         Path::new(&variable("COUNT_STORE")),
     );
-    let options = origin.load().await.unwrap();
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
-    count(&options, snapshots, std::future::pending())
+    count(&options, snapshots, |_| {}, std::future::pending())
         .await
         .unwrap();
 }
 
 /// Counts in this process until the last report is stored.
 async fn count_to_the_end(server: &Server, store: &Path, last: u64) {
-    let origin = settings(&format!("http://{}", server.address), store);
-    let options = origin.load().await.unwrap();
+    let options = settings(&format!("http://{}", server.address), store);
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
     let stop = async {
         while progress(store) < last {
             sleep(Duration::from_millis(50)).await;
         }
     };
-    count(&options, snapshots, stop).await.unwrap();
+    count(&options, snapshots, |_| {}, stop).await.unwrap();
 }
 
 fn progress(store: &Path) -> u64 {

@@ -11,9 +11,10 @@ use std::{
 };
 
 use events::{CALIBRATION, START_MS, Server, event, person, walks};
-use lookdown_count::{Origin, Snapshot, count, load};
+use lookdown_common::ServerEntry;
+use lookdown_count::{CountEntry, Snapshot, WebhookEntry, count};
 use reqwest::Client;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     sync::watch,
@@ -64,34 +65,44 @@ impl Companion {
     }
 }
 
+/// Settings with short intervals.
+fn quick() -> CountEntry {
+    CountEntry {
+        commit_every: Duration::from_millis(100),
+        retention: Duration::from_hours(24 * 3660),
+        ..CountEntry::default()
+    }
+}
+
+/// Settings with a webhook for the camera `hall`.
+fn webhook(url: &str, secret: &Path, on: &str) -> CountEntry {
+    let written = json!({"url": url, "secret_file": secret, "on": on, "camera": "hall"});
+    CountEntry {
+        webhooks: vec![serde_json::from_value::<WebhookEntry>(written).unwrap()],
+        ..quick()
+    }
+}
+
 /// Runs a test with a companion of these settings.
 async fn with_companion<T>(
     server: &Server,
-    settings: &str,
+    settings: CountEntry,
     folder: &Path,
     test: impl AsyncFnOnce(Companion) -> T,
 ) -> T {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
     drop(listener);
-    let store = folder.join("counts.sqlite");
-    let file = folder.join("count.toml");
-    let (http, settings) = match settings.strip_prefix("[http]\n") {
-        Some(http) => (http, ""),
-        None => ("", settings),
+    let entry = CountEntry {
+        server: ServerEntry {
+            url: Some(format!("http://{}", server.address)),
+            ..ServerEntry::default()
+        },
+        listen: Some(address),
+        store: folder.join("counts.sqlite"),
+        ..settings
     };
-    let content = format!(
-        "[server]\nurl = \"http://{}\"\n[http]\nlisten = \"{address}\"\n{http}[store]\npath = '{}'\n\
-         commit_every = \"100ms\"\nretention_days = 3660\n{settings}",
-        server.address,
-        store.display()
-    );
-    std::fs::write(&file, content).unwrap();
-    let origin = Origin {
-        file: Some(file),
-        flags: lookdown_count::CountEntry::default(),
-    };
-    let options = origin.load().await.unwrap();
+    let options = entry.check().unwrap();
     let (snapshots, _receiver) = watch::channel(Snapshot::default());
     let companion = Companion {
         url: format!("http://{address}"),
@@ -107,7 +118,7 @@ async fn with_companion<T>(
             .await;
         outcome = Some(test(companion).await);
     };
-    count(&options, snapshots, stop).await.unwrap();
+    count(&options, snapshots, |_| {}, stop).await.unwrap();
     outcome.unwrap()
 }
 
@@ -124,7 +135,7 @@ async fn steps_add_up_and_a_gap_is_unknown() {
     let walks = walks("hall", 300, 120..180);
     let reports = walks.len();
     let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
-    with_companion(&server, "", folder.path(), async |companion| {
+    with_companion(&server, quick(), folder.path(), async |companion| {
         companion.until_counted(reports).await;
         sleep(Duration::from_millis(400)).await;
         let counts = companion
@@ -197,11 +208,11 @@ async fn a_restart_resumes_after_the_last_report() {
     let walks = walks("hall", 30, 0..0);
     let (reports, last) = (walks.len(), walks.last().unwrap().0);
     let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
-    with_companion(&server, "", folder.path(), async |companion| {
+    with_companion(&server, quick(), folder.path(), async |companion| {
         companion.until_counted(reports).await;
     })
     .await;
-    with_companion(&server, "", folder.path(), async |companion| {
+    with_companion(&server, quick(), folder.path(), async |companion| {
         companion
             .until("it resumes", async |_: &Companion| {
                 let resumed = server.resumed.lock().unwrap().clone();
@@ -239,7 +250,7 @@ async fn tracks_are_current_and_anonymous() {
         CALIBRATION,
     )
     .await;
-    with_companion(&server, "", folder.path(), async |companion| {
+    with_companion(&server, quick(), folder.path(), async |companion| {
         let tracks = companion
             .until("there are two tracks", async |companion: &Companion| {
                 let (status, body) = companion.get("/counts/hall/tracks").await;
@@ -307,7 +318,7 @@ async fn a_person_in_two_views_of_a_site_counts_once() {
         &calibration,
     )
     .await;
-    with_companion(&server, "", folder.path(), async |companion| {
+    with_companion(&server, quick(), folder.path(), async |companion| {
         let svg = companion
             .until(
                 "the person is on the floor",
@@ -337,8 +348,11 @@ async fn a_key_of_the_settings_is_required() {
     let key = folder.path().join("key");
     std::fs::write(&key, "0123456789abcdef\n").unwrap();
     let server = Server::start(walks("hall", 2, 0..0), Duration::ZERO, CALIBRATION).await;
-    let settings = format!("[http]\napi_key_file = {key:?}\n");
-    with_companion(&server, &settings, folder.path(), async |companion| {
+    let settings = CountEntry {
+        api_key_file: Some(key),
+        ..quick()
+    };
+    with_companion(&server, settings, folder.path(), async |companion| {
         assert_eq!(companion.get("/livez").await.0, 200);
         assert_eq!(companion.get("/counts").await.0, 401);
         for (key, status) in [("0123456789abcdef", 200), ("0123456789abcdeg", 401)] {
@@ -354,7 +368,7 @@ async fn a_key_of_the_settings_is_required() {
 async fn refusals_are_problem_documents() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(walks("hall", 2, 0..0), Duration::ZERO, CALIBRATION).await;
-    with_companion(&server, "", folder.path(), async |companion| {
+    with_companion(&server, quick(), folder.path(), async |companion| {
         for (path, status, detail) in [
             ("/nothing", 404, "there is no resource at /nothing"),
             ("/counts/gate", 404, "there is no camera gate"),
@@ -427,10 +441,8 @@ async fn crossings_reach_webhooks_signed_and_repeated() {
     let (url, requests) = receiver(&[500]).await;
     let walks = walks("hall", 12, 0..0);
     let server = Server::start(walks, Duration::ZERO, CALIBRATION).await;
-    let settings = format!(
-        "[[webhooks]]\nurl = \"{url}\"\nsecret_file = {secret:?}\non = \"crossing\"\ncamera = \"hall\"\n"
-    );
-    with_companion(&server, &settings, folder.path(), async |companion| {
+    let settings = webhook(&url, &secret, "crossing");
+    with_companion(&server, settings, folder.path(), async |companion| {
         companion
             .until(
                 "both messages are delivered",
@@ -474,9 +486,6 @@ async fn condition_that_holds_is_not_repeated_by_a_restart() {
     let secret = folder.path().join("secret");
     std::fs::write(&secret, "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n").unwrap();
     let (url, requests) = receiver(&[]).await;
-    let settings = format!(
-        "[[webhooks]]\nurl = \"{url}\"\nsecret_file = {secret:?}\non = \"occupancy\"\ncamera = \"hall\"\n"
-    );
     // A person stands in the hall for 10 s and is gone for 10 s. The restart is after 5 s.
     let reports = |seconds: i64| {
         let frames = (0..seconds * 5).map(|frame| {
@@ -488,7 +497,8 @@ async fn condition_that_holds_is_not_repeated_by_a_restart() {
     };
     for (seconds, reports_of_run) in [(5, 25), (20, 75)] {
         let server = Server::start(reports(seconds), Duration::ZERO, CALIBRATION).await;
-        with_companion(&server, &settings, folder.path(), async |companion| {
+        let settings = webhook(&url, &secret, "occupancy");
+        with_companion(&server, settings, folder.path(), async |companion| {
             companion.until_counted(reports_of_run).await;
             companion
                 .until("one message is delivered", async |companion: &Companion| {
@@ -512,35 +522,50 @@ async fn condition_that_holds_is_not_repeated_by_a_restart() {
     );
 }
 
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_crossing_is_shown_once_it_is_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(walks("hall", 12, 0..0), Duration::ZERO, CALIBRATION).await;
+    let settings = CountEntry {
+        commit_every: Duration::from_mins(1),
+        ..quick()
+    };
+    with_companion(&server, settings, folder.path(), async |companion| {
+        companion
+            .until("a crossing is shown", async |companion: &Companion| {
+                let (_, metrics) = companion.get("/metrics").await;
+                let shown = metrics.lines();
+                let mut shown = shown.filter(|line| line.starts_with("lookdown_count_crossings"));
+                shown.any(|line| !line.ends_with(" 0")).then_some(())
+            })
+            .await;
+        let store = rusqlite::Connection::open(folder.path().join("counts.sqlite")).unwrap();
+        let stored = store.query_row("SELECT sum(crossings) FROM line_totals", [], |row| {
+            row.get::<_, Option<i64>>(0)
+        });
+        assert!(stored.unwrap() >= Some(1), "the process may be killed now");
+    })
+    .await;
+}
+
 #[test]
 fn invalid_settings_name_field_value_and_remedy() {
-    let folder = tempfile::tempdir().unwrap();
-    let error_of = |text: &str| {
-        let path = folder.path().join("count.toml");
-        std::fs::write(&path, text).unwrap();
-        let loaded = load(Some(&path), &lookdown_count::CountEntry::default());
-        loaded.unwrap_err().to_string()
+    let of_server = CountEntry {
+        server: ServerEntry {
+            url: Some("ftp://x".to_owned()),
+            ..ServerEntry::default()
+        },
+        ..CountEntry::default()
     };
-    for (text, expected) in [
+    let of_webhook = webhook("http://x", Path::new("/nowhere"), "crossing");
+    for (entry, expected) in [
+        (of_server, "upstream.url: \"ftp://x\" is no URL of a server"),
         (
-            "[store]\nretention_days = 0",
-            "store.retention_days: \"0\" is out of range: give 1 to 3660",
-        ),
-        (
-            "[counting]\nlongest_gap = \"1h\"",
-            "counting.longest_gap: \"1h\" is no duration from 1 s to 600 s",
-        ),
-        (
-            "[server]\nurl = \"ftp://x\"",
-            "server.url: \"ftp://x\" is no URL of a server",
-        ),
-        ("[stores]\n", "stores: unknown field `stores`"),
-        (
-            "[[webhooks]]\nurl = \"http://x\"\nsecret_file = \"/nowhere\"\non = \"crossing\"",
+            of_webhook,
             "webhooks[0].secret_file: /nowhere cannot be read",
         ),
     ] {
-        let error = error_of(text);
+        let error = entry.check().unwrap_err().to_string();
         assert!(error.starts_with(expected), "{error}");
     }
 }

@@ -75,6 +75,12 @@ impl Shutdown {
         });
     }
 
+    /// Requests of another shutdown what was requested of this one.
+    pub fn pass_on(&self, to: &Self) {
+        let stage = self.stage();
+        to.0.send_modify(|now| *now = (*now).max(stage));
+    }
+
     /// Ends the grace period.
     pub fn drain(&self) {
         self.0.send_modify(|now| *now = (*now).max(Stage::Draining));

@@ -1,10 +1,10 @@
-//! The settings of `lookdown watch`: a TOML file of cameras, or one camera of the command line.
+//! The cameras and the server that receives their frames.
 
 mod entry;
 mod file;
 
 pub use entry::CameraEntry;
-pub use file::load;
+pub use file::WatchEntry;
 
 use lookdown_common::{ConfigError, ServerOptions};
 
@@ -23,15 +23,11 @@ pub struct WatchOptions {
 }
 
 impl WatchOptions {
-    /// Checks that the names of the cameras differ, and that there are not too many.
+    /// Checks that the names of the cameras differ, and that there are at most 256.
     ///
     /// # Errors
     /// [`ConfigError`].
     pub fn new(server: ServerOptions, cameras: Vec<Camera>) -> Result<Self, ConfigError> {
-        if cameras.is_empty() {
-            let problem = "there is no camera: add a [[cameras]] table with a url";
-            return Err(ConfigError::problem("cameras", &problem));
-        }
         if cameras.len() > MAX_CAMERAS {
             let remedy = "cameras are too many: start another process for those beyond 256";
             return Err(ConfigError::value("cameras", &cameras.len(), remedy));

@@ -1,11 +1,16 @@
 //! The metrics of the cameras, in a registry of their own.
 
-use std::{sync::Arc, time::Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use parking_lot::Mutex;
 use prometheus::{
     Encoder, GaugeVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry, TextEncoder,
 };
+
+use crate::rate::Rate;
 
 /// The reason why a frame did not become a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +66,28 @@ pub(crate) struct CameraMetrics {
     skipped: IntCounter,
     failed: [IntCounter; Failure::ALL.len()],
     reconnects: IntCounter,
+    /// The source, without credentials.
+    source: String,
+    rate: Mutex<Option<Rate>>,
+    warning: Mutex<Option<String>>,
+    problem: Mutex<Option<String>>,
+}
+
+/// The state of a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraState {
+    /// Its name.
+    pub name: String,
+    /// Its source, without credentials.
+    pub source: String,
+    /// Time since the last whole frame, or since the start without a frame.
+    pub last_frame_age: Duration,
+    /// The rate of the last whole minute.
+    pub rate: Option<Rate>,
+    /// The reason and the remedies, if less than 80 % of the wanted rate is reached.
+    pub warning: Option<String>,
+    /// The reason why the source gives no frames.
+    pub problem: Option<String>,
 }
 
 impl Metrics {
@@ -120,7 +147,7 @@ impl Metrics {
     }
 
     /// Adds a camera.
-    pub(crate) fn add(&self, camera: &str) -> Arc<CameraMetrics> {
+    pub(crate) fn add(&self, camera: &str, source: String) -> Arc<CameraMetrics> {
         let of = |counter: &IntCounterVec| counter.with_label_values(&[camera]);
         let metrics = Arc::new(CameraMetrics {
             camera: camera.to_owned(),
@@ -131,6 +158,10 @@ impl Metrics {
             failed: Failure::ALL
                 .map(|reason| self.failed.with_label_values(&[camera, reason.label()])),
             reconnects: of(&self.reconnects),
+            source,
+            rate: Mutex::default(),
+            warning: Mutex::default(),
+            problem: Mutex::default(),
         });
         let mut cameras = self.cameras.lock();
         cameras.retain(|other| other.camera != camera);
@@ -152,6 +183,21 @@ impl Metrics {
         }
     }
 
+    /// Returns the states of all cameras.
+    #[must_use]
+    pub fn states(&self) -> Vec<CameraState> {
+        let cameras = self.cameras.lock();
+        let states = cameras.iter().map(|camera| CameraState {
+            name: camera.camera.clone(),
+            source: camera.source.clone(),
+            last_frame_age: camera.last_frame.lock().elapsed(),
+            rate: *camera.rate.lock(),
+            warning: camera.warning.lock().clone(),
+            problem: camera.problem.lock().clone(),
+        });
+        states.collect()
+    }
+
     /// Returns all metrics in the text format of Prometheus.
     #[must_use]
     pub fn text(&self) -> Vec<u8> {
@@ -169,6 +215,7 @@ impl Metrics {
 impl CameraMetrics {
     pub(crate) fn received(&self, at: Instant) {
         *self.last_frame.lock() = at;
+        *self.problem.lock() = None;
         self.received.inc();
     }
 
@@ -185,6 +232,17 @@ impl CameraMetrics {
         for (_, counter) in reasons.filter(|(other, _)| **other == reason) {
             counter.inc();
         }
+    }
+
+    /// Stores the rate of a minute.
+    pub(crate) fn measured(&self, rate: Rate, warning: Option<String>) {
+        *self.rate.lock() = Some(rate);
+        *self.warning.lock() = warning;
+    }
+
+    /// Stores the reason why the source gives no frames.
+    pub(crate) fn ended(&self, problem: &str) {
+        *self.problem.lock() = Some(problem.to_owned());
     }
 
     pub(crate) fn reconnected(&self) {
@@ -204,8 +262,8 @@ mod tests {
     #[test]
     fn a_removed_camera_loses_all_its_series() {
         let metrics = Metrics::new().unwrap();
-        let hall = metrics.add("hall");
-        metrics.add("gate");
+        let hall = metrics.add("hall", String::new());
+        metrics.add("gate", String::new());
         hall.received(Instant::now());
         hall.failed(Failure::Refused);
         let text = String::from_utf8(metrics.text()).unwrap();

@@ -9,7 +9,7 @@ use tokio::net::TcpListener;
 use crate::Metrics;
 
 /// Serves the metrics. Never ends.
-pub(crate) async fn serve(listener: TcpListener, metrics: Arc<Metrics>) {
+pub async fn serve_metrics(listener: TcpListener, metrics: Arc<Metrics>) {
     let access = match listener.local_addr() {
         Ok(address) => Access::without_key(address),
         Err(_) => Access::OwnMachine,

@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 use tokio::time::{sleep, sleep_until};
 
 use crate::{
-    Camera, Frame,
+    Camera, Frame, Location,
     metrics::{CameraMetrics, Failure},
     pace::Pace,
+    rate::RateMeter,
     server::{Answer, Server},
     slot::Slot,
 };
@@ -27,6 +28,8 @@ pub(crate) async fn run(
     let (first, longest) = PAUSES;
     let mut backoff = Backoff::new(first, longest);
     let mut log = LogOnce::default();
+    let mut meter = RateMeter::new(camera.every, Instant::now());
+    let mut is_slow = false;
     loop {
         if let Some(earliest) = pace.earliest() {
             sleep_until(earliest.into()).await;
@@ -34,8 +37,24 @@ pub(crate) async fn run(
         let Some(frame) = slot.take().await else {
             return;
         };
-        pace.sent(Instant::now());
-        let (failure, message, pause) = match server.detect(camera, &frame).await {
+        let sent_at = Instant::now();
+        pace.sent(sent_at);
+        let answer = server.detect(camera, &frame).await;
+        let now = Instant::now();
+        if let Some(rate) = meter.add(answer == Answer::Report, now - sent_at, now) {
+            // A folder, and a snapshot that does not change, have no rate of their own.
+            let has_own_rate = matches!(camera.location, Location::Rtsp(_));
+            let warning = rate.warning();
+            let warning = warning.filter(|_| rate.is_server_slow || has_own_rate);
+            match &warning {
+                Some(warning) if !is_slow => tracing::warn!("{warning}"),
+                None if is_slow => tracing::info!("the wanted rate is reached again"),
+                _ => {}
+            }
+            is_slow = warning.is_some();
+            metrics.measured(rate, warning);
+        }
+        let (failure, message, pause) = match answer {
             Answer::Report => {
                 metrics.sent();
                 backoff.reset();

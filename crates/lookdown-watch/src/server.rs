@@ -60,7 +60,7 @@ impl Server {
             .append_pair("captured_at", &frame.captured_at.to_string());
         let request = self.client.post(url).timeout(REPORT_TIMEOUT);
         let request = request.header(CONTENT_TYPE, frame.format.media_type());
-        match request.body(frame.image.clone()).send().await {
+        match self.client.send(request.body(frame.image.clone())).await {
             Ok(response) => self.answer(response).await,
             Err(error) => Answer::Failed(self.client.failure(error)),
         }

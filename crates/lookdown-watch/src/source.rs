@@ -20,9 +20,10 @@ use reqwest::Client;
 use tokio::time::sleep;
 
 use crate::{
-    Camera, Frame, FrameError, Location, SourceError,
+    Camera, Frame, FrameError, Location, Metrics, SourceError,
     credentials::Login,
     metrics::{CameraMetrics, Failure},
+    server::camera_client,
     slot::Slot,
 };
 use lookdown_common::{Backoff, LogOnce};
@@ -124,6 +125,7 @@ pub(crate) async fn supervise(
         let pause = match outcome {
             Ok(()) => return,
             Err(error) => {
+                metrics.ended(&error.to_string());
                 if log.lock().should_log(&error.to_string()) {
                     tracing::warn!("{error}");
                 }
@@ -141,6 +143,35 @@ pub(crate) async fn supervise(
         }
         sleep(pause).await;
         metrics.reconnected();
+    }
+}
+
+/// Returns the first frame of a camera, within this time.
+///
+/// # Errors
+/// [`SourceError`].
+pub async fn first_frame(camera: &Camera, limit: Duration) -> Result<Frame, SourceError> {
+    let client = camera_client().map_err(|error| SourceError::Unreachable(error.to_string()))?;
+    let all = Metrics::new().map_err(|error| SourceError::Stream(error.to_string()))?;
+    let metrics = all.add(&camera.name, camera.location.to_string());
+    let (slot, log) = (Slot::default(), Mutex::new(LogOnce::default()));
+    let mut login = Login::new(camera.credentials.clone());
+    let sink = Sink {
+        slot: &slot,
+        metrics: &metrics,
+        started: Instant::now(),
+        alive: Mutex::default(),
+        is_failing: &log,
+    };
+    tokio::select! {
+        biased;
+        frame = slot.take() => frame.ok_or(SourceError::Closed),
+        ended = run(camera, &client, &mut login, &sink) => {
+            slot.close();
+            let last = slot.take().await;
+            last.ok_or_else(|| ended.err().unwrap_or(SourceError::Closed))
+        }
+        () = sleep(limit) => Err(SourceError::Stalled(limit)),
     }
 }
 

@@ -3,6 +3,7 @@
 use std::{ffi::OsString, path::Path, process::Stdio, time::Duration};
 
 use bytes::Bytes;
+use jiff::Timestamp;
 use tokio::{
     io::AsyncWriteExt,
     process::{Child, ChildStdin},
@@ -63,11 +64,23 @@ impl VideoFrames {
 
 /// Returns the duration of a video file, if `ffprobe` can read it.
 pub async fn video_duration(path: &Path, options: &VideoOptions) -> Option<Duration> {
+    let seconds = probed(path, "format=duration", options).await?;
+    Duration::try_from_secs_f64(seconds.parse().ok()?).ok()
+}
+
+/// Returns the time at which a video file says that it was created.
+pub async fn video_created_at(path: &Path, options: &VideoOptions) -> Option<Timestamp> {
+    let created_at = probed(path, "format_tags=creation_time", options).await?;
+    created_at.parse().ok()
+}
+
+/// Returns a value that `ffprobe` reads from a file.
+async fn probed(path: &Path, entry: &str, options: &VideoOptions) -> Option<String> {
     let mut command = child::command(options.ffmpeg.with_file_name("ffprobe"));
     command
         .args(["-v", "error"])
         .args(file_restrictions())
-        .args(["-show_entries", "format=duration", "-of", "csv=p=0"])
+        .args(["-show_entries", entry, "-of", "csv=p=0"])
         .arg(file_url(path))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -77,8 +90,8 @@ pub async fn video_duration(path: &Path, options: &VideoOptions) -> Option<Durat
         .await
         .ok()?
         .ok()?;
-    let seconds: f64 = String::from_utf8(output.stdout).ok()?.trim().parse().ok()?;
-    Duration::try_from_secs_f64(seconds).ok()
+    let value = String::from_utf8(output.stdout).ok()?.trim().to_owned();
+    (!value.is_empty()).then_some(value)
 }
 
 /// A video file that is written frame by frame.

@@ -1,37 +1,29 @@
 //! The cameras of a process: each is a task of its own, started and stopped as the settings change.
 
-use std::{
-    collections::HashMap, future::Future, net::SocketAddr, path::PathBuf, sync::Arc, time::Duration,
-};
+use std::{collections::HashMap, future::Future, sync::Arc, time::Duration};
 
 use reqwest::Client;
-use tokio::{
-    task::{JoinHandle, spawn_blocking},
-    time::{sleep, timeout},
-};
+use tokio::{task::JoinHandle, time::timeout};
 use tracing::Instrument as _;
 
 use crate::{
-    Camera, Metrics, WatchOptions, load,
+    Camera, Metrics, WatchOptions,
     metrics::CameraMetrics,
-    metrics_server, sender,
+    sender,
     server::{Server, camera_client},
     slot::{Slot, Writer},
     source,
 };
-use lookdown_common::{AbortOnDrop, ClientError, ConfigError, LogOnce, ServerEntry};
-use lookdown_http::server::bind;
+use lookdown_common::{ClientError, ConfigError, LogOnce, Reload};
 
-/// Interval of the checks for a changed file.
-const FILE_CHECK: Duration = Duration::from_secs(2);
 /// Longest time that the end waits for the reports of frames that were sent.
 const LAST_REPORTS: Duration = Duration::from_secs(5);
 
 /// The origin of the settings.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub enum Origin {
-    /// A file that is read again when it changes. The server has precedence over that of the file.
-    File(PathBuf, ServerEntry),
+    /// Settings that are read again when they change.
+    Reload(Reload<WatchOptions>),
     /// Settings that do not change.
     Fixed(WatchOptions),
 }
@@ -48,9 +40,6 @@ pub enum WatchError {
     /// The metrics cannot be created.
     #[error("the metrics cannot be created: {0}")]
     Metrics(#[from] prometheus::Error),
-    /// The address of the metrics cannot be used.
-    #[error("{0}")]
-    Address(String),
     /// No frame of a finite source was processed.
     #[error("{0}: no frame was processed: the log has the reason")]
     NoFrame(String),
@@ -62,28 +51,11 @@ pub enum WatchError {
 /// [`WatchError`].
 pub async fn watch(
     origin: Origin,
-    metrics_listen: Option<SocketAddr>,
+    metrics: Arc<Metrics>,
     stop: impl Future<Output = ()>,
 ) -> Result<(), WatchError> {
-    let metrics = Arc::new(Metrics::new()?);
-    let listener = match metrics_listen {
-        Some(address) => Some(
-            bind("--metrics-listen", address)
-                .await
-                .map_err(WatchError::Address)?,
-        ),
-        None => None,
-    };
-    let metrics_task = listener.map(|listener| {
-        if let Ok(address) = listener.local_addr() {
-            tracing::info!("metrics at http://{address}/metrics");
-        }
-        AbortOnDrop(
-            tokio::spawn(metrics_server::serve(listener, Arc::clone(&metrics))).abort_handle(),
-        )
-    });
     let options = match &origin {
-        Origin::File(path, server) => read(path, server).await?,
+        Origin::Reload(settings) => settings.load().await?,
         Origin::Fixed(options) => options.clone(),
     };
     let mut watcher = Watcher::new(options, metrics)?;
@@ -92,15 +64,7 @@ pub async fn watch(
         outcome = watcher.run(&origin) => outcome,
     };
     watcher.end().await;
-    drop(metrics_task);
     outcome
-}
-
-/// Reads the file without blocking the runtime.
-async fn read(path: &std::path::Path, server: &ServerEntry) -> Result<WatchOptions, ConfigError> {
-    let (path, server) = (path.to_owned(), server.clone());
-    let read = spawn_blocking(move || load(&path, &server)).await;
-    read.unwrap_or_else(|error| Err(ConfigError::problem("cameras", &error)))
 }
 
 /// The running cameras.
@@ -139,7 +103,7 @@ impl Watcher {
     }
 
     fn start(&mut self, camera: Camera) {
-        let metrics = self.metrics.add(&camera.name);
+        let metrics = self.metrics.add(&camera.name, camera.location.to_string());
         let slot = Arc::new(Slot::default());
         let span = tracing::info_span!("camera", camera = camera.name);
         span.in_scope(|| tracing::info!("watching {}", camera.location));
@@ -175,19 +139,15 @@ impl Watcher {
     }
 
     async fn run(&mut self, origin: &Origin) -> Result<(), WatchError> {
-        let Origin::File(path, server) = origin else {
+        let Origin::Reload(settings) = origin else {
             return self.finish().await;
         };
         let mut log = LogOnce::default();
         loop {
-            sleep(FILE_CHECK).await;
-            let outcome = match read(path, server).await {
-                Ok(options) => self.change(options).map_err(|error| error.to_string()),
-                Err(error) => Err(error.to_string()),
-            };
-            match outcome {
+            let options = settings.changed(&self.options).await;
+            match self.change(options) {
                 Ok(()) => drop(log.clear()),
-                Err(problem) if log.should_log(&problem) => {
+                Err(problem) if log.should_log(&problem.to_string()) => {
                     tracing::warn!("{problem}; the last valid settings stay in use");
                 }
                 Err(_) => {}
@@ -209,9 +169,6 @@ impl Watcher {
 
     /// Applies new settings. Cameras that are unchanged keep running.
     fn change(&mut self, options: WatchOptions) -> Result<(), ClientError> {
-        if options == self.options {
-            return Ok(());
-        }
         let is_same_server = options.server == self.options.server;
         if !is_same_server {
             self.server = Arc::new(Server::new(&options.server)?);

@@ -4,19 +4,26 @@
 mod exchange;
 
 use std::{
-    sync::atomic::{AtomicUsize, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::{Duration, Instant},
 };
 
 use exchange::{Exchange, Reply, serve};
 use lookdown_common::ServerEntry;
 use lookdown_watch::{
-    CameraEntry, Origin, VideoFrames, VideoOptions, WatchError, WatchOptions, watch,
+    CameraEntry, Metrics, Origin, VideoFrames, VideoOptions, WatchError, WatchOptions, watch,
 };
 use tokio::time::{sleep, timeout};
 
 const JPEG: &[u8] = b"\xff\xd8\xff\xda\x00\x02xyz\xff\xd9";
 const PATIENCE: Duration = Duration::from_secs(20);
+
+fn metrics() -> Arc<Metrics> {
+    Arc::new(Metrics::new().unwrap())
+}
 
 /// Settings of a camera that sends every 50 ms.
 fn entry(url: &str) -> CameraEntry {
@@ -44,7 +51,7 @@ async fn watch_until(camera: CameraEntry, server: &Exchange, done: impl Fn() -> 
             sleep(Duration::from_millis(5)).await;
         }
     };
-    let watching = watch(Origin::Fixed(options), None, stop);
+    let watching = watch(Origin::Fixed(options), metrics(), stop);
     timeout(PATIENCE, watching).await.unwrap().unwrap();
     started.elapsed()
 }
@@ -233,7 +240,7 @@ async fn a_single_image_that_is_refused_fails() {
     };
     let camera = entry(clip.to_str().unwrap()).check("").unwrap();
     let options = WatchOptions::new(target.check().unwrap(), vec![camera]).unwrap();
-    let watching = watch(Origin::Fixed(options), None, std::future::pending());
+    let watching = watch(Origin::Fixed(options), metrics(), std::future::pending());
     let outcome = timeout(PATIENCE, watching).await.unwrap();
     assert!(matches!(outcome, Err(WatchError::NoFrame(name)) if name == "hall"));
 }

@@ -33,7 +33,6 @@ impl From<&DetectionReport> for Report {
                 height: report.image_height,
             },
             model: ReportModel::from(&report.model),
-            second_opinion: report.second_opinion.as_ref().map(ReportModel::from),
             crop_model: report.crop_model.as_ref().map(ReportModel::from),
             profile: report.profile.name(),
             refinement: ReportRefinement {
@@ -132,6 +131,8 @@ impl From<&pipeline::Person> for ReportPerson {
                 x_m: metres(floor.x_m),
                 y_m: metres(floor.y_m),
             }),
+            height_m: person.height.map(|height| metres(height.height_m)),
+            height_sd_m: person.height.map(|height| metres(height.sd_m)),
             views: person.views,
             zones: person.zones.clone(),
         }

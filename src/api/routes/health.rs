@@ -151,7 +151,8 @@ pub(in crate::api) async fn metrics(
 ) -> Result<impl IntoResponse, Problem> {
     read_gauges(&state).await;
     read_cameras(&state).await;
-    let text = state.metrics.render().map_err(Problem::internal)?;
+    let mut text = state.metrics.render().map_err(Problem::internal)?;
+    state.options.companions.add_metrics(&mut text);
     Ok(([(CONTENT_TYPE, "text/plain; version=0.0.4")], text))
 }
 

@@ -115,9 +115,9 @@ impl Asset {
 
 /// The server's settings that the page needs.
 #[derive(Serialize)]
-struct PageOptions<'a> {
-    /// The path of `lookdown count` on this origin.
-    counts_path: Option<&'a str>,
+struct PageOptions {
+    /// True if this server answers `/counts`.
+    has_counts: bool,
     /// True if the request may change calibrations.
     can_change: bool,
 }
@@ -130,7 +130,7 @@ pub(in crate::api) fn router() -> Router<ApiState> {
     };
     let options = async |State(state): State<ApiState>, headers: HeaderMap| {
         let options = PageOptions {
-            counts_path: state.options.page_counts_path.as_deref(),
+            has_counts: state.options.companions.has_counts(),
             can_change: RequireAdmin::check(&state, &headers).is_ok(),
         };
         let no_store = [(CACHE_CONTROL, HeaderValue::from_static("no-store"))];

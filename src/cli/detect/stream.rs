@@ -57,9 +57,7 @@ impl Stream {
         if path.as_os_str() == "-" {
             return Some(Self::StandardInput);
         }
-        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-        let is_video = ENDINGS.contains(&ending.as_str()) && !path.is_dir();
-        is_video.then(|| Self::Video(path.to_owned()))
+        is_video(path).then(|| Self::Video(path.to_owned()))
     }
 
     fn name(&self) -> String {
@@ -70,8 +68,15 @@ impl Stream {
     }
 }
 
+/// Returns true if the ending of a file is that of a video.
+pub(in crate::cli) fn is_video(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    let ending = ending.map(str::to_ascii_lowercase);
+    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str())) && !path.is_dir()
+}
+
 /// Parses `--every`.
-pub(super) fn interval(text: &str) -> Result<Duration, String> {
+pub(in crate::cli) fn interval(text: &str) -> Result<Duration, String> {
     let limits = Duration::from_millis(10)..=Duration::from_hours(1);
     parse_duration(text, limits)
         .ok_or_else(|| "give a duration from 10ms to 1h, such as 500ms or 2s".to_owned())

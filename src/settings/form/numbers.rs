@@ -6,9 +6,10 @@ use std::{
     time::Duration,
 };
 
+use lookdown_common::parse_duration;
 use toml::Value;
 
-use super::{Form, Refusal};
+use super::{Form, Refusal, parsed};
 
 /// 1 TiB: more memory than any machine spends on one setting.
 pub(in crate::settings) const MAX_BYTES: u64 = 1 << 40;
@@ -99,6 +100,36 @@ pub(in crate::settings) fn millis(range: RangeInclusive<u64>) -> Form<Duration> 
 /// A time in seconds.
 pub(in crate::settings) fn seconds(range: RangeInclusive<u64>) -> Form<Duration> {
     within("seconds", range).map(Duration::from_secs, Duration::as_secs)
+}
+
+/// A time with its unit, such as `10s`.
+pub(in crate::settings) fn duration(range: RangeInclusive<Duration>) -> Form<Duration> {
+    let (least, most) = (
+        written_duration(range.start()),
+        written_duration(range.end()),
+    );
+    let remedy = format!("give a duration from {least} to {most}, such as 10s or 500ms");
+    parsed(
+        format!("duration from {least} to {most}"),
+        move |text| {
+            let duration = parse_duration(text, range.clone());
+            duration.ok_or_else(|| Refusal::Shown(remedy.clone()))
+        },
+        written_duration,
+    )
+}
+
+/// A duration in its largest whole unit.
+fn written_duration(duration: &Duration) -> String {
+    let millis = duration.as_millis();
+    let units = [(3_600_000, "h"), (60_000, "m"), (1000, "s")];
+    let unit = units
+        .iter()
+        .find(|(size, _)| millis > 0 && millis % size == 0);
+    match unit {
+        Some((size, unit)) => format!("{}{unit}", millis / size),
+        None => format!("{millis}ms"),
+    }
 }
 
 /// An optional time; 0 means none.

@@ -4,6 +4,7 @@ use std::{net::SocketAddr, path::PathBuf};
 
 use secrecy::SecretString;
 use toml::Value;
+use url::Url;
 
 use super::{Form, Refusal, Written};
 
@@ -93,6 +94,21 @@ pub(in crate::settings) fn address() -> Form<SocketAddr> {
             })
         },
         SocketAddr::to_string,
+    )
+}
+
+/// A URL of HTTP.
+pub(in crate::settings) fn web_address() -> Form<Url> {
+    parsed(
+        "URL",
+        |text| {
+            let url = text.parse::<Url>().ok();
+            let url = url.filter(|url| matches!(url.scheme(), "http" | "https"));
+            url.ok_or_else(|| {
+                Refusal::Shown("give an address such as http://lookdown.local:8080".to_owned())
+            })
+        },
+        Url::to_string,
     )
 }
 

@@ -1,11 +1,11 @@
-/** The section Live with counts of `lookdown count`, behind a proxy that forwards their path. */
+/** The section Live of a server that forwards to `lookdown count`. */
 
 import assert from "node:assert/strict";
 import { readFile, readdir } from "node:fs/promises";
 import test from "node:test";
 import { PHONE, SERVER, WIDE, assertAccessible, assertFits, pageTest, picture } from "./browser.js";
 
-/** The address of the proxy, that of the server behind it, a folder of frames of a walk, and its true crossings. */
+/** The address of the server, that of one whose counts are gone, a folder of frames of a walk, and its true crossings. */
 const { LOOKDOWN_COUNTED_URL: COUNTED, LOOKDOWN_UNCOUNTED_URL: UNCOUNTED, LOOKDOWN_WALK: WALK } = process.env;
 const TRUTH = JSON.parse(await readFile(process.env.LOOKDOWN_WALK_TRUTH, "utf8"));
 const FRAMES_PER_SECOND = TRUTH.frames_per_second;
@@ -46,6 +46,13 @@ function differences(some, others) {
 
 test("a camera sends frames of a walk", () => walk("hall"));
 
+test("a camera sends a frame to a server whose counts are gone", async () => {
+  const [frame] = await readdir(WALK);
+  const body = await readFile(`${WALK}/${frame}`);
+  const answer = await fetch(`${UNCOUNTED}/detect?camera=hall&profile=fast`, { method: "POST", body });
+  assert.equal(answer.status, 200);
+});
+
 for (const [device, viewport, colorScheme] of [["wide", WIDE, "light"], ["phone", PHONE, "dark"]]) {
   pageTest(
     `tracks, lines, zones and the heat map are drawn over a camera on a ${device} screen`,
@@ -77,12 +84,12 @@ pageTest(
   "counts that cannot be reached are one sentence, and the cards stay",
   "#live",
   async (page) => {
-    await page.getByText("lookdown count at /counts cannot be reached: start it, and forward this path to it.").waitFor();
+    await page.getByText("The counts cannot be read: the log of the server has the reason.").waitFor();
     await page.getByRole("article", { name: "Camera hall" }).locator(".plot").waitFor();
     assert.equal(await page.locator(".counts").count(), 0);
     assert.equal(await page.getByLabel("Heat map").isVisible(), false);
   },
-  { server: UNCOUNTED, expected: /status of 404/ },
+  { server: UNCOUNTED, expected: /status of 503/ },
 );
 
 pageTest("a page without a path of counts asks for none", "#live", async (page) => {

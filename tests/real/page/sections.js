@@ -133,7 +133,7 @@ pageTest("a click on a false box ignores its place, and Undo takes it back", "#l
   await send("stall-2");
   const second = page.getByRole("article", { name: "Camera stall-2" });
   await second.getByRole("button", { name: /^Ignore the place of person 1,/ }).dispatchEvent("pointerdown");
-  await second.getByText("stall also use stall: stall-2 now has the calibration stall-2.").waitFor();
+  await second.getByText("stall is also used by stall: stall-2 now has the calibration stall-2.").waitFor();
   assert.deepEqual([(await stored("stall")).ignore, (await stored("stall-2")).ignore.length], [undefined, 1]);
 });
 

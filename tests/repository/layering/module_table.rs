@@ -22,7 +22,7 @@ const LIBRARIES: [&str; 7] = [
     "lookdown_watch",
 ];
 
-/// What a module uses: other modules of its crate, and crates of the workspace.
+/// The dependencies of a module: other modules of its crate, and crates of the workspace.
 #[derive(Default)]
 struct Uses {
     purpose: String,

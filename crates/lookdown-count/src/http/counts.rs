@@ -19,12 +19,13 @@ use serde::Serialize;
 
 use super::{Problem, Shared, blocking, check_known, query, time::TimeParameters};
 use crate::{
+    definition::CameraDefinition,
     store::{Span, Step},
     sums::{MINUTE_MS, Owner},
 };
 
 /// Most values of an answer: steps times directions of lines and zones. An answer has 12 MB at most.
-const MAX_VALUES: usize = 100_000;
+pub(crate) const MAX_VALUES: usize = 100_000;
 
 /// The counts of a camera or a site.
 #[derive(Debug, Serialize)]
@@ -146,7 +147,11 @@ fn current_names(api: &Shared, owner: &Owner) -> Names {
     let Owner::Camera(camera) = owner else {
         return Names::default();
     };
-    let Some(definition) = api.engine.lock().definition(camera) else {
+    names(api.engine.lock().definition(camera).as_deref())
+}
+
+fn names(definition: Option<&CameraDefinition>) -> Names {
+    let Some(definition) = definition else {
         return Names::default();
     };
     let directions = definition.lines.iter().zip(&definition.directions);
@@ -156,6 +161,16 @@ fn current_names(api: &Shared, owner: &Owner) -> Names {
     });
     let zones = definition.zones.iter().map(|zone| zone.name.clone());
     (lines.collect(), zones.collect())
+}
+
+/// Returns the counts of a time as CSV, or `None` if there are too many.
+pub(crate) fn table(
+    owner: Owner,
+    span: Span,
+    sums: &BTreeMap<i64, Step>,
+    definition: Option<&CameraDefinition>,
+) -> Option<String> {
+    Some(csv(&counts(owner, span, sums, names(definition))?))
 }
 
 /// Returns the counts, or `None` if there are too many.

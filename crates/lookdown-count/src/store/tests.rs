@@ -3,12 +3,12 @@ use lookdown_tracking::heat_map::Cell;
 use super::*;
 use crate::{
     engine::Batch,
-    sums::{LineDirection, Owner, PresenceSum, Sums, ZoneOf, ZoneSum},
+    sums::{LineDirection, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
     webhooks::Message,
 };
 
 fn batch(minute: i64, last_event: u64) -> Batch {
-    let mut batch = Batch::empty(last_event);
+    let mut batch = Batch::empty(last_event, Totals::default());
     let hall = Owner::Camera("hall".to_owned());
     let presence = PresenceSum {
         known_ms: 30_000,
@@ -127,7 +127,11 @@ fn messages_stay_until_they_are_removed() {
     };
     for _ in 0..2 {
         store
-            .commit(&Batch::empty(1), std::slice::from_ref(&message), None)
+            .commit(
+                &Batch::empty(1, Totals::default()),
+                std::slice::from_ref(&message),
+                None,
+            )
             .unwrap();
     }
     assert_eq!(store.resumed().unwrap().messages, [message]);

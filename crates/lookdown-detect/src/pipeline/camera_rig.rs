@@ -64,7 +64,7 @@ pub(super) struct LeftOut {
     pub(super) outside: usize,
     /// Views whose part of the lens image is wholly masked.
     pub(super) masked: usize,
-    /// Views that can show nobody who stands in an area.
+    /// Views that cannot show a person in an area.
     pub(super) outside_areas: usize,
 }
 
@@ -127,17 +127,6 @@ impl CameraRig {
             };
         };
         let views = plan.views(&geometry.mount, input.width, input.height);
-        Self::of_views(geometry, hidden, views, frame_width, frame_height)
-    }
-
-    /// Returns a rig of the same camera with other views.
-    pub(super) fn with_views(
-        &self,
-        views: Vec<VirtualView>,
-        frame_width: u32,
-        frame_height: u32,
-    ) -> Self {
-        let (geometry, hidden) = (self.geometry.clone(), self.hidden.clone());
         Self::of_views(geometry, hidden, views, frame_width, frame_height)
     }
 
@@ -209,7 +198,7 @@ impl CameraRig {
         }
     }
 
-    /// Returns the boxes of the pixels that can show nobody who stands in an area.
+    /// Returns the boxes of the pixels that cannot show a person in an area.
     pub(super) fn unsearched(&self) -> Vec<[f64; 4]> {
         let reach = self.hidden.reach.as_ref();
         reach.map_or_else(Vec::new, |reach| reach.boxes_outside())

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use lookdown_lens::{
     geometry::{
-        OrientedBox, Pixel, Zone,
+        OrientedBox, PersonHeight, Pixel, Zone,
         floor::{Bearing, FloorPosition},
     },
     warning::Warning,
@@ -37,8 +37,6 @@ pub struct DetectionReport {
     pub image_height: u32,
     /// The detector used.
     pub model: ModelUsed,
-    /// The second detector for some of the zoom views, when the profile uses one.
-    pub second_opinion: Option<ModelUsed>,
     /// The detector of the upright crops, when it is another one.
     pub crop_model: Option<ModelUsed>,
     /// The profile used.
@@ -76,7 +74,7 @@ pub struct ViewCounts {
     pub outside: usize,
     /// Views wholly hidden by the masks of the camera.
     pub masked: usize,
-    /// Views that can show nobody who stands in an area of the camera.
+    /// Views that cannot show a person in an area of the camera.
     pub outside_areas: usize,
 }
 
@@ -145,6 +143,8 @@ pub struct Person {
     pub bearing: Option<Bearing>,
     /// The floor position of the person, when the height of the camera is known.
     pub floor: Option<FloorPosition>,
+    /// The height of the person, where the boxes and the height of the camera give it.
+    pub height: Option<PersonHeight>,
     /// The number of supporting views.
     pub views: usize,
     /// The names of the zones that the person's foot is in; `None` when the calibration has none.

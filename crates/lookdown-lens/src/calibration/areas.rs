@@ -27,7 +27,7 @@ pub struct Areas {
     pub lines: Vec<CountingLine>,
     /// Areas that are blanked before detection, corner-origin frame pixels.
     pub masks: Vec<Polygon>,
-    /// Where people count.
+    /// The places of people who count.
     pub foot_filter: FootFilter,
 }
 

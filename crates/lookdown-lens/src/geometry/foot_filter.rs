@@ -1,4 +1,4 @@
-//! Where people count: in an area and in no ignored place. The foot decides.
+//! Places where people count: in an area and in no ignored place. The foot decides.
 
 mod reach;
 

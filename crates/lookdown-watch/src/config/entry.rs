@@ -32,8 +32,8 @@ const OWN_PARAMETERS: [&str; 6] = [
 ];
 
 /// One camera as it is written in a file or on the command line. Absent values are those of
-/// `[defaults]`, or the defaults of the program.
-#[derive(Debug, Clone, Default, Deserialize)]
+/// `[camera_defaults]`, or the defaults of the program.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraEntry {
     /// The name under which the server keeps the results: the ID of the calibration if absent.
@@ -68,7 +68,7 @@ pub struct CameraEntry {
 }
 
 /// A value of a parameter.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(untagged)]
 pub enum Scalar {
     /// True or false.

@@ -1,39 +1,34 @@
-//! The file `cameras.toml`, and the small files that it names.
+//! The cameras as they are written, and their checks.
 
-use std::path::Path;
-
-use lookdown_common::{ConfigError, ServerEntry, parse_toml, read_file};
-use serde::Deserialize;
+use lookdown_common::{ConfigError, ServerEntry};
 
 use super::{CameraEntry, WatchOptions};
 
-/// The file as it is written.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct WatchFile {
-    #[serde(default)]
-    server: ServerEntry,
-    #[serde(default)]
-    defaults: CameraEntry,
-    #[serde(default)]
-    cameras: Vec<CameraEntry>,
+/// The cameras as they are written in a file or on the command line.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct WatchEntry {
+    /// The server that receives the frames.
+    pub server: ServerEntry,
+    /// The values of keys that a camera does not have.
+    pub defaults: CameraEntry,
+    /// The cameras.
+    pub cameras: Vec<CameraEntry>,
 }
 
-/// Reads and checks the file and the files that it names. `server` has precedence over the server
-/// of the file. Paths are relative to the current folder. Blocks.
-///
-/// # Errors
-/// [`ConfigError`].
-pub fn load(path: &Path, server: &ServerEntry) -> Result<WatchOptions, ConfigError> {
-    let text = read_file("cameras", path)?;
-    let text = String::from_utf8_lossy(&text);
-    let file: WatchFile = parse_toml(&text, "cameras", "docs/watch.md")?;
-    let server = server.clone().or(&file.server).check()?;
-    let cameras = file.cameras.into_iter().enumerate();
-    let cameras = cameras.map(|(index, camera)| {
-        camera
-            .or(&file.defaults)
-            .check(&format!("cameras[{index}]."))
-    });
-    WatchOptions::new(server, cameras.collect::<Result<_, _>>()?)
+impl WatchEntry {
+    /// Checks the cameras and reads the files that they name. Paths are relative to the current
+    /// folder. Blocks.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn check(self) -> Result<WatchOptions, ConfigError> {
+        let server = self.server.check()?;
+        let cameras = self.cameras.into_iter().enumerate();
+        let cameras = cameras.map(|(index, camera)| {
+            camera
+                .or(&self.defaults)
+                .check(&format!("cameras[{index}]."))
+        });
+        WatchOptions::new(server, cameras.collect::<Result<_, _>>()?)
+    }
 }

@@ -97,6 +97,9 @@ problems! {
     /// The calibration shares its file with other calibrations.
     CalibrationConflict = CONFLICT "calibration-conflict" "Calibration conflict"
         => "Change the file itself.";
+    /// The camera is one of the settings.
+    CameraConflict = CONFLICT "camera-conflict" "Camera conflict"
+        => "Change the camera in the settings file.";
     /// The models that are loaded do not allow the change.
     ModelConflict = CONFLICT "model-conflict" "Model conflict"
         => "Unload another model first; the models of the profiles cannot be unloaded.";
@@ -156,6 +159,9 @@ problems! {
     /// The result store does not respond.
     ResultsUnreachable = SERVICE_UNAVAILABLE "results-unreachable" "Result store unavailable" retry_after_seconds 1
         => "Retry after `Retry-After`; the log and `/readyz` report the error of Redis.";
+    /// The counts are being started, or `lookdown count` does not respond.
+    CountsUnavailable = SERVICE_UNAVAILABLE "counts-unavailable" "Counts unavailable" retry_after_seconds 1
+        => "Retry after `Retry-After`; check the program at `counts.url`, and `counts.api_key_file`.";
     /// The calibration store does not respond.
     CalibrationsUnreachable = SERVICE_UNAVAILABLE "calibrations-unreachable" "Calibration store unavailable"
         retry_after_seconds 1

@@ -1,25 +1,43 @@
 use std::{fs, path::Path};
 
-use lookdown_common::ServerEntry;
+use lookdown_common::{ServerEntry, parse_toml};
+use serde::Deserialize;
 
-use crate::{Location, load};
+use super::CameraEntry;
+use crate::{Location, WatchEntry};
+
+/// A file of cameras.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Cameras {
+    #[serde(default)]
+    upstream: ServerEntry,
+    #[serde(default)]
+    camera_defaults: CameraEntry,
+    #[serde(default)]
+    cameras: Vec<CameraEntry>,
+}
 
 fn error_of(text: &str) -> String {
     loaded(text).unwrap_err()
 }
 
 fn loaded(text: &str) -> Result<crate::WatchOptions, String> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("cameras.toml");
-    fs::write(&path, text).unwrap();
-    load(&path, &ServerEntry::default()).map_err(|error| error.to_string())
+    let file: Result<Cameras, _> = parse_toml(text, "the settings file", "docs/watch.md");
+    let file = file.map_err(|error| error.to_string())?;
+    let entry = WatchEntry {
+        server: file.upstream,
+        defaults: file.camera_defaults,
+        cameras: file.cameras,
+    };
+    entry.check().map_err(|error| error.to_string())
 }
 
 #[test]
 fn defaults_apply_to_every_camera() {
     let options = loaded(
         r#"
-        [defaults]
+        [camera_defaults]
         profile = "fast"
         every = "500ms"
         parameters = { score_threshold = 0.4 }
@@ -62,10 +80,6 @@ fn defaults_apply_to_every_camera() {
 fn errors_name_the_field_the_value_and_the_remedy() {
     for (text, expected) in [
         (
-            "",
-            "cameras: there is no camera: add a [[cameras]] table with a url",
-        ),
-        (
             "[[cameras]]\nname='a'",
             "cameras[0].url: the source of the frames is missing: give a URL, a folder or a file",
         ),
@@ -86,8 +100,8 @@ fn errors_name_the_field_the_value_and_the_remedy() {
             "cameras[0].parameters: \"camera\" does not belong here: it is a key of the camera, or is set for each frame",
         ),
         (
-            "[server]\nurl='ftp://x:y@host'\n[[cameras]]\nname='a'\nurl='http://c/'",
-            "server.url: \"host\" is no URL of a server: write it like http://127.0.0.1:8080",
+            "[upstream]\nurl='ftp://x:y@host'\n[[cameras]]\nname='a'\nurl='http://c/'",
+            "upstream.url: \"host\" is no URL of a server: write it like http://127.0.0.1:8080",
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\nhwaccel='-x y'",

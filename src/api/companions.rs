@@ -1,0 +1,96 @@
+//! The cameras and counts of this process, and the counts of another host.
+
+use std::{collections::BTreeMap, fmt, sync::Arc};
+
+use axum::Router;
+use lookdown_common::ServerClient;
+use parking_lot::RwLock;
+
+use crate::cameras::Cameras;
+
+/// Returns metrics in the text format of Prometheus.
+type MetricsText = Arc<dyn Fn() -> Vec<u8> + Send + Sync>;
+
+/// The parts of `lookdown run` beside the server, and the counts that a server forwards to. Clones
+/// share them.
+#[derive(Clone, Default)]
+pub struct Companions(Arc<RwLock<Parts>>);
+
+#[derive(Default)]
+struct Parts {
+    counts: Counts,
+    cameras: Option<Arc<Cameras>>,
+    metrics: BTreeMap<&'static str, MetricsText>,
+}
+
+/// The place of the counts.
+#[derive(Clone, Default)]
+pub(super) enum Counts {
+    /// This server has none.
+    #[default]
+    None,
+    /// They are being started in this process.
+    Starting,
+    /// The routes of this process.
+    Here(Router),
+    /// Another host.
+    Elsewhere(ServerClient),
+}
+
+impl Companions {
+    /// Declares counts of this process, which are not there yet.
+    pub fn expect_counts(&self) {
+        self.0.write().counts = Counts::Starting;
+    }
+
+    /// Answers requests to `/counts` and `/sites` with these routes.
+    pub fn set_counts(&self, routes: Router) {
+        self.0.write().counts = Counts::Here(routes);
+    }
+
+    /// Answers requests to `/cameras` with these cameras.
+    pub fn set_cameras(&self, cameras: Arc<Cameras>) {
+        self.0.write().cameras = Some(cameras);
+    }
+
+    pub(super) fn cameras(&self) -> Option<Arc<Cameras>> {
+        self.0.read().cameras.clone()
+    }
+
+    /// Forwards requests to `/counts` and `/sites`.
+    pub(crate) fn forward_counts(&self, client: ServerClient) {
+        self.0.write().counts = Counts::Elsewhere(client);
+    }
+
+    /// Adds metrics to those of the server, or replaces those of the same name.
+    pub fn set_metrics(
+        &self,
+        name: &'static str,
+        text: impl Fn() -> Vec<u8> + Send + Sync + 'static,
+    ) {
+        self.0.write().metrics.insert(name, Arc::new(text));
+    }
+
+    pub(super) fn counts(&self) -> Counts {
+        self.0.read().counts.clone()
+    }
+
+    /// Returns true if `/counts` is answered.
+    pub(super) fn has_counts(&self) -> bool {
+        !matches!(self.0.read().counts, Counts::None)
+    }
+
+    /// Appends all metrics.
+    pub(super) fn add_metrics(&self, text: &mut String) {
+        let metrics: Vec<_> = self.0.read().metrics.values().cloned().collect();
+        for metrics in metrics {
+            text.push_str(&String::from_utf8_lossy(&metrics()));
+        }
+    }
+}
+
+impl fmt::Debug for Companions {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Companions")
+    }
+}

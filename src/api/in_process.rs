@@ -1,0 +1,50 @@
+//! The connection of parts of this process to the server: requests call its routes without a socket.
+
+use std::{
+    pin::Pin,
+    task::{Context, Poll},
+};
+
+use axum::body::Body;
+use bytes::Bytes;
+use http_body::{Body as HttpBody, Frame, SizeHint};
+use lookdown_common::InProcess;
+use parking_lot::Mutex;
+use tower::ServiceExt;
+
+use super::{ApiState, in_process_router};
+
+/// Returns the connection of parts of this process to the server. It has no rate limit.
+#[must_use]
+pub fn in_process(state: ApiState) -> InProcess {
+    let router = in_process_router(state);
+    InProcess::new(move |request| {
+        let answered = router.clone().oneshot(request.map(Body::new));
+        async {
+            let response = match answered.await {
+                Ok(response) => response,
+                Err(never) => match never {},
+            };
+            response.map(|body| reqwest::Body::wrap(Exclusive(Mutex::new(body))))
+        }
+    })
+}
+
+/// A body in a mutex, which makes it `Sync`.
+struct Exclusive(Mutex<Body>);
+
+impl HttpBody for Exclusive {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(self.0.get_mut()).poll_frame(context)
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.0.lock().size_hint()
+    }
+}

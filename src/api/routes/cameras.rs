@@ -1,0 +1,310 @@
+//! The cameras of `lookdown run`: the scope `read` reads them, the scope `admin` changes them.
+
+use std::sync::Arc;
+
+use axum::{
+    Json,
+    extract::{FromRequest, Path, Request, State},
+    http::{
+        StatusCode,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
+    },
+    response::{IntoResponse, Response},
+};
+use secrecy::SecretString;
+use serde::{Deserialize, Serialize};
+use tokio::task::spawn_blocking;
+use utoipa::ToSchema;
+
+use crate::{
+    api::{
+        ApiState,
+        caller::Caller,
+        http::{
+            deadline::Deadline,
+            problem::{Problem, ProblemKind},
+        },
+        require_scope::{RequireAdmin, RequireRead},
+    },
+    cameras::{CameraError, Cameras, StoredCamera},
+};
+
+/// Largest description of a camera.
+const MAX_BYTES: usize = 16 << 10;
+
+/// A camera to add, to change or to test.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(example = json!({ "url": "rtsp://10.0.0.8:554/stream2", "user": "viewer", "password": "secret" }))]
+pub(in crate::api) struct NewCamera {
+    /// The URL of the source: `rtsp`, `rtsps`, `http` or `https`, without user and password.
+    url: String,
+    /// The user name.
+    user: Option<String>,
+    /// The password. It is never returned. Without it, the stored password of the same user at the
+    /// same host stays.
+    #[schema(write_only)]
+    password: Option<String>,
+    /// The interval between two frames, such as `200ms` (default `1s`).
+    every: Option<String>,
+    /// The ID of the calibration (default: the calibration with the name of the camera, if there is
+    /// one).
+    calibration: Option<String>,
+    /// The profile (default: that of the server).
+    profile: Option<String>,
+    /// `true` if no frames are read.
+    #[serde(default)]
+    paused: bool,
+}
+
+/// A camera and its state.
+#[derive(Default, Serialize, ToSchema)]
+pub(in crate::api) struct CameraInfo {
+    /// The name.
+    name: String,
+    /// The source, without password and query.
+    source: String,
+    /// `true` if the camera can be changed and deleted here, `false` if it is one of the settings.
+    stored: bool,
+    /// `true` if no frames are read.
+    paused: bool,
+    /// The user name of a stored camera.
+    user: Option<String>,
+    /// The interval of a stored camera.
+    every: Option<String>,
+    /// The calibration of a stored camera.
+    calibration: Option<String>,
+    /// The profile of a stored camera.
+    profile: Option<String>,
+    /// Time since the last whole frame, or since the start without a frame.
+    last_frame_age_seconds: Option<f64>,
+    /// Frames per second that the settings want, in the last whole minute.
+    wanted_rate: Option<f64>,
+    /// Frames per second with a report, in the last whole minute.
+    reached_rate: Option<f64>,
+    /// The reason and the remedies, if less than 80 % of the wanted rate is reached.
+    warning: Option<String>,
+    /// The reason why the source gives no frames.
+    problem: Option<String>,
+}
+
+impl FromRequest<ApiState> for NewCamera {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &ApiState) -> Result<Self, Problem> {
+        let (parts, body) = request.into_parts();
+        let deadline = Deadline::of(&parts, state);
+        let caller = Caller::of(&parts, state);
+        let reader = state.body_reader(&caller.client, MAX_BYTES, "send a camera", deadline);
+        let content = reader.read(&parts.headers, body).await?.into_bytes();
+        serde_json::from_slice(&content).map_err(|error| {
+            // The value is not repeated: it may hold a password.
+            let fault = format!("line {}: not a camera: compare it with /docs", error.line());
+            Problem::of_parameter(ProblemKind::InvalidParameter, "body", &fault)
+        })
+    }
+}
+
+impl NewCamera {
+    fn separate(self) -> (StoredCamera, Option<SecretString>) {
+        let camera = StoredCamera {
+            url: self.url,
+            user: self.user.filter(|user| !user.is_empty()),
+            every: self.every,
+            calibration: self.calibration,
+            profile: self.profile,
+            paused: self.paused,
+        };
+        (camera, self.password.map(SecretString::from))
+    }
+}
+
+/// List cameras
+///
+/// The cameras of the settings and those that were added here, by name.
+#[utoipa::path(
+    get, path = "/cameras", tag = "cameras", operation_id = "list_cameras",
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses((status = OK, description = "By name.", body = Vec<CameraInfo>))
+)]
+pub(in crate::api) async fn list(
+    State(state): State<ApiState>,
+    _reader: RequireRead,
+) -> Result<impl IntoResponse, Problem> {
+    let rows = rows(cameras(&state)?).await?;
+    Ok(([(CACHE_CONTROL, "no-store")], Json(rows)))
+}
+
+/// Get a camera
+///
+/// Returns its source without a password, and its state.
+#[utoipa::path(
+    get, path = "/cameras/{camera}", tag = "cameras", operation_id = "get_camera",
+    params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
+    security((), ("bearer" = ["read"]), ("api_key" = ["read"])),
+    responses((status = OK, description = "The camera.", body = CameraInfo))
+)]
+pub(in crate::api) async fn get(
+    State(state): State<ApiState>,
+    _reader: RequireRead,
+    Path(name): Path<String>,
+) -> Result<impl IntoResponse, Problem> {
+    let rows = rows(cameras(&state)?).await?;
+    let row = rows.into_iter().find(|row| row.name == name);
+    let row = row.ok_or_else(unknown)?;
+    Ok(([(CACHE_CONTROL, "no-store")], Json(row)))
+}
+
+/// Create or replace a camera
+///
+/// The camera is stored and read within two seconds. Its password is never returned.
+#[utoipa::path(
+    put, path = "/cameras/{camera}", tag = "cameras", operation_id = "put_camera",
+    params(("camera" = String, Path, pattern = "^[a-z0-9][a-z0-9_-]{0,63}$",
+        description = "The name of the camera.", example = "hall")),
+    request_body(content = NewCamera, content_type = "application/json"),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    responses(
+        (status = CREATED, description = "The camera is new."),
+        (status = NO_CONTENT, description = "The camera is replaced."),
+    )
+)]
+pub(in crate::api) async fn put(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    Path(name): Path<String>,
+    camera: NewCamera,
+) -> Result<StatusCode, Problem> {
+    let (camera, password) = camera.separate();
+    let stored_name = name.clone();
+    let is_new = change(&state, move |cameras| {
+        cameras.put(&stored_name, camera, password.as_ref())
+    });
+    let is_new = is_new.await?;
+    tracing::info!(camera = name, "the camera was stored");
+    Ok(if is_new {
+        StatusCode::CREATED
+    } else {
+        StatusCode::NO_CONTENT
+    })
+}
+
+/// Delete a camera
+///
+/// Deletes the camera with its password. Its reports and counts stay.
+#[utoipa::path(
+    delete, path = "/cameras/{camera}", tag = "cameras", operation_id = "delete_camera",
+    params(("camera" = String, Path, description = "The name of the camera.", example = "hall")),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    responses((status = NO_CONTENT, description = "The camera is deleted."))
+)]
+pub(in crate::api) async fn delete(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    Path(name): Path<String>,
+) -> Result<StatusCode, Problem> {
+    let deleted_name = name.clone();
+    if !change(&state, move |cameras| cameras.delete(&deleted_name)).await? {
+        return Err(unknown());
+    }
+    tracing::info!(camera = name, "the camera was deleted");
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Test a camera
+///
+/// Returns its first frame within 15 seconds, or the reason why there is none. Nothing is stored.
+#[utoipa::path(
+    post, path = "/cameras/test", tag = "cameras", operation_id = "test_camera",
+    request_body(content = NewCamera, content_type = "application/json"),
+    security((), ("bearer" = ["admin"]), ("api_key" = ["admin"])),
+    responses((status = OK, description = "The first frame.", body = String, content_type = "image/jpeg"))
+)]
+pub(in crate::api) async fn test(
+    State(state): State<ApiState>,
+    _admin: RequireAdmin,
+    camera: NewCamera,
+) -> Result<Response, Problem> {
+    cameras(&state)?;
+    let (camera, password) = camera.separate();
+    let frame = Cameras::test(&camera, password).await.map_err(refused)?;
+    let headers = [
+        (CONTENT_TYPE, frame.format.media_type()),
+        (CACHE_CONTROL, "no-store"),
+    ];
+    Ok((headers, frame.image).into_response())
+}
+
+/// Returns the cameras of this process.
+fn cameras(state: &ApiState) -> Result<Arc<Cameras>, Problem> {
+    state.options.companions.cameras().ok_or_else(|| {
+        let detail = "this server reads no cameras: start `lookdown run`";
+        Problem::new(ProblemKind::NotFound, detail)
+    })
+}
+
+/// Changes the stored cameras without blocking the runtime.
+async fn change<T: Send + 'static>(
+    state: &ApiState,
+    change: impl FnOnce(&Cameras) -> Result<T, CameraError> + Send + 'static,
+) -> Result<T, Problem> {
+    let cameras = cameras(state)?;
+    let changed = spawn_blocking(move || change(&cameras)).await;
+    changed.map_err(Problem::internal)?.map_err(refused)
+}
+
+async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
+    let read = Arc::clone(&cameras);
+    let stored = spawn_blocking(move || read.stored()).await;
+    let stored = stored.map_err(Problem::internal)?;
+    let stored = stored.map_err(Problem::internal)?;
+    let mut rows: Vec<_> = cameras
+        .states()
+        .into_iter()
+        .map(|state| CameraInfo {
+            warning: state.warning,
+            wanted_rate: state.rate.map(|rate| rate.wanted),
+            reached_rate: state.rate.map(|rate| rate.reached),
+            last_frame_age_seconds: Some(state.last_frame_age.as_secs_f64()),
+            problem: state.problem,
+            name: state.name,
+            source: state.source,
+            ..CameraInfo::default()
+        })
+        .collect();
+    for (name, camera) in stored {
+        let index = rows.iter().position(|row| row.name == name);
+        let index = index.unwrap_or_else(|| {
+            rows.push(CameraInfo::default());
+            rows.len() - 1
+        });
+        let row = &mut rows[index];
+        row.source = camera.shown_source();
+        row.stored = true;
+        row.paused = camera.paused;
+        row.user = camera.user;
+        row.every = camera.every;
+        row.calibration = camera.calibration;
+        row.profile = camera.profile;
+        row.name = name;
+    }
+    rows.sort_unstable_by(|one, other| one.name.cmp(&other.name));
+    Ok(rows)
+}
+
+fn unknown() -> Problem {
+    Problem::new(
+        ProblemKind::NotFound,
+        "there is no such camera: GET /cameras lists them",
+    )
+}
+
+fn refused(error: CameraError) -> Problem {
+    match error {
+        CameraError::Folder(..) => Problem::internal(error),
+        CameraError::Configured(_) => Problem::new(ProblemKind::CameraConflict, error.to_string()),
+        CameraError::Invalid(_) | CameraError::Source(_) => {
+            Problem::new(ProblemKind::InvalidParameter, error.to_string())
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! The cameras of `lookdown run` that are added over HTTP: a file in the state folder, with each
+//! password in a file of its own, and the states of all cameras.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs, io,
+    io::Write,
+    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use lookdown_common::{ConfigError, plain_name, read_file};
+use lookdown_watch::{
+    CameraEntry, CameraState, Frame, Location, Metrics, SourceError, first_frame,
+};
+use parking_lot::{Mutex, RwLock};
+use secrecy::{ExposeSecret, SecretString};
+use serde::{Deserialize, Serialize};
+
+/// Longest wait for the frame of a test.
+const TEST_TIMEOUT: Duration = Duration::from_secs(15);
+/// The name in the path of a test, which no camera has.
+const TEST: &str = "test";
+/// Most stored cameras.
+const MAX_CAMERAS: usize = 256;
+/// The file of the cameras in the state folder.
+const FILE: &str = "cameras.json";
+/// The folder of the passwords in the state folder.
+const PASSWORDS: &str = "passwords";
+
+/// A camera as it is stored, without its password.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredCamera {
+    /// The URL of the source.
+    pub url: String,
+    /// The user name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub user: Option<String>,
+    /// The interval between two frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<String>,
+    /// The ID of the calibration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
+    /// The profile.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// True if no frames are read.
+    #[serde(default)]
+    pub paused: bool,
+}
+
+impl StoredCamera {
+    /// Returns the source without its query, which may hold a token.
+    #[must_use]
+    pub fn shown_source(&self) -> String {
+        let location = Location::parse(&self.url);
+        location.map_or_else(|_| String::new(), |(location, _)| location.to_string())
+    }
+}
+
+/// A camera that cannot be stored or removed.
+#[derive(Debug, thiserror::Error)]
+pub enum CameraError {
+    /// A value that cannot be used.
+    #[error(transparent)]
+    Invalid(#[from] ConfigError),
+    /// A camera of the settings file.
+    #[error("{0}: this camera is in the settings file: change it there")]
+    Configured(String),
+    /// The state folder cannot be used.
+    #[error("state.path: {0} cannot be written: {1}")]
+    Folder(PathBuf, #[source] io::Error),
+    /// The camera gives no frame.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+}
+
+type Stored = BTreeMap<String, StoredCamera>;
+
+/// The cameras of this process.
+pub struct Cameras {
+    folder: PathBuf,
+    /// Locked while the file is changed.
+    changing: Mutex<()>,
+    /// The names of the cameras of the settings file and the command line.
+    configured: RwLock<BTreeSet<String>>,
+    metrics: Arc<Metrics>,
+}
+
+impl Cameras {
+    /// Creates the cameras of a state folder, which may be missing.
+    #[must_use]
+    pub fn new(folder: PathBuf, metrics: Arc<Metrics>) -> Self {
+        Self {
+            folder,
+            changing: Mutex::default(),
+            configured: RwLock::default(),
+            metrics,
+        }
+    }
+
+    /// Returns the states of the cameras that are watched.
+    #[must_use]
+    pub fn states(&self) -> Vec<CameraState> {
+        self.metrics.states()
+    }
+
+    /// Adds the stored cameras that are not paused to those of the settings, which have precedence.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if the file of the cameras cannot be used. Blocks.
+    pub fn add_to(&self, cameras: &mut Vec<CameraEntry>) -> Result<(), ConfigError> {
+        let named = cameras.iter();
+        let configured: BTreeSet<_> = named
+            .filter_map(|camera| camera.name.clone().or_else(|| camera.calibration.clone()))
+            .collect();
+        for (name, camera) in self.stored()? {
+            if !camera.paused && !configured.contains(&name) {
+                cameras.push(self.entry(&name, &camera));
+            }
+        }
+        *self.configured.write() = configured;
+        Ok(())
+    }
+
+    /// Returns the stored cameras by name. Blocks.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn stored(&self) -> Result<Stored, ConfigError> {
+        let path = self.folder.join(FILE);
+        if !path.exists() {
+            return Ok(Stored::new());
+        }
+        let content = read_file("state.path", &path)?;
+        serde_json::from_slice(&content).map_err(|error| {
+            let problem = format!("{} is not a file of cameras: {error}", path.display());
+            ConfigError::problem("state.path", &problem)
+        })
+    }
+
+    /// Creates or replaces a camera, and returns true if it is new. Without a password, that of the
+    /// same user at the same host stays. Blocks.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub fn put(
+        &self,
+        name: &str,
+        camera: StoredCamera,
+        password: Option<&SecretString>,
+    ) -> Result<bool, CameraError> {
+        self.check(name, &camera)?;
+        let _changing = self.changing.lock();
+        let mut stored = self.stored()?;
+        let before = stored.get(name);
+        if before.is_none() && stored.len() >= MAX_CAMERAS {
+            let problem = "256 cameras are stored: delete one first";
+            return Err(ConfigError::problem("name", &problem).into());
+        }
+        let is_same_login = before.is_some_and(|before| {
+            before.user == camera.user && origin(&before.url) == origin(&camera.url)
+        });
+        match password {
+            Some(password) => self.write(&self.password(name), password.expose_secret())?,
+            None if !is_same_login => self.remove(&self.password(name))?,
+            None => {}
+        }
+        let is_new = stored.insert(name.to_owned(), camera).is_none();
+        self.store(&stored)?;
+        Ok(is_new)
+    }
+
+    /// Deletes a camera with its password. Returns false if there is none. Blocks.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub fn delete(&self, name: &str) -> Result<bool, CameraError> {
+        let _changing = self.changing.lock();
+        let mut stored = self.stored()?;
+        if stored.remove(name).is_none() {
+            if self.configured.read().contains(name) {
+                return Err(CameraError::Configured(name.to_owned()));
+            }
+            return Ok(false);
+        }
+        self.store(&stored)?;
+        self.remove(&self.password(name))?;
+        Ok(true)
+    }
+
+    /// Returns the first frame of a camera that is not stored.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub async fn test(
+        camera: &StoredCamera,
+        password: Option<SecretString>,
+    ) -> Result<Frame, CameraError> {
+        let mut checked = checked("test", camera)?;
+        if let (Some(credentials), Some(password)) = (&mut checked.credentials, password) {
+            credentials.password = password;
+        }
+        Ok(first_frame(&checked, TEST_TIMEOUT).await?)
+    }
+
+    fn check(&self, name: &str, camera: &StoredCamera) -> Result<(), CameraError> {
+        if !plain_name::is_plain(name) || name == TEST {
+            let remedy = "is not a name of 1 to 64 of a-z, 0-9, '_' and '-', and not test";
+            return Err(ConfigError::value("name", name, remedy).into());
+        }
+        if self.configured.read().contains(name) {
+            return Err(CameraError::Configured(name.to_owned()));
+        }
+        checked(name, camera).map(drop)
+    }
+
+    /// Returns the entry of a stored camera with the file of its password.
+    fn entry(&self, name: &str, camera: &StoredCamera) -> CameraEntry {
+        let password = self.password(name);
+        CameraEntry {
+            password_file: (camera.user.is_some() && password.exists()).then_some(password),
+            ..entry(name, camera)
+        }
+    }
+
+    fn password(&self, name: &str) -> PathBuf {
+        self.folder.join(PASSWORDS).join(name)
+    }
+
+    fn store(&self, stored: &Stored) -> Result<(), CameraError> {
+        let content = serde_json::to_string_pretty(stored).unwrap_or_default();
+        self.write(&self.folder.join(FILE), &content)
+    }
+
+    /// Writes a file that only this user can read: beside the old one, synced and renamed.
+    fn write(&self, path: &Path, content: &str) -> Result<(), CameraError> {
+        let unfinished = path.with_extension("part");
+        let written = || {
+            fs::DirBuilder::new()
+                .recursive(true)
+                .mode(0o700)
+                .create(self.folder.join(PASSWORDS))?;
+            let mut file = fs::OpenOptions::new()
+                .create(true)
+                .write(true)
+                .truncate(true)
+                .mode(0o600)
+                .open(&unfinished)?;
+            writeln!(file, "{content}")?;
+            file.sync_all()?;
+            fs::rename(&unfinished, path)
+        };
+        written().map_err(|error| CameraError::Folder(path.to_owned(), error))
+    }
+
+    fn remove(&self, path: &Path) -> Result<(), CameraError> {
+        match fs::remove_file(path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(CameraError::Folder(path.to_owned(), error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn entry(name: &str, camera: &StoredCamera) -> CameraEntry {
+    CameraEntry {
+        name: Some(name.to_owned()),
+        url: Some(camera.url.clone()),
+        user: camera.user.clone(),
+        every: camera.every.clone(),
+        calibration: camera.calibration.clone(),
+        profile: camera.profile.clone(),
+        ..CameraEntry::default()
+    }
+}
+
+/// Checks a camera: only URLs of cameras are permitted, without credentials in them.
+fn checked(name: &str, camera: &StoredCamera) -> Result<lookdown_watch::Camera, CameraError> {
+    let is_url = camera.url.contains("://");
+    let location = is_url.then(|| Location::parse(&camera.url));
+    let problem = match location {
+        Some(Ok((Location::Http(_) | Location::Rtsp(_), None))) => None,
+        Some(Ok((_, Some(_)))) => {
+            Some("it has a user name: give user and password as fields".to_owned())
+        }
+        Some(Err(error)) => Some(error.to_string()),
+        _ => Some("it is not the URL of a camera: use rtsp, rtsps, http or https".to_owned()),
+    };
+    if let Some(problem) = problem {
+        return Err(ConfigError::problem("url", &problem).into());
+    }
+    Ok(entry(name, camera).check("")?)
+}
+
+/// Returns the scheme, host and port of a URL.
+fn origin(url: &str) -> Option<(String, String, Option<u16>)> {
+    let url = url::Url::parse(url).ok()?;
+    let host = url.host_str()?.to_owned();
+    Some((url.scheme().to_owned(), host, url.port_or_known_default()))
+}
+
+#[cfg(test)]
+mod tests;

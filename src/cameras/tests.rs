@@ -1,0 +1,113 @@
+use std::os::unix::fs::PermissionsExt;
+
+use super::*;
+
+fn cameras(folder: &Path) -> Cameras {
+    Cameras::new(folder.join("state"), Arc::new(Metrics::new().unwrap()))
+}
+
+fn camera(url: &str) -> StoredCamera {
+    StoredCamera {
+        url: url.to_owned(),
+        user: Some("viewer".to_owned()),
+        every: None,
+        calibration: None,
+        profile: None,
+        paused: false,
+    }
+}
+
+#[test]
+fn a_camera_is_stored_with_its_password_in_a_private_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let password = SecretString::from("geheim");
+    let url = "rtsp://10.0.0.8/s2";
+    assert!(
+        cameras(folder.path())
+            .put("hall", camera(url), Some(&password))
+            .unwrap()
+    );
+    // After a restart.
+    let cameras = cameras(folder.path());
+    let mut entries = Vec::new();
+    cameras.add_to(&mut entries).unwrap();
+    let [entry] = entries.as_slice() else {
+        panic!("one camera")
+    };
+    let file = entry.password_file.clone().unwrap();
+    assert_eq!(fs::read_to_string(&file).unwrap(), "geheim\n");
+    assert_eq!(
+        fs::metadata(&file).unwrap().permissions().mode() & 0o777,
+        0o600
+    );
+    let json = fs::read_to_string(folder.path().join("state").join(FILE)).unwrap();
+    assert!(!json.contains("geheim"), "{json}");
+    assert!(cameras.delete("hall").unwrap());
+    assert!(!file.exists() && !cameras.delete("hall").unwrap());
+}
+
+#[test]
+fn a_password_stays_with_its_host_and_user_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let password = SecretString::from("geheim");
+    cameras
+        .put("hall", camera("rtsp://10.0.0.8/s2"), Some(&password))
+        .unwrap();
+    assert!(
+        !cameras
+            .put("hall", camera("rtsp://10.0.0.8/s1"), None)
+            .unwrap()
+    );
+    assert!(cameras.password("hall").exists());
+    cameras
+        .put("hall", camera("rtsp://10.0.0.9/s1"), None)
+        .unwrap();
+    assert!(
+        !cameras.password("hall").exists(),
+        "another host never gets it"
+    );
+}
+
+#[test]
+fn only_urls_of_cameras_are_accepted() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    for url in [
+        "file:///etc/passwd",
+        "/etc/passwd",
+        "-",
+        "concat:a|b",
+        "rtsp://u:p@c/",
+        "rtsp://",
+    ] {
+        let error = cameras
+            .put("hall", camera(url), None)
+            .unwrap_err()
+            .to_string();
+        assert!(error.starts_with("url: it"), "{error}");
+    }
+    let error = cameras
+        .put("../x", camera("rtsp://c/"), None)
+        .unwrap_err()
+        .to_string();
+    assert!(error.starts_with("name: \"../x\" is not"), "{error}");
+}
+
+#[test]
+fn cameras_of_the_settings_file_have_precedence() {
+    let folder = tempfile::tempdir().unwrap();
+    let cameras = cameras(folder.path());
+    let mut paused = camera("rtsp://10.0.0.8/s2");
+    paused.paused = true;
+    cameras.put("gate", paused, None).unwrap();
+    cameras
+        .put("hall", camera("rtsp://10.0.0.8/s2"), None)
+        .unwrap();
+    let own = entry("hall", &camera("rtsp://10.0.0.1/"));
+    let mut entries = vec![own.clone()];
+    cameras.add_to(&mut entries).unwrap();
+    assert_eq!(entries, [own]);
+    let refused = cameras.put("hall", camera("rtsp://10.0.0.8/s2"), None);
+    assert!(refused.unwrap_err().to_string().contains("settings file"));
+}

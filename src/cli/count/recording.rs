@@ -1,0 +1,369 @@
+//! Counting of recordings: as fast as the machine can, without a server.
+
+use std::{
+    fs, io,
+    io::Write,
+    num::NonZeroU32,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+    thread,
+    time::{Duration, Instant, UNIX_EPOCH},
+};
+
+use anyhow::{Context, bail};
+use bytes::Bytes;
+use clap::Args;
+use jiff::Timestamp;
+use lookdown_count::Recording;
+use lookdown_detect::{
+    parameters::DetectParameters,
+    pipeline::{CalibrationLookup, DetectJob, Detected, Engine, JobImage},
+};
+use lookdown_lens::calibration::{Calibration, CalibrationId};
+use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
+use tokio::runtime::{self, Runtime};
+
+use super::Arguments;
+use crate::{
+    annotated_image::AnnotationOptions,
+    api::Report,
+    app::{engine_for, open_calibrations},
+    cli::{
+        annotate,
+        detect::stream::{interval, is_video},
+        output::UNWRITABLE,
+        parameters::ParameterFlags,
+        progress::Progress,
+        server_flags::given,
+    },
+    settings::Settings,
+};
+
+/// The interval between two frames if none is given: the figures of docs/count-accuracy.md are
+/// reached with it.
+const DEFAULT_EVERY: Duration = Duration::from_millis(200);
+/// The score threshold of counted frames (docs/count.md).
+const SCORE_THRESHOLD: (&str, &str) = (DetectParameters::SCORE_THRESHOLD, "0.06");
+
+/// Flags of recordings.
+#[derive(Debug, Args)]
+#[group(id = "recording_flags", multiple = true)]
+pub(super) struct RecordingFlags {
+    /// The calibration of the recordings: a file, or the ID of one in the calibration folder
+    #[arg(long, value_name = "FILE|ID")]
+    calibration: Option<String>,
+    /// The time of the first frame, such as 2026-11-22T09:00:00Z [default: that of the file]
+    #[arg(long, value_name = "TIME")]
+    start: Option<Timestamp>,
+    /// The interval between two frames of a recording [default: 200ms]
+    #[arg(long, value_name = "DURATION", value_parser = interval)]
+    every: Option<Duration>,
+    /// Write the counts of the recordings as CSV [default: to standard output]
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// The minutes of a row of the CSV [default: 15]
+    #[arg(long, value_name = "MINUTES")]
+    step_minutes: Option<NonZeroU32>,
+    /// Also draw the persons and zones into a video
+    #[arg(long, value_name = "OUT.mp4")]
+    annotate: Option<PathBuf>,
+    #[command(flatten)]
+    parameters: ParameterFlags,
+}
+
+impl RecordingFlags {
+    /// Returns true if a flag is given that has no meaning without a recording.
+    pub(super) fn is_given(&self) -> bool {
+        self.calibration.is_some()
+            || self.start.is_some()
+            || self.every.is_some()
+            || self.csv.is_some()
+            || self.step_minutes.is_some()
+            || self.annotate.is_some()
+            || !self.parameters.is_empty()
+    }
+}
+
+/// A recording and the time of its first frame.
+struct Clip {
+    path: PathBuf,
+    start: Timestamp,
+    duration: Option<Duration>,
+}
+
+/// Everything that counts the frames.
+struct Counting<'a> {
+    runtime: Runtime,
+    engine: Engine,
+    parameters: DetectParameters,
+    calibration: Option<Arc<Calibration>>,
+    recording: Recording,
+    every: Duration,
+    /// Frames that are processed at the same time.
+    at_once: usize,
+    video: Option<(VideoWriter, &'a Path)>,
+    drawing: AnnotationOptions,
+    progress: Progress,
+}
+
+/// Counts recordings in their order.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let flags = &arguments.recording;
+    if let Some(other) = arguments.files.iter().find(|file| !is_video(file)) {
+        let other = other.display();
+        bail!(
+            "{other}: it is no recording: give one settings file, or recordings such as clip.mp4"
+        );
+    }
+    let own = given(&[("counts.path", arguments.store.as_deref())]);
+    let settings = arguments.settings_file.load_with(&own)?;
+    let calibration = calibration(flags.calibration.as_deref(), &settings)?;
+    let id = calibration.as_ref().map(|found| found.id().as_str());
+    let parameters = flags.parameters.check_or(id, SCORE_THRESHOLD)?;
+    let camera = match (&parameters.camera, id, &arguments.files[..]) {
+        (Some(camera), ..) => camera.clone(),
+        (None, Some(id), _) => id.to_owned(),
+        (None, None, files) => files.first().map(|file| stem(file)).unwrap_or_default(),
+    };
+    let runtime = runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("the operating system creates no thread")?;
+    let clips = clips(&arguments.files, flags.start, &runtime)?;
+    let (Some(first), Some(last)) = (clips.first(), clips.last()) else {
+        bail!("there is no recording: give a video such as clip.mp4");
+    };
+    let counts = &settings.counts;
+    let recording = Recording::open(
+        &counts.path,
+        counts.longest_gap,
+        &camera,
+        calibration.clone(),
+    )?;
+    let until = recording.counted_until();
+    if let Some(until) = until.filter(|until| *until >= first.start) {
+        if until >= last.start + last.duration.unwrap_or_default() {
+            bail!(
+                "--store: {} has counts up to {until}, after the end of the recordings: they are \
+                 counted already, or give another --store",
+                counts.path.display()
+            );
+        }
+        tracing::info!("continuing after {until}: earlier frames are counted already");
+    }
+    let every = flags.every.unwrap_or(DEFAULT_EVERY);
+    let video = match &flags.annotate {
+        Some(path) => Some((writer(path, every, &runtime)?, path.as_path())),
+        None => None,
+    };
+    let engine = engine_for(&settings, std::slice::from_ref(&parameters))?;
+    let frames = clips.iter().filter_map(|clip| clip.duration);
+    let frames: u128 = frames
+        .map(|duration| duration.as_millis().div_ceil(every.as_millis().max(1)))
+        .sum();
+    let started = Instant::now();
+    let mut counting = Counting {
+        runtime,
+        engine,
+        parameters,
+        calibration,
+        recording,
+        every,
+        at_once: settings.threads.frame_workers.get(),
+        video,
+        drawing: AnnotationOptions::parse([])?,
+        progress: Progress::start(&camera, usize::try_from(frames).unwrap_or(usize::MAX)),
+    };
+    let mut end = last.start;
+    for clip in &clips {
+        end = counting.count(clip)?;
+    }
+    let span = (first.start, end);
+    let recording = counting.finish()?;
+    let step = flags.step_minutes.map_or(15, NonZeroU32::get);
+    let csv = recording.csv(span, step)?;
+    let csv = csv.context("--step-minutes: the CSV has too many values: give a longer step")?;
+    write(&csv, flags.csv.as_deref())?;
+    let crossings = recording.lines().into_iter();
+    let crossings =
+        crossings.map(|line| format!("{} {} {}", line.line, line.direction, line.crossings));
+    tracing::info!(
+        "{camera}: {:.0} s of video in {:.0} s; crossings in the store: {}",
+        (end.duration_since(first.start)).as_secs_f64(),
+        started.elapsed().as_secs_f64(),
+        crossings.collect::<Vec<_>>().join(", ")
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Counting<'_> {
+    /// Counts the frames of a recording, and returns the time of its end.
+    fn count(&mut self, clip: &Clip) -> anyhow::Result<Timestamp> {
+        let name = clip.path.display().to_string();
+        let counted_until = self.recording.counted_until();
+        let options = VideoOptions::default();
+        let frames = VideoFrames::open(&clip.path, self.every, &options);
+        let mut frames = self.runtime.block_on(frames)?;
+        let mut end = clip.start;
+        loop {
+            let mut images = Vec::new();
+            while images.len() < self.at_once {
+                let next = self.runtime.block_on(frames.next_frame());
+                let Some((position, image)) = next.with_context(|| name.clone())? else {
+                    break;
+                };
+                let at = clip.start + position;
+                end = at + self.every;
+                if counted_until.is_some_and(|until| at <= until) {
+                    self.progress.advance();
+                } else {
+                    images.push((at, image));
+                }
+            }
+            if images.is_empty() {
+                return Ok(end);
+            }
+            for (at, detected) in self.detect(&name, images)? {
+                let report = serde_json::to_vec(&Report::from(&detected.report))?;
+                self.recording.count(at, &report)?;
+                if let Some((writer, path)) = &mut self.video {
+                    let jpeg = annotate::jpeg(detected, &self.drawing)?;
+                    let written = self.runtime.block_on(writer.write(&jpeg));
+                    written.with_context(|| unwritable(path))?;
+                }
+                self.progress.advance();
+            }
+        }
+    }
+
+    /// Detects the persons of several frames at the same time, and returns them in their order.
+    fn detect(
+        &self,
+        name: &str,
+        images: Vec<(Timestamp, Bytes)>,
+    ) -> anyhow::Result<Vec<(Timestamp, Detected)>> {
+        thread::scope(|scope| {
+            let running = images.into_iter().map(|(at, image)| {
+                let job = DetectJob::local(
+                    name.to_owned(),
+                    JobImage::Encoded(image),
+                    self.parameters.clone(),
+                    self.calibration.clone(),
+                );
+                let detecting = thread::Builder::new().name("recording".to_owned());
+                let detecting = detecting.spawn_scoped(scope, move || self.engine.detect(&job));
+                (at, detecting)
+            });
+            let running: Vec<_> = running.collect();
+            let detected = running.into_iter().map(|(at, detecting)| {
+                let detecting = detecting.context("the operating system creates no thread")?;
+                let Ok(detected) = detecting.join() else {
+                    bail!("{name}: the frame at {at} failed: the log has the reason");
+                };
+                Ok((
+                    at,
+                    detected.with_context(|| format!("{name}: the frame at {at}"))?,
+                ))
+            });
+            detected.collect()
+        })
+    }
+
+    /// Stores the last counts and completes the video.
+    fn finish(mut self) -> anyhow::Result<Recording> {
+        self.recording.commit()?;
+        if let Some((writer, path)) = self.video {
+            let finished = self.runtime.block_on(writer.finish());
+            finished.with_context(|| unwritable(path))?;
+        }
+        self.progress.finish();
+        Ok(self.recording)
+    }
+}
+
+/// Returns the calibration of `--calibration`.
+fn calibration(
+    named: Option<&str>,
+    settings: &Settings,
+) -> anyhow::Result<Option<Arc<Calibration>>> {
+    let Some(named) = named else { return Ok(None) };
+    let path = Path::new(named);
+    if path.is_file() {
+        return Ok(Some(Arc::new(Calibration::read(path)?)));
+    }
+    let Ok(id) = named.parse::<CalibrationId>() else {
+        bail!("--calibration: {named:?} is neither a file nor a calibration's ID");
+    };
+    let found = open_calibrations(settings)?.get(&id)?;
+    if found.is_none() {
+        bail!("--calibration: there is no calibration {named:?} in calibrations.path");
+    }
+    Ok(found)
+}
+
+/// Returns the recordings with their times. Each begins at the end of the one before, or later if
+/// its file says so.
+fn clips(
+    files: &[PathBuf],
+    start: Option<Timestamp>,
+    runtime: &Runtime,
+) -> anyhow::Result<Vec<Clip>> {
+    let options = VideoOptions::default();
+    let mut clips = Vec::<Clip>::new();
+    for path in files {
+        let duration = runtime.block_on(video_duration(path, &options));
+        let created_at = match start {
+            Some(_) => None,
+            None => runtime.block_on(video_created_at(path, &options)),
+        };
+        let after = clips
+            .last()
+            .map(|clip| clip.start + clip.duration.unwrap_or_default());
+        let own = match (created_at, after) {
+            (Some(created_at), _) => created_at,
+            (None, Some(after)) => after,
+            (None, None) => match start {
+                Some(start) => start,
+                None => modified_at(path)? - duration.unwrap_or_default(),
+            },
+        };
+        clips.push(Clip {
+            path: path.clone(),
+            start: after.map_or(own, |after| after.max(own)),
+            duration,
+        });
+    }
+    Ok(clips)
+}
+
+fn modified_at(path: &Path) -> anyhow::Result<Timestamp> {
+    let modified = fs::metadata(path).and_then(|file| file.modified());
+    let modified = modified.with_context(|| format!("{}: it cannot be read", path.display()))?;
+    let since = modified.duration_since(UNIX_EPOCH).unwrap_or_default();
+    Ok(Timestamp::UNIX_EPOCH + since)
+}
+
+fn writer(path: &Path, every: Duration, runtime: &Runtime) -> anyhow::Result<VideoWriter> {
+    let _entered = runtime.enter();
+    let writer = VideoWriter::create(path, every, &VideoOptions::default());
+    writer.with_context(|| unwritable(path))
+}
+
+fn unwritable(path: &Path) -> String {
+    format!("--annotate: {} cannot be written", path.display())
+}
+
+fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
+/// Writes the counts to a file or to standard output.
+fn write(csv: &str, path: Option<&Path>) -> anyhow::Result<()> {
+    match path {
+        Some(path) => fs::write(path, csv)
+            .with_context(|| format!("--csv: {} cannot be written", path.display())),
+        None => io::stdout().write_all(csv.as_bytes()).context(UNWRITABLE),
+    }
+}

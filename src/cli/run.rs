@@ -1,0 +1,236 @@
+//! `lookdown run`
+
+use std::{process::ExitCode, sync::Arc};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use lookdown_common::ServerOptions;
+use lookdown_count::Started;
+use lookdown_http::Shutdown;
+use lookdown_watch::{CameraEntry, Metrics, Origin, watch as watch_cameras};
+use secrecy::SecretString;
+use tokio::{runtime, sync::watch};
+
+use super::{
+    SettingsFile,
+    camera_flags::CameraFlags,
+    count::{counting, run_counts},
+    serve,
+    server_flags::given,
+    settings_file::SettingsSource,
+    watch::{cameras, separate},
+};
+use crate::{
+    access::{KeyDigest, KeyList, new_key},
+    api::{Companions, Readiness},
+    cameras::Cameras,
+    probe,
+    settings::Settings,
+};
+
+/// The name of the key with which cameras and counts use the server of this process.
+const OWN_KEY: &str = "lookdown-run";
+/// The name of a camera of the command line without a name.
+const CAMERA: &str = "camera";
+/// Threads for sockets, cameras, counts and JSON. Frames have separate threads.
+const RUNTIME_THREADS: usize = 2;
+
+/// Arguments of `lookdown run`.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// A settings file (docs/configuration.md), or a camera: the URL of RTSP, an MJPEG stream or a
+    /// JPEG snapshot, a folder into which images are dropped, a video file, or `-` for images on
+    /// standard input
+    #[arg(value_name = "SETTINGS.toml|SOURCE")]
+    source: Option<String>,
+    #[command(flatten)]
+    camera: CameraFlags,
+    /// IP address and port to listen on, such as 0.0.0.0:8080 (`server.listen`)
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<String>,
+    /// The file of the counts (`counts.path`) [default: counts.sqlite]
+    #[arg(long, value_name = "FILE")]
+    store: Option<String>,
+    #[command(flatten)]
+    settings_file: SettingsFile,
+}
+
+/// Serves, watches and counts until a stop is requested.
+pub(super) fn run(arguments: &Arguments, commit: Option<&str>) -> anyhow::Result<ExitCode> {
+    let (file, source) = separate(arguments.source.as_deref());
+    let flags = given(&[
+        ("server.listen", arguments.listen.as_deref()),
+        ("counts.path", arguments.store.as_deref()),
+    ]);
+    let source_of_settings = arguments.settings_file.source(file, &flags)?;
+    if source.is_none() && arguments.camera.is_given() {
+        bail!(
+            "flags of a single camera need a source: give its URL, or set them in the settings \
+             file, under [camera_defaults] or [[cameras]]"
+        );
+    }
+    let camera = source.map(|source| arguments.camera.entry(source, Some(CAMERA)));
+    let mut settings = source_of_settings.load()?;
+    check(&settings)?;
+    let key = own_key(&mut settings)?;
+    let runtime = runtime::Builder::new_multi_thread()
+        .worker_threads(RUNTIME_THREADS)
+        .enable_all()
+        .build()
+        .context("the operating system creates no thread")?;
+    let outcome = runtime.block_on(async {
+        let shutdown = Shutdown::on_signals().context("signals cannot be handled")?;
+        let parts = Parts {
+            settings: source_of_settings,
+            camera,
+            key,
+            shutdown,
+        };
+        Box::pin(parts.run(settings, commit)).await
+    });
+    serve::end(runtime);
+    outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// Refuses settings of several processes.
+fn check(settings: &Settings) -> anyhow::Result<()> {
+    if settings.results.redis.is_some() {
+        bail!(
+            "results.url: `lookdown run` is one process with its own result store: remove \
+             results.url, or start `lookdown serve` on each server with one `lookdown count`"
+        );
+    }
+    if settings.counts.url.is_some() {
+        bail!(
+            "counts.url: `lookdown run` counts in its own process: remove counts.url, or start \
+             `lookdown serve`"
+        );
+    }
+    Ok(())
+}
+
+/// Adds a key of this process to those of the settings, if requests need keys. It is in memory only.
+fn own_key(settings: &mut Settings) -> anyhow::Result<Option<SecretString>> {
+    if !settings.access.needs_keys() {
+        return Ok(None);
+    }
+    let key = new_key().context("the operating system gives no random numbers")?;
+    let digest = KeyDigest::of(key.as_bytes()).hexadecimal();
+    let own: KeyList = format!("{OWN_KEY}:detect+read:{digest}:1").parse()?;
+    let keys = std::mem::take(&mut settings.access.keys).with(&own);
+    settings.access.keys = keys.context("access.keys")?;
+    Ok(Some(key.into()))
+}
+
+/// The cameras and the counts beside the server.
+struct Parts {
+    settings: SettingsSource,
+    /// The camera of the command line.
+    camera: Option<CameraEntry>,
+    key: Option<SecretString>,
+    shutdown: Shutdown,
+}
+
+impl Parts {
+    /// Serves, watches and counts. The end of one ends the others: first the cameras, then the
+    /// counts, then the server.
+    async fn run(self, settings: Settings, commit: Option<&str>) -> anyhow::Result<()> {
+        let url = format!("http://{}", probe::reachable(settings.server.listen));
+        let state = settings.state.path.clone();
+        let (app, sockets) = serve::open(settings, commit).await?;
+        let (companions, readiness) = (app.companions(), app.readiness());
+        let metrics = Arc::new(Metrics::new()?);
+        let stored = Arc::new(Cameras::new(state, Arc::clone(&metrics)));
+        companions.set_cameras(Arc::clone(&stored));
+        companions.expect_counts();
+        let server = ServerOptions {
+            url: url.parse()?,
+            api_key: self.key.clone(),
+            authorities: None,
+            in_process: Some(app.in_process()),
+        };
+        let stop_of_server = Shutdown::default();
+        let (watched, after_watching) = watch::channel(false);
+        let (counted, after_counting) = watch::channel(false);
+        let serving = self.ends_all(serve::serve_app(app, sockets, stop_of_server.clone()));
+        let watching = async {
+            let shown = Arc::clone(&metrics);
+            companions.set_metrics("cameras", move || shown.text());
+            let run = (Arc::clone(&stored), server.clone());
+            let watching = self.watch_when_ready(run, metrics, readiness);
+            let outcome = self.ends_all(watching).await;
+            let _ = watched.send(true);
+            outcome
+        };
+        let counting = async {
+            let counting = self.count(&server, &companions, after_watching);
+            let outcome = self.ends_all(counting).await;
+            let _ = counted.send(true);
+            outcome
+        };
+        let stopping = async {
+            self.shutdown.requested().await;
+            tokio::select! {
+                () = over(after_counting) => self.shutdown.pass_on(&stop_of_server),
+                () = self.shutdown.requested_at_once() => {}
+            }
+            self.shutdown.requested_at_once().await;
+            self.shutdown.pass_on(&stop_of_server);
+            std::future::pending().await
+        };
+        let parts = async { tokio::join!(serving, watching, counting) };
+        tokio::select! {
+            (served, watched, counted) = parts => served.and(watched).and(counted),
+            outcome = stopping => outcome,
+        }
+    }
+
+    /// Watches the cameras once the server accepts frames.
+    async fn watch_when_ready(
+        &self,
+        run: (Arc<Cameras>, ServerOptions),
+        metrics: Arc<Metrics>,
+        readiness: Readiness,
+    ) -> anyhow::Result<()> {
+        tokio::select! {
+            () = readiness.ready() => {}
+            () = self.shutdown.requested() => return Ok(()),
+        }
+        let cameras = cameras(&self.settings, self.camera.clone(), Some(run));
+        let stop = self.shutdown.requested();
+        Ok(watch_cameras(Origin::Reload(cameras), metrics, stop).await?)
+    }
+
+    /// Counts until the cameras are no longer watched.
+    async fn count(
+        &self,
+        server: &ServerOptions,
+        companions: &Companions,
+        after_watching: watch::Receiver<bool>,
+    ) -> anyhow::Result<()> {
+        let settings = counting(&self.settings, Some(server.clone()));
+        let started = |started: Started| {
+            companions.set_counts(started.routes);
+            companions.set_metrics("counts", started.metrics);
+        };
+        run_counts(&settings, started, async || {
+            over(after_watching.clone()).await;
+        })
+        .await
+    }
+
+    /// Requests the end of all parts at the end of this one.
+    async fn ends_all(&self, part: impl Future<Output = anyhow::Result<()>>) -> anyhow::Result<()> {
+        let outcome = part.await;
+        if !self.shutdown.is_requested() {
+            self.shutdown.request_without_pause();
+        }
+        outcome
+    }
+}
+
+/// Waits until a part is over.
+async fn over(mut part: watch::Receiver<bool>) {
+    // A sender that is gone means the same.
+    let _ = part.wait_for(|is_over| *is_over).await;
+}

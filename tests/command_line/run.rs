@@ -1,0 +1,304 @@
+//! `lookdown run`: a server, cameras and counts in one process.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Read, Write},
+    net::{TcpListener, TcpStream},
+    path::Path,
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use super::{assert_fails_with, lookdown};
+
+const KEY: &str = "lookdown_0123456789abcdef";
+/// SHA-256 of [`KEY`].
+const KEY_DIGEST: &str = "5800568aa3f1d98c8b4ed0c70daf01517134d48b8a9392e61ae22301e0c65945";
+/// Longest wait for a condition.
+const TIMEOUT: Duration = Duration::from_secs(60);
+/// Interval of the checks of a condition.
+const CHECK: Duration = Duration::from_millis(100);
+
+/// A running process.
+struct Running {
+    process: Child,
+    address: String,
+    log: thread::JoinHandle<Vec<String>>,
+}
+
+impl Running {
+    fn start(arguments: &[&str], variables: &[(&str, &str)]) -> Self {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_lookdown"))
+            .args(arguments)
+            .args(["--listen", "127.0.0.1:0"])
+            .env("LOOKDOWN__SHUTDOWN__GRACE_MILLIS", "0")
+            .envs(variables.iter().copied())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
+        let address = lines.by_ref().map_while(Result::ok).find_map(|line| {
+            let (_, rest) = line.split_once("listening on http://")?;
+            Some(rest.split_once(',')?.0.to_owned())
+        });
+        let log = thread::Builder::new().name("log".to_owned());
+        Self {
+            process,
+            address: address.unwrap(),
+            log: log
+                .spawn(move || lines.map_while(Result::ok).collect())
+                .unwrap(),
+        }
+    }
+
+    /// Sends a request with a JSON body, and returns the response.
+    fn ask(&self, request: &str, body: &str) -> String {
+        let length = body.len();
+        let head = format!(
+            "{request} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
+             Content-Type: application/json\r\nContent-Length: {length}\r\n\r\n{body}"
+        );
+        let mut connection = TcpStream::connect(&self.address).unwrap();
+        connection.write_all(head.as_bytes()).unwrap();
+        let mut answer = String::new();
+        connection.read_to_string(&mut answer).unwrap();
+        answer
+    }
+
+    /// Sends a GET request with these header lines, and returns the response.
+    fn get(&self, path: &str, headers: &str) -> String {
+        let head =
+            format!("GET {path} HTTP/1.1\r\nHost: lookdown\r\nConnection: close\r\n{headers}\r\n");
+        let mut connection = TcpStream::connect(&self.address).unwrap();
+        connection.write_all(head.as_bytes()).unwrap();
+        let mut answer = Vec::new();
+        connection.read_to_end(&mut answer).unwrap();
+        String::from_utf8_lossy(&answer).into_owned()
+    }
+
+    /// Waits until the response has this part, and returns it. `act` is called before each request.
+    #[track_caller]
+    fn until(&self, path: &str, headers: &str, part: &str, mut act: impl FnMut()) -> String {
+        let started = Instant::now();
+        loop {
+            act();
+            let answer = self.get(path, headers);
+            if answer.contains(part) {
+                return answer;
+            }
+            assert!(
+                started.elapsed() < TIMEOUT,
+                "{path}: no {part:?} in {answer}"
+            );
+            thread::sleep(CHECK);
+        }
+    }
+
+    /// Ends the process as Ctrl-C does, and returns the rest of the log.
+    fn interrupt(mut self) -> Vec<String> {
+        let kill = format!("kill -INT {}", self.process.id());
+        assert!(
+            Command::new("sh")
+                .args(["-c", &kill])
+                .status()
+                .unwrap()
+                .success()
+        );
+        let ended = self.process.wait().unwrap();
+        let log = self.log.join().unwrap();
+        assert!(ended.success(), "{log:?}");
+        log
+    }
+}
+
+/// Drops frames into a folder.
+fn drop_frames(folder: &Path) -> impl FnMut() {
+    let office = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples/office.jpg");
+    let folder = folder.to_owned();
+    let mut number = 0;
+    move || {
+        number += 1;
+        let hidden = folder.join(".office.part");
+        fs::copy(&office, &hidden).unwrap();
+        fs::rename(hidden, folder.join(format!("{number}.jpg"))).unwrap();
+    }
+}
+
+#[test]
+fn a_camera_is_counted_on_the_port_of_the_server() {
+    let folder = tempfile::tempdir().unwrap();
+    let frames = folder.path().join("frames");
+    fs::create_dir(&frames).unwrap();
+    let (source, store) = (
+        frames.to_str().unwrap(),
+        folder.path().join("counts.sqlite"),
+    );
+    let keys = format!("me:read:{KEY_DIGEST}");
+    let arguments = [
+        "run",
+        source,
+        "--name",
+        "hall",
+        "--every",
+        "200ms",
+        "--profile",
+        "fast",
+        "--store",
+        store.to_str().unwrap(),
+    ];
+    let running = Running::start(&arguments, &[("LOOKDOWN__ACCESS__KEYS", &keys)]);
+    let key = format!("X-API-Key: {KEY}\r\n");
+    let counted = "lookdown_count_last_report_timestamp_seconds{camera=\"hall\"}";
+    let metrics = running.until("/metrics", "", counted, drop_frames(&frames));
+    assert!(metrics.contains("lookdown_watch_frames_sent_total{camera=\"hall\"}"));
+    let counts = running.get("/counts", &key);
+    assert!(counts.contains("\"name\":\"hall\""), "{counts}");
+    assert!(counts.starts_with("HTTP/1.1 200 "), "{counts}");
+    let refused = running.get("/counts", "");
+    assert!(refused.starts_with("HTTP/1.1 401 "), "{refused}");
+    let unknown = running.get("/counts/gate", &key);
+    assert!(unknown.starts_with("HTTP/1.1 404 "), "{unknown}");
+    assert!(unknown.contains("/problems/not-found"), "{unknown}");
+    let page = running.get("/assets/options.json", "");
+    assert!(page.contains("\"has_counts\":true"), "{page}");
+    let log = running.interrupt().join("\n");
+    assert!(
+        !log.contains("status=503") && !log.contains("ended the stream"),
+        "{log}"
+    );
+    assert!(store.exists());
+}
+
+#[test]
+fn cameras_of_the_settings_file_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let frames = folder.path().join("frames");
+    fs::create_dir(&frames).unwrap();
+    let settings = folder.path().join("lookdown.toml");
+    let text = format!(
+        "[counts]\npath = {store:?}\n[camera_defaults]\nprofile = \"fast\"\nevery = \"200ms\"\n\
+         [[cameras]]\nname = \"hall\"\nurl = {frames:?}\n",
+        store = folder.path().join("counts.sqlite"),
+    );
+    fs::write(&settings, &text).unwrap();
+    let running = Running::start(&["run", settings.to_str().unwrap()], &[]);
+    running.until("/counts", "", "\"hall\"", drop_frames(&frames));
+    // A camera that is added to the file is watched without a restart.
+    let text = format!("{text}[[cameras]]\nname = \"gate\"\nurl = {frames:?}\n");
+    fs::write(&settings, text).unwrap();
+    running.until("/counts", "", "\"gate\"", drop_frames(&frames));
+    running.interrupt();
+}
+
+#[test]
+fn a_camera_that_is_added_is_there_after_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("state");
+    let store = folder.path().join("counts.sqlite");
+    let variables = [
+        ("LOOKDOWN__STATE__PATH", state.to_str().unwrap()),
+        ("LOOKDOWN__COUNTS__PATH", store.to_str().unwrap()),
+    ];
+    // Nothing listens there.
+    let unused = TcpListener::bind("127.0.0.1:0").unwrap();
+    let source = format!("http://{}/snapshot.jpg", unused.local_addr().unwrap());
+    drop(unused);
+    let body = format!(r#"{{"url": "{source}", "user": "viewer", "password": "geheim"}}"#);
+    let running = Running::start(&["run"], &variables);
+    let added = running.ask("PUT /cameras/hall", &body);
+    assert!(added.starts_with("HTTP/1.1 201 "), "{added}");
+    let refused = running.ask("PUT /cameras/gate", r#"{"url": "file:///etc/passwd"}"#);
+    assert!(refused.starts_with("HTTP/1.1 422 "), "{refused}");
+    let tested = running.ask("POST /cameras/test", &body);
+    assert!(tested.contains("the camera cannot be reached"), "{tested}");
+    running.interrupt();
+
+    let running = Running::start(&["run"], &variables);
+    let cameras = running.until("/cameras", "", "cannot be reached", || {});
+    assert!(
+        cameras.contains(&source) && !cameras.contains("geheim"),
+        "{cameras}"
+    );
+    let deleted = running.ask("DELETE /cameras/hall", "");
+    assert!(deleted.starts_with("HTTP/1.1 204 "), "{deleted}");
+    assert!(
+        running
+            .get("/cameras/hall", "")
+            .starts_with("HTTP/1.1 404 ")
+    );
+    running.interrupt();
+}
+
+#[test]
+fn settings_of_several_processes_are_refused() {
+    for (key, value, parts) in [
+        (
+            "LOOKDOWN__RESULTS__URL",
+            "redis://127.0.0.1:1",
+            ["results.url", "lookdown serve", "one `lookdown count`"],
+        ),
+        (
+            "LOOKDOWN__COUNTS__URL",
+            "http://127.0.0.1:1",
+            ["counts.url", "own process", "lookdown serve"],
+        ),
+    ] {
+        assert_fails_with(&lookdown(&["run"], &[(key, value)]), &parts);
+    }
+}
+
+#[test]
+fn a_server_forwards_counts_with_the_key_of_the_other_host() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let answering = move || {
+        let (mut connection, _) = listener.accept().unwrap();
+        let lines = BufReader::new(connection.try_clone().unwrap()).lines();
+        let head: Vec<_> = lines
+            .map(Result::unwrap)
+            .take_while(|line| !line.is_empty())
+            .collect();
+        let answer =
+            "HTTP/1.1 200 OK\r\ncontent-type: text/csv\r\ncontent-length: 5\r\n\r\na,b\r\n";
+        connection.write_all(answer.as_bytes()).unwrap();
+        head.join("\n")
+    };
+    let other = thread::Builder::new().name("other".to_owned());
+    let other = other.spawn(answering).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let key_file = folder.path().join("counts.key");
+    fs::write(&key_file, "0123456789abcdef0123\n").unwrap();
+    let keys = format!("me:read:{KEY_DIGEST}");
+    let running = Running::start(
+        &["serve"],
+        &[
+            ("LOOKDOWN__ACCESS__KEYS", &keys),
+            ("LOOKDOWN__COUNTS__URL", &url),
+            ("LOOKDOWN__COUNTS__API_KEY_FILE", key_file.to_str().unwrap()),
+        ],
+    );
+    assert!(running.get("/counts", "").starts_with("HTTP/1.1 401 "));
+    let key = format!("X-API-Key: {KEY}\r\nAccept: text/csv\r\n");
+    let answer = running.get("/counts/hall?step=1h", &key);
+    assert!(answer.ends_with("\r\n\r\na,b\r\n"), "{answer}");
+    let head = other.join().unwrap();
+    assert!(
+        head.starts_with("GET /counts/hall?step=1h HTTP/1.1"),
+        "{head}"
+    );
+    assert!(
+        head.contains("authorization: Bearer 0123456789abcdef0123"),
+        "{head}"
+    );
+    assert!(
+        head.contains("accept: text/csv") && !head.contains(KEY),
+        "{head}"
+    );
+    let gone = running.get("/counts", &key);
+    assert!(
+        gone.starts_with("HTTP/1.1 503 ") && gone.contains("counts-unavailable"),
+        "{gone}"
+    );
+    running.interrupt();
+}
