@@ -18,10 +18,12 @@ const READS: [&str; 6] = [
     "tokio::fs",
 ];
 /// The files that may make them.
-const READERS: [&str; 5] = [
+const READERS: [&str; 6] = [
     "crates/lookdown-common/src/files.rs",
     // Creates the file that locks the store.
     "crates/lookdown-count/src/store.rs",
+    // Writes a password.
+    "src/cameras.rs",
     // Tests of generated documentation.
     "src/api/parameters/reference.rs",
     "src/settings/reference.rs",
