@@ -54,12 +54,8 @@ async function show() {
 }
 
 /** States how many more inputs possible persons may get. */
-function secondLook({ crops_at_most: crops, zoomed_pictures_at_most: zoomed }) {
-  const parts = [
-    crops ? plural(crops, "upright crop") : "",
-    zoomed ? plural(zoomed, "zoomed view") : "",
-  ].filter(Boolean);
-  return parts.length ? ` Possible persons are seen again in up to ${parts.join(" and ")}.` : "";
+function secondLook({ crops_at_most: crops }) {
+  return crops ? ` Possible persons are seen again in up to ${plural(crops, "upright crop")}.` : "";
 }
 
 function drawOutlines() {

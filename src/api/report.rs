@@ -15,7 +15,6 @@ use utoipa::ToSchema;
     "calibration": {"id": "lobby", "revision": "9f86d081884c", "assumed": false},
     "image": {"width": 1680, "height": 1680},
     "model": {"name": "nanodet_g_416", "revision": "a3c2e9b54d10"},
-    "second_opinion": {"name": "ssdlite_mobilenet_v2_int8", "revision": "60303ae22b99"},
     "crop_model": {"name": "nanodet_g_fisheye_416_int8", "revision": "99cfa8ef2934"},
     "profile": "quality",
     "refinement": {
@@ -60,10 +59,6 @@ pub struct Report {
     pub image: ReportImage,
     /// The model.
     pub model: ReportModel,
-    /// The second model of the zoom views; absent when they used no other model than `model`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    pub second_opinion: Option<ReportModel>,
     /// The model of the upright crops; absent when they used no other model than `model`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]

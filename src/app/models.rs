@@ -4,16 +4,16 @@ use std::{path::Path, sync::Arc};
 
 use lookdown_detect::{
     inference::{
-        CandidateOptions, Device, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
+        CandidateOptions, Int8Use, Model, ModelFolder, ModelLoader, ModelManifest, ModelRepository,
         OnnxOptions, RemoteDetector, RemoteOptions, RemoteServer, RepositoryOptions, is_fetched,
         onnx_loader,
     },
-    metrics::DetectMetrics,
+    metrics::{DetectMetrics, replace_info},
     parameters::Profile,
     pipeline::DefaultModels,
 };
 
-use crate::settings::{RemoteSettings, Settings, SettingsError, is_installed};
+use crate::settings::{InferenceSettings, RemoteSettings, Settings, SettingsError, is_installed};
 
 /// Opens the repository without loading a model. Also returns the default models.
 ///
@@ -35,7 +35,7 @@ pub(super) fn open(
     };
     let defaults = match &elsewhere {
         Some((name, _)) => DefaultModels::One(name.clone()),
-        None => per_profile(&path, settings.inference.device),
+        None => per_profile(&path, &settings.inference, metrics),
     };
     let called = defaults.of(Profile::default()).to_owned();
     let options = RepositoryOptions {
@@ -122,8 +122,16 @@ fn candidate_options(settings: &Settings) -> CandidateOptions {
     }
 }
 
-fn per_profile(folder: &Path, device: Device) -> DefaultModels {
-    let defaults = DefaultModels::per_profile(device, |name| is_fetched(&folder.join(name)));
+/// Selects the model of each profile, and publishes the precision.
+fn per_profile(
+    folder: &Path,
+    inference: &InferenceSettings,
+    metrics: &DetectMetrics,
+) -> DefaultModels {
+    let int8 = Int8Use::on(inference.device, inference.precision);
+    tracing::info!("inference.precision: {}", int8.description());
+    replace_info(&metrics.precision_info, None, &[int8.name()]);
+    let defaults = DefaultModels::per_profile(int8, |name| is_fetched(&folder.join(name)));
     if let DefaultModels::PerProfile { missing, .. } = &defaults {
         for name in missing {
             tracing::warn!("{name} is missing, so another model is used: run `make setup`");

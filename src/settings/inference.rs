@@ -2,12 +2,12 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
-use lookdown_detect::inference::{CandidateOptions, Device, UnknownDevice};
+use lookdown_detect::inference::{CandidateOptions, Device, PrecisionChoice, UnknownDevice};
 
 use super::{
     SettingsError,
     declare::settings,
-    form::{Form, Refusal, count, millis, parsed, path, share},
+    form::{Form, Refusal, choice, count, millis, parsed, path, share},
     locate::{DEFAULT_LIBRARY, locate},
 };
 
@@ -29,6 +29,15 @@ settings! {
         /// For a GPU, `inference.library_path` must be the `libonnxruntime.so` of the package
         /// `onnxruntime-gpu`. GPUs are experimental: none has been tested.
         device: Device = Device::Cpu => device();
+        /// The precision of the default models on the CPU. `auto`: 8-bit integers for upright
+        /// crops and all profiles except `quality`, and for `balanced` only if the CPU has
+        /// instructions for them (VNNI, or `dotprod` on arm64). `int8`: also for `balanced` on any
+        /// CPU. A GPU uses `fp32`.
+        precision: PrecisionChoice = PrecisionChoice::Auto => choice(&[
+            ("auto", PrecisionChoice::Auto),
+            ("int8", PrecisionChoice::Int8),
+            ("fp32", PrecisionChoice::Fp32),
+        ]);
         /// The least score of a candidate. Candidates below it are dropped first of all.
         score_floor: f64 = CandidateOptions::DEFAULT.score_floor => share();
         /// The most candidates kept of one view, best first.

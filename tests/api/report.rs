@@ -72,10 +72,6 @@ fn report() -> DetectionReport {
             name: "ssdlite_mobilenet_v2".to_owned(),
             revision: "60303ae22b99".to_owned(),
         },
-        second_opinion: Some(ModelUsed {
-            name: "nanodet_g_416".to_owned(),
-            revision: "a3c2e9b54d10".to_owned(),
-        }),
         crop_model: Some(ModelUsed {
             name: "nanodet_g_fisheye_416".to_owned(),
             revision: "5b1f0c77e2aa".to_owned(),

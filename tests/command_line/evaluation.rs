@@ -72,6 +72,45 @@ fn saved_detections_are_scored_and_plotted_without_a_model() {
 }
 
 #[test]
+fn counts_are_printed_also_for_empty_rooms() {
+    let folder = samples_with_detections();
+    let row = |data_set: &std::path::Path| {
+        let rows = folder.path().join("rows/paper.nms.tiny.json");
+        let flags = ["--from-detections", rows.to_str().unwrap(), "--json"];
+        let output = lookdown(
+            &[&["eval", data_set.to_str().unwrap()], &flags[..]].concat(),
+            &[],
+        );
+        assert!(output.status.success(), "{output:?}");
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    let with_persons = row(folder.path());
+    // One false person and one missed person, in the same image.
+    let third = 1.0 / 3.0;
+    assert_eq!(with_persons["false_persons"], third);
+    assert_eq!(with_persons["missed_persons"], third);
+    assert_eq!(with_persons["count_error"], 0.0);
+    assert_eq!(
+        with_persons["false_in_empty_images"],
+        serde_json::Value::Null
+    );
+
+    let path = folder.path().join("annotations.json");
+    let mut truth: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    truth["annotations"] = serde_json::json!([]);
+    std::fs::write(&path, truth.to_string()).unwrap();
+    let empty = row(folder.path());
+    assert_eq!(empty["ap50"], serde_json::Value::Null);
+    assert_eq!(
+        (&empty["persons"], &empty["empty_images"]),
+        (&0.into(), &3.into())
+    );
+    assert_eq!(empty["false_in_empty_images"], 1.0);
+    assert_eq!(empty["count_error"], 6.0);
+}
+
+#[test]
 fn saved_detections_are_scored_by_stratum() {
     let folder = samples_with_detections();
     let rows = folder.path().join("rows/paper.nms.tiny.json");

@@ -5,6 +5,7 @@ use std::{path::Path, process::Command, sync::Arc};
 use lookdown_detect::{
     Detector, DetectorOptions,
     imaging::decode::{DecodeLimits, decode},
+    inference::cpu_has_integer_dot_product,
     parameters::DetectParameters,
 };
 use lookdown_lens::calibration::Calibration;
@@ -158,9 +159,9 @@ fn the_paper_s_refinements_differ_as_their_formulas_require() {
 }
 
 #[test]
-fn report_names_the_models_of_first_pass_zoom_views_and_crops() {
+fn report_names_the_models_of_views_and_crops() {
     let names = |report: &Value| {
-        ["model", "second_opinion", "crop_model"].map(|part| {
+        ["model", "crop_model"].map(|part| {
             let name = report.get(part).map(|model| model["name"].as_str());
             name.map(|name| name.unwrap().to_owned())
         })
@@ -169,18 +170,21 @@ fn report_names_the_models_of_first_pass_zoom_views_and_crops() {
     let quality = detect("office", &["--profile", "quality"]);
     assert_eq!(
         names(&quality),
-        [
-            some("nanodet_g_416"),
-            some("ssdlite_mobilenet_v2_int8"),
-            some("nanodet_g_fisheye_416_int8")
-        ]
+        [some("nanodet_g_416"), some("nanodet_g_fisheye_416_int8")]
     );
+    // The CPU decides on INT8 for `balanced`.
+    let balanced = detect("office", &[]);
+    let expected = if cpu_has_integer_dot_product() {
+        "nanodet_g_416_int8"
+    } else {
+        "nanodet_g_416"
+    };
+    assert_eq!(names(&balanced)[0], some(expected));
     let fast = detect("office", &["--profile", "fast"]);
     assert_eq!(
         names(&fast),
         [
             some("nanodet_g_416_int8"),
-            None,
             some("nanodet_g_fisheye_416_int8")
         ]
     );

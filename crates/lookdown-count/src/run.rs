@@ -117,6 +117,7 @@ pub async fn count(
         }
         let access = match (&options.api_key, address) {
             (Some(key), _) => Access::Key(key.clone()),
+            (None, _) if options.open => Access::Everyone(options.hosts.clone().into()),
             (None, Some(address)) => Access::without_key(address),
             (None, None) => Access::OwnMachine,
         };

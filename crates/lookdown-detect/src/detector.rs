@@ -8,8 +8,8 @@ use parking_lot::Mutex;
 use crate::{
     imaging::Frame,
     inference::{
-        CandidateOptions, Device, ModelFolder, ModelRepository, OnnxOptions, RepositoryError,
-        RepositoryOptions, is_fetched, onnx_loader,
+        CandidateOptions, Device, Int8Use, ModelFolder, ModelRepository, OnnxOptions,
+        PrecisionChoice, RepositoryError, RepositoryOptions, is_fetched, onnx_loader,
     },
     metrics::DetectMetrics,
     parameters::DetectParameters,
@@ -93,7 +93,8 @@ impl Detector {
     /// [`DetectorError::Threads`].
     pub fn new(options: &DetectorOptions) -> Result<Self, DetectorError> {
         let fetched = |name: &str| is_fetched(&options.models.join(name));
-        let default_models = DefaultModels::per_profile(options.device, fetched);
+        let int8 = Int8Use::on(options.device, PrecisionChoice::Auto);
+        let default_models = DefaultModels::per_profile(int8, fetched);
         let metrics = Arc::<DetectMetrics>::default();
         let onnx = OnnxOptions {
             device: options.device,

@@ -10,6 +10,7 @@ mod manifest;
 mod model;
 mod onnx;
 mod onnx_file;
+mod precision;
 mod registry;
 mod remote;
 mod repository;
@@ -25,6 +26,7 @@ pub use heads::CandidateOptions;
 pub use manifest::{Layout, ManifestInput, ModelManifest};
 pub use model::Model;
 pub use onnx::{ModelDescription, OnnxDetector, OnnxOptions, OnnxTensor, onnx_loader};
+pub use precision::{Int8Use, PrecisionChoice, cpu_has_integer_dot_product};
 pub use registry::{ModelRegistry, RegistryFull};
 pub use remote::{BearerToken, InvalidToken, RemoteDetector, RemoteOptions, RemoteServer};
 pub use repository::{

@@ -3,6 +3,7 @@
 //! [`DataSet`] reads the annotations, [`detect`] runs a detector on them, [`Summary`] has the figures.
 
 mod average_precision;
+mod counts;
 mod data_set;
 mod ground_truth;
 mod in_order;
@@ -20,6 +21,7 @@ mod summary;
 pub mod sweep;
 
 pub use average_precision::AveragePrecision;
+pub use counts::{CalibrationError, CountFigures, Counts, DEFAULT_COUNT_THRESHOLD};
 pub use data_set::{DataSet, DataSetError, DataSetImage, ImageId, ScoringMismatch};
 pub use ground_truth::{AnnotatedPerson, EvaluatedImage, GroundTruth, ScoredBox};
 pub use matching::{MatchingRule, Outcome};

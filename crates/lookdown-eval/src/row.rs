@@ -10,8 +10,8 @@ use lookdown_detect::{
 use lookdown_lens::geometry::OrientedBox;
 
 use super::{
-    DataSet, EvaluatedImage, MatchingRule, NoPersons, NoStrata, Outline, PrecisionRecallCurve,
-    ScoredBox, Stratification, Stratum, Summary,
+    Counts, DataSet, EvaluatedImage, MatchingRule, NoPersons, NoStrata, Outline,
+    PrecisionRecallCurve, ScoredBox, Stratification, Stratum, Summary,
 };
 
 /// The rule that matches detections with the ground truth.
@@ -97,7 +97,6 @@ pub struct EvaluatedRow {
 impl DetectedRow {
     /// Scores the row against the ground truth of its data set.
     ///
-    ///
     /// # Errors
     /// [`NoPersons`] if no person counts.
     pub fn evaluate(&self, data_set: &DataSet) -> Result<EvaluatedRow, NoPersons> {
@@ -110,8 +109,13 @@ impl DetectedRow {
         })
     }
 
+    /// Counts the persons of each image. The data set may have no persons.
+    #[must_use]
+    pub fn counts(&self, data_set: &DataSet) -> Counts {
+        Counts::of_images(&self.evaluated_images(data_set), RULE)
+    }
+
     /// Scores the row against the persons of each stratum of its data set.
-    ///
     ///
     /// # Errors
     /// [`NoStrata`] if the data set lacks the property that defines the strata.

@@ -23,7 +23,6 @@ pub mod site_placement;
 pub mod view_plan;
 pub mod virtual_view;
 pub mod zone;
-pub mod zoom;
 
 pub use counting_line::{CountingLine, LineEnds};
 pub use foot_filter::{FootFilter, FootPlace};

@@ -33,7 +33,6 @@ impl From<&DetectionReport> for Report {
                 height: report.image_height,
             },
             model: ReportModel::from(&report.model),
-            second_opinion: report.second_opinion.as_ref().map(ReportModel::from),
             crop_model: report.crop_model.as_ref().map(ReportModel::from),
             profile: report.profile.name(),
             refinement: ReportRefinement {

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use anyhow::Context;
-use lookdown_eval::{DataSet, DetectedRow, EvaluatedRow, precision_recall_plot};
+use lookdown_eval::{DataSet, DetectedRow, EvaluatedRow, NoPersons, precision_recall_plot};
 
 use super::{
     Arguments,
@@ -33,8 +33,9 @@ impl<'a> Output<'a> {
         detected: &DetectedRow,
         data_set: &DataSet,
     ) -> anyhow::Result<()> {
-        let evaluated = detected.evaluate(data_set)?;
-        let mut row = Row::new(detected, &evaluated);
+        // A data set of empty rooms has counts, but neither precision nor recall.
+        let evaluated = detected.evaluate(data_set).ok();
+        let mut row = Row::new(detected, evaluated.as_ref(), &detected.counts(data_set));
         for by in &self.arguments.truth.by {
             row.add_strata(*by, &detected.strata(data_set, *by).context("--by")?);
         }
@@ -51,7 +52,8 @@ impl<'a> Output<'a> {
         };
         written.context(UNWRITABLE)?;
         if self.arguments.plot.is_some() {
-            self.plotted.push((detected.name.to_string(), evaluated));
+            self.plotted
+                .push((detected.name.to_string(), evaluated.ok_or(NoPersons)?));
         }
         Ok(())
     }

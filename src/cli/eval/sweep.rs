@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
         Ok((row, evaluated))
     });
     let cells = cells.collect::<anyhow::Result<Vec<_>>>()?;
-    print(&cells, arguments.json)?;
+    print(&cells, &data_set, arguments.json)?;
 
     let name = match cells.first() {
         Some((row, _)) => format!("{}, {}", base.profile.name(), row.name.model),
@@ -59,13 +59,13 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     write(folder, "matrix.jpg", &encode_jpeg(&matrix, JPEG_QUALITY)?)
 }
 
-fn print(cells: &Cells, json: bool) -> anyhow::Result<()> {
+fn print(cells: &Cells, data_set: &DataSet, json: bool) -> anyhow::Result<()> {
     let mut lines = Vec::with_capacity(cells.len() + 1);
     if !json {
         lines.push(SWEEP_HEAD.to_owned());
     }
     for (detected, evaluated) in cells {
-        let row = Row::new(detected, evaluated);
+        let row = Row::new(detected, Some(evaluated), &detected.counts(data_set));
         lines.push(if json {
             serde_json::to_string(&row)?
         } else {

@@ -18,6 +18,10 @@ pub struct ServerMetadata {
     #[serde(default, deserialize_with = "null_as_default")]
     #[schema(required)]
     pub extensions: Vec<String>,
+    /// The default models that use 8-bit integers: `none`, `small_profiles` (`fast`, upright crops,
+    /// `paper`, `direct`) or `all_but_quality`. Omitted with a single model for all profiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub int8_models: Option<String>,
 }
 
 /// The liveness of the server.

@@ -33,8 +33,7 @@ pub enum Profile {
     /// frame; on a CPU the crops by a model in INT8.
     #[default]
     Balanced,
-    /// 24 views, up to 40 zoom views, half of them by a second model, and up to 16 upright crops of
-    /// the frame.
+    /// 24 views and up to 16 upright crops of the frame.
     Quality,
     /// No views: the detector on the fisheye frame itself (the paper's "Omni" row).
     Direct,
@@ -60,14 +59,6 @@ impl Profile {
         }
     }
 
-    /// Returns the zoom pass that follows the views of the plan, if any.
-    pub(crate) fn zoom_pass(self) -> Option<ZoomPass> {
-        (self == Self::Quality).then_some(ZoomPass {
-            most_views: 40,
-            fill: 1.0 / 3.0,
-        })
-    }
-
     /// Returns the pass through upright crops that follows the views of the plan, if any.
     pub(crate) fn crop_pass(self) -> Option<CropPass> {
         let (max_crops, vote) = match self {
@@ -85,8 +76,7 @@ impl Profile {
 
     /// Returns the maximum number of network inputs of the passes after the views of the plan.
     pub(crate) fn max_second_pass_views(self) -> usize {
-        let zoom_views = self.zoom_pass().map_or(0, |zoom| zoom.most_views);
-        zoom_views + self.crop_pass().map_or(0, |crops| crops.max_crops)
+        self.crop_pass().map_or(0, |crops| crops.max_crops)
     }
 
     /// Returns the method that projects boxes back to the frame.
@@ -98,12 +88,12 @@ impl Profile {
         }
     }
 
-    /// Returns the score at which a person merged by fusion is as likely as not. The more views
-    /// see a person, the more of them must agree.
+    /// Returns the score at which a person merged by fusion is as likely as not. `docs/results.md`
+    /// has the error of the number of persons and of the probabilities with these values.
     pub(crate) fn even_odds_score(self) -> f64 {
         match self {
-            Self::Quality => 0.31,
-            Self::Fast | Self::Balanced => 0.28,
+            Self::Balanced => 0.25,
+            Self::Fast | Self::Quality => 0.26,
             Self::Paper | Self::Direct => 0.25,
         }
     }
@@ -128,13 +118,4 @@ pub(crate) struct CropPass {
     /// The factor for scores from crops, in which persons lean by up to 45° and more. Where many
     /// upright views see a person, they give better scores, and crops give better extents.
     pub(crate) vote: f64,
-}
-
-/// A second pass through zoom views of possible persons.
-pub(crate) struct ZoomPass {
-    /// The maximum number of zoom views.
-    pub(crate) most_views: usize,
-    /// The share of a view's shorter side that a person fills. A larger share confirms false
-    /// detections: at a high zoom, half a person or a poster resembles a whole person.
-    pub(crate) fill: f64,
 }

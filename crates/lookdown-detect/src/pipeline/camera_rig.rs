@@ -130,17 +130,6 @@ impl CameraRig {
         Self::of_views(geometry, hidden, views, frame_width, frame_height)
     }
 
-    /// Returns a rig of the same camera with other views.
-    pub(super) fn with_views(
-        &self,
-        views: Vec<VirtualView>,
-        frame_width: u32,
-        frame_height: u32,
-    ) -> Self {
-        let (geometry, hidden) = (self.geometry.clone(), self.hidden.clone());
-        Self::of_views(geometry, hidden, views, frame_width, frame_height)
-    }
-
     /// Returns a rig of the same camera with crops of the frame instead of views.
     pub(super) fn with_crops(
         &self,

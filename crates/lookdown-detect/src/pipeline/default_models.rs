@@ -5,17 +5,18 @@ use std::iter;
 use strum::VariantArray;
 
 use crate::{
-    inference::Device,
+    inference::Int8Use,
     parameters::{DetectParameters, Profile},
 };
 
 /// Returns the models of a profile, in order of preference. This is the only table of them. Models
 /// that were not fetched are skipped; [`FALLBACK`] is the last choice.
-fn preferred(profile: Profile, device: Device) -> &'static [&'static str] {
-    match (profile, device) {
-        (Profile::Paper | Profile::Direct, Device::Cpu) => &[SSDLITE_INT8],
-        (Profile::Paper | Profile::Direct, _) => &[FALLBACK],
-        (Profile::Fast, Device::Cpu) => &[NANODET_INT8, NANODET],
+fn preferred(profile: Profile, int8: Int8Use) -> &'static [&'static str] {
+    match (profile, int8) {
+        (Profile::Paper | Profile::Direct, Int8Use::None) => &[FALLBACK],
+        (Profile::Paper | Profile::Direct, _) => &[SSDLITE_INT8],
+        (Profile::Fast, Int8Use::SmallProfiles)
+        | (Profile::Fast | Profile::Balanced, Int8Use::AllButQuality) => &[NANODET_INT8, NANODET],
         (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[NANODET],
     }
 }
@@ -23,30 +24,22 @@ fn preferred(profile: Profile, device: Device) -> &'static [&'static str] {
 /// Returns the models of a profile's upright crops, in order of preference. They are trained on
 /// rendered fisheye frames; the profile's own model is the last choice. Packages include the model
 /// in INT8 only.
-fn preferred_for_crops(profile: Profile, device: Device) -> &'static [&'static str] {
-    match (profile, device) {
+fn preferred_for_crops(profile: Profile, int8: Int8Use) -> &'static [&'static str] {
+    match (profile, int8) {
         (Profile::Paper | Profile::Direct, _) => &[],
-        (_, Device::Cpu) => &[FISHEYE_INT8],
-        (Profile::Fast | Profile::Balanced | Profile::Quality, _) => &[FISHEYE],
+        (_, Int8Use::None) => &[FISHEYE],
+        (_, Int8Use::SmallProfiles | Int8Use::AllButQuality) => &[FISHEYE_INT8],
     }
-}
-
-/// Returns the profile whose model processes half of the zoom views of `profile`.
-fn second_model_profile(profile: Profile) -> Option<Profile> {
-    (profile == Profile::Quality).then_some(Profile::Paper)
 }
 
 const NANODET: &str = "nanodet_g_416";
 
-/// ONNX Runtime has integer kernels for this model on CPUs only.
 const NANODET_INT8: &str = "nanodet_g_416_int8";
 
 const FISHEYE: &str = "nanodet_g_fisheye_416";
 
-/// ONNX Runtime has integer kernels for this model on CPUs only.
 const FISHEYE_INT8: &str = "nanodet_g_fisheye_416_int8";
 
-/// ONNX Runtime has integer kernels for this model on CPUs only.
 const SSDLITE_INT8: &str = "ssdlite_mobilenet_v2_int8";
 
 /// The fallback for models that were not fetched: every installation includes it.
@@ -59,29 +52,38 @@ pub enum DefaultModels {
     One(String),
     /// One model for each profile, or the fallback that every installation includes.
     PerProfile {
-        /// The device that runs the models.
-        device: Device,
+        /// The models in INT8.
+        int8: Int8Use,
         /// The preferred models that were not fetched.
         missing: Vec<&'static str>,
     },
 }
 
 impl DefaultModels {
-    /// Selects the model of each profile for this device from those that `is_fetched` accepts.
+    /// Selects the model of each profile from those that `is_fetched` accepts.
     #[must_use]
-    pub fn per_profile(device: Device, is_fetched: impl Fn(&str) -> bool) -> Self {
+    pub fn per_profile(int8: Int8Use, is_fetched: impl Fn(&str) -> bool) -> Self {
         let mut missing: Vec<_> = Profile::VARIANTS
             .iter()
             .flat_map(|&profile| {
-                let crops = preferred_for_crops(profile, device);
-                preferred(profile, device).iter().chain(crops)
+                let crops = preferred_for_crops(profile, int8);
+                preferred(profile, int8).iter().chain(crops)
             })
             .copied()
             .filter(|name| *name != FALLBACK && !is_fetched(name))
             .collect();
         missing.sort_unstable();
         missing.dedup();
-        Self::PerProfile { device, missing }
+        Self::PerProfile { int8, missing }
+    }
+
+    /// Returns the models in INT8; `None` for one model for all profiles.
+    #[must_use]
+    pub fn int8(&self) -> Option<Int8Use> {
+        match self {
+            Self::One(_) => None,
+            Self::PerProfile { int8, .. } => Some(*int8),
+        }
     }
 
     /// Returns the model of a profile.
@@ -89,29 +91,21 @@ impl DefaultModels {
     pub fn of(&self, profile: Profile) -> &str {
         match self {
             Self::One(name) => name,
-            Self::PerProfile { device, missing } => {
-                let mut models = preferred(profile, *device).iter();
+            Self::PerProfile { int8, missing } => {
+                let mut models = preferred(profile, *int8).iter();
                 let fetched = models.find(|name| !missing.contains(name));
                 fetched.copied().unwrap_or(FALLBACK)
             }
         }
     }
 
-    /// Returns the second model of a profile's zoom views, if the profile has one and it differs
-    /// from the profile's own model.
-    #[must_use]
-    pub fn second_opinion(&self, profile: Profile) -> Option<&str> {
-        let name = self.of(second_model_profile(profile)?);
-        (name != self.of(profile)).then_some(name)
-    }
-
     /// Returns the model of a profile's upright crops, if it differs from the profile's own model.
     #[must_use]
     pub fn crop_model(&self, profile: Profile) -> Option<&str> {
-        let Self::PerProfile { device, missing } = self else {
+        let Self::PerProfile { int8, missing } = self else {
             return None;
         };
-        let mut models = preferred_for_crops(profile, *device).iter();
+        let mut models = preferred_for_crops(profile, *int8).iter();
         models.find(|name| !missing.contains(name)).copied()
     }
 
@@ -138,11 +132,9 @@ impl DefaultModels {
         names
     }
 
-    /// Returns the profile's own model, that of half of its zoom views, and that of its crops.
+    /// Returns the profile's own model and that of its crops.
     fn of_profile(&self, profile: Profile) -> impl Iterator<Item = &str> {
-        iter::once(self.of(profile))
-            .chain(self.second_opinion(profile))
-            .chain(self.crop_model(profile))
+        iter::once(self.of(profile)).chain(self.crop_model(profile))
     }
 }
 
@@ -152,44 +144,40 @@ mod tests {
 
     #[test]
     fn a_model_that_was_not_fetched_has_a_fallback() {
-        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
+        let all = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
         assert_eq!(
             all.names(),
             [NANODET, FISHEYE_INT8, SSDLITE_INT8, NANODET_INT8]
         );
-        let without = DefaultModels::per_profile(Device::Cpu, |name| name != NANODET_INT8);
+        let without =
+            DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != NANODET_INT8);
         assert_eq!(without.of(Profile::Fast), NANODET);
-        let few = DefaultModels::per_profile(Device::Cpu, |_| false);
+        let few = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| false);
         assert_eq!(few.names(), [FALLBACK]);
     }
 
     #[test]
-    fn int8_models_are_selected_on_cpus_only() {
-        let gpu = DefaultModels::per_profile(Device::Cuda(0), |_| true);
+    fn int8_models_are_selected_by_profile_and_cpu() {
+        let gpu = DefaultModels::per_profile(Int8Use::None, |_| true);
         assert_eq!(gpu.of(Profile::Paper), FALLBACK);
-        let cpu = DefaultModels::per_profile(Device::Cpu, |_| true);
+        let cpu = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
         assert_eq!(cpu.of(Profile::Paper), SSDLITE_INT8);
         assert_eq!(
             (cpu.of(Profile::Fast), gpu.of(Profile::Fast)),
             (NANODET_INT8, NANODET)
         );
-        assert_eq!(cpu.of(Profile::Quality), gpu.of(Profile::Quality));
-    }
-
-    #[test]
-    fn second_model_differs_from_the_profile_s_own_model() {
-        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
-        assert_eq!(all.second_opinion(Profile::Quality), Some(SSDLITE_INT8));
-        assert_eq!(all.second_opinion(Profile::Balanced), None);
-        let few = DefaultModels::per_profile(Device::Cpu, |_| false);
-        assert_eq!(few.second_opinion(Profile::Quality), None);
-        let one = DefaultModels::One("mine".to_owned());
-        assert_eq!(one.second_opinion(Profile::Quality), None);
+        assert_eq!(cpu.of(Profile::Balanced), gpu.of(Profile::Balanced));
+        let vnni = DefaultModels::per_profile(Int8Use::AllButQuality, |_| true);
+        assert_eq!(vnni.of(Profile::Balanced), NANODET_INT8);
+        assert_eq!(vnni.crop_model(Profile::Balanced), Some(FISHEYE_INT8));
+        let not_fetched =
+            DefaultModels::per_profile(Int8Use::AllButQuality, |name| name != NANODET_INT8);
+        assert_eq!(not_fetched.of(Profile::Balanced), NANODET);
     }
 
     #[test]
     fn crops_have_a_model_of_their_own_if_it_was_fetched() {
-        let all = DefaultModels::per_profile(Device::Cpu, |_| true);
+        let all = DefaultModels::per_profile(Int8Use::SmallProfiles, |_| true);
         let crop_models = [
             Profile::Fast,
             Profile::Balanced,
@@ -206,9 +194,10 @@ mod tests {
                 None
             ]
         );
-        let without = DefaultModels::per_profile(Device::Cpu, |name| name != FISHEYE_INT8);
+        let without =
+            DefaultModels::per_profile(Int8Use::SmallProfiles, |name| name != FISHEYE_INT8);
         assert_eq!(without.crop_model(Profile::Fast), None);
-        let gpu = DefaultModels::per_profile(Device::Cuda(0), |_| true);
+        let gpu = DefaultModels::per_profile(Int8Use::None, |_| true);
         assert_eq!(gpu.crop_model(Profile::Fast), Some(FISHEYE));
         let one = DefaultModels::One("mine".to_owned());
         assert_eq!(one.crop_model(Profile::Balanced), None);

@@ -185,7 +185,6 @@ impl Engine {
             calibration,
             image_width: observation.frame.width(),
             image_height: observation.frame.height(),
-            second_opinion: observation.second_opinion().map(ModelUsed::from),
             crop_model: observation.crop_model().map(ModelUsed::from),
             model: ModelUsed::from(observation.model()),
             profile: parameters.profile,
@@ -203,13 +202,11 @@ impl Engine {
             },
             warnings: observation.warnings,
         };
-        let mut rigs: Vec<_> = observation
+        let rigs: Vec<_> = observation
             .passes
             .into_iter()
             .map(|pass| pass.rig)
             .collect();
-        // Two passes with different models may share a rig.
-        rigs.dedup_by(|one, other| Arc::ptr_eq(one, other));
         let has_no_masks = observation.camera.rig.has_no_masks();
         Ok(Detected {
             withdrawn: job.ticket.withdrawn.clone(),
@@ -263,7 +260,7 @@ impl Engine {
         });
         let mut observation = Observation {
             profile: job.parameters.profile,
-            passes: Vec::with_capacity(3),
+            passes: Vec::with_capacity(2),
             unchanged_views: 0,
             batch_count: 0,
             non_finite: 0,
@@ -290,9 +287,10 @@ impl Engine {
             job.ticket.clone(),
             self.cached_views(job, &observation),
         );
-        observation.wait_for(&[first])?;
-        let second = self.second_pass(job, &observation);
-        observation.wait_for(&second)?;
+        observation.wait_for(&first)?;
+        if let Some(second) = self.second_pass(job, &observation) {
+            observation.wait_for(&second)?;
+        }
         if let Some(key) = key {
             self.inference_cache.store(key, &observation.passes);
         }

@@ -1,7 +1,7 @@
 //! Merges boxes of views into persons of the frame.
 
 use lookdown_lens::geometry::{
-    BackProjection, Footprint, OrientedBox, PersonHeight, Ray,
+    BackProjection, Footprint, OrientedBox, PersonHeight,
     crop_placement::CropTarget,
     floor::{bearing, floor_position},
     oriented_box::vertical_in_frame,
@@ -113,29 +113,18 @@ const TARGET_REFINEMENT: RefinementParameters = RefinementParameters {
     max_detections: 500,
 };
 
-/// Possible persons of the first pass, highest score first.
-pub(super) struct SecondPassTargets {
-    /// The outline (unit rays) of each person's best box.
-    pub(super) outlines: Vec<Vec<Ray>>,
-    /// The fused boxes within the frame.
-    pub(super) crop_targets: Vec<CropTarget>,
-}
-
-/// Merges the boxes of the first pass into targets of the second.
+/// Merges the boxes of the first pass into possible persons within the frame, highest score first.
 pub(super) fn second_pass_targets(
     passes: &[Pass],
     rig: &CameraRig,
     profile: Profile,
-) -> SecondPassTargets {
+) -> Vec<CropTarget> {
     let (mapped, mut merged) = merged(passes, rig, profile, &TARGET_REFINEMENT);
     if !rig.geometry().areas.foot_filter.areas.is_empty() {
         merged.retain(|merged| may_count(merged, &mapped, rig));
     }
-    let best = merged.iter().filter_map(|merged| merged.members.first());
-    let unit = |rays: &[Ray]| rays.iter().map(Ray::normalize).collect();
-    let outlines = best.map(|&member| unit(mapped[member].footprint.rays()));
     let geometry = rig.geometry();
-    let crop_targets = merged.iter().filter_map(|merged| {
+    let targets = merged.iter().filter_map(|merged| {
         let bbox = merged.bbox.clipped_to(rig.frame())?;
         let center = nalgebra::Point2::from(bbox.center());
         Some(CropTarget {
@@ -144,10 +133,7 @@ pub(super) fn second_pass_targets(
             up: vertical_in_frame(center, &geometry.lens, &geometry.mount),
         })
     });
-    SecondPassTargets {
-        outlines: outlines.collect(),
-        crop_targets: crop_targets.collect(),
-    }
+    targets.collect()
 }
 
 /// Returns true if a merged box of the first pass may become a person in the margin of an area.

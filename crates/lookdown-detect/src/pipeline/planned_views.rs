@@ -40,8 +40,6 @@ pub struct PlannedViews {
     pub mean_views: f64,
     /// The number of network inputs of the first pass over every frame.
     pub pictures: usize,
-    /// The maximum number of additional zoom views of possible persons.
-    pub zoomed_pictures_at_most: usize,
     /// The maximum number of additional upright crops around possible persons.
     pub crops_at_most: usize,
     /// The number of runs of the network in the first pass.
@@ -116,7 +114,6 @@ impl Engine {
             seen_share: coverage.map_or(1.0, |coverage| coverage.seen_share),
             mean_views: coverage.map_or(1.0, |coverage| coverage.mean_views),
             pictures,
-            zoomed_pictures_at_most: profile.zoom_pass().map_or(0, |zoom| zoom.most_views),
             crops_at_most: profile.crop_pass().map_or(0, |crops| crops.max_crops),
             batches: pictures.div_ceil(options.batches.max_views.get()),
             pixels: pictures as u64 * u64::from(input.width) * u64::from(input.height),

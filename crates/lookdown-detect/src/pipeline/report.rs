@@ -37,8 +37,6 @@ pub struct DetectionReport {
     pub image_height: u32,
     /// The detector used.
     pub model: ModelUsed,
-    /// The second detector for some of the zoom views, when the profile uses one.
-    pub second_opinion: Option<ModelUsed>,
     /// The detector of the upright crops, when it is another one.
     pub crop_model: Option<ModelUsed>,
     /// The profile used.

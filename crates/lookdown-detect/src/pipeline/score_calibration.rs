@@ -8,7 +8,7 @@
 use crate::{detection::Refinement, parameters::Profile};
 
 /// The power of the odds. It holds for all profiles, on photographs and on rendered frames.
-const SLOPE: f64 = 2.5;
+const SLOPE: f64 = 3.0;
 
 /// Converts between merged scores and reported scores, both 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -66,8 +66,6 @@ pub(in crate::api) struct ViewPlanInfo {
 pub(in crate::api) struct PlanCost {
     /// Number of images that the model receives for every frame.
     pictures: usize,
-    /// Largest number of additional zoomed images of possible persons.
-    zoomed_pictures_at_most: usize,
     /// Largest number of additional upright crops of the frame around possible persons.
     crops_at_most: usize,
     /// Number of batches for the images of every frame.
@@ -255,7 +253,6 @@ impl From<&PlannedViews> for ViewPlanInfo {
             overlap: plan.mean_views,
             cost: PlanCost {
                 pictures: plan.pictures,
-                zoomed_pictures_at_most: plan.zoomed_pictures_at_most,
                 crops_at_most: plan.crops_at_most,
                 batches: plan.batches,
                 pixels: plan.pixels,

@@ -10,9 +10,7 @@ use crate::{
     inference::Model,
     parameters::Profile,
     pipeline::{
-        PipelineError, Stage, StageTimings, Timeline, ViewCounts,
-        network::{PassTask, Work},
-        pass::Pass,
+        PipelineError, Stage, StageTimings, Timeline, ViewCounts, network::PassTask, pass::Pass,
     },
 };
 
@@ -63,38 +61,23 @@ impl Observation {
         &self.model
     }
 
-    /// Returns the second model of the zoom views, if they used one.
-    pub(super) fn second_opinion(&self) -> Option<&Model> {
-        self.other_model(|pass| !pass.is_of_crops())
-    }
-
     /// Returns the model of the upright crops, if it is another one than that of the first pass.
     pub(super) fn crop_model(&self) -> Option<&Model> {
-        self.other_model(Pass::is_of_crops)
-    }
-
-    /// Returns the model of a selected pass that is not the model of the first pass.
-    fn other_model(&self, is_selected: impl Fn(&Pass) -> bool) -> Option<&Model> {
-        let selected = self.passes.iter().filter(|pass| is_selected(pass));
-        let mut models = selected.map(|pass| &*pass.model);
+        let crops = self.passes.iter().filter(|pass| pass.is_of_crops());
+        let mut models = crops.map(|pass| &*pass.model);
         models.find(|model| model.name() != self.model.name())
     }
 
-    /// Waits for passes that were queued together, and adds their detections. Rendering and
-    /// inference overlap, so the total span is divided between these stages in proportion to their
-    /// work.
-    pub(super) fn wait_for(&mut self, tasks: &[Arc<PassTask>]) -> Result<(), PipelineError> {
-        let mut work: Option<Work> = None;
-        for task in tasks {
-            let output = task.wait()?;
-            work = Some(work.map_or(output.work, |others| others.and(output.work)));
-            self.passes.push(Pass {
-                rig: Arc::clone(&task.rig),
-                model: Arc::clone(&task.model),
-                per_view: output.per_view,
-            });
-        }
-        let Some(work) = work else { return Ok(()) };
+    /// Waits for a queued pass, and adds its detections. Rendering and inference overlap, so the
+    /// span is divided between these stages in proportion to their work.
+    pub(super) fn wait_for(&mut self, task: &PassTask) -> Result<(), PipelineError> {
+        let output = task.wait()?;
+        let work = output.work;
+        self.passes.push(Pass {
+            rig: Arc::clone(&task.rig),
+            model: Arc::clone(&task.model),
+            per_view: output.per_view,
+        });
         self.batch_count += work.runs;
         self.unchanged_views += work.still_views;
         self.non_finite += work.non_finite;
