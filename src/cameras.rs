@@ -79,7 +79,8 @@ pub enum CameraError {
     Source(#[from] SourceError),
 }
 
-type Stored = BTreeMap<String, StoredCamera>;
+/// Stored cameras by name.
+pub type Stored = BTreeMap<String, StoredCamera>;
 
 /// The cameras of this process.
 pub struct Cameras {
@@ -103,10 +104,14 @@ impl Cameras {
         }
     }
 
-    /// Returns the states of the cameras that are watched.
+    /// Returns the states of the cameras that are watched: those of the settings and these stored
+    /// ones. A camera that was deleted may still end.
     #[must_use]
-    pub fn states(&self) -> Vec<CameraState> {
-        self.metrics.states()
+    pub fn states(&self, stored: &Stored) -> Vec<CameraState> {
+        let configured = self.configured.read();
+        let mut states = self.metrics.states();
+        states.retain(|state| stored.contains_key(&state.name) || configured.contains(&state.name));
+        states
     }
 
     /// Adds the stored cameras that are not paused to those of the settings, which have precedence.
