@@ -214,7 +214,7 @@ impl Follower {
         }
         let batch = batch.unwrap_or_else(|| {
             let engine = self.engine.lock();
-            Batch::empty(engine.last_event(), engine.totals().clone())
+            Batch::empty(engine.last_event(), engine.stored_totals().clone())
         });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);

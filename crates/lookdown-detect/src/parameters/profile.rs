@@ -92,9 +92,8 @@ impl Profile {
     /// has the error of the number of persons and of the probabilities with these values.
     pub(crate) fn even_odds_score(self) -> f64 {
         match self {
-            Self::Balanced => 0.25,
             Self::Fast | Self::Quality => 0.26,
-            Self::Paper | Self::Direct => 0.25,
+            Self::Balanced | Self::Paper | Self::Direct => 0.25,
         }
     }
 

@@ -9,6 +9,7 @@ use crate::{Location, WatchEntry};
 /// A file of cameras.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "keys of the file")]
 struct Cameras {
     #[serde(default)]
     upstream: ServerEntry,
