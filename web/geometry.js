@@ -25,10 +25,25 @@ export const points = (places) => places.map(([x, y]) => `${x.toFixed(1)},${y.to
 /** The centre of a person's box. */
 export const centre = ({ oriented_box: box }) => [box.cx, box.cy];
 
-/** The foot of a person: the middle of the lower end of the box, which decides the zones of the person. */
-export function foot({ oriented_box: { cx, cy, height, angle_deg: degrees } }) {
+/** Cameras that look down to within 30° of it see feet nearer to the point below them than heads. */
+const LOOKS_DOWN = -Math.cos(Math.PI / 6);
+
+/** The point below the camera of a calibration file, in pixels of the report; null if it does not look down. */
+export function pointBelow({ image, lens, mount }, report) {
+  const [x, y, z] = mount?.world_up ?? [0, 0, -1];
+  if (!lens || z > LOOKS_DOWN) return null;
+  const tilt = Math.hypot(x, y);
+  const shift = tilt > 0 ? ((lens.focal ?? lens.fx ?? 0) * Math.atan2(tilt, -z)) / tilt : 0;
+  const scale = report.image.width / image.width;
+  return [(lens.cx + 0.5 - x * shift) * scale, (lens.cy + 0.5 - y * shift) * scale];
+}
+
+/** The foot of a person: the end of the box that is nearer to the point `below` the camera; the lower end if that is null. */
+export function foot({ oriented_box: { cx, cy, height, angle_deg: degrees } }, below) {
   const turn = (degrees * Math.PI) / 180;
-  return [cx - (Math.sin(turn) * height) / 2, cy + (Math.cos(turn) * height) / 2];
+  const half = [(-Math.sin(turn) * height) / 2, (Math.cos(turn) * height) / 2];
+  const isAbove = below && half[0] * (below[0] - cx) + half[1] * (below[1] - cy) < 0;
+  return isAbove ? [cx - half[0], cy - half[1]] : [cx + half[0], cy + half[1]];
 }
 
 /** The smallest of 1, 2 and 5 times a power of ten of which `most` steps reach `length`. */

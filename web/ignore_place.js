@@ -1,7 +1,7 @@
 /** One click on a false box in Live ignores its place: it is written into the calibration of the camera, with undo. */
 
 import { element, find, shape } from "./dom.js";
-import { corners, points } from "./geometry.js";
+import { corners, foot, pointBelow, points } from "./geometry.js";
 import { ask, askJson } from "./server.js";
 
 /** The radius of an ignored place: metres on the floor, and the least share of the frame's width. */
@@ -130,18 +130,9 @@ function placeOf(person, file, report) {
     return { floor_m: around([x, y], RADIUS_M, 2) };
   }
   const [scaleX, scaleY] = [file.image.width / report.image.width, file.image.height / report.image.height];
-  const [x, y] = footToward(person, [file.lens.cx / scaleX, file.lens.cy / scaleY]);
+  const [x, y] = foot(person, pointBelow(file, report));
   const radius = Math.max(person.oriented_box.width / 2, LEAST_SHARE * report.image.width);
   return { frame_px: around([x * scaleX, y * scaleY], radius * scaleX, 1) };
-}
-
-/** The end of the box that is nearer to the point below the camera: there the foot is. */
-function footToward({ oriented_box: { cx, cy, height, angle_deg: degrees } }, [x, y]) {
-  const turn = (degrees * Math.PI) / 180;
-  const half = [(-Math.sin(turn) * height) / 2, (Math.cos(turn) * height) / 2];
-  const ends = [1, -1].map((sign) => [cx + sign * half[0], cy + sign * half[1]]);
-  ends.sort((one, other) => Math.hypot(one[0] - x, one[1] - y) - Math.hypot(other[0] - x, other[1] - y));
-  return ends[0];
 }
 
 function around([x, y], radius, decimals) {

@@ -2,7 +2,7 @@
 
 import { shape } from "./dom.js";
 import { VIEW_BOX, floorDot, floorGrid, floorPlaces, reachOf, scaleOf } from "./floor_map.js";
-import { corners, foot, points } from "./geometry.js";
+import { corners, foot, pointBelow, points } from "./geometry.js";
 
 /** Steps of the arrow keys: the share of the frame's longer side, and metres on the floor. */
 const FRAME_STEPS = 500;
@@ -12,8 +12,9 @@ const FARTHEST_M = 1000;
 
 const numbers = (text) => text.split(" ").map(Number);
 
-/** The frame, in pixels of frames of the size `image`. */
-export function frameSurface(image) {
+/** The frame, in pixels of frames of the size of a calibration file. */
+export function frameSurface(file) {
+  const { image } = file;
   const { width, height } = image;
   const scaled = (report) => ([x, y]) => [(x * width) / report.image.width, (y * height) / report.image.height];
   return {
@@ -28,7 +29,7 @@ export function frameSurface(image) {
     backdrop: (report, unit) =>
       (report?.persons ?? []).flatMap((person) => {
         const toDrawing = scaled(report);
-        const [x, y] = toDrawing(foot(person));
+        const [x, y] = toDrawing(foot(person, pointBelow(file, report)));
         const outline = points(corners(person.oriented_box).map(toDrawing));
         return [
           shape("polygon", { points: outline, class: "person-box", "stroke-width": 1.4 * unit }),

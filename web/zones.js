@@ -80,7 +80,7 @@ const hasFloor = () => Boolean(shownDocument.file.mount?.height_m);
 
 /** The text of the count of a zone; null for other areas, and without a report. */
 function countOf(area) {
-  const count = area.kind === "zone" ? personsIn(area, ownReport(), shownDocument.file.image) : null;
+  const count = area.kind === "zone" ? personsIn(area, ownReport(), shownDocument.file) : null;
   return count === null ? null : plural(count, "person");
 }
 
@@ -94,7 +94,7 @@ function draw() {
   }
   if (selectedArea && !isDragging()) space = selectedArea.space;
   // The map of the floor keeps its scale while something is dragged.
-  if (!isDragging() || !surface) surface = space === "floor_m" ? floorSurface(editor.areas, ownReport()) : frameSurface(file.image);
+  if (!isDragging() || !surface) surface = space === "floor_m" ? floorSurface(editor.areas, ownReport()) : frameSurface(file);
   showStage();
   const unit = 1 / (drawing().getScreenCTM()?.a || 1);
   drawAreas(drawing(), { editor, surface, report: ownReport(), unit, countOf, invalid: invalid?.key });

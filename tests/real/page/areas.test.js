@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { personsIn } from "../../../web/area_counts.js";
+import { foot, pointBelow } from "../../../web/geometry.js";
 import { AreaEditor } from "../../../web/area_editor.js";
 import { assumedFile, withIgnored } from "../../../web/ignore_place.js";
 import { areaOf, areasOf, freeName, movedBy, placed, problemOf, titleOf, withAreas } from "../../../web/areas.js";
@@ -108,10 +109,10 @@ test("a zone counts feet in the frame, and places on the floor", () => {
   const person = (cy, floor) => ({ oriented_box: { cx: 20, cy, width: 4, height: 20, angle_deg: 0 }, ...floor });
   const report = { image: { width: 50, height: 50 }, persons: [person(10, { floor: { x_m: 1.5, y_m: 1.2 } }), person(50)] };
   const zone = (space, corners) => areaOf("zone", space, "a", corners);
-  assert.equal(personsIn(zone("frame_px", [[35, 35], [45, 35], [45, 45], [35, 45]]), report, FILE.image), 1);
-  assert.equal(personsIn(zone("frame_px", [[35, 15], [45, 15], [45, 25], [35, 25]]), report, FILE.image), 0);
-  assert.equal(personsIn(zone("floor_m", FILE.zones[1].floor_m), report, FILE.image), 1);
-  assert.equal(personsIn(zone("floor_m", FILE.zones[1].floor_m), null, FILE.image), null);
+  assert.equal(personsIn(zone("frame_px", [[35, 35], [45, 35], [45, 45], [35, 45]]), report, FILE), 1);
+  assert.equal(personsIn(zone("frame_px", [[35, 15], [45, 15], [45, 25], [35, 25]]), report, FILE), 0);
+  assert.equal(personsIn(zone("floor_m", FILE.zones[1].floor_m), report, FILE), 1);
+  assert.equal(personsIn(zone("floor_m", FILE.zones[1].floor_m), null, FILE), null);
 });
 
 test("the place of a person is ignored on the floor, or around the foot in the frame", () => {
@@ -127,6 +128,21 @@ test("the place of a person is ignored on the floor, or around the foot in the f
   assert.deepEqual([first.name, second.name], ["ignore-1", "ignore-2"]);
   // The foot is toward the middle: at 120, 100 of 200 pixels, thus at 60, 50 of 100.
   assert.ok(second.frame_px.every(([x, y]) => Math.abs(Math.hypot(x - 60, y - 50) - 5) < 0.2), JSON.stringify(second));
+});
+
+test("the foot of a person is toward the point below a camera that looks down", () => {
+  const report = { image: { width: 200, height: 200 } };
+  const file = { image: { width: 100, height: 100 }, lens: { focal: 30, cx: 49.5, cy: 49.5 } };
+  const box = (cx, cy, degrees) => ({ oriented_box: { cx, cy, width: 20, height: 40, angle_deg: degrees } });
+  const below = pointBelow(file, report);
+  assert.deepEqual(below, [100, 100]);
+  assert.deepEqual(foot(box(100, 40, 0), below), [100, 60]);
+  assert.deepEqual(foot(box(100, 160, 0), below), [100, 140]);
+  // A camera on a wall sees feet at the lower end.
+  const wall = pointBelow({ ...file, mount: { world_up: [0, -1, 0] } }, report);
+  assert.deepEqual([wall, foot(box(100, 160, 0), wall)], [null, [100, 180]]);
+  const [x, y] = pointBelow({ ...file, mount: { world_up: [0, -0.1, -0.995] } }, report);
+  assert.ok(x === 100 && Math.abs(y - 106) < 0.1, `${x}, ${y}`);
 });
 
 test("an assumed lens becomes a calibration", () => {
