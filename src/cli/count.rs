@@ -108,6 +108,7 @@ pub(super) fn counting(
                 None => settings.upstream,
             },
             webhooks: settings.lists.webhooks,
+            hosts: settings.access.hosts.clone(),
             ..settings.counts.entry()
         }
         .check()?;

@@ -27,6 +27,8 @@ pub struct CountEntry {
     pub api_key_file: Option<PathBuf>,
     /// True to answer every client of an address that other machines reach, without a key.
     pub open: bool,
+    /// Public names of an open address, in lower case.
+    pub hosts: Vec<String>,
     /// The file of the store.
     pub store: PathBuf,
     /// The time after which sums are removed.
@@ -48,6 +50,7 @@ impl Default for CountEntry {
             listen: Some(SocketAddr::from(([127, 0, 0, 1], 8090))),
             api_key_file: None,
             open: false,
+            hosts: Vec::new(),
             store: "counts.sqlite".into(),
             retention: Duration::from_hours(90 * 24),
             commit_every: Duration::from_secs(2),
@@ -67,6 +70,10 @@ pub struct CountOptions {
     pub listen: Option<SocketAddr>,
     /// The key that requests to the HTTP API must have.
     pub api_key: Option<SecretString>,
+    /// True if every client may read without a key.
+    pub open: bool,
+    /// Public names of an open address.
+    pub hosts: Vec<String>,
     /// The file of the store.
     pub store: PathBuf,
     /// The time after which sums are removed.
@@ -93,6 +100,7 @@ impl PartialEq for CountOptions {
                 options.store.clone(),
                 [options.retention, options.commit_every, options.longest_gap],
                 options.max_cameras,
+                (options.open, options.hosts.clone()),
             )
         };
         self.server == other.server
@@ -125,6 +133,8 @@ impl CountEntry {
             server: self.server.check()?,
             listen: self.listen,
             api_key,
+            open: self.open,
+            hosts: self.hosts,
             store: self.store,
             retention: self.retention,
             commit_every: self.commit_every,

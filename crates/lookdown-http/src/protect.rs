@@ -36,8 +36,8 @@ pub enum Access {
     Key(SecretString),
     /// Clients of the own machine: the address is a loopback address.
     OwnMachine,
-    /// Every client that reaches the address.
-    Everyone,
+    /// Every client that reaches the address, under local names and these public ones.
+    Everyone(Arc<[String]>),
 }
 
 impl Access {
@@ -47,7 +47,7 @@ impl Access {
         if listen.ip().is_loopback() {
             Self::OwnMachine
         } else {
-            Self::Everyone
+            Self::Everyone(Arc::default())
         }
     }
 }
@@ -75,7 +75,10 @@ pub async fn serve(
     let origins = AllowedOrigins {
         own_machine_only: matches!(access, Access::OwnMachine),
         allowed: Arc::default(),
-        hosts: Arc::default(),
+        hosts: match &access {
+            Access::Everyone(hosts) => Arc::clone(hosts),
+            Access::Key(_) | Access::OwnMachine => Arc::default(),
+        },
         remedies: Remedies {
             keys: keys_setting,
             hosts: "protect it with a key",
@@ -86,7 +89,7 @@ pub async fn serve(
         Access::Key(key) => routes
             .protected
             .layer(from_fn_with_state(Arc::new(key), check_key)),
-        Access::OwnMachine | Access::Everyone => routes
+        Access::OwnMachine | Access::Everyone(_) => routes
             .protected
             .layer(from_fn_with_state(origins, csrf::refuse)),
     };
