@@ -74,7 +74,7 @@ mod tests {
             ("direct", 1),
             ("fast", 1),
             ("balanced", 1),
-            ("quality", 3),
+            ("quality", 2),
             ("paper", 5),
         ] {
             let image = frame_with_disc(100, [30.0, 50.0], 8.0);
