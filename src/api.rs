@@ -138,7 +138,7 @@ pub fn router(state: ApiState) -> Router {
 }
 
 /// The router for requests of this process: without a rate limit.
-fn in_process_router(state: ApiState) -> Router {
+pub fn in_process_router(state: ApiState) -> Router {
     limited_router(state, None)
 }
 

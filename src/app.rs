@@ -283,7 +283,7 @@ impl App {
     /// Returns the connection of parts of this process to the server.
     #[must_use]
     pub fn in_process(&self) -> InProcess {
-        api::in_process(self.state.clone())
+        api::in_process(api::in_process_router(self.state.clone()))
     }
 
     /// The readiness of the app. Clones share its state.

@@ -5,19 +5,16 @@ use std::{
     task::{Context, Poll},
 };
 
-use axum::body::Body;
+use axum::{Router, body::Body};
 use bytes::Bytes;
 use http_body::{Body as HttpBody, Frame, SizeHint};
 use lookdown_common::InProcess;
 use parking_lot::Mutex;
 use tower::ServiceExt;
 
-use super::{ApiState, in_process_router};
-
-/// Returns the connection of parts of this process to the server. It has no rate limit.
+/// Returns the connection of parts of this process to the server with these routes.
 #[must_use]
-pub fn in_process(state: ApiState) -> InProcess {
-    let router = in_process_router(state);
+pub fn in_process(router: Router) -> InProcess {
     InProcess::new(move |request| {
         let answered = router.clone().oneshot(request.map(Body::new));
         async {

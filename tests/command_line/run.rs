@@ -24,7 +24,14 @@ const CHECK: Duration = Duration::from_millis(100);
 struct Running {
     process: Child,
     address: String,
-    log: thread::JoinHandle<Vec<String>>,
+    log: Option<thread::JoinHandle<Vec<String>>>,
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It still runs only if a test has failed.
+        let _ = self.process.kill();
+    }
 }
 
 impl Running {
@@ -46,9 +53,10 @@ impl Running {
         Self {
             process,
             address: address.unwrap(),
-            log: log
-                .spawn(move || lines.map_while(Result::ok).collect())
-                .unwrap(),
+            log: Some(
+                log.spawn(move || lines.map_while(Result::ok).collect())
+                    .unwrap(),
+            ),
         }
     }
 
@@ -106,7 +114,7 @@ impl Running {
                 .success()
         );
         let ended = self.process.wait().unwrap();
-        let log = self.log.join().unwrap();
+        let log = self.log.take().unwrap().join().unwrap();
         assert!(ended.success(), "{log:?}");
         log
     }

@@ -12,8 +12,9 @@ use tokio::{
 };
 
 use crate::{
+    batch::Batch,
     calibrations::{CalibrationProblem, Calibrations},
-    engine::{Accepted, Batch, Engine},
+    engine::{Accepted, Engine},
     event_parser::Event,
     event_stream::{EventStream, StreamError},
     message::Message,

@@ -2,7 +2,7 @@ use lookdown_tracking::heat_map::Cell;
 
 use super::*;
 use crate::{
-    engine::Batch,
+    batch::Batch,
     message::Message,
     sums::{LineDirection, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
 };

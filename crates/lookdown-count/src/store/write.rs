@@ -6,7 +6,7 @@ use rusqlite::{Transaction, params};
 
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
-    engine::Batch,
+    batch::Batch,
     message::{HeldCondition, Message},
     sums::{DAY_MS, MINUTE_MS, Owner, Sums},
 };
