@@ -57,7 +57,9 @@ def main():
     for name in [*LIMITS, "seconds"]:
         values = [row[name] for row in rows]
         if values:
-            print(f"{name}: median {np.median(values):.2f}, 95 % {np.quantile(values, 0.95):.2f}, max {max(values):.2f}")
+            print(
+                f"{name}: median {np.median(values):.2f}, 95 % {np.quantile(values, 0.95):.2f}, max {max(values):.2f}"
+            )
     print(f"{len(rows)} fitted, {refused} refused")
 
 

@@ -126,9 +126,7 @@ def main():
             kind = str(generator.choice(list(DEGRADATIONS), p=list(DEGRADATIONS.values())))
             made = degrade(remap(frame, source["lens"], lens, np.array(down)), kind, generator)
             quality = 50 if kind == "jpeg" else 92
-            cv2.imwrite(
-                str(arguments.out / "images" / f"{name}.jpg"), made, [cv2.IMWRITE_JPEG_QUALITY, quality]
-            )
+            cv2.imwrite(str(arguments.out / "images" / f"{name}.jpg"), made, [cv2.IMWRITE_JPEG_QUALITY, quality])
             mount = source["mount"] | {"world_up": [-round(value, 8) for value in down]}
             calibration = {"id": name, "image": source["image"], "lens": lens, "mount": mount}
             (arguments.out / "calibrations" / f"{name}.json").write_text(json.dumps(calibration, indent=1))
