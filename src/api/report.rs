@@ -35,6 +35,7 @@ use utoipa::ToSchema;
         "views": 3,
         "zones": ["entrance"]
     }],
+    "margin": [],
     "zones": [{"name": "entrance", "persons": 1}, {"name": "till", "persons": 0}],
     "timings_ms": {
         "decode": 11.204, "calibrate": 0.015, "queue": 0.061, "remap": 21.377,

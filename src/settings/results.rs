@@ -88,7 +88,7 @@ impl ResultKeys {
             .url
             .map(|url| url.expose_secret().parse::<RedisAddress>());
         let address = address.transpose().map_err(|error: RedisAddressError| {
-            SettingsError::value("results.url", "no URL of a Redis", error.to_string())
+            SettingsError::value("results.url", "not a URL of a Redis", error.to_string())
         })?;
         Ok(ResultSettings {
             redis: address.map(|address| RedisOptions {

@@ -559,7 +559,10 @@ fn invalid_settings_name_field_value_and_remedy() {
     };
     let of_webhook = webhook("http://x", Path::new("/nowhere"), "crossing");
     for (entry, expected) in [
-        (of_server, "upstream.url: \"ftp://x\" is no URL of a server"),
+        (
+            of_server,
+            "upstream.url: \"ftp://x\" is not a URL of a server",
+        ),
         (
             of_webhook,
             "webhooks[0].secret_file: /nowhere cannot be read",

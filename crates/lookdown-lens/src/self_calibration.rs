@@ -7,6 +7,7 @@
 mod camera;
 mod climb;
 mod edge_curve;
+mod evaluation;
 mod evidence;
 mod fit;
 mod prior;

@@ -9,7 +9,6 @@ use std::{
 use anyhow::{Context, bail};
 use clap::Args;
 use lookdown_common::{ServerClient, read_body};
-use reqwest::StatusCode;
 use serde::Deserialize;
 use serde_json::json;
 use tokio::runtime;
@@ -75,7 +74,7 @@ async fn heat_map(arguments: &Arguments) -> anyhow::Result<HeatMap> {
     }
     let sent = client.get(url).timeout(TIMEOUT).send().await;
     let response = sent.map_err(|error| anyhow::anyhow!(client.failure(error)))?;
-    if response.status() != StatusCode::OK {
+    if !response.status().is_success() {
         bail!(
             "{}: give the address of `lookdown count` with --server, such as \
              http://127.0.0.1:8090",

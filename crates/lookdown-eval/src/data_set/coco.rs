@@ -58,14 +58,13 @@ struct CocoCategory {
 /// the annotations.
 pub(super) fn read_own_folder(folder: &Path, file: &Path) -> Result<DataSet, DataSetError> {
     let mut calibrations = Calibrations::new(folder.join("calibrations"));
-    let images = folder.join("images");
-    let images = if images.is_dir() {
-        images
-    } else {
-        folder.to_owned()
+    let place = |name: &Path| {
+        let [inside, beside] = [folder.join("images").join(name), folder.join(name)];
+        let is_beside = !inside.exists() && beside.is_file();
+        Ok(if is_beside { beside } else { inside })
     };
     let mut reader = Reader::default();
-    reader.read(file, Some(&mut calibrations), |name| Ok(images.join(name)))?;
+    reader.read(file, Some(&mut calibrations), place)?;
     Ok(reader.data_set())
 }
 

@@ -5,7 +5,8 @@ use nalgebra::{DVector, Rotation3, Vector3};
 use super::{
     camera::RoomCamera,
     edge_curve::EdgeCurve,
-    evidence::{Evaluation, PARAMETERS, evaluate},
+    evaluation::{Evaluation, PARAMETERS},
+    evidence::evaluate,
     prior::Prior,
 };
 

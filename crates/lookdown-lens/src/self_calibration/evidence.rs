@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::{
     camera::{Angles, RoomCamera, SeenRay, ideal_shape_slope},
     edge_curve::EdgeCurve,
+    evaluation::{Evaluation, PARAMETERS},
     prior::Prior,
 };
 use crate::geometry::Ray;
@@ -22,23 +23,6 @@ const SIGMA_PIXELS: f64 = 0.2;
 const SIGMA_DIRECTION: f64 = 0.004;
 /// Share of curves along none of the directions, before they are seen.
 const OUTLIER_SHARE: f64 = 0.4;
-/// Parameters without further headings: focal length, two of the shape, center, rotation.
-pub(super) const PARAMETERS: usize = 8;
-
-/// Evidence, and the normal equations of the parameters.
-pub(super) struct Evaluation {
-    /// Logarithm of the likelihood ratio, plus that of the prior.
-    pub evidence: f64,
-    /// Gauss-Newton matrix.
-    pub normal: DMatrix<f64>,
-    /// Right side.
-    pub right: DVector<f64>,
-    /// Share of the lengths of all curves that each direction explains.
-    pub shares: Vec<f64>,
-    /// Explained share of each curve.
-    pub explained: Vec<f64>,
-}
-
 /// One curve along one direction.
 struct Fitted {
     normal: Ray,

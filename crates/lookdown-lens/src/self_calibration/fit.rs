@@ -6,7 +6,7 @@ use super::{
     camera::{RoomCamera, ideal_shape_slope},
     climb::climb,
     edge_curve::EdgeCurve,
-    evidence::{Evaluation, PARAMETERS},
+    evaluation::{Evaluation, PARAMETERS},
     prior::Prior,
     refusal::FitRefusal,
     search,

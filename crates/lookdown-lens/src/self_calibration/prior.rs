@@ -2,7 +2,7 @@
 
 use super::{
     camera::{Angles, RoomCamera, ideal_shape_slope},
-    evidence::Evaluation,
+    evaluation::Evaluation,
 };
 
 /// The assumptions before any curve is seen.

@@ -209,7 +209,7 @@ impl CameraEntry {
         if let Some(method) = &self.hwaccel {
             let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
             if method.is_empty() || !method.chars().all(is_plain) {
-                let remedy = "is no method of `ffmpeg -hwaccels`: use auto, or one of that list";
+                let remedy = "is not a method of `ffmpeg -hwaccels`: use auto, or one of that list";
                 return Err(ConfigError::value(field, method, remedy));
             }
         }

@@ -13,7 +13,7 @@ use lookdown_lens::{
     geometry::{Lens, Ray},
 };
 
-use super::{Arguments, IdealLens, thousandths};
+use super::arguments::{Arguments, IdealLens, thousandths};
 
 /// The lens and the field of view in degrees of most ceiling cameras.
 const LENS: IdealLens = IdealLens::Equidistant;

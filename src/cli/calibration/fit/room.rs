@@ -14,7 +14,10 @@ use lookdown_lens::{
     self_calibration::{KnownLens, RoomFit},
 };
 
-use super::{Arguments, preview, thousandths};
+use super::{
+    arguments::{Arguments, IdealLens, thousandths},
+    preview,
+};
 
 /// Fits the camera and reports its values.
 pub(super) fn fit(
@@ -24,7 +27,7 @@ pub(super) fn fit(
 ) -> anyhow::Result<NativeCalibration> {
     let known = KnownLens {
         field_of_view: arguments.field_of_view.map(f64::to_radians),
-        k1: arguments.lens.map(super::IdealLens::k1),
+        k1: arguments.lens.map(IdealLens::k1),
     };
     let fit = fit_room(frames, known).context(
         "the camera cannot be fitted; --circle-only detects the lens circle and assumes the rest",

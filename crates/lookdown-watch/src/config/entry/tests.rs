@@ -102,11 +102,11 @@ fn errors_name_the_field_the_value_and_the_remedy() {
         ),
         (
             "[upstream]\nurl='ftp://x:y@host'\n[[cameras]]\nname='a'\nurl='http://c/'",
-            "upstream.url: \"host\" is no URL of a server: write it like http://127.0.0.1:8080",
+            "upstream.url: \"host\" is not a URL of a server: write it like http://127.0.0.1:8080",
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\nhwaccel='-x y'",
-            "cameras[0].hwaccel: \"-x y\" is no method of `ffmpeg -hwaccels`: use auto, or one of that list",
+            "cameras[0].hwaccel: \"-x y\" is not a method of `ffmpeg -hwaccels`: use auto, or one of that list",
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\nevery='20s'\nstall_after='10s'",

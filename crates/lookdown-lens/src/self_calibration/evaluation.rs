@@ -1,0 +1,20 @@
+//! The evidence for a camera with its normal equations, to which curves and the prior add.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Parameters without further headings: focal length, two of the shape, center, rotation.
+pub(super) const PARAMETERS: usize = 8;
+
+/// Evidence, and the normal equations of the parameters.
+pub(super) struct Evaluation {
+    /// Logarithm of the likelihood ratio, plus that of the prior.
+    pub evidence: f64,
+    /// Gauss-Newton matrix.
+    pub normal: DMatrix<f64>,
+    /// Right side.
+    pub right: DVector<f64>,
+    /// Share of the lengths of all curves that each direction explains.
+    pub shares: Vec<f64>,
+    /// Explained share of each curve.
+    pub explained: Vec<f64>,
+}
