@@ -195,6 +195,9 @@ impl App {
         } = assembly;
         settings.access.check_exposure(settings.server.listen)?;
         let keys = open_keys(&settings.access)?;
+        if let Some(int8) = engine.default_models().int8() {
+            tracing::info!("inference.precision: {}", int8.description());
+        }
         let to_load = models_to_load(engine.default_models(), &settings.model.also_load);
         let (workers, capacity) = (
             settings.threads.frame_workers,

@@ -129,7 +129,6 @@ fn per_profile(
     metrics: &DetectMetrics,
 ) -> DefaultModels {
     let int8 = Int8Use::on(inference.device, inference.precision);
-    tracing::info!("inference.precision: {}", int8.description());
     replace_info(&metrics.precision_info, None, &[int8.name()]);
     let defaults = DefaultModels::per_profile(int8, |name| is_fetched(&folder.join(name)));
     if let DefaultModels::PerProfile { missing, .. } = &defaults {
