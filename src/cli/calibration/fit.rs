@@ -19,7 +19,7 @@ use lookdown_lens::calibration::{export::Target, native::NativeImage};
 use super::read_frame;
 use crate::cli::output::UNWRITABLE;
 
-pub(super) use arguments::Arguments;
+pub(in crate::cli) use arguments::Arguments;
 
 /// Fits the camera, writes the calibration, and describes the accuracy on standard error.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {

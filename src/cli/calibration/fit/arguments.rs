@@ -10,7 +10,7 @@ use lookdown_lens::{
 
 /// Arguments of `lookdown calibration fit`.
 #[derive(Debug, Args)]
-pub(in crate::cli::calibration) struct Arguments {
+pub(in crate::cli) struct Arguments {
     /// Frames of one camera: JPEG, PNG or WebP, all of one size. Bright frames work best
     #[arg(required = true, value_name = "FRAME")]
     pub(super) frames: Vec<PathBuf>,
