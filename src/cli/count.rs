@@ -58,7 +58,12 @@ pub(super) struct Counting {
 /// Counts until a stop is requested. Changed settings apply at once.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if arguments.files.iter().any(|file| is_video(file)) {
-        return recording::run(arguments);
+        return recording::run(
+            &arguments.files,
+            &arguments.recording,
+            arguments.store.as_deref(),
+            &arguments.settings_file,
+        );
     }
     if arguments.recording.is_given() {
         bail!("flags of a recording need one: give a video such as clip.mp4");
@@ -67,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         [] => None,
         [file] => Some(file.to_string_lossy()),
         [_, other, ..] => bail!(
-            "{}: it is no recording: give one settings file, or recordings such as clip.mp4",
+            "{}: it is not a recording: give one settings file, or recordings such as clip.mp4",
             other.display()
         ),
     };

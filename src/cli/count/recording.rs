@@ -24,13 +24,12 @@ use lookdown_lens::calibration::{Calibration, CalibrationId};
 use lookdown_watch::{VideoFrames, VideoOptions, VideoWriter, video_created_at, video_duration};
 use tokio::runtime::{self, Runtime};
 
-use super::Arguments;
 use crate::{
     annotated_image::AnnotationOptions,
     api::Report,
     app::{engine_for, open_calibrations},
     cli::{
-        annotate,
+        SettingsFile, annotate,
         detect::stream::{interval, is_video},
         output::UNWRITABLE,
         parameters::ParameterFlags,
@@ -107,21 +106,25 @@ struct Counting<'a> {
     progress: Progress,
 }
 
-/// Counts recordings in their order.
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let flags = &arguments.recording;
-    if let Some(other) = arguments.files.iter().find(|file| !is_video(file)) {
+/// Counts recordings in their order, into the file `store` or that of the settings.
+pub(super) fn run(
+    files: &[PathBuf],
+    flags: &RecordingFlags,
+    store: Option<&str>,
+    settings_file: &SettingsFile,
+) -> anyhow::Result<ExitCode> {
+    if let Some(other) = files.iter().find(|file| !is_video(file)) {
         let other = other.display();
         bail!(
-            "{other}: it is no recording: give one settings file, or recordings such as clip.mp4"
+            "{other}: it is not a recording: give one settings file, or recordings such as clip.mp4"
         );
     }
-    let own = given(&[("counts.path", arguments.store.as_deref())]);
-    let settings = arguments.settings_file.load_with(&own)?;
+    let own = given(&[("counts.path", store)]);
+    let settings = settings_file.load_with(&own)?;
     let calibration = calibration(flags.calibration.as_deref(), &settings)?;
     let id = calibration.as_ref().map(|found| found.id().as_str());
     let parameters = flags.parameters.check_or(id, SCORE_THRESHOLD)?;
-    let camera = match (&parameters.camera, id, &arguments.files[..]) {
+    let camera = match (&parameters.camera, id, files) {
         (Some(camera), ..) => camera.clone(),
         (None, Some(id), _) => id.to_owned(),
         (None, None, files) => files.first().map(|file| stem(file)).unwrap_or_default(),
@@ -130,7 +133,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         .enable_all()
         .build()
         .context("the operating system creates no thread")?;
-    let clips = clips(&arguments.files, flags.start, &runtime)?;
+    let clips = clips(files, flags.start, &runtime)?;
     let (Some(first), Some(last)) = (clips.first(), clips.last()) else {
         bail!("there is no recording: give a video such as clip.mp4");
     };
