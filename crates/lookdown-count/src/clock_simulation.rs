@@ -266,6 +266,7 @@ impl World {
     fn commit(&mut self) {
         if let Some(batch) = self.engine.take_batch() {
             self.store.commit(&batch, &[], None).unwrap();
+            self.engine.stored(&batch);
         }
         self.uncommitted.clear();
     }
