@@ -3,12 +3,13 @@
 use crate::{assert_fails_with, lookdown};
 
 #[test]
-fn fit_writes_a_calibration_and_names_its_assumptions() {
+fn circle_only_fit_names_its_assumptions() {
     let fitted = lookdown(
         &[
             "calibration",
             "fit",
             "samples/office.jpg",
+            "--circle-only",
             "--id",
             "office",
             "--height",
@@ -40,6 +41,113 @@ fn fit_writes_a_calibration_and_names_its_assumptions() {
     }
 }
 
+/// Draws a room of 6 by 5 by 2.8 metres as a tilted equidistant camera sees it: walls with doors, a
+/// floor of tiles.
+fn drawn_room(side: u32, focal: f64, tilt: f64) -> image::RgbImage {
+    let center = f64::from(side) / 2.0 - 0.5;
+    image::RgbImage::from_fn(side, side, |column, row| {
+        let (mut sum, mut count) = (0_u32, 0_u32);
+        for (dx, dy) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
+            let (x, y) = (
+                f64::from(column) + dx - center,
+                f64::from(row) + dy - center,
+            );
+            let theta = x.hypot(y) / focal;
+            let azimuth = y.atan2(x);
+            let [x, y, z] = [
+                theta.sin() * azimuth.cos(),
+                theta.sin() * azimuth.sin(),
+                theta.cos(),
+            ];
+            let (x, z) = (
+                x * tilt.cos() + z * tilt.sin(),
+                z * tilt.cos() - x * tilt.sin(),
+            );
+            let (turn_sin, turn_cos) = 0.3_f64.sin_cos();
+            let (x, y) = (x * turn_cos - y * turn_sin, x * turn_sin + y * turn_cos);
+            count += 1;
+            if theta < 1.5 {
+                sum += shade(x, y, z);
+            }
+        }
+        let value = u8::try_from(sum / count).unwrap();
+        image::Rgb([value; 3])
+    })
+}
+
+/// Brightness of the wall, door or tile that a ray meets.
+fn shade(x: f64, y: f64, z: f64) -> u32 {
+    let to_x = if x > 0.0 { 3.4 / x } else { -2.6 / x };
+    let to_y = if y > 0.0 { 2.2 / y } else { -2.8 / y };
+    let to_z = if z > 0.0 { 2.6 / z } else { f64::INFINITY };
+    let reach = to_x.min(to_y).min(to_z);
+    let [x, y, z] = [x * reach, y * reach, z * reach];
+    let cell = |value: f64, size: f64| (value / size).floor().rem_euclid(2.0) > 0.5;
+    if reach == to_z {
+        return if cell(x, 0.7) == cell(y, 0.55) {
+            150
+        } else {
+            110
+        };
+    }
+    let (along, base) = if reach == to_x { (y, 190) } else { (x, 220) };
+    if (0.5..2.1).contains(&z) && cell(along + 9.3, 0.8) {
+        base - 120
+    } else {
+        base
+    }
+}
+
+#[test]
+fn fit_finds_lens_and_level_of_a_drawn_room() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (frame, out, preview) = (path("room.png"), path("room.json"), path("preview.jpg"));
+    drawn_room(700, 220.0, 0.15).save(&frame).unwrap();
+    let fit = [
+        "calibration",
+        "fit",
+        &frame,
+        "--height",
+        "2.6",
+        "--out",
+        &out,
+    ];
+    let fitted = lookdown(&[&fit[..], &["--preview", &preview]].concat(), &[]);
+    let said = String::from_utf8_lossy(&fitted.stderr);
+    assert!(fitted.status.success(), "{said}");
+    assert!(
+        said.contains("measured") && said.contains("given"),
+        "{said}"
+    );
+    let found: serde_json::Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
+    let focal = found["lens"]["fx"].as_f64().unwrap();
+    assert!((focal / 220.0 - 1.0).abs() < 0.02, "{found}");
+    let up = &found["mount"]["world_up"];
+    let tilt = up[0]
+        .as_f64()
+        .unwrap()
+        .hypot(up[1].as_f64().unwrap())
+        .asin();
+    assert!((tilt - 0.15).abs() < 0.02, "{found}");
+    assert_eq!(found["sources"]["height_m"]["source"], "given");
+    assert!(image::open(&preview).is_ok());
+    let checked = lookdown(&["calibration", "check", &out], &[]);
+    let report = String::from_utf8(checked.stdout).unwrap();
+    assert!(report.contains("world_up: measured"), "{report}");
+}
+
+#[test]
+fn frame_without_edges_is_refused_with_a_remedy() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let gray = folder.path().join("gray.png");
+    image::RgbImage::from_pixel(64, 64, image::Rgb([90; 3]))
+        .save(&gray)
+        .unwrap();
+    let fitted = lookdown(&["calibration", "fit", gray.to_str().unwrap()], &[]);
+    assert_fails_with(&fitted, &["edges", "lights on", "--circle-only"]);
+}
+
 #[test]
 fn frames_without_a_lens_circle_are_not_fitted() {
     let folder = tempfile::TempDir::new().unwrap();
@@ -47,7 +155,15 @@ fn frames_without_a_lens_circle_are_not_fitted() {
     image::RgbImage::from_pixel(64, 64, image::Rgb([200; 3]))
         .save(&bright)
         .unwrap();
-    let fitted = lookdown(&["calibration", "fit", bright.to_str().unwrap()], &[]);
+    let fitted = lookdown(
+        &[
+            "calibration",
+            "fit",
+            "--circle-only",
+            bright.to_str().unwrap(),
+        ],
+        &[],
+    );
     let said = String::from_utf8(fitted.stderr).unwrap();
     assert_eq!(fitted.status.code(), Some(1), "{said}");
     assert!(fitted.stdout.is_empty());

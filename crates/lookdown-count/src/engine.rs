@@ -10,6 +10,7 @@ use lookdown_common::text::one_line;
 use lookdown_tracking::MAX_CAMERAS;
 
 use crate::{
+    batch::Batch,
     definition::CameraDefinition,
     definition_key::DefinitionKey,
     drops::{DropReason, Drops},
@@ -58,16 +59,6 @@ pub(crate) struct Engine {
     changed: BTreeSet<Owner>,
     /// True if reports arrived since the last commit.
     has_news: bool,
-}
-
-/// The content of the next transaction of the store.
-pub(crate) struct Batch {
-    pub(crate) last_event: u64,
-    /// The totals with these sums.
-    pub(crate) totals: Totals,
-    pub(crate) sums: Sums,
-    /// Changed scenes; `None` for those that are gone.
-    pub(crate) scenes: Vec<(Owner, Option<SceneState>)>,
 }
 
 /// The outcome of a report.
@@ -119,7 +110,7 @@ impl Engine {
     }
 
     /// Returns the totals that are stored.
-    pub(crate) fn totals(&self) -> &Totals {
+    pub(crate) fn stored_totals(&self) -> &Totals {
         &self.stored_totals
     }
 
@@ -396,17 +387,5 @@ impl Engine {
             scenes: scenes.collect(),
             sums: std::mem::take(&mut self.sums),
         })
-    }
-}
-
-impl Batch {
-    /// Returns a batch without news.
-    pub(crate) fn empty(last_event: u64, totals: Totals) -> Self {
-        Self {
-            last_event,
-            totals,
-            sums: Sums::default(),
-            scenes: Vec::new(),
-        }
     }
 }

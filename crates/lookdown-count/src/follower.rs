@@ -12,16 +12,18 @@ use tokio::{
 };
 
 use crate::{
+    batch::Batch,
     calibrations::{CalibrationProblem, Calibrations},
-    engine::{Accepted, Batch, Engine},
+    engine::{Accepted, Engine},
     event_parser::Event,
     event_stream::{EventStream, StreamError},
+    message::Message,
     metrics::Metrics,
     now::Now,
     report::Report,
     snapshot::Snapshot,
     store::Store,
-    webhooks::{Conditions, Deliveries, Message},
+    webhooks::{Conditions, Deliveries},
 };
 
 /// Pauses between connections.
@@ -213,7 +215,7 @@ impl Follower {
         }
         let batch = batch.unwrap_or_else(|| {
             let engine = self.engine.lock();
-            Batch::empty(engine.last_event(), engine.totals().clone())
+            Batch::empty(engine.last_event(), engine.stored_totals().clone())
         });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);

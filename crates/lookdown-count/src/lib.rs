@@ -8,6 +8,7 @@
 //! Around it: the follower reads `/events` and feeds the engine, the store keeps sums per minute with
 //! the state and the ID of the last report, and the HTTP API answers from both.
 
+mod batch;
 mod calibrations;
 #[cfg(test)]
 mod clock_simulation;
@@ -20,6 +21,7 @@ mod event_stream;
 mod follower;
 mod hand_back;
 mod http;
+mod message;
 mod metrics;
 mod now;
 mod options;

@@ -4,6 +4,7 @@
 pub mod annotate;
 mod buffer_pool;
 pub mod decode;
+pub mod edge_curves;
 pub mod frame;
 pub mod image_grid;
 pub mod lens_circle;
@@ -11,6 +12,7 @@ mod letterbox;
 mod masked_pixels;
 mod network_input;
 mod remap_table;
+pub mod room_fit;
 mod thumbnail;
 mod view_signature;
 

@@ -6,4 +6,5 @@
 pub mod calibration;
 pub mod geometry;
 pub mod revision;
+pub mod self_calibration;
 pub mod warning;

@@ -80,6 +80,7 @@ fn write(camera: &Camera, calibration: &Calibration, choice: usize) {
         areas: camera.areas.clone(),
         ignore: camera.ignore.clone(),
         detect: camera.detect.clone(),
+        sources: camera.sources.clone(),
     });
     let Ok(Exported { content, .. }) = written else {
         return;

@@ -79,6 +79,7 @@ fn entry(
             areas: described.areas,
             ignore: described.ignore,
             detect: described.detect,
+            sources: described.sources,
         },
         defaults,
         notes: described.notes,

@@ -14,7 +14,7 @@ use lookdown_detect::imaging::{
     annotate::{encode_jpeg, sketch_areas, sketch_foot_filter, sketch_lens, sketch_lines},
 };
 use lookdown_lens::{
-    calibration::{Areas, Calibration, CameraGeometry},
+    calibration::{Areas, Calibration, CameraGeometry, native::NativeSource},
     geometry::{Lens, Pixel, Ray, ViewPlan, VirtualView, ZoneArea, view_plan::Coverage},
 };
 
@@ -113,6 +113,12 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
             ),
         ),
     ];
+    lines.extend(
+        stated
+            .into_iter()
+            .flat_map(|stated| &stated.sources)
+            .map(sourced),
+    );
     lines.extend(areas(calibration));
     let notes = stated
         .into_iter()
@@ -120,6 +126,15 @@ fn report(camera: &NamedCamera, calibration: &Calibration) -> Vec<(&'static str,
     let warnings = notes.chain(calibration.warnings());
     lines.extend(warnings.map(|warning| ("  warning", warning.to_string())));
     lines
+}
+
+/// Describes the source of a value.
+fn sourced((name, source): (&String, &NativeSource)) -> (&'static str, String) {
+    let kind = source.source;
+    let deviation = source
+        .uncertainty
+        .map_or_else(String::new, |value| format!(" ± {value}"));
+    ("  source", format!("{name}: {kind}{deviation}"))
 }
 
 /// Describes the rim of the lens image, and its position in the frame.

@@ -59,6 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         areas: stated.areas,
         ignore: stated.ignore,
         detect: stated.detect,
+        sources: stated.sources,
     })?;
     let notes = stated.notes.iter().map(ToString::to_string);
     for note in notes.chain(exported.lost) {

@@ -1,7 +1,10 @@
 //! `lookdown calibration fit`
 
+mod circle;
+mod preview;
+mod room;
+
 use std::{
-    collections::BTreeMap,
     fs,
     io::{self, Write},
     path::PathBuf,
@@ -10,17 +13,10 @@ use std::{
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use lookdown_detect::imaging::lens_circle::{AgreedCircle, agreed_circle, find_lens_circle};
+use lookdown_detect::imaging::Frame;
 use lookdown_lens::{
-    calibration::{
-        CalibrationId,
-        export::Target,
-        native::{NativeCalibration, NativeImage, NativeMount},
-    },
-    geometry::{
-        Lens, Ray,
-        lens::{Equidistant, Equisolid, LensModel, Orthographic, Stereographic},
-    },
+    calibration::{CalibrationId, export::Target, native::NativeImage},
+    geometry::lens::{Equidistant, Equisolid, LensModel, Orthographic, Stereographic},
 };
 
 use super::read_frame;
@@ -35,21 +31,28 @@ pub(in super::super) struct Arguments {
     /// ID of the calibration
     #[arg(long, value_name = "ID", default_value = "camera")]
     id: CalibrationId,
-    /// Projection of the lens: the growth of the radius with the angle, see its data sheet
-    #[arg(long, value_name = "MODEL", default_value = "equidistant")]
-    lens: IdealLens,
-    /// Field of view of the circle in degrees, as in the data sheet
-    #[arg(long, value_name = "DEGREES", default_value_t = 180.0, value_parser = field_of_view)]
-    field_of_view: f64,
+    /// Detect the lens circle only; lens, field of view and level are given or assumed
+    #[arg(long)]
+    circle_only: bool,
+    /// Projection of the lens, from its data sheet [default: found; equidistant with --circle-only]
+    #[arg(long, value_name = "MODEL")]
+    lens: Option<IdealLens>,
+    /// Field of view of the circle in degrees, from the data sheet [default: found; 180 with
+    /// --circle-only]
+    #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
+    field_of_view: Option<f64>,
     /// Height of the camera above the floor: enables floor positions of persons
     #[arg(long, value_name = "METRES", value_parser = height)]
     height: Option<f64>,
     /// Output file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Output file of straightened views before and after the fit, JPEG
+    #[arg(long, value_name = "OUT.jpg", conflicts_with = "circle_only")]
+    preview: Option<PathBuf>,
 }
 
-/// Lenses that are determined by a circle and a field of view.
+/// Lenses with one parameter, the focal length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum IdealLens {
     /// `r = f theta`: most ceiling cameras
@@ -63,6 +66,16 @@ enum IdealLens {
 }
 
 impl IdealLens {
+    /// First coefficient of its odd polynomial.
+    fn k1(self) -> f64 {
+        match self {
+            Self::Equidistant => 0.0,
+            Self::Equisolid => -1.0 / 24.0,
+            Self::Stereographic => 1.0 / 12.0,
+            Self::Orthographic => -1.0 / 6.0,
+        }
+    }
+
     fn with(self, focal: f64, cx: f64, cy: f64, max_theta: f64) -> LensModel {
         match self {
             Self::Equidistant => Equidistant::with_focal(focal, cx, cy, max_theta).into(),
@@ -73,12 +86,15 @@ impl IdealLens {
     }
 }
 
-/// Fits the circle, writes the calibration, and describes the accuracy on standard error.
+/// Fits the camera, writes the calibration, and describes the accuracy on standard error.
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let (image, agreed) = circle(&arguments.frames)?;
-    let calibration = calibration(arguments, image, &agreed)?;
+    let (image, frames) = read(&arguments.frames)?;
+    let calibration = if arguments.circle_only {
+        circle::fit(arguments, image, &frames)?
+    } else {
+        room::fit(arguments, image, &frames)?
+    };
     let written = Target::Native.write(&calibration)?.content;
-    eprintln!("lookdown: {}", verdict(arguments, &agreed));
     match &arguments.out {
         Some(out) => fs::write(out, written)
             .with_context(|| format!("--out: {} cannot be written", out.display()))?,
@@ -87,99 +103,34 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the size of the frames, and the circle on which most of them agree.
-fn circle(frames: &[PathBuf]) -> anyhow::Result<(NativeImage, AgreedCircle)> {
-    let mut size = None;
-    let mut circles = Vec::with_capacity(frames.len());
-    for path in frames {
+/// Reads the frames, which must have one size.
+fn read(paths: &[PathBuf]) -> anyhow::Result<(NativeImage, Vec<Frame>)> {
+    let mut frames: Vec<Frame> = Vec::with_capacity(paths.len());
+    for path in paths {
         let frame = read_frame(path).with_context(|| path.display().to_string())?;
-        let (width, height) = (frame.width(), frame.height());
-        let NativeImage {
-            width: first_width,
-            height: first_height,
-        } = *size.get_or_insert(NativeImage { width, height });
-        if (width, height) != (first_width, first_height) {
+        if let Some(first) = frames.first()
+            && (frame.width(), frame.height()) != (first.width(), first.height())
+        {
             bail!(
-                "{}: {width}x{height} pixels, but the first frame has {first_width}x{first_height}: \
-                 give frames of one camera at one size",
-                path.display()
+                "{}: {}x{} pixels, but the first frame has {}x{}: give frames of one camera at one \
+                 size",
+                path.display(),
+                frame.width(),
+                frame.height(),
+                first.width(),
+                first.height()
             );
         }
-        match find_lens_circle(&frame) {
-            Some(circle) => circles.push(circle),
-            None => eprintln!("lookdown: {}: no lens circle found", path.display()),
-        }
+        frames.push(frame);
     }
-    size.zip(agreed_circle(&circles)).context(
-        "no frame shows a lens circle: give brighter frames, with black around the lens image",
-    )
+    let first = frames.first().context("give at least one frame")?;
+    let (width, height) = (first.width(), first.height());
+    Ok((NativeImage { width, height }, frames))
 }
 
-fn calibration(
-    arguments: &Arguments,
-    image: NativeImage,
-    agreed: &AgreedCircle,
-) -> anyhow::Result<NativeCalibration> {
-    let max_theta = (arguments.field_of_view.to_radians() / 2.0 * 1e6).floor() / 1e6;
-    let circle = agreed.circle;
-    let thousandths = |pixels: f64| (pixels * 1000.0).round() / 1000.0;
-    let (cx, cy) = (thousandths(circle.cx), thousandths(circle.cy));
-    let lens = |focal: f64| arguments.lens.with(focal, cx, cy, max_theta);
-    let of_one_pixel = Lens::new(&lens(1.0)).context(
-        "--field-of-view: no lens of this model sees so much; equidistant has no such limit",
-    )?;
-    let rim = Ray::new(max_theta.sin(), 0.0, max_theta.cos());
-    let rim = of_one_pixel.project_to_rim(&rim);
-    let rim = rim.context("--field-of-view: the rim of this lens cannot be calculated")?;
-    let radius_in_focal_lengths = rim.x - of_one_pixel.principal_point().x;
-    let lens = lens(thousandths(circle.radius / radius_in_focal_lengths));
-    Ok(NativeCalibration {
-        id: arguments.id.to_string(),
-        image,
-        lens,
-        mount: NativeMount {
-            height_m: arguments.height,
-            ..NativeMount::default()
-        },
-        zones: Vec::new(),
-        lines: Vec::new(),
-        masks: Vec::new(),
-        areas: Vec::new(),
-        ignore: Vec::new(),
-        detect: BTreeMap::new(),
-    })
-}
-
-/// Describes the measurements, the assumptions, and a way to check them.
-fn verdict(arguments: &Arguments, agreed: &AgreedCircle) -> String {
-    let AgreedCircle {
-        circle,
-        agreeing,
-        spread,
-    } = agreed;
-    let frames = arguments.frames.len();
-    let how_sure = match (frames, *agreeing) {
-        (1, _) => "found in one frame: give a second one to measure the accuracy".to_owned(),
-        (_, agreeing) if 2 * agreeing > frames => {
-            format!("{agreeing} of {frames} frames agree within {spread:.1} pixels")
-        }
-        (_, agreeing) => format!(
-            "unsure: only {agreeing} of {frames} frames agree; are they of one camera, and bright?"
-        ),
-    };
-    format!(
-        "circle: centre {:.1}, {:.1}, radius {:.1} pixels, {how_sure}; the lens ({}) and the field \
-         of view of {}° were given, not measured, and the camera is assumed to look straight \
-         down; check it with `lookdown calibration check FILE --preview FRAME --out P.jpg`",
-        circle.cx + 0.5,
-        circle.cy + 0.5,
-        circle.radius,
-        arguments
-            .lens
-            .to_possible_value()
-            .map_or_else(String::new, |value| value.get_name().to_owned()),
-        arguments.field_of_view,
-    )
+/// Rounds to thousandths, enough for pixels.
+fn thousandths(pixels: f64) -> f64 {
+    (pixels * 1000.0).round() / 1000.0
 }
 
 fn field_of_view(text: &str) -> Result<f64, &'static str> {

@@ -156,6 +156,7 @@ fn a_native_file_keeps_everything() {
         areas: read_back.areas,
         ignore: read_back.ignore,
         detect: read_back.detect,
+        sources: read_back.sources,
     };
     let written = Target::Native.write(&native).unwrap().content;
     let file = CalibrationFile::parse(written.as_bytes()).unwrap();

@@ -6,9 +6,9 @@ use rusqlite::{Transaction, params};
 
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
-    engine::Batch,
+    batch::Batch,
+    message::{HeldCondition, Message},
     sums::{DAY_MS, MINUTE_MS, Owner, Sums},
-    webhooks::{HeldCondition, Message},
 };
 
 impl Owner {

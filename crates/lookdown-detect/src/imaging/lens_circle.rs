@@ -66,6 +66,14 @@ fn find_at_contrast(frame: &Frame, min_contrast: f64) -> Option<LensCircle> {
     (is_large && is_shown(&edge, frame, &circle)).then_some(circle)
 }
 
+/// Brightness (0 to 255) above which a pixel is lens image, or `None` in a frame without a dark
+/// surround.
+#[must_use]
+pub fn surround_threshold(frame: &Frame) -> Option<f64> {
+    let surround = Surround::of(frame, MIN_CONTRASTS[1])?;
+    Some(surround.threshold)
+}
+
 fn short_side(frame: &Frame) -> u32 {
     frame.width().min(frame.height())
 }

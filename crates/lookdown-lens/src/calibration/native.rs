@@ -4,6 +4,7 @@
 mod areas;
 mod detect;
 mod read_lens;
+mod source;
 
 use std::{collections::BTreeMap, str::FromStr};
 
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 pub use areas::{NativeLine, NativeMask, NativePlace, NativeZone};
 pub use detect::NativeValue;
+pub use source::{NativeSource, ValueSource};
 
 use crate::geometry::lens::LensModel;
 
@@ -45,6 +47,9 @@ pub struct NativeCalibration {
     /// Defaults of detection parameters for the frames of this camera, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub detect: BTreeMap<String, NativeValue>,
+    /// The sources of values: `lens`, `center`, `world_up`, `height_m`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub sources: BTreeMap<String, NativeSource>,
 }
 
 /// A frame size.
@@ -71,7 +76,7 @@ impl FromStr for NativeImage {
     }
 }
 
-/// Text that is no frame size.
+/// Text that is not a frame size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("give the width and height in pixels, such as 640x480")]
 pub struct NotAFrameSize;

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use super::{Format, FormatError};
 use crate::{
     calibration::native::{
-        NativeImage, NativeLine, NativeMask, NativeMount, NativePlace, NativeValue, NativeZone,
+        NativeImage, NativeLine, NativeMask, NativeMount, NativePlace, NativeSource, NativeValue,
+        NativeZone,
     },
     geometry::lens::LensModel,
     warning::Warning,
@@ -50,6 +51,8 @@ pub struct Camera {
     pub ignore: Vec<NativePlace>,
     /// Its defaults of detection parameters; only native files have some.
     pub detect: BTreeMap<String, NativeValue>,
+    /// The sources of its values; only native files have some.
+    pub sources: BTreeMap<String, NativeSource>,
     /// The assumptions of the reader.
     pub notes: Vec<Warning>,
 }
@@ -66,6 +69,7 @@ impl Camera {
             areas: Vec::new(),
             ignore: Vec::new(),
             detect: BTreeMap::new(),
+            sources: BTreeMap::new(),
             notes: Vec::new(),
         }
     }

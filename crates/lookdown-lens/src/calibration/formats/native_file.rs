@@ -31,6 +31,7 @@ pub(super) fn read(text: &str, syntax: Syntax) -> Result<CalibrationFile, Format
                 areas: file.areas,
                 ignore: file.ignore,
                 detect: file.detect,
+                sources: file.sources,
                 notes: Vec::new(),
             }),
         }],

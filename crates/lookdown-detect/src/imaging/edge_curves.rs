@@ -1,0 +1,49 @@
+//! Smooth edges of a frame with subpixel positions, for the fit of its camera.
+//!
+//! 1. Gradient of the smoothed luminance (`gradient`).
+//! 2. Maxima across the edge are linked to chains, whose positions are interpolated (`chains`).
+//! 3. Chains are split at corners into pieces that a parabola describes (`pieces`). The image of a
+//!    straight edge in a fisheye frame is such a piece.
+
+mod chains;
+mod gradient;
+mod pieces;
+mod plane;
+mod surround;
+
+use lookdown_lens::self_calibration::EdgeCurve;
+
+use super::{frame::Frame, lens_circle::LensCircle};
+use gradient::Gradient;
+use plane::Plane;
+
+/// Longer sides are halved, or divided by three, and so on.
+const MAX_SIDE: u32 = 1700;
+/// Share of the radius that is used: the rim itself is an edge, too.
+const USED_RADIUS: f64 = 0.975;
+
+/// Returns the smooth edges inside a circle, in pixel centers of the frame.
+#[must_use]
+pub fn edge_curves(frame: &Frame, circle: &LensCircle) -> Vec<EdgeCurve> {
+    let divisor = frame.width().max(frame.height()).div_ceil(MAX_SIDE);
+    let luminance = Plane::luminance(frame, divisor);
+    let surround = surround::mask(frame, divisor);
+    let gradient = Gradient::of(&luminance);
+    let scale = f64::from(divisor);
+    // The center of the first pixel of the smaller plane.
+    let origin = (scale - 1.0) / 2.0;
+    let in_frame = |[x, y]: [f64; 2]| [x * scale + origin, y * scale + origin];
+    let is_used = |point: [f64; 2]| {
+        let [x, y] = in_frame(point);
+        (x - circle.cx).hypot(y - circle.cy) < USED_RADIUS * circle.radius
+            && !surround.contains(point)
+    };
+    let mut curves = Vec::new();
+    for chain in chains::linked(&gradient, &is_used) {
+        for piece in pieces::smooth(&chain) {
+            let points = pieces::supports(piece).into_iter().map(in_frame).collect();
+            curves.push(EdgeCurve { points });
+        }
+    }
+    curves
+}

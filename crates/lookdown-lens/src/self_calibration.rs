@@ -1,0 +1,20 @@
+//! A camera's lens and level from the straight edges of a room.
+//!
+//! Rooms have edges in three orthogonal directions. With the right lens, center and level, the
+//! planes through the center of projection and nearly all edges contain one of those directions.
+//! `docs/geometry.md` has the derivation.
+
+mod camera;
+mod climb;
+mod edge_curve;
+mod evidence;
+mod fit;
+mod prior;
+mod refusal;
+mod search;
+#[cfg(test)]
+mod tests;
+
+pub use edge_curve::EdgeCurve;
+pub use fit::{CircleGuess, FitUncertainty, KnownLens, RoomFit};
+pub use refusal::FitRefusal;

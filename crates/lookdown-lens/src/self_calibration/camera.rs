@@ -1,0 +1,188 @@
+//! The camera that is fitted: an odd polynomial, a center, and the directions of the room.
+
+use nalgebra::{Rotation3, Vector3};
+
+use crate::geometry::Ray;
+
+/// Largest angle of the table of angles, radians.
+const MAX_THETA: f64 = 2.2;
+/// Entries of the table of angles.
+const ENTRIES: usize = 1024;
+/// Least slope of the curve `r(theta)` up to the circle, in focal lengths per radian. A curve that
+/// turns back before the circle explains every edge at the rim.
+const MIN_SLOPE: f64 = 0.02;
+
+/// Coefficients of `r = f (theta + k1 theta^3 + k2 theta^5 + k3 theta^7)`.
+pub(super) type Shape = [f64; 3];
+
+/// The shape of an ideal lens with this first coefficient: `f sin(q theta) / q` below zero,
+/// `f tan(q theta) / q` above. Equidistant, equisolid, stereographic and orthographic lenses are
+/// among them.
+pub(super) fn ideal_shape(k1: f64) -> Shape {
+    let (square, cube) = (k1 * k1, k1 * k1 * k1);
+    if k1 < 0.0 {
+        [k1, 0.3 * square, 3.0 / 70.0 * cube]
+    } else {
+        [k1, 1.2 * square, 51.0 / 35.0 * cube]
+    }
+}
+
+/// The derivative of [`ideal_shape`] to its first coefficient.
+pub(super) fn ideal_shape_slope(k1: f64) -> Shape {
+    if k1 < 0.0 {
+        [1.0, 0.6 * k1, 9.0 / 70.0 * k1 * k1]
+    } else {
+        [1.0, 2.4 * k1, 153.0 / 35.0 * k1 * k1]
+    }
+}
+
+/// A camera in a room of straight edges.
+#[derive(Debug, Clone)]
+pub(super) struct RoomCamera {
+    /// Focal length in pixels.
+    pub focal: f64,
+    /// First coefficient of the shape.
+    pub k1: f64,
+    /// Difference of the second coefficient from that of the ideal shape.
+    pub k2_offset: f64,
+    /// Center in pixels.
+    pub center: [f64; 2],
+    /// Camera from room: the third axis of the room is the vertical.
+    pub room: Rotation3<f64>,
+    /// Headings of further horizontal frames of edges, radians from the first.
+    pub headings: Vec<f64>,
+}
+
+/// A ray and what it changes with.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SeenRay {
+    /// The unit vector.
+    pub ray: Ray,
+    /// Derivative to the angle from the axis.
+    pub outward: Ray,
+    /// Derivative to the position around the axis, of unit length.
+    pub around: Ray,
+    /// Direction in the image from the center, a unit vector.
+    pub side: [f64; 2],
+    /// Angle from the axis.
+    pub theta: f64,
+    /// Change of the angle per pixel.
+    pub theta_per_pixel: f64,
+    /// Angle around the axis per pixel, times the sine of the angle from it.
+    pub around_per_pixel: f64,
+}
+
+impl RoomCamera {
+    pub(super) fn shape(&self) -> Shape {
+        let mut shape = ideal_shape(self.k1);
+        shape[1] += self.k2_offset;
+        shape
+    }
+
+    /// Radius in focal lengths, and its slope.
+    pub(super) fn curve(&self, theta: f64) -> (f64, f64) {
+        curve(self.shape(), theta)
+    }
+
+    /// The angle at a radius in pixels, or `None` where the curve turns back before.
+    pub(super) fn theta(&self, radius: f64) -> Option<f64> {
+        Angles::of(self, radius).map(|angles| angles.theta(radius / self.focal))
+    }
+
+    /// The directions of edges: the vertical, then pairs of horizontal ones.
+    pub(super) fn directions(&self) -> Vec<Ray> {
+        let mut directions = vec![
+            self.room * Ray::z(),
+            self.room * Ray::x(),
+            self.room * Ray::y(),
+        ];
+        for heading in &self.headings {
+            let (sin, cos) = heading.sin_cos();
+            directions.push(self.room * Vector3::new(cos, sin, 0.0));
+            directions.push(self.room * Vector3::new(-sin, cos, 0.0));
+        }
+        directions
+    }
+}
+
+fn curve([k1, k2, k3]: Shape, theta: f64) -> (f64, f64) {
+    let square = theta * theta;
+    let radius = theta * (1.0 + square * (k1 + square * (k2 + square * k3)));
+    let slope = 1.0 + square * (3.0 * k1 + square * (5.0 * k2 + square * 7.0 * k3));
+    (radius, slope)
+}
+
+/// Table of the angles of a camera.
+#[derive(Debug)]
+pub(super) struct Angles {
+    shape: Shape,
+    thetas: Vec<f64>,
+    entries_per_focal: f64,
+}
+
+impl Angles {
+    /// The table up to a radius in pixels, or `None` if the curve does not rise up to there.
+    pub(super) fn of(camera: &RoomCamera, radius: f64) -> Option<Self> {
+        let shape = camera.shape();
+        let end = radius / camera.focal;
+        let mut thetas = Vec::with_capacity(ENTRIES + 2);
+        let mut theta = 0.0_f64;
+        for entry in 0..ENTRIES + 2 {
+            #[expect(clippy::cast_precision_loss, reason = "a small index")]
+            let target = end * entry as f64 / ENTRIES as f64;
+            for _ in 0..3 {
+                let (value, slope) = curve(shape, theta);
+                if slope < MIN_SLOPE {
+                    return None;
+                }
+                theta += (target - value) / slope;
+            }
+            if !(0.0..MAX_THETA).contains(&theta.max(0.0)) {
+                return None;
+            }
+            thetas.push(theta);
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a small constant")]
+        let entries_per_focal = ENTRIES as f64 / end;
+        Some(Self {
+            shape,
+            thetas,
+            entries_per_focal,
+        })
+    }
+
+    /// The angle at a radius in focal lengths: linear between the entries, then one step of Newton.
+    pub(super) fn theta(&self, radius: f64) -> f64 {
+        let at = radius * self.entries_per_focal;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative"
+        )]
+        let entry = (at as usize).min(self.thetas.len() - 2);
+        #[expect(clippy::cast_precision_loss, reason = "a small index")]
+        let share = (at - entry as f64).min(1.0);
+        let theta = self.thetas[entry] + share * (self.thetas[entry + 1] - self.thetas[entry]);
+        let (value, slope) = curve(self.shape, theta);
+        theta + (radius - value) / slope.max(MIN_SLOPE)
+    }
+
+    /// The ray of a pixel.
+    pub(super) fn ray(&self, camera: &RoomCamera, [x, y]: [f64; 2]) -> SeenRay {
+        let [x, y] = [x - camera.center[0], y - camera.center[1]];
+        let radius = x.hypot(y).max(1e-6);
+        let side = [x / radius, y / radius];
+        let theta = self.theta(radius / camera.focal);
+        let (sin, cos) = theta.sin_cos();
+        let (_, slope) = curve(self.shape, theta);
+        SeenRay {
+            ray: Ray::new(sin * side[0], sin * side[1], cos),
+            outward: Ray::new(cos * side[0], cos * side[1], -sin),
+            around: Ray::new(-side[1], side[0], 0.0),
+            side,
+            theta,
+            theta_per_pixel: 1.0 / (camera.focal * slope.max(MIN_SLOPE)),
+            around_per_pixel: sin / radius,
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The way to the nearest maximum of the evidence.
+
+use nalgebra::{DVector, Rotation3, Vector3};
+
+use super::{
+    camera::RoomCamera,
+    edge_curve::EdgeCurve,
+    evidence::{Evaluation, PARAMETERS, evaluate},
+    prior::Prior,
+};
+
+/// The camera after a step of its parameters.
+fn stepped(camera: &RoomCamera, step: &DVector<f64>) -> RoomCamera {
+    RoomCamera {
+        focal: camera.focal * step[0].exp(),
+        k1: camera.k1 + step[1],
+        k2_offset: camera.k2_offset + step[2],
+        center: [camera.center[0] + step[3], camera.center[1] + step[4]],
+        room: Rotation3::new(Vector3::new(step[5], step[6], step[7])) * camera.room,
+        headings: camera
+            .headings
+            .iter()
+            .enumerate()
+            .map(|(index, heading)| heading + step[PARAMETERS + index])
+            .collect(),
+    }
+}
+
+/// Climbs to the nearest maximum of the evidence (Levenberg-Marquardt).
+pub(super) fn climb(
+    mut camera: RoomCamera,
+    curves: &[EdgeCurve],
+    weights: &[f64],
+    prior: &Prior,
+    blur: f64,
+    steps: usize,
+) -> Option<(RoomCamera, Evaluation)> {
+    let mut current = evaluate(&camera, curves, weights, prior, blur, true)?;
+    let mut damping = 1e-3;
+    for _ in 0..steps {
+        let mut damped = current.normal.clone();
+        for index in 0..damped.nrows() {
+            damped[(index, index)] *= 1.0 + damping;
+        }
+        let Some(cholesky) = damped.cholesky() else {
+            break;
+        };
+        let step = cholesky.solve(&current.right);
+        let next = stepped(&camera, &step);
+        match evaluate(&next, curves, weights, prior, blur, true) {
+            Some(evaluation) if evaluation.evidence > current.evidence => {
+                let gain = evaluation.evidence - current.evidence;
+                (camera, current) = (next, evaluation);
+                damping = (damping * 0.2).max(1e-6);
+                if gain < 1e-3 {
+                    break;
+                }
+            }
+            _ => {
+                damping *= 10.0;
+                if damping > 1e4 {
+                    break;
+                }
+            }
+        }
+    }
+    Some((camera, current))
+}

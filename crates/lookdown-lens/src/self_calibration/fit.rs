@@ -1,0 +1,317 @@
+//! The fit of a camera: starts, the best maximum, its uncertainty, and reasons to refuse it.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::{
+    camera::{RoomCamera, ideal_shape_slope},
+    climb::climb,
+    edge_curve::EdgeCurve,
+    evidence::{Evaluation, PARAMETERS},
+    prior::Prior,
+    refusal::FitRefusal,
+    search,
+};
+use crate::geometry::Ray;
+
+/// Curves of the first steps: the longest.
+const COARSE_CURVES: usize = 300;
+/// Starts that are followed.
+const COARSE_STARTS: usize = 12;
+/// Maxima that are followed with all curves.
+const FINE_STARTS: usize = 4;
+/// Fewer curves do not determine a camera.
+const MIN_CURVES: usize = 60;
+/// Less evidence (logarithm of the likelihood ratio) may be chance.
+const MIN_EVIDENCE: f64 = 100.0;
+/// Least share of the edges along each of the three directions.
+const MIN_SHARE: f64 = 0.02;
+/// Least share of the edges along any of them.
+const MIN_SHARES: f64 = 0.45;
+/// A second maximum with so much less evidence is within reach.
+const RIVAL_EVIDENCE: f64 = 12.0;
+/// Difference of two maxima that matters: share of the radius, and radians of the level.
+const RIVAL_DISTANCE: (f64, f64) = (0.03, 0.026);
+/// Largest uncertainty of the radius, as a share, and of the level, degrees.
+const MAX_UNCERTAINTY: (f64, f64) = (0.016, 0.8);
+/// Largest difference of a fit of half of the edges.
+const MAX_HALF: (f64, f64) = (0.03, 2.0);
+
+/// A lens circle, detected or assumed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CircleGuess {
+    /// Center in pixels.
+    pub center: [f64; 2],
+    /// Radius in pixels.
+    pub radius: f64,
+    /// Standard deviation of the optical center from it, pixels.
+    pub center_sigma: f64,
+}
+
+/// Values that are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct KnownLens {
+    /// Field of view of the circle, radians.
+    pub field_of_view: Option<f64>,
+    /// First coefficient of an ideal lens: 0 equidistant, -1/24 equisolid, 1/12 stereographic, -1/6
+    /// orthographic.
+    pub k1: Option<f64>,
+}
+
+/// Standard deviations of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitUncertainty {
+    /// Largest share of the radius between 20° and 80° from the axis.
+    pub radius: f64,
+    /// Pixels.
+    pub center: f64,
+    /// Degrees.
+    pub level_deg: f64,
+}
+
+/// A camera from the edges of a room.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoomFit {
+    /// Focal length in pixels.
+    pub focal: f64,
+    /// Coefficients of a Kannala-Brandt lens.
+    pub k: [f64; 4],
+    /// Center in pixels.
+    pub center: [f64; 2],
+    /// Angle at the circle, radians.
+    pub max_theta: f64,
+    /// Vertical and two horizontal directions of edges, in the camera frame; the first is down.
+    pub directions: [Ray; 3],
+    /// Share of the length of all edges along one of the directions.
+    pub explained: f64,
+    /// Number of edges.
+    pub edges: usize,
+    /// Standard deviations.
+    pub uncertainty: FitUncertainty,
+}
+
+impl RoomFit {
+    /// Fits a camera to the edges of its frames. Circles are tried in turn, a later one must explain the edges clearly
+    /// better than those before. The result is deterministic.
+    ///
+    /// # Errors
+    /// [`FitRefusal`] when the edges do not determine the camera.
+    pub fn of(
+        frames: &[Vec<EdgeCurve>],
+        circles: &[CircleGuess],
+        known: KnownLens,
+    ) -> Result<Self, FitRefusal> {
+        let all = frames.concat();
+        let curves = all.as_slice();
+        let edges = curves.len() / frames.len().max(1);
+        if edges < MIN_CURVES {
+            return Err(FitRefusal::TooFewEdges { edges });
+        }
+        // Frames of one camera show the same edges, so they are no independent evidence.
+        #[expect(clippy::cast_precision_loss, reason = "a few frames")]
+        let weight = 1.0 / frames.len() as f64;
+        let mut best: Option<(Vec<Maximum>, Prior)> = None;
+        for (index, circle) in circles.iter().enumerate() {
+            let prior = prior(circle, known);
+            let found = maxima(curves, weight, &prior, known);
+            let Some(first) = found.first() else { continue };
+            let least = if index == 0 { 0.0 } else { CLEARLY_BETTER };
+            let before = best.as_ref().and_then(|(maxima, _)| maxima.first());
+            if before
+                .is_none_or(|before| first.evaluation.evidence > before.evaluation.evidence + least)
+            {
+                best = Some((found, prior));
+            }
+        }
+        let (maxima, prior) = best.ok_or(FitRefusal::NoDirections { explained: 0.0 })?;
+        checked(curves, weight, &maxima, &prior)
+    }
+}
+
+/// Evidence by which a further circle must be better.
+const CLEARLY_BETTER: f64 = 3.0;
+
+/// A maximum of the evidence.
+struct Maximum {
+    camera: RoomCamera,
+    evaluation: Evaluation,
+}
+
+fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
+    let half = known.field_of_view.map(|field| (field / 2.0, 1e-3));
+    Prior {
+        center: circle.center,
+        center_sigma: circle.center_sigma,
+        radius: circle.radius,
+        k1: known.k1.map_or((-0.03, 0.15), |k1| (k1, 1e-4)),
+        k2_sigma: if known.k1.is_some() { 1e-5 } else { 0.003 },
+        rim: half.unwrap_or((FRAC_PI_2, 0.22)),
+    }
+}
+
+/// The best maxima, best first, each different from the others.
+fn maxima(curves: &[EdgeCurve], weight: f64, prior: &Prior, known: KnownLens) -> Vec<Maximum> {
+    let mut longest = curves.to_vec();
+    longest.sort_by_key(|segment| std::cmp::Reverse(segment.points.len()));
+    longest.truncate(COARSE_CURVES);
+    let weights = vec![weight; curves.len()];
+    let rim = known.field_of_view.map(|field| field / 2.0);
+    let mut coarse: Vec<Maximum> = Vec::new();
+    for start in search::starts(&longest, prior, rim, known.k1) {
+        let mut found = None;
+        let mut camera = start;
+        for (blur, steps) in [(6.0, 5), (3.0, 5), (1.5, 6)] {
+            found = climb(camera.clone(), &longest, &weights, prior, blur, steps);
+            let Some((next, _)) = &found else { break };
+            camera = next.clone();
+        }
+        coarse.extend(found.map(|(camera, evaluation)| Maximum { camera, evaluation }));
+        if coarse.len() == COARSE_STARTS {
+            break;
+        }
+    }
+    best_first(&mut coarse);
+    let mut fine: Vec<Maximum> = Vec::new();
+    let mut tried: Vec<RoomCamera> = Vec::new();
+    for Maximum { camera, .. } in coarse {
+        let is_known = tried.iter().any(|other| {
+            let (radius, level) = distance(&camera, other);
+            radius < 0.01 && level < 0.02
+        });
+        if is_known || tried.len() == FINE_STARTS {
+            continue;
+        }
+        tried.push(camera.clone());
+        let found = climb(camera, curves, &weights, prior, 1.5, 4)
+            .and_then(|(camera, _)| climb(camera, curves, &weights, prior, 1.0, 12));
+        fine.extend(found.map(|(camera, evaluation)| Maximum { camera, evaluation }));
+    }
+    best_first(&mut fine);
+    fine
+}
+
+fn best_first(maxima: &mut [Maximum]) {
+    maxima.sort_by(|a, b| b.evaluation.evidence.total_cmp(&a.evaluation.evidence));
+}
+
+/// Largest relative difference of the radius between 20° and 80°, and the angle between verticals.
+fn distance(one: &RoomCamera, other: &RoomCamera) -> (f64, f64) {
+    let radius = angles().map(|theta| {
+        (one.focal * one.curve(theta).0 / (other.focal * other.curve(theta).0) - 1.0).abs()
+    });
+    let level = (one.room * Ray::z()).angle(&(other.room * Ray::z()));
+    (radius.fold(0.0, f64::max), level)
+}
+
+/// 20° to 80°, radians.
+fn angles() -> impl Iterator<Item = f64> {
+    (2..=8).map(|tens| (10.0 * f64::from(tens)).to_radians())
+}
+
+fn checked(
+    curves: &[EdgeCurve],
+    weight: f64,
+    maxima: &[Maximum],
+    prior: &Prior,
+) -> Result<RoomFit, FitRefusal> {
+    let Some(Maximum { camera, evaluation }) = maxima.first() else {
+        return Err(FitRefusal::NoDirections { explained: 0.0 });
+    };
+    let explained: f64 = evaluation.shares.iter().sum();
+    if explained < MIN_SHARES || evaluation.evidence < MIN_EVIDENCE {
+        return Err(FitRefusal::NoDirections { explained });
+    }
+    if evaluation.shares.iter().any(|share| *share < MIN_SHARE) {
+        return Err(FitRefusal::MissingDirection);
+    }
+    let is_rival = |rival: &Maximum| {
+        let (radius, level) = distance(camera, &rival.camera);
+        let is_near = evaluation.evidence - rival.evaluation.evidence < RIVAL_EVIDENCE;
+        is_near && (radius > RIVAL_DISTANCE.0 || level > RIVAL_DISTANCE.1)
+    };
+    if maxima[1..].iter().any(is_rival) {
+        return Err(FitRefusal::Ambiguous);
+    }
+    let mut uncertainty = curvature(camera, evaluation).ok_or(FitRefusal::Ambiguous)?;
+    let (mut radius, mut level) = (0.0_f64, 0.0_f64);
+    let (mut squares, mut center_squares) = ([0.0; 2], 0.0);
+    for half in 0..4_usize {
+        // Two interleaved halves, then two halves of the image.
+        let weights: Vec<f64> = curves
+            .iter()
+            .enumerate()
+            .map(|(index, curve)| {
+                let first = curve.points[0];
+                let side = match half {
+                    0 | 1 => index % 2 == half,
+                    _ => (first[0] < camera.center[0]) == (half == 2),
+                };
+                if side { weight } else { 0.0 }
+            })
+            .collect();
+        let found = climb(camera.clone(), curves, &weights, prior, 1.0, 6);
+        let (other, _) = found.ok_or(FitRefusal::Ambiguous)?;
+        let (apart, turned) = distance(camera, &other);
+        radius = radius.max(apart);
+        level = level.max(turned.to_degrees());
+        if half < 2 {
+            squares[0] += apart * apart / 2.0;
+            squares[1] += turned.to_degrees().powi(2) / 2.0;
+            let [x, y] = [0, 1].map(|axis| other.center[axis] - camera.center[axis]);
+            center_squares += f64::midpoint(x * x, y * y);
+        }
+    }
+    uncertainty.radius = uncertainty.radius.max(squares[0].sqrt());
+    uncertainty.level_deg = uncertainty.level_deg.max(squares[1].sqrt());
+    uncertainty.center = uncertainty.center.max(center_squares.sqrt());
+    if uncertainty.radius > MAX_UNCERTAINTY.0 || uncertainty.level_deg > MAX_UNCERTAINTY.1 {
+        return Err(FitRefusal::Uncertain {
+            radius_percent: 100.0 * uncertainty.radius,
+            level_deg: uncertainty.level_deg,
+        });
+    }
+    if radius > MAX_HALF.0 || level > MAX_HALF.1 {
+        return Err(FitRefusal::HalvesDisagree {
+            radius_percent: 100.0 * radius,
+            level_deg: level,
+        });
+    }
+    let [k1, k2, k3] = camera.shape();
+    let directions = camera.directions();
+    Ok(RoomFit {
+        focal: camera.focal,
+        k: [k1, k2, k3, 0.0],
+        center: camera.center,
+        max_theta: camera.theta(prior.radius).ok_or(FitRefusal::Ambiguous)?,
+        directions: [directions[0], directions[1], directions[2]],
+        explained,
+        edges: curves.len(),
+        uncertainty,
+    })
+}
+
+/// Standard deviations from the curvature of the evidence.
+fn curvature(camera: &RoomCamera, evaluation: &Evaluation) -> Option<FitUncertainty> {
+    let covariance = evaluation.normal.clone().try_inverse()?;
+    debug_assert!(covariance.nrows() >= PARAMETERS);
+    let ideal = ideal_shape_slope(camera.k1);
+    let radius = angles().map(|theta| {
+        let (radius, _) = camera.curve(theta);
+        let (square, cube) = (theta * theta, theta.powi(3));
+        let along = cube * (ideal[0] + square * (ideal[1] + square * ideal[2]));
+        let slopes = [1.0, along / radius, cube * square / radius];
+        let mut variance = 0.0;
+        for (row, slope) in slopes.iter().enumerate() {
+            for (column, other) in slopes.iter().enumerate() {
+                variance += slope * other * covariance[(row, column)];
+            }
+        }
+        variance.max(0.0).sqrt()
+    });
+    let both =
+        |first: usize| (covariance[(first, first)] + covariance[(first + 1, first + 1)]).sqrt();
+    Some(FitUncertainty {
+        radius: radius.fold(0.0, f64::max),
+        center: both(3),
+        level_deg: both(5).to_degrees(),
+    })
+}

@@ -1,0 +1,65 @@
+//! What is assumed before any edge is seen.
+
+use super::{
+    camera::{Angles, RoomCamera, ideal_shape_slope},
+    evidence::Evaluation,
+};
+
+/// What is assumed before any curve is seen.
+#[derive(Debug, Clone)]
+pub(super) struct Prior {
+    /// Center of the lens circle in pixels.
+    pub center: [f64; 2],
+    /// Standard deviation of the optical center from it, pixels.
+    pub center_sigma: f64,
+    /// Radius up to which the curve must rise, pixels.
+    pub radius: f64,
+    /// First coefficient of the shape and its standard deviation.
+    pub k1: (f64, f64),
+    /// Standard deviation of the second coefficient from that of an ideal lens.
+    pub k2_sigma: f64,
+    /// Angle at the radius and its standard deviation, radians.
+    pub rim: (f64, f64),
+}
+
+impl Prior {
+    /// Adds the logarithm of the prior and its normal equations.
+    pub fn add_to(&self, result: &mut Evaluation, camera: &RoomCamera, angles: &Angles) {
+        let mut add = |rows: &[(usize, f64)], residual: f64, sigma: f64| {
+            let weight = 1.0 / (sigma * sigma);
+            result.evidence -= 0.5 * weight * residual * residual;
+            for (index, slope) in rows {
+                result.right[*index] -= weight * slope * residual;
+                for (other, other_slope) in rows {
+                    if other <= index {
+                        result.normal[(*index, *other)] += weight * slope * other_slope;
+                    }
+                }
+            }
+        };
+        for axis in 0..2 {
+            let off = camera.center[axis] - self.center[axis];
+            add(&[(3 + axis, 1.0)], off, self.center_sigma);
+        }
+        add(&[(2, 1.0)], camera.k2_offset, self.k2_sigma);
+        add(&[(1, 1.0)], camera.k1 - self.k1.0, self.k1.1);
+        let theta = angles.theta(self.radius / camera.focal);
+        let (radius, slope) = camera.curve(theta);
+        let ideal = ideal_shape_slope(camera.k1);
+        let cube = theta.powi(3);
+        let rows = [
+            (0, -radius / slope),
+            (
+                1,
+                -cube * (ideal[0] + theta * theta * (ideal[1] + theta * theta * ideal[2])) / slope,
+            ),
+            (2, -cube * theta * theta / slope),
+        ];
+        add(&rows, theta - self.rim.0, self.rim.1);
+        for index in 0..result.right.len() {
+            for other in 0..index {
+                result.normal[(other, index)] = result.normal[(index, other)];
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Reasons to return no camera.
+
+/// The edges do not determine the camera.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum FitRefusal {
+    /// A blank or dark room.
+    #[error(
+        "the frame has {edges} edges, too few for a fit: give another frame with the lights on, or with more of the \
+         room"
+    )]
+    TooFewEdges {
+        /// Number of edges.
+        edges: usize,
+    },
+    /// A room without a rectangular order.
+    #[error(
+        "only {:.0} % of the edges follow three orthogonal directions: give a frame that shows more walls, doors or \
+         shelves", 100.0 * explained
+    )]
+    NoDirections {
+        /// Explained share of the edges.
+        explained: f64,
+    },
+    /// Walls without vertical edges, or edges in one horizontal direction only.
+    #[error(
+        "one of the three directions of the room has no edges: give a frame that shows walls with doors or corners"
+    )]
+    MissingDirection,
+    /// Two cameras explain the edges equally well.
+    #[error(
+        "two different cameras explain the edges equally well: give further frames, or the field of view of the lens"
+    )]
+    Ambiguous,
+    /// The evidence is flat.
+    #[error(
+        "the edges determine the lens to {radius_percent:.1} % and the level to {level_deg:.1}° only: give further \
+         frames, or the field of view of the lens"
+    )]
+    Uncertain {
+        /// Standard deviation of the radius, percent.
+        radius_percent: f64,
+        /// Standard deviation of the level, degrees.
+        level_deg: f64,
+    },
+    /// Half of the edges gives another camera.
+    #[error(
+        "halves of the edges disagree by {radius_percent:.1} % of the radius and {level_deg:.1}°: give further frames \
+         with more of the room"
+    )]
+    HalvesDisagree {
+        /// Difference of the radius, percent.
+        radius_percent: f64,
+        /// Difference of the level, degrees.
+        level_deg: f64,
+    },
+}

@@ -1,0 +1,176 @@
+//! Starting points: lenses on a grid, and for each the directions that most edges agree on.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use nalgebra::{Matrix3, Rotation3};
+
+use super::{
+    camera::{Angles, RoomCamera, ideal_shape},
+    edge_curve::EdgeCurve,
+    prior::Prior,
+};
+use crate::geometry::Ray;
+
+/// First coefficients of the tried lenses: orthographic, between, equisolid, equidistant,
+/// stereographic.
+const SHAPES: [f64; 5] = [-1.0 / 6.0, -0.094, -1.0 / 24.0, 0.0, 1.0 / 12.0];
+/// Angles at the circle of the tried lenses, degrees.
+const RIMS: [f64; 7] = [72.0, 78.0, 84.0, 90.0, 96.0, 102.0, 108.0];
+/// Largest tilt, degrees.
+const MAX_TILT: f64 = 36.0;
+/// Distance between tried verticals, degrees.
+const TILT_STEP: f64 = 3.0;
+/// Width of the kernel: the sine of an angle.
+const KERNEL: f64 = 0.035;
+/// Verticals of one lens whose headings are tried.
+const VERTICALS: usize = 4;
+/// Headings over a quarter turn.
+const HEADINGS: usize = 45;
+
+struct Plane {
+    normal: Ray,
+    middle: Ray,
+    weight: f64,
+}
+
+/// Returns starts in the order of their scores, best first, one or two per lens.
+pub(super) fn starts(
+    curves: &[EdgeCurve],
+    prior: &Prior,
+    known_rim: Option<f64>,
+    known_k1: Option<f64>,
+) -> Vec<RoomCamera> {
+    let verticals = cone();
+    let mut starts: Vec<(RoomCamera, f64)> = Vec::new();
+    let shapes = known_k1.map_or(SHAPES.to_vec(), |k1| vec![k1]);
+    let rims = known_rim.map_or(RIMS.map(f64::to_radians).to_vec(), |rim| vec![rim]);
+    for k1 in shapes {
+        for &rim in &rims {
+            let shape = ideal_shape(k1);
+            let square = rim * rim;
+            let radius =
+                rim * (1.0 + square * (shape[0] + square * (shape[1] + square * shape[2])));
+            let camera = RoomCamera {
+                focal: prior.radius / radius,
+                k1,
+                k2_offset: 0.0,
+                center: prior.center,
+                room: Rotation3::identity(),
+                headings: Vec::new(),
+            };
+            let Some(angles) = Angles::of(&camera, prior.radius) else {
+                continue;
+            };
+            let planes = planes(curves, &camera, &angles);
+            starts.extend(
+                directions(&planes, &verticals)
+                    .into_iter()
+                    .map(|(room, score)| {
+                        (
+                            RoomCamera {
+                                room,
+                                ..camera.clone()
+                            },
+                            score,
+                        )
+                    }),
+            );
+        }
+    }
+    starts.sort_by(|a, b| b.1.total_cmp(&a.1));
+    starts.into_iter().map(|(camera, _)| camera).collect()
+}
+
+/// Directions around the axis, evenly.
+fn cone() -> Vec<Ray> {
+    let mut rays = vec![Ray::z()];
+    let mut tilt = TILT_STEP;
+    while tilt <= MAX_TILT {
+        let (sin, cos) = tilt.to_radians().sin_cos();
+        let count = (TAU * sin / TILT_STEP.to_radians()).round();
+        let mut index = 0.0;
+        while index < count {
+            let (y, x) = (TAU * index / count).sin_cos();
+            rays.push(Ray::new(sin * x, sin * y, cos));
+            index += 1.0;
+        }
+        tilt += TILT_STEP;
+    }
+    rays
+}
+
+/// The planes of the curves, weighted by length; a curve that is no straight line has no weight.
+fn planes(curves: &[EdgeCurve], camera: &RoomCamera, angles: &Angles) -> Vec<Plane> {
+    let plane = |curve: &EdgeCurve| {
+        let first = angles.ray(camera, *curve.points.first()?).ray;
+        let last = angles.ray(camera, *curve.points.last()?).ray;
+        let middle = angles.ray(camera, curve.points[curve.points.len() / 2]).ray;
+        let normal = first.cross(&last).try_normalize(1e-6)?;
+        let bend = normal.dot(&middle) * camera.focal / 2.0;
+        let weight = curve.length().min(120.0) / (1.0 + bend * bend);
+        Some(Plane {
+            normal,
+            middle,
+            weight,
+        })
+    };
+    curves.iter().filter_map(plane).collect()
+}
+
+fn kernel(sine: f64) -> f64 {
+    let ratio = sine / KERNEL;
+    let root = 1.0 / (1.0 + ratio * ratio);
+    root * root
+}
+
+fn directions(planes: &[Plane], verticals: &[Ray]) -> Vec<(Rotation3<f64>, f64)> {
+    let total: f64 = planes.iter().map(|plane| plane.weight).sum();
+    let along = |direction: &Ray| -> f64 {
+        let hits = planes
+            .iter()
+            .filter(|plane| plane.middle.dot(direction).abs() < 0.97);
+        hits.map(|plane| plane.weight * kernel(plane.normal.dot(direction)))
+            .sum()
+    };
+    let mut scored: Vec<(Ray, f64)> = verticals.iter().map(|ray| (*ray, along(ray))).collect();
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut peaks: Vec<Ray> = Vec::new();
+    for (ray, _) in scored {
+        if peaks.iter().all(|peak| peak.angle(&ray) > 0.1) {
+            peaks.push(ray);
+        }
+        if peaks.len() == VERTICALS {
+            break;
+        }
+    }
+    let mut found: Vec<(Rotation3<f64>, f64)> = peaks
+        .iter()
+        .map(|down| heading(planes, *down, total))
+        .collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found.truncate(2);
+    found
+}
+
+/// The heading at which most edges fit, and its score.
+fn heading(planes: &[Plane], down: Ray, total: f64) -> (Rotation3<f64>, f64) {
+    let first = Ray::y().cross(&down).normalize();
+    let second = down.cross(&first);
+    let mut best = (Rotation3::identity(), f64::NEG_INFINITY);
+    for index in 0..HEADINGS {
+        #[expect(clippy::cast_precision_loss, reason = "a small index")]
+        let angle = FRAC_PI_2 * index as f64 / HEADINGS as f64;
+        let x = first * angle.cos() + second * angle.sin();
+        let y = down.cross(&x);
+        let mut score = 0.0;
+        for plane in planes {
+            let nearest = [&x, &y, &down].map(|direction| plane.normal.dot(direction).abs());
+            score += plane.weight * kernel(nearest[0].min(nearest[1]).min(nearest[2]));
+        }
+        if score > best.1 {
+            let axes = Matrix3::from_columns(&[x, y, down]);
+            best = (Rotation3::from_matrix_unchecked(axes), score);
+        }
+    }
+    (best.0, best.1 / total.max(1e-9))
+}

@@ -1,0 +1,130 @@
+//! Fits of cameras to drawn edges of a room.
+
+use nalgebra::{Rotation3, Vector3};
+
+use super::{CircleGuess, EdgeCurve, FitRefusal, KnownLens, RoomFit};
+use crate::geometry::Ray;
+
+const FOCAL: f64 = 400.0;
+const CENTER: [f64; 2] = [603.0, 596.0];
+
+/// Pixel of a ray in an equisolid lens.
+fn pixel(ray: &Ray) -> [f64; 2] {
+    let theta = ray.z.atan2(ray.x.hypot(ray.y));
+    let radius = 2.0 * FOCAL * ((std::f64::consts::FRAC_PI_2 - theta) / 2.0).sin();
+    let flat = ray.x.hypot(ray.y).max(1e-12);
+    [
+        CENTER[0] + radius * ray.x / flat,
+        CENTER[1] + radius * ray.y / flat,
+    ]
+}
+
+/// Edges of a room of 6 by 5 by 2.8 metres seen by a tilted camera below its ceiling.
+fn edges(camera_from_room: &Rotation3<f64>) -> Vec<EdgeCurve> {
+    let mut edges = Vec::new();
+    let mut add = |from: [f64; 3], to: [f64; 3]| {
+        let [from, to] = [from, to].map(Vector3::from);
+        let points: Vec<[f64; 2]> = (0..12)
+            .map(|step| from + (to - from) * (f64::from(step) / 11.0))
+            .map(|at| camera_from_room * at)
+            .filter(|ray| ray.angle(&Ray::z()) < 1.6)
+            .map(|ray| pixel(&ray))
+            .collect();
+        if points.len() > 2 {
+            edges.push(EdgeCurve { points });
+        }
+    };
+    for step in 0..12 {
+        let share = f64::from(step) / 11.0;
+        let (x, y) = (-2.0 + 6.0 * share, -3.0 + 5.0 * share);
+        add([x, -3.0, 0.3], [x, -3.0, 2.0]);
+        add([x, 2.0, 0.6], [x, 2.0, 2.7]);
+        add([-2.0, y, 0.5], [-2.0, y, 1.9]);
+        add([4.0, y, 0.4], [4.0, y, 2.5]);
+        add([x, -3.0, 2.7], [x, -1.2, 2.7]);
+        add([-2.0, y, 2.7], [0.5, y, 2.7]);
+        add(
+            [-1.0 + share, -3.0, 0.5 + share],
+            [1.0 + share, -3.0, 0.5 + share],
+        );
+    }
+    edges
+}
+
+fn circle() -> CircleGuess {
+    CircleGuess {
+        center: [600.0, 600.0],
+        radius: 2.0 * FOCAL * (1.55_f64 / 2.0).sin(),
+        center_sigma: 6.0,
+    }
+}
+
+#[test]
+fn tilted_equisolid_camera_is_found() {
+    let room = Rotation3::from_euler_angles(0.14, -0.09, 0.4);
+    let fit = RoomFit::of(&[edges(&room)], &[circle()], KnownLens::default()).unwrap();
+    let level = fit.directions[0].angle(&(room * Ray::z())).to_degrees();
+    assert!(level < 0.2, "{level}° off level");
+    let off = (fit.center[0] - CENTER[0]).hypot(fit.center[1] - CENTER[1]);
+    assert!(off < 2.0, "{off} pixels off center");
+    for degrees in [20.0_f64, 50.0, 80.0] {
+        let theta = degrees.to_radians();
+        let square = theta * theta;
+        let odd = fit.k.iter().rev().fold(0.0, |sum, k| (sum + k) * square);
+        let ratio = fit.focal * theta * (1.0 + odd) / (2.0 * FOCAL * (theta / 2.0).sin());
+        assert!((ratio - 1.0).abs() < 0.01, "{ratio} at {degrees}°");
+    }
+}
+
+#[test]
+fn given_field_of_view_is_kept() {
+    let room = Rotation3::from_euler_angles(0.1, 0.05, 0.2);
+    let known = KnownLens {
+        field_of_view: Some(3.1),
+        k1: Some(-1.0 / 24.0),
+    };
+    let fit = RoomFit::of(&[edges(&room)], &[circle()], known).unwrap();
+    assert!(
+        (2.0 * fit.max_theta - 3.1).abs() < 0.01,
+        "{}",
+        fit.max_theta
+    );
+}
+
+#[test]
+fn few_edges_are_refused() {
+    let room = Rotation3::identity();
+    let few = edges(&room).split_off(70);
+    let refusal = RoomFit::of(
+        std::slice::from_ref(&few),
+        &[circle()],
+        KnownLens::default(),
+    );
+    assert_eq!(refusal, Err(FitRefusal::TooFewEdges { edges: few.len() }));
+}
+
+#[test]
+fn edges_without_order_are_refused() {
+    let mut state = 7_u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        f64::from(u32::try_from(state >> 40).unwrap()) / f64::from(1 << 24)
+    };
+    let curves: Vec<EdgeCurve> = (0..200)
+        .map(|_| {
+            let ([x, y], turn) = (
+                [200.0 + 800.0 * random(), 200.0 + 800.0 * random()],
+                std::f64::consts::TAU * random(),
+            );
+            let points = (0..6).map(|step| 8.0 * f64::from(step));
+            EdgeCurve {
+                points: points
+                    .map(|far| [x + far * turn.cos(), y + far * turn.sin()])
+                    .collect(),
+            }
+        })
+        .collect();
+    assert!(RoomFit::of(&[curves], &[circle()], KnownLens::default()).is_err());
+}
