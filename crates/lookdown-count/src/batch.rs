@@ -1,4 +1,4 @@
-//! What a transaction of the store changes.
+//! The content of a transaction of the store.
 
 use crate::{
     scene::SceneState,
