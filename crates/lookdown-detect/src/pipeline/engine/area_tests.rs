@@ -159,7 +159,7 @@ fn views_far_from_all_areas_skip_inference() {
             "{profile}: {limited:?}, {open:?}"
         );
         // The disc is far from the area: no crop shows it.
-        let first_pass = open.inferred + open.outside - usize::from(profile == "balanced");
+        let first_pass = open.inferred + open.outside - usize::from(profile != "paper");
         assert_eq!(
             limited.inferred + limited.outside + limited.outside_areas,
             first_pass,
