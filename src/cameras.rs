@@ -79,7 +79,8 @@ pub enum CameraError {
     Source(#[from] SourceError),
 }
 
-type Stored = BTreeMap<String, StoredCamera>;
+/// Stored cameras by name.
+pub type Stored = BTreeMap<String, StoredCamera>;
 
 /// The cameras of this process.
 pub struct Cameras {
@@ -103,10 +104,14 @@ impl Cameras {
         }
     }
 
-    /// Returns the states of the cameras that are watched.
+    /// Returns the states of the cameras that are watched: those of the settings and these stored
+    /// ones. A camera that was deleted may still end.
     #[must_use]
-    pub fn states(&self) -> Vec<CameraState> {
-        self.metrics.states()
+    pub fn states(&self, stored: &Stored) -> Vec<CameraState> {
+        let configured = self.configured.read();
+        let mut states = self.metrics.states();
+        states.retain(|state| stored.contains_key(&state.name) || configured.contains(&state.name));
+        states
     }
 
     /// Adds the stored cameras that are not paused to those of the settings, which have precedence.
@@ -167,7 +172,7 @@ impl Cameras {
         });
         match password {
             Some(password) => self.write(&self.password(name), password.expose_secret())?,
-            None if !is_same_login => self.remove(&self.password(name))?,
+            None if !is_same_login => remove_file(&self.password(name))?,
             None => {}
         }
         let is_new = stored.insert(name.to_owned(), camera).is_none();
@@ -189,7 +194,7 @@ impl Cameras {
             return Ok(false);
         }
         self.store(&stored)?;
-        self.remove(&self.password(name))?;
+        remove_file(&self.password(name))?;
         Ok(true)
     }
 
@@ -257,15 +262,6 @@ impl Cameras {
         };
         written().map_err(|error| CameraError::Folder(path.to_owned(), error))
     }
-
-    fn remove(&self, path: &Path) -> Result<(), CameraError> {
-        match fs::remove_file(path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(CameraError::Folder(path.to_owned(), error))
-            }
-            _ => Ok(()),
-        }
-    }
 }
 
 fn entry(name: &str, camera: &StoredCamera) -> CameraEntry {
@@ -303,6 +299,16 @@ fn origin(url: &str) -> Option<(String, String, Option<u16>)> {
     let url = url::Url::parse(url).ok()?;
     let host = url.host_str()?.to_owned();
     Some((url.scheme().to_owned(), host, url.port_or_known_default()))
+}
+
+/// Removes a file, if it exists.
+fn remove_file(path: &Path) -> Result<(), CameraError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(CameraError::Folder(path.to_owned(), error))
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

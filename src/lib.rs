@@ -22,4 +22,3 @@ mod rounding;
 pub mod settings;
 pub mod telemetry;
 pub mod tls;
-pub mod watched_file;

@@ -2,6 +2,7 @@
 //! for live streams. A report is stored as the exact bytes that answered its frame.
 
 mod cameras;
+mod followed_number;
 mod headline;
 mod listeners;
 mod memory;
@@ -12,9 +13,8 @@ mod store;
 mod unreachable;
 
 pub use cameras::Cameras;
-pub use headline::{
-    FOLLOWED_FOR, FollowedNumber, Headline, HeadlineSource, MEDIAN_WINDOW, medians,
-};
+pub use followed_number::{FOLLOWED_FOR, FollowedNumber};
+pub use headline::{Headline, HeadlineSource, MEDIAN_WINDOW, medians};
 pub use listeners::{ListenError, Listeners, Listening};
 pub use memory::MemoryResults;
 pub use picture::{NewPicture, PicturesOf, StoredPicture};

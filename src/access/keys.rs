@@ -9,9 +9,10 @@ use std::{
 use parking_lot::{Mutex, RwLock};
 
 use super::{Holder, KeyError, KeyList};
-use lookdown_common::LogOnce;
-
-use crate::watched_file;
+use lookdown_common::{
+    LogOnce,
+    files::{self, MAX_SETTINGS_BYTES},
+};
 
 /// The current keys.
 #[derive(Debug)]
@@ -91,5 +92,5 @@ fn read(path: &Path, lasting: &KeyList) -> Result<KeyList, KeyError> {
 }
 
 fn read_text(path: &Path) -> io::Result<String> {
-    io::read_to_string(watched_file::read(path)?.as_slice())
+    files::read_text(path, MAX_SETTINGS_BYTES)
 }

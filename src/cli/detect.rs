@@ -19,6 +19,7 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
+use lookdown_common::files;
 use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{DetectJob, Detected, Engine, JobImage},
@@ -263,7 +264,7 @@ fn read(image: &Path, max_bytes: u64) -> anyhow::Result<Bytes> {
     if bytes > max_bytes {
         bail!("the file has {bytes} bytes: server.max_body_bytes allows {max_bytes}");
     }
-    let encoded = fs::read(image).context("the file cannot be read")?;
+    let encoded = files::read(image, max_bytes).context("the file cannot be read")?;
     Ok(encoded.into())
 }
 

@@ -12,6 +12,7 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use lookdown_common::files::{self, MAX_IMAGE_BYTES};
 use lookdown_detect::{
     imaging::ViewBatch,
     inference::{Detector, InferenceError, OnnxDetector},
@@ -158,7 +159,7 @@ fn time(detector: &mut OnnxDetector, views: usize) -> Result<Duration, Inference
 fn detect(settings: &Settings, sample: &Path, profile: &str) -> anyhow::Result<Detected> {
     let parameters = DetectParameters::parse([("profile", profile)])?;
     let engine = engine_for(settings, std::slice::from_ref(&parameters))?;
-    let image = std::fs::read(sample)
+    let image = files::read(sample, MAX_IMAGE_BYTES)
         .with_context(|| format!("--sample: {} cannot be read", sample.display()))?;
     Ok(engine.detect(&DetectJob::local(
         sample.display().to_string(),

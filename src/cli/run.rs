@@ -164,7 +164,7 @@ impl Parts {
         };
         let counting = async {
             let counting = self.count(&server, &companions, after_watching);
-            let outcome = self.ends_all(counting).await;
+            let outcome = self.ends_all(Box::pin(counting)).await;
             let _ = counted.send(true);
             outcome
         };
@@ -180,7 +180,7 @@ impl Parts {
         };
         let parts = async { tokio::join!(serving, watching, counting) };
         tokio::select! {
-            (served, watched, counted) = parts => served.and(watched).and(counted),
+            (first, second, third) = parts => first.and(second).and(third),
             outcome = stopping => outcome,
         }
     }

@@ -46,7 +46,7 @@ impl Broker {
     }
 }
 
-/// The text is no URL of a broker. The text is not repeated, as it may hold a password.
+/// The text is not a URL of a broker. The text is not repeated, as it may hold a password.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "not a URL of a broker: give one such as mqtt://user:password@host:1883, or mqtts:// for TLS, \

@@ -5,34 +5,12 @@
 
 use std::{num::NonZeroUsize, sync::Arc, time::Duration};
 
-use jiff::Timestamp;
-
-use super::{Cameras, ReportId, ResultStore, StoredReport, Unreachable};
+use super::{Cameras, FollowedNumber, ReportId, ResultStore, StoredReport, Unreachable};
 
 /// The reports of this time before the latest one, inclusively, have a part in the median.
 pub const MEDIAN_WINDOW: Duration = Duration::from_secs(5);
 /// Most reports of the median.
 const MOST_REPORTS: usize = 500;
-/// A followed number is valid for this time.
-pub const FOLLOWED_FOR: Duration = Duration::from_secs(15);
-
-/// The number of followed persons, as it was handed back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FollowedNumber {
-    /// The number of persons.
-    pub persons: usize,
-    /// The time at which it was handed back.
-    pub at: Timestamp,
-}
-
-impl FollowedNumber {
-    /// Returns true while it is valid.
-    #[must_use]
-    pub fn is_valid(&self, now: Timestamp) -> bool {
-        let age = now.duration_since(self.at);
-        Duration::try_from(age).map_or(true, |age| age <= FOLLOWED_FOR)
-    }
-}
 
 /// The origin of a headline number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,6 +99,8 @@ fn median(numbers: impl Iterator<Item = usize>) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use bytes::Bytes;
+
+    use jiff::Timestamp;
 
     use super::*;
     use crate::{

@@ -3,6 +3,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use lookdown_common::files::{self, MAX_SETTINGS_BYTES};
 use toml::{Table, Value};
 
 use super::{
@@ -113,7 +114,7 @@ impl Values {
 }
 
 fn read(path: &Path) -> Result<String, SettingsError> {
-    std::fs::read_to_string(path).map_err(|source| SettingsError::Unreadable {
+    files::read_text(path, MAX_SETTINGS_BYTES).map_err(|source| SettingsError::Unreadable {
         path: path.to_owned(),
         source,
     })

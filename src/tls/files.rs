@@ -9,7 +9,7 @@ use rustls::pki_types::{
 use sha2::{Digest, Sha256};
 
 use super::{TlsError, TlsOptions};
-use crate::watched_file;
+use lookdown_common::files::{self, MAX_SETTINGS_BYTES};
 
 const CERTIFICATE: &str = "server.tls.certificate";
 const PRIVATE_KEY: &str = "server.tls.private_key";
@@ -125,7 +125,7 @@ fn certificates(
 }
 
 fn read(setting: &'static str, path: &Path) -> Result<Vec<u8>, TlsError> {
-    watched_file::read(path).map_err(|cause| TlsError::Unreadable {
+    files::read(path, MAX_SETTINGS_BYTES).map_err(|cause| TlsError::Unreadable {
         setting,
         path: path.to_owned(),
         cause,

@@ -162,7 +162,7 @@ fn free_address() -> SocketAddr {
 }
 
 /// Starts `lookdown count` for a server that does not run.
-async fn start_count(folder: &Path, key_file: Option<PathBuf>) -> (SocketAddr, JoinHandle<()>) {
+fn start_count(folder: &Path, key_file: Option<PathBuf>) -> (SocketAddr, JoinHandle<()>) {
     let address = free_address();
     let entry = CountEntry {
         server: nowhere(),
@@ -225,8 +225,8 @@ async fn each_listener_has_the_protections_of_the_table() {
     let folders: [TempDir; 3] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
     let key_file = folders[1].path().join("key");
     fs::write(&key_file, KEY).unwrap();
-    let (count, count_task) = start_count(folders[0].path(), None).await;
-    let (guarded, guarded_task) = start_count(folders[1].path(), Some(key_file)).await;
+    let (count, count_task) = start_count(folders[0].path(), None);
+    let (guarded, guarded_task) = start_count(folders[1].path(), Some(key_file));
     let (watched, watch_task) = start_watch(folders[2].path());
     let listener = |name, address, path, key| Listener {
         name,

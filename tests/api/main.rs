@@ -20,6 +20,7 @@ mod kept_pictures;
 mod listeners;
 mod load;
 mod log;
+mod matrix;
 mod metrics_table;
 mod operation;
 mod peers;

@@ -16,7 +16,7 @@ const KEY: &str = "lookdown_0123456789abcdef";
 /// SHA-256 of [`KEY`].
 const KEY_DIGEST: &str = "5800568aa3f1d98c8b4ed0c70daf01517134d48b8a9392e61ae22301e0c65945";
 /// Longest wait for a condition.
-const TIMEOUT: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_mins(1);
 /// Interval of the checks of a condition.
 const CHECK: Duration = Duration::from_millis(100);
 

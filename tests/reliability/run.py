@@ -25,10 +25,12 @@ from proofs import (  # noqa: E402
     kill,
     memory,
     overload,
+    planted,
     reload,
     rude,
     soak,
     stop,
+    streams,
 )
 from support.effort import LONG, SHORT  # noqa: E402
 from support.places import WORK  # noqa: E402
@@ -44,6 +46,8 @@ PARTS = (
     descriptors,
     memory,
     clock,
+    planted,
+    streams,
     rude,
     floods,
     drawing,

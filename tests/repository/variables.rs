@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, fs, path::Path};
 use lookdown::settings::load;
 
 /// The folders and files that tell users how to set variables.
-const PLACES: [&str; 13] = [
+const PLACES: [&str; 14] = [
     "CONTRIBUTING.md",
     "Makefile",
     "README.md",
@@ -15,7 +15,8 @@ const PLACES: [&str; 13] = [
     "docs",
     "examples",
     "k8s",
-    "lab",
+    "lab/benches",
+    "lab/training",
     "packaging",
     "scripts",
     "web",

@@ -1,16 +1,11 @@
 //! Settings files: reading with limits, secrets, and errors that name the field.
 
-use std::{
-    fs::File,
-    io::{self, Read},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use secrecy::SecretString;
 use serde::de::DeserializeOwned;
 
-/// Most bytes of a file.
-const MAX_BYTES: u64 = 1 << 20;
+use crate::files::{self, MAX_SETTINGS_BYTES};
 
 /// A setting that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -106,17 +101,7 @@ pub fn parse_toml<T: DeserializeOwned>(
 /// # Errors
 /// [`ConfigError::Unreadable`].
 pub fn read_file(field: &str, path: &Path) -> Result<Vec<u8>, ConfigError> {
-    let limited = || {
-        let mut content = Vec::new();
-        let length = File::open(path)?
-            .take(MAX_BYTES + 1)
-            .read_to_end(&mut content)?;
-        if length as u64 > MAX_BYTES {
-            return Err(io::Error::other("it has more than 1 MiB"));
-        }
-        Ok(content)
-    };
-    limited().map_err(|source| ConfigError::Unreadable {
+    files::read(path, MAX_SETTINGS_BYTES).map_err(|source| ConfigError::Unreadable {
         field: field.to_owned(),
         path: path.to_owned(),
         source,

@@ -16,6 +16,9 @@ use rustix::fs::OFlags;
 /// Most bytes of a settings file, a key or a certificate.
 pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 
+/// Most bytes of an image file that the command line reads.
+pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
+
 /// The treatment of a symbolic link at the end of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Links {

@@ -140,7 +140,7 @@ impl ServerClient {
         self.url.origin().ascii_serialization()
     }
 
-    /// Describes a response that is no success, with the detail of its problem document.
+    /// Describes a response that is not a success, with the detail of its problem document.
     pub async fn refusal(&self, response: Response) -> String {
         let status = response.status();
         let body = read_body(response, MAX_PROBLEM_BYTES).await;

@@ -74,7 +74,7 @@ impl ServerEntry {
             is_http && url.username().is_empty() && url.password().is_none()
         });
         let Some(url) = url else {
-            let remedy = "is no URL of a server: write it like http://127.0.0.1:8080";
+            let remedy = "is not a URL of a server: write it like http://127.0.0.1:8080";
             // It may hold a password.
             let shown = text.rsplit('@').next().unwrap_or_default();
             return Err(ConfigError::value("upstream.url", &shown, remedy));

@@ -20,13 +20,36 @@ impl fmt::Display for Quoted<'_> {
     }
 }
 
+/// Returns true for characters that a name must not have: control characters, and invisible ones
+/// that join, hide or reorder the others (Unicode category Cf), such as U+202E.
+#[must_use]
+pub fn is_invisible(character: char) -> bool {
+    character.is_control()
+        || matches!(
+            character,
+            '\u{ad}'
+                | '\u{600}'..='\u{605}'
+                | '\u{61c}'
+                | '\u{6dd}'
+                | '\u{70f}'
+                | '\u{180e}'
+                | '\u{200b}'..='\u{200f}'
+                | '\u{2028}'..='\u{202e}'
+                | '\u{2060}'..='\u{206f}'
+                | '\u{feff}'
+                | '\u{fff9}'..='\u{fffb}'
+                | '\u{e0000}'..='\u{e007f}'
+        )
+}
+
 /// Formats a text as one line of at most 300 characters, so that it can neither forge nor fill log
 /// lines.
 #[must_use]
 pub fn one_line(text: &(impl fmt::Display + ?Sized)) -> String {
     let text = text.to_string();
     let text = text.trim().chars().take(MAX_LINE_CHARS);
-    text.map(|c| if c.is_control() { ' ' } else { c }).collect()
+    text.map(|c| if is_invisible(c) { ' ' } else { c })
+        .collect()
 }
 
 /// Formats an error with its causes in one line.
@@ -57,6 +80,12 @@ pub fn shortened(text: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn characters_that_reorder_a_line_are_replaced() {
+        assert_eq!(one_line("a\u{202e}b\u{feff}c\nd"), "a b c d");
+        assert!(!is_invisible('ä') && !is_invisible('走') && !is_invisible(' '));
+    }
 
     #[test]
     fn short_text_is_quoted_whole() {

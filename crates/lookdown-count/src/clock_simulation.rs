@@ -271,7 +271,7 @@ impl World {
     }
 
     fn crossings(&self) -> u64 {
-        let crossings = self.engine.totals().crossings.iter();
+        let crossings = self.engine.stored_totals().crossings.iter();
         let of_hall = crossings.filter(|(of, _)| of.camera == CAMERAS[1]);
         of_hall.map(|(_, count)| count).sum()
     }

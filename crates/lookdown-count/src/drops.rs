@@ -58,7 +58,7 @@ impl fmt::Display for DropReason {
             Self::OutOfOrder => {
                 "its times go back, or are later than those of other cameras of its site: set the clocks"
             }
-            Self::TooManyCameras => "there are too many cameras: raise counting.max_cameras",
+            Self::TooManyCameras => "there are too many cameras: raise counts.max_cameras",
         })
     }
 }

@@ -119,7 +119,7 @@ impl Engine {
     }
 
     /// Returns the totals that are stored.
-    pub(crate) fn totals(&self) -> &Totals {
+    pub(crate) fn stored_totals(&self) -> &Totals {
         &self.stored_totals
     }
 

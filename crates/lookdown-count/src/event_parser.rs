@@ -8,7 +8,7 @@ const MAX_EVENT_BYTES: usize = 8 << 20;
 /// An event with data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Event {
-    /// Its ID; `None` if it is no ID of a Lookdown server.
+    /// Its ID; `None` if it is not an ID of a Lookdown server.
     pub(crate) id: Option<u64>,
     pub(crate) data: Vec<u8>,
 }

@@ -16,12 +16,13 @@ use crate::{
     engine::{Accepted, Batch, Engine},
     event_parser::Event,
     event_stream::{EventStream, StreamError},
+    message::Message,
     metrics::Metrics,
     now::Now,
     report::Report,
     snapshot::Snapshot,
     store::Store,
-    webhooks::{Conditions, Deliveries, Message},
+    webhooks::{Conditions, Deliveries},
 };
 
 /// Pauses between connections.
@@ -213,7 +214,7 @@ impl Follower {
         }
         let batch = batch.unwrap_or_else(|| {
             let engine = self.engine.lock();
-            Batch::empty(engine.last_event(), engine.totals().clone())
+            Batch::empty(engine.last_event(), engine.stored_totals().clone())
         });
         let batch = Arc::new((batch, messages, held));
         let mut backoff = Backoff::new(FIRST_PAUSE, LONGEST_PAUSE);

@@ -4,6 +4,7 @@ mod counts;
 mod floor;
 mod frame_heat_map;
 mod heat_map;
+mod shared;
 mod time;
 mod tracks;
 
@@ -21,21 +22,13 @@ use axum::{
     routing::get,
 };
 use jiff::Timestamp;
-use lookdown_common::text::one_line;
-use lookdown_http::problem::{Kind, Problem};
 use parking_lot::Mutex;
 use serde::Serialize;
 
-use crate::{engine::Engine, metrics::Metrics, store::Store, sums::Owner};
+use crate::{engine::Engine, metrics::Metrics, sums::Owner};
 pub(crate) use counts::{MAX_VALUES, table};
-
-/// Everything that requests read.
-pub(crate) struct Api {
-    pub(crate) engine: Arc<Mutex<Engine>>,
-    pub(crate) store: Store,
-}
-
-type Shared = Arc<Api>;
+pub(crate) use shared::Api;
+use shared::{Shared, now_ms};
 
 /// Returns the routes, without protection: a listener adds it.
 pub(crate) fn router(api: Api) -> Router {
@@ -143,61 +136,4 @@ async fn cameras(State(api): State<Shared>) -> Json<Vec<CameraRow>> {
         entry.or_insert_with(|| CameraRow::new(name, &engine));
     }
     Json(rows.into_values().collect())
-}
-
-fn now_ms() -> i64 {
-    Timestamp::now().as_millisecond()
-}
-
-/// Runs a query of the store without blocking the runtime.
-async fn query<T: Send + 'static>(
-    api: &Shared,
-    query: impl FnOnce(&Store) -> Result<T, crate::store::StoreError> + Send + 'static,
-) -> Result<T, Problem> {
-    let store = api.store.clone();
-    blocking(move || {
-        query(&store).map_err(|problem| {
-            tracing::error!("{problem}");
-            Problem::internal()
-        })
-    })
-    .await
-}
-
-/// Runs work that takes time without blocking the runtime.
-async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
-) -> Result<T, Problem> {
-    let done = tokio::task::spawn_blocking(work).await;
-    // A task that panicked is logged by the panic hook.
-    done.unwrap_or_else(|_| Err(Problem::internal()))
-}
-
-fn not_found(detail: impl Into<String>) -> Problem {
-    Problem::new(Kind::NotFound, detail)
-}
-
-/// Refuses an owner that has neither a scene nor sums.
-async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Problem> {
-    let is_followed = match owner {
-        Owner::Camera(camera) => api.engine.lock().scene_of(camera).is_some(),
-        Owner::Site(site) => api.engine.lock().site(site).is_some(),
-    };
-    if is_followed {
-        return Ok(());
-    }
-    let asked = owner.clone();
-    if query(api, move |store| store.has(&asked)).await? {
-        return Ok(());
-    }
-    Err(match owner {
-        Owner::Camera(camera) => not_found(format!(
-            "there is no camera {}: GET /counts lists them",
-            one_line(camera)
-        )),
-        Owner::Site(site) => not_found(format!(
-            "there is no site {}: give a mount.site of a calibration in use",
-            one_line(site)
-        )),
-    })
 }

@@ -20,6 +20,7 @@ mod event_stream;
 mod follower;
 mod hand_back;
 mod http;
+mod message;
 mod metrics;
 mod now;
 mod options;

@@ -11,6 +11,7 @@ use lookdown_http::{
 };
 use parking_lot::Mutex;
 use tokio::{
+    net::TcpListener,
     sync::watch,
     task::spawn_blocking,
     time::{Instant, timeout},
@@ -110,27 +111,8 @@ pub async fn count(
         store: store.clone(),
     };
     let counts = router(api);
-    let _serving = listener.map(|listener| {
-        let address = listener.local_addr().ok();
-        if let Some(address) = address {
-            tracing::info!("counts at http://{address}/counts");
-        }
-        let access = match (&options.api_key, address) {
-            (Some(key), _) => Access::Key(key.clone()),
-            (None, _) if options.open => Access::Everyone(options.hosts.clone().into()),
-            (None, Some(address)) => Access::without_key(address),
-            (None, None) => Access::OwnMachine,
-        };
-        let routes = Routes {
-            protected: counts.clone().merge(metrics_router(&engine, &metrics)),
-            probes: probes(),
-        };
-        let open = metrics.connections.clone();
-        let serving = tokio::spawn(async move {
-            protect::serve(listener, routes, access, "counts.api_key_file", &open).await;
-        });
-        AbortOnDrop(serving.abort_handle())
-    });
+    let own_listener = |listener| serve_alone(listener, options, counts.clone(), &engine, &metrics);
+    let _serving = listener.map(own_listener);
     let (shown, shown_engine) = (Arc::clone(&metrics), Arc::clone(&engine));
     started(Started {
         routes: counts,
@@ -177,4 +159,33 @@ pub async fn count(
         following.abort();
     }
     Ok(())
+}
+
+/// Serves the routes on an address of their own, with the metrics and probes.
+fn serve_alone(
+    listener: TcpListener,
+    options: &CountOptions,
+    counts: Router,
+    engine: &Arc<Mutex<Engine>>,
+    metrics: &Arc<Metrics>,
+) -> AbortOnDrop {
+    let address = listener.local_addr().ok();
+    if let Some(address) = address {
+        tracing::info!("counts at http://{address}/counts");
+    }
+    let access = match (&options.api_key, address) {
+        (Some(key), _) => Access::Key(key.clone()),
+        (None, _) if options.open => Access::Everyone(options.hosts.clone().into()),
+        (None, Some(address)) => Access::without_key(address),
+        (None, None) => Access::OwnMachine,
+    };
+    let routes = Routes {
+        protected: counts.merge(metrics_router(engine, metrics)),
+        probes: probes(),
+    };
+    let open = metrics.connections.clone();
+    let serving = tokio::spawn(async move {
+        protect::serve(listener, routes, access, "counts.api_key_file", &open).await;
+    });
+    AbortOnDrop(serving.abort_handle())
 }

@@ -97,7 +97,7 @@ impl Engine {
                             line: line.name.clone(),
                             direction: direction.clone(),
                         };
-                        let crossings = self.totals().crossings.get(&of);
+                        let crossings = self.stored_totals().crossings.get(&of);
                         LineSnapshot {
                             crossings: crossings.copied().unwrap_or_default(),
                             line: of.line,
@@ -110,7 +110,12 @@ impl Engine {
                         camera: camera.name.clone(),
                         zone: zone.to_owned(),
                     };
-                    let total = self.totals().zones.get(&of).copied().unwrap_or_default();
+                    let total = self
+                        .stored_totals()
+                        .zones
+                        .get(&of)
+                        .copied()
+                        .unwrap_or_default();
                     ZoneSnapshot {
                         zone: of.zone,
                         persons: is_known.then_some(persons as u64),

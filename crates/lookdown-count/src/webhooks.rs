@@ -14,25 +14,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-pub(crate) use conditions::{Conditions, HeldCondition};
+pub(crate) use conditions::Conditions;
 pub(crate) use delivery::Deliveries;
 use signature::SigningKey;
 
 /// Time without a report after which a camera is silent.
 const SILENT_AFTER: Duration = Duration::from_mins(1);
-
-/// A message to be delivered.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Message {
-    /// The same for every attempt.
-    pub(crate) id: String,
-    /// The digest of its webhook. The URL of the receiver may hold a password or a token.
-    pub(crate) webhook: String,
-    /// JSON.
-    pub(crate) body: String,
-    /// Time of the message, seconds since the Unix epoch.
-    pub(crate) created_s: i64,
-}
 
 /// A webhook as it is written.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -99,7 +86,7 @@ impl WebhookEntry {
         let Some(url) = url else {
             // It may hold a password.
             let shown = self.url.rsplit('@').next().unwrap_or_default();
-            let remedy = "is no URL of a receiver: write it like https://example.com/hook";
+            let remedy = "is not a URL of a receiver: write it like https://example.com/hook";
             return Err(ConfigError::value(&field("url"), shown, remedy));
         };
         let secret = read_secret(&field("secret_file"), &self.secret_file)?;

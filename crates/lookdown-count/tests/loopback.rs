@@ -376,9 +376,9 @@ async fn refusals_are_problem_documents() {
             (
                 "/counts/hall?step=90s",
                 422,
-                "step: it is no duration of whole minutes",
+                "step: it is not a duration of whole minutes",
             ),
-            ("/counts/hall?from=yesterday", 422, "from: it is no time"),
+            ("/counts/hall?from=yesterday", 422, "from: it is not a time"),
             (
                 "/counts/hall?from=2020-01-01T00:00:00Z&step=1m",
                 422,

@@ -6,6 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use lookdown_common::files::{self, MAX_IMAGE_BYTES};
 use lookdown_detect::{
     parameters::DetectParameters,
     pipeline::{DetectJob, Engine, JobImage, PipelineError},
@@ -99,9 +100,11 @@ fn evaluate_image(
 }
 
 fn job(image: &DataSetImage, parameters: &DetectParameters) -> Result<DetectJob, EvaluationError> {
-    let bytes = std::fs::read(&image.path).map_err(|source| EvaluationError::Unreadable {
-        path: image.path.clone(),
-        source,
+    let bytes = files::read(&image.path, MAX_IMAGE_BYTES).map_err(|source| {
+        EvaluationError::Unreadable {
+            path: image.path.clone(),
+            source,
+        }
     })?;
     Ok(DetectJob::local(
         String::new(),

@@ -9,6 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use lookdown_common::files;
 use lookdown_detect::detection::BBox;
 use lookdown_lens::geometry::{OrientedBox, Pixel};
 use serde::{Deserialize, Serialize};
@@ -116,13 +117,7 @@ impl DetectedRow {
             problem,
         };
         let unreadable = |error| wrong(format!("cannot be read: {error}"));
-        let bytes = fs::metadata(path).map_err(unreadable)?.len();
-        if bytes > MAX_BYTES {
-            return Err(wrong(format!(
-                "has {bytes} bytes; split files of more than {MAX_BYTES}"
-            )));
-        }
-        let text = fs::read_to_string(path).map_err(unreadable)?;
+        let text = files::read_text(path, MAX_BYTES).map_err(unreadable)?;
         let entries: Vec<Entry> = serde_json::from_str(&text)
             .map_err(|error| wrong(format!("not COCO results: {error}")))?;
         let position_of = positions(data_set, path)?;

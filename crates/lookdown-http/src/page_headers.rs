@@ -41,17 +41,20 @@ const ALWAYS: [(HeaderName, HeaderValue); 5] = [
 ];
 
 /// Adds the policy of the web page.
+#[expect(clippy::unused_async, reason = "layers of axum are async")]
 pub async fn of_web_page(response: Response) -> Response {
     with_policy(response, WEB_PAGE_POLICY)
 }
 
 /// Adds the policy of the API page.
+#[expect(clippy::unused_async, reason = "layers of axum are async")]
 pub async fn of_api_page(response: Response) -> Response {
     with_policy(response, API_PAGE_POLICY)
 }
 
 /// Permits pages of other origins to show a response. A server with `access.cors_origins` refuses the
 /// requests of other pages itself.
+#[expect(clippy::unused_async, reason = "layers of axum are async")]
 pub async fn for_other_origins(mut response: Response) -> Response {
     let policy = HeaderValue::from_static("cross-origin");
     response.headers_mut().insert(RESOURCE_POLICY, policy);

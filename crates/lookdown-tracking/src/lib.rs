@@ -13,6 +13,7 @@ pub mod lines;
 mod measurement;
 mod motion;
 mod observation;
+mod place;
 mod plane;
 mod settings;
 mod site;

@@ -5,17 +5,7 @@
 
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
-use crate::MeasurementNoise;
-use crate::{CameraPose, Observation};
-
-/// A measured place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Place {
-    /// Metres on the site's floor.
-    Floor(Vector2<f64>),
-    /// A direction in the camera's frame.
-    Bearing(Unit<Vector3<f64>>),
-}
+use crate::{CameraPose, MeasurementNoise, Observation, place::Place};
 
 /// Extents in the radial direction and across it: metres, or radians.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     kalman::{Innovation, Kalman},
-    measurement::{Measurement, Place},
+    measurement::Measurement,
+    place::Place,
     settings::PlaneSettings,
 };
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{evidence::EvidenceSettings, measurement::Place};
+use crate::{evidence::EvidenceSettings, place::Place};
 
 /// Settings of a tracker. The defaults are tuned on simulated walks (`docs/lab/count-accuracy.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

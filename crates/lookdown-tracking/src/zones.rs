@@ -61,7 +61,7 @@ pub enum ZoneError {
     /// Too many zones.
     #[error("there are {0} zones: give at most {MAX_ZONES}")]
     Count(usize),
-    /// A hold that is no time.
+    /// A hold that is not a time.
     #[error("the hold of the zones is {0} s: give a number of at least 0")]
     Hold(f64),
 }
@@ -100,7 +100,7 @@ impl ZoneCounter {
     /// Returns a counter of these zones with the hold in seconds.
     ///
     /// # Errors
-    /// [`ZoneError`] for too many zones or a hold that is no time.
+    /// [`ZoneError`] for too many zones or a hold that is not a time.
     pub fn new(zones: Vec<Zone>, hold_s: f64) -> Result<Self, ZoneError> {
         Self::resumed(zones, hold_s, ZoneState::default())
     }
@@ -108,7 +108,7 @@ impl ZoneCounter {
     /// Returns a counter of the zones that `state` was kept for.
     ///
     /// # Errors
-    /// [`ZoneError`] for too many zones or a hold that is no time.
+    /// [`ZoneError`] for too many zones or a hold that is not a time.
     pub fn resumed(zones: Vec<Zone>, hold_s: f64, mut state: ZoneState) -> Result<Self, ZoneError> {
         if zones.len() > MAX_ZONES {
             return Err(ZoneError::Count(zones.len()));

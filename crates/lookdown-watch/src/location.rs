@@ -27,7 +27,7 @@ pub enum Location {
 pub enum InvalidLocation {
     /// Not a URL.
     #[error(
-        "it is no valid URL: give it as scheme://host/path, with special characters percent-encoded"
+        "it is not a valid URL: give it as scheme://host/path, with special characters percent-encoded"
     )]
     InvalidUrl,
     /// An unknown scheme.

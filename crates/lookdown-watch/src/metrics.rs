@@ -15,7 +15,7 @@ use crate::rate::Rate;
 /// The reason why a frame did not become a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Failure {
-    /// The camera sent a file that is no whole image.
+    /// The camera sent a file that is not a whole image.
     Damaged,
     /// The server was busy (429, 503).
     Overloaded,

@@ -96,7 +96,7 @@ mod tests {
     fn rates(interval: Duration, busy: Duration) -> Vec<Rate> {
         let start = Instant::now();
         let mut meter = RateMeter::new(Duration::from_millis(200), start);
-        let frames = 1..=(121_000 / interval.as_millis()) as u32;
+        let frames = 1..=u32::try_from(121_000 / interval.as_millis()).unwrap();
         frames
             .filter_map(|frame| meter.add(true, busy, start + interval * frame))
             .collect()

@@ -62,9 +62,9 @@ impl Relay {
             let port = listener.local_addr()?.port();
             let mut token = [0; TOKEN_BYTES];
             getrandom::fill(&mut token).map_err(std::io::Error::other)?;
-            let token: String = token.iter().map(|byte| format!("{byte:02x}")).collect();
+            let token = u128::from_be_bytes(token);
             // Only `ffmpeg` has the token, so no other local process gets the stream.
-            std::io::Result::Ok((listener, format!("rtsp://127.0.0.1:{port}/{token}")))
+            std::io::Result::Ok((listener, format!("rtsp://127.0.0.1:{port}/{token:032x}")))
         };
         let (listener, inner) = local
             .await
@@ -104,7 +104,7 @@ impl Relay {
                     match unit {
                         Unit::Packet(packet) => to_camera.extend_from_slice(&packet),
                         Unit::Message(message) => {
-                            exchange.accept_request(message, &mut to_camera)?
+                            exchange.accept_request(message, &mut to_camera)?;
                         }
                     }
                 }

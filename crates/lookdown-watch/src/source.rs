@@ -3,28 +3,22 @@
 mod folder;
 mod http;
 mod multipart;
+mod sink;
 mod standard_input;
 mod video;
 
+use sink::Sink;
 pub use standard_input::ImageReader;
 
-use std::{
-    convert::Infallible,
-    time::{Duration, Instant},
-};
+use std::{convert::Infallible, time::Duration};
 
-use bytes::Bytes;
-use jiff::Timestamp;
 use parking_lot::Mutex;
 use reqwest::Client;
 use tokio::time::sleep;
 
 use crate::{
-    Camera, Frame, FrameError, Location, Metrics, SourceError,
-    credentials::Login,
-    metrics::{CameraMetrics, Failure},
-    server::camera_client,
-    slot::Slot,
+    Camera, Frame, Location, Metrics, SourceError, credentials::Login, metrics::CameraMetrics,
+    server::camera_client, slot::Slot,
 };
 use lookdown_common::{Backoff, LogOnce};
 
@@ -32,68 +26,6 @@ use lookdown_common::{Backoff, LogOnce};
 const PAUSES: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));
 /// First and longest pause after wrong credentials: cameras lock accounts after a few attempts.
 const LOGIN_PAUSES: (Duration, Duration) = (Duration::from_secs(10), Duration::from_mins(5));
-/// Number of checks for a stalled source within its limit.
-const STALL_CHECKS: u32 = 4;
-/// Shortest time for the first frame: streams begin with a key frame.
-const FIRST_FRAME: Duration = Duration::from_secs(10);
-
-/// The receiver of a camera's frames.
-pub(crate) struct Sink<'a> {
-    slot: &'a Slot<Frame>,
-    metrics: &'a CameraMetrics,
-    started: Instant,
-    /// The time of the last sign that the camera works.
-    alive: Mutex<Option<Instant>>,
-    is_failing: &'a Mutex<LogOnce>,
-}
-
-impl Sink<'_> {
-    /// Accepts an image file that was captured now.
-    fn accept(&self, image: Bytes) -> Result<(), FrameError> {
-        self.accept_at(image, Timestamp::now())
-    }
-
-    /// Accepts an image file that was captured at this time. It replaces an older frame that was
-    /// not sent yet.
-    fn accept_at(&self, image: Bytes, captured_at: Timestamp) -> Result<(), FrameError> {
-        let frame = Frame::new(image, captured_at)
-            .inspect_err(|_| self.metrics.failed(Failure::Damaged))?;
-        self.metrics.received(frame.received);
-        self.alive();
-        if self.slot.put(frame).is_some() {
-            self.metrics.skipped();
-        }
-        if self.is_failing.lock().clear() {
-            tracing::info!("the camera sends frames again");
-        }
-        Ok(())
-    }
-
-    /// Notes that the camera works, although it sent no new frame.
-    fn alive(&self) {
-        *self.alive.lock() = Some(Instant::now());
-    }
-
-    /// The time from the start to the last sign that the camera works.
-    fn lifetime(&self) -> Duration {
-        let alive = *self.alive.lock();
-        alive.map_or(Duration::ZERO, |alive| alive - self.started)
-    }
-
-    /// Waits until the camera showed no sign of work for this time.
-    async fn stalled(&self, limit: Duration) -> SourceError {
-        loop {
-            sleep(limit / STALL_CHECKS).await;
-            let (since, limit) = match *self.alive.lock() {
-                Some(alive) => (alive, limit),
-                None => (self.started, limit.max(FIRST_FRAME)),
-            };
-            if since.elapsed() >= limit {
-                return SourceError::Stalled(limit);
-            }
-        }
-    }
-}
 
 /// Fills the slot with the frames of a camera. Ends with the frames of a finite source, otherwise
 /// never.
@@ -111,13 +43,7 @@ pub(crate) async fn supervise(
     let mut login = Login::new(camera.credentials.clone());
     loop {
         login.restart();
-        let sink = Sink {
-            slot,
-            metrics,
-            started: Instant::now(),
-            alive: Mutex::default(),
-            is_failing: &log,
-        };
+        let sink = Sink::new(slot, metrics, &log);
         let outcome = tokio::select! {
             outcome = run(camera, client, &mut login, &sink) => outcome,
             error = stalled(camera, &sink) => Err(error),
@@ -156,13 +82,7 @@ pub async fn first_frame(camera: &Camera, limit: Duration) -> Result<Frame, Sour
     let metrics = all.add(&camera.name, camera.location.to_string());
     let (slot, log) = (Slot::default(), Mutex::new(LogOnce::default()));
     let mut login = Login::new(camera.credentials.clone());
-    let sink = Sink {
-        slot: &slot,
-        metrics: &metrics,
-        started: Instant::now(),
-        alive: Mutex::default(),
-        is_failing: &log,
-    };
+    let sink = Sink::new(&slot, &metrics, &log);
     tokio::select! {
         biased;
         frame = slot.take() => frame.ok_or(SourceError::Closed),

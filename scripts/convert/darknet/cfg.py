@@ -81,6 +81,8 @@ def read_cfg(file: Path) -> list[Section]:
             continue
         name, equals, value = line.partition("=")
         if not equals or not sections:
-            raise ConversionError(f"{place}: '{text.strip()}' is no option of a section; is this a darknet .cfg file?")
+            raise ConversionError(
+                f"{place}: '{text.strip()}' is not an option of a section; is this a darknet .cfg file?"
+            )
         sections[-1].options.setdefault(name, value)
     return sections

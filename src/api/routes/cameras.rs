@@ -259,7 +259,7 @@ async fn rows(cameras: Arc<Cameras>) -> Result<Vec<CameraInfo>, Problem> {
     let stored = stored.map_err(Problem::internal)?;
     let stored = stored.map_err(Problem::internal)?;
     let mut rows: Vec<_> = cameras
-        .states()
+        .states(&stored)
         .into_iter()
         .map(|state| CameraInfo {
             warning: state.warning,

@@ -9,6 +9,7 @@ use axum::{
     http::request::Parts,
 };
 use bytes::Bytes;
+use lookdown_common::text::is_invisible;
 
 use crate::api::http::problem::{Problem, ProblemKind};
 
@@ -129,7 +130,7 @@ fn second_image(name: &str) -> Problem {
 /// Returns the last segment of a path of any operating system, if it is a name.
 fn name_of_file(path: &str) -> Option<String> {
     let name = path.rsplit(['/', '\\']).next().unwrap_or(path);
-    let characters = name.chars().filter(|character| !character.is_control());
+    let characters = name.chars().filter(|&character| !is_invisible(character));
     let name: String = characters.take(MAX_FILE_NAME_CHARS).collect();
     (!name.is_empty()).then_some(name)
 }

@@ -3,12 +3,13 @@
 
 use std::{
     fs::{self, File},
-    io::{self, ErrorKind, Read, Write},
+    io::{self, ErrorKind, Write},
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
     time::{Duration, SystemTime},
 };
 
+use lookdown_common::files;
 use uuid::Uuid;
 
 use super::{CalibrationStore, MAX_FILES, Replaces, StoreError, StoredFile};
@@ -114,7 +115,7 @@ impl CalibrationStore for FolderStore {
                 return Err(self.failed(&problem));
             }
             let entry = entry.map_err(|error| self.failed(&error))?;
-            // A link to nothing, as while files are being replaced, is no file.
+            // A link to nothing, as while files are being replaced, is not a file.
             if let (Ok(name), Some(stamp)) = (entry.file_name().into_string(), stamp(&entry.path()))
             {
                 files.push(StoredFile { name, stamp });
@@ -124,12 +125,7 @@ impl CalibrationStore for FolderStore {
     }
 
     fn read(&self, names: &[&str], at_most: usize) -> Vec<Result<Vec<u8>, StoreError>> {
-        let read = |name: &&str| {
-            let mut content = Vec::new();
-            let file = File::open(self.path.join(name))?;
-            file.take(at_most as u64).read_to_end(&mut content)?;
-            Ok(content)
-        };
+        let read = |name: &&str| files::read_start(&self.path.join(name), at_most as u64);
         let contents = names.iter().map(read);
         contents
             .map(|content| content.map_err(|error: io::Error| self.failed(&error)))

@@ -40,7 +40,7 @@ use crate::{
     settings::Settings,
 };
 
-/// The interval between two frames if none is given: the figures of docs/count-accuracy.md are
+/// The interval between two frames if none is given: the figures of docs/lab/count-accuracy.md are
 /// reached with it.
 const DEFAULT_EVERY: Duration = Duration::from_millis(200);
 /// The score threshold of counted frames (docs/count.md).

@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::Context;
+use lookdown_common::files::{self, MAX_IMAGE_BYTES};
 use lookdown_detect::imaging::{Frame, annotate::encode_jpeg, decode::decode};
 use lookdown_eval::{DataSet, DetectedRow, EvaluatedRow, sweep};
 
@@ -82,7 +83,8 @@ fn most_crowded(data_set: &DataSet, limits: &LimitSettings) -> anyhow::Result<(u
         .max_by_key(|(_, image)| image.truth.person_count())
         .context("the data set has no images")?;
     let path = &image.path;
-    let bytes = fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let bytes = files::read(path, MAX_IMAGE_BYTES)
+        .with_context(|| format!("{}: cannot be read", path.display()))?;
     let decoded =
         decode(&bytes, &decode_limits(limits)).with_context(|| path.display().to_string())?;
     Ok((position, decoded.frame))

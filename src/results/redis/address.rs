@@ -12,7 +12,7 @@ pub struct RedisAddress {
     client: Client,
 }
 
-/// The text is no address of a Redis. The text is not repeated, as it may hold a password.
+/// The text is not an address of a Redis. The text is not repeated, as it may hold a password.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "give redis://host:port/database, or rediss:// for TLS, with user:password@ before \

@@ -161,7 +161,7 @@ impl ReplyMeter {
     fn length(&self) -> io::Result<Option<u64>> {
         let text = str::from_utf8(&self.line[1..]).ok();
         let length = text.and_then(|text| text.trim().parse::<i64>().ok());
-        let length = length.ok_or_else(|| refused("a length that is no number"))?;
+        let length = length.ok_or_else(|| refused("a length that is not a number"))?;
         Ok(u64::try_from(length).ok())
     }
 

@@ -141,7 +141,7 @@ fn an_invalid_address_of_a_redis_is_not_repeated() {
         "LOOKDOWN__RESULTS__URL",
         "http://:do-not-show-me@localhost:6379",
     ));
-    let expected = "results.url is no URL of a Redis: give redis://host:port/database";
+    let expected = "results.url is not a URL of a Redis: give redis://host:port/database";
     assert!(message.starts_with(expected), "{message}");
     assert!(!message.contains("do-not-show-me"), "{message}");
 }

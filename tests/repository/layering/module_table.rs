@@ -12,11 +12,12 @@ use super::source_scan::{CRATES, absolute, code, names_crate, sources, used_path
 const PARTS: [&str; 3] = ["api::http", "api::protocols", "api::routes"];
 
 /// The crates of the workspace as code names them.
-const LIBRARIES: [&str; 7] = [
+const LIBRARIES: [&str; 8] = [
     "lookdown_common",
     "lookdown_count",
     "lookdown_detect",
     "lookdown_eval",
+    "lookdown_http",
     "lookdown_lens",
     "lookdown_tracking",
     "lookdown_watch",

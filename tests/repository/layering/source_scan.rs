@@ -7,13 +7,14 @@ use std::{
 };
 
 /// The crates of the workspace with the folders of their sources.
-pub const CRATES: [(&str, &str); 11] = [
+pub const CRATES: [(&str, &str); 12] = [
     ("lookdown-common", "crates/lookdown-common/src"),
     ("lookdown-lens", "crates/lookdown-lens/src"),
     ("lookdown-tracking", "crates/lookdown-tracking/src"),
     ("lookdown-detect", "crates/lookdown-detect/src"),
     ("lookdown-eval", "crates/lookdown-eval/src"),
     ("lookdown-watch", "crates/lookdown-watch/src"),
+    ("lookdown-http", "crates/lookdown-http/src"),
     ("lookdown-count", "crates/lookdown-count/src"),
     ("lookdown", "src"),
     ("lookdown-python", "crates/lookdown-python/src"),

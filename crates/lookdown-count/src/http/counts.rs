@@ -15,9 +15,13 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
+use lookdown_http::problem::Problem;
 use serde::Serialize;
 
-use super::{Problem, Shared, blocking, check_known, query, time::TimeParameters};
+use super::{
+    shared::{Shared, blocking, check_known, query},
+    time::TimeParameters,
+};
 use crate::{
     definition::CameraDefinition,
     store::{Span, Step},

@@ -7,9 +7,10 @@ use axum::{
     http::header::CONTENT_TYPE,
     response::{IntoResponse, Response},
 };
+use lookdown_http::problem::Problem;
 use lookdown_tracking::Plane;
 
-use super::{Problem, Shared, check_known, not_found, now_ms};
+use super::shared::{Shared, check_known, not_found, now_ms};
 use crate::{scene::Scene, sums::Owner};
 
 /// Least extent around a camera, metres.

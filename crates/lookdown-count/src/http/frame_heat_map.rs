@@ -6,12 +6,12 @@ use axum::{
     extract::{Path, State},
     response::Response,
 };
+use lookdown_http::problem::Problem;
 use lookdown_tracking::heat_map::Cell;
 
 use super::{
-    Problem, Shared, blocking,
     heat_map::{Parameters, colour, image, stored},
-    not_found,
+    shared::{Shared, blocking, not_found},
 };
 use crate::{definition::CameraDefinition, sums::Owner};
 

@@ -9,11 +9,14 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
+use lookdown_http::problem::Problem;
 use lookdown_tracking::heat_map::{CELL_M, Cell};
 use serde::Serialize;
 
 use super::{
-    Problem, Shared, blocking, check_known, counts::unknown_parameter, query, time::TimeParameters,
+    counts::unknown_parameter,
+    shared::{Shared, blocking, check_known, query},
+    time::TimeParameters,
 };
 use crate::sums::{DAY_MS, MINUTE_MS, Owner};
 

@@ -1,9 +1,10 @@
 //! The parameters `from`, `to` and `step`.
 
 use jiff::{SignedDuration, Timestamp};
+use lookdown_http::problem::Problem;
 use serde::Deserialize;
 
-use super::{Problem, now_ms};
+use super::shared::now_ms;
 use crate::{store::Span, sums::MINUTE_MS};
 
 /// Most steps of an answer.
@@ -59,7 +60,7 @@ fn timestamp(name: &str, text: Option<&str>) -> Result<Option<i64>, Problem> {
         Ok(time) => Ok(Some(time.as_millisecond())),
         Err(_) => Err(Problem::of_parameter(
             name,
-            "it is no time: write it like 2026-11-22T10:00:00Z, with + as %2B",
+            "it is not a time: write it like 2026-11-22T10:00:00Z, with + as %2B",
         )),
     }
 }
@@ -73,7 +74,8 @@ fn step(text: &str) -> Result<i64, Problem> {
     });
     let minutes = minutes.filter(|minutes| (1..=MAX_STEP).contains(minutes));
     minutes.ok_or_else(|| {
-        let fault = "it is no duration of whole minutes from 1m to 168h: write it like 15m or 24h";
+        let fault =
+            "it is not a duration of whole minutes from 1m to 168h: write it like 15m or 24h";
         Problem::of_parameter("step", fault)
     })
 }

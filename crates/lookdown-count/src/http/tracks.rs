@@ -7,11 +7,12 @@ use axum::{
     extract::{Path, State},
 };
 use jiff::Timestamp;
+use lookdown_http::problem::Problem;
 use lookdown_tracking::{Plane, TailPoint, Track};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::{Problem, Shared, check_known, now_ms};
+use super::shared::{Shared, check_known, now_ms};
 use crate::{
     engine::Engine,
     scene::{Scene, SceneCamera},

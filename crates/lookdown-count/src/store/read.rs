@@ -7,9 +7,9 @@ use rusqlite::{Connection, OptionalExtension, params};
 
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
+    message::{HeldCondition, Message},
     scene::SceneState,
     sums::{DAY_MS, LineDirection, Owner, PresenceSum, Totals, ZoneOf, ZoneSum, ZoneTotal},
-    webhooks::{HeldCondition, Message},
 };
 
 /// The content of the store at the start.

@@ -3,8 +3,8 @@ use lookdown_tracking::heat_map::Cell;
 use super::*;
 use crate::{
     engine::Batch,
+    message::Message,
     sums::{LineDirection, Owner, PresenceSum, Sums, Totals, ZoneOf, ZoneSum},
-    webhooks::Message,
 };
 
 fn batch(minute: i64, last_event: u64) -> Batch {

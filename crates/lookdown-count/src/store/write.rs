@@ -7,8 +7,8 @@ use rusqlite::{Transaction, params};
 use super::{STATE_VERSION, Store, StoreError};
 use crate::{
     engine::Batch,
+    message::{HeldCondition, Message},
     sums::{DAY_MS, MINUTE_MS, Owner, Sums},
-    webhooks::{HeldCondition, Message},
 };
 
 impl Owner {

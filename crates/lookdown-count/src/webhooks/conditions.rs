@@ -5,8 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use serde_json::{Value, json};
 
-use super::{Condition, Message, Webhook};
-use crate::scene::{NamedCrossing, Scene};
+use super::{Condition, Webhook};
+use crate::{
+    message::{HeldCondition, Message},
+    scene::{NamedCrossing, Scene},
+};
 
 /// The conditions and whether they hold.
 pub(crate) struct Conditions {
@@ -21,14 +24,6 @@ pub(crate) struct Conditions {
     /// Time of the start, milliseconds since the Unix epoch. No camera is silent for longer: reports
     /// of the time before may still arrive.
     started_ms: i64,
-}
-
-/// A condition that holds, as it is stored.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct HeldCondition {
-    /// The digest of the webhook.
-    pub(crate) webhook: String,
-    pub(crate) camera: String,
 }
 
 impl Conditions {

@@ -11,8 +11,8 @@ use tokio::{
     time::sleep,
 };
 
-use super::{Message, Webhook, signature::SigningKey};
-use crate::{metrics::Metrics, store::Store};
+use super::{Webhook, signature::SigningKey};
+use crate::{message::Message, metrics::Metrics, store::Store};
 
 /// Most messages that wait for a receiver.
 const QUEUE: usize = 256;

@@ -9,7 +9,11 @@ use std::{
     time::Duration,
 };
 
-use reqwest::blocking::Client;
+use lookdown_common::files::{self, Links};
+use reqwest::{
+    blocking::Client,
+    redirect::{Action, Attempt, Policy},
+};
 use sha2::{Digest, Sha256};
 use url::Url;
 
@@ -19,6 +23,8 @@ use super::ModelManifest;
 const MAX_BYTES: u64 = 2 << 30;
 /// Longest time for a connection, and without a byte of the answer.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// Most redirections on the same host.
+const MAX_REDIRECTIONS: usize = 5;
 /// Bytes that are copied at a time.
 const CHUNK: usize = 1 << 20;
 
@@ -163,6 +169,19 @@ fn copy(reader: impl Read, place: &str, to: &Path, wanted: &str) -> Result<u64, 
     Ok(bytes)
 }
 
+/// Follows a redirection on the same host only, and not from HTTPS to HTTP.
+fn within_host(attempt: Attempt<'_>) -> Action {
+    let first = attempt.previous().first();
+    let is_same = first.is_some_and(|first| first.origin() == attempt.url().origin());
+    if attempt.previous().len() > MAX_REDIRECTIONS {
+        attempt.error("there are too many redirections")
+    } else if is_same {
+        attempt.follow()
+    } else {
+        attempt.error("it redirects to another host: give that address")
+    }
+}
+
 /// Opens the file of a model at its source: in the folder of the model's name, or in the given
 /// folder itself.
 fn open(
@@ -179,7 +198,7 @@ fn open(
                 folder.join(file)
             };
             let place = path.display().to_string();
-            match fs::metadata(&path).and_then(|_| File::open(&path)) {
+            match files::open(&path, Links::Follow) {
                 Ok(file) => Ok((place, Box::new(file))),
                 Err(error) => Err(FetchError::Unreadable {
                     place,
@@ -199,6 +218,7 @@ fn open(
             let client = Client::builder()
                 // For the connection and for each read, not for the whole file.
                 .timeout(PATIENCE)
+                .redirect(Policy::custom(within_host))
                 .build();
             let client = client.map_err(|error| unreadable(error.to_string()))?;
             let answer = client.get(&place).send();

@@ -4,6 +4,7 @@ mod input;
 
 use std::path::{Component, Path, PathBuf};
 
+use lookdown_common::files;
 use serde::Deserialize;
 
 use super::{InferenceError, heads::Head};
@@ -87,16 +88,8 @@ impl ModelManifest {
             path: path.clone(),
             problem,
         };
-        let bytes = path
-            .metadata()
-            .map_err(|error| unreadable(error.to_string()))?
-            .len();
-        if bytes > MAX_BYTES {
-            return Err(unusable(format!(
-                "it has {bytes} bytes, too many for a manifest"
-            )));
-        }
-        let text = std::fs::read_to_string(&path).map_err(|error| unreadable(error.to_string()))?;
+        let text =
+            files::read_text(&path, MAX_BYTES).map_err(|error| unreadable(error.to_string()))?;
         let manifest: Self =
             toml::from_str(&text).map_err(|error| unusable(one_line(&error, &text)))?;
         manifest.check().map_err(unusable)?;

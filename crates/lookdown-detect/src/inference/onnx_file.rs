@@ -7,7 +7,9 @@
 
 mod protobuf;
 
-use std::{fs::File, io::Read, path::Path};
+use std::path::Path;
+
+use lookdown_common::files;
 
 use self::protobuf::{Field, Value, fields};
 
@@ -25,24 +27,7 @@ const ENGINE: &[u8] = b"EPContext";
 /// # Errors
 /// One sentence: the error of the operating system, or that the file is too large.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let metadata = file.metadata().map_err(|error| error.to_string())?;
-    if !metadata.is_file() {
-        return Err("it is not a file".to_owned());
-    }
-    let mut bytes = Vec::new();
-    if metadata.len() <= MAX_BYTES {
-        // One byte more than allowed, as the file may grow during the read.
-        file.take(MAX_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|error| error.to_string())?;
-    }
-    if metadata.len().max(bytes.len() as u64) > MAX_BYTES {
-        return Err(format!(
-            "it has more than {MAX_BYTES} bytes, the largest model accepted"
-        ));
-    }
-    Ok(bytes)
+    files::read(path, MAX_BYTES).map_err(|error| error.to_string())
 }
 
 /// Checks that the runtime may load this file.

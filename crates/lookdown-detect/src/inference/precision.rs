@@ -54,13 +54,13 @@ impl Int8Use {
     #[must_use]
     pub fn on(device: Device, choice: PrecisionChoice) -> Self {
         match (device, choice) {
-            (Device::Cpu, PrecisionChoice::Auto) if cpu_has_integer_dot_product() => {
-                Self::AllButQuality
+            (Device::Cpu, PrecisionChoice::Auto) if !cpu_has_integer_dot_product() => {
+                Self::SmallProfiles
             }
-            (Device::Cpu, PrecisionChoice::Auto) => Self::SmallProfiles,
-            (Device::Cpu, PrecisionChoice::Int8) => Self::AllButQuality,
-            (Device::Cpu, PrecisionChoice::Fp32) => Self::None,
-            (Device::Cuda(_) | Device::TensorRt(_), _) => Self::None,
+            (Device::Cpu, PrecisionChoice::Auto | PrecisionChoice::Int8) => Self::AllButQuality,
+            (Device::Cpu, PrecisionChoice::Fp32) | (Device::Cuda(_) | Device::TensorRt(_), _) => {
+                Self::None
+            }
         }
     }
 }

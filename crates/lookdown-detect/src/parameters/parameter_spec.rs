@@ -3,6 +3,8 @@
 
 use std::str::FromStr;
 
+use lookdown_common::text::is_invisible;
+
 use super::ParameterError;
 
 /// A request parameter.
@@ -166,7 +168,7 @@ impl ParameterKind {
             Self::Text | Self::Pattern { .. } | Self::Switch | Self::Time => true,
             Self::Name { max_chars } => {
                 let count = value.chars().count();
-                (1..=max_chars).contains(&count) && !value.chars().any(char::is_control)
+                (1..=max_chars).contains(&count) && !value.chars().any(is_invisible)
             }
             Self::Choice(names) => names.contains(&value),
             Self::Choices { names, none } => {

@@ -88,13 +88,12 @@ impl Profile {
         }
     }
 
-    /// Returns the score at which a person merged by fusion is as likely as not. `docs/results.md`
+    /// Returns the score at which a person merged by fusion is as likely as not. `docs/lab/results.md`
     /// has the error of the number of persons and of the probabilities with these values.
     pub(crate) fn even_odds_score(self) -> f64 {
         match self {
-            Self::Balanced => 0.25,
             Self::Fast | Self::Quality => 0.26,
-            Self::Paper | Self::Direct => 0.25,
+            Self::Balanced | Self::Paper | Self::Direct => 0.25,
         }
     }
 

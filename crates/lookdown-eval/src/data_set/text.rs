@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use lookdown_common::files;
+
 use super::DataSetError;
 
 /// Reads the text of a file of at most `max_bytes`.
@@ -10,12 +12,5 @@ pub(super) fn read_text(path: &Path, max_bytes: u64) -> Result<String, DataSetEr
         path: path.to_owned(),
         source,
     };
-    let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
-    if bytes > max_bytes {
-        return Err(DataSetError::Annotations {
-            path: path.to_owned(),
-            problem: format!("it has {bytes} bytes; at most {max_bytes} are read"),
-        });
-    }
-    std::fs::read_to_string(path).map_err(unreadable)
+    files::read_text(path, max_bytes).map_err(unreadable)
 }

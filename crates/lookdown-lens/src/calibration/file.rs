@@ -1,7 +1,8 @@
 //! Calibration files: from a path to checked cameras under their IDs.
 
-use std::{io::Read, path::Path};
+use std::path::Path;
 
+use lookdown_common::files;
 use nalgebra::{Unit, Vector3};
 
 use super::{
@@ -23,17 +24,13 @@ const UNIT_TOLERANCE: f64 = 1e-3;
 /// # Errors
 /// [`CalibrationError::Unreadable`].
 pub fn content(path: &Path) -> Result<Vec<u8>, CalibrationError> {
-    let unreadable = |source| CalibrationError::Unreadable {
-        path: path.to_owned(),
-        source,
-    };
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    let mut content = Vec::new();
-    // One byte more than is accepted, so that a larger file is known for one.
-    file.take(CalibrationFile::MAX_BYTES as u64 + 1)
-        .read_to_end(&mut content)
-        .map_err(unreadable)?;
-    Ok(content)
+    // One byte more than is accepted, so that a larger file is recognized.
+    files::read_start(path, CalibrationFile::MAX_BYTES as u64 + 1).map_err(|source| {
+        CalibrationError::Unreadable {
+            path: path.to_owned(),
+            source,
+        }
+    })
 }
 
 impl Calibration {
@@ -130,7 +127,7 @@ fn check(id: &str, camera: &Camera, content: &[u8]) -> Result<Calibration, Forma
 fn mount(raw: &NativeMount) -> Result<Mount, String> {
     let up = Vector3::from(raw.world_up);
     let length = up.norm();
-    // Written so that a length that is no number is refused, too.
+    // Written so that a length that is not a number is refused, too.
     let is_unit = (length - 1.0).abs() <= UNIT_TOLERANCE;
     if !is_unit {
         let [x, y, z] = raw.world_up;

@@ -11,7 +11,7 @@ use lookdown_common::{
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CalibrationId(String);
 
-/// A text that is no calibration ID.
+/// A text that is not a calibration ID.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{} is not {}", Quoted(.0), CalibrationId::RULE)]
 pub struct InvalidCalibrationId(String);

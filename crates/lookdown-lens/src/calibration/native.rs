@@ -76,7 +76,7 @@ impl FromStr for NativeImage {
     }
 }
 
-/// Text that is no frame size.
+/// Text that is not a frame size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("give the width and height in pixels, such as 640x480")]
 pub struct NotAFrameSize;

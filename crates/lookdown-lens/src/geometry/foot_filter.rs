@@ -93,8 +93,8 @@ mod tests {
         Polygon::new(&[[left, top], [right, top], [right, bottom], [left, bottom]]).unwrap()
     }
 
-    fn at(x_m: f64, y_m: f64) -> Option<FloorPosition> {
-        Some(FloorPosition { x_m, y_m })
+    fn at(x_m: f64, y_m: f64) -> FloorPosition {
+        FloorPosition { x_m, y_m }
     }
 
     #[test]
@@ -106,15 +106,15 @@ mod tests {
         };
         let nowhere = Pixel::new(0.0, 0.0);
         for (floor, expected) in [
-            (at(3.0, 3.0), FootPlace::Inside),
-            (at(1.2, 1.2), FootPlace::Outside),
-            (at(4.9, 3.0), FootPlace::Margin),
-            (at(5.1, 3.0), FootPlace::Outside),
+            (Some(at(3.0, 3.0)), FootPlace::Inside),
+            (Some(at(1.2, 1.2)), FootPlace::Outside),
+            (Some(at(4.9, 3.0)), FootPlace::Margin),
+            (Some(at(5.1, 3.0)), FootPlace::Outside),
             (None, FootPlace::Outside),
         ] {
             assert_eq!(filter.place(nowhere, floor), expected, "{floor:?}");
         }
-        assert!(filter.is_near(nowhere, at(5.4, 3.0), 1.5));
+        assert!(filter.is_near(nowhere, Some(at(5.4, 3.0)), 1.5));
     }
 
     #[test]

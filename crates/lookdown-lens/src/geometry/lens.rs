@@ -177,7 +177,7 @@ impl Lens {
         if radius == 0.0 {
             return Some(Ray::z());
         }
-        // A radius that is no number is not within either.
+        // A radius that is not a number is not within either.
         let is_within = radius <= self.max_radius * (1.0 + RIM_TOLERANCE);
         if !is_within {
             return None;

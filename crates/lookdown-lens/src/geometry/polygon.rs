@@ -61,7 +61,7 @@ impl Polygon {
             return Err(PolygonError::Count(corners.len()));
         }
         for (index, &[x, y]) in corners.iter().enumerate() {
-            // Not so where it is no number either.
+            // Not so where it is not a number either.
             let is_near = x.abs() <= MAX_COORDINATE && y.abs() <= MAX_COORDINATE;
             if !is_near {
                 let number = index + 1;

@@ -151,7 +151,7 @@ fn prior(circle: &CircleGuess, known: KnownLens) -> Prior {
 /// The best maxima, best first, each different from the others.
 fn maxima(curves: &[EdgeCurve], weight: f64, prior: &Prior, known: KnownLens) -> Vec<Maximum> {
     let mut longest = curves.to_vec();
-    longest.sort_by(|a, b| b.points.len().cmp(&a.points.len()));
+    longest.sort_by_key(|segment| std::cmp::Reverse(segment.points.len()));
     longest.truncate(COARSE_CURVES);
     let weights = vec![weight; curves.len()];
     let rim = known.field_of_view.map(|field| field / 2.0);
@@ -257,7 +257,7 @@ fn checked(
             squares[0] += apart * apart / 2.0;
             squares[1] += turned.to_degrees().powi(2) / 2.0;
             let [x, y] = [0, 1].map(|axis| other.center[axis] - camera.center[axis]);
-            center_squares += (x * x + y * y) / 2.0;
+            center_squares += f64::midpoint(x * x, y * y);
         }
     }
     uncertainty.radius = uncertainty.radius.max(squares[0].sqrt());

@@ -116,7 +116,7 @@ fn edges_without_order_are_refused() {
         .map(|_| {
             let ([x, y], turn) = (
                 [200.0 + 800.0 * random(), 200.0 + 800.0 * random()],
-                6.28 * random(),
+                std::f64::consts::TAU * random(),
             );
             let points = (0..6).map(|step| 8.0 * f64::from(step));
             EdgeCurve {

@@ -6,7 +6,7 @@ use secrecy::SecretString;
 use serde::Deserialize;
 
 use crate::{Camera, Credentials, Location, Transport, VideoOptions};
-use lookdown_common::{ConfigError, optional_duration, read_secret};
+use lookdown_common::{ConfigError, optional_duration, read_secret, text::is_invisible};
 
 /// Shortest interval between two frames.
 const MIN_EVERY: Duration = Duration::from_millis(40);
@@ -171,8 +171,9 @@ impl CameraEntry {
             return Err(ConfigError::problem(field, &problem));
         };
         let length = name.chars().count();
-        if length == 0 || length > MAX_NAME_CHARS || name.chars().any(char::is_control) {
-            let remedy = "is no name of 1 to 128 characters without control characters";
+        if length == 0 || length > MAX_NAME_CHARS || name.chars().any(is_invisible) {
+            let remedy =
+                "is not a name of 1 to 128 characters without control and invisible characters";
             return Err(ConfigError::value(field, name, remedy));
         }
         Ok(name.clone())

@@ -45,7 +45,10 @@ pub(super) fn next_unit(buffer: &mut BytesMut) -> Result<Option<Unit>, TooLong> 
     let skipped = buffer.iter().position(is_start).unwrap_or(buffer.len());
     buffer.advance(skipped);
     if buffer.first() == Some(&PACKET) {
-        let Some(&[high, low]) = buffer.get(2..PACKET_HEAD).and_then(|b| b.as_array()) else {
+        let Some(&[high, low]) = buffer
+            .get(2..PACKET_HEAD)
+            .and_then(|bytes| <&[u8; 2]>::try_from(bytes).ok())
+        else {
             return Ok(None);
         };
         let length = PACKET_HEAD + usize::from(u16::from_be_bytes([high, low]));
@@ -182,7 +185,7 @@ mod tests {
 
     #[test]
     fn endless_heads_and_large_descriptions_are_refused() {
-        let endless = [b"RTSP/1.0 200 OK\r\nX: ".as_slice(), &[b'a'; 20_000]].concat();
+        let endless = [b"RTSP/1.0 200 OK\r\nX: ".as_slice(), &vec![b'a'; 20_000]].concat();
         assert_eq!(units(&endless, 1000), Err(TooLong));
         let large = b"RTSP/1.0 200 OK\r\nContent-Length: 6400000\r\n\r\n";
         assert_eq!(units(large, 1000), Err(TooLong));

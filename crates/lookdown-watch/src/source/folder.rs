@@ -6,17 +6,19 @@
 use std::{
     collections::HashMap,
     convert::Infallible,
-    fs::{self, File},
-    io::{self, Read},
+    fs, io,
     path::{Path, PathBuf},
     time::{Duration, SystemTime},
 };
 
 use jiff::Timestamp;
-use lookdown_common::text::one_line;
+use lookdown_common::{
+    files::{self, Links},
+    text::one_line,
+};
 use tokio::{task::spawn_blocking, time::sleep};
 
-use super::Sink;
+use super::sink::Sink;
 use crate::{Camera, MAX_FRAME_BYTES, SourceError};
 
 /// Shortest and longest interval of the checks for new files.
@@ -102,8 +104,8 @@ fn read_newest(folder: &Path, before: &Seen) -> io::Result<(Seen, Option<NewFile
         if !is_image(&path) {
             continue;
         }
-        // A file may have been removed since.
-        let Ok(about) = fs::metadata(&path) else {
+        // A file may have been removed since. Cameras that upload files must not name others by links.
+        let Ok(about) = fs::symlink_metadata(&path) else {
             continue;
         };
         if !about.is_file() || about.len() == 0 || about.len() > MAX_FRAME_BYTES as u64 {
@@ -125,19 +127,11 @@ fn read_newest(folder: &Path, before: &Seen) -> io::Result<(Seen, Option<NewFile
     let Some((path, state)) = newest else {
         return Ok((seen, None));
     };
-    match read_bounded(&path) {
+    match files::read_with(&path, MAX_FRAME_BYTES as u64, Links::Refuse) {
         Ok(image) => Ok((seen, Some(NewFile { path, state, image }))),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok((seen, None)),
         Err(error) => Err(error),
     }
-}
-
-/// Reads a file that may grow meanwhile.
-fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
-    let mut image = Vec::new();
-    let file = File::open(path)?;
-    file.take(MAX_FRAME_BYTES as u64).read_to_end(&mut image)?;
-    Ok(image)
 }
 
 fn is_image(path: &Path) -> bool {
@@ -151,6 +145,8 @@ fn is_image(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use super::*;
 
     /// A folder of files with their names as content.

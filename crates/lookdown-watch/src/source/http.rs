@@ -12,7 +12,7 @@ use reqwest::{
 };
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::{Sink, multipart::PartReader};
+use super::{multipart::PartReader, sink::Sink};
 use crate::{Camera, MAX_FRAME_BYTES, SourceError, credentials::Login, memory_budget::Reservation};
 
 /// Requests for one answer: the second one answers the challenge of the first.

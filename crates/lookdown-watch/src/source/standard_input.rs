@@ -4,7 +4,7 @@ use bytes::Bytes;
 use lookdown_common::JPEG_START;
 use tokio::io::{AsyncRead, AsyncReadExt};
 
-use super::Sink;
+use super::sink::Sink;
 use crate::{MAX_FRAME_BYTES, SourceError, jpeg_splitter::JpegSplitter};
 
 /// Reads images from a stream.

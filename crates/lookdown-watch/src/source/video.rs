@@ -7,7 +7,7 @@ use std::{convert::Infallible, ffi::OsString, fmt::Write as _, path::Path, time:
 
 use reqwest::Url;
 
-use super::Sink;
+use super::sink::Sink;
 use crate::{
     Camera, SourceError,
     credentials::Login,

@@ -191,7 +191,7 @@ fn positions(start: f32, step: f32) -> __m256 {
 fn split(start: f32, step: f32, count: usize) -> (Neighbours, __m256) {
     let position = positions(start, step);
     let last = _mm256_cvtepi32_ps(whole(count - 1));
-    // In this order what is no number becomes 0, and is not within.
+    // In this order what is not a number becomes 0, and is not within.
     let within = _mm256_min_ps(_mm256_max_ps(position, _mm256_setzero_ps()), last);
     let beyond = _mm256_andnot_ps(_mm256_set1_ps(-0.0), _mm256_sub_ps(position, within));
     let is_within = _mm256_cmp_ps::<_CMP_LE_OQ>(beyond, _mm256_set1_ps(0.5));

@@ -158,7 +158,7 @@ fn positions(start: f32, step: f32, first_lane: usize) -> float32x4_t {
 #[target_feature(enable = "neon")]
 fn split(position: float32x4_t, count: usize) -> (Neighbours, uint32x4_t) {
     let (first, last) = (vdupq_n_f32(0.0), vcvtq_f32_s32(whole(count - 1)));
-    // What is no number becomes 0, and is not within.
+    // What is not a number becomes 0, and is not within.
     let within = vbslq_f32(vcgtq_f32(position, first), position, first);
     let within = vbslq_f32(vcltq_f32(within, last), within, last);
     let beyond = vabsq_f32(vsubq_f32(position, within));

@@ -113,7 +113,7 @@ impl Sample {
 )]
 fn split(position: f32, count: usize) -> Option<(usize, f32)> {
     let within = position.clamp(0.0, (count - 1) as f32);
-    // Not so where it is no number either.
+    // Not so where it is not a number either.
     let is_inside = (position - within).abs() <= 0.5;
     let lower = (within as usize).min(count - 2);
     is_inside.then_some((lower, within - lower as f32))

@@ -170,7 +170,7 @@ fn areas_and_ignored_places_are_read_scaled_and_written() {
         native
     );
     let lost = Target::Kalibr.write(&native).map(|exported| exported.lost);
-    let lost = lost.map_or_else(|error| vec![error.to_string()], |lost| lost);
+    let lost = lost.unwrap_or_else(|error| vec![error.to_string()]);
     assert!(!lost.is_empty());
 }
 

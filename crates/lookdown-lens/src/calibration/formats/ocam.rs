@@ -73,7 +73,7 @@ fn numbers(block: &'static str, line: &str) -> Result<Vec<f64>, FormatError> {
         .map(|word| {
             word.parse().map_err(|_| {
                 let word: String = word.chars().take(40).collect();
-                FormatError::invalid(block, format!("{word:?} is no number"))
+                FormatError::invalid(block, format!("{word:?} is not a number"))
             })
         })
         .collect()

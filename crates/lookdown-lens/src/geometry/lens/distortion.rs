@@ -61,7 +61,7 @@ impl RadialTangential {
     /// The point within `max_radius` that is distorted to (`x`, `y`), if there is one.
     pub(super) fn undistort(&self, x: f64, y: f64, max_radius: f64) -> Option<(f64, f64)> {
         let distance = x.hypot(y);
-        // Also where (x, y) is no number.
+        // Also where (x, y) is not a number.
         let is_off_axis = distance > 0.0 && distance.is_finite();
         if !is_off_axis {
             return (distance == 0.0).then_some((0.0, 0.0));

@@ -9,6 +9,7 @@ use crate::{Location, WatchEntry};
 /// A file of cameras.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "keys of the file")]
 struct Cameras {
     #[serde(default)]
     upstream: ServerEntry,
@@ -89,7 +90,7 @@ fn errors_name_the_field_the_value_and_the_remedy() {
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\nevery='1 parsec'",
-            "cameras[0].every: \"1 parsec\" is no duration from 0.04 s to 1 h: write it like 1s, 500ms or 2m",
+            "cameras[0].every: \"1 parsec\" is not a duration from 0.04 s to 3600 s: write it like 10s or 500ms",
         ),
         (
             "[[cameras]]\nname='a'\nurl='http://c/'\n[[cameras]]\nname='a'\nurl='http://d/'",

@@ -1,0 +1,79 @@
+//! The parts that all routes share: the state, queries of the store, known owners.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+use lookdown_common::text::one_line;
+use lookdown_http::problem::{Kind, Problem};
+use parking_lot::Mutex;
+
+use crate::{
+    engine::Engine,
+    store::{Store, StoreError},
+    sums::Owner,
+};
+
+/// Everything that requests read.
+pub(crate) struct Api {
+    pub(crate) engine: Arc<Mutex<Engine>>,
+    pub(crate) store: Store,
+}
+
+pub(super) type Shared = Arc<Api>;
+
+pub(super) fn now_ms() -> i64 {
+    Timestamp::now().as_millisecond()
+}
+
+/// Runs a query of the store without blocking the runtime.
+pub(super) async fn query<T: Send + 'static>(
+    api: &Shared,
+    query: impl FnOnce(&Store) -> Result<T, StoreError> + Send + 'static,
+) -> Result<T, Problem> {
+    let store = api.store.clone();
+    blocking(move || {
+        query(&store).map_err(|problem| {
+            tracing::error!("{problem}");
+            Problem::internal()
+        })
+    })
+    .await
+}
+
+/// Runs work that takes time without blocking the runtime.
+pub(super) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
+    let done = tokio::task::spawn_blocking(work).await;
+    // A task that panicked is logged by the panic hook.
+    done.unwrap_or_else(|_| Err(Problem::internal()))
+}
+
+pub(super) fn not_found(detail: impl Into<String>) -> Problem {
+    Problem::new(Kind::NotFound, detail)
+}
+
+/// Refuses an owner that has neither a scene nor sums.
+pub(super) async fn check_known(api: &Shared, owner: &Owner) -> Result<(), Problem> {
+    let is_followed = match owner {
+        Owner::Camera(camera) => api.engine.lock().scene_of(camera).is_some(),
+        Owner::Site(site) => api.engine.lock().site(site).is_some(),
+    };
+    if is_followed {
+        return Ok(());
+    }
+    let asked = owner.clone();
+    if query(api, move |store| store.has(&asked)).await? {
+        return Ok(());
+    }
+    Err(match owner {
+        Owner::Camera(camera) => not_found(format!(
+            "there is no camera {}: GET /counts lists them",
+            one_line(camera)
+        )),
+        Owner::Site(site) => not_found(format!(
+            "there is no site {}: give a mount.site of a calibration in use",
+            one_line(site)
+        )),
+    })
+}

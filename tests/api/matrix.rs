@@ -1,0 +1,132 @@
+//! Every operation of the OpenAPI document with every kind of key, and every other method of its
+//! paths.
+
+use serde_json::Value;
+
+use crate::{
+    access::{ADMINISTRATOR, BOTH, FINDER, READER, guarded},
+    service::{Answer, Service},
+};
+
+const METHODS: [&str; 5] = ["GET", "POST", "PUT", "DELETE", "PATCH"];
+/// The values of the parameters in paths.
+const PARAMETERS: [(&str, &str); 6] = [
+    ("{calibration}", "lobby"),
+    ("{camera}", "lobby"),
+    ("{id}", "lobby"),
+    ("{version}", "1"),
+    ("/problems/{name}", "/problems/not-found"),
+    ("{name}", "eager"),
+];
+/// Keys of the tests, each with the scopes that it allows.
+const KEYS: [(&str, &[&str]); 4] = [
+    (FINDER, &["detect"]),
+    (READER, &["read"]),
+    (BOTH, &["detect", "read"]),
+    (ADMINISTRATOR, &["detect", "read", "admin"]),
+];
+
+/// An operation of the document.
+struct Operation {
+    method: String,
+    path: String,
+    /// The scope that it needs.
+    scope: Option<String>,
+}
+
+/// Every operation of the document, and the paths with their documented methods.
+async fn operations(service: &Service) -> Vec<Operation> {
+    let document = service.get("/openapi.json").await.json();
+    let mut operations = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        let mut filled = path.clone();
+        for (parameter, value) in PARAMETERS {
+            filled = filled.replace(parameter, value);
+        }
+        assert!(!filled.contains('{'), "{path}: give its parameter a value");
+        for method in METHODS {
+            let operation = &item[method.to_lowercase()];
+            if operation.is_object() {
+                operations.push(Operation {
+                    method: method.to_owned(),
+                    path: filled.clone(),
+                    scope: scope(operation),
+                });
+            }
+        }
+    }
+    operations
+}
+
+fn scope(operation: &Value) -> Option<String> {
+    let mut security = operation["security"].as_array().unwrap().iter();
+    security.find_map(|way| Some(way["api_key"][0].as_str()?.to_owned()))
+}
+
+async fn ask(service: &Service, method: &str, path: &str, key: Option<&str>) -> Answer {
+    let headers = key.map(|key| ("x-api-key", key));
+    service.ask(method, path, headers.as_slice()).await
+}
+
+#[tokio::test]
+async fn every_operation_needs_the_scope_of_the_document() {
+    let service = guarded();
+    let operations = operations(&service).await;
+    assert!(operations.len() >= 38, "{}", operations.len());
+    for Operation {
+        method,
+        path,
+        scope,
+    } in operations
+    {
+        let place = format!("{method} {path}");
+        for key in [None, Some("lookdown_unknown")] {
+            let answer = ask(&service, &method, &path, key).await;
+            match scope {
+                Some(_) => {
+                    assert_eq!(answer.status, 401, "{place}");
+                    assert_eq!(answer.header("www-authenticate"), "Bearer", "{place}");
+                    assert_eq!(answer.problem()["type"], "/problems/key-required");
+                }
+                None => assert!(![401, 403].contains(&answer.status.as_u16()), "{place}"),
+            }
+        }
+        for (key, scopes) in KEYS {
+            let answer = ask(&service, &method, &path, Some(key)).await;
+            let text = answer.text();
+            assert!(!text.contains(key), "{place} repeats the key");
+            match &scope {
+                Some(scope) if !scopes.contains(&&**scope) => {
+                    assert_eq!(answer.status, 403, "{place} with {scopes:?}");
+                    assert_eq!(answer.problem()["type"], "/problems/forbidden");
+                    assert!(text.contains(scope.as_str()), "{place}: {text}");
+                }
+                _ => {
+                    let is_refused = [401, 403].contains(&answer.status.as_u16());
+                    assert!(!is_refused, "{place} with {scopes:?}: {text}");
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn methods_outside_the_document_are_refused() {
+    let service = guarded();
+    let operations = operations(&service).await;
+    for Operation { path, .. } in &operations {
+        for method in METHODS {
+            let is_documented =
+                |operation: &Operation| operation.method == method && operation.path == *path;
+            if operations.iter().any(is_documented) {
+                continue;
+            }
+            let answer = ask(&service, method, path, None).await;
+            let status = answer.status.as_u16();
+            assert!(
+                [401, 404, 405].contains(&status),
+                "{method} {path}: {status}"
+            );
+        }
+    }
+}

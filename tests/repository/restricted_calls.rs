@@ -1,0 +1,96 @@
+//! Calls that belong in one place each: opening files to read them, and starting processes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use crate::layering::source_scan::code;
+
+/// Calls that open files for reading, which only `lookdown_common::files` makes: it opens without
+/// waiting, accepts regular files only, and reads a bounded number of bytes.
+const READS: [&str; 6] = [
+    "fs::read(",
+    "fs::read_to_string(",
+    "File::open(",
+    "File::options(",
+    "OpenOptions::new(",
+    "tokio::fs",
+];
+/// The files that may make them.
+const READERS: [&str; 6] = [
+    "crates/lookdown-common/src/files.rs",
+    // Creates the file that locks the store.
+    "crates/lookdown-count/src/store.rs",
+    // Writes a password.
+    "src/cameras.rs",
+    // Tests of generated documentation.
+    "src/api/parameters/reference.rs",
+    "src/settings/reference.rs",
+    // Syncs the folder itself.
+    "src/calibration_store/store/folder.rs",
+];
+/// Calls that start processes, which only `child.rs` makes: it limits them.
+const STARTS: [&str; 2] = ["Command::new(", ".spawn()?"];
+/// The files that may make them.
+const STARTERS: [&str; 2] = [
+    "crates/lookdown-watch/src/child.rs",
+    // Replaces the process by itself.
+    "src/main.rs",
+];
+
+/// The source files of all crates without those of tests.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if path.is_dir() && name != "tests" {
+            sources(&path, found);
+        } else if name.ends_with(".rs") && name != "tests.rs" {
+            found.push(path);
+        }
+    }
+}
+
+/// The files outside `allowed` with one of these calls, each with the call.
+fn callers(calls: &[&str], allowed: &[&str]) -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    sources(&root.join("src"), &mut files);
+    for entry in fs::read_dir(root.join("crates")).unwrap() {
+        sources(&entry.unwrap().path().join("src"), &mut files);
+    }
+    assert!(files.len() > 400, "{}", files.len());
+    let mut found = Vec::new();
+    for path in files {
+        let text = fs::read_to_string(&path).unwrap();
+        // Tests are at the end of a file.
+        let program = text.split("#[cfg(test)]\nmod ").next().unwrap();
+        let program = code(program);
+        let place = path.strip_prefix(root).unwrap().display().to_string();
+        for call in calls {
+            if program.contains(call) && !allowed.contains(&&*place) {
+                found.push(format!("{place}: {call}"));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn files_are_read_by_one_module() {
+    let found = callers(&READS, &READERS);
+    assert!(
+        found.is_empty(),
+        "use lookdown_common::files: it reads regular files only, with a limit: {found:#?}"
+    );
+}
+
+#[test]
+fn processes_are_started_by_one_module() {
+    let found = callers(&STARTS, &STARTERS);
+    assert!(
+        found.is_empty(),
+        "use `child::spawn`, which limits the process: {found:#?}"
+    );
+}
