@@ -2,7 +2,7 @@
 
 mod file_circles;
 mod module_table;
-mod source_scan;
+pub(crate) mod source_scan;
 
 use std::fs;
 

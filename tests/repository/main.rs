@@ -7,4 +7,5 @@ mod fuzz_corpus;
 mod layering;
 mod links;
 mod openapi;
+mod restricted_calls;
 mod variables;
