@@ -145,7 +145,7 @@ fn persons_outside_areas_and_in_ignored_places_do_not_count() {
 #[test]
 fn views_far_from_all_areas_skip_inference() {
     let engine = engine(BlobDetector::default(), None);
-    for (profile, least) in [("fast", 1), ("balanced", 6), ("paper", 30)] {
+    for (profile, least) in [("fast", 1), ("balanced", 4), ("paper", 15)] {
         let views = |areas| {
             detected(&engine, areas, profile, 1, [420.0, 300.0])
                 .report
