@@ -61,7 +61,7 @@ async function poll(signal) {
         await Promise.all(shown.map((camera) => load(camera, signal)));
         await pause(TRACKS_MILLIS, signal);
       }
-    } catch (error) {
+    } catch {
       if (signal.aborted) return;
       report("The counts cannot be read: the log of the server has the reason.");
       for (const camera of [...counted.keys()]) remove(camera);
